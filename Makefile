@@ -4,7 +4,8 @@
 # make slow    what takes long and rarely fails: what intervals promise, counted over many lives; further ways to the same
 #              answer, files cut off anywhere, charts drawn by the large library                               (30 minutes)
 # make faults  kills the service and its commands hundreds of times, and sends what nobody sends: schemathesis over whole
-#              sequences of requests, and files of every format with bytes changed          (an hour; ARGS="-k kills")
+#              sequences of requests, and files of every format with bytes changed, MINUTES=10 of each
+#              (two and a half hours; ARGS="-k kills")
 # make check   formatting, lint, types, layers; of the dashboard's JavaScript and styles too, for which it needs npm
 # make lowest  tests that meet every dependency, on the oldest releases that pyproject.toml allows
 # make score   how good the prognosis is, on simulated lives: the tables of docs/appendix/prognosis.md  (SEED= SIZE= PARTS= ARGS=--write)
@@ -31,6 +32,8 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 ARGS ?=
+# minutes that `make faults` changes files of each format
+MINUTES ?= 10
 # the built site, as the service serves it and the wheel takes it along
 HELP := service/dashboard/help
 # what checks JavaScript: of `make check` alone, everything else needs Python only
@@ -62,7 +65,7 @@ slow: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m slow $(ARGS)
 
 faults: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m slow tests/journeys/faults tests/journeys/test_openapi.py \
+	OPENBLAS_NUM_THREADS=1 CLUTCHLIFE_FUZZ_MINUTES=$(MINUTES) $(BIN)/python -m pytest -m slow tests/journeys/faults tests/journeys/test_openapi.py \
 		tests/service/readers $(ARGS)
 
 check: $(VENV)/.tests $(JAVASCRIPT)/.package-lock.json

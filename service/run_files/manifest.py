@@ -27,8 +27,8 @@ ANSWER = "answer.json"
 _MOST_CYCLES = 1e15
 _NEEDED, _OPTIONAL = ("file", "kind", "cycles"), ("run_id", "origin", "started_at", "map")
 _RECORDS = (
-    ".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tdms", ".mf4", ".mdf", ".parquet", ".xlsx", ".xls", ".ods", ".mat", ".h5",
-    ".hdf5", ".zip",
+    ".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tdms", ".mf4", ".mdf", ".parquet", ".xlsx", ".xls", ".ods", ".mat",
+    ".h5", ".hdf5", ".zip",
 )  # fmt: skip
 
 

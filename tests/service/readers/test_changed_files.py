@@ -1,9 +1,11 @@
 """Files of every format with bytes changed: read to checked columns or refused; the reader neither ends nor hangs.
 
-CI changes some; `make faults` changes files for ten minutes.
+CI changes some; `make faults` changes files of each format for ten minutes, or for `MINUTES=`.
 """
 
+import os
 import tempfile
+import time
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -160,6 +162,29 @@ def test_a_changed_file_is_read_or_refused(
         "hardly any is read: the changes show little of what follows"
     )
     assert list((tmp_path / "temporary").iterdir()) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WRITERS)
+def test_files_that_are_changed_for_minutes_are_read_or_refused(name: str, tmp_path: Path) -> None:
+    """No seed: what is found is kept in the message, as the seed of its file."""
+    content = WRITERS[name](tmp_path / name, COLUMNS, units=UNITS).read_bytes()
+    path = tmp_path / f"changed-{name}"
+    first = time.time_ns()
+    end = time.monotonic() + 60 * float(os.environ.get("CLUTCHLIFE_FUZZ_MINUTES", "0.2"))
+    faults, number = [], 0
+    while time.monotonic() < end and len(faults) < 10:
+        rng = np.random.default_rng(first + number)
+        path.write_bytes(changed(content, rng))
+        try:
+            check_arrays(read_file(path, filename=name, limits=SOON).columns)
+        except (InvalidError, TooLargeError) as error:
+            if is_of_the_reader(error):
+                faults.append(f"seed {first + number}: {error.detail}")
+        number += 1
+    print(f"{number} changed files of {name}")
+    assert faults == []
+    assert number > 0
 
 
 def test_what_is_not_changed_is_read(tmp_path: Path) -> None:
