@@ -427,14 +427,18 @@ class _Weighed:
                 continue
             mean, variance, log_weight = fit.without()
             off = fit.tests.log_cof - mean
-            now = np.logaddexp.reduce(log_weight + _log_normal(off, variance), axis=0)
-            for k, i in enumerate(own):
-                sign = -1.0 if i in belief.outlying else 1.0
-                other = variance[:, k] + sign * criteria.OUTLYING_SD**2
-                then = np.logaddexp.reduce(log_weight[:, k] + _log_normal(off[:, k], other))
-                yield replace(belief, outlying=belief.outlying ^ {i}), float(then - now[k]) + sign * to_outlying
+            sign = np.array([-1.0 if i in belief.outlying else 1.0 for i in own])
+            now, then = (
+                np.logaddexp.reduce(log_weight + _log_normal(off, variance + more * criteria.OUTLYING_SD**2), axis=0)
+                for more in (0.0, sign)
+            )
+            turned = then - now + sign * to_outlying
+            for i, gain in zip(own, turned.tolist(), strict=True):
+                if gain > _WORTH:
+                    yield replace(belief, outlying=belief.outlying ^ {i}), gain
             gains = fit.log_step_gains()
-            for k, i in enumerate(own):
+            for k in np.flatnonzero(gains > _WORTH).tolist():
+                i = own[k]
                 if i not in belief.levels and fit.tests.cycles[k] > fit.tests.cycles.min():
                     yield replace(belief, levels=belief.levels | {i}), float(gains[k]) + self._log_level(i)
 

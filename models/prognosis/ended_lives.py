@@ -14,8 +14,9 @@ alive:
 
     p(T) ∝ t((log T - c - μ)/σ) · Σ w_jqs(T') N(log T; log T', ...),    T > ζ
 
-A clutch of another kind takes one of a few smooth courses with an end anywhere: the evidence says how probable that is, and
-with that probability the ended lives say nothing.
+A clutch of the kind may also take a course that none of them took: three plain ones stand beside theirs. One of another kind
+takes a plain course with an end anywhere: the evidence says how probable that is, and with that probability the ended lives
+say nothing.
 
 An end may be uncertain: a life that was declared worn just short of its threshold. Its log T has a deviation, whose square
 the predictive has more in its sum of squares (the expected one). Or it is censored: a life that was taken out at C for
@@ -223,9 +224,10 @@ def as_its_kind(
     log_end = np.linspace(earliest, latest, _ENDS)
     clock = seen.progress / np.exp(log_end)[:, None]
     courses = [life for life, counts in zip(lives, exact, strict=True) if counts]
-    kin = seen.nodes(log_end, np.stack([life.course(clock) for life in courses]))
-    pace = np.array([life.final_pace for life in courses])
-    middle, deviation, share = kin.crossings(seen, log_end, pace, as_of)
+    kin = seen.nodes(log_end, np.concatenate([[life.course(clock) for life in courses], _plain_courses(clock)]))
+    pace = np.array([*(life.final_pace for life in courses), *_PLAIN_PACES])
+    wander = COURSE_STRETCH_SD * math.sqrt(1.0 + 2.0 / len(courses))
+    middle, deviation, share = kin.crossings(seen, log_end, pace, as_of, wander)
     places = now + (latest + _BEYOND - now) * np.linspace(0.0, 1.0, _PLACES + 1)[1:] ** 1.5
     density = np.exp(-0.5 * np.square((places[:, None] - middle) / deviation)) @ (share / deviation)
     log_prior = of_ends.log_density(places - centre)
@@ -233,10 +235,10 @@ def as_its_kind(
     if not stated.any():
         return None
     log_anywhere = np.linspace(earliest, earliest + _ANYWHERE, _ENDS)
-    others = seen.nodes(log_anywhere, _other_shapes(seen.progress / np.exp(log_anywhere)[:, None]))
+    others = seen.nodes(log_anywhere, _plain_courses(seen.progress / np.exp(log_anywhere)[:, None]))
     log_prior = of_ends.log_density(log_end - centre)
     log_prior -= logsumexp(log_prior)
-    log_odds = logsumexp(kin.log_evidence + log_prior[:, None, None]) - math.log(len(courses))
+    log_odds = logsumexp(kin.log_evidence + log_prior[:, None, None]) - math.log(pace.size)
     log_odds -= logsumexp(others.log_evidence) - math.log(_ENDS * others.log_evidence.shape[2])
     log_odds += math.log((1.0 - OTHER_KIND) / OTHER_KIND)
     return Kin(ends=np.exp(places), weight=stated / stated.sum(), probability=float(expit(log_odds)))
@@ -325,10 +327,11 @@ class _Nodes:
     courses: FloatArray
 
     def crossings(
-        self, seen: _Seen, log_end: FloatArray, pace: FloatArray, as_of: float
+        self, seen: _Seen, log_end: FloatArray, pace: FloatArray, as_of: float, wander: float
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the threshold is crossed, under the nodes that hold nearly all of the evidence: the logarithm of ζ [m], its
-        deviation [m], and the nodes' shares of the evidence [m]. `pace` [j] is that of every course at its end."""
+        deviation [m], and the nodes' shares of the evidence [m]. `pace` [j] is that of every course at its
+        end, `wander` the deviation of the logarithm where all is to come."""
         share = np.exp(self.log_evidence - self.log_evidence.max()).ravel()
         order = np.argsort(share)[::-1]
         within = np.cumsum(share[order])
@@ -349,9 +352,8 @@ class _Nodes:
         spread = np.maximum(spread, 0.0) + self.taller_variance[e, k, j]
         early = np.clip(beyond / pace[j], -_FARTHEST, 1.0 - 1.0 / (1.0 + _FARTHEST))
         to_come = np.maximum(1.0 - as_of / end, 0.0)
-        wander = COURSE_STRETCH_SD * math.sqrt(1.0 + 2.0 / pace.size) * to_come**1.5
         step = (log_end[1] - log_end[0]) / math.sqrt(12.0)
-        deviation = np.sqrt(spread / np.square(pace[j]) + np.square(wander) + step**2)
+        deviation = np.sqrt(spread / np.square(pace[j]) + np.square(wander * to_come**1.5) + step**2)
         return log_end[e] + np.log1p(-early), deviation, share[held] / share[held].sum()
 
 
@@ -361,9 +363,14 @@ def _walked(early: FloatArray, late: FloatArray) -> FloatArray:
     return np.asarray(0.5 * low**2 * (3.0 * high - low))
 
 
-def _other_shapes(share: FloatArray) -> FloatArray:
-    """The courses of a clutch of another kind at shares of its life: slowing down, straight and steepening."""
-    return np.stack([np.log1p(share / 0.03) / math.log1p(1.0 / 0.03), share, np.minimum(share, 2.0) ** 3])
+def _plain_courses(share: FloatArray) -> FloatArray:
+    """Courses beside those of ended lives, at shares of life [e, n]: slowing down, straight, steepening; [3, e, n]."""
+    return np.stack([np.log1p(share / _BEND) / math.log1p(1.0 / _BEND), share, np.minimum(share, 2.0) ** 3])
+
+
+#: How early the first of them bends [shares of life], and their slopes at the end.
+_BEND = 0.03
+_PLAIN_PACES = (1.0 / ((1.0 + _BEND) * math.log1p(1.0 / _BEND)), 1.0, 3.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

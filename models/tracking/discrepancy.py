@@ -7,6 +7,10 @@ continues with the slope it has and further curvature on stretches that grow wit
 (ζ/T)^1.5: a discrepancy observed today widens every forecast, the further ahead the more. At ten times T it levels off:
 what is observed over a tenth of a course must not make every course pass every threshold in the end.
 
+A course that has a discrepancy may also have a knee ahead: from ζ_k > T on it goes faster by g times its mean pace until
+then, g (ξ(ζ_k) - ξ0)/ζ_k (ζ - ζ_k), linear in ξ0 and Δ as the course is. Before any sign of it, it may come at any time:
+P(none until ζ) = (T/ζ)^h. A knee that is behind is part of δ, whose slope goes on.
+
 An event such as an oil change begins an epoch, whose level is off by a normal step from the one before.
 
 Source: the integrated Wiener process as a prior of smooth functions is G. Wahba, J. R. Statist. Soc. B 40 (1978) 364;
@@ -20,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.criteria import LEVELLING
+from models.tracking.criteria import KNEE_PACE, LEVELLING, LOG_KNEE_PACE_SD
 from models.tracking.history import History, later_epochs, span_of
 from models.tracking.prior import Prior
 
@@ -84,7 +88,8 @@ class Discrepancy:
     """Courses beside eq. 6, one for each of n draws, in the unit of the quantity.
 
     `span` is T; `size` [n] is q; `curvature` [n, PAST + FUTURE] multiplies `smooth`; the level steps by `height`
-    [n, e] at progress `at` [e].
+    [n, e] at progress `at` [e]. From the progress `knee` [n] on, inf where there is none, a course goes faster by
+    `steepening` [n] times its mean pace until then.
     """
 
     span: float
@@ -92,6 +97,8 @@ class Discrepancy:
     curvature: FloatArray
     at: FloatArray
     height: FloatArray
+    knee: FloatArray
+    steepening: FloatArray
 
     def __call__(self, own: FloatArray, progress: FloatArray) -> FloatArray:
         """δ at each draw's own time [k, n], plus the steps up to ζ, [k, n] or [k, 1]; [k, n]."""
@@ -122,7 +129,12 @@ class Discrepancy:
 
     def taken(self, index: NDArray[np.intp]) -> "Discrepancy":
         """The courses at `index`."""
-        return replace(self, size=self.size[index], curvature=self.curvature[index], height=self.height[index])
+        rows = {name: getattr(self, name)[index] for name in BY_DRAW}
+        return replace(self, **rows)
+
+
+#: What of a discrepancy has a row a draw.
+BY_DRAW = ("size", "curvature", "height", "knee", "steepening")
 
 
 def _stretchwise(curvature: FloatArray, time: FloatArray) -> FloatArray:
@@ -142,10 +154,16 @@ def drawn(history: History, prior: Prior, size: FloatArray, terms: FloatArray, r
     ahead = np.zeros((size.size, FUTURE))
     alive = size > 0.0
     ahead[alive] = rng.standard_normal((int(alive.sum()), FUTURE)) * (size[alive] * prior.size)[:, None]
+    knee, steepening = np.full(size.size, np.inf), np.ones(size.size)
+    if prior.knee_hazard > 0.0:
+        knee[alive] = history.span * rng.random(int(alive.sum())) ** (-1.0 / prior.knee_hazard)
+        steepening = KNEE_PACE * np.exp(LOG_KNEE_PACE_SD * rng.standard_normal(size.size))
     return Discrepancy(
         span=history.span,
         size=size,
         curvature=np.concatenate([terms[:, :PAST], ahead], axis=1),
         at=history.steps,
         height=terms[:, PAST:],
+        knee=knee,
+        steepening=steepening,
     )

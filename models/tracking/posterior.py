@@ -18,7 +18,7 @@ from models.arrays import FloatArray
 from models.degradation.general_order import Degradation
 from models.tracking.courses import basis, coordinates_of, course_of, unit_of_change
 from models.tracking.criteria import FEWEST_EFFECTIVE
-from models.tracking.discrepancy import Discrepancy
+from models.tracking.discrepancy import BY_DRAW, Discrepancy
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 
@@ -81,6 +81,16 @@ class Posterior:
 
     def values(self, progress: FloatArray) -> FloatArray:
         """ξ at progress ζ >= 0 [k], or [k, n] where draws differ, discrepancy and all; [k, n]."""
+        beside, zeta = self.discrepancy, progress if progress.ndim == 2 else progress[:, None]
+        values = self._without_knee(progress)
+        furthest = float(progress.max(initial=0.0))
+        if beside is None or not (beside.knee < furthest).any():
+            return values
+        knee = np.minimum(beside.knee, furthest)
+        pace = (self._without_knee(knee[None])[0] - self.initial) / knee
+        return np.asarray(values + beside.steepening * pace * np.maximum(zeta - knee, 0.0))
+
+    def _without_knee(self, progress: FloatArray) -> FloatArray:
         zeta = progress if progress.ndim == 2 else progress[:, None]
         share = self._share(zeta)
         law = self.initial + self.change * share
@@ -166,8 +176,7 @@ def _joined(columns: Sequence[Any]) -> Any:
     if isinstance(first, bool):
         return any(columns)
     if isinstance(first, Discrepancy):
-        names = ("size", "curvature", "height")
-        rows = {name: np.concatenate([getattr(column, name) for column in columns]) for name in names}
+        rows = {name: np.concatenate([getattr(column, name) for column in columns]) for name in BY_DRAW}
         return Discrepancy(span=first.span, at=first.at, **rows)
     return None if first is None else np.concatenate(columns)
 

@@ -18,6 +18,7 @@ from models.tracking.criteria import (
     EXPONENT_MEDIAN,
     FALLING_CHANGE,
     INITIAL_SD,
+    KNEE_HAZARD,
     LAW_SHARE,
     LEAST_RELATIVE,
     LOG_EXPONENT_SD,
@@ -40,8 +41,9 @@ class Prior:
     `outlying_share` of the runs are off by a further normal of deviation `outlying_size`, `law_share` is the probability
     that there is no discrepancy beside eq. 6, `eq_6_share` that the course is that of eq. 6, `proportional_share` that the
     scatter is a share of the value (s then is that of a value of `size`), `step_size` the deviation of the level's shift at
-    an event; both sizes are shares of `size`. Raises ValueError where a number is not finite, a deviation or size not
-    positive or a share not within [0, 1).
+    an event; both sizes are shares of `size`. `knee_hazard` is that of a knee per e-fold of progress (`discrepancy`).
+    Raises ValueError where a number is not finite, a deviation or size not positive, a share not within [0, 1) or a hazard
+    negative.
     """
 
     initial_mean: float
@@ -60,6 +62,7 @@ class Prior:
     step_size: float = STEP_SIZE
     eq_6_share: float = 1.0
     proportional_share: float = 0.0
+    knee_hazard: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -71,6 +74,8 @@ class Prior:
         for name in ("outlying_share", "proportional_share"):
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise ValueError(f"{name} must lie within [0, 1), got {getattr(self, name)}")
+        if self.knee_hazard < 0.0:
+            raise ValueError(f"knee_hazard must not be negative, got {self.knee_hazard}")
         for name in ("law_share", "eq_6_share"):
             if not 0.0 < getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} must lie within (0, 1], got {getattr(self, name)}")
@@ -85,7 +90,7 @@ class Prior:
         return np.maximum(np.square(np.asarray(value) / self.size), LEAST_RELATIVE)
 
     def to_array(self) -> FloatArray:
-        """The numbers in the order of the fields [16]."""
+        """The numbers in the order of the fields [17]."""
         return np.array(astuple(self), dtype=np.float64)
 
     @classmethod
@@ -131,4 +136,5 @@ def weak(first: Measurement, *, falling: bool) -> Prior:
         log_scatter_sd=LOG_SCATTER_SD,
         eq_6_share=EQ_6_SHARE if falling else 1.0,
         proportional_share=PROPORTIONAL_SHARE if falling else 0.0,
+        knee_hazard=KNEE_HAZARD if falling else 0.0,
     )

@@ -196,15 +196,13 @@ def top_line(
 
 def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, date: str | None) -> str:
     """The safe bound, its date and the median; else the statement, where there is no number to give."""
-    median = summary["remaining_cycles"]["0.5"]
     if summary["status"] in (REACHED, INSUFFICIENT, ENDED) or at_least is None or at_least < 1.0:
         return statement_of(summary, at_least)
     bound = f"at least {rounded_down(at_least)} more cycles (95 %)"
     until = "" if date is None else f", that is until {date} at this pace"
-    if median is None:
-        chance = chance_in_words(summary["probability_of_reaching"])
-        return f"{bound}{until}; the end of life is reached within {HORIZON:,.0f} cycles with a probability of {chance}"
-    return f"{bound}, most likely {_two_digits(median)}{until}"
+    if summary["status"] == PassageStatus.MAY_NEVER_REACH.value:
+        return _left_open(f"{bound}{until}", summary)
+    return f"{bound}, most likely {_two_digits(summary['remaining_cycles']['0.5'])}{until}"
 
 
 def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: Mapping[str, Any] | None) -> str:
@@ -276,10 +274,14 @@ def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
         return f"the end of life is reached: {limit_in_words(payload['criterion'])}"
     if payload["status"] == INSUFFICIENT:
         return "the tests cannot tell yet" + (f": {bound}" if payload["runs_used"] else "")
-    if payload["status"] != PassageStatus.MAY_NEVER_REACH.value:
-        return bound
+    return _left_open(bound, payload) if payload["status"] == PassageStatus.MAY_NEVER_REACH.value else bound
+
+
+def _left_open(bound: str, payload: Mapping[str, Any]) -> str:
+    """An interval that reaches the horizon: its safe bound is the number that counts, and how probable an end is."""
     chance = chance_in_words(payload["probability_of_reaching"])
-    return f"{bound}; the end of life is reached within {HORIZON:,.0f} cycles with a probability of {chance}"
+    within = f"the end of life is reached within {HORIZON:,.0f} cycles with a probability of {chance}"
+    return f"the tests cannot tell yet: {bound}; {within}"
 
 
 def bound_in_words(at_least: float | None) -> str:

@@ -22,7 +22,7 @@ import argparse
 import csv
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -149,23 +149,26 @@ def alone(tests: Sequence[Measurement], end: float, number: int) -> dict[str, li
 
 
 def with_ended(
-    tests: Sequence[Measurement], end: float, kin: Sequence[EndedLife], rng: np.random.Generator
-) -> dict[str, list[list[float]]]:
-    """By stage the outcomes with ended lives: as it is stated, by their ends alone, and by their curves."""
-    found: dict[str, list[list[float]]] = {}
+    tests: Sequence[Measurement], end: float, by_count: Mapping[int, Sequence[EndedLife]], rng: np.random.Generator
+) -> dict[str, dict[str, list[list[float]]]]:
+    """By count of ended lives and stage: the outcomes as it is stated, by their ends alone, and by their curves."""
+    found: dict[str, dict[str, list[list[float]]]] = {str(count): {} for count in by_count}
     for stage in STAGES:
         seen = [test for test in tests if test.progress <= (stage + 1e-3) * end]
-        now = seen[-1].progress
-        alive = np.array([life.end for life in kin if life.end > now])
-        if len(seen) < 3 or alive.size == 0:
+        if len(seen) < 3:
             continue
+        now = seen[-1].progress
         drawn = GRID.posterior(GRID.from_history(weak(seen[0], falling=True), seen), DRAWS, rng)
-        stated = stated_end(drawn, fraction=0.5, as_of=now, horizon=HORIZON, ended=kin, tests=seen)
-        slid = now + np.array([_left(life, seen) for life in kin])
-        found[f"{stage:g}"] = [
-            list(_outcome(ends, weight, end))
-            for ends, weight in ((stated.ends, stated.weight), *((each, np.ones(each.size)) for each in (alive, slid)))
-        ]
+        for count, kin in by_count.items():
+            alive = np.array([life.end for life in kin if life.end > now])
+            if alive.size == 0:
+                continue
+            stated = stated_end(drawn, fraction=0.5, as_of=now, horizon=HORIZON, ended=kin, tests=seen)
+            slid = now + np.array([_left(life, seen) for life in kin])
+            rivals = ((each, np.ones(each.size)) for each in (alive, slid))
+            found[str(count)][f"{stage:g}"] = [
+                list(_outcome(ends, weight, end)) for ends, weight in ((stated.ends, stated.weight), *rivals)
+            ]
     return found
 
 
@@ -210,11 +213,12 @@ def judged(half: str, every: int, store: Path) -> Iterator[tuple[str, dict[str, 
                     _, tests, end = lives[number]
                     rng = np.random.default_rng([SEED, number])
                     order = [index for index in rng.permutation(len(lives)).tolist() if index != number]
-                    known[key] = {"alone": alone(tests, end, number)} | {
-                        str(count): with_ended(tests, end, [taught[index] for index in order[:count]], rng)
+                    kin = {
+                        count: [taught[index] for index in order[:count]]
                         for count, least in OTHERS.items()
                         if len(order) >= least
                     }
+                    known[key] = {"alone": alone(tests, end, number)} | with_ended(tests, end, kin, rng)
                     with store.open("a") as file:
                         file.write(json.dumps([key, known[key]]) + "\n")
                 yield name, known[key]

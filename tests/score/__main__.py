@@ -16,7 +16,7 @@ from service.work.cluster import executor_of
 from service.work.progress import progress
 from tests.score import off_prior, on_prior, paper
 from tests.score.after_end import after_end
-from tests.score.belief import belief
+from tests.score.belief import belief, knees
 from tests.score.fleets import fleets
 from tests.score.severity import severity
 from tests.score.table import timed, written
@@ -37,6 +37,7 @@ def main() -> None:
     seed = chosen.seed
     parts: dict[str, Callable[[], str]] = {
         "belief": partial(belief, lives(600), seed + 7),
+        "knees": partial(knees, lives(200), seed + 13),
         "calibration": partial(on_prior.calibration, lives(1_000), seed),
         "exact": partial(on_prior.beside_exact, lives(100), seed + 1),
         "outlying": partial(on_prior.calibration, lives(1_000), seed + 2, outlying=0.1),

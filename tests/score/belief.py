@@ -1,6 +1,6 @@
-"""How much to believe in eq. 6: what each belief costs on lives that follow it, and gains on lives that take another course.
+"""How much to believe in eq. 6, and in knees: what it costs on lives that follow eq. 6, and gains on those of other courses.
 
-Every life is laid once, under much doubt; the draws, weighted by belief over belief, tell what each belief would have said.
+Every life is laid once; its draws, weighted by belief over belief or given other knees, tell what each would have said.
 """
 
 from collections import defaultdict
@@ -15,10 +15,14 @@ from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior, weak
 from tests.score.table import Score, percents, score
 from tests.statistical.laws import LAWS, observed
-from tests.statistical.lives import PRIOR, STAGES, lives
+from tests.statistical.lives import PRIOR, STAGES, ends, lives
 
 LAID, DRAWS = 0.4, 2_000
 BELIEFS = (0.3, 0.5, 0.55, 0.6, 0.7, 0.8, 0.9, 1.0)
+HAZARDS = (0.0, 0.2, 0.4, 0.6, 1.0)
+#: What of other laws is shown beside the hazards, and one that goes six times as fast from 0.7 of a life on.
+KNEE = "a knee at 0.7 of a life"
+BESIDE = ("logarithm", "accelerating (n = -1)", "exponential growth", KNEE)
 
 
 def belief(count: int, seed: int) -> str:
@@ -50,6 +54,57 @@ def belief(count: int, seed: int) -> str:
     return "\n".join(lines)
 
 
+def knees(count: int, seed: int) -> str:
+    """By hazard of a knee: how often the interval holds the truth, its width and CRPS of the end's logarithm over those
+    without knees; of other laws how many intervals hold the truth and begin after it."""
+    told = _with_knees(_from_prior(count, seed))
+    plain = [float(np.median([each.width for each in stage])) for stage in told[0.0]]
+    score_without = np.mean([each.log_crps for stage in told[0.0] for each in stage])
+    others = {name: _with_knees(_off(name, max(8, count // 8), seed)) for name in BESIDE}
+    lines = [
+        f"{count} lives of eq. 6, {max(8, count // 8)} of each other law, seed {seed}; at 20/40/60/80 % of life\n",
+        "| hazard per e-fold | eq. 6: held, % | width over that without | CRPS over that without | "
+        + " | ".join(f"{name}: held; begins after it, %" for name in BESIDE)
+        + " |",
+        "|---" * (4 + len(BESIDE)) + "|",
+    ]
+    for hazard in HAZARDS:
+        wide = "/".join(
+            f"{np.median([each.width for each in stage]) / least:.2f}"
+            for stage, least in zip(told[hazard], plain, strict=True)
+        )
+        rest = [
+            f"{percents([float(np.mean([each.held for each in stage])) for stage in by[hazard]])}; "
+            f"{percents([float(np.mean([each.late for each in stage])) for stage in by[hazard]])}"
+            for by in others.values()
+        ]
+        held = percents([float(np.mean([each.held for each in stage])) for stage in told[hazard]])
+        crps = np.mean([each.log_crps for stage in told[hazard] for each in stage]) / score_without
+        lines.append(f"| {hazard:g} | {held} | {wide} | {crps:.3f} | " + " | ".join(rest) + " |")
+    return "\n".join(lines)
+
+
+def _with_knees(
+    cases: Iterator[tuple[Prior, list[list[Measurement]], float, np.random.Generator]],
+) -> dict[float, list[list[Score]]]:
+    """By hazard and stage the scores of all lives."""
+    grid, found = Grid(), defaultdict(lambda: [[] for _ in STAGES])
+    for prior, stages, end, rng in cases:
+        for index, seen in enumerate(stages):
+            laid = grid.posterior(grid.from_history(replace(prior, knee_hazard=1.0), seen), DRAWS, rng)
+            beside = laid.discrepancy
+            assert beside is not None
+            for hazard in HAZARDS:
+                # a knee of hazard 1 at T e^x is one of hazard h at T e^(x/h)
+                knee = np.full(laid.weight.size, np.inf)
+                if hazard > 0.0:
+                    with np.errstate(over="ignore"):
+                        knee = beside.span * (beside.knee / beside.span) ** (1.0 / hazard)
+                given = replace(laid, discrepancy=replace(beside, knee=knee))
+                found[hazard][index].append(score(ends(given), given.weight, end))
+    return found
+
+
 def _told(
     cases: Iterator[tuple[Prior, list[list[Measurement]], float, np.random.Generator]],
 ) -> dict[float, list[list[Score]]]:
@@ -68,7 +123,7 @@ def _told(
                 weight = drawn.weight * lean[form]
                 # where the data leave no draw of eq. 6 the sure are as wrong as can be
                 weight = weight / weight.sum() if weight.any() else np.full(weight.size, 1.0 / weight.size)
-                found[share][index].append(score(replace(drawn, weight=weight), end))
+                found[share][index].append(score(ends(drawn), weight, end))
     return found
 
 
@@ -83,6 +138,10 @@ def _off(
 ) -> Iterator[tuple[Prior, list[list[Measurement]], float, np.random.Generator]]:
     for index in range(count):
         rng = np.random.default_rng([seed, index])
-        seen = observed(LAWS[name], rng, 10_000.0)
+        seen = observed(_knee if name == KNEE else LAWS[name], rng, 10_000.0)
         stages = [[each for each in seen if each.progress <= (stage + 0.01) * 10_000.0] for stage in STAGES]
         yield weak(seen[0], falling=True), stages, 10_000.0, rng
+
+
+def _knee(share: float) -> float:
+    return 1.0 - 0.5 * (0.4 * share if share < 0.7 else 0.28 + 2.4 * (share - 0.7))

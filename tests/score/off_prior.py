@@ -108,7 +108,13 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
             truth = replace(truth, scale=scale, exponent=exponent)
             course = size * PRIOR.size * rng.standard_normal((1, PAST + FUTURE))
             beside = Discrepancy(
-                span=last, size=np.full(1, size), curvature=course, at=np.zeros(0), height=np.zeros((1, 0))
+                span=last,
+                size=np.full(1, size),
+                curvature=course,
+                at=np.zeros(0),
+                height=np.zeros((1, 0)),
+                knee=np.full(1, np.inf),
+                steepening=np.ones(1),
             )
             truth = replace(truth, discrepancy=beside)
             if FORM_PROPORTIONAL[form]:

@@ -150,7 +150,13 @@ def beside(draws: Posterior, size: float, curvature: list[float], step: float = 
     bends = np.zeros((n, PAST + FUTURE))
     bends[:, : len(curvature)] = curvature
     course = Discrepancy(
-        span=1_000.0, size=np.full(n, size), curvature=bends, at=np.array([at]), height=np.full((n, 1), step)
+        span=1_000.0,
+        size=np.full(n, size),
+        curvature=bends,
+        at=np.array([at]),
+        height=np.full((n, 1), step),
+        knee=np.full(n, np.inf),
+        steepening=np.ones(n),
     )
     return replace(draws, discrepancy=course)
 
@@ -190,6 +196,8 @@ def test_looking_at_every_sixth_place_first_is_looking_at_all(monkeypatch: pytes
         curvature=0.1 * rng.standard_normal((count, PAST + FUTURE)),
         at=np.array([300.0, 700.0]),
         height=rng.normal(0.0, 0.05, (count, 2)),
+        knee=1_000.0 * rng.random(count) ** -1.5,
+        steepening=np.full(count, 4.0),
     )
     found = ends_of_life(replace(draws, discrepancy=course), 0.5)
     monkeypatch.setattr(first_passage, "_STRIDE", 1)

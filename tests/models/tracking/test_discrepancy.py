@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.prognosis.first_passage import predict_first_passage
-from models.tracking.discrepancy import Discrepancy, smooth
+from models.prognosis.first_passage import ends_of_life, predict_first_passage, weighted_quantiles
+from models.tracking.criteria import KNEE_HAZARD
+from models.tracking.discrepancy import PAST, Discrepancy, drawn, smooth
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
+from models.tracking.history import History
 from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
 from tests.models.tracking.tracked_series import NAMES, PRIOR, TYPICAL, followed, series
 
@@ -35,6 +38,8 @@ def test_what_was_measured_bends_as_the_course_beyond_it_does() -> None:
         curvature=rng.standard_normal((50, 22)),
         at=np.array([4_000.5]),
         height=rng.standard_normal((50, 1)),
+        knee=np.full(50, np.inf),
+        steepening=np.ones(50),
     )
     own = np.repeat(progress[:, None], 50, axis=1)
     np.testing.assert_allclose(beside.measured(progress), beside(own, progress[:, None]), rtol=0, atol=1e-13)
@@ -80,3 +85,57 @@ def test_after_an_event_the_forecast_widens_and_then_settles(tracker: Any) -> No
     step = posterior.moments(posterior.discrepancy.height.sum(axis=1))
     assert step[0] == pytest.approx(0.06 * 0.134, abs=3.0 * step[1])
     assert step[1] < 0.3 * 0.06 * 0.134
+
+
+def test_a_course_goes_on_along_its_knee_from_there_on() -> None:
+    """From ζ = 1,500 on at four times the mean pace until then, which is a line's own; before, nothing changes."""
+    line = Posterior(
+        weight=np.full(2, 0.5),
+        initial=np.full(2, 0.1),
+        change=np.full(2, -0.1),
+        scale=np.full(2, -10_000.0),
+        exponent=np.full(2, -1.0),
+        scatter=np.full(2, 0.001),
+        discrepancy=Discrepancy(
+            span=1_000.0,
+            size=np.full(2, 0.01),
+            curvature=np.zeros((2, 22)),
+            at=np.zeros(0),
+            height=np.zeros((2, 0)),
+            knee=np.array([1_500.0, np.inf]),
+            steepening=np.full(2, 4.0),
+        ),
+    )
+    at = np.array([0.0, 1_000.0, 1_500.0, 2_000.0])
+    np.testing.assert_allclose(line.values(at).T, [[0.1, 0.09, 0.085, 0.06], [0.1, 0.09, 0.085, 0.08]], atol=1e-12)
+    assert ends_of_life(line, 0.5) == pytest.approx([2_200.0, 5_000.0], rel=2e-3)
+
+
+def test_knees_come_as_their_hazard_has_it_and_eq_6_alone_has_none() -> None:
+    prior = weak(Measurement(progress=0.0, value=0.1, variance=0.0), falling=True)
+    history = History.of([Measurement(progress=x, value=0.1, variance=0.0) for x in (0.0, 2_000.0)], prior)
+    sizes = np.repeat([0.0, 0.03], 20_000)
+    beside = drawn(history, prior, sizes, np.zeros((sizes.size, PAST)), np.random.default_rng(4))
+    assert np.isinf(beside.knee[:20_000]).all()
+    for ahead in (1.5, 3.0):
+        assert (beside.knee[20_000:] > ahead * 2_000.0).mean() == pytest.approx(ahead**-KNEE_HAZARD, abs=0.015)
+    assert beside.knee.min() >= 2_000.0
+    parameter = weak(Measurement(progress=0.0, value=0.1, variance=0.0), falling=False)
+    assert np.isinf(drawn(history, parameter, sizes, np.zeros((sizes.size, PAST)), np.random.default_rng(4)).knee).all()
+
+
+def test_the_first_signs_of_a_knee_move_the_answer_within_two_tests() -> None:
+    """An even course that goes six times as fast from 7,000 cycles on and ends at 10,000, a test every 400."""
+    rng = np.random.default_rng(1)
+    at = np.arange(0.0, 8_000.1, 400.0)
+    share = np.where(at < 7_000.0, 0.4e-4 * at, 0.28 + 2.4e-4 * (at - 7_000.0))
+    values = 0.1 * (1.0 - 0.5 * share) * (1.0 + 0.003 * rng.standard_normal(at.size))
+    tests = [Measurement(progress=x, value=y, variance=1e-9) for x, y in zip(at.tolist(), values.tolist(), strict=True)]
+    said = []
+    for count in (18, 20):
+        posterior = Grid().posterior(Grid().from_history(weak(tests[0], falling=True), tests[:count]), 1_000, rng)
+        said.append(weighted_quantiles(np.minimum(ends_of_life(posterior, 0.5), 1e6), posterior.weight, (0.05, 0.5)))
+    (_, before), (low, after) = said
+    assert before > 15_000.0
+    assert low < 10_000.0
+    assert after < 12_000.0

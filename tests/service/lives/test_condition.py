@@ -164,6 +164,10 @@ def summary(left: float | None, **other: Any) -> dict[str, Any]:
         (summary(800.0, status="insufficient_data", runs_used=2), True, "check", "2 of the 3 tests"),
         (summary(9000.0), True, "out_of_specification", "data and model disagree"),
         (summary(9000.0, status="may_never_reach", current={"health": 0.27}), False, "normal", "probability of 94 %"),
+        (
+            summary(9000.0, status="may_never_reach"), False, "normal",
+            "the tests cannot tell yet: at least 9,000 cycles are left with 95 %; ",
+        ),
         ({}, False, "check", "no run yet"),
     ],
     ids=str,
@@ -200,6 +204,11 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
             "Replace before 3 Dec 2026.",
         ),
         (summary(2000.0), None, "Maintenance required: ", "Replace it soon."),
+        (
+            summary(9450.0, status="may_never_reach", pace=PACE), None,
+            "Normal: the tests cannot tell yet: at least 9,400 more cycles (95 %), that is until 10 Dec 2026 at this pace; ",
+            "Nothing to do: carry on testing.",
+        ),
         (summary(0.0, status="reached"), None, "Failure: the end of life is reached: slope", "Replace the clutch."),
         (
             summary(9000.0, **HELD), None,

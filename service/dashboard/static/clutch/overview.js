@@ -163,7 +163,8 @@ const COURSES = { eq6: "As expected", slowing: "Slower and slower", accelerating
  */
 function remainingNotes(life, status) {
   const { held_runs: held, back_cast: cast, ended_lives: lives, probability_of_reaching: chance } = life;
-  const lasts = status === "reached" ? "the end of life is reached" : atLeast(life.at_least);
+  const open = status === "may_never_reach" ? "the tests cannot tell yet" : atLeast(life.at_least);
+  const lasts = status === "reached" ? "the end of life is reached" : open;
   const never = chance !== null && chance < 0.995 && status !== "insufficient_data";
   return [
     ["insufficient_data", "reached", "ended"].includes(status) ? null : `90 %: ${interval(life.remaining_cycles)}`,
@@ -189,8 +190,9 @@ const tile = (name, value, more) =>
   h("div", { class: "tile" }, h("dt", {}, name), h("dd", {}, h("span", { class: "big" }, value), more));
 
 /** @param {RemainingLife} life */
-function remaining({ status, remaining_cycles: q, ended }) {
+function remaining({ status, remaining_cycles: q, at_least: bound, ended }) {
   if (ended) return ended.reason === "worn" ? "0" : "–";
   if (status === "insufficient_data") return "–";
+  if (status === "may_never_reach") return atLeast(bound);
   return status === "reached" ? "0" : aboutCycles(q);
 }

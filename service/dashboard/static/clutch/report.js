@@ -4,7 +4,17 @@
 import { sentence } from "../diagnosis/report.js";
 import { byMeanCof } from "../quantities/criteria.js";
 import { h, table } from "../shared/dom.js";
-import { aboutCycles, estimate, fixed, interval, moment, percent, probability, words } from "../shared/format.js";
+import {
+  aboutCycles,
+  atLeast,
+  estimate,
+  fixed,
+  interval,
+  moment,
+  percent,
+  probability,
+  words,
+} from "../shared/format.js";
 import { stateIcon } from "../shared/state.js";
 
 /** @import { Chart } from "../charts/chart.js" */
@@ -94,7 +104,8 @@ function diagnosisText(latest) {
 function facts(clutch, life) {
   const { current, model, remaining_cycles: q } = life;
   const { criterion } = byMeanCof(life);
-  const predicted = `${aboutCycles(q)} (90 %: ${interval(q)})`;
+  const number = life.status === "may_never_reach" ? atLeast(life.at_least) : aboutCycles(q);
+  const predicted = `${number} (90 %: ${interval(q)})`;
   const chance = probability(life.probability_of_reaching);
   const cof = estimate(current.mean_cof, current.mean_cof_sd);
   return [

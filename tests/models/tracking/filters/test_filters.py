@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.prognosis.first_passage import predict_first_passage
-from models.tracking.criteria import EQ_6_SHARE, PROPORTIONAL_SHARE
+from models.tracking.criteria import EQ_6_SHARE, KNEE_HAZARD, PROPORTIONAL_SHARE
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState
 from models.tracking.filters.ukf import Ukf, UkfState
@@ -102,7 +102,7 @@ def test_stored_arrays_have_the_names_of_this_version(tracker, state_type) -> No
     arrays = state.to_arrays()
     assert arrays.keys() == STORED_NAMES[tracker.name]
     # in the order of the fields of Prior, of which 0.05 is the share of outlying runs and 0.1 their size
-    assert arrays["prior"].tolist()[10:] == [0.05, 0.1, 0.95, 0.05, EQ_6_SHARE, PROPORTIONAL_SHARE]
+    assert arrays["prior"].tolist()[10:] == [0.05, 0.1, 0.95, 0.05, EQ_6_SHARE, PROPORTIONAL_SHARE, KNEE_HAZARD]
     again = state_type.from_arrays({name: np.array(column) for name, column in arrays.items()}).to_arrays()
     assert all((again[name] == column).all() for name, column in arrays.items())
 
