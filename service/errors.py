@@ -59,6 +59,13 @@ class NotFoundError(ServiceError):
     title = "Not found"
 
 
+def unknown_clutch(clutch_id: str) -> NotFoundError:
+    """What is answered of a clutch that nobody has registered."""
+    return NotFoundError(
+        f"no clutch is known as {clutch_id!r}: register it with POST /v1/clutches, or clutchlife register {clutch_id}"
+    )
+
+
 class ConflictError(ServiceError):
     """That name is taken by other content."""
 

@@ -22,7 +22,7 @@ from models.prognosis.ended_lives import EndedLife
 from models.prognosis.fleet import FleetPrior
 from service.alarms import raising
 from service.columns import content_of, instant, whole
-from service.errors import BusyError, NotFoundError
+from service.errors import BusyError, NotFoundError, unknown_clutch
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
 from service.lives.condition import DISAGREES, rank_of, state_of, top_line
 from service.lives.history import ByPressure, Event, Shown, duty_block, moment_of, of_maintenance, order
@@ -62,7 +62,7 @@ def clutch(connection: Connection, clutch_id: str) -> ClutchRow:
     """The clutch, or NotFoundError."""
     row = clutches.get(connection, clutch_id)
     if row is None:
-        raise NotFoundError(f"no clutch is known as {clutch_id!r}")
+        raise unknown_clutch(clutch_id)
     return row
 
 

@@ -22,7 +22,7 @@ from fastapi.responses import Response
 from pydantic import BaseModel
 from starlette.requests import ClientDisconnect
 
-from service.errors import NotFoundError, UnsupportedMediaTypeError
+from service.errors import UnsupportedMediaTypeError, unknown_clutch
 from service.lists import ALL_ITEMS, Place, from_cursor, sliced
 from service.queries.cache import Answer, Page, name_of, revision_and_json, shared_answer, to_json
 from service.schemas.parameters import ClutchId
@@ -286,7 +286,7 @@ def _revision(request: Request, clutch_id: str) -> int:
     """That of the clutch in the path when the request came in. Raises NotFoundError."""
     revision = glance_of(request).revision
     if revision is None:
-        raise NotFoundError(f"no clutch is known as {clutch_id!r}")
+        raise unknown_clutch(clutch_id)
     return revision
 
 

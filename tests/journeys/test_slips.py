@@ -40,7 +40,7 @@ def test_slips_are_seen_and_mended_in_the_terminal(server: Server, tmp_path: Pat
     assert "odd" in held
     assert "mean COF" in held
     assert "withdrawn" in clutchlife("withdraw", "c1", "odd", "--reason", "in lbf", *at)
-    assert "held" in clutchlife("restore", "c1", "odd", "--reason", "look again", *at)
+    assert "held" in clutchlife("withdraw", "c1", "odd", "--undo", "--reason", "look again", *at)
     assert "accepted" in clutchlife("confirm", "c1", "odd", *at)
     assert life(server, "c1") != whole
     clutchlife("withdraw", "c1", "odd", "--reason", "in lbf", *at)

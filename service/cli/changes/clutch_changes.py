@@ -27,7 +27,7 @@ def edit(
         record = service.get(address)
         fields: dict[str, Any] = {}
         for assignment in set_fields:
-            _assign(fields, record, assignment)
+            assign(fields, record, assignment)
         changed = service.patch(address, json.dumps(fields | {"reason": reason}).encode())
     for name in fields:
         out.print(f"{clutch}: {name} = {json.dumps(changed[name])}", markup=False, soft_wrap=True)
@@ -48,8 +48,8 @@ def archive(
     out.print(f"{clutch} is {'archived' if changed['archived'] else 'in use'}", markup=False)
 
 
-def _assign(fields: dict[str, Any], record: dict[str, Any], assignment: str) -> None:
-    """`geometry.friction_faces=4` into the field that is sent, whose other parts stay as they are in the record."""
+def assign(fields: dict[str, Any], record: dict[str, Any], assignment: str) -> None:
+    """Put `geometry.friction_faces=4` into the field that is sent, whose other parts stay as they are in the record."""
     name, equals, text = assignment.partition("=")
     field, dot, part = name.strip().partition(".")
     if not equals or not field:
@@ -61,7 +61,7 @@ def _assign(fields: dict[str, Any], record: dict[str, Any], assignment: str) -> 
     if not dot:
         fields[field] = value
         return
-    whole = fields.get(field, record.get(field))
+    whole = fields.get(field, record.get(field, {}))
     if not isinstance(whole, dict):
         fail(f"{field} has no parts that could be set", EX_USAGE)
     fields[field] = whole | {part: value}

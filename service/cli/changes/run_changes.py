@@ -1,4 +1,4 @@
-"""`clutchlife withdraw`, `restore`, `confirm`, `correct`: what is changed of a run afterwards. Nothing is deleted."""
+"""`clutchlife withdraw`, `end`, `confirm`, `correct`: what is changed of a run afterwards. Nothing is deleted."""
 
 import json
 from typing import Annotated, Any
@@ -14,17 +14,16 @@ Reason = Annotated[str, typer.Option("--reason", help="Why; the audit trail keep
 
 
 def withdraw(
-    clutch: ClutchId, run: RunId, reason: Reason, url: Url = URL, key: Key = None, patience: Patience = 10.0
+    clutch: ClutchId,
+    run: RunId,
+    reason: Reason,
+    undo: Annotated[bool, typer.Option("--undo", help="Take the withdrawal back")] = False,
+    url: Url = URL,
+    key: Key = None,
+    patience: Patience = 10.0,
 ) -> None:
     """Take a run out of a clutch's history; it stays stored."""
-    _post(clutch, run, "withdraw", reason, url, key, patience)
-
-
-def restore(
-    clutch: ClutchId, run: RunId, reason: Reason, url: Url = URL, key: Key = None, patience: Patience = 10.0
-) -> None:
-    """Take a withdrawal back."""
-    _post(clutch, run, "restore", reason, url, key, patience)
+    _post(clutch, run, "restore" if undo else "withdraw", reason, url, key, patience)
 
 
 def end(

@@ -10,7 +10,8 @@ from service.cli.options import EX_DATAERR, EX_USAGE, URL, Key, Patience, Url, e
 from service.cli.sending.entry import INSPECTIONS, RUNS, Entry
 from service.cli.sending.spool import Spool, default_folder
 from service.cli.sending.transmission import say, transmit
-from service.client.clutchlife.transport import Service
+from service.client.clutchlife.answers import RefusedError, ServiceAwayError
+from service.client.clutchlife.transport import Service, connect
 from service.run_files import manifest
 
 SPOOL = default_folder()
@@ -48,6 +49,8 @@ def push(
             files += [manifest.RunFile(path=record) for record in unlisted]
         for record in [] if rig else unlisted:
             say(f"{record} is not listed in {manifest.MANIFEST} and not sent")
+        if _record(paths) is None:
+            _require_known(url, key, clutch)
         waiting = Spool.of(spool, url, clutch)
         runs = [_request(file, kind, cycles, channel_map, rig) for file in files if not file.of_inspection]
         inspections = [(file.path, None) for file in files if file.of_inspection]
@@ -104,9 +107,26 @@ def _parameters(file: manifest.RunFile, kind: str | None, cycles: float | None, 
     return {"kind": kind, "cycles": repr(cycles), "filename": file.path.name}
 
 
+def _record(paths: list[Path]) -> Path | None:
+    """The `clutch.json` in one of the folders."""
+    return next((path / manifest.CLUTCH_FILE for path in paths if (path / manifest.CLUTCH_FILE).is_file()), None)
+
+
+def _require_known(url: str, key: str | None, clutch_id: str) -> None:
+    """End the command, before anything is kept, where the service says that it knows no such clutch: it may be mistyped."""
+    with connect(url, key=key) as http:
+        try:
+            Service(http=http, patience=0.0).get(f"/v1/clutches/{clutch_id}")
+        except ServiceAwayError:
+            return
+        except RefusedError as error:
+            if error.unknown:
+                fail(str(error), EX_DATAERR)
+
+
 def _register(service: Service, clutch_id: str, paths: list[Path]) -> None:
     """Register the clutch from a `clutch.json` in one of the folders; without one it must be registered already."""
-    record = next((path / manifest.CLUTCH_FILE for path in paths if (path / manifest.CLUTCH_FILE).is_file()), None)
+    record = _record(paths)
     if record is None:
         service.get(f"/v1/clutches/{clutch_id}")
         return

@@ -28,7 +28,7 @@ _STORED_NOTHING = (301, 302, 303, 307, 308, 425, 429, 503, 511)
 #: The service's own types of problem that are about the content of one run, and that are about the clutch.
 _TYPE = "urn:clutchlife:problem:"
 _OF_THE_RUN = tuple(_TYPE + slug for slug in ("invalid-content", "conflict", "too-large"))
-_CONFLICT, _ARCHIVED = _TYPE + "conflict", _TYPE + "archived"
+_CONFLICT, _ARCHIVED, _UNKNOWN = _TYPE + "conflict", _TYPE + "archived", _TYPE + "not-found"
 #: Characters of an answer that is no problem report, quoted as its detail.
 _MOST_QUOTED = 500
 
@@ -74,6 +74,11 @@ class RefusedError(ClutchlifeError):
     def of_all_runs(self) -> bool:
         """Whether every other run of the clutch would get this answer too."""
         return self.status in _ALL_RUNS or self.problem.get("type") == _ARCHIVED
+
+    @property
+    def unknown(self) -> bool:
+        """Whether the service itself says that there is nothing of that name."""
+        return self.problem.get("type") == _UNKNOWN
 
     @property
     def other_content(self) -> bool:

@@ -177,7 +177,7 @@ def test_backup_names_what_it_leaves_out_and_the_commands_say_where_it_is(
     listed = clutchlife("raw", "list", *given)
     assert f"{in_folder}: 0 columns in 0 blobs\n{in_bucket}: 2 columns in 2 blobs, in use\n" == listed
     assert "2 too new to be removed" in clutchlife("raw", "collect", *given)
-    clutchlife("raw", "collect", "--grace-hours", "0.5", *given, code=2)
+    clutchlife("raw", "collect", "--grace-hours", "0.5", *given, code=64)
     assert clutchlife("raw", "move", "--to", DATABASE, *given).strip() == "2 columns are moved"
     assert "new raw records go into the database" in clutchlife("raw", "list", *given)
     assert "raw records are kept in" in clutchlife("raw", "move", "--to", "ftp://id:secret@x", *given, code=64)

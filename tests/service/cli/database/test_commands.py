@@ -120,7 +120,6 @@ def test_a_backup_is_restored_unless_a_service_runs(path: Path, tmp_path: Path) 
     clutchlife("verify", "--database", f"sqlite:///{path}-replaced", code=1)
     assert integrity(path) == ["ok"]
     assert "there is no backup at" in clutchlife("restore", tmp_path / "none.db", *url, code=64)
-    assert "give --reason" in clutchlife("restore", "a", "s0", *url, code=64)
 
 
 def test_replay_goes_on_after_a_clutch_that_it_refuses_and_names_it_at_the_end(path: Path) -> None:

@@ -34,12 +34,30 @@ NARROWED: dict[tuple[str, str], Scope] = {
     ("POST", "/v1/jobs"): "admin",
     ("GET", "/v1/jobs/{job_id}"): "read",
     ("DELETE", "/v1/jobs/{job_id}"): "admin",
+    ("GET", "/v1/alarms"): "read",
+    ("POST", "/v1/alarms"): "ingest",
+    ("GET", "/v1/alarms/events"): "read",
+    ("GET", "/v1/alarms/events/{event_id}"): "read",
+    ("POST", "/v1/alarms/events/{event_id}/acknowledge"): "ingest",
+    ("GET", "/v1/alarms/{alarm_id}"): "read",
+    ("PUT", "/v1/alarms/{alarm_id}"): "admin",
+    ("DELETE", "/v1/alarms/{alarm_id}"): "admin",
+    ("POST", "/v1/alarms/{alarm_id}/test"): "admin",
 }
 #: Routes that are of all clutches together: a key that is bound to some has no place there.
 OF_ALL: dict[tuple[str, str], Scope] = {
     ("GET", path): "read"
     for path in ("/metrics", "/v1/fleet/priors", "/v1/fleet/priors.csv", "/v1/fleet/scores", "/v1/fleet/scores.csv")
-} | {("POST", "/v1/rigs"): "ingest", ("PUT", "/v1/rigs/{name}"): "admin"}
+} | {
+    ("POST", "/v1/rigs"): "ingest",
+    ("PUT", "/v1/rigs/{name}"): "admin",
+    ("GET", "/v1/webhooks"): "read",
+    ("POST", "/v1/webhooks"): "admin",
+    ("GET", "/v1/webhooks/{webhook_id}"): "read",
+    ("DELETE", "/v1/webhooks/{webhook_id}"): "admin",
+    ("GET", "/v1/webhooks/{webhook_id}/deliveries"): "read",
+    ("POST", "/v1/webhooks/{webhook_id}/test"): "admin",
+}
 _READ = (
     "", "/changes", "/changes.csv", "/runs", "/runs.csv", "/runs/{run_id}", "/runs/{run_id}/file", "/remaining-useful-life",
     "/remaining-useful-life.csv", "/degradation", "/degradation.csv", "/stribeck", "/stribeck.csv", "/engagement",

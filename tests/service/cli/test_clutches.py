@@ -1,0 +1,94 @@
+"""The terminal of a working day: register, list, status, watch, alarms; what a mistyped name leaves behind."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from service.client.clutchlife import Client
+from tests.support import Server, clutchlife, free_port, serving, stationary
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with serving(tmp_path_factory.mktemp("terminal") / "clutchlife.db", loaded=True) as running:
+        with Client(running.url) as client:
+            for name in ("worn", "young", "fine"):
+                client.register(name)
+            for cycles in (0.0, 1000.0, 2000.0, 3000.0):
+                client.post_run("fine", stationary(cycles, wear=cycles / 1e6))
+                client.post_run("worn", stationary(cycles, wear=cycles / 4000))
+        yield running
+
+
+@pytest.mark.parametrize(
+    ("clutch", "code", "words"),
+    [("fine", 0, "Normal"), ("young", 1, "Function check"), ("worn", 2, "Failure"), ("nobody", 3, "register nobody")],
+)
+def test_status_ends_as_monitoring_plugins_do(server: Server, clutch: str, code: int, words: str) -> None:
+    printed = clutchlife("status", clutch, "--url", server.url, code=code)
+    assert words in printed
+    assert "Traceback" not in printed
+
+
+def test_status_is_unknown_where_nobody_answers_or_it_is_misused() -> None:
+    assert "unknown" in clutchlife(
+        "status", "fine", "--url", f"http://127.0.0.1:{free_port()}", "--patience", "0", code=3
+    )
+    for wrong in (("status",), ("status", "fine", "--bogus"), ("status", "fine", "--url", "nonsense")):
+        printed = clutchlife(*wrong, code=3)
+        assert len(printed.strip().splitlines()) == 1, printed
+
+
+def test_clutches_are_registered_and_listed(server: Server, tmp_path: Path) -> None:
+    record = tmp_path / "record.json"
+    record.write_text(json.dumps({"fluid": "other"}), encoding="utf-8")
+    at = ("--url", server.url)
+    assert "is registered" in clutchlife(
+        "register", "new", "--record", record, "--set", "geometry.friction_faces=4", *at
+    )
+    with Client(server.url, frames="list") as client:
+        made = client.clutch("new")
+        assert (made["fluid"], made["geometry"]["friction_faces"]) == ("other", 4)
+        assert [item["clutch_id"] for item in client.clutches()] == [
+            item["clutch_id"] for item in json.loads(clutchlife("list", "--json", *at))
+        ]
+    assert "failure" in clutchlife("list", *at)
+    assert "409" in clutchlife("register", "new", *at, code=65)
+
+
+def test_watch_prints_a_line_where_it_changes(server: Server) -> None:
+    printed = clutchlife("watch", "fine", "--looks", "3", "--every", "0.1", "--url", server.url)
+    assert printed.count("fine: Normal") == 1
+
+
+def test_alarms_are_listed_and_acknowledged(server: Server) -> None:
+    at = ("--url", server.url)
+    assert "no alarm" in clutchlife("alarms", "--clutch", "worn", *at)
+    with Client(server.url) as client:
+        client.service.post("/v1/alarms", json.dumps({"clutch_id": "worn", "quantity": "state"}).encode())
+    (event,) = json.loads(clutchlife("alarms", "--json", *at))
+    assert "worn: failure" in clutchlife("alarms", *at)
+    assert "acknowledged" in clutchlife("alarms", "--acknowledge", event["event_id"], "--note", "seen", *at)
+    assert "state" in clutchlife("alarms", "--rules", *at)
+
+
+def test_the_version_is_that_of_the_release() -> None:
+    assert clutchlife("--version").startswith("clutchlife 0.")
+
+
+def test_a_push_to_a_mistyped_clutch_leaves_nothing_in_the_spool(server: Server, tmp_path: Path) -> None:
+    run = tmp_path / "run.json"
+    run.write_text(json.dumps(stationary(4000.0)), encoding="utf-8")
+    spool = tmp_path / "spool"
+    printed = clutchlife("push", run, "--clutch", "fien", "--url", server.url, "--spool", spool, code=65)
+    assert "clutchlife register fien" in printed
+    assert not list(spool.rglob("*.body"))
+
+
+def test_a_wrong_call_is_one_plain_line() -> None:
+    for wrong in (("life",), ("bogus",), ("key", "create"), ("list", "--bogus")):
+        lines = clutchlife(*wrong, code=64).strip().splitlines()
+        assert len(lines) == 1, lines
+        assert "--help" in lines[0]
