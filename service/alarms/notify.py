@@ -51,14 +51,9 @@ def _require_apprise(url: str, scheme: str) -> None:
         raise wrong_address(
             f"url begins with {scheme[:20]}://, which needs the extra `notify`: pip install 'clutchlife[notify]'"
         )
-    if _instantiated(url) is None:
+    reply = _asked({"url": url, "private": False})
+    if not reply.get("understood"):
         raise wrong_address(f"url is no address that Apprise understands ({scheme[:20]}://)")
-
-
-def _instantiated(url: str) -> Any:
-    import apprise  # an extra
-
-    return apprise.Apprise.instantiate(url, suppress_exceptions=True)
 
 
 def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool) -> Attempt:
@@ -70,17 +65,23 @@ def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
     over = content["type"] == "alarm.cleared"
     title = f"Clutchlife: {event['name'] or event['quantity'].replace('_', ' ')}" + (" is over" if over else "")
     task = {"url": url, "title": title, "body": event["message"], "private": private}
+    reply = _asked(task)
+    return Attempt() if reply.get("sent") else Attempt(problem=reply.get("problem", "it could not be sent"))
+
+
+def _asked(task: dict[str, Any]) -> dict[str, Any]:
+    """What the process of its own answers: a message is sent where the task has one, else the address is looked at."""
     command = [sys.executable, "-m", "service.alarms.notify"]
     try:
         done = subprocess.run(  # noqa: S603  (our own module)
             command, input=json.dumps(task), capture_output=True, text=True, timeout=_SECONDS, check=False
         )
-        reply = json.loads(done.stdout or "{}")
+        reply: dict[str, Any] = json.loads(done.stdout)
     except subprocess.TimeoutExpired:
-        return Attempt(problem=f"it was not sent within {_SECONDS:g} s")
+        return {"problem": f"it was not sent within {_SECONDS:g} s"}
     except ValueError:
-        reply = {}
-    return Attempt(problem=reply.get("problem", "it could not be sent")) if not reply.get("sent") else Attempt()
+        return {}
+    return reply
 
 
 def confine(private: bool) -> None:
@@ -114,17 +115,20 @@ def _require_connectable(address: Any, *, private: bool) -> None:
 
 
 def main() -> None:
-    """Send what standard input says, and answer."""
+    """Do what standard input says, and answer."""
+    import apprise  # an extra, and of this process alone
+
     task = json.load(sys.stdin)
     with redirect_stdout(sys.stderr):
-        receiver = _instantiated(task["url"])
-        refused: list[str] = []
-        confine(task["private"])
-        try:
-            sent = receiver is not None and bool(receiver.notify(body=task["body"], title=task["title"]))
-        except (NotAllowedError, PermissionError) as error:
-            sent, refused = False, [f"not asked: {error}"]
-    answer = {"sent": sent} if sent else {"sent": False, "problem": (refused or ["the receiver did not take it"])[0]}
+        receiver = apprise.Apprise.instantiate(task["url"], suppress_exceptions=True)
+        answer: dict[str, Any] = {"understood": receiver is not None}
+        if receiver is not None and "body" in task:
+            confine(private=task["private"])
+            try:
+                answer["sent"] = bool(receiver.notify(body=task["body"], title=task["title"]))
+                answer["problem"] = "the receiver did not take it"
+            except (NotAllowedError, PermissionError) as error:
+                answer["problem"] = f"not asked: {error}"
     sys.stdout.write(json.dumps(answer))
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from service import records, stored_runs
-from service.errors import NotFoundError
+from service.errors import NotFoundError, unknown_clutch
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.condition import beside_held
 from service.lives.outlook import Evidence, measured_life, with_held
@@ -41,7 +41,7 @@ def criteria_of(database: Database, clutch_id: str) -> bytes:
     with database.reading() as connection:
         row = clutches.get(connection, clutch_id)
     if row is None:
-        raise NotFoundError(f"no clutch is known as {clutch_id!r}")
+        raise unknown_clutch(clutch_id)
     return json.dumps(row.record["end_of_life"].get("criteria", [])).encode()
 
 
@@ -56,7 +56,7 @@ def remaining_life(
     with database.reading() as connection:
         row = clutches.get(connection, clutch_id)
         if row is None:
-            raise NotFoundError(f"no clutch is known as {clutch_id!r}")
+            raise unknown_clutch(clutch_id)
         stored = (
             results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)
             if pressure_bar is None

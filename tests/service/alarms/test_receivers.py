@@ -1,0 +1,266 @@
+"""Nobody has the service ask the inside of a network for them, wait for ever, read without end, or say a secret."""
+
+import ipaddress
+import logging
+import socket
+import socketserver
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.alarms import notify, receivers
+from service.alarms.receivers import post, shown, why_not
+from tests.service.alarms.receiving import SECRET, receiving
+from tests.service.web.routes.granting import granted
+
+BODY = b'{"type": "alarm.test"}'
+INSIDE = [
+    "127.0.0.1", "10.0.0.1", "172.16.3.4", "192.168.1.1", "100.64.0.1", "169.254.169.254", "0.0.0.0",  # noqa: S104
+    "224.0.0.1", "240.0.0.1", "255.255.255.255", "::1", "::", "fe80::1", "fc00::1", "ff02::1", "::ffff:127.0.0.1",
+    "::127.0.0.1", "::ffff:169.254.169.254", "2002:7f00:1::", "64:ff9b::7f00:1", "64:ff9b::a9fe:a9fe",
+    "2001:0:4136:e378:8000:63bf:80ff:fffe",
+]  # fmt: skip
+
+
+def send(url: str, *, private: bool = True) -> receivers.Attempt:
+    return post(url, BODY, secret=SECRET, delivery_id="d", private=private)
+
+
+@pytest.mark.parametrize("address", INSIDE)
+def test_the_inside_is_not_asked(address: str) -> None:
+    assert why_not(ipaddress.ip_address(address), private=False)
+
+
+@pytest.mark.parametrize("address", ["169.254.169.254", "0.0.0.0", "224.0.0.1", "fe80::1", "::ffff:169.254.169.254"])  # noqa: S104
+def test_where_a_cloud_keeps_its_secrets_is_never_asked(address: str) -> None:
+    assert why_not(ipaddress.ip_address(address), private=True)
+
+
+@pytest.mark.parametrize("address", ["93.184.216.34", "2606:2800:220:1:248:1893:25c8:1946", "64:ff9b::5db8:d822"])
+def test_the_outside_is_asked(address: str) -> None:
+    assert why_not(ipaddress.ip_address(address), private=False) is None
+
+
+@pytest.mark.parametrize(
+    "host", ["127.0.0.1", "localhost", "2130706433", "0x7f.1", "127.1", "[::1]", "[::ffff:127.0.0.1]"]
+)
+def test_no_way_of_writing_an_address_leads_inside(host: str) -> None:
+    with receiving() as receiver:
+        ended = send(f"http://{host}:{receiver.port}/hook", private=False)
+    assert receiver.requests == []
+    assert ended.problem is not None
+
+
+def test_a_name_that_is_rebound_after_it_was_checked_is_not_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first answer of the name's server lies outside, every later one inside: it is asked once, and that is connected
+    to."""
+    connected: list[Any] = []
+    answers = iter(["93.184.216.34", "127.0.0.1", "127.0.0.1"])
+
+    def resolved(_host: str, port: int, **_: object) -> list[Any]:
+        return [(socket.AF_INET, socket.SOCK_STREAM, 6, "", (next(answers), port))]
+
+    def connect(address: Any, timeout: float) -> socket.socket:  # noqa: ARG001
+        connected.append(address)
+        raise ConnectionRefusedError(111, "refused")
+
+    monkeypatch.setattr(socket, "getaddrinfo", resolved)
+    monkeypatch.setattr(socket, "create_connection", connect)
+    send("http://rebound.test/hook", private=False)
+    assert connected == [("93.184.216.34", 80)]
+    assert "not asked" in str(send("http://rebound.test/hook", private=False).problem), "asked again, it is inside"
+    assert len(connected) == 1
+
+
+def test_a_redirect_is_not_followed() -> None:
+    with receiving() as inner, receiving() as outer:
+        outer.status, outer.headers = 307, {"Location": inner.url}
+        ended = send(outer.url)
+    assert (ended.status, inner.requests) == (307, [])
+    assert "redirects are not followed" in str(ended.problem)
+
+
+@contextmanager
+def answering(write: Callable[[socket.socket], object]) -> Iterator[str]:
+    """A receiver that reads what comes and then writes as a test wants."""
+
+    class Handler(socketserver.BaseRequestHandler):
+        def handle(self) -> None:
+            self.request.recv(65536)
+            with suppress(OSError):
+                write(self.request)
+
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Handler) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_address[1]}/"
+        server.shutdown()
+
+
+def drip(connection: socket.socket) -> None:
+    for sign in b"HTTP/1.1 200 OK\r\n" + b"X: 1\r\n" * 1000:
+        connection.sendall(bytes([sign]))
+        time.sleep(0.1)
+
+
+def endless_headers(connection: socket.socket) -> None:
+    connection.sendall(b"HTTP/1.1 200 OK\r\n")
+    while True:
+        connection.sendall(b"X: " + b"a" * 60000 + b"\r\n")
+
+
+def endless_continues(connection: socket.socket) -> None:
+    while True:
+        connection.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")
+
+
+@pytest.mark.parametrize("write", [drip, endless_headers, endless_continues, lambda _: time.sleep(30)], ids=str)
+def test_a_receiver_that_never_ends_is_cut_off(write: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(receivers, "ATTEMPT_SECONDS", 1.0)
+    started = time.monotonic()
+    with answering(write) as url:
+        ended = send(url)
+        assert time.monotonic() - started < 10
+    assert ended.problem is not None
+
+
+def test_a_body_without_end_is_not_read() -> None:
+    def endless(connection: socket.socket) -> None:
+        connection.sendall(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n")
+        while True:
+            connection.sendall(b"10000\r\n" + b"a" * 65536 + b"\r\n")
+
+    with answering(endless) as url:
+        started = time.monotonic()
+        assert send(url).problem is None
+        assert time.monotonic() - started < 5
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "ftp://example.org/", "file:///etc/passwd", "gopher://x/", "http://", "http:///hook", "example.org", "syslog://",
+        "http://exa mple.org/", "http://example.org/\r\nX: 1", "http://example.org:99999/", "http://example.org:0/", "unheard://x",
+    ],
+)  # fmt: skip
+def test_what_is_no_address_is_refused(client: TestClient, url: str) -> None:
+    answer = client.post("/v1/webhooks", json={"url": url})
+    assert answer.status_code == 422, answer.text
+    assert answer.json()["errors"][0]["pointer"] == "/url"
+
+
+@pytest.mark.parametrize(
+    ("url", "public"),
+    [
+        ("https://user:pass-word@example.org/hook", "https://user:***@example.org/hook"),
+        ("https://example.org/services/T0123456/B0123456/abcdefghijklmnop1234?sig=geheim", "https://example.org/services/T0123456/B0123456/***?***"),
+        ("http://127.0.0.1:9000/hook", "http://127.0.0.1:9000/hook"),
+        ("mailtos://user:pass-word@example.org", "mailtos://***"),
+    ],
+)  # fmt: skip
+def test_addresses_are_shown_without_what_is_secret(url: str, public: str) -> None:
+    assert shown(url) == public
+
+
+def test_secrets_are_in_no_answer_log_or_export(
+    client: TestClient, caplog: pytest.LogCaptureFixture, database_url: str
+) -> None:
+    """The database holds them, or nothing could be signed."""
+    caplog.set_level(logging.DEBUG)
+    secret, password = "signs-everything", "pass-word"
+    with receiving() as receiver:
+        receiver.status = 500
+        url = receiver.url.replace("http://", f"http://user:{password}@") + "?token=geheim"
+        name = client.post("/v1/webhooks", json={"url": url, "secret": secret}).json()["webhook_id"]
+        client.post(f"/v1/webhooks/{name}/test")
+        assert receiver.requests[0][1]["Authorization"].startswith("Basic ")
+    client.post(f"/v1/webhooks/{name}/test")
+    answers = [
+        client.get(address).text
+        for address in ("/v1/webhooks", f"/v1/webhooks/{name}", f"/v1/webhooks/{name}/deliveries", "/v1/clutches/c1")
+    ]
+    text = "\n".join([*answers, caplog.text])
+    for hidden in (secret, password, "geheim"):
+        assert hidden not in text
+    file = Path(database_url.removeprefix("sqlite:///"))
+    assert secret.encode() in file.read_bytes() + file.with_name(f"{file.name}-wal").read_bytes()
+
+
+def test_with_keys_the_inside_needs_a_setting(client: TestClient) -> None:
+    headers = granted(client, "admin")
+    with receiving() as receiver:
+        refused = client.post("/v1/webhooks", json={"url": receiver.url}, headers=headers)
+    assert refused.status_code == 422
+    assert "CLUTCHLIFE_PRIVATE_RECEIVERS" in refused.json()["detail"]
+
+
+def test_a_key_made_later_stops_deliveries_to_the_inside(client: TestClient) -> None:
+    with receiving() as receiver:
+        name = client.post("/v1/webhooks", json={"url": receiver.url}).json()["webhook_id"]
+        headers = granted(client, "admin")
+        tested = client.post(f"/v1/webhooks/{name}/test", headers=headers).json()
+    assert receiver.requests == []
+    assert "not asked" in tested["deliveries"][0]["problem"]
+
+
+class Mailbox(socketserver.StreamRequestHandler):
+    """As much of an SMTP server as a client needs."""
+
+    def handle(self) -> None:
+        self.wfile.write(b"220 test\r\n")
+        while line := self.rfile.readline():
+            word = line[:4].upper()
+            if word == b"DATA":
+                self.wfile.write(b"354 go\r\n")
+                mail = b""
+                while (line := self.rfile.readline()) not in (b".\r\n", b""):
+                    mail += line
+                self.server.mails.append(mail)  # type: ignore[attr-defined]
+            if word == b"QUIT":
+                self.wfile.write(b"221 bye\r\n")
+                return
+            self.wfile.write(b"250 ok\r\n")
+
+
+@contextmanager
+def mailbox() -> Iterator[tuple[int, list[bytes]]]:
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Mailbox) as server:
+        server.daemon_threads = True
+        server.mails = []  # type: ignore[attr-defined]
+        threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
+        yield server.server_address[1], server.mails  # type: ignore[attr-defined]
+        server.shutdown()
+
+
+def test_an_alarm_arrives_as_a_mail(client: TestClient) -> None:
+    pytest.importorskip("apprise")
+    with mailbox() as (port, mails):
+        url = f"mailto://127.0.0.1:{port}/?from=rig@example.org&to=engineer@example.org"
+        made = client.post("/v1/webhooks", json={"url": url})
+        assert made.status_code == 201, made.text
+        assert "example.org" not in made.text
+        client.post("/v1/alarms", json={"clutch_id": "c1", "quantity": "state", "name": "look at it"})
+        deadline = time.monotonic() + 40
+        while not mails and time.monotonic() < deadline:
+            time.sleep(0.1)
+        (mail,) = mails
+    assert b"look at it" in mail
+
+
+def test_apprise_does_not_lead_inside_either() -> None:
+    pytest.importorskip("apprise")
+    body = b'{"type": "alarm.raised", "event": {"name": "n", "quantity": "state", "message": "m"}}'
+    with mailbox() as (port, mails), receiving() as receiver:
+        for url in (
+            f"mailto://127.0.0.1:{port}/?from=rig@example.org&to=engineer@example.org",
+            f"json://127.0.0.1:{receiver.port}/hook",
+        ):
+            ended = notify.send(url, body, secret=SECRET, delivery_id="d", private=False)
+            assert ended.problem is not None, url
+    assert (mails, receiver.requests) == ([], [])
