@@ -141,6 +141,7 @@ EXAMPLES: dict[str, Any] = {
     "mse_percent_after": 1.2,
     "mse_percent_before": 4.8,
     "nats": 3.2,
+    "minutes": 42.0,
     "narrows": 0.4,
     "pause_hours": 0.0,
     "pressures_bar": [4.0, 5.0, 6.0],
