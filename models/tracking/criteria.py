@@ -57,10 +57,10 @@ LEVELLING = 10.0
 #: The hazard of a knee per e-fold of progress, of a course that is a shape or has a discrepancy, and the median of how many
 #: times its mean pace so far such a course goes faster from then on, with the deviation of its logarithm. Chosen:
 #: `make score PARTS=knees`. On real lives (`make real`, the half for developing) 21 % of the intervals as stated begin after
-#: the end without knees, in up to 64 % of a row; with hazards of 0.3, 0.4 and 0.6 it is 5, 4 and 2 %, up to 27, 20 and 20 %.
-#: Of lives of eq. 6 at 60 % of life 8, 10 and 17 % are then said to be near their end, 7 % without; medians of 4, 6 and 8
-#: hold alike.
-KNEE_HAZARD, KNEE_PACE, LOG_KNEE_PACE_SD = 0.4, 4.0, 1.0
+#: the end without knees, in up to 64 % of a row; with hazards of 0.3, 0.4 and 0.6 and a median of 4 it is 5, 4 and 2 %, up
+#: to 27, 20 and 20 %; with 0.3 and a median of 8 3 %, up to 20 %. By the last 8 % of lives of eq. 6 and 30 % of those of
+#: other laws are said to be near their end at 60 % of it (7 and 2 % without knees); by 0.4 and 8 19 and 54 %.
+KNEE_HAZARD, KNEE_PACE, LOG_KNEE_PACE_SD = 0.3, 8.0, 1.0
 
 # A test off the track (`innovation`)
 

@@ -19,7 +19,7 @@ from tests.statistical.lives import PRIOR, STAGES, ends, lives
 
 LAID, DRAWS = 0.4, 2_000
 BELIEFS = (0.3, 0.5, 0.55, 0.6, 0.7, 0.8, 0.9, 1.0)
-HAZARDS = (0.0, 0.2, 0.4, 0.6, 1.0)
+HAZARDS = (0.0, 0.15, 0.3, 0.6, 1.0)
 #: What of other laws is shown beside the hazards, and one that goes six times as fast from 0.7 of a life on.
 KNEE = "a knee at 0.7 of a life"
 BESIDE = ("logarithm", "accelerating (n = -1)", "exponential growth", KNEE)
