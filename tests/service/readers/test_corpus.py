@@ -19,6 +19,7 @@ import xlsxwriter  # type: ignore[import-untyped]
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from service.columns import CHANNELS
 from service.errors import InvalidError, TooLargeError
 from service.readers import hdf5 as hdf5_reader
 from service.readers.channels import Channels, to_channels
@@ -499,14 +500,17 @@ def test_bombs_are_refused_by_what_they_state(tmp_path: Path, inner: str) -> Non
 
 # --- no factor ---
 
-UNIT = {
-    channel: sorted(UNITS[unit])
-    for channel, unit in (("pressure_bar", "bar"), ("speed_rpm", "rpm"), ("torque_nm", "Nm"))
+TITLES = {
+    "time_s": "Zeit",
+    "pressure_bar": "Druck",
+    "speed_rpm": "Drehzahl",
+    "torque_nm": "Drehmoment",
+    "oil_temperature_c": "Öltemperatur",
 }
-TITLES = {"pressure_bar": "Druck", "speed_rpm": "Drehzahl", "torque_nm": "Drehmoment"}
+UNIT = {channel: sorted(UNITS[CHANNELS[channel].unit]) for channel in TITLES}
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     st.fixed_dictionaries({channel: st.sampled_from(units) for channel, units in UNIT.items()}),
     st.sampled_from(["{} [{}]", "{} ({})", "{}（{}）", "{} / {}", "{} in {}", "{}, {}", "{}_{}"]),
@@ -515,7 +519,7 @@ TITLES = {"pressure_bar": "Druck", "speed_rpm": "Drehzahl", "torque_nm": "Drehmo
     ),
     st.sampled_from(["%.0f", "%.1f", "%.3f", "%.6f", "%r"]),
     st.booleans(),
-    st.lists(st.tuples(*[st.floats(0.001, 9000)] * 3), min_size=2, max_size=5),
+    st.lists(st.tuples(*[st.floats(0.001, 9000)] * len(TITLES)), min_size=2, max_size=5),
 )
 def test_no_file_is_accepted_with_a_channel_off_by_a_factor(
     tmp_path_factory: pytest.TempPathFactory,
@@ -539,8 +543,47 @@ def test_no_file_is_accepted_with_a_channel_off_by_a_factor(
     except InvalidError:
         return
     for place, channel in enumerate(TITLES):
-        factor = UNITS[{"pressure_bar": "bar", "speed_rpm": "rpm", "torque_nm": "Nm"}[channel]][units[channel]].factor
-        expected = [factor * float(row[place]) for row in printed]
+        stated = UNITS[CHANNELS[channel].unit][units[channel]]
+        expected = [stated.factor * float(row[place]) + stated.offset for row in printed]
+        np.testing.assert_allclose(columns[channel], expected, rtol=1e-9, atol=1e-9, err_msg=channel)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.fixed_dictionaries({channel: st.sampled_from(units) for channel, units in UNIT.items()}),
+    st.sampled_from(["dt", "sampling_interval", "Delta_X"]),
+    st.sampled_from(["attribute beside", "end of the name", "in the text"]),
+    st.booleans(),
+    st.lists(st.tuples(*[st.floats(0.001, 9000)] * 3), min_size=2, max_size=5),
+)
+def test_no_array_is_accepted_with_a_factor_or_a_clock_that_is_off(
+    tmp_path_factory: pytest.TempPathFactory,
+    units: dict[str, str],
+    name: str,
+    way: str,
+    packed: bool,
+    values: list[tuple[float, ...]],
+) -> None:
+    def fill(file: h5py.File) -> None:
+        unit = units["time_s"]
+        if way == "attribute beside":
+            file.attrs.update({name: 20.0, f"{name}_unit": unit})
+        else:
+            file.attrs.update({f"{name}_{unit}": 20.0} if way == "end of the name" else {name: f"20 {unit}"})
+        for place, channel in enumerate(PLATEAUS):
+            title = channel.rpartition("_")[0]
+            data = np.array([row[place] for row in values])
+            held = file.create_dataset(title, data=data * 2 if packed else data)
+            held.attrs.update({"unit": units[channel]} | ({"scale_factor": 0.5} if packed else {}))
+
+    try:
+        columns = read_hdf5(tmp_path_factory.getbasetemp() / "factor.h5", fill).columns
+    except InvalidError:
+        return
+    step = 20 * UNITS["s"][units["time_s"]].factor
+    np.testing.assert_allclose(columns["time_s"], step * np.arange(len(values)), rtol=1e-9)
+    for place, channel in enumerate(PLATEAUS):
+        expected = [UNITS[CHANNELS[channel].unit][units[channel]].factor * row[place] for row in values]
         np.testing.assert_allclose(columns[channel], expected, rtol=1e-9, err_msg=channel)
 
 
