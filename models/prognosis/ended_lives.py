@@ -29,6 +29,7 @@ Source: A. Gelman et al., Bayesian Data Analysis (2013) ch. 3, for the predictiv
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -89,8 +90,8 @@ class EndedLife:
 
     end: float
     fraction: float
-    progress: FloatArray
-    damage: FloatArray
+    progress: tuple[float, ...]
+    damage: tuple[float, ...]
     energy: float | None = None
     deviation: float = 0.0
     censored: bool = False
@@ -105,19 +106,21 @@ class EndedLife:
         return np.where(share > 1.0, 1.0 + self.final_pace * (share - 1.0), self._inside(share))
 
     def _inside(self, share: FloatArray) -> FloatArray:
-        return np.asarray(np.interp(share, np.append(self.progress / self.end, 1.0), np.append(self.damage, 1.0)))
+        return np.asarray(
+            np.interp(share, np.append(np.array(self.progress) / self.end, 1.0), np.append(self.damage, 1.0))
+        )
 
     def in_unit(self, cycles: float) -> "EndedLife":
         """The same life with ζ counted in units of so many cycles."""
-        return replace(self, end=self.end / cycles, progress=self.progress / cycles)
+        return replace(self, end=self.end / cycles, progress=tuple(zeta / cycles for zeta in self.progress))
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON can carry it."""
         return {
             "end": self.end,
             "fraction": self.fraction,
-            "progress": self.progress.tolist(),
-            "damage": self.damage.tolist(),
+            "progress": list(self.progress),
+            "damage": list(self.damage),
             "energy": self.energy,
             "deviation": self.deviation,
             "censored": self.censored,
@@ -129,8 +132,8 @@ class EndedLife:
         return cls(
             end=stored["end"],
             fraction=stored["fraction"],
-            progress=np.array(stored["progress"]),
-            damage=np.array(stored["damage"]),
+            progress=tuple(stored["progress"]),
+            damage=tuple(stored["damage"]),
             energy=stored["energy"],
             deviation=stored["deviation"],
             censored=stored["censored"],
@@ -149,7 +152,8 @@ def ended_life(
     if at.size < FEWEST_TESTS:
         return None
     mean = np.bincount(where, weights=values[before]) / np.bincount(where)
-    return EndedLife(end=end, fraction=fraction, progress=at, damage=(1.0 - mean / initial) / (1.0 - fraction))
+    damage = (1.0 - mean / initial) / (1.0 - fraction)
+    return EndedLife(end=end, fraction=fraction, progress=tuple(at.tolist()), damage=tuple(damage.tolist()))
 
 
 def value_when_new(history: Sequence[Measurement]) -> float:
@@ -207,12 +211,20 @@ def as_its_kind(
     """The end of life of a clutch that is alive at ζ = `as_of` > 0, given its tests and lives that have ended.
 
     `offset` [t] is added to the tests' values. None of fewer than FEWEST_ENDED lives that are not censored, of fewer than
-    FEWEST_TESTS tests at different ζ, or where the first value is not positive.
+    FEWEST_TESTS tests at different ζ, or where the first value is not positive. Kept for the next filter, which asks it of
+    the same tests.
     """
+    return _as_its_kind(tuple(tests), as_of, tuple(lives), None if offset is None else tuple(offset.tolist()))
+
+
+@lru_cache(maxsize=8)
+def _as_its_kind(
+    tests: tuple[Measurement, ...], as_of: float, lives: tuple[EndedLife, ...], offset: tuple[float, ...] | None
+) -> Kin | None:
     exact = np.array([not life.censored for life in lives], dtype=bool)
     if np.count_nonzero(exact) < FEWEST_ENDED or len({test.progress for test in tests}) < FEWEST_TESTS:
         return None
-    seen = _Seen.of(tests, offset, lives[0].fraction)
+    seen = _Seen.of(tests, None if offset is None else np.array(offset), lives[0].fraction)
     if seen is None:
         return None
     log_ends = np.log([life.end for life in lives])
