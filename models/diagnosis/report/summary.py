@@ -41,8 +41,8 @@ from models.diagnosis.validation.held_out import Gain
 
 #: A share [%] below which its size is not given, and axes of structure that are mentioned at most.
 _LEAST_PERCENT, _AXES_MENTIONED = 0.1, 2
-#: Alternatives that are listed at most where there are many.
-_ALTERNATIVES = 4
+#: Alternatives that are listed with their probability at most; of the others the effects are named.
+_ALTERNATIVES = 8
 #: How much a sentence matters: it stays; it goes where words are short; it goes first.
 MUST, SHOULD, MAY = 0, 1, 2
 
@@ -180,23 +180,24 @@ def _ambiguous(findings: Findings) -> list[Sentence]:
             [effect_name(slug) for slug in item.effects if slug != UNCATALOGUED] if item.effects else ["nothing at all"]
         )
         if UNCATALOGUED in item.effects:
-            names.append(f"something that has no name{f', such as {findings.resembles}' if findings.resembles else ''}")
+            names.append(
+                f"something that is not in the catalogue{f', such as {findings.resembles}' if findings.resembles else ''}"
+            )
         sizes = [
             signed(estimate) if estimate.value != 0.0 else "not measured, so it cannot be excluded"
             for slug in item.effects
             if (estimate := sized.pop(slug, None)) is not None
         ]
         listed.append(f"{' together with '.join(names)} ({'; '.join([probability(item.probability), *sizes])})")
-    first = "Something is wrong that the model does not explain, and these data cannot tell which of these it is"
+    first = "Something is wrong that the model does not explain, and these data cannot distinguish which of these it is"
     if sum(len(alternative.split()) for alternative in listed) > MAX_WORDS // 2:  # the sizes are in the report's fields
         short = [
             alternative if alternative.endswith("))") or ";" not in alternative else f"{alternative.split(';')[0]})"
             for alternative in listed
         ]
-        listed = [
-            *short[:_ALTERNATIVES],
-            *([f"{len(short) - _ALTERNATIVES} more"] if len(short) > _ALTERNATIVES else []),
-        ]
+        listed = short[:_ALTERNATIVES]
+        names = [effect_name(slug) for slug in findings.causes if slug != UNCATALOGUED]
+        listed += [name for name in names if not any(name in alternative for alternative in listed)]
     alternatives = listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])}, or {listed[-1]}"
     sentences = [Sentence(f"{first} (with its probability): {alternatives}."), Sentence(_error(findings), MAY)]
     return [*sentences, *_gained(findings), *_next(findings)]

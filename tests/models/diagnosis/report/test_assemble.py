@@ -75,7 +75,7 @@ def test_two_causes_that_predict_worse_than_none_are_not_named(
     assert report.verdict is verdict
     assert (report.causes == hypothesis.slugs) == (verdict is Verdict.CAUSE_NAMED)
     assert set(hypothesis.slugs) <= set(report.causes)
-    beside = "together with something that has no name" in report.summary
+    beside = "together with something that is not in the catalogue" in report.summary
     assert beside == (verdict is Verdict.CAUSE_AMBIGUOUS)
     # of the second cause a hundredth was planted, of which these data do not even know the sign
     unsure = [] if gain is WORSE or len(effects) == 1 else ["do not determine the size of viscous exponent"]
