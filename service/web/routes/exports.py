@@ -39,7 +39,7 @@ from service.web.problems import READING
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["spreadsheets"], responses=READING)
 fleet_router = APIRouter(prefix="/v1/fleet", tags=["spreadsheets"], responses=READING)
 
-Asked = Annotated[TablePage, Depends(table_page)]
+OfTable = Annotated[TablePage, Depends(table_page)]
 
 
 def _items(payload: Mapping[str, Any]) -> Any:
@@ -47,7 +47,7 @@ def _items(payload: Mapping[str, Any]) -> Any:
 
 
 @router.get("/runs.csv", response_class=Response)
-async def list_runs_csv(of: Asked, state: State = None) -> Response:
+async def list_runs_csv(of: OfTable, state: State = None) -> Response:
     """Receipts by cycles as CSV; warnings and fits are counted."""
     return await clutch_table(
         of,
@@ -59,7 +59,7 @@ async def list_runs_csv(of: Asked, state: State = None) -> Response:
 
 
 @router.get("/changes.csv", response_class=Response)
-async def list_changes_csv(of: Asked) -> Response:
+async def list_changes_csv(of: OfTable) -> Response:
     """The audit trail as CSV, newest first; what changed is JSON."""
 
     def make() -> RowsAndNext:
@@ -70,7 +70,7 @@ async def list_changes_csv(of: Asked) -> Response:
 
 
 @router.get("/inspections.csv", response_class=Response)
-async def list_inspections_csv(of: Asked) -> Response:
+async def list_inspections_csv(of: OfTable) -> Response:
     """Inspections by cycles as CSV; photographs are counted."""
 
     def make() -> RowsAndNext:
@@ -92,7 +92,7 @@ async def diagnosis_plan_csv(of: Asked, diagnosis_id: DiagnosisId) -> Response:
 
 @router.get("/remaining-useful-life.csv", response_class=Response)
 async def remaining_useful_life_csv(
-    of: Asked,
+    of: OfTable,
     method: Method = "particle",
     pressure_bar: PressureBar = None,
     at_cycles: AtCycles = None,
@@ -105,7 +105,7 @@ async def remaining_useful_life_csv(
 
 @router.get("/degradation.csv", response_class=Response)
 async def degradation_csv(
-    of: Asked,
+    of: OfTable,
     method: Method = "grid",
     quantity: TrackedQuantity = None,
     at_cycles: AtCycles = None,
@@ -118,7 +118,7 @@ async def degradation_csv(
 
 
 @router.get("/stribeck.csv", response_class=Response)
-async def stribeck_csv(of: Asked, prefer: Prefer = None) -> Response:
+async def stribeck_csv(of: OfTable, prefer: Prefer = None) -> Response:
     """The fits, a row a test and pressure; `limit` counts tests."""
     return await computed_table(
         of, stribeck.curves, lambda payload: stribeck.rows(_items(payload)), ("run_id", "cycles"), prefer=prefer,
@@ -127,13 +127,13 @@ async def stribeck_csv(of: Asked, prefer: Prefer = None) -> Response:
 
 
 @router.get("/surfaces.csv", response_class=Response)
-async def surfaces_csv(of: Asked, prefer: Prefer = None) -> Response:
+async def surfaces_csv(of: OfTable, prefer: Prefer = None) -> Response:
     """The surfaces, a row a count of cycles, a pressure and a speed."""
     return await computed_table(of, surfaces.surface, surfaces.rows, ("cycles", "pressure_bar"), prefer=prefer)
 
 
 @router.get("/scores.csv", response_class=Response)
-async def clutch_scores_csv(of: Asked, method: Method = "particle", prefer: Prefer = None) -> Response:
+async def clutch_scores_csv(of: OfTable, method: Method = "particle", prefer: Prefer = None) -> Response:
     """The scored predictions, a row each."""
     columns = ("end_of_life_cycles", "cycles")
     return await computed_table(
@@ -142,7 +142,7 @@ async def clutch_scores_csv(of: Asked, method: Method = "particle", prefer: Pref
 
 
 @router.get("/loops.csv", response_class=Response)
-async def loops_csv(of: Asked) -> Response:
+async def loops_csv(of: OfTable) -> Response:
     """Friction loops, a row each."""
 
     def make() -> RowsAndNext:
@@ -152,7 +152,7 @@ async def loops_csv(of: Asked) -> Response:
 
 
 @router.get("/series.csv", response_class=Response)
-async def series_csv(of: Asked, quantity: Quantity = None) -> Response:
+async def series_csv(of: OfTable, quantity: Quantity = None) -> Response:
     """The flat rows as CSV."""
 
     def make() -> RowsAndNext:
