@@ -418,11 +418,11 @@ def _level_fit(row: FitRow) -> LevelFit:
     return LevelFit(mean_pressure=row.mean_pressure, speeds=row.speeds, fit=fit)
 
 
-def latest_diagnosis(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:
+def latest_diagnosis(row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:
     """The newest finished diagnosis as it goes out; one of a life that a rebuild has ended is past."""
     if verdict is None:
         return None
-    earlier = verdict.life != _present_life(connection, row)
+    earlier = verdict.life != row.summary.get("life", "")
     return {
         "diagnosis_id": verdict.diagnosis_id,
         "verdict": verdict.verdict,
@@ -434,18 +434,14 @@ def latest_diagnosis(connection: Connection, row: ClutchRow, verdict: VerdictRow
     }
 
 
-def condition(connection: Connection, row: ClutchRow) -> dict[str, str]:
+def condition(row: ClutchRow) -> dict[str, str]:
     """The clutch's state and why."""
-    return state_of(row.summary, disputed=_disputed(connection, row), silent=row.silent)
+    return state_of(row.summary, disputed=row.is_disputed, silent=row.silent)
 
 
-def first_line(connection: Connection, row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, str]:
+def first_line(row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, str]:
     """What stands first of the clutch: `headline` and `action`; `diagnosis` is its newest one as it goes out."""
-    return top_line(row.summary, disputed=_disputed(connection, row), diagnosis=diagnosis, silent=row.silent)
-
-
-def _disputed(connection: Connection, row: ClutchRow) -> bool:
-    return row.disputed is not None and row.disputed == _present_life(connection, row)
+    return top_line(row.summary, disputed=row.is_disputed, diagnosis=diagnosis, silent=row.silent)
 
 
 def note_dispute(connection: Connection, clutch_id: str) -> None:
@@ -454,13 +450,8 @@ def note_dispute(connection: Connection, clutch_id: str) -> None:
     verdict = diagnoses.newest(connection, [clutch_id]).get(clutch_id)
     disputed = None if verdict is None or verdict.adopted or verdict.verdict not in DISAGREES else verdict.life
     row = replace(clutch(connection, clutch_id), disputed=disputed)
-    clutches.set_disputed(connection, clutch_id, disputed, state=condition(connection, row)["name"])
+    clutches.set_disputed(connection, clutch_id, disputed, state=condition(row)["name"])
     raising.evaluate(connection, clutch_id)
-
-
-def _present_life(connection: Connection, row: ClutchRow) -> str:
-    life: str | None = row.summary.get("life")  # what was stored by earlier releases does not hold it
-    return present_life(connection, row.clutch_id) if life is None else life
 
 
 def inspection(connection: Connection, clutch_id: str, inspection_id: str) -> InspectionRow:

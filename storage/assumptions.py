@@ -203,15 +203,9 @@ def fleet_prior_for(connection: Connection, fleet: Json, clutch_id: str, version
     if version_row is None:
         return None
     members = to_list(version_row.members)
-    left_out = [NOBODY]
-    if clutch_id in members:
-        # earlier releases left each clutch out by itself, however many there were
-        left_out = [clutch_id, members[members.index(clutch_id) % _GROUPS]]
-    for name in left_out:
-        row = connection.execute(_fleet_without, values | {"of_version": version_row.version, "wanted": name}).first()
-        if row is not None:
-            return _fleet_row(row)
-    return None
+    left_out = members[members.index(clutch_id) % _GROUPS] if clutch_id in members else NOBODY
+    row = connection.execute(_fleet_without, values | {"of_version": version_row.version, "wanted": left_out}).first()
+    return None if row is None else _fleet_row(row)
 
 
 def current_fleet_priors(connection: Connection) -> list[FleetPriorRow]:

@@ -34,6 +34,11 @@ class ClutchRow:
     disputed: str | None = None
     silent: str | None = None
 
+    @property
+    def is_disputed(self) -> bool:
+        """Whether data and model are in dispute in the present life."""
+        return self.disputed is not None and self.disputed == self.summary.get("life", "")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:

@@ -21,7 +21,7 @@ ACCEPTED, HELD, WITHDRAWN = "accepted", "held", "withdrawn"
 class NewRun:
     """A run that is about to be stored. `cycles` since new; `details` holds what only some kinds have; `doubts` are why
     it is or was held, `sent_cycles` the cycles as they were sent where `cycles` was corrected since, else None;
-    `received_by` is who posted it, None where an earlier release did not note it."""
+    `received_by` is who posted it."""
 
     clutch_id: str
     run_id: str

@@ -48,7 +48,7 @@ clutch = Table(
 
 #: `details` holds what only some kinds have (duty, event, note, origin); `receipt` is the answer without what is in other
 #: columns: `state` (whether the run counts), `doubts` (why it was held), `sent_cycles` (where `cycles` was corrected since),
-#: `received_by` (who posted it; null for runs of earlier releases).
+#: `received_by` (who posted it).
 run = Table(
     "run",
     metadata,

@@ -15,6 +15,7 @@ from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.storage.blobs.stores import new_bucket, s3_server, use_endpoint
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
+from tests.storage.samples import later_step
 
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("untimed")
@@ -24,6 +25,13 @@ settings.load_profile("untimed")
 def postgresql() -> Iterator[PostgresServer]:
     with postgresql_server() as server:
         yield server
+
+
+@pytest.fixture(name="later_step")
+def _later_step() -> Iterator[None]:
+    """The code of a later release, with one migration more."""
+    with later_step():
+        yield
 
 
 @pytest.fixture

@@ -191,7 +191,7 @@ def _with_silence(connection: Connection, row: ClutchRow, kept: set[str], facts:
     silent = facts.heard() if kept else None
     if silent is None and row.silent is None:
         return row
-    state = state_of(row.summary, disputed=_is_disputed(row), silent=silent)
+    state = state_of(row.summary, disputed=row.is_disputed, silent=silent)
     clutches.set_silent(connection, row.clutch_id, silent, state=state["name"])
     return replace(row, silent=silent, state=state["name"])
 
@@ -200,7 +200,7 @@ def _facts(connection: Connection, row: ClutchRow, record: ClutchIn, at: str) ->
     return Facts(
         clutch_id=row.clutch_id,
         summary=row.summary,
-        state=state_of(row.summary, disputed=_is_disputed(row), silent=row.silent),
+        state=state_of(row.summary, disputed=row.is_disputed, silent=row.silent),
         geometry=record.geometry.to_model(),
         verdict=diagnoses.newest(connection, [row.clutch_id]).get(row.clutch_id),
         now=at,
@@ -208,10 +208,6 @@ def _facts(connection: Connection, row: ClutchRow, record: ClutchIn, at: str) ->
         off_course=partial(_off_course, connection, row.clutch_id),
         heard=partial(_heard, connection, row.clutch_id),
     )
-
-
-def _is_disputed(row: ClutchRow) -> bool:
-    return row.disputed is not None and row.disputed == row.summary.get("life", "")
 
 
 def _newest_fits(connection: Connection, clutch_id: str) -> list[FitRow]:

@@ -391,12 +391,8 @@ def duty_block(
 
 
 def moment_of(started_at: str | None, received_at: str) -> float:
-    """When a run was made [s since 1970]: when it was started, or received where the rig did not say.
-
-    Earlier releases stored times outside of the years 1 to 9999 in UTC: they count as the first and the last moment.
-    """
-    earliest, latest = _MOMENTS
-    return min(max(datetime.fromisoformat(started_at or received_at).timestamp(), earliest), latest)
+    """When a run was made [s since 1970]: when it was started, or received where the rig did not say."""
+    return datetime.fromisoformat(started_at or received_at).timestamp()
 
 
 def pace_of(events: Sequence[Event]) -> float | None:

@@ -145,9 +145,9 @@ def _shown(
     newest, held = diagnoses.newest(connection, names), runs.held(connection, names)
     shown = []
     for row in rows:
-        diagnosis = records.latest_diagnosis(connection, row, newest.get(row.clutch_id))
-        first = records.first_line(connection, row, diagnosis)
-        state = {"state": records.condition(connection, row)}
+        diagnosis = records.latest_diagnosis(row, newest.get(row.clutch_id))
+        first = records.first_line(row, diagnosis)
+        state = {"state": records.condition(row)}
         shown.append((row, held.get(row.clutch_id, 0), diagnosis, state | first))
     return shown
 

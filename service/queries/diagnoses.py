@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 #: What a list does not show.
 _LARGE = ("maps", "loops")
-#: What `prediction_log_score_gain` was called until 0.2.
-FORMER_NAME = "foretelling_log_score_gain"
 
 
 def diagnosis(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str, Any]:
@@ -77,7 +75,7 @@ def _items(connection: Connection, clutch_id: str, rows: list[DiagnosisRow]) -> 
     in_force = adoption.diagnosis_id if adoption is not None and adoption.life == life else None
     latest, changed = diagnoses.last_run_key(connection, clutch_id), changes.last_of_history(connection, clutch_id)
     return [
-        _with_former_name(
+        (
             {
                 "diagnosis_id": row.diagnosis_id,
                 "clutch_id": row.clutch_id,
@@ -98,12 +96,6 @@ def _items(connection: Connection, clutch_id: str, rows: list[DiagnosisRow]) -> 
         )
         for row in rows
     ]
-
-
-def _with_former_name(answer: dict[str, Any]) -> dict[str, Any]:
-    """The answer, a number of the gain under its former name, too: scripts may read it."""
-    gain = answer["gain"]
-    return answer | {"gain": gain | {FORMER_NAME: gain["prediction_log_score_gain"]}}
 
 
 def model(database: Database, clutch_id: str) -> dict[str, Any]:

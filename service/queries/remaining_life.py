@@ -68,7 +68,7 @@ def remaining_life(
         "clutch_id": clutch_id,
         "method": method,
         "revision": row.revision,
-        "origin": row.record.get("origin", "measured"),  # earlier releases stored none
+        "origin": row.record["origin"],
     }
     now = at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf)
     summary = row.summary if now else {}

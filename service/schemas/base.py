@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal
 from pydantic import (
     AwareDatetime,
     BaseModel,
-    BeforeValidator,
     ConfigDict,
     Field,
     PlainSerializer,
@@ -46,10 +45,6 @@ Cycles = Annotated[float, Field(ge=0, le=MOST_CYCLES, allow_inf_nan=False, stric
 
 PositiveNumber = Annotated[float, Field(gt=0, le=LARGEST_NUMBER, allow_inf_nan=False, strict=True)]
 NotNegativeNumber = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_nan=False, strict=True)]
-#: 2.0 is the whole number 2.
-WholeNumber = Annotated[
-    int, Field(strict=True), BeforeValidator(lambda sent: whole(sent) if isinstance(sent, float) else sent)
-]
 
 #: ISO 8601 with a time zone.
 StartedAt = Annotated[AwareDatetime, Field(ge=EARLIEST_START, le=LATEST_START)]

@@ -2,10 +2,11 @@
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
 from models.clutch import Geometry
 from models.degradation.severity import Severity, SeverityBasis
+from service.columns import whole
 from service.schemas.base import (
     Answer,
     ClutchName,
@@ -19,7 +20,6 @@ from service.schemas.base import (
     RunCycles,
     RunName,
     Schema,
-    WholeNumber,
 )
 from service.schemas.life import (
     AtLeast,
@@ -46,6 +46,10 @@ from service.schemas.limits import (
     MOST_TORQUE_FILTER_MS,
 )
 
+#: 2.0 is the whole number 2.
+WholeNumber = Annotated[
+    int, Field(strict=True), BeforeValidator(lambda sent: whole(sent) if isinstance(sent, float) else sent)
+]
 Name = Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_NAME)]
 TorqueFilter = Annotated[
     Annotated[NotNegativeNumber, Field(le=MOST_TORQUE_FILTER_MS)] | None,

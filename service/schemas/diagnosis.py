@@ -113,9 +113,6 @@ class GainOut(Answer):
     prediction_log_score_gain: Number = Field(
         description="Gain in log score when the last states are predicted from the first ones, nats"
     )
-    foretelling_log_score_gain: Number = Field(
-        description="The former name of `prediction_log_score_gain`", deprecated=True, examples=[4.1]
-    )
     remaining_useful_life: BeforeAndAfter = Field(description="Remaining useful life under both models")
 
 

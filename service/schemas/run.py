@@ -320,9 +320,7 @@ class Receipt(Answer):
     state: State
     doubts: list[Doubt] = Field(description="Why the run is, or was, held; empty where nothing was odd")
     sent_cycles: float = Field(description="Cycles as they were sent; `cycles` is what holds now")
-    received_by: str | None = Field(
-        description="Who posted it: `key:` with the key's id and note, or `local`; null where an earlier release stored it"
-    )
+    received_by: str | None = Field(description="Who posted it: `key:` with the key's id and note, or `local`")
 
 
 Action = Literal[

@@ -14,8 +14,6 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection
 
-from storage.tables import metadata
-
 # Alembic keeps the step that it runs in module globals: one at a time in a process.
 _one_at_a_time = threading.Lock()
 
@@ -46,18 +44,6 @@ def revisions() -> frozenset[str]:
 def current(connection: Connection) -> str | None:
     """The revision that the database is at; None where it is empty."""
     return MigrationContext.configure(connection).get_current_revision()
-
-
-def make_all(connection: Connection) -> None:
-    """Make all tables of an empty database as they are at `head()`, without the steps that led there; nothing is committed.
-
-    The first steps are SQLite's; those from s0008 on are run on databases of either kind.
-    """
-    with _one_at_a_time:
-        metadata.create_all(connection)
-        config = _config()
-        config.attributes["connection"] = connection
-        command.stamp(config, "head")
 
 
 def upgrade(connection: Connection) -> None:

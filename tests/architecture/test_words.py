@@ -12,9 +12,6 @@ QUAINT = re.compile(r"foretell|foretold|reckon|\bstrangers?\b|spoiled|swallowed"
 #: be unreadable under another name; the former key of a gain, in the step that renames it and where it is still answered.
 STORED_NAMES = {
     "models/tracking/filters/particle.py": '{"outlying": "spoiled"}',
-    "storage/migrations/versions/s0004_prediction_gain.py": '"foretelling_log_score_gain":',
-    "service/queries/diagnoses.py": 'FORMER_NAME = "foretelling_log_score_gain"',
-    "service/schemas/diagnosis.py": "foretelling_log_score_gain: Number",
 }
 TEXT = {".py", ".js", ".css", ".html", ".md", ".svg", ".toml"}
 

@@ -1,5 +1,6 @@
 """Rows to store, each recognisable by its number."""
 
+import os
 import sqlite3
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from typing import IO
 import numpy as np
 import pytest
 from alembic import command
+from alembic.config import Config
 from numpy.typing import NDArray
 from sqlalchemy import Connection, text
 
@@ -19,6 +21,7 @@ from storage.clutches import ClutchRow
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
 from storage.engine.opening import open_database
+from storage.migrations import upgrade as migrations
 from storage.results import FitRow
 from storage.runs import NewRun
 
@@ -132,12 +135,34 @@ def child(script: str, *arguments: object) -> Iterator[tuple["subprocess.Popen[s
             process.kill()
 
 
-#: A revision of an earlier release, before runs had states.
-OLD = "s0004_prediction_gain"
+#: The revision of the first release; its code knows no other, and `later_step` gives it one more.
+OLD = "s0001_first_tables"
+_LATER = Path(__file__).parent / "later_step"
+
+
+@contextmanager
+def later_step() -> Iterator[None]:
+    """The code of a later release, with one step more, inside."""
+    plain, versions = migrations._config, Path(migrations.__file__).parent / "versions"
+
+    def with_later_step() -> Config:
+        config = plain()
+        config.set_main_option("version_locations", f"{versions}{os.pathsep}{_LATER}")
+        return config
+
+    migrations._config = with_later_step
+    try:
+        for known in (migrations.head, migrations.revisions):
+            known.cache_clear()
+        yield
+    finally:
+        migrations._config = plain
+        for known in (migrations.head, migrations.revisions):
+            known.cache_clear()
 
 
 def old_database(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A file that an earlier release has left, at revision OLD, with a clutch; one file without a log."""
+    """A file that the first release has left, at revision OLD, with a clutch; one file without a log."""
     path = folder / "old.db"
     whole = command.upgrade
     with monkeypatch.context() as earlier:
@@ -166,42 +191,7 @@ def integrity(path: Path) -> list[str]:
         return problems + [str(row) for row in connection.execute("PRAGMA foreign_key_check")]
 
 
-#: By migration, what takes back all that it made, the newest first; a column of SQLite's that refers to a table stays.
-TAKEN_BACK = {
-    "s0014_alarms": (
-        "DROP TABLE delivery",
-        "DROP TABLE webhook",
-        "DROP TABLE alarm_event",
-        "DROP TABLE alarm",
-        "ALTER TABLE clutch DROP COLUMN silent",
-    ),
-    "s0013_corrected_cof_draws": ("ALTER TABLE corrected_cof DROP COLUMN mean_cof_draws",),
-    "s0012_rigs": ("DROP TABLE rig",),
-    "s0011_unbiased_covariance": ("ALTER TABLE fit DROP COLUMN unbiased_covariance",),
-    "s0010_clutch_states": (
-        "DROP INDEX clutch_worst_first",
-        "DROP INDEX clutch_by_state",
-        "ALTER TABLE clutch DROP COLUMN state",
-        "ALTER TABLE clutch DROP COLUMN disputed",
-        "ALTER TABLE clutch DROP COLUMN searched",
-        "CREATE INDEX clutch_worst_first ON clutch (rank, clutch_id)",
-    ),
-    "s0009_raw_stores": (
-        "DROP INDEX channel_in_store",
-        "ALTER TABLE channel DROP COLUMN blob",
-        "ALTER TABLE channel DROP COLUMN store_key",
-        "DROP TABLE raw_removal",
-        "DROP TABLE raw_store",
-    ),
-    "s0008_jobs": ("DROP TABLE job",),
-}
-
-
-def take_back(connection: Connection, revision: str) -> None:
-    """Bring a database of today to an earlier revision, keeping what it holds. Those before s0007 are not known."""
-    for step, statements in TAKEN_BACK.items():
-        if step == revision:
-            break
-        for statement in statements:
-            connection.exec_driver_sql(statement)
-    connection.execute(text("UPDATE alembic_version SET version_num = :before"), {"before": revision})
+def take_back(connection: Connection) -> None:
+    """Bring a database that has the later step to OLD, keeping what it holds."""
+    connection.exec_driver_sql("ALTER TABLE clutch DROP COLUMN later")
+    connection.execute(text("UPDATE alembic_version SET version_num = :before"), {"before": OLD})

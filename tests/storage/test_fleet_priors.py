@@ -73,18 +73,6 @@ def test_a_large_fleet_is_left_out_in_twenty_groups(database: Database) -> None:
         assert assumptions.fleet_prior_for(connection, PAPER.fleet, "another", 1) == everyone
 
 
-def test_each_is_left_out_by_itself_where_an_earlier_release_stored_it_so(database: Database) -> None:
-    everyone = replace(PAPER, members=tuple(f"clutch-{number:02}" for number in range(30)))
-    with database.writing() as connection:
-        assumptions.insert_fleet_prior(connection, everyone)
-        for name in everyone.members:
-            assumptions.insert_fleet_prior(connection, replace(everyone, left_out=name, content={"without": [name]}))
-        for name in everyone.members:
-            found = assumptions.fleet_prior_for(connection, PAPER.fleet, name, None)
-            assert found is not None
-            assert found.content == {"without": [name]}
-
-
 def test_a_version_is_stored_once(database: Database) -> None:
     with database.writing() as connection:
         assumptions.insert_fleet_prior(connection, PAPER)

@@ -47,7 +47,7 @@ from storage.engine.postgresql.connect import (
     translated,
     write_lock,
 )
-from storage.migrations.upgrade import current, head, make_all, upgrade
+from storage.migrations.upgrade import current, head, upgrade
 
 shared_answer = Table(
     "shared_answer",
@@ -265,9 +265,7 @@ class ServerDatabase(Database):
             self.writing() as connection,
         ):
             revision = current(connection)  # another process may have been before
-            if revision is None:
-                make_all(connection)
-            elif revision != head():
+            if revision != head():
                 refuse_newer(revision)
                 upgrade(connection)
             server_tables.create_all(connection)

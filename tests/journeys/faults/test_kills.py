@@ -130,6 +130,7 @@ def post_until_killed(url: str, clutch: str, acknowledged: dict[tuple[str, str],
             return
 
 
+@pytest.mark.usefixtures("later_step")
 @kills(5, 50)
 def test_a_migration_that_is_killed_is_whole_or_not_begun(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int

@@ -9,12 +9,10 @@ from fastapi.testclient import TestClient
 
 from service.lives.condition import recent
 from service.lives.criteria import MOST_LINE_POINTS
-from service.lives.history import Event, moment_of
+from service.lives.history import Event
 from service.queries import clutch_list
-from storage import clutches, diagnoses
-from storage.diagnoses import NewDiagnosis
+from storage import clutches
 from storage.engine.database import Database
-from storage.engine.opening import open_database
 from tests.support import stationary
 
 AT = "2026-11-02T10:00:00+00:00"
@@ -47,38 +45,6 @@ def test_a_line_is_short_and_ends_with_the_last_value(count: int) -> None:
 def test_without_a_measurement_there_is_no_line() -> None:
     events = [Event(run_id="a", kind="run_in", cycles=0.0, moment=0.0)]
     assert recent(events, SimpleNamespace(measurements=[]))["mean_cof"] == []  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("stored", ["0001-01-01T00:00:00+23:59", "9999-12-31T23:59:59-23:59"])
-def test_a_time_that_an_earlier_release_stored_outside_of_all_dates_is_shown(stored: str) -> None:
-    """Both are no date in UTC, in which the fleet shows when the last run was made."""
-    events = [Event(run_id="a", kind="run_in", cycles=0.0, moment=moment_of(stored, ""))]
-    said = recent(events, SimpleNamespace(measurements=[]))["last_run"]["at"]  # type: ignore[arg-type]
-    assert said[:4] == stored[:4]
-
-
-def test_a_summary_of_an_earlier_release_tells_the_life_all_the_same(client: TestClient, database_url: str) -> None:
-    """Summaries did not name the present life: it is looked up where a diagnosis is known."""
-    database = open_database(database_url)
-    with database.writing() as connection:
-        new = NewDiagnosis(
-            clutch_id="c1",
-            diagnosis_id="d1",
-            created_at=AT,
-            revision=0,
-            last_run_key=0,
-            life="",
-            as_of_cycles=None,
-            code_version="0",
-        )
-        diagnoses.insert(connection, new)
-        diagnoses.finish(connection, "d1", AT, {"verdict": "cause_named", "causes": ["oil_change"]}, None)
-    for body in (stationary(0), {"kind": "maintenance", "cycles": 10, "event": "oil_change"}):
-        client.post("/v1/clutches/c1/runs", json=body)
-    assert _forgotten(client, database) == {False}
-    client.post("/v1/clutches/c1/runs", json={"kind": "maintenance", "cycles": 20, "event": "rebuild"})
-    assert _forgotten(client, database) == {True}
-    database.close()
 
 
 def _forgotten(client: TestClient, database: Database) -> set[bool]:

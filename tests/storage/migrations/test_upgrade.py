@@ -2,18 +2,14 @@
 
 import sqlite3
 from contextlib import ExitStack, closing
-from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, insert
 
-from storage import channels, clutches, diagnoses, runs, tables
-from storage.encoding.json_text import to_text
+from storage import channels, clutches, diagnoses
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseTooNew, StorageUnavailable
 from storage.engine.integrity import other_schema
@@ -28,7 +24,6 @@ from tests.storage.samples import (
     columns,
     integrity,
     new_diagnosis,
-    new_run,
     old_database,
     revision,
     store_run,
@@ -86,64 +81,18 @@ def test_a_second_start_changes_nothing(database: Database) -> None:
     assert database.path.read_bytes() == before
 
 
-def insert_as_before(connection: Connection) -> None:
-    """A clutch and a run as the first release stored them, in the columns that it had."""
-    row = {field.name: getattr(clutch_row(), field.name) for field in fields(clutch_row())}
-    for name in ("archived", "registered", "state", "disputed", "silent"):
-        del row[name]
-    row |= {name: to_text(row[name]) for name in ("record", "summary")}
-    connection.execute(insert(tables.clutch), row)
-    sent = {field.name: getattr(new_run(1), field.name) for field in fields(new_run(1))}
-    for name in ("state", "sent_cycles", "doubts", "received_by"):
-        del sent[name]
-    sent |= {name: to_text(sent[name]) for name in ("details", "receipt")}
-    connection.execute(insert(tables.run), sent)
-
-
+@pytest.mark.usefixtures("later_step")
 def test_an_older_file_is_brought_up_and_keeps_what_it_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "old.db"
-    whole = command.upgrade
-    monkeypatch.setattr(command, "upgrade", lambda config, _: whole(config, "s0001_first_tables"))
-    with closing(open_database(f"sqlite:///{path}")) as old, old.writing() as connection:
-        insert_as_before(connection)
-    monkeypatch.undo()
+    path = old_database(tmp_path, monkeypatch)
     with closing(sqlite3.connect(path)) as connection:
-        names = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-        assert "diagnosis" not in names
-        assert connection.execute("SELECT version_num FROM alembic_version").fetchall() == [("s0001_first_tables",)]
+        assert "later" not in {row[1] for row in connection.execute("PRAGMA table_info(clutch)")}
     with closing(open_database(f"sqlite:///{path}")) as new, new.writing() as connection:
-        assert migrations.current(connection) == migrations.head()
-        assert clutches.get(connection, CLUTCH) == clutch_row()
-        (row,) = runs.page(connection, CLUTCH)
-        assert (row.run_id, row.state, row.sent_cycles, row.doubts) == ("run-0001", "accepted", None, ())
-        assert [row.run_id for row in runs.in_order(connection, CLUTCH)] == ["run-0001"]
+        assert migrations.current(connection) == migrations.head() == "s0002_later"
+        (row,) = connection.exec_driver_sql("SELECT clutch_id, later FROM clutch").fetchall()
+        assert tuple(row) == (CLUTCH, None)
         diagnoses.insert(connection, new_diagnosis(0))
         assert diagnoses.running(connection, CLUTCH, 1) == "d0"
     assert integrity(path) == ["ok"]
-
-
-def test_a_report_of_an_earlier_release_reads_with_the_new_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reports of earlier releases hold a gain's former key; its value, other keys and quoted text stay as they are."""
-    path = tmp_path / "old.db"
-    whole = command.upgrade
-    monkeypatch.setattr(command, "upgrade", lambda config, _: whole(config, "s0003_fleet_priors"))
-    former = "foretelling_log_score_gain"
-    notes = [f'the key "{former}": of an earlier release']
-    with closing(open_database(f"sqlite:///{path}")) as old, old.writing() as connection:
-        insert_as_before(connection)
-        for number in range(3):
-            diagnoses.insert(connection, new_diagnosis(number))
-        diagnoses.finish(connection, "d0", "later", {"gain": {"log_score_gain": 2.5, former: 1.25}, "notes": notes}, {})
-        diagnoses.finish(connection, "d1", "later", {"gain": {former: None}}, None)
-    monkeypatch.undo()
-    with closing(open_database(f"sqlite:///{path}")) as new, new.reading() as connection:
-        reports = {row.diagnosis_id: row.report for row in diagnoses.page(connection, CLUTCH, limit=10)}
-    gain = {"log_score_gain": 2.5, "prediction_log_score_gain": 1.25}
-    assert reports == {
-        "d0": {"gain": gain, "notes": notes},
-        "d1": {"gain": {"prediction_log_score_gain": None}},
-        "d2": None,
-    }
 
 
 def test_steps_are_one_line_and_named_after_their_files() -> None:
@@ -200,6 +149,7 @@ def test_processes_that_start_at_once_all_succeed(tmp_path: Path, journal_mode: 
     assert integrity(tmp_path / "0.db") == ["ok"]
 
 
+@pytest.mark.usefixtures("later_step")
 def test_a_migration_keeps_a_copy_of_the_file_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = old_database(tmp_path, monkeypatch)
     kept = path.with_name(f"old.db-before-{migrations.head()}")
@@ -211,6 +161,7 @@ def test_a_migration_keeps_a_copy_of_the_file_as_it_was(tmp_path: Path, monkeypa
     assert [each.name for each in tmp_path.glob("*-before-*")] == [kept.name]
 
 
+@pytest.mark.usefixtures("later_step")
 def test_a_migration_that_is_tried_again_replaces_no_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same content is kept once; a file that was worked on in between is kept beside it."""
     path = old_database(tmp_path, monkeypatch)
@@ -233,21 +184,30 @@ def test_a_new_file_needs_no_copy(database: Database) -> None:
     assert list(database.path.parent.glob("*-before-*")) == []
 
 
+@pytest.mark.usefixtures("later_step")
 def test_a_server_of_an_earlier_release_is_brought_up(postgresql: PostgresServer) -> None:
-    """The first revision that PostgreSQL had, with a run; its channels stay in the database."""
     url = postgresql.fresh()
     with closing(open_database(url)) as old, old.writing() as connection:
         clutches.insert(connection, clutch_row())
         run_key = store_run(connection, 1)
-        take_back(connection, "s0007_inspections")
+        take_back(connection)
     with closing(open_database(url)) as new, new.reading() as connection:
         assert migrations.current(connection) == migrations.head()
-        assert other_schema(connection) == []
+        assert connection.exec_driver_sql("SELECT count(later) FROM clutch").scalar_one() == 0
         kept = channels.read(connection, run_key)
         assert all(kept[name].tobytes() == column.tobytes() for name, column in columns(1).items())
-        collations = connection.exec_driver_sql(
-            "SELECT count(*) FROM information_schema.columns WHERE collation_name = 'C' "
-            "AND (table_name, column_name) IN (('channel', 'blob'), ('raw_store', 'address'), ('raw_removal', 'blob'))"
-        ).scalar_one()
-        assert collations == 3
+    postgresql.drop(url)
+
+
+def test_the_first_tables_of_a_server_are_those_of_the_metadata(postgresql: PostgresServer) -> None:
+    """Made by the same step as a file's; text is ordered by its code points."""
+    url = postgresql.fresh()
+    with closing(open_database(url)) as database, database.reading() as connection:
+        assert other_schema(connection) == []
+        others = connection.exec_driver_sql(
+            "SELECT table_name, column_name FROM information_schema.columns WHERE table_schema = current_schema() "
+            "AND data_type = 'text' AND collation_name IS DISTINCT FROM 'C' "
+            "AND table_name NOT IN ('shared_answer', 'alembic_version')"
+        ).fetchall()
+        assert others == []
     postgresql.drop(url)

@@ -81,11 +81,12 @@ def test_a_newer_release_s_database_is_refused(database: Database) -> None:
     assert "s9999_later" in database.faults(least_free=0)["database"]
 
 
+@pytest.mark.usefixtures("later_step")
 def test_a_database_of_an_earlier_revision_is_not_migrated_under_a_service(database: Database) -> None:
     """Services that run hold it up; once they have ended, several that start at once wait for the one that migrates."""
     services = [open_database(database.url, serving=True) for _ in range(2)]
     with database.writing() as connection:
-        take_back(connection, "s0007_inspections")
+        take_back(connection)
     for service in services:
         with pytest.raises(ServiceRuns, match="a service uses"):
             open_database(database.url, lock_timeout=0.1)
@@ -101,7 +102,7 @@ def test_a_database_of_an_earlier_revision_is_not_migrated_under_a_service(datab
             stack.enter_context(closing(each.result()))
         with database.reading() as connection:
             assert current(connection) == head()
-            assert other_schema(connection) == []
+            assert connection.exec_driver_sql("SELECT count(later) FROM clutch").scalar_one() == 0
 
 
 def test_what_came_with_a_later_revision_is_not_found(database: Database) -> None:
@@ -110,8 +111,8 @@ def test_what_came_with_a_later_revision_is_not_found(database: Database) -> Non
     with closing(find_database(database.url)) as found:
         with pytest.raises(ProgrammingError), found.reading() as connection:
             changes.page(connection, "c1", limit=1)
-        set_revision(database, "s0006_key_bounds")
-        with pytest.raises(DatabaseTooOld, match="s0006_key_bounds"), found.reading() as connection:
+        set_revision(database, "s0000_earlier")
+        with pytest.raises(DatabaseTooOld, match="s0000_earlier"), found.reading() as connection:
             changes.page(connection, "c1", limit=1)
         with pytest.raises(StorageUnavailable, match="read-only"), found.writing() as connection:
             clutches.insert(connection, clutch_row())
