@@ -19,7 +19,7 @@ from service.web import openapi, problems
 from service.web.answers import now
 from service.web.context import Context
 from service.web.files import emptied_folder
-from service.web.limits import MOST_CACHED_BYTES, MOST_REVALIDATED_BYTES
+from service.web.limits import MOST_CACHED_BYTES
 from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Edge, Encodings, Heads, Polls, RootPath, Shares
 from service.web.readiness import Needs, Readiness
@@ -105,15 +105,16 @@ def create_app(settings: Settings) -> FastAPI:
             workers.warm()
             queue.start()
             outbox.start()
+            cache = AnswerCache(MOST_CACHED_BYTES)
             app.state.context = Context(
                 database=database,
-                cache=AnswerCache(MOST_CACHED_BYTES),
+                cache=cache,
                 metrics=metrics,
                 jobs=queue,
                 outbox=outbox,
                 settings=settings,
                 workers=workers,
-                revalidation=Revalidation(MOST_REVALIDATED_BYTES),
+                revalidation=Revalidation(cache),
                 readiness=readiness,
                 folder=folder,
             )

@@ -124,13 +124,14 @@ class AnswerCache:
     """The last answers; the least lately asked for goes first. `most_bytes` bounds their sizes together.
 
     Of each key the answer of one version is held, that whose making began last: one that was superseded is not asked for
-    again.
+    again. What is `pinned` stays: its next answer is being made, and its last one is given meanwhile.
     """
 
     def __init__(self, most_bytes: int) -> None:
         self._most = most_bytes
         self._held = 0
         self._begun = 0
+        self.pinned: set[Hashable] = set()
         self._answers: OrderedDict[Hashable, tuple[Hashable, Answer, int]] = OrderedDict()  # and which begin it was
         self._making: dict[tuple[Hashable, Hashable], Future[Answer]] = {}
         self._lock = threading.Lock()
@@ -139,6 +140,24 @@ class AnswerCache:
         """The answer for `key` where it is there and of `version`."""
         with self._lock:
             return self._current(key, version)
+
+    def __contains__(self, key: Hashable) -> bool:
+        with self._lock:
+            return key in self._answers
+
+    def newest(self, key: Hashable) -> tuple[Any, Answer] | None:
+        """The answer for `key`, of whichever version, and that version; None where none is there."""
+        with self._lock:
+            if key not in self._answers:
+                return None
+            self._answers.move_to_end(key)
+            return self._answers[key][:2]
+
+    def put(self, key: Hashable, version: Hashable, answer: Answer) -> None:
+        """Hold an answer that was made elsewhere, in place of what there was."""
+        with self._lock:
+            self._begun += 1
+            self._hold(key, version, answer, self._begun)
 
     def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> Answer:
         """The answer for `key`, made by `make` where that of `version` is not there. What `make` raises is raised for all
@@ -188,7 +207,10 @@ class AnswerCache:
             self._held += answer.size
             self._answers[key] = version, answer, begun
         while self._held > self._most:
-            self._drop(next(iter(self._answers)))
+            oldest = next((name for name in self._answers if name not in self.pinned and name != key), None)
+            if oldest is None:
+                break
+            self._drop(oldest)
 
     def _drop(self, key: Hashable) -> None:
         if key in self._answers:

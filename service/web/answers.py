@@ -162,7 +162,7 @@ async def computed_answer(
         payload = json.loads(whole.body)
         return to_json(payload | sliced(payload["items"], limit, after))
 
-    key = (clutch_id, name_of(query), *arguments, limit, after)
+    key = (clutch_id, f"{name_of(query)}.page", *arguments, limit, after)
     return tagged(request, await kept(context, key, revision, one_page), JSON_TYPE, revision)
 
 
@@ -270,7 +270,7 @@ def _computed_again(
 
     def again(request: Request) -> Response | None:
         revision = glance_of(request).revision
-        whole = None if revision is None else context.revalidation.held(key, revision)
+        whole = None if revision is None else context.cache.held(key, revision)
         return None if whole is None else tagged(request, whole, JSON_TYPE, revision)
 
     return again

@@ -7,7 +7,7 @@ from concurrent.futures import Future
 import pytest
 
 from service.queries import cache
-from service.queries.cache import Answer
+from service.queries.cache import Answer, AnswerCache
 from service.web.revalidation import Made, Revalidation
 
 
@@ -44,7 +44,7 @@ def run(scenario: Callable[[Revalidation, Worker], Awaitable[None]]) -> None:
     """The scenario in a loop of its own, with room for two answers of 4 bytes."""
 
     async def whole() -> None:
-        await asyncio.wait_for(scenario(Revalidation(8), Worker()), 30)
+        await asyncio.wait_for(scenario(Revalidation(AnswerCache(8)), Worker()), 30)
 
     asyncio.run(whole())
 
@@ -58,8 +58,8 @@ def test_the_first_answer_is_waited_for_and_made_once() -> None:
         assert {task.result() for task in waiting} == {(1, Answer.of(b"one"))}
         assert await kept.answer("a", 1, worker.compute, wait=0) == (1, Answer.of(b"one"))
         assert len(worker.asked) == 1
-        assert kept.held("a", 1) == Answer.of(b"one")
-        assert kept.held("a", 2) is None
+        assert kept._cache.held("a", 1) == Answer.of(b"one")
+        assert kept._cache.held("a", 2) is None
 
     run(scenario)
 
@@ -100,7 +100,7 @@ def test_who_waits_does_not_wait_for_a_renewal_that_yields_to_all_others() -> No
         assert {await task for task in patient} == {(3, Answer.of(b"3rd"))}
         renewal.set_result((2, b"old"))
         await _settled()
-        assert kept.held("a", 3) == Answer.of(b"3rd")  # the slower and older one replaces nothing
+        assert kept._cache.held("a", 3) == Answer.of(b"3rd")  # the slower and older one replaces nothing
 
     run(scenario)
 
@@ -154,13 +154,13 @@ def test_the_least_lately_asked_for_goes_first() -> None:
             await _settled()
             await worker.gives(1, b"four")
             await asking
-        assert [kept.held(name, 1) is not None for name in "abc"] == [False, True, True]
+        assert [kept._cache.held(name, 1) is not None for name in "abc"] == [False, True, True]
 
     run(scenario)
 
 
 def test_answers_begun_elsewhere_are_bounded_too() -> None:
-    kept = Revalidation(most_bytes=1_000)
+    kept = Revalidation(AnswerCache(1_000))
     for number in range(50):
         kept.begin(number, 1, b"x" * 100)
     assert [number for number in range(50) if kept.knows(number)] == list(range(40, 50))
@@ -202,9 +202,9 @@ def test_what_is_being_made_is_not_made_twice_to_make_room() -> None:
 
 
 def test_a_poll_of_what_is_held_counts_as_asking() -> None:
-    kept = Revalidation(most_bytes=8)
+    kept = Revalidation(AnswerCache(8))
     for name in ("a", "b"):
         kept.begin(name, 1, b"four")
-    assert kept.held("a", 1) == Answer.of(b"four")
+    assert kept._cache.held("a", 1) == Answer.of(b"four")
     kept.begin("c", 1, b"four")
     assert [name for name in ("a", "b", "c") if kept.knows(name)] == ["a", "c"]
