@@ -19,7 +19,7 @@ from service.web import openapi, problems
 from service.web.answers import now
 from service.web.context import Context
 from service.web.files import emptied_folder
-from service.web.limits import MOST_CACHED_BYTES
+from service.web.limits import MAX_CACHED_BYTES
 from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Edge, Encodings, Heads, Polls, RootPath, Shares
 from service.web.readiness import Needs, Readiness
@@ -52,7 +52,7 @@ its mean coefficient of friction has halved are predicted with their uncertainty
 
 
 def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, Kind]]:
-    """How jobs are done, by their kind, and their ends stored: what somebody wants adopted is tracked anew by the workers.
+    """How jobs are done, by their kind, and their ends stored: what somebody wants adopted is tracked again by the workers.
 
     Of each group one is done at a time: a diagnosis does not wait until a thousand clutches are replayed.
     """
@@ -105,7 +105,7 @@ def create_app(settings: Settings) -> FastAPI:
             workers.warm()
             queue.start()
             outbox.start()
-            cache = AnswerCache(MOST_CACHED_BYTES)
+            cache = AnswerCache(MAX_CACHED_BYTES)
             app.state.context = Context(
                 database=database,
                 cache=cache,

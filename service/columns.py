@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from models.arrays import FloatArray
-from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError
+from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
 
 RADIANS_PER_SECOND_PER_RPM = 2 * math.pi / 60
 PASCALS_PER_BAR = 1e5
@@ -84,7 +84,7 @@ LineOf = Callable[[int], int]
 
 
 class _Errors:
-    """Collects errors; keeps the first MOST_ERRORS and counts the rest. Rows of a file are given with their line."""
+    """Collects errors; keeps the first MAX_ERRORS and counts the rest. Rows of a file are given with their line."""
 
     def __init__(self, line_of: LineOf | None = None) -> None:
         self.kept: list[FieldError] = []
@@ -93,14 +93,14 @@ class _Errors:
 
     def add(self, error: FieldError) -> None:
         self.total += 1
-        if len(self.kept) < MOST_ERRORS:
+        if len(self.kept) < MAX_ERRORS:
             self.kept.append(error)
 
     def add_row(self, name: str, index: int, value: object, code: str, rule: str) -> None:
-        if len(self.kept) >= MOST_ERRORS:
+        if len(self.kept) >= MAX_ERRORS:
             self.total += 1
             return
-        shown = repr(value)[:MOST_QUOTED] if isinstance(value, str | list | dict) else str(value)[:MOST_QUOTED]
+        shown = repr(value)[:MAX_QUOTED] if isinstance(value, str | list | dict) else str(value)[:MAX_QUOTED]
         place = f"{name}[{index}]" + (f" (line {self._line_of(index)})" if self._line_of else "")
         self.add(
             FieldError(
@@ -191,8 +191,8 @@ def _check_range(name: str, column: FloatArray, errors: _Errors, *, sampled: boo
     least = SAMPLED_LEAST.get(name, channel.least) if sampled else channel.least
     good = (column >= least) & (column <= channel.most)
     wrong = np.flatnonzero(~good)
-    errors.total += max(0, wrong.size - MOST_ERRORS)
-    for index in wrong[:MOST_ERRORS]:
+    errors.total += max(0, wrong.size - MAX_ERRORS)
+    for index in wrong[:MAX_ERRORS]:
         value = float(column[index])
         if not math.isfinite(value):
             errors.add_row(name, int(index), value, "not_finite", "must be finite")

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 #: Errors that one answer lists; chosen: a screenful. The total is always stated.
-MOST_ERRORS = 50
+MAX_ERRORS = 50
 #: Characters of a wrong value that a message quotes; chosen: a line of a terminal.
-MOST_QUOTED = 80
+MAX_QUOTED = 80
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class ServiceError(Exception):
     def __init__(self, detail: str, *, errors: Sequence[FieldError] = (), total: int | None = None) -> None:
         super().__init__(detail)
         self.detail = detail
-        self.errors = tuple(errors[:MOST_ERRORS])
+        self.errors = tuple(errors[:MAX_ERRORS])
         self.total = len(errors) if total is None else total
 
 

@@ -270,7 +270,7 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
             results.write_fits(connection, rows[run_id], fit_rows(own, computed.cofs.get(run_id, {})))
         for run_id, receipt in computed.receipts.items():
             runs.set_receipt(connection, rows[run_id], receipt)
-    if computed.corrected_anew:
+    if computed.corrected_again:
         assumptions.clear_corrected_cofs(connection, clutch_id)
     for run_id, cofs in computed.corrected.items():
         assumptions.write_corrected_cofs(connection, rows[run_id], cofs)
@@ -305,7 +305,7 @@ def ask_fleet_refresh(connection: Connection, *, by: str, at: str) -> None:
 
 
 def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) -> None:
-    if tracking.anew:
+    if tracking.again:
         results.clear_predictions(connection, clutch_id)
     rows = [
         PredictionRow(

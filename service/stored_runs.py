@@ -26,7 +26,7 @@ from service.lives.recomputation import (
     Receipt,
     Results,
     Tracking,
-    computed_anew,
+    computed_again,
     computed_aside,
 )
 from service.lives.run_analysis import Analysis, analyse
@@ -157,7 +157,7 @@ def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> Incomin
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recomputed:
-    """All results of a clutch, computed anew from its raw runs: what stands beside each run's channels and its receipt by
+    """All results of a clutch, computed again from its raw runs: what stands beside each run's channels and its receipt by
     run_id, the levels and mean COFs of runs that are none of the history, and what follows from the history."""
 
     details: Mapping[str, dict[str, Any]]
@@ -188,7 +188,7 @@ def recorded(database: Database, state: ClutchState, *, whole: bool = False) -> 
 
 
 def recomputed(recorded: Recorded) -> Recomputed:
-    """Every run of a clutch analysed anew, under the state's record, and all that follows.
+    """Every run of a clutch analysed again, under the state's record, and all that follows.
 
     Raises InvalidError where this code refuses a run that is stored, DamagedData where its channels are damaged.
     """
@@ -210,7 +210,7 @@ def recomputed(recorded: Recorded) -> Recomputed:
     held = tuple(replace(event, **measured[event.run_id]) for event in state.held)
     state = replace(state, events=events, held=held)
     tests = reader.stationary_tests(state.lives[-1]) if events else iter(())
-    final, computed = computed_anew(state, levels, receipts, tests, reader, evaluated={})
+    final, computed = computed_again(state, levels, receipts, tests, reader, evaluated={})
     cofs = {}
     for run_id, event in aside.items():
         event = replace(event, **measured[run_id])
@@ -234,17 +234,17 @@ def recomputed(recorded: Recorded) -> Recomputed:
     )
 
 
-def store_recomputed(connection: Connection, clutch_id: str, anew: Recomputed) -> None:
+def store_recomputed(connection: Connection, clutch_id: str, again: Recomputed) -> None:
     """Store results in place of all that there were. The revision is the workflow's to move on."""
     keys = runs.keys(connection, clutch_id)
     for run_id, run_key in keys.items():
-        results.write_fits(connection, run_key, records.fit_rows(anew.levels[run_id], anew.aside.get(run_id, {})))
-        runs.set_results(connection, run_key, anew.details[run_id], anew.receipts[run_id], CODE_VERSION)
-    records.store(connection, clutch_id, anew.results)
+        results.write_fits(connection, run_key, records.fit_rows(again.levels[run_id], again.aside.get(run_id, {})))
+        runs.set_results(connection, run_key, again.details[run_id], again.receipts[run_id], CODE_VERSION)
+    records.store(connection, clutch_id, again.results)
 
 
 def _receipt(row: RunRow, analysis: Analysis) -> Receipt:
-    """The receipt anew, its mean COFs, loops and warnings of the history yet to come."""
+    """The receipt again, its mean COFs, loops and warnings of the history yet to come."""
     return receipt(
         row.clutch_id,
         incoming(row, {}),

@@ -27,7 +27,7 @@ from storage.tables import channel, raw_store, run
 
 #: Bytes of an encoded column that stay in the database wherever raw records go. Chosen: docs/appendix/benchmarks.md
 #: (`python -m tests.benchmarks.places`): a store adds 20 to 45 ms to a column of any length. Some 10,000 samples are longer.
-MOST_INLINE = 64 << 10
+MAX_INLINE = 64 << 10
 #: The name under which a run's file stands among its channels; no channel has it.
 FILE = "@file"
 #: How a file is kept: deflated, or as it was sent where that is hardly shorter (it is packed already).
@@ -56,7 +56,7 @@ _samples = (
 )
 
 
-_LONG_HERE = (channel.c.blob.is_(None), func.length(channel.c.data) > MOST_INLINE)
+_LONG_HERE = (channel.c.blob.is_(None), func.length(channel.c.data) > MAX_INLINE)
 _elsewhere = (
     select(channel.c.run_key, channel.c.name)
     .where(tuple_(channel.c.run_key, channel.c.name) > tuple_(bindparam("after_key"), bindparam("after_name")))
@@ -79,12 +79,12 @@ class Encoded:
     @property
     def is_long(self) -> bool:
         """Whether a column would go to a store where one is in use."""
-        return any(len(data) > MOST_INLINE for *_, data in self.columns)
+        return any(len(data) > MAX_INLINE for *_, data in self.columns)
 
     def put(self, store: RawStore) -> "Encoded":
         """The same with the long columns in the store; `store` must have been read before. Raises RawStoreUnavailable."""
         opened = open_store(store.address)
-        long = {name: data for name, _, _, data in self.columns if len(data) > MOST_INLINE}
+        long = {name: data for name, _, _, data in self.columns if len(data) > MAX_INLINE}
         blobs = {name: name_of(data) for name, data in long.items()}
         with ThreadPoolExecutor(max(len(long), 1)) as pool:  # a store is waited for, it takes no time of the processor
             list(pool.map(opened.put, blobs.values(), long.values()))

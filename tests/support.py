@@ -71,7 +71,7 @@ def free_port() -> int:
 def wait_until_ready(url: str, ended: Callable[[], bool]) -> None:
     """Wait for a service that has just been started."""
     deadline = time.monotonic() + 120
-    with httpx2.Client(base_url=url, timeout=5) as http:  # one for all: each loads the certificates anew
+    with httpx2.Client(base_url=url, timeout=5) as http:  # one for all: each loads the certificates again
         while time.monotonic() < deadline:
             try:
                 if http.get("/readyz").status_code == 200:

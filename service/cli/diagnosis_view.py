@@ -21,12 +21,12 @@ _VERDICTS = {
     "insufficient_data": ("Too little data", "cyan"),
 }
 #: Candidates that are less probable, or come after this many, are shown by `--json` only. Chosen: a screenful.
-_LEAST_PROBABILITY, _MOST_CANDIDATES = 0.005, 6
+_MIN_PROBABILITY, _MAX_CANDIDATES = 0.005, 6
 #: A gain in log evidence [nats] from which the evidence has this name. Derived: 2 ln B of 6 and 2 in R. E. Kass, A. E.
 #: Raftery, Bayes Factors, JASA 90, 1995, section 3.2.
 _EVIDENCE = ((3.0, "strong"), (1.0, "moderate"), (0.0, "weak"))
 #: Cells of two characters across a map; finer axes are averaged. Chosen: two maps fit 80 characters.
-_MOST_CELLS = 15
+_MAX_CELLS = 15
 #: A cell is marked from this share of the largest residual on: share, mark, colours for residuals above and below zero.
 #: Chosen: quarters.
 _MARKS = ((0.75, "##", 160, 27), (0.5, "++", 203, 69), (0.25, "+ ", 217, 153))
@@ -38,8 +38,8 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     causes = f": {', '.join(report['causes'])}" if report["causes"] else ""
     yield Panel(Text(report["summary"]), title=Text(f"{words}{causes}", style=f"bold {colour}"), border_style=colour)
     if report["candidates"]:
-        likely = [item for item in report["candidates"] if (item["probability"] or 0.0) >= _LEAST_PROBABILITY]
-        yield _candidates((likely or report["candidates"])[:_MOST_CANDIDATES])
+        likely = [item for item in report["candidates"] if (item["probability"] or 0.0) >= _MIN_PROBABILITY]
+        yield _candidates((likely or report["candidates"])[:_MAX_CANDIDATES])
     if report["maps"] is not None:
         yield _maps(report["maps"])
     if report["baseline"]["where"]:
@@ -104,7 +104,7 @@ def _tables(residuals: Mapping[str, Any]) -> tuple[_Table, _Table]:
 
 
 def _thinned(table: _Table) -> _Table:
-    size = max(1, math.ceil(max(map(len, table), default=0) / _MOST_CELLS))
+    size = max(1, math.ceil(max(map(len, table), default=0) / _MAX_CELLS))
     return [[_mean(line[start : start + size]) for start in range(0, len(line), size)] for line in table]
 
 

@@ -35,7 +35,7 @@ def refresh(
     scheduler: Scheduler = "local",
     quiet: Annotated[bool, typer.Option("--quiet", help="Print changes only")] = False,
 ) -> None:
-    """Learn every kind's prior anew, and update the predictions of clutches whose prior has changed."""
+    """Learn every kind's prior again, and update the predictions of clutches whose prior has changed."""
     from service.work.background import in_background  # start-up time
     from service.work.progress import progress  # start-up time
 

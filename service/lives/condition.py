@@ -14,7 +14,7 @@ from models.prognosis.criteria import FEWEST_TESTS, HORIZON
 from models.prognosis.first_passage import PassageStatus
 from service.columns import whole
 from service.errors import Notice
-from service.lives.criteria import MOST_LINE_POINTS, NEAR_LIMIT, SOON
+from service.lives.criteria import MAX_LINE_POINTS, NEAR_LIMIT, SOON
 from service.lives.history import WORN, Event, Series, date_of
 from service.lives.payloads import ENDED, INSUFFICIENT
 
@@ -332,7 +332,7 @@ def recent(events: Sequence[Event], series: Series) -> dict[str, Any]:
     """
     last = max(events, key=lambda event: event.moment)
     values = [measurement.value for measurement in series.measurements]
-    step = -(-len(values) // MOST_LINE_POINTS)  # rounded up
+    step = -(-len(values) // MAX_LINE_POINTS)  # rounded up
     return {
         "last_run": {
             "run_id": last.run_id,

@@ -17,9 +17,9 @@ POOR_FIT = 0.02
 OTHER_OIL = 10.0
 #: Least deviation of a mean torque, as a share of the torque [-]: a smaller one that was sent counts as this. Chosen; no
 #: table.
-LEAST_TORQUE_SD = 1e-4
+MIN_TORQUE_SD = 1e-4
 #: Pressure levels of one test [-]; more is a continuous pressure and no stationary test. Chosen: above any known protocol.
-MOST_LEVELS = 100
+MAX_LEVELS = 100
 #: Weighted draws of eq. 6's coefficients behind a stored prediction [-]. Chosen: `make score PARTS=exact`.
 PREDICTION_DRAWS = 1000
 #: Particles of a filter at least, however many draws of an adopted model they are shared among [-]. Chosen; no table: the
@@ -42,13 +42,13 @@ TRAJECTORY_DRAWS, TRAJECTORY_LATTICE = 400, (13, 13, 7)
 COURSE_PROBES = 40
 #: Samples of sampled records that are kept in memory at 40 bytes each: of one record, and of all of a campaign together.
 #: Chosen: 80 MB and 240 MB, within the memory that a diagnosis is given.
-MOST_OF_RECORD, MOST_OF_CAMPAIGN = 2_000_000, 6_000_000
+MAX_OF_RECORD, MAX_OF_CAMPAIGN = 2_000_000, 6_000_000
 #: Points of mean COF in the short line of a list [-]. Chosen: its width in pixels.
-MOST_LINE_POINTS = 32
+MAX_LINE_POINTS = 32
 
-#: How often a clutch is computed anew by `replay` or `fleet refresh` where runs come meanwhile. Chosen: at a run each time
+#: How often a clutch is computed again by `replay` or `fleet refresh` where runs come meanwhile. Chosen: at a run each time
 #: it could go on for ever.
-MOST_ATTEMPTS = 3
+MAX_ATTEMPTS = 3
 
 #: A clutch's state is "maintenance required" where less than this share of its life is left at the safe bound. Chosen, on 40
 #: simulated lives of eq. 6 and 39 real filters, at every test from the third on: 0.2 calls for maintenance in 213 of

@@ -12,7 +12,7 @@ from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
 from service.columns import CHANNELS, PLATE_TEMPERATURES, content_with_columns, instant
 from service.errors import FieldError, InvalidError
-from service.lives.criteria import LEAST_TORQUE_SD, MOST_LEVELS
+from service.lives.criteria import MAX_LEVELS, MIN_TORQUE_SD
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,7 +149,7 @@ def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
     if deviation is not None:
         under_load = si["pressure_bar"] >= UNLOADED
         torque = si["torque_nm"][under_load] if under_load.any() else si["torque_nm"]
-        deviation = np.maximum(deviation, LEAST_TORQUE_SD * float(np.sqrt(np.mean(torque**2))))
+        deviation = np.maximum(deviation, MIN_TORQUE_SD * float(np.sqrt(np.mean(torque**2))))
     return Plateaus(
         pressure=si["pressure_bar"],
         speed=si["speed_rpm"],
@@ -193,8 +193,8 @@ def _require_readings(channels: Mapping[str, FloatArray]) -> None:
 def _require_curve(torque: FloatArray, speed: FloatArray, pressure: FloatArray) -> None:
     if torque.size == 1:
         _refuse("torque_nm", torque, "too_few_points", "a Stribeck curve needs more than one point")
-    if np.unique(levels_of(pressure * CHANNELS["pressure_bar"].factor)).size > MOST_LEVELS:
-        _refuse("pressure_bar", pressure, "too_many_levels", f"a test may have at most {MOST_LEVELS} pressure levels")
+    if np.unique(levels_of(pressure * CHANNELS["pressure_bar"].factor)).size > MAX_LEVELS:
+        _refuse("pressure_bar", pressure, "too_many_levels", f"a test may have at most {MAX_LEVELS} pressure levels")
     if (speed == speed[0]).all():
         _refuse("speed_rpm", speed, "speeds_all_equal", "a Stribeck curve needs more than one speed")
 

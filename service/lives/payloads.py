@@ -32,7 +32,7 @@ OFF_TRACK = "off_track"
 NOT_EQ_6 = "not_eq6"
 #: The warning of a prediction whose forerunners held too few of the tests since.
 MISSED_FORECASTS = "missed_forecasts"
-#: Warnings of a run in its clutch's history, written anew where the history changes: it arrived after a run of more cycles,
+#: Warnings of a run in its clutch's history, written again where the history changes: it arrived after a run of more cycles,
 #: its pressures or its oil temperature are not those of the first test, its mean COF is not what those before it predict.
 LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE = "late_arrival", "other_pressures", "other_oil_temperature"
 OF_HISTORY = LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE, OFF_TRACK
@@ -81,7 +81,7 @@ def late_arrival(cycles: float, latest: float) -> list[Notice]:
     """A run that arrived after another of more cycles; `latest` are the most of those that were there."""
     if cycles >= latest:
         return []
-    message = f"the run's {cycles:g} cycles lie before the latest known {latest:g}: all was tracked anew"
+    message = f"the run's {cycles:g} cycles lie before the latest known {latest:g}: all was tracked again"
     return [Notice(code=LATE, message=message)]
 
 
@@ -347,7 +347,7 @@ def history_warnings(
     }
 
 
-def warned_anew(
+def warned_again(
     lives: Sequence[Life], off_track: Mapping[str, list[dict[str, str]]], receipts: Mapping[str, dict[str, Any]]
 ) -> dict[str, dict[str, Any]]:
     """The receipts whose warnings of the history change."""

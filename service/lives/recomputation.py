@@ -1,4 +1,4 @@
-"""A clutch's state as one value, and everything that is computed of it anew; nothing here reads or writes a database.
+"""A clutch's state as one value, and everything that is computed of it again; nothing here reads or writes a database.
 
 A workflow loads a `ClutchState`, computes `Results` with the functions below, and stores them in one short transaction that
 checks that the state's revision is still the newest. An `Arrival` is a run as it comes in, among the stored ones.
@@ -33,7 +33,7 @@ from service.lives.history import (
 )
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
-from service.lives.payloads import OF_HISTORY, OFF_TRACK, fit_items, loop_items, warned_anew
+from service.lives.payloads import OF_HISTORY, OFF_TRACK, fit_items, loop_items, warned_again
 from service.lives.run_analysis import Analysis, LevelFit, loops_of, mean_cofs
 from service.lives.tracks import CARRIED, Prediction, States, follow
 from service.schemas.clutch import ClutchIn
@@ -128,29 +128,29 @@ class ClutchState:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracking:
     """Predictions after events, the filters' states after the last, and by run_id the warnings of the predictions right
-    after tests; `anew` where all that was predicted before is replaced."""
+    after tests; `again` where all that was predicted before is replaced."""
 
     predictions: tuple[Prediction, ...] = ()
     filters: States = field(default_factory=dict)
     warnings: Mapping[str, list[dict[str, str]]] = field(default_factory=dict)
-    anew: bool = True
+    again: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
     """What is to be stored of a clutch: mean COFs by run_id beside their levels, receipts that change, corrected mean COFs
-    (in place of all where `corrected_anew`), the tracking and the summary (None: it stays)."""
+    (in place of all where `corrected_again`), the tracking and the summary (None: it stays)."""
 
     levels: Levels = field(default_factory=dict)
     cofs: Mapping[str, ByPressure] = field(default_factory=dict)
     receipts: Mapping[str, Receipt] = field(default_factory=dict)
     corrected: Mapping[str, Corrected] = field(default_factory=dict)
-    corrected_anew: bool = False
+    corrected_again: bool = False
     tracking: Tracking | None = None
     summary: dict[str, Any] | None = None
 
 
-def computed_anew(
+def computed_again(
     state: ClutchState,
     levels: Levels,
     receipts: Mapping[str, Receipt],
@@ -159,22 +159,22 @@ def computed_anew(
     *,
     evaluated: Mapping[str, str | None],
 ) -> tuple[ClutchState, Results]:
-    """Mean COFs over the protocol of each life, freed of the artefacts of the model in force, and all tracked anew.
+    """Mean COFs over the protocol of each life, freed of the artefacts of the model in force, and all tracked again.
 
     `levels` and `receipts` are those of all runs; `tests` the stationary tests of the present life, read only where a model
-    is in force; `evaluated` as `loops_anew` takes it. Returns the state with its mean COFs, and what is to be stored.
+    is in force; `evaluated` as `loops_again` takes it. Returns the state with its mean COFs, and what is to be stored.
     """
     final, cofs, corrected = with_cofs(state, levels, tests, reader)
     fresh = {run_id: receipts[run_id] | {"fits": fit_items(levels[run_id], cofs[run_id])} for run_id in cofs}
-    for run_id, items in loops_anew(final, levels, reader, evaluated).items():
+    for run_id, items in loops_again(final, levels, reader, evaluated).items():
         fresh[run_id] = receipts[run_id] | {"loops": items}
     tracking = track(final)
     results = Results(
         levels={run_id: levels[run_id] for run_id in cofs},
         cofs=cofs,
-        receipts=fresh | warned_anew(final.lives, tracking.warnings, {**receipts, **fresh}),
+        receipts=fresh | warned_again(final.lives, tracking.warnings, {**receipts, **fresh}),
         corrected=corrected,
-        corrected_anew=True,
+        corrected_again=True,
         tracking=tracking,
     )
     return final, results
@@ -184,7 +184,7 @@ def with_cofs(
     state: ClutchState, levels: Levels, tests: Iterable[StationaryRun], reader: RunReader
 ) -> tuple[ClutchState, dict[str, ByPressure], dict[str, Corrected]]:
     """The state with the mean COFs of its events, those that the fits give by run_id, and those that the model in force
-    corrects; arguments as of `computed_anew`."""
+    corrects; arguments as of `computed_again`."""
     cofs = _all_cofs(state.lives, levels, state.geometry)
     events = tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in state.events)
     plain = replace(state, events=events)
@@ -211,7 +211,7 @@ def computed_aside(state: ClutchState, event: Event, levels: Levels, reader: Run
     evaluated = stationary_tests_of(among.events)
     evaluated.pop(event.run_id, None)
     cofs = cofs_among(state, event, own)
-    loops = loops_anew(among, levels, reader, evaluated)
+    loops = loops_again(among, levels, reader, evaluated)
     return cofs, {"fits": fit_items(own, cofs), "loops": loops.get(event.run_id, [])}
 
 
@@ -283,7 +283,7 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
         predictions=tuple(predictions.values()),
         filters=filters,
         warnings=warnings,
-        anew=carried is None,
+        again=carried is None,
     )
 
 
@@ -302,7 +302,7 @@ def _carried(state: ClutchState, life: Life, whole: Series, newest: Event) -> St
     return None if any(tracked.runs != before for tracked in state.filters.values()) else state.filters
 
 
-def loops_anew(
+def loops_again(
     state: ClutchState, levels: Levels, reader: RunReader, evaluated: Mapping[str, str | None]
 ) -> dict[str, list[dict[str, Any]]]:
     """run_id -> loops of the dynamic tests that have another stationary test than that which they were `evaluated` against,

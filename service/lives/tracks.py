@@ -2,7 +2,7 @@
 stored.
 
 A run that comes last in order of cycles carries the stored filter states one step on; any other run makes the life be
-tracked anew from its first test. Both ways give the same answer: the random numbers of a step depend on clutch, series and
+tracked again from its first test. Both ways give the same answer: the random numbers of a step depend on clutch, series and
 step alone. Where a fleet's prior stands beside the weak one a filter runs under both, and its draws are put together by
 their evidence (`models.prognosis.fleet`).
 """
@@ -38,7 +38,7 @@ FilterState = ParticleState | UkfState | GridState
 _GRID = Grid()
 _TRACKERS: Mapping[str, Tracker[Any]] = {tracker.name: tracker for tracker in (Particle(), Ukf(), _GRID)}
 METHODS = tuple(_TRACKERS)
-#: The exact filter is laid anew over the whole history at each step, and computed when it is asked for: these carry a
+#: The exact filter is laid again over the whole history at each step, and computed when it is asked for: these carry a
 #: state from run to run, and their predictions are stored with each.
 CARRIED = tuple(method for method in METHODS if method != _GRID.name)
 
@@ -143,7 +143,7 @@ def advance(
     """Carry one filter on until it has taken in the first `runs` measurements of the series.
 
     A `back_cast` that is known from another filter takes the place of its own. States that were made of other measurements
-    or under other priors are not carried on: then the filter starts anew.
+    or under other priors are not carried on: then the filter starts again.
     """
     branches = _branches(series, assumptions)
     if tracked is not None and not _continues(tracked, branches):

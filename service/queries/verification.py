@@ -91,7 +91,7 @@ def _file_finding(file: Stored | None, run_id: str, wanted: str) -> str | None:
 #: processors, and a filter of a hundred steps multiplies that.
 _SAME = 1e-6
 #: Findings that are listed of a clutch. Chosen: the first ones tell, and all runs follow from a wrong one.
-_MOST_LISTED = 10
+_MAX_LISTED = 10
 
 #: Results by what they are of: a run's receipt, its fits, a prediction.
 _Results = Mapping[str, tuple[str, Any]]
@@ -106,32 +106,32 @@ class CheckedResults:
 
 
 def check_results(database: Database, clutch_id: str) -> CheckedResults:
-    """All results of a clutch computed anew and compared; those of earlier releases need not be the same."""
+    """All results of a clutch computed again and compared; those of earlier releases need not be the same."""
     while True:
         with database.reading() as connection:
             state = records.state(connection, clutch_id)
             stored = _stored(connection, clutch_id)
         try:
-            anew = _anew(stored_runs.recomputed(stored_runs.recorded(database, state)))
+            again = _recomputed(stored_runs.recomputed(stored_runs.recorded(database, state)))
         except (InvalidError, DamagedData) as error:
-            return CheckedResults(findings=(f"{clutch_id}: results cannot be computed anew: {error}",), earlier={})
+            return CheckedResults(findings=(f"{clutch_id}: results cannot be computed again: {error}",), earlier={})
         with database.reading() as connection:
             if records.unchanged(connection, clutch_id, state.revision):
-                return _compared(clutch_id, stored, anew)
+                return _compared(clutch_id, stored, again)
 
 
-def _compared(clutch_id: str, stored: _Results, anew: Mapping[str, Any]) -> CheckedResults:
+def _compared(clutch_id: str, stored: _Results, again: Mapping[str, Any]) -> CheckedResults:
     earlier = Counter(version for version, _ in stored.values() if version != CODE_VERSION)
-    lines = [f"{name} is stored and does not follow from the runs" for name in stored.keys() - anew.keys()]
-    lines += [f"{name} follows from the runs and is not stored" for name in anew.keys() - stored.keys()]
-    for name in stored.keys() & anew.keys():
+    lines = [f"{name} is stored and does not follow from the runs" for name in stored.keys() - again.keys()]
+    lines += [f"{name} follows from the runs and is not stored" for name in again.keys() - stored.keys()]
+    for name in stored.keys() & again.keys():
         version, result = stored[name]
-        place = _difference(result, anew[name]) if version == CODE_VERSION else None
+        place = _difference(result, again[name]) if version == CODE_VERSION else None
         if place is not None:
-            lines.append(f"{name} differs when it is computed anew: {place}")
+            lines.append(f"{name} differs when it is computed again: {place}")
     lines = sorted(lines) if not earlier else sorted(line for line in lines if "differs" in line)
-    more = [f"and {len(lines) - _MOST_LISTED} more"] if len(lines) > _MOST_LISTED else []
-    findings = tuple(f"{clutch_id}: {line}" for line in [*lines[:_MOST_LISTED], *more])
+    more = [f"and {len(lines) - _MAX_LISTED} more"] if len(lines) > _MAX_LISTED else []
+    findings = tuple(f"{clutch_id}: {line}" for line in [*lines[:_MAX_LISTED], *more])
     return CheckedResults(findings=findings, earlier=earlier)
 
 
@@ -148,7 +148,7 @@ def _stored(connection: Connection, clutch_id: str) -> _Results:
     return named
 
 
-def _anew(computed: stored_runs.Recomputed) -> dict[str, Any]:
+def _recomputed(computed: stored_runs.Recomputed) -> dict[str, Any]:
     named = {f"the receipt of run {run_id}": _plain(receipt) for run_id, receipt in computed.receipts.items()}
     cofs = {**computed.aside, **computed.results.cofs}
     for run_id, levels in {**computed.levels, **computed.results.levels}.items():
@@ -173,16 +173,16 @@ def _plain(result: Any) -> Any:
     return json.loads(to_text(result))
 
 
-def _difference(stored: Any, anew: Any, place: str = "") -> str | None:
+def _difference(stored: Any, again: Any, place: str = "") -> str | None:
     """The first place where two results differ by more than the last digits, with both values; None where none does."""
-    if isinstance(stored, dict) and isinstance(anew, dict) and stored.keys() == anew.keys():
-        pairs = [(stored[name], anew[name], f"{place}/{name}") for name in stored]
-    elif isinstance(stored, list) and isinstance(anew, list) and len(stored) == len(anew):
-        pairs = [(*both, f"{place}/{index}") for index, both in enumerate(zip(stored, anew, strict=True))]
-    elif _are_numbers(stored, anew) and math.isclose(stored, anew, rel_tol=_SAME):
+    if isinstance(stored, dict) and isinstance(again, dict) and stored.keys() == again.keys():
+        pairs = [(stored[name], again[name], f"{place}/{name}") for name in stored]
+    elif isinstance(stored, list) and isinstance(again, list) and len(stored) == len(again):
+        pairs = [(*both, f"{place}/{index}") for index, both in enumerate(zip(stored, again, strict=True))]
+    elif _are_numbers(stored, again) and math.isclose(stored, again, rel_tol=_SAME):
         return None
     else:
-        return None if stored == anew else f"{place or '/'} is {str(stored)[:80]}, computed anew {str(anew)[:80]}"
+        return None if stored == again else f"{place or '/'} is {str(stored)[:80]}, computed again {str(again)[:80]}"
     return next((other for pair in pairs if (other := _difference(*pair)) is not None), None)
 
 

@@ -28,7 +28,7 @@ _NO_RECORDS = (
     ".m",
 )
 _BLOCK = 1 << 20
-_MOST_MEMBERS = 10_000
+_MAX_MEMBERS = 10_000
 
 
 def check_archive(path: Path, limits: Limits) -> list[zipfile.ZipInfo]:
@@ -38,8 +38,8 @@ def check_archive(path: Path, limits: Limits) -> list[zipfile.ZipInfo]:
             listed = archive.infolist()
     except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError) as error:
         raise InvalidError(f"the ZIP archive cannot be read: {error}") from None
-    if len(listed) > _MOST_MEMBERS:
-        raise TooLargeError(f"a ZIP archive must not hold more than {_MOST_MEMBERS} files, got {len(listed)}")
+    if len(listed) > _MAX_MEMBERS:
+        raise TooLargeError(f"a ZIP archive must not hold more than {_MAX_MEMBERS} files, got {len(listed)}")
     packed, most = path.stat().st_size, most_unpacked(path, limits)
     if sum(info.file_size for info in listed) > most:
         raise TooLargeError(f"a ZIP archive of {packed} bytes must not unpack to more than {most} bytes, got more")

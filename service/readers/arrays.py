@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import MOST_QUOTED, FieldError, InvalidError, Notice
+from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice
 from service.readers.column_names import column_of, known_channel
 from service.readers.limits import Limits
 from service.readers.table import Clock, Column, Reading, Table, only
@@ -44,7 +44,7 @@ _GAINS, _OFFSETS = ("gain", "scale", "factor", "slope", "multiplier", "sensitivi
 _CHARACTERS = "SUO"
 #: Folders in folders, at most. Chosen: recorders have three.
 _DEEPEST = 8
-_MOST_MATRIX_COLUMNS = 200
+_MAX_MATRIX_COLUMNS = 200
 
 Tree = Mapping[str, Any]
 
@@ -145,7 +145,7 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
         yield source
         return
     shape = tuple(size for size in leaf.data.shape if size > 1)
-    if len(shape) != 2 or leaf.data.dtype.kind not in "iuf" or min(shape) > _MOST_MATRIX_COLUMNS:
+    if len(shape) != 2 or leaf.data.dtype.kind not in "iuf" or min(shape) > _MAX_MATRIX_COLUMNS:
         return
     across = 0 if shape[0] < shape[1] else 1
     width = shape[across]
@@ -218,7 +218,7 @@ def _stated(held: Mapping[str, Any], names: str) -> float | None:
         unit = unit or next((_text(stated) for stated in beside if _text(stated)), "")
         factor = _factor(names, unit)
         if factor is None:
-            message = f"the unit of {key} must be known, got {unit[:MOST_QUOTED]!r}"
+            message = f"the unit of {key} must be known, got {unit[:MAX_QUOTED]!r}"
             raise InvalidError(message, errors=[FieldError(pointer="", code="unknown_unit", message=message)])
         return number * factor
     return None

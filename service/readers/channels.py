@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from service.columns import LineOf, check_arrays
-from service.errors import MOST_QUOTED, FieldError, InvalidError, Notice, TooLargeError
+from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice, TooLargeError
 from service.readers.column_names import Taken, choose, is_counter, known_channel
 from service.readers.limits import Limits
 from service.readers.numerals import Numerals
@@ -28,7 +28,7 @@ _LEADING = ("torque_nm", "speed_rpm", "pressure_bar")
 #: Steps of the time that repeated titles may interrupt a table for. Chosen: a printed page takes none, a new test minutes.
 _LONGEST_PAUSE = 10
 #: Columns that one notice names.
-_MOST_NAMED = 20
+_MAX_NAMED = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +96,7 @@ def labels(table: Table) -> dict[str, str]:
         if len(cells) == 1:
             cells = [part.strip() for part in re.split(r"[:=]", cells[0], maxsplit=1)]
         if len(cells) > 1:
-            values_by_label.setdefault(cells[0][:MOST_QUOTED], cells[1][:MOST_QUOTED])
+            values_by_label.setdefault(cells[0][:MAX_QUOTED], cells[1][:MAX_QUOTED])
     return values_by_label
 
 
@@ -115,7 +115,7 @@ def _clocks(columns: Sequence[Column], taken: Sequence[Taken]) -> dict[int, int 
             clocks[column.index] = columns[column.index].clock or (times[0] if len(times) == 1 else None)
     unused = [index for index in times if index not in clocks.values()]
     if unused and len(times) > 1:
-        shown = " and ".join(columns[index].shown() for index in times[:_MOST_NAMED])
+        shown = " and ".join(columns[index].shown() for index in times[:_MAX_NAMED])
         message = f"time_s must be one column, got {shown}; time=NAME chooses one"
         raise InvalidError(message, errors=[FieldError(pointer="/time", code="ambiguous", message=message)])
     return clocks
@@ -213,8 +213,8 @@ def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Readin
     ]
     if not others:
         return []
-    more = f" and {len(others) - _MOST_NAMED} more" if len(others) > _MOST_NAMED else ""
-    message = f"columns that are no channel were left out: {', '.join(others[:_MOST_NAMED])}{more}"
+    more = f" and {len(others) - _MAX_NAMED} more" if len(others) > _MAX_NAMED else ""
+    message = f"columns that are no channel were left out: {', '.join(others[:_MAX_NAMED])}{more}"
     return [Notice(code=LEFT_OUT, message=message)]
 
 
@@ -319,7 +319,7 @@ def _brought(series: Mapping[str, _Series], leading: str, kept: NDArray[np.bool_
         if name != leading and not _same_clock(own, lead) and own.times is not None:
             step = _step(own.times)
             rates.append(f"{name} ({own.values.size} samples, {step:.6g} s apart, from {own.times[0]:.9g} s)")
-    shown = ", ".join(rates)[: 5 * MOST_QUOTED]
+    shown = ", ".join(rates)[: 5 * MAX_QUOTED]
     cut = int(np.count_nonzero(~kept))
     more = f"; {cut} of {kept.size} samples outside the time that all have in common were left out" if cut else ""
     message = f"brought to the times of {leading} by straight lines between their own samples: {shown}{more}"

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from service.columns import CHANNELS
-from service.errors import MOST_QUOTED, FieldError, InvalidError
+from service.errors import MAX_QUOTED, FieldError, InvalidError
 from service.readers.limits import LONGEST_MAP, LONGEST_NAME, LONGEST_TITLE, LONGEST_UNIT
 from service.readers.table import NO_TIME, Choice, Column, Reading
 from service.readers.unit_table import Conversion, conversion, is_unit, spellings
@@ -44,7 +44,7 @@ _WORDS = {
 _SECONDS = frozenset({"x_value", "timestamps"})
 
 #: Columns that one message names.
-_MOST_NAMED = 10
+_MAX_NAMED = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ def column_of(text: str, unit: str | None = None, group: str = "") -> Column:
     """
     title = text.strip()
     if len(title) > LONGEST_TITLE:
-        shown = title[:MOST_QUOTED]
+        shown = title[:MAX_QUOTED]
         message = (
             f"a column's title must not be longer than {LONGEST_TITLE} characters, got {len(title)}: {shown!r} ..."
         )
@@ -152,7 +152,7 @@ def with_unit(column: Column, unit: str | None) -> Column:
     if stated and column.unit and stated != column.unit:
         channel = known_channel(column.name)
         if channel is None or conversion(channel, stated) != conversion(channel, column.unit):
-            both = f"{column.unit[:MOST_QUOTED]!r} and {stated[:MOST_QUOTED]!r}"
+            both = f"{column.unit[:MAX_QUOTED]!r} and {stated[:MAX_QUOTED]!r}"
             message = f"column {column.shown()!r} must be in one unit, got {both}"
             raise InvalidError(
                 message, errors=[FieldError(pointer="", code="mixed_units", message=message, value=both)]
@@ -184,9 +184,9 @@ def parse_map(mapping: str | None) -> dict[str, Choice]:
 
 
 def _wrong_map(value: str, rule: str) -> InvalidError:
-    message = f"map {rule}, got {value[:MOST_QUOTED]!r}"
+    message = f"map {rule}, got {value[:MAX_QUOTED]!r}"
     return InvalidError(
-        message, errors=[FieldError(pointer="/map", code="invalid_map", message=message, value=value[:MOST_QUOTED])]
+        message, errors=[FieldError(pointer="/map", code="invalid_map", message=message, value=value[:MAX_QUOTED])]
     )
 
 
@@ -286,18 +286,18 @@ def _find(columns: Sequence[Column], channel: str, name: str) -> int:
         if matches:
             raise _twice(channel, *(columns[index] for index in matches))
     message = (
-        f"map names for {channel} the column {name[:MOST_QUOTED]!r}, which is not there; there are {_list(columns)}"
+        f"map names for {channel} the column {name[:MAX_QUOTED]!r}, which is not there; there are {_list(columns)}"
     )
     raise InvalidError(
-        message, errors=[FieldError(pointer="/map", code="no_such_column", message=message, value=name[:MOST_QUOTED])]
+        message, errors=[FieldError(pointer="/map", code="no_such_column", message=message, value=name[:MAX_QUOTED])]
     )
 
 
 def _twice(channel: str, *columns: Column) -> InvalidError:
     names = [column.shown() for column in columns]
     if len(set(names)) < len(names):
-        names = [column.title[:MOST_QUOTED] or column.shown() for column in columns]
-    shown = " and ".join(names[:_MOST_NAMED])
+        names = [column.title[:MAX_QUOTED] or column.shown() for column in columns]
+    shown = " and ".join(names[:_MAX_NAMED])
     distinct = len(set(names)) == len(names)
     way = f"map={channel}:NAME chooses one" if distinct else "their names must differ"
     message = f"{channel} must be one column, got {shown}; {way}"
@@ -307,8 +307,8 @@ def _twice(channel: str, *columns: Column) -> InvalidError:
 
 
 def _list(columns: Sequence[Column]) -> str:
-    shown = ", ".join(repr(column.shown()) for column in columns[:_MOST_NAMED])
-    return shown if len(columns) <= _MOST_NAMED else f"{shown} and {len(columns) - _MOST_NAMED} more"
+    shown = ", ".join(repr(column.shown()) for column in columns[:_MAX_NAMED])
+    return shown if len(columns) <= _MAX_NAMED else f"{shown} and {len(columns) - _MAX_NAMED} more"
 
 
 def unit_in_title(channel: str, title: str) -> str | None:
@@ -341,7 +341,7 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
     wanted = choice.unit or (None if choice.column == column.title else column_of(choice.column).unit)
     if wanted and stated not in (None, choice.stated) and conversion(channel, stated) != conversion(channel, wanted):
         rule = f"must be {wanted}, as its profile or map says"
-        raise _wrong_unit(channel, column, "mixed_units", rule, repr(stated[:MOST_QUOTED]))
+        raise _wrong_unit(channel, column, "mixed_units", rule, repr(stated[:MAX_QUOTED]))
     unit = wanted or stated
     if unit is None and not public and (word := _may_state(channel, column.name)):
         rule = f"may be {word}: map={channel}:{column.name} [{word}], or [{CHANNELS[channel].unit}], says which"
@@ -361,10 +361,10 @@ def _conversion(channel: str, column: Column, choice: Choice | None, unit: str |
         converted = conversion(channel, unit)
     if converted is None:
         rule = f"must be a known one ({spellings(channel)})"
-        raise _wrong_unit(channel, column, "unknown_unit", rule, repr((unit or "")[:MOST_QUOTED]))
+        raise _wrong_unit(channel, column, "unknown_unit", rule, repr((unit or "")[:MAX_QUOTED]))
     if public and not converted.is_identity() and choice is None:
         rule = f"is in {own} by its name"
-        raise _wrong_unit(channel, column, "mixed_units", rule, repr((unit or "")[:MOST_QUOTED]))
+        raise _wrong_unit(channel, column, "mixed_units", rule, repr((unit or "")[:MAX_QUOTED]))
     if choice is not None:
         converted = Conversion(converted.factor * choice.factor, converted.offset * choice.factor + choice.offset)
     return converted
@@ -374,6 +374,6 @@ def _wrong_unit(channel: str, column: Column, code: str, rule: str, got: str) ->
     shown = channel if _key(column.name) == channel else f"{channel} (column {column.shown()!r})"
     message = f"{shown}: the unit {rule}, got {got}"
     error = FieldError(
-        pointer=f"/channels/{channel}", code=code, message=message, value=(column.unit or "")[:MOST_QUOTED]
+        pointer=f"/channels/{channel}", code=code, message=message, value=(column.unit or "")[:MAX_QUOTED]
     )
     return InvalidError(message, errors=[error])

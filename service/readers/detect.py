@@ -9,7 +9,7 @@ from enum import StrEnum
 from pathlib import Path, PurePath
 from typing import BinaryIO, Protocol
 
-from service.errors import MOST_QUOTED, InvalidError, TooLargeError
+from service.errors import MAX_QUOTED, InvalidError, TooLargeError
 from service.readers.limits import Limits
 
 
@@ -120,7 +120,7 @@ def sniff(path: Path, filename: str, limits: Limits) -> Format:
     """The format of a file, by content first. Raises InvalidError where it is another one."""
     with opened(path, limits) as source:
         head = source.read(_HEAD)
-    shown = repr(filename[-MOST_QUOTED:])
+    shown = repr(filename[-MAX_QUOTED:])
     suffix = PurePath(filename.lower().removesuffix(".gz")).suffix
     if not head:
         raise InvalidError(f"{shown} must not be empty")

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any
 
-from service.errors import MOST_QUOTED, FieldError, InvalidError, Notice
+from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice
 from service.readers.column_names import bare_unit, column_of, known_channel, recognised
 from service.readers.limits import LONGEST_TITLE
 from service.readers.numerals import is_stamp
@@ -21,11 +21,11 @@ from service.readers.unit_table import is_unit
 Row = Sequence[Any]
 
 #: Rows that are looked at for the table's beginning. Chosen: no recorder writes as many lines above it.
-MOST_ROWS = 500
+MAX_ROWS = 500
 #: Rows of a run by which two candidates are compared; longer ones count the same. Chosen: more than header blocks have.
 _LONG_RUN = 8
 #: Rows of titles and units above the data, at most; blank rows between them do not count.
-_MOST_TITLE_ROWS = 4
+_MAX_TITLE_ROWS = 4
 #: What a row begins with that names the units of the columns beside it.
 _UNIT_LABELS = re.compile(r"(y_)?units?(_label)?s?:?|einheit(en)?:?|单位", re.IGNORECASE)
 NUMERIC = re.compile(
@@ -167,7 +167,7 @@ def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) 
             break
         if not is_blank(rows[index]):
             text_rows.append(index)
-        if len(text_rows) == _MOST_TITLE_ROWS:
+        if len(text_rows) == _MAX_TITLE_ROWS:
             break
     return text_rows
 
@@ -210,7 +210,7 @@ def _are_units(texts: Sequence[str]) -> bool:
 
 def _units(rows: Sequence[Row], below: Sequence[int], at: int, start: int) -> list[str]:
     """The units beside the titles in row `at`: a row of them under it or above it, or a row that is labelled so."""
-    texts = {index: [_text(cell) for cell in rows[index]] for index in range(max(0, start - MOST_ROWS), start)}
+    texts = {index: [_text(cell) for cell in rows[index]] for index in range(max(0, start - MAX_ROWS), start)}
     candidates = [index for index in below if texts[index] != texts[at]]
     best = max(candidates, key=lambda index: sum(map(is_unit, filter(None, texts[index]))), default=None)
     if best is None and at and _are_units(texts[at - 1]):
@@ -225,12 +225,12 @@ def _units(rows: Sequence[Row], below: Sequence[int], at: int, start: int) -> li
 
 def left_out(number: int, where: str, first: str) -> Notice:
     """The notice of lines that are no rows of the table."""
-    message = f"{number} lines {where} the table were left out, the first: {first.strip()[:MOST_QUOTED]!r}"
+    message = f"{number} lines {where} the table were left out, the first: {first.strip()[:MAX_QUOTED]!r}"
     return Notice(code="lines_left_out", message=message)
 
 
 def no_table(line: int, got: str) -> InvalidError:
     """The error of a text or sheet without a row of titles over numbers."""
-    shown = got.strip()[:MOST_QUOTED]
+    shown = got.strip()[:MAX_QUOTED]
     message = f"line {line} must be a header with the channels' names, above rows of numbers, got {shown!r}"
     return InvalidError(message, errors=[FieldError(pointer="", code="no_header", message=message, value=shown)])

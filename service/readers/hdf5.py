@@ -14,13 +14,13 @@ from service.readers.limits import Limits
 from service.readers.table import Reading, Table
 
 #: Groups in groups, and objects of a file, that are looked at. Chosen: recorders have three and hundreds.
-_DEEPEST, _MOST_OBJECTS = 8, 20_000
+_DEEPEST, _MAX_OBJECTS = 8, 20_000
 
 
 def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     """The table of the file's data sets."""
     file = h5py.File(path, "r")
-    return table_of(_folder(file, 0, [_MOST_OBJECTS]), reading, limits)
+    return table_of(_folder(file, 0, [_MAX_OBJECTS]), reading, limits)
 
 
 def _folder(group: h5py.Group, depth: int, left: list[int]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from asammdf.blocks import v4_constants as v4c
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import MOST_QUOTED, FieldError, InvalidError, Notice
+from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice
 from service.readers.column_names import choices_of, column_of
 from service.readers.limits import Limits
 from service.readers.table import Clock, Column, Reading, Table, cut_short
@@ -87,7 +87,7 @@ def _times(file: Any, group: int) -> FloatArray:
     unit = str(file.get_channel_unit(group=group, index=master) or "s")
     converted = conversion("time_s", unit)
     if converted is None:
-        message = f"the unit of the time of {_name(file, group)!r} must be known, got {unit[:MOST_QUOTED]!r}"
+        message = f"the unit of the time of {_name(file, group)!r} must be known, got {unit[:MAX_QUOTED]!r}"
         raise InvalidError(message, errors=[FieldError(pointer="", code="unknown_unit", message=message)])
     times = np.array(file.get_master(group), dtype=np.float64)
     converted.apply(times)
@@ -115,7 +115,7 @@ def _refuse_formula(file: Any, group: int, index: int) -> None:
     channel = file.groups[group].channels[index]
     if _has_formula(channel.conversion):
         message = (
-            f"{channel.name[:MOST_QUOTED]} is converted by a formula (MDF4 algebraic conversion), which is not computed "
+            f"{channel.name[:MAX_QUOTED]} is converted by a formula (MDF4 algebraic conversion), which is not computed "
             "here: record it with a linear, rational or tabular conversion, or export its physical values"
         )
         raise InvalidError(message, errors=[FieldError(pointer="", code="algebraic_conversion", message=message)])

@@ -16,7 +16,7 @@ import pydantic_core
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError
+from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
 
 #: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_arrays` refuses with their row. Digits
 #: are never given back, or a long run of them with a letter behind it would be tried from every digit to every other.
@@ -94,7 +94,7 @@ class Numerals:
             values = self._floats(cells) if values is None else values
             for row, rule in self._wrong(cells, name == "time_s") if values is None else ():
                 total += 1
-                if total <= MOST_ERRORS:
+                if total <= MAX_ERRORS:
                     wrong.append((before + row, name, _shown(cells[row]), rule))
             if values is not None:
                 read[index] = values
@@ -162,7 +162,7 @@ class Numerals:
 
 
 def _shown(cell: Any) -> str:
-    return str("" if cell is None else cell).strip()[:MOST_QUOTED]
+    return str("" if cell is None else cell).strip()[:MAX_QUOTED]
 
 
 #: What helps where a cell is empty.
@@ -310,7 +310,7 @@ class Stamps:
         for written in dates:
             self._orders = {order for order in self._orders if _day_by(written, order) is not None} or self._orders
         if len(self._orders) > 1 and len(dates | {written for written in self._dates if "/" in written}) > 1:
-            shown = min(dates)[:MOST_QUOTED]
+            shown = min(dates)[:MAX_QUOTED]
             message = (
                 f"the dates of the time column may be day/month or month/day, got {shown!r}: write them as 2026-11-02"
             )

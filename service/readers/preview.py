@@ -3,14 +3,14 @@
 from typing import Any
 
 from service.columns import CHANNELS
-from service.errors import MOST_QUOTED, InvalidError
+from service.errors import MAX_QUOTED, InvalidError
 from service.readers.channels import labels
 from service.readers.column_names import choices_of, choose, known_channel
 from service.readers.table import Reading, Table
 from service.readers.unit_table import conversion
 
 #: Lines above the table that are shown. Chosen: a screenful.
-_MOST_LINES = 50
+_MAX_LINES = 50
 
 
 def preview(table: Table, reading: Reading) -> dict[str, Any]:
@@ -48,10 +48,10 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
     return {
         "table": table.name,
         "tables": list(table.others),
-        "above": [[cell[:MOST_QUOTED] for cell in row] for row in table.above[-_MOST_LINES:]],
+        "above": [[cell[:MAX_QUOTED] for cell in row] for row in table.above[-_MAX_LINES:]],
         "labels": labels(table),
         "first_line": table.first_line,
-        "head": [[cell[:MOST_QUOTED] for cell in row] for row in table.head],
+        "head": [[cell[:MAX_QUOTED] for cell in row] for row in table.head],
         "columns": columns,
         "problem": problem,
         "notices": [{"code": notice.code, "message": notice.message} for notice in table.notices],

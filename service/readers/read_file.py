@@ -22,7 +22,7 @@ from service.readers.table import Reading, only
 from service.readers.text import read_text
 
 #: Files of an archive that are tried, to find the one that holds channels. Chosen; a rig's folder of one test has few.
-_MOST_TRIED = 10
+_MAX_TRIED = 10
 Read = TypeVar("Read")
 
 
@@ -70,7 +70,7 @@ def _in_archive(path: Path, reading: Reading, limits: Limits, read: Callable[...
         return _member(path, within[0], replace(reading, table=reading.table[len(within[0]) + 1 :]), limits, read)
     records: dict[str, Read] = {}
     refused: dict[str, InvalidError] = {}
-    for name in names[:_MOST_TRIED]:
+    for name in names[:_MAX_TRIED]:
         try:
             records[name] = _member(path, name, reading, limits, read)
         except InvalidError as error:

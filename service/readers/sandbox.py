@@ -49,11 +49,11 @@ _BLOCK = 1 << 20
 #: What the reading process writes first, when its library is loaded.
 _STARTED = b"started\n"
 #: Characters of a foreign library's message that ours quotes, and of a whole message.
-_MOST_QUOTED, _LONGEST_DETAIL = 200, 4000
+_MAX_QUOTED, _LONGEST_DETAIL = 200, 4000
 #: How C code ends on a file that it does not bear.
 _CRASHES = (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT)
 #: Files that the reading process has open at once. Chosen: importing the libraries takes a dozen.
-_MOST_OPEN_FILES = 64
+_MAX_OPEN_FILES = 64
 #: Added to the limit on reading, for the interpreter to start and import the library.
 _STARTING_SECONDS = 10
 #: Environment variables that the reading process gets; no others, so no keys.
@@ -256,7 +256,7 @@ def _described(channels: Channels) -> dict[str, Any]:
 
 def _without_paths(message: str) -> str:
     """A foreign message without the places of this machine."""
-    return re.sub(r"(/[\w.~+-]+)+/", "", message)[:_MOST_QUOTED]
+    return re.sub(r"(/[\w.~+-]+)+/", "", message)[:_MAX_QUOTED]
 
 
 def _limit(limits: Limits) -> None:
@@ -271,7 +271,7 @@ def _limit(limits: Limits) -> None:
         ),  # first SIGXCPU, which names the cause, then SIGKILL
         (resource.RLIMIT_FSIZE, 8 * limits.most_values + _LONGEST_ANSWER, 0),
         (resource.RLIMIT_CORE, 0, 0),
-        (resource.RLIMIT_NOFILE, _MOST_OPEN_FILES, 0),
+        (resource.RLIMIT_NOFILE, _MAX_OPEN_FILES, 0),
     ):
         resource.setrlimit(which, (most, most + over))
 

@@ -10,7 +10,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import MOST_QUOTED, FieldError, InvalidError, Notice
+from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice
 
 #: Row of a table, from 0 -> its line in the file, from 1.
 LineOf = Callable[[int], int]
@@ -78,7 +78,7 @@ class Column:
 
     def shown(self) -> str:
         """The name for a message."""
-        return f"{self.group}/{self.name}"[:MOST_QUOTED] if self.group else self.name[:MOST_QUOTED]
+        return f"{self.group}/{self.name}"[:MAX_QUOTED] if self.group else self.name[:MAX_QUOTED]
 
 
 #: Reads columns [n] by their index, each with the channel that it is for: `time_s` may be points in time, and errors name
@@ -117,8 +117,8 @@ def only(names: Sequence[str], wanted: str, kind: str) -> int:
             return int(wanted) - 1
     elif len(names) == 1:
         return 0
-    shown = ", ".join(repr(name[:MOST_QUOTED]) for name in names[:10]) + (" ..." if len(names) > 10 else "")
-    missing = f"has no {kind} {wanted[:MOST_QUOTED]!r}" if wanted else f"holds {len(names)} {kind}s with channels"
+    shown = ", ".join(repr(name[:MAX_QUOTED]) for name in names[:10]) + (" ..." if len(names) > 10 else "")
+    missing = f"has no {kind} {wanted[:MAX_QUOTED]!r}" if wanted else f"holds {len(names)} {kind}s with channels"
     message = f"the file {missing}: table=NAME chooses one of {shown}"
     raise InvalidError(message, errors=[FieldError(pointer="/table", code="which_table", message=message)])
 

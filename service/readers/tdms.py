@@ -13,7 +13,7 @@ from nptdms import TdmsFile  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import MOST_QUOTED, FieldError, InvalidError
+from service.errors import MAX_QUOTED, FieldError, InvalidError
 from service.readers.column_names import column_of
 from service.readers.limits import Limits
 from service.readers.table import Clock, Column, Reading, Table, cut_short
@@ -73,7 +73,7 @@ def _clock(channel: Any, start: Any, earliest: Any) -> Clock | None:
     converted = conversion("time_s", unit)
     if converted is None:
         if str(properties.get("wf_xname") or "").strip().lower() in ("", "time"):
-            name, shown = channel.name[:MOST_QUOTED], unit[:MOST_QUOTED]
+            name, shown = channel.name[:MAX_QUOTED], unit[:MAX_QUOTED]
             message = f"{name}: the unit of the waveform's time must be known, got {shown!r}"
             raise InvalidError(message, errors=[FieldError(pointer="", code="unknown_unit", message=message)])
         return None

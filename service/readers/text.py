@@ -22,10 +22,10 @@ import pydantic_core
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError, Notice, TooLargeError
+from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, Notice, TooLargeError
 from service.readers.column_names import choices_of, is_counter, recognised
 from service.readers.detect import ByteSource
-from service.readers.grid import MOST_ROWS, Layout, find_table, is_footer, left_out, no_table
+from service.readers.grid import MAX_ROWS, Layout, find_table, is_footer, left_out, no_table
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
 from service.readers.numerals import NUMBER, Numerals, is_stamp
 from service.readers.table import Clock, Column, Reading, Table
@@ -39,7 +39,7 @@ _ENCODINGS = ("cp1252", "gb18030", "shift_jis", "euc_jp", "big5", "euc_kr", "cp1
 #: Pairs of bytes as Chinese text has them, and single ones as Western text has them.
 _CHINESE = re.compile(rb"(?:[\x00-\x7f]|[\xa1-\xf7][\xa1-\xfe])*")
 #: Lines that one cell in quotes may go over, in the rows of titles.
-_MOST_CELL_LINES = 5
+_MAX_CELL_LINES = 5
 
 #: Opens the file's bytes from their beginning.
 Open = Callable[[], AbstractContextManager[ByteSource]]
@@ -129,7 +129,7 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[str]:
             end = text.rfind("\n", 0, text.rfind('"', 0, end)) + 1
         if len(text) - end > LONGEST_LINE_BYTES + _BLOCK * ('"' in text[end:]):
             rule = f"must not be longer than {LONGEST_LINE_BYTES} bytes"
-            raise wrong_line(line + text.count("\n", 0, end), rule, "line_too_long", text[end : end + MOST_QUOTED])
+            raise wrong_line(line + text.count("\n", 0, end), rule, "line_too_long", text[end : end + MAX_QUOTED])
         if last:
             text += "" if end == len(text) else "\n"
             end = len(text)
@@ -199,23 +199,23 @@ def _form(first: bytes, reading: Reading, limits: Limits) -> _Form:
 
 def _separators(lines: Sequence[str], skipped: int) -> list[str]:
     """The separators that are tried: the one that the text names, or all that it holds."""
-    for line in lines[skipped : skipped + MOST_ROWS]:
+    for line in lines[skipped : skipped + MAX_ROWS]:
         if re.fullmatch(r"sep=.?", line.strip(), re.IGNORECASE):
             return [line.strip()[4:] or "\t"]
-    held = [separator for separator in "\t;,|" if any(separator in line for line in lines[:MOST_ROWS])]
-    return [*held, "  ", " "] if any(" " in line.strip() for line in lines[:MOST_ROWS]) else held or [","]
+    held = [separator for separator in "\t;,|" if any(separator in line for line in lines[:MAX_ROWS])]
+    return [*held, "  ", " "] if any(" " in line.strip() for line in lines[:MAX_ROWS]) else held or [","]
 
 
 def _with_separator(encoding: str, separator: str, lines: list[str], reading: Reading) -> _Form | None:
     rows: list[list[str]] = []
     at: list[int] = []
     comments = set()
-    numbered = enumerate(lines[: reading.skip_rows + MOST_ROWS])
+    numbered = enumerate(lines[: reading.skip_rows + MAX_ROWS])
     for index, line in numbered:
         if index < reading.skip_rows or re.fullmatch(r"sep=.?", line.strip(), re.IGNORECASE):
             continue
         whole, begun = line, index
-        while whole.count('"') % 2 and separator.strip() and index - begun < _MOST_CELL_LINES:
+        while whole.count('"') % 2 and separator.strip() and index - begun < _MAX_CELL_LINES:
             following = next(numbered, None)
             if following is None:
                 break
@@ -256,7 +256,7 @@ def _cells(line: str, separator: str) -> list[str]:
 
 def wrong_line(line: int, rule: str, code: str, got: str = "") -> InvalidError:
     """The error of a line that cannot be part of a table; `line` counts from 1."""
-    shown = got[:MOST_QUOTED]
+    shown = got[:MAX_QUOTED]
     message = f"line {line} {rule}" + (f", got {shown!r}" if got else "")
     return InvalidError(message, errors=[FieldError(pointer="", code=code, message=message, value=shown)])
 
@@ -446,7 +446,7 @@ class _Body:
                 if len(errors) == 1
                 else f"; {len(errors)} errors up to line {self.lines.of(self._rows + len(rows) - 1)}"
             )
-            raise InvalidError(errors[0].message + more, errors=errors[:MOST_ERRORS], total=len(errors))
+            raise InvalidError(errors[0].message + more, errors=errors[:MAX_ERRORS], total=len(errors))
         columns = [[cells[index] for cells in rows] for index in channels]
         return self._numerals.values(channels, columns, self.lines.of, self._rows)
 
@@ -459,7 +459,7 @@ class _Body:
         return len(cells) == self._width
 
     def _ragged(self, row: int, cells: Sequence[str]) -> FieldError:
-        line = (self._separator or " ").join(cells)[:MOST_QUOTED]
+        line = (self._separator or " ").join(cells)[:MAX_QUOTED]
         message = f"line {self.lines.of(row)} must have {self._width} cells, got {len(cells)}: {line!r}"
         if recognised(cells, ()) > 1:
             message += ": another table begins there, send it in a file of its own"

@@ -15,12 +15,12 @@ from python_calamine import CalamineWorkbook, SheetTypeEnum
 from service.errors import InvalidError
 from service.readers.archive import check_archive
 from service.readers.column_names import choices_of, recognised
-from service.readers.grid import MOST_ROWS, Layout, find_table, is_blank, is_footer, is_value, left_out, no_table
+from service.readers.grid import MAX_ROWS, Layout, find_table, is_blank, is_footer, is_value, left_out, no_table
 from service.readers.limits import Limits
 from service.readers.table import Reading, Table, only
 
 #: Rows of data that a person is shown.
-_MOST_SHOWN = 20
+_MAX_SHOWN = 20
 
 
 def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
@@ -41,7 +41,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         rows: list[Sequence[Any]] = [
             _trimmed(row) for row in book.get_sheet_by_name(name).to_python(skip_empty_area=False)
         ]
-        layout = find_table(rows[reading.skip_rows : reading.skip_rows + MOST_ROWS], frozenset(), named)
+        layout = find_table(rows[reading.skip_rows : reading.skip_rows + MAX_ROWS], frozenset(), named)
         if layout is None:
             line = next((index for index, row in enumerate(rows) if not is_blank(row)), 0)
             refused.append(no_table(line + 1, " ".join(map(str, rows[line] if rows else ()))))
@@ -106,9 +106,9 @@ def _table(
         read=read,
         name=name,
         others=sheets,
-        above=tuple(tuple(map(_shown, row)) for row in rows[max(titles - MOST_ROWS, 0) : titles]),
+        above=tuple(tuple(map(_shown, row)) for row in rows[max(titles - MAX_ROWS, 0) : titles]),
         first_line=start + 1,
-        head=tuple(tuple(map(_shown, rows[line])) for line in lines[:_MOST_SHOWN]),
+        head=tuple(tuple(map(_shown, rows[line])) for line in lines[:_MAX_SHOWN]),
         line_of=line_of,
         breaks=breaks[:-1],
         notices=notices,

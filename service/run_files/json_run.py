@@ -15,14 +15,14 @@ import pydantic
 import pydantic_core
 
 from service.columns import CHANNELS, check_columns
-from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError
+from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
 from service.lives.history import END_OF_LIFE, WORN
 from service.lives.incoming_run import IncomingRun, name_run
-from service.schemas.limits import LONGEST_NOTE, MOST_MARKS
+from service.schemas.limits import LONGEST_NOTE, MAX_MARKS
 from service.schemas.run import RUN_IN, DutyRunIn, MaintenanceRunIn
 
 #: Items of a list and characters of a name that are checked by a schema: more than a message quotes.
-_MOST_SHOWN = 100
+_MAX_SHOWN = 100
 
 #: Byte order marks that are not UTF-8's; that of UTF-16 in little-endian order begins that of UTF-32.
 _MARKS = (
@@ -84,7 +84,7 @@ def checked(schema: type[Body], body: bytes) -> Body:
 def _parsed(body: bytes, read: Callable[[Any], Answer]) -> Answer:
     """What `read` makes of the body's value, in memory of some ten times its size. Raises InvalidError."""
     body = _in_utf8(body)
-    if sum(map(body.count, (b'"', b"[", b"{"))) > MOST_MARKS:
+    if sum(map(body.count, (b'"', b"[", b"{"))) > MAX_MARKS:
         raise _too_many_marks(body, read)
     try:
         sent = pydantic_core.from_json(body)
@@ -101,7 +101,7 @@ def _too_many_marks(body: bytes, read: Callable[[Any], object]) -> InvalidError:
     A value in memory is some fifty bytes, whether the body spends two on it or twenty: such a body is not parsed whole.
     """
     try:
-        end = next(islice(re.finditer(rb'["\[{]', body), MOST_MARKS, None)).start()
+        end = next(islice(re.finditer(rb'["\[{]', body), MAX_MARKS, None)).start()
         head = pydantic_core.from_json(body[:end], allow_partial=True)
         for look in (_check_channels, read):
             try:
@@ -113,7 +113,7 @@ def _too_many_marks(body: bytes, read: Callable[[Any], object]) -> InvalidError:
                     return InvalidError(f"{errors[0].message}; {total} errors or more", errors=errors, total=total)
     except ValueError:
         pass  # nested too deeply, or no JSON from its beginning on
-    message = f"the body must not hold more than {MOST_MARKS} quotation marks and opening brackets, got more"
+    message = f"the body must not hold more than {MAX_MARKS} quotation marks and opening brackets, got more"
     return InvalidError(message, errors=[FieldError(pointer="", code="too_many_marks", message=message)])
 
 
@@ -168,16 +168,16 @@ def _validated(validate: Callable[[bytes], Answer], sent: object) -> Answer:
 
 def _cut(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name[:_MOST_SHOWN]: _cut(item) for name, item in value.items()}
+        return {name[:_MAX_SHOWN]: _cut(item) for name, item in value.items()}
     if isinstance(value, list):
-        return [item if type(item) is float else _cut(item) for item in value[:_MOST_SHOWN]]
+        return [item if type(item) is float else _cut(item) for item in value[:_MAX_SHOWN]]
     return value[: LONGEST_NOTE + 1] if isinstance(value, str) else value
 
 
 def _invalid(error: pydantic.ValidationError) -> InvalidError:
     """pydantic's errors as the service's: pointer, row, value, rule."""
     details = error.errors(include_url=False, include_context=False)
-    errors = [_field_error(item["loc"], item["type"], item["msg"], item["input"]) for item in details[:MOST_ERRORS]]
+    errors = [_field_error(item["loc"], item["type"], item["msg"], item["input"]) for item in details[:MAX_ERRORS]]
     more = f"; {len(details)} errors in all" if len(details) > 1 else ""
     return InvalidError(errors[0].message + more, errors=errors, total=len(details))
 
@@ -189,7 +189,7 @@ def _field_error(loc: tuple[int | str, ...], code: str, rule: str, value: object
         value = value.get("kind", "") if isinstance(value, dict) else value
     pointer = "".join(f"/{str(part).replace('~', '~0').replace('/', '~1')}" for part in place)
     name = ".".join(str(part) for part in place) or "the body"
-    shown = "" if code == "missing" else repr(value)[:MOST_QUOTED]
+    shown = "" if code == "missing" else repr(value)[:MAX_QUOTED]
     rule = rule.removeprefix("Value error, ")
     message = f"{name}: {rule}" + (f", got {shown}" if shown and "got" not in rule else "")
     row = place[-1] + 1 if place and isinstance(place[-1], int) else None

@@ -24,7 +24,7 @@ INSPECTIONS = "inspections"
 #: What was hidden in a simulated campaign: for who rehearses a diagnosis, and no run.
 ANSWER = "answer.json"
 #: Cycles from which a file is not taken for a run. Chosen: far beyond what the service accepts (`schemas.limits`).
-_MOST_CYCLES = 1e15
+_MAX_CYCLES = 1e15
 _NEEDED, _OPTIONAL = ("file", "kind", "cycles"), ("run_id", "origin", "started_at", "map")
 _RECORDS = (
     ".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tdms", ".mf4", ".mdf", ".parquet", ".xlsx", ".xls", ".ods", ".mat",
@@ -120,7 +120,7 @@ def _entry(manifest: Path, index: int, entry: object) -> tuple[Path, dict[str, s
         rule = f"must hold {', '.join(_NEEDED)} and at most {', '.join(_OPTIONAL)}"
         raise ValueError(f"{at} {rule}, got {str(entry)[:80]}")
     cycles = entry["cycles"]
-    if isinstance(cycles, bool) or not isinstance(cycles, int | float) or not 0 <= cycles < _MOST_CYCLES:
+    if isinstance(cycles, bool) or not isinstance(cycles, int | float) or not 0 <= cycles < _MAX_CYCLES:
         raise ValueError(f"{at}: cycles must be a number that is not negative, got {cycles!r}")
     for name in entry.keys() - {"cycles"}:
         if not isinstance(entry[name], str) or not entry[name]:
@@ -146,4 +146,4 @@ def _cycles(path: Path) -> float:
     except (ValueError, RecursionError):
         return math.inf
     cycles = body.get("cycles") if isinstance(body, dict) else None
-    return float(cycles) if isinstance(cycles, int | float) and abs(cycles) < _MOST_CYCLES else math.inf
+    return float(cycles) if isinstance(cycles, int | float) and abs(cycles) < _MAX_CYCLES else math.inf

@@ -11,11 +11,11 @@ from pathlib import PurePath
 
 from service.errors import FieldError, InvalidError
 from service.readers.unit_table import conversion, spellings
-from service.schemas.limits import MOST_CYCLES
+from service.schemas.limits import MAX_CYCLES
 from service.schemas.rig import RigProfile
 
 #: Places of a pattern that may match in several ways. Chosen: matching takes time with that power of the name's length.
-_MOST_WILD = 4
+_MAX_WILD = 4
 _WILD = re.compile(r"\{cycles\}|\{kind\}|\{run_id\}|\*")
 _MEANING = {
     "{cycles}": r"(?P<cycles>\d{1,12}k?)(?!\d)",
@@ -51,8 +51,8 @@ def require_usable(profile: RigProfile) -> None:
         return
     places = _WILD.findall(pattern)
     rule = None
-    if len(places) > _MOST_WILD:
-        rule = f"may hold at most {_MOST_WILD} of {', '.join(_MEANING)}"
+    if len(places) > _MAX_WILD:
+        rule = f"may hold at most {_MAX_WILD} of {', '.join(_MEANING)}"
     elif any(places.count(name) > 1 for name in _MEANING if name != "*"):
         rule = "may hold each of {cycles}, {kind} and {run_id} once"
     elif "{kind}" in places and not profile.kinds:
@@ -97,7 +97,7 @@ def pattern_for(filename: str, cycles: float | None) -> str | None:
     for place in range(1, len(parts), 2):
         parts[place] = "{cycles}" if place == places[0] else "*"
     pattern = re.sub(r"\*[-_.: ]*(?=\*)", "", "".join(parts))
-    return pattern if len(_WILD.findall(pattern)) <= _MOST_WILD else None
+    return pattern if len(_WILD.findall(pattern)) <= _MAX_WILD else None
 
 
 def _is(part: str, whole: str, thousands: str | None) -> bool:
@@ -120,7 +120,7 @@ def _count(text: str | None) -> float | None:
     if not _NUMBER.fullmatch(plain):
         return None
     value = times * float(re.sub(r"\D", "", plain))
-    return value if value <= MOST_CYCLES else None
+    return value if value <= MAX_CYCLES else None
 
 
 def fits(profile: RigProfile, titles: Collection[str]) -> bool:

@@ -11,7 +11,7 @@ from service.schemas.limits import (
     LONGEST_ADDRESS,
     LONGEST_NAME,
     LONGEST_SECRET,
-    MOST_SPEED_RPM,
+    MAX_SPEED_RPM,
     SHORTEST_SECRET,
 )
 
@@ -87,7 +87,7 @@ class AlarmIn(Schema):
         description="States or verdicts that raise it; left out: every state but `normal`, every verdict by which data and "
         "model disagree",
     )
-    speed_rpm: Annotated[PositiveNumber, Field(le=MOST_SPEED_RPM)] = Field(
+    speed_rpm: Annotated[PositiveNumber, Field(le=MAX_SPEED_RPM)] = Field(
         default=100.0, description="Speed at which the shudder margin is taken, rpm"
     )
     hysteresis: Annotated[NotNegativeNumber, Field(le=1.0)] = Field(

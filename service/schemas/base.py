@@ -21,7 +21,7 @@ from service.schemas.limits import (
     LARGEST_NUMBER,
     LATEST_START,
     LONGEST_REASON,
-    MOST_CYCLES,
+    MAX_CYCLES,
 )
 
 
@@ -41,7 +41,7 @@ class Answer(BaseModel):
 
 Identifier = Annotated[str, StringConstraints(pattern=IDENTIFIER_PATTERN)]
 
-Cycles = Annotated[float, Field(ge=0, le=MOST_CYCLES, allow_inf_nan=False, strict=True), PlainSerializer(whole)]
+Cycles = Annotated[float, Field(ge=0, le=MAX_CYCLES, allow_inf_nan=False, strict=True), PlainSerializer(whole)]
 
 PositiveNumber = Annotated[float, Field(gt=0, le=LARGEST_NUMBER, allow_inf_nan=False, strict=True)]
 NotNegativeNumber = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_nan=False, strict=True)]

@@ -286,7 +286,7 @@ class JobIn(Schema):
     """A job that is asked for."""
 
     kind: Literal["replay", "fleet_refresh"] = Field(
-        description="`replay`: results anew from the raw runs; `fleet_refresh`: what clutches of a kind share"
+        description="`replay`: results are recomputed from the raw runs; `fleet_refresh`: what clutches of a kind share"
     )
     clutch_id: Identifier | None = Field(
         default=None, description="The clutch that is replayed; null or left out, all. A fleet refresh is of all"
@@ -319,7 +319,7 @@ class LeftClutch(Answer):
 class JobResult(Answer):
     """What a replay or a fleet refresh did."""
 
-    replayed: int | None = Field(default=None, description="Clutches whose results were computed anew, of a replay")
+    replayed: int | None = Field(default=None, description="Clutches whose results were recomputed, of a replay")
     kinds: int | None = Field(default=None, description="Kinds that have a new version of their prior, of a refresh")
     changed: int | None = Field(default=None, description="Clutches whose predictions have changed, of a refresh")
     left: int = Field(description="Clutches that keep what they had")

@@ -10,12 +10,12 @@ from pydantic import Field, model_validator
 from service.schemas.base import Answer, ClutchName, NotNegativeNumber, Origin, PositiveNumber, Revision, Schema
 from service.schemas.limits import (
     LARGEST_LIMIT,
-    LEAST_BLOCK_CYCLES,
-    LEAST_PLANNED_KJ,
-    MOST_BLOCKS,
-    MOST_CRITERION_PRESSURE_BAR,
-    MOST_CYCLES,
-    MOST_SPEED_RPM,
+    MAX_BLOCKS,
+    MAX_CRITERION_PRESSURE_BAR,
+    MAX_CYCLES,
+    MAX_SPEED_RPM,
+    MIN_BLOCK_CYCLES,
+    MIN_PLANNED_KJ,
 )
 from service.schemas.run import EndReason, Warned
 
@@ -70,10 +70,10 @@ class CriterionIn(Schema):
         default=None, description="The life ends when it falls below this value; of a slope 0 where no limit is given"
     )
     above: _Value | None = Field(default=None, description="The life ends when it rises above this value")
-    pressure_bar: Annotated[PositiveNumber, Field(le=MOST_CRITERION_PRESSURE_BAR)] | None = Field(
+    pressure_bar: Annotated[PositiveNumber, Field(le=MAX_CRITERION_PRESSURE_BAR)] | None = Field(
         default=None, description="Line pressure, bar: that of all but mean COF, which left out is the mean over all"
     )
-    speed_rpm: Annotated[PositiveNumber, Field(le=MOST_SPEED_RPM)] | None = Field(
+    speed_rpm: Annotated[PositiveNumber, Field(le=MAX_SPEED_RPM)] | None = Field(
         default=None, description="Speed of a slope, rpm"
     )
     frequency_hz: PositiveNumber | None = Field(default=None, description="Frequency of a quantity of loops, Hz")
@@ -345,10 +345,10 @@ class RemainingLife(Answer):
 class PlannedBlock(Schema):
     """Duty cycles that are planned alike. What states no severity is as severe as recent duty."""
 
-    cycles: Annotated[PositiveNumber, Field(ge=LEAST_BLOCK_CYCLES, le=MOST_CYCLES)] = Field(
+    cycles: Annotated[PositiveNumber, Field(ge=MIN_BLOCK_CYCLES, le=MAX_CYCLES)] = Field(
         description="Duty cycles in the block"
     )
-    energy_per_cycle_kj: Annotated[PositiveNumber, Field(ge=LEAST_PLANNED_KJ)] | None = Field(
+    energy_per_cycle_kj: Annotated[PositiveNumber, Field(ge=MIN_PLANNED_KJ)] | None = Field(
         default=None, description="Energy to be dissipated in a duty cycle, kJ"
     )
     sd: NotNegativeNumber = Field(
@@ -378,7 +378,7 @@ class PlannedBlock(Schema):
 class ProgrammeIn(Schema):
     """Blocks that are run one after the other, and from the first one again until the end of life."""
 
-    programme: Annotated[tuple[PlannedBlock, ...], Field(min_length=1, max_length=MOST_BLOCKS)] = Field(
+    programme: Annotated[tuple[PlannedBlock, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = Field(
         description="The blocks of duty"
     )
     pace_cycles_per_hour: PositiveNumber | None = Field(

@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 
 #: Duty cycles since new, or in one block.
-MOST_CYCLES = 1e12
+MAX_CYCLES = 1e12
 #: Any other positive number of a request (energy in kJ, speed in rpm, duration in s, pressure in bar, viscosity in cSt).
 LARGEST_NUMBER = 1e12
 
@@ -11,17 +11,17 @@ LARGEST_NUMBER = 1e12
 EARLIEST_START, LATEST_START = datetime(1900, 1, 1, tzinfo=UTC), datetime(9998, 12, 31, tzinfo=UTC)
 
 #: Diameters and radii of the disc, mm.
-LEAST_LENGTH_MM, MOST_LENGTH_MM = 0.1, 1e5
+MIN_LENGTH_MM, MAX_LENGTH_MM = 0.1, 1e5
 #: Outer less inner diameter, mm: a narrower ring is mistyped.
-LEAST_WIDTH_MM = 0.1
+MIN_WIDTH_MM = 0.1
 #: Friction faces of one clutch.
-MOST_FRICTION_FACES = 1000
+MAX_FRICTION_FACES = 1000
 #: Lining pressure over line pressure.
-LEAST_PRESSURE_FACTOR, MOST_PRESSURE_FACTOR = 1e-6, 1e6
+MIN_PRESSURE_FACTOR, MAX_PRESSURE_FACTOR = 1e-6, 1e6
 #: Time constant of the torque channel's own low-pass, ms: a slower one would hide the swing of a dynamic test (0.1 Hz).
-MOST_TORQUE_FILTER_MS = 1000
+MAX_TORQUE_FILTER_MS = 1000
 #: Exponent of the severity of a duty cycle.
-MOST_SEVERITY_EXPONENT = 10
+MAX_SEVERITY_EXPONENT = 10
 
 #: Characters of a material's or fluid's name, a maintenance note, the reason of a change, a diagnosis' name, a file's name
 #: and a map of channels.
@@ -37,27 +37,27 @@ IDENTIFIER_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._:@+-]{0,127}$"
 #: Characters of a number in an address. Derived: the longest that a 64-bit float is written in has 24.
 LONGEST_NUMBER = 32
 #: Quotation marks and opening brackets of a JSON body. Derived: those of a note that consists of them, and as many again.
-MOST_MARKS = 10_000
+MAX_MARKS = 10_000
 #: Samples of a channel that a plot may ask for: more than any screen has pixels; all samples need no argument.
-MOST_POINTS = 1_000_000
+MAX_POINTS = 1_000_000
 #: The limits of a criterion: its number of either sign, its place, and how many a clutch may have. Chosen: beyond any rig.
-LARGEST_LIMIT, MOST_CRITERION_PRESSURE_BAR, MOST_SPEED_RPM, MOST_CRITERIA = 1e9, 1e4, 1e6, 8
+LARGEST_LIMIT, MAX_CRITERION_PRESSURE_BAR, MAX_SPEED_RPM, MAX_CRITERIA = 1e9, 1e4, 1e6, 8
 #: The skewness of a surface profile, of either sign. Derived: of n heights it is at most √n, and no profile has 1e8 of them.
 LARGEST_SKEWNESS = 1e4
 #: Bytes of a photograph, and photographs of one inspection. Chosen: twice what a camera of 24 megapixels writes as JPEG; a
 #: place on each of eight radii of both sides of three discs.
-MOST_PHOTOGRAPH_BYTES, MOST_PHOTOGRAPHS = 16 << 20, 48
+MAX_PHOTOGRAPH_BYTES, MAX_PHOTOGRAPHS = 16 << 20, 48
 #: Joint draws of a track's coefficients: beyond what the sample behind it holds they would repeat.
-MOST_DRAWS = 1_000
+MAX_DRAWS = 1_000
 #: Blocks of a programme of planned duty.
-MOST_BLOCKS = 1000
+MAX_BLOCKS = 1000
 #: The fewest cycles of a planned block, and its least energy a cycle, kJ: less is mistyped.
-LEAST_BLOCK_CYCLES, LEAST_PLANNED_KJ = 1, 1e-6
+MIN_BLOCK_CYCLES, MIN_PLANNED_KJ = 1, 1e-6
 #: Characters that a list is searched for, and items that it may pass over.
-LONGEST_SEARCH, MOST_OFFSET = 200, 10_000_000
+LONGEST_SEARCH, MAX_OFFSET = 200, 10_000_000
 #: Characters of a column's title in a rig profile, columns of one, lines above its table, and words that stand for a kind of
 #: run. Derived: what the readers take as a title, and as many columns as they read; chosen: more than any rig has.
-LONGEST_TITLE, MOST_COLUMNS, MOST_SKIPPED, MOST_WORDS = 1000, 1000, 10_000, 20
+LONGEST_TITLE, MAX_COLUMNS, MAX_SKIPPED, MAX_WORDS = 1000, 1000, 10_000, 20
 #: Characters of a receiver's address and of the secret that signs what it is sent. Chosen: a query of tokens fits, and what
 #: is shorter can be guessed.
 LONGEST_ADDRESS, SHORTEST_SECRET, LONGEST_SECRET = 2000, 8, 200

@@ -14,11 +14,11 @@ from service.schemas.limits import (
     LONGEST_MAP,
     LONGEST_NUMBER,
     LONGEST_SEARCH,
-    MOST_CYCLES,
-    MOST_DRAWS,
-    MOST_OFFSET,
-    MOST_POINTS,
-    MOST_SKIPPED,
+    MAX_CYCLES,
+    MAX_DRAWS,
+    MAX_OFFSET,
+    MAX_POINTS,
+    MAX_SKIPPED,
 )
 
 
@@ -44,7 +44,7 @@ Points = Annotated[
     SHORT,
     Field(
         ge=1,
-        le=MOST_POINTS,
+        le=MAX_POINTS,
         description="Samples of each channel at most, for a plot: of a sampled record those are answered where a channel is "
         "lowest or highest within its bin, and the first and the last; left out, all. Plateaus and Parquet are whole",
     ),
@@ -74,7 +74,7 @@ LifeNumber = Annotated[
     ),
 ]
 Draws = Annotated[
-    int, SHORT, Field(ge=0, le=MOST_DRAWS, description="Joint draws of the coefficients of eq. 6 for each track")
+    int, SHORT, Field(ge=0, le=MAX_DRAWS, description="Joint draws of the coefficients of eq. 6 for each track")
 ]
 RunKind = Annotated[
     Literal["stationary_stribeck", "dynamic_stribeck", "duty_cycles", "run_in", "maintenance"] | None,
@@ -109,7 +109,7 @@ Offset = Annotated[
     int,
     SHORT,
     Field(
-        ge=0, le=MOST_OFFSET, description="Clutches to pass over, to show a part of the list; a walk takes the cursor"
+        ge=0, le=MAX_OFFSET, description="Clutches to pass over, to show a part of the list; a walk takes the cursor"
     ),
 ]
 
@@ -124,7 +124,7 @@ FileCycles = Annotated[
     SHORT,
     Field(
         ge=0,
-        le=MOST_CYCLES,
+        le=MAX_CYCLES,
         allow_inf_nan=False,
         description="Duty cycles since new when the run is made; left out, as the rig's profile finds them",
     ),
@@ -151,7 +151,7 @@ FileDecimal = Annotated[
     Literal["", ".", ","], Field(description="The decimal sign; needed where 1.100 may be 1.1 or 1100")
 ]
 FileSkipRows = Annotated[
-    int, SHORT, Field(ge=0, le=MOST_SKIPPED, description="Lines above the table that are not looked at")
+    int, SHORT, Field(ge=0, le=MAX_SKIPPED, description="Lines above the table that are not looked at")
 ]
 FileName = Annotated[str, Field(max_length=LONGEST_FILENAME, description="The sender's name for the file")]
 FileRunId = Annotated[

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from service.schemas.base import Answer, Identifier, Next, Schema
-from service.schemas.limits import LARGEST_NUMBER, LONGEST_NAME, LONGEST_TITLE, MOST_COLUMNS, MOST_SKIPPED, MOST_WORDS
+from service.schemas.limits import LARGEST_NUMBER, LONGEST_NAME, LONGEST_TITLE, MAX_COLUMNS, MAX_SKIPPED, MAX_WORDS
 from service.schemas.run import Fit, Warned
 
 FileKindName = Literal["stationary_stribeck", "dynamic_stribeck"]
@@ -45,7 +45,7 @@ class RigProfile(Schema):
     """How the files of a rig are read. What a request states itself comes before it."""
 
     columns: list[RigColumn] = Field(
-        min_length=1, max_length=MOST_COLUMNS, description="The columns by their titles; others are left out"
+        min_length=1, max_length=MAX_COLUMNS, description="The columns by their titles; others are left out"
     )
     decimal: Literal[".", ","] | None = Field(
         default=None, description="The decimal mark of text files, the other one then separates thousands; null: found"
@@ -54,7 +54,7 @@ class RigProfile(Schema):
         default=None,
         description="The sheet, group or test of a file with several, by its name or its number from 1 on; null: the only",
     )
-    skip_rows: Annotated[int, Field(ge=0, le=MOST_SKIPPED)] = Field(
+    skip_rows: Annotated[int, Field(ge=0, le=MAX_SKIPPED)] = Field(
         default=0, description="Lines above the titles that are not looked at"
     )
     kind: FileKindName | None = Field(default=None, description="The kind of run; null: by `file_name`, or asked for")
@@ -63,7 +63,7 @@ class RigProfile(Schema):
         description="What the file's name says: `{cycles}`, `{kind}`, `{run_id}` and `*` stand for what differs",
     )
     kinds: dict[Text, FileKindName] = Field(
-        default_factory=dict, max_length=MOST_WORDS, description="The words that stand for `{kind}` in the name"
+        default_factory=dict, max_length=MAX_WORDS, description="The words that stand for `{kind}` in the name"
     )
     cycles_cell: Text | None = Field(
         default=None, description="The words above the table beside which the cycles stand, such as `Lastspiele`"

@@ -20,7 +20,7 @@ from service.schemas.base import (
     Schema,
     StartedAt,
 )
-from service.schemas.limits import LONGEST_NOTE, MOST_CYCLES
+from service.schemas.limits import LONGEST_NOTE, MAX_CYCLES
 
 
 class IndicatorEstimate(Answer):
@@ -107,7 +107,7 @@ class DynamicChannels(Schema):
 class Duty(Schema):
     """The block of engagements that ends at the run's `cycles`."""
 
-    cycles: Annotated[PositiveNumber, Field(le=MOST_CYCLES)] = Field(description="Duty cycles in the block")
+    cycles: Annotated[PositiveNumber, Field(le=MAX_CYCLES)] = Field(description="Duty cycles in the block")
     energy_per_cycle_kj: NotNegativeNumber | None = Field(
         default=None, description="Energy dissipated in a duty cycle, kJ"
     )

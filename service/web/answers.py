@@ -26,7 +26,7 @@ from service.errors import UnsupportedMediaTypeError, unknown_clutch
 from service.lists import ALL_ITEMS, Place, from_cursor, sliced
 from service.queries.cache import Answer, Page, name_of, revision_and_json, shared_answer, to_json
 from service.schemas.parameters import ClutchId
-from service.web.auth import Reader, glance_of, name_of_caller
+from service.web.auth import Reader, name_of_caller, snapshot_of
 from service.web.context import Context, Cursor, Whole
 from service.web.limits import LONGEST_WAIT_SECONDS, WAIT_SECONDS
 from service.web.middleware import Again, remember
@@ -89,7 +89,7 @@ def now() -> str:
 
 
 async def answer(request: Request, make: Callable[[], object]) -> Response:
-    """A GET's answer that is made anew each time; its ETag is that of the bytes: it changes when and only when they do."""
+    """A GET's answer that is made again each time; its ETag is that of the bytes: it changes when and only when they do."""
     return tagged(request, Answer.of(await run_in_threadpool(lambda: to_json(make()))), JSON_TYPE)
 
 
@@ -121,8 +121,8 @@ async def clutch_answer(
     held = await kept(context, key, revision, make)
 
     def again(request: Request) -> Response | None:
-        held = context.cache.held(key, glance_of(request).revision)
-        return None if held is None else tagged(request, held, JSON_TYPE, glance_of(request).revision)
+        held = context.cache.held(key, snapshot_of(request).revision)
+        return None if held is None else tagged(request, held, JSON_TYPE, snapshot_of(request).revision)
 
     remember(request, again)
     return tagged(request, held, JSON_TYPE, revision)
@@ -269,7 +269,7 @@ def _computed_again(
     key = (clutch_id, name_of(query), *arguments)
 
     def again(request: Request) -> Response | None:
-        revision = glance_of(request).revision
+        revision = snapshot_of(request).revision
         whole = None if revision is None else context.cache.held(key, revision)
         return None if whole is None else tagged(request, whole, JSON_TYPE, revision)
 
@@ -284,14 +284,14 @@ def preferred_wait(prefer: str | None) -> int | None:
 
 def _revision(request: Request, clutch_id: str) -> int:
     """That of the clutch in the path when the request came in. Raises NotFoundError."""
-    revision = glance_of(request).revision
+    revision = snapshot_of(request).revision
     if revision is None:
         raise unknown_clutch(clutch_id)
     return revision
 
 
 async def table(request: Request, columns: Sequence[str], make: Callable[[], RowsAndNext]) -> Response:
-    """A GET's answer as CSV that is made anew each time, a page of it."""
+    """A GET's answer as CSV that is made again each time, a page of it."""
     return tagged(request, Answer.of(await run_in_threadpool(lambda: encode_page(columns, *make()))), CSV_TYPE)
 
 

@@ -20,7 +20,7 @@ from fastapi import Depends, Request
 from service.errors import FieldError, ForbiddenError, InvalidError, UnauthorizedError
 from service.schemas.limits import LONGEST_IDENTIFIER
 from service.web.context import Context
-from storage.engine.database import Glance, GrantedKey, Question
+from storage.engine.database import GrantedKey, Question, Snapshot
 from storage.keys import KeyRow
 
 Scope = Literal["read", "ingest", "admin"]
@@ -78,25 +78,25 @@ def make_key(
     return text, row
 
 
-def authorise(glance: Glance, caller: Caller, scope: Scope, clutch_id: str | None = None) -> Grant:
+def authorise(snapshot: Snapshot, caller: Caller, scope: Scope, clutch_id: str | None = None) -> Grant:
     """Let the caller pass and return what it may, or raise UnauthorizedError or ForbiddenError.
 
-    `glance` is of the caller's key; `clutch_id` is the clutch that is asked about, None where it is all of them.
+    `snapshot` is of the caller's key; `clutch_id` is the clutch that is asked about, None where it is all of them.
     """
-    grant = identify(glance, caller)
+    grant = identify(snapshot, caller)
     require_scope(grant, scope)
     _require_own(grant, clutch_id)
     return grant
 
 
-def identify(glance: Glance, caller: Caller) -> Grant:
+def identify(snapshot: Snapshot, caller: Caller) -> Grant:
     """Who asks; raises UnauthorizedError, or ForbiddenError where no keys are configured and the caller is not local."""
-    if not glance.keys_are_needed:
+    if not snapshot.keys_are_needed:
         _require_loopback(caller)
         return _LOCAL_GRANT
     if _key_of(caller) is None:
         raise UnauthorizedError("send a key as: Authorization: Bearer KEY")
-    key = glance.key
+    key = snapshot.key
     if key is None:
         raise UnauthorizedError("the key is not known, or was revoked")
     if key.expires_at is not None and key.expires_at <= _stamp(datetime.now(UTC)):
@@ -110,21 +110,21 @@ def _key_of(caller: Caller) -> str | None:
     return text.strip() if scheme.lower() == "bearer" and text else None
 
 
-async def glance_at(request: Request, caller: Caller, clutch_id: str | None) -> Glance:
-    """What is so of the caller's key and the clutch, asked once a request, of which it stays the `glance`."""
+async def snapshot_at(request: Request, caller: Caller, clutch_id: str | None) -> Snapshot:
+    """The caller's key and the clutch's revision, read once a request and kept with it."""
     key = _key_of(caller)
     if clutch_id is not None and len(clutch_id) > LONGEST_IDENTIFIER:
         clutch_id = None  # no clutch is called so, and whoever asks is not known yet
     question = Question(clutch_id, None if key is None else _digest(key))
-    glance = await context_of(request).database.watch.look(question)
-    request.state.glance = glance
-    return glance
+    snapshot = await context_of(request).database.watch.look(question)
+    request.state.snapshot = snapshot
+    return snapshot
 
 
-def glance_of(request: Request) -> Glance:
-    """What was so when the request came in."""
-    glance: Glance = request.state.glance
-    return glance
+def snapshot_of(request: Request) -> Snapshot:
+    """The snapshot of a request."""
+    snapshot: Snapshot = request.state.snapshot
+    return snapshot
 
 
 @lru_cache(maxsize=256)
@@ -221,8 +221,8 @@ def allowed(scope: Scope, *, narrowed: bool = False) -> Callable[[Request], Awai
 
     async def check(request: Request) -> Context:
         context, caller = context_of(request), caller_of(request)
-        glance = getattr(request.state, "glance", None) or await glance_at(request, caller, clutch_of(request))
-        grant = identify(glance, caller)
+        snapshot = getattr(request.state, "snapshot", None) or await snapshot_at(request, caller, clutch_of(request))
+        grant = identify(snapshot, caller)
         require_scope(grant, scope)
         request.state.grant = grant
         if not narrowed:

@@ -17,7 +17,7 @@ from service.lists import ALL_ITEMS, LONGEST_CURSOR
 from service.queries.cache import AnswerCache
 from service.schemas.parameters import SHORT
 from service.settings import Settings
-from service.web.limits import MOST_HORIZONS, MOST_ITEMS, MOST_PRESSURE_BAR, USE_NOTED_SECONDS
+from service.web.limits import MAX_HORIZONS, MAX_ITEMS, MAX_PRESSURE_BAR, USE_NOTED_SECONDS
 from service.web.metrics import Metrics
 from service.web.readiness import Readiness
 from service.web.revalidation import Revalidation
@@ -75,7 +75,7 @@ class Context:
     key_uses: KeyUses = field(default_factory=KeyUses)
 
 
-Limit = Annotated[int, SHORT, Query(ge=1, le=MOST_ITEMS, description="Items a page")]
+Limit = Annotated[int, SHORT, Query(ge=1, le=MAX_ITEMS, description="Items a page")]
 Whole = Annotated[int, SHORT, Query(ge=1, le=ALL_ITEMS, description="Items a page; left out, all of them")]
 Cursor = Annotated[str | None, Query(max_length=LONGEST_CURSOR, description="Where an earlier page ended: its `next`")]
 PressureBar = Annotated[
@@ -83,7 +83,7 @@ PressureBar = Annotated[
     SHORT,
     Query(
         ge=0,
-        le=MOST_PRESSURE_BAR,
+        le=MAX_PRESSURE_BAR,
         allow_inf_nan=False,
         description="A pressure of the first stationary test; left out, their mean",
     ),
@@ -91,7 +91,7 @@ PressureBar = Annotated[
 AtCycles = Annotated[
     float | None,
     SHORT,
-    Query(ge=0, le=HORIZON * MOST_HORIZONS, allow_inf_nan=False, description="As it would have been predicted then"),
+    Query(ge=0, le=HORIZON * MAX_HORIZONS, allow_inf_nan=False, description="As it would have been predicted then"),
 ]
 Prefer = Annotated[
     str | None,

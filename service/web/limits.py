@@ -2,7 +2,7 @@
 
 #: Bytes of answers that are kept together, those that are given while newer ones are computed among them. Chosen: some
 #: hundred pages of `/degradation`.
-MOST_CACHED_BYTES = 120 << 20
+MAX_CACHED_BYTES = 120 << 20
 #: Bytes of JSON from which a run waits among files, lest it hold up short ones. Chosen: plateaus take some 10 kB, a dynamic
 #: test 300.
 LARGE_BODY_BYTES = 1 << 17
@@ -12,19 +12,19 @@ LARGE_BODY_BYTES = 1 << 17
 #: three times while it is passed on.
 MAX_BYTES_IN_MEMORY, MAX_BODIES_IN_MEMORY = 1 << 20, 64 << 20
 #: Bytes of any other body. Chosen: four times a plan of 1,000 blocks; checking the worst takes some 20 ms.
-MOST_SHORT_BODY_BYTES = 1 << 18
+MAX_SHORT_BODY_BYTES = 1 << 18
 #: Addresses whose answers are found again before the request is looked at. Chosen: a page asks for some twenty a clutch.
-MOST_POLLED = 4096
+MAX_POLLED = 4096
 #: Bytes of an answer from which it is packed, and how hard. Chosen: shorter ones fit in two packets of a network anyway; no
 #: table of the level.
-LEAST_PACKED_BYTES, PACKING_LEVEL = 2048, 4
+MIN_PACKED_BYTES, PACKING_LEVEL = 2048, 4
 #: Items a page may hold.
-MOST_ITEMS = 1000
+MAX_ITEMS = 1000
 #: Items of a page where no limit is given.
 USUAL_ITEMS = 100
 #: Pressure [bar] and cycles [-] that an argument may name. Derived: a channel's bound; a million times the horizon.
-MOST_PRESSURE_BAR = 1e4
-MOST_HORIZONS = 1e6
+MAX_PRESSURE_BAR = 1e4
+MAX_HORIZONS = 1e6
 #: Seconds that a POST of a diagnosis waits for its report, and a GET for the newest answer that idle workers compute (whose
 #: processors another service may keep busy), where it does not say, and at most. Chosen: the contract's default; what
 #: proxies usually let pass.
@@ -41,7 +41,7 @@ MAX_AHEAD = 16
 LINGER_SECONDS = 2.0
 #: Callers whose shares are kept, and seconds' worth of requests that one may save up. Chosen: more than there are rigs; a
 #: page loads some hundred files at once.
-MOST_CALLERS, SAVED_SECONDS = 10_000, 2.0
+MAX_CALLERS, SAVED_SECONDS = 10_000, 2.0
 #: Seconds after which a busy service may be asked again.
 RETRY_AFTER_SECONDS = 1
 #: Seconds between two notes of a key's use. Chosen: each is a commit, and whoever looks for unused keys thinks in days.

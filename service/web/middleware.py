@@ -34,7 +34,7 @@ from service.errors import (
 )
 from service.logging import access, log_request, request_id, sane
 from service.web import limits
-from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context_of, glance_at, route_of
+from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context_of, route_of, snapshot_at
 from service.web.files import PARQUET_TYPE
 from service.web.metrics import Metrics
 from service.web.problems import refused, unexpected
@@ -80,7 +80,7 @@ class Shares:
         share = self._shares.get(name)
         if share is None:
             share = self._shares[name] = _Share(limits.SAVED_SECONDS * self.per_second, time.monotonic())
-            while len(self._shares) > limits.MOST_CALLERS:
+            while len(self._shares) > limits.MAX_CALLERS:
                 self._shares.popitem(last=False)
         else:
             self._shares.move_to_end(name)
@@ -102,7 +102,7 @@ class Shares:
         grant = scope.get("state", {}).get("grant")
         if grant is not None and grant.key_id is not None:
             self._keys[sent] = f"key {grant.key_id}"
-            while len(self._keys) > limits.MOST_CALLERS:
+            while len(self._keys) > limits.MAX_CALLERS:
                 self._keys.popitem(last=False)
 
     async def _refuse(self, wait: float, scope: Scope, receive: Receive, send: Send) -> None:
@@ -157,7 +157,7 @@ class BodyLimit:
 
     def __init__(self, app: ASGIApp, most: int, most_file: int, seconds: float) -> None:
         self.app = app
-        short = min(most, limits.MOST_SHORT_BODY_BYTES)
+        short = min(most, limits.MAX_SHORT_BODY_BYTES)
         self.bounds = {
             "/runs/file": _Bound(most_file, 0),
             "/import/preview": _Bound(most_file, 0),
@@ -372,15 +372,15 @@ class Polls:
             self._places[path] = _Place(scope["route"], clutch_of(Request(scope)))
             self._polls[path, _arguments(scope["route"], query)] = again
             for index in (self._places, self._polls):
-                while len(index) > limits.MOST_POLLED:
+                while len(index) > limits.MAX_POLLED:
                     index.popitem(last=False)
 
     async def _answered(self, place: _Place, again: Again, scope: Scope) -> Response | None:
         request = Request(scope)
         try:
             context, caller = context_of(request), caller_of(request)
-            glance = await glance_at(request, caller, place.clutch_id)
-            grant = authorise(glance, caller, "read", place.clutch_id)
+            snapshot = await snapshot_at(request, caller, place.clutch_id)
+            grant = authorise(snapshot, caller, "read", place.clutch_id)
             request.state.grant = grant
             response = again(request)
         except (ServiceError, StorageError):  # the usual way says what is wrong
@@ -457,7 +457,7 @@ class Encodings:
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
-        self.packing = GZipMiddleware(app, limits.LEAST_PACKED_BYTES, limits.PACKING_LEVEL)
+        self.packing = GZipMiddleware(app, limits.MIN_PACKED_BYTES, limits.PACKING_LEVEL)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":

@@ -11,7 +11,7 @@ from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 
 from service.errors import (
-    MOST_ERRORS,
+    MAX_ERRORS,
     ConflictError,
     FieldError,
     ForbiddenError,
@@ -112,7 +112,7 @@ def _request_error(_: Request, error: Exception) -> Response:
     errors = [_argument_error(details) for details in error.errors()]
     more = f"; {len(errors)} errors in all" if len(errors) > 1 else ""
     detail = errors[0].message + more
-    return problem(422, InvalidError.slug, InvalidError.title, detail, tuple(errors[:MOST_ERRORS]), len(errors))
+    return problem(422, InvalidError.slug, InvalidError.title, detail, tuple(errors[:MAX_ERRORS]), len(errors))
 
 
 def _argument_error(details: dict[str, Any]) -> FieldError:

@@ -1,4 +1,4 @@
-"""Work that waits for all other: diagnoses, answers made anew, clutches tracked anew under another fleet prior, replays.
+"""Work that waits for all other: diagnoses, answers made again, clutches tracked again under another fleet prior, replays.
 
 python -m service.work.background MODULE ...    runs a module so, what it imports and all
 """

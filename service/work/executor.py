@@ -127,7 +127,7 @@ class InProcess(Closing):
 
 #: How often the process of an input may end before that is taken for the input's doing. Chosen: as Dask's
 #: `distributed.scheduler.allowed-failures`.
-MOST_LOST = 3
+MAX_LOST = 3
 
 
 class Submitter(Protocol):
@@ -194,7 +194,7 @@ def bounded(
                     result, error = submitter.ended(future)
                 except WorkerLostError as lost:
                     task.lost += 1
-                    if task.lost < MOST_LOST:
+                    if task.lost < MAX_LOST:
                         waiting.append(task)
                         continue
                     result, error = None, lost

@@ -22,7 +22,7 @@ from storage.encoding.json_text import Json, to_text
 
 #: Of what a job's process said, so many bytes are logged: its last ones hold the traceback.
 _TAIL = 8000
-#: Memory that arrays gave back is kept for the next ones: having it mapped anew each time takes as long as what is
+#: Memory that arrays gave back is kept for the next ones: having it mapped again each time takes as long as what is
 #: computed in it.
 _MEMORY = {
     "MALLOC_MMAP_THRESHOLD_": str(32 << 20),

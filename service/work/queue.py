@@ -76,8 +76,8 @@ def workflow_work(function: str) -> Callable[[JobRow, Settings], Work]:
 
 #: How often a job is begun at most. Chosen: whatever ends the service once, as an operator may, is not the job's fault; what
 #: ends it three times is.
-MOST_ATTEMPTS = 3
-GIVEN_UP = f"the service or its database ended {MOST_ATTEMPTS} times while it ran"
+MAX_ATTEMPTS = 3
+GIVEN_UP = f"the service or its database ended {MAX_ATTEMPTS} times while it ran"
 UNSTORED = "its end could not be stored: see the service's log"
 UNDONE = "it could not be done: see the service's log"
 #: A lease is prolonged so many times before it would run out. Chosen: a database that is away for some seconds loses none.
@@ -178,19 +178,19 @@ class JobQueue:
             self._give_up(job, kind)
 
     def _stored(self, job: JobRow, kind: Kind, ended: Mapping[str, Any]) -> None:
-        """Have its end stored, the lease prolonged meanwhile: what is adopted is tracked anew first."""
+        """Have its end stored, the lease prolonged meanwhile: what is adopted is tracked again first."""
         done = threading.Event()
         renewing = threading.Thread(target=self._renew_until, args=(done, job), name="lease", daemon=True)
         renewing.start()
         try:
-            for attempt in range(1, MOST_ATTEMPTS + 1):
+            for attempt in range(1, MAX_ATTEMPTS + 1):
                 try:
                     return kind.finish(job, ended)
                 except BusyError as error:
                     _log.warning(
                         "%s %s: its end could not be stored at attempt %d: %s", job.kind, job.job_id, attempt, error
                     )
-                    if attempt == MOST_ATTEMPTS:
+                    if attempt == MAX_ATTEMPTS:
                         raise
         finally:
             done.set()
@@ -217,7 +217,7 @@ class JobQueue:
 
     def _outcome(self, job: JobRow, kind: Kind) -> dict[str, Any] | None:
         """What its process wrote, or a problem; None where it is not to be ended now: by another service, or later."""
-        if job.attempts > MOST_ATTEMPTS:
+        if job.attempts > MAX_ATTEMPTS:
             return {"problem": GIVEN_UP}
         try:
             with running(kind.work(job, self._settings), self._database.url) as process:

@@ -31,8 +31,8 @@ from storage.engine.database import Database
 
 #: Calls of a lane that wait or run; more are refused as busy. Chosen: a minute of runs at 15 a second is 900. Of what takes
 #: a second or more a call (files that are read, simulations) so few that the last one is answered within a minute.
-_MOST_WAITING = 256
-_MOST_WAITING_LONG = 32
+_MAX_WAITING = 256
+_MAX_WAITING_LONG = 32
 #: [s] How long a call may wait to be begun, and how long a process may say nothing. Derived: both together and the start of
 #: another process are less than the minute for which proxies and clients usually wait.
 PATIENCE = 40.0
@@ -51,7 +51,7 @@ ENDING = "the service is ending"
 
 class Lane(Enum):
     """What waits for what: runs that are taken in, answers that somebody waits for, simulations, long and raw records,
-    files from outside, and answers that are made anew while the last ones are given.
+    files from outside, and answers that are made again while the last ones are given.
 
     The values are by how much a lane's processes yield [nice], None to all others; what takes the write lock yields little.
     Chosen by `make load`.
@@ -182,7 +182,7 @@ class Workers:
         )
         call.answer.set_running_or_notify_cancel()  # nobody who stops waiting stops what is stored
         with self._lock:
-            most = _MOST_WAITING_LONG if lane in _LONG else _MOST_WAITING
+            most = _MAX_WAITING_LONG if lane in _LONG else _MAX_WAITING
             if self._closing or self._calls[lane] >= most:
                 raise BusyError(f"{self._calls[lane]} requests of this kind wait already: ask again in a little while")
             self._count(lane, 1)

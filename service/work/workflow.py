@@ -20,7 +20,7 @@ from storage.engine.errors import DatabaseBusy, StorageUnavailable
 from storage.engine.opening import open_database
 
 #: Of so many clutches that were left it is kept why; of all of them the log says it. Chosen: an answer stays a page.
-MOST_REASONS = 20
+MAX_REASONS = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +62,7 @@ def done(database: Database, task: Task, say: Callable[[Json], None], at_once: A
     for clutch_id, reason in left.items():
         sys.stderr.write(f"{clutch_id}: left as it was: {reason}\n")
     reasons = [{"clutch_id": clutch_id, "reason": reason} for clutch_id, reason in left.items()]
-    return {"result": counts | {"left": len(left), "reasons": reasons[:MOST_REASONS]}, "progress": steps[-1]}
+    return {"result": counts | {"left": len(left), "reasons": reasons[:MAX_REASONS]}, "progress": steps[-1]}
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Adopting what a diagnosis found: from then on a clutch is tracked under the extended model, until it is rebuilt.
 
-An adopted model belongs to the life that was diagnosed. All is computed anew before the database is locked; the version is
+An adopted model belongs to the life that was diagnosed. All is computed again before the database is locked; the version is
 stored with its results, under the revision that they were computed from.
 """
 
@@ -15,7 +15,7 @@ from service.errors import NotFoundError, NothingToAdoptError
 from service.lives.history import stationary_tests_of
 from service.lives.model_correction import extension_of
 from service.lives.outlook import summarised
-from service.lives.recomputation import Adoption, ClutchState, Results, Tracking, computed_anew
+from service.lives.recomputation import Adoption, ClutchState, Results, Tracking, computed_again
 from storage import assumptions, changes, clutches, diagnoses, jobs
 from storage.assumptions import AdoptedRow
 from storage.changes import NewChange
@@ -24,7 +24,7 @@ from storage.engine.database import Database
 
 
 def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, adopted_at: str, by: str = "local") -> None:
-    """Adopt a diagnosis's extension, or return to the baseline, as `by` asked for; all is tracked anew.
+    """Adopt a diagnosis's extension, or return to the baseline, as `by` asked for; all is tracked again.
 
     What is in force already stays and makes no version. Raises NotFoundError for an unknown clutch or diagnosis,
     NothingToAdoptError where there is nothing to adopt or another life was diagnosed; then nothing was written.
@@ -131,7 +131,7 @@ def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> 
     reader = stored_runs.run_reader(database, clutch_id)
     tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
     evaluated = stationary_tests_of(state.events)
-    final, results = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
+    final, results = computed_again(state, levels, receipts, tests, reader, evaluated=evaluated)
     evidence = stored_runs.evidence_for(database, final, reader)
     return state, replace(results, summary=summarised(final, results.tracking or Tracking(), evidence))
 

@@ -39,7 +39,7 @@ from service.lives.recomputation import (
     Receipt,
     Results,
     cofs_among,
-    computed_anew,
+    computed_again,
     reader_with,
     set_aside,
 )
@@ -121,7 +121,7 @@ def confirm(database: Database, clutch_id: str, run_id: str, *, reason: str, by:
 def correct(
     database: Database, clutch_id: str, run_id: str, *, cycles: float, reason: str, by: str, at: str
 ) -> Receipt:
-    """Put a run to other cycles, where doubts are asked anew; returns its receipt.
+    """Put a run to other cycles, where doubts are asked again; returns its receipt.
 
     Raises NotFoundError, and NotPossibleNowError for a run that is withdrawn.
     """
@@ -136,7 +136,7 @@ def correct(
 def read_again(
     database: Database, clutch_id: str, run_id: str, *, rig: str, reason: str, by: str, at: str, folder: Path
 ) -> Receipt:
-    """Read a run's file again, by another rig's profile or by one that was mended, where doubts are asked anew; returns its
+    """Read a run's file again, by another rig's profile or by one that was mended, where doubts are asked again; returns its
     receipt. The file is unpacked below `folder`.
 
     Raises NotFoundError, NotPossibleNowError for a run that is withdrawn or has no file, and as reading does.
@@ -321,7 +321,7 @@ def _computed(database: Database, loaded: _Loaded, row: RunRow) -> _Changed:
         evaluated = stationary_tests_of(before.events)
         if loaded.again is not None:  # its own loops, and those that are held against its curves
             evaluated = {loop: test for loop, test in evaluated.items() if run_id not in (loop, test)}
-        after, computed = computed_anew(after, loaded.levels, receipts, tests, reader, evaluated=evaluated)
+        after, computed = computed_again(after, loaded.levels, receipts, tests, reader, evaluated=evaluated)
     aside = {}
     for other in [*judged.held, *([] if own else [event])]:
         name = other.run_id

@@ -1,4 +1,4 @@
-"""A clutch's record is edited, or the clutch archived: what depends on the record is computed anew before it is stored.
+"""A clutch's record is edited, or the clutch archived: what depends on the record is computed again before it is stored.
 
 Curves depend on the geometry and on the torque channel's filter alone: where these change, every run is fitted again. The
 record that was registered stays stored.
@@ -15,7 +15,7 @@ from service.alarms import raising
 from service.columns import content_of
 from service.lives.history import stationary_tests_of
 from service.lives.outlook import summarised
-from service.lives.recomputation import Results, Tracking, computed_anew
+from service.lives.recomputation import Results, Tracking, computed_again
 from service.schemas.clutch import ClutchIn
 from service.stored_runs import Recomputed
 from storage import changes, clutches
@@ -83,7 +83,7 @@ def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results 
     reader = stored_runs.run_reader(database, record.clutch_id)
     tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
     evaluated = stationary_tests_of(state.events)
-    state, results = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
+    state, results = computed_again(state, levels, receipts, tests, reader, evaluated=evaluated)
     evidence = stored_runs.evidence_for(database, state, reader)
     return replace(results, summary=summarised(state, results.tracking or Tracking(), evidence))
 

@@ -1,4 +1,4 @@
-"""A run comes in: its curves are fitted, the clutch is tracked on or anew, and all is stored in one short transaction.
+"""A run comes in: its curves are fitted, the clutch is tracked on or again, and all is stored in one short transaction.
 
 Everything is computed before the database is locked; where another run of the clutch was stored meanwhile, what depends on
 the history is computed again. A doubtful run is stored with its curves, held, and changes nothing else.
@@ -32,7 +32,7 @@ from service.lives.history import (
 )
 from service.lives.incoming_run import IncomingRun
 from service.lives.outlook import Evidence, held_part, needs_evidence, summarised
-from service.lives.payloads import history_warnings, notice_items, receipt, warned_anew
+from service.lives.payloads import history_warnings, notice_items, receipt, warned_again
 from service.lives.plausibility.doubts import Judged, doubts_alone, doubts_together
 from service.lives.recomputation import (
     Arrival,
@@ -41,9 +41,9 @@ from service.lives.recomputation import (
     Results,
     Tracking,
     cofs_among,
-    computed_anew,
+    computed_again,
     corrected_newest,
-    loops_anew,
+    loops_again,
     reader_with,
     set_aside,
     test_of,
@@ -59,7 +59,7 @@ from storage.engine.database import Database
 from storage.runs import NewRun, RunRow
 
 #: Bytes of a packed file that are kept. Derived: a value of SQLite's has 1e9 at most.
-MOST_FILE_BYTES = 900_000_000
+MAX_FILE_BYTES = 900_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,8 +99,8 @@ def ingest_posted(
     with ThreadPoolExecutor(1) as beside:  # deflating lets the reader run
         packing = beside.submit(channels.packed, path)
         run, file = read(), packing.result()
-    if len(file.data) > MOST_FILE_BYTES:
-        raise TooLargeError(f"a file must be kept in at most {MOST_FILE_BYTES} bytes, its packed ones are more")
+    if len(file.data) > MAX_FILE_BYTES:
+        raise TooLargeError(f"a file must be kept in at most {MAX_FILE_BYTES} bytes, its packed ones are more")
     run = replace(run, file={**(run.file or {}), "sha256": file.sha256, "bytes": file.length})
     return ingest(database, clutch_id, run, received_at=received_at, by=by, file=file)
 
@@ -236,7 +236,7 @@ def _with_others(
     reader = reader_with(stored_runs.run_reader(database, before.clutch_id), arrival)
     tests = tests_with(reader, state.lives[-1], arrival) if state.events else iter(())
     evaluated = stationary_tests_of(before.events)
-    final, computed = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
+    final, computed = computed_again(state, levels, receipts, tests, reader, evaluated=evaluated)
     computed = _summarised(database, final, computed, arrival, answer)
     aside, changed = {}, dict(computed.receipts)
     for other in judged.held:
@@ -267,14 +267,14 @@ def _among(
     answer: dict[str, Any],
     arrival: Arrival,
 ) -> Results:
-    """What changes with the run among the others: the filters carried one step on, or everything anew."""
+    """What changes with the run among the others: the filters carried one step on, or everything again."""
     if _changes_the_past(before, state.events, event):
         with database.reading() as connection:
             receipts = records.receipts(connection, state.clutch_id) | {event.run_id: answer}
         reader = reader_with(stored_runs.run_reader(database, state.clutch_id), arrival)
         tests = tests_with(reader, state.lives[-1], arrival)
         evaluated = _evaluated(before, state, event)
-        state, computed = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
+        state, computed = computed_again(state, levels, receipts, tests, reader, evaluated=evaluated)
         return _summarised(database, state, computed, arrival, answer)
     corrected: dict[str, Corrected] = {}
     if state.extension is not None and event is state.events[-1]:
@@ -288,15 +288,15 @@ def _among(
     changed = {event.run_id: answer | {"warnings": answer["warnings"] + noticed}}
     evaluated = _evaluated(before, state, event)
     outdated = evaluated != stationary_tests_of(state.events)
-    if tracking.anew or outdated:
+    if tracking.again or outdated:
         with database.reading() as connection:
             receipts = records.receipts(connection, state.clutch_id) | changed
         if outdated:
             stored = stored_runs.run_reader(database, state.clutch_id)
-            loops = loops_anew(state, levels, stored, evaluated)
+            loops = loops_again(state, levels, stored, evaluated)
             changed |= {run_id: receipts[run_id] | {"loops": items} for run_id, items in loops.items()}
-        if tracking.anew:
-            changed |= warned_anew(state.lives, tracking.warnings, receipts | changed)
+        if tracking.again:
+            changed |= warned_again(state.lives, tracking.warnings, receipts | changed)
     computed = Results(corrected=corrected, receipts=changed, tracking=tracking)
     return _summarised(database, state, computed, arrival, answer)
 

@@ -1,6 +1,6 @@
 """An inspection of a clutch is stored, photographs are added to it, and it is withdrawn where it was a slip.
 
-No track and no prediction uses inspections: nothing is computed anew. Nothing is deleted either.
+No track and no prediction uses inspections: nothing is computed again. Nothing is deleted either.
 """
 
 import hashlib
@@ -12,7 +12,7 @@ from service import records
 from service.errors import FieldError, InvalidError, NotPossibleNowError
 from service.records import inspection, inspection_answers, inspection_hash, photograph_answer
 from service.schemas.inspection import InspectionIn, MediaType
-from service.schemas.limits import MOST_PHOTOGRAPHS
+from service.schemas.limits import MAX_PHOTOGRAPHS
 from storage import changes, clutches, inspections
 from storage.changes import NewChange
 from storage.engine.database import Database
@@ -69,9 +69,9 @@ def add_photograph(
         for photograph in stored:
             if photograph.sha256 == row.sha256:
                 return photograph_answer(photograph), False
-        if len(stored) >= MOST_PHOTOGRAPHS:
+        if len(stored) >= MAX_PHOTOGRAPHS:
             raise NotPossibleNowError(
-                f"inspection {inspection_id!r} has {MOST_PHOTOGRAPHS} photographs, the most it may"
+                f"inspection {inspection_id!r} has {MAX_PHOTOGRAPHS} photographs, the most it may"
             )
         inspections.attach(connection, key, row, content, position=len(stored))
         return photograph_answer(row), True

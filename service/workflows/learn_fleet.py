@@ -15,10 +15,10 @@ from models.prognosis.fleet import Taught, population, taught
 from models.prognosis.scoring import measured_end
 from service import records, stored_runs
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
-from service.lives.criteria import MOST_ATTEMPTS
+from service.lives.criteria import MAX_ATTEMPTS
 from service.lives.history import WORN, Life
 from service.lives.outlook import Evidence, needs_evidence, summarised
-from service.lives.payloads import warned_anew
+from service.lives.payloads import warned_again
 from service.lives.recomputation import ClutchState, Receipt, Results, track
 from service.lives.tracks import CARRIED, mean_offset_of
 from service.settings import CODE_VERSION
@@ -76,7 +76,7 @@ class Refreshed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Tracked:
-    """What a clutch's tracks are computed anew from."""
+    """What a clutch's tracks are computed again from."""
 
     state: ClutchState
     receipts: Mapping[str, Receipt]
@@ -91,7 +91,7 @@ def refresh(
     executor: Executor | None = None,
     advance: Callable[[], object] = lambda: None,
 ) -> Refreshed:
-    """Learn every fleet's prior anew; one that differs is a new version, and tracks are made anew. Stored by `at_once`.
+    """Learn every fleet's prior again; one that differs is a new version, and tracks are made again. Stored by `at_once`.
 
     Computed by the executor, None: in this process. `advance` is called twice for every clutch: as it has taught, and as its
     tracks are up to date.
@@ -106,7 +106,7 @@ def refresh(
         if lessons:
             fleets.setdefault(to_text(kind), Fleet(kind=kind)).lessons[clutch_id] = lessons
         advance()
-    fresh = [fleet.kind for fleet in fleets.values() if _stored_anew(database, fleet, now, at_once, executor)]
+    fresh = [fleet.kind for fleet in fleets.values() if _stored_again(database, fleet, now, at_once, executor)]
     ended = []
     for clutch in _brought_up(database, names, at_once, executor):
         if clutch.error is not None:
@@ -192,7 +192,7 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
     return Lesson(taught=lesson, ended=replace(ended.in_unit(1.0 / unit), energy=done / worked if worked else None))
 
 
-def _stored_anew(database: Database, fleet: Fleet, now: str, at_once: AtOnce, executor: Executor) -> bool:
+def _stored_again(database: Database, fleet: Fleet, now: str, at_once: AtOnce, executor: Executor) -> bool:
     """Store a fleet's prior and what it is without each of its clutches, where it is not what is stored already."""
     (learned,) = executor.map(learned_without, [(fleet, ())])
     with database.reading() as connection:
@@ -245,7 +245,7 @@ def _versions(fleet: Fleet, whole: Json | None, version: int, now: str, executor
 def _brought_up(
     database: Database, names: Sequence[str], at_once: AtOnce, executor: Executor
 ) -> Iterator[Ended[Results]]:
-    """Track clutches anew where their stored predictions were made under another prior."""
+    """Track clutches again where their stored predictions were made under another prior."""
 
     def load(clutch_id: str) -> _Tracked | None:
         with database.reading() as connection:
@@ -263,15 +263,15 @@ def _brought_up(
     def store(tracked: _Tracked, retracked: Results) -> bool:
         return at_once(_replaced, database, tracked.state, retracked)
 
-    return in_rounds(executor, names, load=load, compute=_retracked, store=store, rounds=MOST_ATTEMPTS)
+    return in_rounds(executor, names, load=load, compute=_retracked, store=store, rounds=MAX_ATTEMPTS)
 
 
 def _retracked(tracked: _Tracked) -> Results:
-    """A clutch's tracks anew."""
+    """A clutch's tracks again."""
     state, tracking = tracked.state, track(tracked.state)
     return Results(
         tracking=tracking,
-        receipts=warned_anew(state.lives, tracking.warnings, tracked.receipts),
+        receipts=warned_again(state.lives, tracking.warnings, tracked.receipts),
         summary=summarised(state, tracking, tracked.evidence),
     )
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from service import records, stored_runs
 from service.errors import BusyError, ServiceError
-from service.lives.criteria import MOST_ATTEMPTS
+from service.lives.criteria import MAX_ATTEMPTS
 from service.stored_runs import Recomputed, Recorded
 from service.work.background import AtOnce, directly
 from service.work.executor import Executor, InProcess, WorkerLostError
@@ -18,7 +18,7 @@ from storage.engine.errors import DamagedData
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replayed:
-    """What became of a clutch: how many runs were computed anew, or why it keeps the results that it had."""
+    """What became of a clutch: how many runs were computed again, or why it keeps the results that it had."""
 
     clutch_id: str
     runs: int = 0
@@ -34,9 +34,9 @@ def clutch_ids(database: Database) -> list[str]:
 def replay(
     database: Database, clutch_ids: Sequence[str], executor: Executor, at_once: AtOnce = directly
 ) -> Iterator[Replayed]:
-    """Fit and track all runs of these clutches anew; each as it ends. Stored by `at_once`.
+    """Fit and track all runs of these clutches again; each as it ends. Stored by `at_once`.
 
-    A clutch of which runs came at each of MOST_ATTEMPTS has a BusyError; errors that are nobody's data are raised. The
+    A clutch of which runs came at each of MAX_ATTEMPTS has a BusyError; errors that are nobody's data are raised. The
     revision moves on only where a result has changed.
     """
 
@@ -49,7 +49,7 @@ def replay(
         return at_once(_replaced, database, recorded, computed)
 
     for ended in in_rounds(
-        executor, clutch_ids, load=load, compute=stored_runs.recomputed, store=store, rounds=MOST_ATTEMPTS
+        executor, clutch_ids, load=load, compute=stored_runs.recomputed, store=store, rounds=MAX_ATTEMPTS
     ):
         if ended.ending is Ending.LEFT:
             yield Replayed(clutch_id=ended.name, error=BusyError(_LEFT))
@@ -93,7 +93,7 @@ def as_job(
 
 _STEP = "replays the clutches"
 _LEFT = (
-    f"left as it was: runs came each of the {MOST_ATTEMPTS} times that it was computed anew; replay it when fewer come"
+    f"left as it was: runs came each of the {MAX_ATTEMPTS} times that it was computed again; replay it when fewer come"
 )
 
 

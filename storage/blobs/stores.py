@@ -337,7 +337,7 @@ DATABASE = "database"
 _FOLDER = re.compile(r"folder://(/.+)")
 _BUCKET = re.compile(r"s3://([a-z0-9][a-z0-9.-]{1,61}[a-z0-9])(?:/([A-Za-z0-9._/-]*))?")
 #: Stores that a process keeps open; one is in use, and another while records move.
-_MOST_OPEN = 8
+_MAX_OPEN = 8
 
 
 def normal_address(address: str) -> str:
@@ -355,7 +355,7 @@ def normal_address(address: str) -> str:
     )
 
 
-@lru_cache(_MOST_OPEN)
+@lru_cache(_MAX_OPEN)
 def open_store(address: str) -> BlobStore:
     """The store at an address. Raises ValueError as `normal_address`, RawStoreUnavailable where its client is missing."""
     address = normal_address(address)

@@ -202,7 +202,7 @@ DECIMAL_CODEC = "decimal-zlib"
 
 #: Shorter columns gain too little to be stored this way.
 LONG = 1 << 12
-_MOST_DECIMALS = 15
+_MAX_DECIMALS = 15
 _LARGEST_STEP = 1 << 30
 #: Values probed first, and encoded at a time.
 _PROBED, _PIECE = 64, 1 << 14
@@ -214,7 +214,7 @@ _STEP_PLANES = 4
 def encode_decimals(column: NDArray[np.float64]) -> bytearray | None:
     """A column [n] as bytes, to be read back by `decode_decimals`; None where it does not hold decimals."""
     probe = column[:: max(1, column.size // _PROBED)]
-    decimals = next((d for d in range(_MOST_DECIMALS + 1) if _whole(probe, d) is not None), None)
+    decimals = next((d for d in range(_MAX_DECIMALS + 1) if _whole(probe, d) is not None), None)
     head = None if decimals is None else _whole(column[:1], decimals)
     if decimals is None or head is None:
         return None
@@ -255,7 +255,7 @@ def decode_decimals(data: bytes | bytearray, length: int) -> NDArray[np.float64]
     decimals, first, *sizes = _HEAD.unpack_from(body)
     end = sum(sizes) + _HEAD.size
     minus = np.frombuffer(body[end:], dtype="<u4") if end <= len(body) and (len(body) - end) % 4 == 0 else None
-    if minus is None or max(sizes) > length or decimals > _MOST_DECIMALS or (minus >= length).any():
+    if minus is None or max(sizes) > length or decimals > _MAX_DECIMALS or (minus >= length).any():
         raise DamagedData(f"{length} decimals are stored in planes of {sizes} bytes, {len(body)} bytes in all")
     planes = read_planes(body[_HEAD.size :], sizes, length)
     folded = np.ascontiguousarray(planes.T).view("<u4").reshape(length).astype(np.int64)

@@ -37,8 +37,8 @@ class Question:
 
 
 @dataclass(frozen=True, slots=True)
-class Glance:
-    """What was so at one moment.
+class Snapshot:
+    """Key, clutch revision and commit number, read together at the start of a request.
 
     `version`: a number that changes with every commit, whichever process made it; compare it only with those of the same
     watch. Read before a query, it shows later whether the query would still give the same rows.
@@ -57,20 +57,20 @@ class Watch(ABC):
     """Answers the questions; threads share it."""
 
     @abstractmethod
-    def glances(self, questions: Sequence[Question]) -> list[Glance]:
+    def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
         """What is so now, question by question, all at the same moment."""
 
     @abstractmethod
-    async def look(self, question: Question) -> Glance:
+    async def look(self, question: Question) -> Snapshot:
         """What is so now, for one who asks from the event loop, which does not wait for another process meanwhile."""
 
     @abstractmethod
     def close(self) -> None:
         """Ask nothing any more."""
 
-    def glance(self, clutch_id: str | None = None, secret_sha256: str | None = None) -> Glance:
+    def snapshot(self, clutch_id: str | None = None, secret_sha256: str | None = None) -> Snapshot:
         """What is so now, of one clutch and one key."""
-        return self.glances([Question(clutch_id, secret_sha256)])[0]
+        return self.snapshots([Question(clutch_id, secret_sha256)])[0]
 
 
 @lru_cache(maxsize=256)

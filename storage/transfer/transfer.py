@@ -22,7 +22,7 @@ from storage.transfer.digest import digest, rows_of
 
 #: Rows, and bytes of their texts and binaries, that one transaction stores. Chosen: what is lost by an interruption is a
 #: second's work, and a batch is small beside the memory of a service.
-MOST_ROWS, MOST_BYTES = 1000, 32_000_000
+MAX_ROWS, MAX_BYTES = 1000, 32_000_000
 
 #: Called with a table's name and how many of its rows have just been stored.
 Advance = Callable[[str, int], object]
@@ -132,7 +132,7 @@ def _batches(table: Table, rows: Iterator[Any]) -> Iterator[list[dict[str, Any]]
         if row is not None:
             batch.append(dict(zip(names, row, strict=True)))
             size += sum(len(value) for value in row if isinstance(value, (str, bytes)))
-        if batch and (row is None or len(batch) >= MOST_ROWS or size >= MOST_BYTES):
+        if batch and (row is None or len(batch) >= MAX_ROWS or size >= MAX_BYTES):
             yield batch
             batch, size = [], 0
 

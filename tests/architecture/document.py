@@ -1,6 +1,6 @@
 """The parts of docs/explanation/architecture.md made from the code: the ways of the common errands, and the examples.
 
-A part stands between `<!-- name -->` and `<!-- end -->`. `python -m tests.architecture` writes all of them anew.
+A part stands between `<!-- name -->` and `<!-- end -->`. `python -m tests.architecture` writes all of them again.
 """
 
 import re
@@ -20,7 +20,7 @@ def parts(text: str) -> dict[str, str]:
 
 
 def filled(text: str, bodies: dict[str, str]) -> str:
-    """The document with these parts written anew; each must be there."""
+    """The document with these parts written again; each must be there."""
     for name, body in bodies.items():
         start, end = f"<!-- {name} -->\n", "<!-- end -->"
         before, _, rest = text.partition(start)

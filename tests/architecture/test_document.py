@@ -6,7 +6,7 @@ from tests.architecture import document, graph, picture
 from tests.architecture.source import ROOT, none_of
 
 PARTS = document.parts(document.DOCUMENT.read_text(encoding="utf-8"))
-AGAIN = "write it anew: make architecture"
+AGAIN = "write it again: make architecture"
 
 
 def test_the_picture_is_that_of_the_code() -> None:

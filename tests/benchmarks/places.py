@@ -1,4 +1,4 @@
-"""What a column costs in the database and in stores beside it, by its length: the choice of `MOST_INLINE`.
+"""What a column costs in the database and in stores beside it, by its length: the choice of `MAX_INLINE`.
 
 The places take turns; a bucket is that of a server that speaks S3 on the same machine (moto), as near as one can be.
 """
@@ -29,7 +29,7 @@ REPEATS = 15
 
 def measured(folder: Path, places: dict[str, str]) -> list[tuple[int, dict[str, tuple[float, float]]]]:
     """(kB, place -> (ms to write, ms to read), medians) of a run with one column, by its length."""
-    limit, channels.MOST_INLINE = channels.MOST_INLINE, 0
+    limit, channels.MAX_INLINE = channels.MAX_INLINE, 0
     opened = {name: open_database(f"sqlite:///{folder}/{number}.db") for number, name in enumerate(places)}
     rows = []
     try:
@@ -64,7 +64,7 @@ def measured(folder: Path, places: dict[str, str]) -> list[tuple[int, dict[str, 
             medians = {name: tuple(map(statistics.median, zip(*times, strict=True))) for name, times in taken.items()}
             rows.append((round(size), medians))
     finally:
-        channels.MOST_INLINE = limit
+        channels.MAX_INLINE = limit
         for database in opened.values():
             database.close()
     return rows  # type: ignore[return-value]

@@ -34,7 +34,7 @@ class Beside:
 
 
 def fleet_refresh(address: str) -> list[str]:
-    """The command that learns the fleets' priors anew."""
+    """The command that learns the fleets' priors again."""
     return [sys.executable, "-m", "service.cli.main", "fleet", "refresh", "--database", address]
 
 

@@ -123,7 +123,7 @@ class Line:
 
 
 class Blocking:
-    """A keep-alive connection that waits for its answers; opened anew where it was idle so long that it may be closed."""
+    """A keep-alive connection that waits for its answers; opened again where it was idle so long that it may be closed."""
 
     def __init__(self, port: int) -> None:
         self._port = port

@@ -2,7 +2,7 @@
 worker is killed midway. Prints what each takes, and fails unless all three store the same rows.
 
 Each begins with the same file: copies of one simulated life, whose results are those of the first copy until they are
-computed anew. Times of the processor are those of one core, whatever else runs on the machine.
+computed again. Times of the processor are those of one core, whatever else runs on the machine.
 """
 
 import argparse

@@ -18,7 +18,7 @@ def test_a_replay_stores_the_same_rows_in_this_process_in_a_pool_and_on_a_cluste
     path = tmp_path / "source.db"
     source(path, 3, CLUTCHES)
     with closing(open_database(f"sqlite:///{path}")) as database, database.writing() as connection:
-        connection.execute(sa.delete(prediction))  # so that what is compared was computed anew
+        connection.execute(sa.delete(prediction))  # so that what is compared was computed again
     local = replayed(path, "local")
     assert local.stored["prediction"][0] == 2 * 3 * CLUTCHES
     assert replayed(path, "processes:2").stored == local.stored

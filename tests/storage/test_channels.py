@@ -125,8 +125,8 @@ def test_columns_keep_their_bits_wherever_they_are(database: Database, place: st
     kept = channels.values_of(held)
     assert list(kept) == list(sent)
     assert all(kept[name].tobytes() == column.tobytes() for name, column in sent.items())
-    assert 0 < sizes["oil_temperature_c"] < channels.MOST_INLINE  # a short one stays in the database
-    assert (sizes["torque_nm"] > channels.MOST_INLINE) == (place == DATABASE)
+    assert 0 < sizes["oil_temperature_c"] < channels.MAX_INLINE  # a short one stays in the database
+    assert (sizes["torque_nm"] > channels.MAX_INLINE) == (place == DATABASE)
     assert numbers == ({} if place == DATABASE else {place: (3, 3)})
 
 
@@ -149,7 +149,7 @@ def test_a_column_that_is_damaged_or_missing_in_its_store_is_named(database: Dat
 
 def test_short_columns_go_to_no_store_and_ask_for_none(database: Database, in_folder: str) -> None:
     raw_records.use(database, in_folder)
-    short = channels.encoded(columns(1, channels.MOST_INLINE // 16))
+    short = channels.encoded(columns(1, channels.MAX_INLINE // 16))
     assert not short.is_long
     assert stored_runs.placed(database, short).columns == short.columns
     assert list(open_store(in_folder).names()) == []

@@ -14,7 +14,7 @@ NOW = "2026-06-01T00:00:00+00:00"
 
 
 def granted(database: Database, secret: str) -> GrantedKey | None:
-    return database.watch.glance(None, secret).key
+    return database.watch.snapshot(None, secret).key
 
 
 def key(key_id: str, secret: str, created_at: str = "2026-01-01T00:00:00Z") -> KeyRow:
@@ -23,12 +23,12 @@ def key(key_id: str, secret: str, created_at: str = "2026-01-01T00:00:00Z") -> K
 
 def test_a_key_opens_until_it_is_revoked(database: Database) -> None:
     watch = database.watch
-    assert not watch.glance().keys_are_needed
+    assert not watch.snapshot().keys_are_needed
     with database.writing() as connection:
         keys.insert(connection, key("k2", "bb"))
         keys.insert(connection, key("k1", "aa", "2026-02-01T00:00:00Z"))
         assert keys.any_active(connection, NOW)
-    assert watch.glance().keys_are_needed
+    assert watch.snapshot().keys_are_needed
     assert [granted(database, secret) for secret in ("aa", "cc")] == [
         GrantedKey("k1", "ingest", "bench 3", None, None),
         None,
@@ -43,7 +43,7 @@ def test_a_key_opens_until_it_is_revoked(database: Database) -> None:
         keys.revoke(connection, "k1", "2026-03-02T00:00:00Z")
         assert not keys.any_active(connection, NOW)
         listed = keys.all_keys(connection)
-    assert watch.glance().keys_are_needed, "revoking the last key opens nothing"
+    assert watch.snapshot().keys_are_needed, "revoking the last key opens nothing"
     assert [(row.key_id, row.revoked_at) for row in listed] == [
         ("k2", "2026-03-01T00:00:00Z"),
         ("k1", "2026-03-02T00:00:00Z"),

@@ -8,7 +8,7 @@ from service.cli.answers.tables import number, show_table, with_deviation
 from service.cli.options import URL, ClutchId, Json, Key, Patience, Url, out
 
 #: Lines of the course that are shown. Chosen: with the head they fit a terminal of 24 lines.
-_MOST_LINES = 16
+_MAX_LINES = 16
 #: The indicators of measured engagements that fit beside each other; `--json` has all of them.
 _INDICATORS = (
     "stop_time_s",
@@ -51,7 +51,7 @@ def show(answer: Mapping[str, Any]) -> None:
         markup=False,
     )
     columns = list(answer["channels"].values())
-    step = max(1, -(-len(columns[0]) // _MOST_LINES))
+    step = max(1, -(-len(columns[0]) // _MAX_LINES))
     rows = [[number(value) for value in row] for row in list(zip(*columns, strict=True))[::step]]
     show_table(list(answer["channels"]), rows, left=0)
     if answer["measured"]:

@@ -21,7 +21,7 @@ def edit(
     key: Key = None,
     patience: Patience = 10.0,
 ) -> None:
-    """Change fields of a clutch's record; all results are computed anew."""
+    """Change fields of a clutch's record; all results are computed again."""
     address = f"/v1/clutches/{clutch}"
     with service_at(url, key, patience) as service:
         record = service.get(address)

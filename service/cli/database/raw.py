@@ -12,7 +12,7 @@ app = typer.Typer(help="Where long raw records are kept beside the database.", n
 _SECONDS_AN_HOUR = 3600.0
 #: Hours that a blob may be without a run that names it. Chosen: no run takes longer from its arrival to its commit, nor do
 #: the clocks of a store and of this machine differ by more; the least that is allowed is what a single run may take.
-_GRACE_HOURS, _LEAST_GRACE_HOURS = 24.0, 1.0
+_GRACE_HOURS, _MIN_GRACE_HOURS = 24.0, 1.0
 
 Address = Annotated[str, typer.Option("--to", help="database, folder:///path or s3://bucket/prefix")]
 
@@ -67,7 +67,7 @@ def relocate(
 def collect(
     database: Database = DATABASE,
     grace_hours: Annotated[
-        float, typer.Option(min=_LEAST_GRACE_HOURS, help="What was put within so many hours is left")
+        float, typer.Option(min=_MIN_GRACE_HOURS, help="What was put within so many hours is left")
     ] = _GRACE_HOURS,
 ) -> None:
     """Remove blobs that no run names, as interrupted posts and moves leave them. Safe while services run."""

@@ -1,4 +1,4 @@
-"""`clutchlife replay`: all results computed anew, on the database itself."""
+"""`clutchlife replay`: all results computed again, on the database itself."""
 
 from typing import TYPE_CHECKING, Annotated
 

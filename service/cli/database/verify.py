@@ -12,7 +12,7 @@ from service.cli.options import DATABASE, Database, err, fail, out, read_only
 def verify(
     database: Database = DATABASE,
     sample: Annotated[
-        int | None, typer.Option(min=0, help="Recompute this many clutches only, drawn anew each time; left out, all")
+        int | None, typer.Option(min=0, help="Recompute this many clutches only, drawn again each time; left out, all")
     ] = None,
 ) -> None:
     """Check pages, references and schema, the hashes of every run, inspection and photograph, and that all results follow.
@@ -59,12 +59,12 @@ def verify(
                     earlier[version] = earlier.get(version, 0) + count
             progress.advance(task)
     for version, count in sorted(earlier.items()):
-        note = f"{count} results were made by release {version}: they can be computed anew, and may differ (replay)"
+        note = f"{count} results were made by release {version}: they can be computed again, and may differ (replay)"
         out.print(note, markup=False, soft_wrap=True)
     if inspections:
         out.print(f"{inspections} inspections with {photographs} photographs are checked", markup=False, soft_wrap=True)
     summary = (
-        f"{runs} runs of {len(ids)} clutches are checked, {len(chosen)} clutches computed anew: {findings} findings"
+        f"{runs} runs of {len(ids)} clutches are checked, {len(chosen)} clutches computed again: {findings} findings"
     )
     if findings:
         fail(summary)

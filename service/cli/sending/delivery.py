@@ -12,7 +12,7 @@ from service.client.clutchlife.transport import NoLongerWantedError, Service
 
 #: Runs in a row that an otherwise present service does not answer, after which it is taken to be away. Chosen: one run that
 #: it cannot take must not hold up the others; two cost twice the patience.
-_MOST_UNANSWERED = 2
+_MAX_UNANSWERED = 2
 
 #: What receipts call the name of a run and of an inspection.
 _NAMES = {RUNS: "run_id", INSPECTIONS: "inspection_id"}
@@ -51,7 +51,7 @@ def deliver(service: Service, spool: Spool, sent: Sent, report: Report, on_run: 
         except ServiceAwayError as error:
             spool.note(entry, last_answer=str(error), perhaps_stored=entry.perhaps_stored or error.perhaps_stored)
             sent.unanswered += 1
-            if sent.unanswered == _MOST_UNANSWERED or not _present(service, spool):
+            if sent.unanswered == _MAX_UNANSWERED or not _present(service, spool):
                 raise
             _stays(spool, entry, sent, report, str(error))
         on_run()

@@ -30,7 +30,7 @@ _TYPE = "urn:clutchlife:problem:"
 _OF_THE_RUN = tuple(_TYPE + slug for slug in ("invalid-content", "conflict", "too-large"))
 _CONFLICT, _ARCHIVED, _UNKNOWN = _TYPE + "conflict", _TYPE + "archived", _TYPE + "not-found"
 #: Characters of an answer that is no problem report, quoted as its detail.
-_MOST_QUOTED = 500
+_MAX_QUOTED = 500
 
 
 class ClutchlifeError(Exception):
@@ -92,10 +92,10 @@ def passing(response: httpx2.Response, answer: object | None) -> str | None:
     if status < 300:
         if answer is not None:
             return None
-        media = response.headers.get("Content-Type", "nothing")[:_MOST_QUOTED]
+        media = response.headers.get("Content-Type", "nothing")[:_MAX_QUOTED]
         return f"status {status} with {media}, not an answer of the service: a login page or a proxy?"
     if status < 400:
-        target = response.headers.get("Location", "nowhere")[:_MOST_QUOTED]
+        target = response.headers.get("Location", "nowhere")[:_MAX_QUOTED]
         return f"status {status}, a redirect to {target}: is the address right?"
     if status in _TRANSIENT or status > 500:
         return f"status {status}"
@@ -130,7 +130,7 @@ def image(response: httpx2.Response) -> bytes | None:
 def problem(response: httpx2.Response) -> dict[str, Any]:
     """The problem report of a refusal, or its text as one."""
     report = content(response)
-    return {"detail": response.text[:_MOST_QUOTED]} if report is None else report
+    return {"detail": response.text[:_MAX_QUOTED]} if report is None else report
 
 
 def retry_after(headers: Mapping[str, str], *, now: datetime | None = None) -> float:

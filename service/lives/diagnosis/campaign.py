@@ -22,7 +22,7 @@ from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, Record
 from models.records.torque_filter import filtered_as_torque
 from service.columns import CHANNELS
-from service.lives.criteria import MOST_OF_CAMPAIGN, MOST_OF_RECORD
+from service.lives.criteria import MAX_OF_CAMPAIGN, MAX_OF_RECORD
 from service.lives.history import DYNAMIC, MAINTENANCE, STATIONARY, Life
 from service.lives.incoming_run import IncomingRun, sampled_record, stationary_plateaus
 from service.schemas.clutch import ClutchIn
@@ -75,8 +75,8 @@ def records_to_keep(run_ids: Sequence[str], samples: Mapping[str, int]) -> set[s
     `samples` is how many samples each sampled record has.
     """
     sizes = [(run_id, samples[run_id]) for run_id in run_ids if run_id in samples]
-    fitting = [(run_id, size) for run_id, size in sizes if size <= MOST_OF_RECORD]
-    every = max(1, math.ceil(sum(size for _, size in fitting) / MOST_OF_CAMPAIGN))
+    fitting = [(run_id, size) for run_id, size in sizes if size <= MAX_OF_RECORD]
+    every = max(1, math.ceil(sum(size for _, size in fitting) / MAX_OF_CAMPAIGN))
     return {run_id for run_id, _ in fitting[::every]}
 
 
@@ -139,7 +139,7 @@ def _stationary(run: IncomingRun, origin: float, torque_filter: float, keep_reco
     )
 
 
-def thinned(record: Record, most: int = MOST_OF_RECORD) -> Record:
+def thinned(record: Record, most: int = MAX_OF_RECORD) -> Record:
     """The record, or the means of blocks of its samples where it has more than `most`."""
     size = math.ceil(record.time.size / most)
     if size == 1:

@@ -37,7 +37,7 @@ STILL = 2e-3
 #: Speed whose middle 90 % differ by less than this share of the highest is no Stribeck test.
 SPEED_STILL = 0.02
 #: Highest over lowest loaded pressure from which torque must follow, and the least exponent of torque over pressure.
-PRESSURE_SPAN, LEAST_EXPONENT = 1.25, 0.4
+PRESSURE_SPAN, MIN_EXPONENT = 1.25, 0.4
 #: Scatter of torque [-] at one speed and one pressure from which pressure was not one: loops and stick-slip are less.
 SINGLE_LEVEL_SPREAD = 0.1
 #: A mean COF below this is no friction where torque scatters about zero by half of itself and more.

@@ -302,7 +302,7 @@ def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
     span = f"{low / PASCALS_PER_BAR:.3g} to {high / PASCALS_PER_BAR:.3g} bar"
     if high > criteria.PRESSURE_SPAN * low:
         exponent, error = _exponent(rows)
-        if exponent + 3 * error < criteria.LEAST_EXPONENT:
+        if exponent + 3 * error < criteria.MIN_EXPONENT:
             message = (
                 f"torque does not follow pressure: it goes with pressure to the power of {exponent:.2f} from {span}, about "
                 "1 is expected. Is a sensor disconnected, or does a column hold another channel?"

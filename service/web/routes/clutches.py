@@ -33,10 +33,10 @@ from service.web.auth import (
     OwnIngester,
     OwnReader,
     Reader,
-    glance_of,
     name_of_caller,
     own_clutches,
     require_clutch,
+    snapshot_of,
 )
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
@@ -127,11 +127,11 @@ async def _of_all(request: Request, context: Context, key: Hashable, make: Calla
     """A GET's answer that any commit may change, made once for what is committed."""
 
     def again(request: Request) -> Response | None:
-        held = context.cache.held(key, glance_of(request).version)
+        held = context.cache.held(key, snapshot_of(request).version)
         return None if held is None else tagged(request, held, JSON_TYPE)
 
     # the version before the rows are read: what is committed meanwhile makes another
-    held = await kept(context, key, glance_of(request).version, make)
+    held = await kept(context, key, snapshot_of(request).version, make)
     if own_clutches(request) is None:
         remember(request, again)
     return tagged(request, held, JSON_TYPE)
@@ -152,7 +152,7 @@ async def read_clutch(request: Request, context: Reader, clutch_id: ClutchId) ->
     ),
 )
 async def edit_clutch(request: Request, context: Admin, clutch_id: ClutchId) -> Response:
-    """Edit a clutch's record, each given field as a whole, and archive it or bring it back; results are computed anew."""
+    """Edit a clutch's record, each given field as a whole, and archive it or bring it back; results are computed again."""
     wanted = checked(ClutchEdit, await json_body(request))
     made = partial(edit, archived=wanted.archived, reason=wanted.reason, by=name_of_caller(request), at=now())
     editing = context.workers.submit(

@@ -98,7 +98,7 @@ async def read_model(request: Request, context: Reader, clutch_id: ClutchId) -> 
     openapi_extra=described_body(ModelIn, {"diagnosis_id": "3f9a1c0b7d2e4f56"}),
 )
 async def put_model(request: Request, context: Admin, clutch_id: ClutchId) -> Response:
-    """Adopt what a diagnosis found, or return to the baseline; all is tracked anew before this is answered."""
+    """Adopt what a diagnosis found, or return to the baseline; all is tracked again before this is answered."""
     wanted = checked(ModelIn, await json_body(request))
     adopting = context.workers.submit(
         Lane.RUNS,

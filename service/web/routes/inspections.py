@@ -14,7 +14,7 @@ from service.queries import inspections
 from service.queries.cache import to_json
 from service.run_files.json_run import checked
 from service.schemas.inspection import InspectionIn, InspectionOut, InspectionPage, MediaType, PhotographOut
-from service.schemas.limits import MOST_PHOTOGRAPH_BYTES
+from service.schemas.limits import MAX_PHOTOGRAPH_BYTES
 from service.schemas.parameters import ClutchId, InspectionId, PhotographId
 from service.schemas.run import Withdrawal
 from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, unchanged
@@ -158,8 +158,8 @@ async def _file(request: Request) -> bytes:
     content = bytearray()
     async for piece in request.stream():
         content += piece
-        if len(content) > MOST_PHOTOGRAPH_BYTES:
-            raise TooLargeError(f"a photograph may have at most {MOST_PHOTOGRAPH_BYTES} bytes")
+        if len(content) > MAX_PHOTOGRAPH_BYTES:
+            raise TooLargeError(f"a photograph may have at most {MAX_PHOTOGRAPH_BYTES} bytes")
     return bytes(content)
 
 

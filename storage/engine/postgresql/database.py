@@ -31,7 +31,7 @@ from sqlalchemy import (
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.exc import ProgrammingError, SQLAlchemyError
 
-from storage.engine.database import Database, Glance, Question, SharedAnswer, SharedAnswers, Watch, granted
+from storage.engine.database import Database, Question, SharedAnswer, SharedAnswers, Snapshot, Watch, granted
 from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailable
 from storage.engine.integrity import refuse_newer
 from storage.engine.postgresql.connect import (
@@ -92,7 +92,7 @@ class ServerAnswers(SharedAnswers):
         self._statements.rows(_keep, {column.name: getattr(answer, column.name) for column in shared_answer.columns})
 
 
-_GLANCE = text("""
+_SNAPSHOT = text("""
 SELECT (SELECT number FROM commits) AS version,
        EXISTS (SELECT 1 FROM access_key) AS keys_are_needed,
        (SELECT json_object_agg(clutch_id, revision) FROM clutch WHERE clutch_id = ANY(:clutches)) AS revisions,
@@ -107,11 +107,11 @@ class ServerWatch(Watch):
     def __init__(self, statements: SingleStatements) -> None:
         self._statements = statements
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="watch")
-        self._waiting: list[tuple[Question, asyncio.Future[Glance]]] = []
+        self._waiting: list[tuple[Question, asyncio.Future[Snapshot]]] = []
         self._asking: asyncio.Task[None] | None = None
         self._closed = False
 
-    def glances(self, questions: Sequence[Question]) -> list[Glance]:
+    def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
         """What is so now, question by question, all at the same moment."""
         # no clutch is named by what the server cannot store
         clutches = sorted(
@@ -122,10 +122,10 @@ class ServerWatch(Watch):
             }
         )
         secrets = sorted({question.secret_sha256 for question in questions if question.secret_sha256 is not None})
-        [row] = self._statements.rows(_GLANCE, {"clutches": clutches, "secrets": secrets})
+        [row] = self._statements.rows(_SNAPSHOT, {"clutches": clutches, "secrets": secrets})
         revisions, keys = row["revisions"] or {}, row["keys"] or {}
         return [
-            Glance(
+            Snapshot(
                 version=row["version"] or 0,
                 keys_are_needed=row["keys_are_needed"],
                 key=granted(tuple(keys[question.secret_sha256])) if question.secret_sha256 in keys else None,
@@ -134,10 +134,10 @@ class ServerWatch(Watch):
             for question in questions
         ]
 
-    async def look(self, question: Question) -> Glance:
+    async def look(self, question: Question) -> Snapshot:
         """What is so now, for one who asks from the event loop."""
         self._refuse_closed()
-        answer: asyncio.Future[Glance] = asyncio.get_running_loop().create_future()
+        answer: asyncio.Future[Snapshot] = asyncio.get_running_loop().create_future()
         self._waiting.append((question, answer))
         if self._asking is None:
             self._asking = asyncio.create_task(self._ask())
@@ -157,20 +157,20 @@ class ServerWatch(Watch):
         finally:
             self._asking = None
 
-    async def _ask_for(self, questions: list[tuple[Question, asyncio.Future[Glance]]]) -> None:
+    async def _ask_for(self, questions: list[tuple[Question, asyncio.Future[Snapshot]]]) -> None:
         try:
             self._refuse_closed()
-            glances = await asyncio.get_running_loop().run_in_executor(
-                self._thread, self.glances, [question for question, _ in questions]
+            snapshots = await asyncio.get_running_loop().run_in_executor(
+                self._thread, self.snapshots, [question for question, _ in questions]
             )
         except Exception as error:  # noqa: BLE001  (raised again for each who asked)
             for _, answer in questions:
                 if not answer.done():
                     answer.set_exception(error)
         else:
-            for (_, answer), glance in zip(questions, glances, strict=True):
+            for (_, answer), snapshot in zip(questions, snapshots, strict=True):
                 if not answer.done():  # who asked may have gone
-                    answer.set_result(glance)
+                    answer.set_result(snapshot)
 
     def _refuse_closed(self) -> None:
         if self._closed:
@@ -310,7 +310,7 @@ def open_server(address: URL, *, lock_timeout: float, serving: bool = False) -> 
     try:
         with database.reading() as connection:
             refuse_newer(current(connection))  # a newer release may have migrated it in between
-        database.watch.glance()  # makes its connection: later one would wait behind a migration that waits for this service
+        database.watch.snapshot()  # makes its connection: a later one waits behind a migration that waits for this service
     except BaseException:
         database.close()
         raise

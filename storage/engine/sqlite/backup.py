@@ -30,13 +30,13 @@ from storage.engine.sqlite.connect import (
 )
 
 #: Findings of one kind that are listed. Chosen: a screenful; SQLite's own default is 100.
-_MOST_LISTED = 20
+_MAX_LISTED = 20
 
 
 def damage(connection: Connection) -> list[str]:
     """What is wrong with the pages, the indexes and the references of a database; empty where nothing is."""
-    pages = [str(row[0]) for row in connection.exec_driver_sql(f"PRAGMA integrity_check({_MOST_LISTED})")]
-    broken = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchmany(_MOST_LISTED)
+    pages = [str(row[0]) for row in connection.exec_driver_sql(f"PRAGMA integrity_check({_MAX_LISTED})")]
+    broken = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchmany(_MAX_LISTED)
     return [f"integrity: {line}" for line in pages if line != "ok"] + [
         f"row {row} of {table} refers to a row of {other} that is missing" for table, row, other, _ in broken
     ]

@@ -16,7 +16,7 @@ from typing import Any
 from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError
 
-from storage.engine.database import LOCK_TIMEOUT, Database, Glance, Question, Watch, granted
+from storage.engine.database import LOCK_TIMEOUT, Database, Question, Snapshot, Watch, granted
 from storage.engine.errors import DatabaseTooOld, StorageUnavailable
 from storage.engine.integrity import refuse_newer
 from storage.engine.sqlite.backup import copy, copy_beside, damage
@@ -83,7 +83,7 @@ def _fault_of_file(path: Path, journal_mode: str) -> str | None:
 
 
 #: Rows that are kept at most. Chosen: some clutches and keys; all are forgotten when there are more.
-_MOST_ROWS = 10_000
+_MAX_ROWS = 10_000
 _REVISION = "SELECT revision FROM clutch WHERE clutch_id = ?"
 _ANY_KEY = "SELECT EXISTS (SELECT 1 FROM access_key)"
 _KEY = "SELECT key_id, scope, note, clutches, expires_at FROM access_key WHERE secret_sha256 = ? AND revoked_at IS NULL"
@@ -100,24 +100,24 @@ class FileWatch(Watch):
         self._closed = False
         self._connection = connect_shared(path, lock_timeout, writable=writable)
 
-    def glances(self, questions: Sequence[Question]) -> list[Glance]:
+    def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
         """What is so now, question by question, all at the same moment."""
         with self._lock:
             version = self._version()
-            if version != self._rows_version or len(self._rows) > _MOST_ROWS:
+            if version != self._rows_version or len(self._rows) > _MAX_ROWS:
                 self._rows.clear()
                 self._rows_version = version
-            return [self._glance(version, question) for question in questions]
+            return [self._snapshot(version, question) for question in questions]
 
-    async def look(self, question: Question) -> Glance:
+    async def look(self, question: Question) -> Snapshot:
         """What is so now, for one who asks from the event loop: the file answers at once."""
-        return self.glances([question])[0]
+        return self.snapshots([question])[0]
 
-    def _glance(self, version: int, question: Question) -> Glance:
+    def _snapshot(self, version: int, question: Question) -> Snapshot:
         any_key = self._row(_ANY_KEY)
         key = None if question.secret_sha256 is None else self._row(_KEY, question.secret_sha256)
         revision = None if question.clutch_id is None else self._row(_REVISION, question.clutch_id)
-        return Glance(
+        return Snapshot(
             version=version,
             keys_are_needed=any_key is not None and bool(any_key[0]),
             key=None if key is None else granted(key),

@@ -19,7 +19,7 @@ from tests.support import ONCE, Server, serving, stationary
 pytestmark = pytest.mark.browser
 
 CLUTCHES = 400
-MOST_ROWS = 150
+MAX_ROWS = 150
 #: Between two cards of a phone's page, px.
 GAP = 13
 PHONE = {"width": 390, "height": 844}
@@ -102,7 +102,7 @@ def test_scrolling_shows_every_row_and_the_page_holds_few(
         places = [place for place, *_ in shown]
         assert places == list(range(places[0], places[0] + len(places)))
         assert all(abs(below[2] - above[3]) <= GAP for above, below in pairwise(shown)), "rows overlap or leave gaps"
-        assert page.locator(ROWS).count() <= MOST_ROWS
+        assert page.locator(ROWS).count() <= MAX_ROWS
         seen |= {place: clutch for place, clutch, *_ in shown}
         if places[-1] == CLUTCHES + 1 or (far and places[0] > 100):
             break
@@ -113,7 +113,7 @@ def test_scrolling_shows_every_row_and_the_page_holds_few(
     goes_to(page, "End", name(CLUTCHES - 1))
     settled(page)
     goes_to(page, "Home", name(0))
-    assert page.locator(ROWS).count() <= MOST_ROWS
+    assert page.locator(ROWS).count() <= MAX_ROWS
     watched.close()
 
 
@@ -127,7 +127,7 @@ def test_a_jump_into_the_middle_reads_only_what_is_in_sight(watched: Watched) ->
     assert abs(shown[0][0] - CLUTCHES / 2) < 30
     lists = [url for url in watched.asked if "/v1/clutches?" in url]
     assert len(lists) <= 6
-    assert all(most(url) <= MOST_ROWS for url in lists)
+    assert all(most(url) <= MAX_ROWS for url in lists)
     before = shown[0]
     page.wait_for_timeout(4000)  # a poll moves nothing
     assert settled(page)[0] == before
@@ -157,7 +157,7 @@ def test_the_focus_stays_while_the_rows_about_it_change(watched: Watched) -> Non
         assert page.evaluate("document.activeElement.closest('tr').dataset.clutch") == name(number)
         if number % 10 == 0:  # nobody is faster than the rows ahead
             page.get_by_role("link", name=name(number + 11), exact=True).wait_for(state="attached")
-    assert page.locator(ROWS).count() <= MOST_ROWS
+    assert page.locator(ROWS).count() <= MAX_ROWS
 
 
 def test_the_send_dialog_offers_what_is_typed(watched: Watched) -> None:

@@ -141,7 +141,7 @@ def test_while_there_is_nothing_else_all_is_answered_as_without_tests(client: Te
 
 @pytest.mark.slow
 def test_no_track_sees_an_open_test_at_a_state(client: TestClient, database_url: str) -> None:
-    """Not to the last bit, whether it comes last or late, nor after all was made anew."""
+    """Not to the last bit, whether it comes last or late, nor after all was made again."""
     post(client, *life())
     before = told(client)
     assert before["remaining-useful-life"]["runs_used"] == 4  # there is something that a fifth state would change

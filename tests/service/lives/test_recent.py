@@ -8,7 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.lives.condition import recent
-from service.lives.criteria import MOST_LINE_POINTS
+from service.lives.criteria import MAX_LINE_POINTS
 from service.lives.history import Event
 from service.queries import clutch_list
 from storage import clutches
@@ -32,12 +32,12 @@ def test_a_clutch_says_its_last_run_and_its_mean_cof(client: TestClient) -> None
     assert one["diagnosis"] is None
 
 
-@pytest.mark.parametrize("count", [1, MOST_LINE_POINTS, MOST_LINE_POINTS + 1, 1000])
+@pytest.mark.parametrize("count", [1, MAX_LINE_POINTS, MAX_LINE_POINTS + 1, 1000])
 def test_a_line_is_short_and_ends_with_the_last_value(count: int) -> None:
     series = SimpleNamespace(measurements=[SimpleNamespace(value=float(index)) for index in range(count)])
     events = [Event(run_id="a", kind="maintenance", cycles=5.0, moment=10.0)]
     said = recent(events, series)["mean_cof"]  # type: ignore[arg-type]
-    assert len(said) <= MOST_LINE_POINTS
+    assert len(said) <= MAX_LINE_POINTS
     assert said[-1] == count - 1
     assert len({after - before for before, after in itertools.pairwise(said)}) <= 1
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from service.schemas.limits import MOST_TORQUE_FILTER_MS
+from service.schemas.limits import MAX_TORQUE_FILTER_MS
 from tests.models.loops.dynamic_records import FALLING, attractor, record
 from tests.models.records.test_torque_filter import FILTER, behind, spiking
 
@@ -56,7 +56,7 @@ def test_a_declared_filter_is_taken_off_and_an_edit_does_so_afterwards(client: T
     assert sent(client, "none", late=True, torque_filter_ms=0) == wrong
 
 
-@pytest.mark.parametrize("wrong", [-1, MOST_TORQUE_FILTER_MS + 1, "20", True])
+@pytest.mark.parametrize("wrong", [-1, MAX_TORQUE_FILTER_MS + 1, "20", True])
 def test_what_is_no_time_constant_is_refused(client: TestClient, wrong: Any) -> None:
     answer = client.post("/v1/clutches", json={"clutch_id": "odd", "torque_filter_ms": wrong})
     assert answer.status_code == 422

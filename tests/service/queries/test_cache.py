@@ -11,7 +11,7 @@ import pytest
 from service.queries import cache as caches
 from service.queries.cache import AnswerCache, build_of, revision_and_json, shared_answer, to_json
 from service.settings import CODE_VERSION
-from service.web.limits import MOST_CACHED_BYTES
+from service.web.limits import MAX_CACHED_BYTES
 from storage import clutches
 from storage.engine.database import Database, SharedAnswer, SharedAnswers
 from storage.engine.errors import StorageUnavailable
@@ -51,7 +51,7 @@ def test_an_answer_larger_than_all_may_be_together_is_given_and_not_kept() -> No
     assert made(cache, "small", b"s")
     assert [made(cache, "large", b"l" * 11) for _ in range(2)] == [True, True]
     assert not made(cache, "small", b"s")
-    assert MOST_CACHED_BYTES < 2**27
+    assert MAX_CACHED_BYTES < 2**27
 
 
 def test_answers_without_a_body_take_room_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -105,7 +105,7 @@ def test_a_run_that_cannot_be_evaluated_is_a_finding(life: str) -> None:
     execute(life, "UPDATE channel SET data = zeroblob(9) WHERE run_key = 1 AND position = 0")
     with closing(find_database(life)) as database:
         (finding,) = check_results(database, "c1").findings
-    assert "results cannot be computed anew: channel" in finding
+    assert "results cannot be computed again: channel" in finding
 
 
 def test_results_of_an_earlier_release_are_counted_and_no_finding(life: str) -> None:

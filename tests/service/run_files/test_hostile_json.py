@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from service.errors import MOST_ERRORS, InvalidError
+from service.errors import MAX_ERRORS, InvalidError
 from service.run_files.json_run import checked, read_run
 from service.schemas.clutch import ClutchIn
 from tests.growth import LINEAR, peak, time_ratio
@@ -37,7 +37,7 @@ def missing(count: int) -> bytes:
 def refused(body: bytes) -> InvalidError:
     with pytest.raises(InvalidError) as raised:
         read_run(body)
-    assert len(raised.value.errors) <= MOST_ERRORS
+    assert len(raised.value.errors) <= MAX_ERRORS
     assert all(len(error.message) < 400 for error in raised.value.errors)
     return raised.value
 

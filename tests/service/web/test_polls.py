@@ -166,6 +166,6 @@ def test_a_database_that_cannot_be_read_is_said_to_be(polled: TestClient, monkey
     def unreadable(*_: object) -> NoReturn:
         raise DatabaseBusy("locked")
 
-    monkeypatch.setattr("storage.engine.sqlite.database.FileWatch.glances", unreadable)
+    monkeypatch.setattr("storage.engine.sqlite.database.FileWatch.snapshots", unreadable)
     answer = polled.get("/v1/clutches/c1/runs")
     assert (answer.status_code, answer.headers["Retry-After"]) == (503, "1")

@@ -97,7 +97,7 @@ def test_they_are_idle_until_one_works(workers: Workers, tmp_path: Path) -> None
 
 
 def test_more_than_may_wait_are_refused(workers: Workers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_MOST_WAITING_LONG", 2)
+    monkeypatch.setattr(module, "_MAX_WAITING_LONG", 2)
     gate = tmp_path / "gate"
     held = [workers.submit(Lane.FILES, calls.logged, tmp_path / "log", name, gate) for name in "ab"]
     with pytest.raises(BusyError, match="2 requests"):

@@ -12,7 +12,7 @@ from service.errors import BusyError
 from service.schemas.clutch import ClutchIn
 from service.schemas.diagnosis import JobOut, JobPage
 from service.work.background import directly
-from service.work.workflow import MOST_REASONS, Task, done
+from service.work.workflow import MAX_REASONS, Task, done
 from service.workflows import ask_job, learn_fleet
 from service.workflows.register_clutch import register
 from storage import jobs
@@ -80,7 +80,7 @@ def leaving(
     assert (database, clutch_id, at, at_once) == (None, None, AT, directly)
     say({"step": "leaves", "done": 1, "of": 2})
     say({"step": "leaves", "done": 2, "of": 2})
-    return {"replayed": 3}, {f"c{number}": "why" for number in range(MOST_REASONS + 5)}
+    return {"replayed": 3}, {f"c{number}": "why" for number in range(MAX_REASONS + 5)}
 
 
 def test_the_result_has_few_reasons_and_the_log_all(capsys: pytest.CaptureFixture[str]) -> None:
@@ -88,9 +88,9 @@ def test_the_result_has_few_reasons_and_the_log_all(capsys: pytest.CaptureFixtur
     task = Task(function=f"{__name__}:leaving", clutch_id=None, at=AT)
     ended = done(None, task, said.append, directly)  # type: ignore[arg-type]  # the workflow reads nothing
     assert ended["progress"] == said[-1] == {"step": "leaves", "done": 2, "of": 2}
-    assert (ended["result"]["replayed"], ended["result"]["left"]) == (3, MOST_REASONS + 5)
-    assert ended["result"]["reasons"] == [{"clutch_id": f"c{n}", "reason": "why"} for n in range(MOST_REASONS)]
-    assert len(capsys.readouterr().err.splitlines()) == MOST_REASONS + 5
+    assert (ended["result"]["replayed"], ended["result"]["left"]) == (3, MAX_REASONS + 5)
+    assert ended["result"]["reasons"] == [{"clutch_id": f"c{n}", "reason": "why"} for n in range(MAX_REASONS)]
+    assert len(capsys.readouterr().err.splitlines()) == MAX_REASONS + 5
 
 
 def test_a_fleet_refresh_stores_what_one_in_process_does(in_file: Database, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from models.diagnosis.extension import Extension
 from service import stored_runs
 from service.cli.main import app
 from service.lives import model_correction, recomputation, run_analysis, tracks
-from service.lives.criteria import MOST_ATTEMPTS
+from service.lives.criteria import MAX_ATTEMPTS
 from service.queries import degradation
 from service.queries.cache import to_json
 from service.run_files.json_run import read_run
@@ -119,7 +119,7 @@ def numerics(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
 
     watched_functions = (
         run_analysis.analyse, run_analysis.mean_cofs, run_analysis.levels_of, run_analysis.loops_of, tracks.advance,
-        tracks.predict, recomputation.track, recomputation.computed_anew, model_correction.corrected_cofs,
+        tracks.predict, recomputation.track, recomputation.computed_again, model_correction.corrected_cofs,
         learn_fleet.taught, learn_fleet.population,
     )  # fmt: skip
     for function in watched_functions:
@@ -134,7 +134,7 @@ def test_nothing_is_computed_while_the_write_lock_is_held(database: Database, nu
     diagnosed(database, "d1")
     errands: list[Callable[[], Any]] = [
         *(lambda cycles=cycles: post(database, cycles) for cycles in (*CYCLES, 4000.0, 5000.0)),
-        lambda: post(database, 500.0),  # late: everything anew
+        lambda: post(database, 500.0),  # late: everything again
         lambda: adopt(database, "c1", "d1", adopted_at=AT),
         lambda: post(database, 6000.0),
         lambda: adopt(database, "c1", None, adopted_at=AT),
@@ -182,7 +182,7 @@ def test_a_run_that_comes_while_another_is_computed_counts_for_it(
 def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
     database: Database, url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run comes whenever the clutch is computed anew: it is left as it was, the others are replayed all the same."""
+    """A run comes whenever the clutch is computed again: it is left as it was, the others are replayed all the same."""
     register_clutch.register(database, ClutchIn(clutch_id="c2"), created_at=AT)
     post(database, 0.0)
     attempts = []
@@ -198,11 +198,11 @@ def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
     with monkeypatch.context() as busy:
         busy.setattr(stored_runs, "recomputed", overtaken)
         replayed = CliRunner().invoke(app, ["replay", "--database", url])
-    assert len(attempts) == MOST_ATTEMPTS
+    assert len(attempts) == MAX_ATTEMPTS
     assert replayed.exit_code == 1
-    assert "runs came each of the 3 times that it was computed anew" in replayed.stderr
+    assert "runs came each of the 3 times that it was computed again" in replayed.stderr
     assert "c2: 0 runs" in replayed.stdout
-    assert replay_clutch(database, "c1") == 1 + MOST_ATTEMPTS
+    assert replay_clutch(database, "c1") == 1 + MAX_ATTEMPTS
 
 
 @pytest.mark.usefixtures("stand_in")

@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 
 from models.diagnosis.extension import Extension
 from service.schemas.diagnosis import DiagnosisOut, JobPage
-from service.work.queue import MOST_ATTEMPTS
+from service.work.queue import MAX_ATTEMPTS
 from service.workflows import adopt_model
 from tests.service.workflows import stand_in_engine
 from tests.service.workflows.diagnosing import BASE, diagnosed, post_tests, service
@@ -144,7 +144,7 @@ def test_what_a_dead_service_left_running_is_made_by_the_next(tmp_path: Path) ->
 def test_what_ends_the_service_again_and_again_is_given_up(tmp_path: Path) -> None:
     with service(tmp_path) as client:
         report = diagnosed(client)
-    left_running(tmp_path, attempts=MOST_ATTEMPTS)
+    left_running(tmp_path, attempts=MAX_ATTEMPTS)
     with service(tmp_path) as client:
         found = ended(client, report["diagnosis_id"])
         assert (found["status"], "ended 3 times" in found["problem"]) == ("failed", True)

@@ -143,7 +143,7 @@ def test_a_refresh_that_learns_nothing_new_changes_nothing(url: str) -> None:
 
 
 def test_posting_on_and_tracking_anew_agree_under_a_fleets_prior(tmp_path: Path) -> None:
-    """One step on from stored states, and all of it anew (a test that comes late), give the same answer."""
+    """One step on from stored states, and all of it again (a test that comes late), give the same answer."""
     answers = []
     for order in ((0, 1, 2, 3, 4), (0, 4, 2, 1, 3)):
         url = f"sqlite:///{tmp_path / str(order[1])}.db"

@@ -69,23 +69,23 @@ def test_threads_take_turns_and_readers_never_see_half_a_run(database: Database)
 
 
 def test_the_version_changes_with_every_commit_and_with_nothing_else(database: Database) -> None:
-    numbers = [database.watch.glance().version, database.watch.glance().version]
+    numbers = [database.watch.snapshot().version, database.watch.snapshot().version]
     with database.writing() as connection:
         connection.exec_driver_sql("CREATE TABLE extra (x INTEGER)")
-        numbers.append(database.watch.glance().version)  # not committed yet
+        numbers.append(database.watch.snapshot().version)  # not committed yet
     assert len(set(numbers)) == 1
-    numbers.append(database.watch.glance().version)
+    numbers.append(database.watch.snapshot().version)
     with contextlib.suppress(RuntimeError), database.writing() as connection:
         connection.exec_driver_sql("INSERT INTO extra VALUES (1)")
         raise RuntimeError
-    assert database.watch.glance().version == numbers[-1] != numbers[0]
+    assert database.watch.snapshot().version == numbers[-1] != numbers[0]
     with database.reading() as connection:
         connection.exec_driver_sql("SELECT * FROM extra").fetchall()
-    assert database.watch.glance().version == numbers[-1]
+    assert database.watch.snapshot().version == numbers[-1]
     other = open_database(database.url)
     with other.writing() as connection:
         connection.exec_driver_sql("INSERT INTO extra VALUES (2)")
-    assert database.watch.glance().version not in numbers
+    assert database.watch.snapshot().version not in numbers
     other.close()
 
 

@@ -105,7 +105,7 @@ def test_a_key_that_a_database_gives_after_a_migration_is_a_new_one(in_file: str
 
 def killed(source: str, target: str, after: int) -> None:
     """A migration whose process is killed after so many batches."""
-    transfers.MOST_ROWS = 2
+    transfers.MAX_ROWS = 2
     batches = 0
 
     def advance(_: str, rows: int) -> None:
@@ -134,7 +134,7 @@ def test_a_killed_migration_goes_on_where_it_was_and_is_used_by_nobody_before(
             open_database(target)
         with pytest.raises(UnfinishedMigration):
             find_database(target)
-    monkeypatch.setattr(transfers, "MOST_ROWS", 2)
+    monkeypatch.setattr(transfers, "MAX_ROWS", 2)
     stored: list[tuple[str, int]] = []
     with transfer(in_file, target) as moving:
         assert moving.rows() == ROWS * len(metadata.sorted_tables)

@@ -21,7 +21,7 @@ def quick_disk(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Bench:
-    """A sender with its files and its spool, and a service; made anew for each kill."""
+    """A sender with its files and its spool, and a service; made again for each kill."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir()

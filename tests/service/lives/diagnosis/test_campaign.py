@@ -107,11 +107,11 @@ def test_a_raw_record_gives_plateaus_and_stays(
     assert (np.diff(run.time) > 0).all()
     assert 0 < run.time[0] < 5 < run.time[1]
     assert run.plateaus.speed[-1] == pytest.approx(1970 * np.pi / 30, rel=1e-2)
-    monkeypatch.setattr(campaign_module, "MOST_OF_CAMPAIGN", run.record.time.size + 1)
+    monkeypatch.setattr(campaign_module, "MAX_OF_CAMPAIGN", run.record.time.size + 1)
     found = campaign(database_url)
     assert [each.record is None for each in found.campaign.stationary] == [False, True]
     assert ["left out for their size" in note for note in found.notes] == [True]
-    monkeypatch.setattr(campaign_module, "MOST_OF_RECORD", 10)
+    monkeypatch.setattr(campaign_module, "MAX_OF_RECORD", 10)
     assert [each.record for each in campaign(database_url).campaign.stationary] == [None, None]
 
 

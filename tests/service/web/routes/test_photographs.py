@@ -75,16 +75,16 @@ def test_a_file_that_is_no_photograph_of_its_type_is_refused(
 
 
 def test_a_photograph_that_is_too_large_is_refused(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.web.routes.inspections.MOST_PHOTOGRAPH_BYTES", 1000)
+    monkeypatch.setattr("service.web.routes.inspections.MAX_PHOTOGRAPH_BYTES", 1000)
     address = inspected(client)
     assert post(client, address, png() + bytes(1000 - len(png())))[0] == 201
     answer = client.post(f"{address}/photographs", content=png() + bytes(1000), headers={"Content-Type": "image/png"})
     assert (answer.status_code, "at most 1000 bytes" in answer.json()["detail"]) == (413, True)
-    assert limits.MOST_PHOTOGRAPH_BYTES == 16 * 2**20
+    assert limits.MAX_PHOTOGRAPH_BYTES == 16 * 2**20
 
 
 def test_an_inspection_has_only_so_many_photographs(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(inspect_clutch, "MOST_PHOTOGRAPHS", 2)
+    monkeypatch.setattr(inspect_clutch, "MAX_PHOTOGRAPHS", 2)
     address = inspected(client)
     assert [post(client, address, png(red=red))[0] for red in (1, 2, 3, 2)] == [201, 201, 409, 200]
 

@@ -45,9 +45,9 @@ def test_a_service_is_asked_on_while_a_migration_waits_for_its_end(on_server: Da
         while not waits_for_the_lock(on_server):
             assert not waiting.done()
             time.sleep(0.01)
-        glances = list(pool.map(lambda _: service.watch.glance(), range(200)))
+        snapshots = list(pool.map(lambda _: service.watch.snapshot(), range(200)))
         assert not waiting.done()
-        assert len(glances) == 200
+        assert len(snapshots) == 200
         with pytest.raises(ServiceRuns):
             waiting.result()
 
@@ -67,7 +67,7 @@ def test_answers_that_cannot_be_read_hold_up_no_request(on_server: Database) -> 
             connection.execute(text("LOCK TABLE shared_answer IN ACCESS EXCLUSIVE MODE"))
             reading = [pool.submit(answers.newest, "c1", "degradation", "1.0") for _ in range(8)]
             for _ in range(50):
-                assert not service.watch.glance().keys_are_needed
+                assert not service.watch.snapshot().keys_are_needed
             assert not any(each.done() for each in reading)
         assert [each.result() for each in reading] == [None] * 8
 
@@ -91,14 +91,14 @@ def test_a_statement_finds_the_server_that_was_started_again() -> None:
             clutches.insert(connection, clutch_row("c1"))
         answers.keep(ANSWER)
 
-        def glance() -> None:
-            assert database.watch.glance("c1").revision == 0
+        def snapshot() -> None:
+            assert database.watch.snapshot("c1").revision == 0
 
         def keep_and_read() -> None:
             answers.keep(ANSWER)
             assert answers.newest("c1", "degradation", "1.0") == ANSWER
 
-        for ask in (glance, keep_and_read, glance, lambda: answers.newest("c1", "degradation", "1.0")):
+        for ask in (snapshot, keep_and_read, snapshot, lambda: answers.newest("c1", "degradation", "1.0")):
             server.kill()
             server.start()
             ask()
@@ -111,7 +111,7 @@ def test_who_asks_a_database_that_was_closed_is_told_so(on_server: Database) -> 
     opened.close()
     opened.close()
     for ask in (
-        opened.watch.glance,
+        opened.watch.snapshot,
         lambda: asyncio.run(opened.watch.look(Question("a"))),
         lambda: answers.newest("a", "degradation", "1.0"),
     ):

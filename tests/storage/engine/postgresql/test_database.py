@@ -138,7 +138,7 @@ def test_who_reads_a_number_of_commits_sees_all_that_was_committed_up_to_it(data
     with database.writing() as connection:
         for name in names:
             clutches.insert(connection, clutch_row(name))
-    first = database.watch.glance().version
+    first = database.watch.snapshot().version
 
     def write(name: str) -> None:
         for _ in range(40):
@@ -149,14 +149,14 @@ def test_who_reads_a_number_of_commits_sees_all_that_was_committed_up_to_it(data
     with ThreadPoolExecutor(4) as pool:
         writing = [pool.submit(write, name) for name in names]
         while not all(each.done() for each in writing):
-            number = database.watch.glance().version
+            number = database.watch.snapshot().version
             with database.reading() as connection:
                 seen.append((number - first, sum(clutches.revision(connection, name) or 0 for name in names)))
         for each in writing:
             each.result()
     assert all(committed >= number for number, committed in seen)
     assert len({number for number, _ in seen}) > 10, "it was read while they wrote"
-    assert database.watch.glance().version == first + 160
+    assert database.watch.snapshot().version == first + 160
 
 
 def test_a_database_that_is_not_in_utf8_is_refused(postgresql: PostgresServer) -> None:
@@ -177,7 +177,7 @@ def test_what_is_acknowledged_is_on_the_disk_whatever_the_database_s_default(
 def test_text_that_postgresql_does_not_have_is_refused(database: Database) -> None:
     with pytest.raises(UnstorableText, match="NUL"), database.writing() as connection:
         clutches.insert(connection, clutch_row("a\0b"))
-    assert database.watch.glance("a\0b").revision is None
+    assert database.watch.snapshot("a\0b").revision is None
 
 
 def test_a_rolled_back_run_leaves_no_gap_in_what_is_counted(database: Database) -> None:
@@ -198,19 +198,19 @@ def test_what_was_committed_is_there_after_the_server_was_killed() -> None:
         with closing(open_database(url)) as database:
             with database.writing() as connection:
                 clutches.insert(connection, clutch_row())
-            before = database.watch.glance().version
+            before = database.watch.snapshot().version
             server.kill()
-            for question in (database.watch.glance, lambda: open_database(url)):
+            for question in (database.watch.snapshot, lambda: open_database(url)):
                 with pytest.raises(StorageUnavailable):
                     question()
             with pytest.raises(StorageUnavailable), database.writing() as connection:
                 pytest.fail("written without a server")
             assert database.faults(least_free=0)["database"].startswith("the database cannot be read")
             server.start()
-            assert database.watch.glance().version == before
+            assert database.watch.snapshot().version == before
             with database.writing() as connection:
                 store_run(connection, 0)
-            assert database.watch.glance().version == before + 1
+            assert database.watch.snapshot().version == before + 1
             assert database.faults(least_free=0) == {}
 
 

@@ -44,8 +44,8 @@ def test_a_database_of_before_gets_the_table_and_counts_its_commits_on(on_server
         clutches.insert(connection, clutch_row("c1"))
     with on_server.writing() as connection:
         connection.execute(text("DROP TABLE shared_answer"))
-    counted = on_server.watch.glance().version
+    counted = on_server.watch.snapshot().version
     with closing(open_database(on_server.url)) as opened:
         assert opened.answers is not None
         opened.answers.keep(FIRST)
-        assert opened.watch.glance().version == counted + 1  # of the commit that made the table
+        assert opened.watch.snapshot().version == counted + 1  # of the commit that made the table

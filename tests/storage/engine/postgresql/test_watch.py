@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import create_engine
 
 from storage import clutches
-from storage.engine.database import Database, Glance, Question
+from storage.engine.database import Database, Question, Snapshot
 from storage.engine.errors import StorageUnavailable
 from storage.engine.postgresql.connect import SingleStatements
 from storage.engine.postgresql.database import ServerWatch
@@ -25,13 +25,13 @@ class Slow(ServerWatch):
         self.may_answer = threading.Semaphore(0)
         self.fails = False
 
-    def glances(self, questions: Sequence[Question]) -> list[Glance]:
+    def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
         self.statements.append(list(questions))
         number = len(self.statements)
         assert self.may_answer.acquire(timeout=30)
         if self.fails:
             raise StorageUnavailable("away")
-        return [Glance(number, False, None, None if each.clutch_id is None else number) for each in questions]
+        return [Snapshot(number, False, None, None if each.clutch_id is None else number) for each in questions]
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ async def sent(watch: Slow, statements: int) -> None:
 
 
 def test_who_asks_while_a_statement_is_under_way_shares_the_next(slow: Slow) -> None:
-    async def ask() -> list[Glance]:
+    async def ask() -> list[Snapshot]:
         first = asyncio.create_task(slow.look(Question("c0")))
         await sent(slow, 1)
         later = [asyncio.create_task(slow.look(Question(f"c{number}"))) for number in range(1, 21)]
@@ -78,7 +78,7 @@ def test_what_fails_fails_for_those_who_asked_and_not_for_the_next(slow: Slow) -
 
 
 def test_who_waits_when_it_is_closed_is_told_so(slow: Slow) -> None:
-    async def ask() -> list[Glance | BaseException]:
+    async def ask() -> list[Snapshot | BaseException]:
         first = asyncio.create_task(slow.look(Question("a")))
         await sent(slow, 1)
         second = asyncio.create_task(slow.look(Question("b")))
@@ -88,7 +88,7 @@ def test_who_waits_when_it_is_closed_is_told_so(slow: Slow) -> None:
         return await asyncio.gather(first, second, return_exceptions=True)
 
     first, second = asyncio.run(ask())
-    assert isinstance(first, Glance)
+    assert isinstance(first, Snapshot)
     assert isinstance(second, StorageUnavailable)
 
 
@@ -98,7 +98,7 @@ def test_a_database_answers_each_what_it_asked(database: Database) -> None:
             clutches.insert(connection, clutch_row(name))
         clutches.bump_revision(connection, "b")
 
-    async def ask() -> list[Glance]:
+    async def ask() -> list[Snapshot]:
         names = ("b", "a", "b", None, "unknown", "a\0b")
         return await asyncio.gather(*(database.watch.look(Question(name)) for name in names))
 

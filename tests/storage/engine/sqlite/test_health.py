@@ -39,7 +39,7 @@ def test_not_ready_on_a_full_disk(database: Database, monkeypatch: pytest.Monkey
 def test_not_ready_where_nothing_can_be_written(
     tmp_path: Path, journal_mode: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As on a disk that was mounted anew for reading only, where the system refuses root too."""
+    """As on a disk that was mounted again for reading only, where the system refuses root too."""
     access = os.access
     with closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
         assert database.journal_mode == journal_mode
