@@ -81,7 +81,7 @@ async def list_inspections_csv(of: OfTable) -> Response:
 
 
 @router.get("/diagnoses/{diagnosis_id}/plan.csv", response_class=Response)
-async def diagnosis_plan_csv(of: Asked, diagnosis_id: DiagnosisId) -> Response:
+async def diagnosis_plan_csv(of: OfTable, diagnosis_id: DiagnosisId) -> Response:
     """The tests that a diagnosis advises as CSV, a row a step."""
 
     def make() -> RowsAndNext:
