@@ -64,7 +64,7 @@ EXAMPLES: dict[str, Any] = {
     "delivered_at": _MOMENT,
     "next_attempt_at": _MOMENT,
     "code": "late_run",
-    "code_version": "0.3.0",
+    "code_version": "1.0.0",
     "content_sha256": _SHA256,
     "created_at": _MOMENT,
     "cursor": _CURSOR,
