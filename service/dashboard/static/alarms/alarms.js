@@ -90,7 +90,7 @@ export class Alarms {
       h("h2", {}, "Rules"),
       rows.length === 0
         ? h("p", { class: "quiet" }, "No rule yet: nothing raises an alarm.")
-        : h("div", { class: "panel" }, scrolling("Rules", table("Rules", ["An alarm when", "Of", ""], rows))),
+        : h("div", { class: "panel" }, scrolling("Rules", table("Rules", ["An alarm when", "Of", "Action"], rows))),
       h("button", { type: "button", class: "main", onclick: () => this.change(null) }, "New rule …"),
     );
   }
@@ -111,7 +111,7 @@ export class Alarms {
       h("h2", {}, "Receivers"),
       rows.length === 0
         ? h("p", { class: "quiet" }, "Nobody is called: alarms stand on this page alone.")
-        : h("div", { class: "panel" }, scrolling("Receivers", table("Receivers", ["Name", "Address", "Of", ""], rows))),
+        : h("div", { class: "panel" }, scrolling("Receivers", table("Receivers", ["Name", "Address", "Of", "Action"], rows))),
       h("button", { type: "button", onclick: add }, "New receiver …"),
     );
   }
@@ -166,4 +166,4 @@ export class Alarms {
   }
 }
 
-const COLUMNS = ["Raised", "Clutch", "What", "State", ""];
+const COLUMNS = ["Raised", "Clutch", "What", "State", "Action"];
