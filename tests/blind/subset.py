@@ -24,12 +24,7 @@ import numpy as np
 
 import models.diagnosis
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.design.design import build_design
-from models.diagnosis.detection.raw_records.evidence import raw_evidence
-from models.diagnosis.diagnose import diagnose
-from models.diagnosis.explanations.decide import decide, explanations_of
-from models.diagnosis.explanations.posterior import posterior_of
-from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
+from models.diagnosis.diagnose import diagnose, verdict_by_posterior
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
 from tests.blind.rows import drawn_pairs
 from tests.blind.trials import Diagnose, Trial, judge
@@ -120,9 +115,7 @@ class Said:
 def by_posterior(seen: Campaign, *, rng: np.random.Generator, without: frozenset[str] = frozenset()) -> Said:
     """The verdict read off one posterior; it draws nothing from `rng`."""
     del rng
-    raw = tuple(record for record in raw_evidence(seen) if record.effect not in without)
-    explanations = explanations_of(posterior_of(fit_baseline(build_design(seen)), raw, without))
-    verdict, causes = decide(explanations)
+    verdict, causes = verdict_by_posterior(seen, without)
     return Said(verdict=verdict.value, causes=causes)
 
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from models.diagnosis import criteria
-from models.diagnosis.explanations import posterior
+from models.diagnosis import diagnose
 from tests.blind.subset import Judged, ablate, table, trials
 
 
@@ -44,9 +43,8 @@ def test_a_seed_has_its_campaigns_and_no_two_are_alike() -> None:
 
 
 def test_a_number_is_ablated_wherever_it_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (criteria, posterior):
-        monkeypatch.setattr(module, "MOST_REFITS", module.MOST_REFITS)  # put back afterwards
-    ablate("MOST_REFITS=6")
-    assert posterior.MOST_REFITS == 6
+    monkeypatch.setattr(diagnose, "A_NUMBER", 1, raising=False)
+    ablate("A_NUMBER=6")
+    assert diagnose.A_NUMBER == 6  # type: ignore[attr-defined]
     with pytest.raises(ValueError, match="no module of the diagnosis has a number NOT_THERE"):
         ablate("NOT_THERE=1")
