@@ -1,6 +1,7 @@
 """The pages of docs/reference that are made from the code: settings, commands, routes, fields, codes, metrics.
 
-Each is a function from the code to Markdown; `python -m tests.documents` writes them, `test_reference.py` holds them.
+Each is a function from the code to Markdown. Tables of docs/appendix that other pages quote are copied to them again.
+`python -m tests.documents` writes all, `test_reference.py` holds them.
 """
 
 import ast
@@ -44,7 +45,33 @@ def pages() -> dict[Path, str]:
         "codes": codes(),
         "metrics": metrics(),
     }
-    return {FOLDER / f"{name}.md": text for name, text in made.items()}
+    own = {FOLDER / f"{name}.md": text for name, text in made.items()}
+    others = [path for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")] if path not in own]
+    return own | {path: quoting(path) for path in others if "<!-- quote " in path.read_text(encoding="utf-8")}
+
+
+_QUOTE = re.compile(r"(<!-- quote (\S+): (.*?) -->\n)(.*?)(<!-- end -->)", flags=re.DOTALL)
+
+
+def quoting(path: Path) -> str:
+    """A page whose quoted tables are those of the page that they come from, with the command above them."""
+
+    def filled(match: re.Match[str]) -> str:
+        rows = (ROOT / "docs" / match[2]).read_text(encoding="utf-8").splitlines()
+        return f"{match[1]}{quoted(rows, match[3].split('; '))}\n{match[5]}"
+
+    return _QUOTE.sub(filled, path.read_text(encoding="utf-8"))
+
+
+def quoted(lines: Sequence[str], keys: Sequence[str]) -> str:
+    """The rows that begin with these cells, of the first table that has all of them. Raises ValueError."""
+    for start in (number for number, line in enumerate(lines) if line.startswith(("|---", "| ---"))):
+        end = next((n for n in range(start, len(lines)) if not lines[n].startswith("|")), len(lines))
+        by_key = {line.split(" | ")[0].removeprefix("| "): line for line in reversed(lines[start + 1 : end])}
+        if all(key in by_key for key in keys):
+            command = next(line for line in reversed(lines[:start]) if line.startswith("`make "))
+            return "\n".join([command, "", *lines[start - 1 : start + 1], *(by_key[key] for key in keys)])
+    raise ValueError(f"no table has all of {keys}")
 
 
 def page(title: str, introduction: str, parts: Iterable[str]) -> str:
