@@ -64,16 +64,17 @@ FEWEST_ENDED = 2
 #: And fewer lives than this tell no exponent of their work. Derived: two lie on any power.
 FEWEST_SEVERITIES = 3
 #: Of a course that an ended life has taken: the deviation q of δ at the end and that of the scatter, in shares of the way
-#: to the threshold, each as probable; the deviation of a, and of the logarithm of what remains where all of it does. Chosen
-#: on the half for developing of `make real`: with q of 0.3 and 1 % besides, intervals hold 85 %; with 80 % they score 5 %
-#: worse; scatter below 0.6 %, that of the ended life's own tests, makes a straight course fit better than any measured one,
-#: from 1.2 % on knees are predicted a fifth worse; a of 0.2 and 0.4 score alike; 0.2 for the last holds 80 %, and 0.45 as
-#: many as 0.35 with a worse score.
+#: to the threshold, each as probable; the deviation of a, and for each q that of the logarithm of what remains where all of
+#: it does. Chosen on the half for developing of `make real`: with q of 0.3 and 1 % besides, intervals hold 85 %; with 80 %
+#: they score 5 % worse; scatter below 0.6 %, that of the ended life's own tests, makes a straight course fit better than any
+#: measured one, from 1.2 % on knees are predicted a fifth worse; a of 0.2 and 0.4 score alike; 0.2 for the last, whatever q,
+#: holds 80 %, 0.45 as many as 0.35 with a worse score, and by q the score is 2 % better.
 COURSE_DISCREPANCIES, COURSE_SCATTERS = np.array([0.03, 0.1, 0.3]), np.array([0.006, 0.012, 0.03, 0.08, 0.2])
-COURSE_SIZE_SD, COURSE_STRETCH_SD = 0.1, 0.35
-#: How often a clutch is of another kind than its fleet, before its tests have spoken. Chosen: of real lives among their own
-#: kind the evidence against it is below e^0.5, and with 5 % their mean CRPS is that of intervals that reach the horizon.
-OTHER_KIND = 0.005
+COURSE_SIZE_SD, COURSE_STRETCH_SD = 0.1, np.array([0.2, 0.35, 0.5])
+#: How often a clutch is of another kind than its fleet, before its tests have spoken. Chosen: among their own
+#: kind the evidence of real lives is at least e^0.8 for it, so that less than 1 % is left to an interval that may reach the
+#: horizon and would decide their mean CRPS.
+OTHER_KIND = 0.02
 #: How early a life is declared worn: the mean of log(end by its criterion / declared), and the odds that its tests show
 #: nothing of what ended it. Chosen on the filters of `make real`. Stopped at 98 % of their threshold, the first of 0.03, 0.1
 #: and 0.3 scatters by 0.5, 0.6 and 0.8 % of the end; the second of 0.1, 0.02 and 0.005 errs by 1.4, 0.9 and 0.8 %, and

@@ -8,15 +8,15 @@ clutch 12, 1.1 times as long". With D = (1 - y/y_0)/(1 - fraction) the share of 
 is linear in x and a given life j, the end T and the deviations of e (s) and of δ (q at T): δ is an integrated random
 walk, as beside any other course (`models.tracking.discrepancy`). All that is linear is integrated out, and the evidence of
 a clutch's tests weighs every j, T, q and s. Where the clutch then crosses the threshold follows from x, a and δ. As no
-life is another one stretched evenly, log T has a further deviation ω r^1.5 √(1 + 2/n), r the share of it that remains, by n
-lives. The prior of T is the predictive of the others' log ends about their median c, Student's t, given that the clutch is
+life is another one stretched evenly, log T has a further deviation ω(q) r^1.5 √(1 + 2/n), r the share of it that remains, by
+n lives. The prior of T is the predictive of the others' log ends about their median c, Student's t, given that the clutch is
 alive:
 
     p(T) ∝ t((log T - c - μ)/σ) · Σ w_jqs(T') N(log T; log T', ...),    T > ζ
 
 A clutch of the kind may also take a course that none of them took: three plain ones stand beside theirs. One of another kind
-takes a plain course with an end anywhere: the evidence says how probable that is, and with that probability the ended lives
-say nothing.
+takes one of all these with an end anywhere, or a plain one: the evidence says how probable that is, and with that
+probability the ended lives say nothing.
 
 An end may be uncertain: a life that was declared worn just short of its threshold. Its log T has a deviation, whose square
 the predictive has more in its sum of squares (the expected one). Or it is censored: a life that was taken out at C for
@@ -238,7 +238,7 @@ def _as_its_kind(
     courses = [life for life, counts in zip(lives, exact, strict=True) if counts]
     kin = seen.nodes(log_end, np.concatenate([[life.course(clock) for life in courses], _plain_courses(clock)]))
     pace = np.array([*(life.final_pace for life in courses), *_PLAIN_PACES])
-    wander = COURSE_STRETCH_SD * math.sqrt(1.0 + 2.0 / len(courses))
+    wander = np.repeat(COURSE_STRETCH_SD, COURSE_SCATTERS.size) * math.sqrt(1.0 + 2.0 / len(courses))
     middle, deviation, share = kin.crossings(seen, log_end, pace, as_of, wander)
     places = now + (latest + _BEYOND - now) * np.linspace(0.0, 1.0, _PLACES + 1)[1:] ** 1.5
     density = np.exp(-0.5 * np.square((places[:, None] - middle) / deviation)) @ (share / deviation)
@@ -251,7 +251,9 @@ def _as_its_kind(
     log_prior = of_ends.log_density(log_end - centre)
     log_prior -= logsumexp(log_prior)
     log_odds = logsumexp(kin.log_evidence + log_prior[:, None, None]) - math.log(pace.size)
-    log_odds -= logsumexp(others.log_evidence) - math.log(_ENDS * others.log_evidence.shape[2])
+    along = logsumexp(kin.log_evidence) + math.log((log_end[1] - log_end[0]) / _ANYWHERE) - math.log(pace.size)
+    beside = logsumexp(others.log_evidence) - math.log(_ENDS * others.log_evidence.shape[2])
+    log_odds -= np.logaddexp(along, beside) - math.log(2.0)
     log_odds += math.log((1.0 - OTHER_KIND) / OTHER_KIND)
     return Kin(ends=np.exp(places), weight=stated / stated.sum(), probability=float(expit(log_odds)))
 
@@ -339,11 +341,11 @@ class _Nodes:
     courses: FloatArray
 
     def crossings(
-        self, seen: _Seen, log_end: FloatArray, pace: FloatArray, as_of: float, wander: float
+        self, seen: _Seen, log_end: FloatArray, pace: FloatArray, as_of: float, wander: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the threshold is crossed, under the nodes that hold nearly all of the evidence: the logarithm of ζ [m], its
         deviation [m], and the nodes' shares of the evidence [m]. `pace` [j] is that of every course at its
-        end, `wander` the deviation of the logarithm where all is to come."""
+        end, `wander` [k] the deviation of the logarithm where all is to come."""
         share = np.exp(self.log_evidence - self.log_evidence.max()).ravel()
         order = np.argsort(share)[::-1]
         within = np.cumsum(share[order])
@@ -365,7 +367,7 @@ class _Nodes:
         early = np.clip(beyond / pace[j], -_FARTHEST, 1.0 - 1.0 / (1.0 + _FARTHEST))
         to_come = np.maximum(1.0 - as_of / end, 0.0)
         step = (log_end[1] - log_end[0]) / math.sqrt(12.0)
-        deviation = np.sqrt(spread / np.square(pace[j]) + np.square(wander * to_come**1.5) + step**2)
+        deviation = np.sqrt(spread / np.square(pace[j]) + np.square(wander[k] * to_come**1.5) + step**2)
         return log_end[e] + np.log1p(-early), deviation, share[held] / share[held].sum()
 
 
