@@ -142,7 +142,7 @@ def _rules(rows: Iterable[AlarmRow]) -> list[tuple[AlarmRow, AlarmIn]]:
 def _judged(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, before: EventRow | None) -> set[str]:
     """Raise an alarm where its rule does; the rule's name where an alarm that was there stays."""
     finding = rules.finding(rule, facts)
-    if before is not None and finding is not None and rules.keeps(rule, finding) and before.mark == finding.mark:
+    if before is not None and finding is not None and rules.keeps(rule, finding) and _is_of(before, rule, finding):
         return {row.alarm_id}
     if finding is not None and rules.raises(rule, finding):
         if before is not None:
@@ -150,6 +150,11 @@ def _judged(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, 
         _raise(connection, row, rule, facts, finding)
         return {row.alarm_id}
     return set()
+
+
+def _is_of(event: EventRow, rule: AlarmIn, finding: Finding) -> bool:
+    """Whether an alarm is of what a rule watches and finds now."""
+    return (event.quantity, event.mark) == (rule.quantity, finding.mark)
 
 
 def _raise(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> None:

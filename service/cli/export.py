@@ -4,7 +4,14 @@ What `push` sends are the runs that count, at the cycles that hold now: another 
 that are held, withdrawn or corrected are beside them as they were sent, and so are the files that runs were read from.
 """
 
+import csv
+import importlib.util
+import io
 import json
+import shutil
+import tempfile
+from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
@@ -13,6 +20,7 @@ from rich.progress import Progress
 
 from service.cli.connection import service_at
 from service.cli.options import URL, ClutchId, Key, Patience, Url, err, errors_in_a_line, out
+from service.cli.workbook import write_workbook
 from service.client.clutchlife.transport import Service
 from service.run_files import manifest
 
@@ -20,17 +28,37 @@ from service.run_files import manifest
 AS_SENT = "as-sent"
 #: The folder of the files that runs were read from.
 FILES = "files"
+CODE_VERSION = version("clutchlife")
+#: The tables of the API that have a CSV export.
+TABLES = (
+    "runs", "changes", "inspections", "remaining-useful-life", "degradation", "stribeck", "surfaces", "scores", "loops",
+    "series",
+)  # fmt: skip
 _SENT = ("run_id", "kind", "cycles", "started_at", "origin", "duty", "event", "reason", "note", "channels")
 
 
 def export(
     clutch: ClutchId,
-    out_folder: Annotated[Path, typer.Option("--out", help="The folder to write to")],
+    out_folder: Annotated[Path, typer.Option("--out", help="The folder to write to, or with --archive the file")],
+    archive: Annotated[bool, typer.Option("--archive", help="Write one ZIP archive in place of a folder")] = False,
     url: Url = URL,
     key: Key = None,
     patience: Patience = 10.0,
 ) -> None:
     """Write a clutch's record, its runs with their raw channels, all results, and its inspections with their photographs."""
+    if archive:
+        with errors_in_a_line(), tempfile.TemporaryDirectory(prefix="clutchlife-export-") as place:
+            folder = Path(place) / _safe(clutch)
+            _export(clutch, folder, url, key, patience)
+            made = Path(shutil.make_archive(str(Path(place) / "archive"), "zip", place, folder.name))
+            out_folder.parent.mkdir(parents=True, exist_ok=True)
+            shutil.move(made, out_folder)
+        out.print(f"all of it is in {out_folder}", markup=False, soft_wrap=True)
+        return
+    _export(clutch, out_folder, url, key, patience)
+
+
+def _export(clutch: str, out_folder: Path, url: str, key: str | None, patience: float) -> None:
     from service.schemas.clutch import ClutchIn  # start-up time
 
     results = out_folder / "results"
@@ -59,7 +87,42 @@ def export(
                 progress.advance(task)
             _results(service, clutch, results)
             _inspections(service, clutch, results)
+            _tables(service, clutch, results)
+            _write(results / "about.json", _about(service, clutch_out, record))
         out.print(f"{count} runs of {clutch} in {out_folder}, results in {results}", markup=False, soft_wrap=True)
+
+
+def _tables(service: Service, clutch: str, folder: Path) -> None:
+    """Every table of the API as CSV, all of them as sheets of a workbook, and as Parquet where its library is installed."""
+    tables = {name: service.table(f"/v1/clutches/{clutch}/{name}.csv") for name in TABLES}
+    place = folder / "tables"
+    place.mkdir(exist_ok=True)
+    for name, text in tables.items():
+        (place / f"{name}.csv").write_text(text, encoding="utf-8", newline="")
+        if importlib.util.find_spec("pyarrow") is not None:
+            _write_parquet(place / f"{name}.csv")
+    write_workbook(folder / "tables.xlsx", {name: csv.reader(io.StringIO(text)) for name, text in tables.items()})
+
+
+def _write_parquet(path: Path) -> None:
+    from pyarrow import csv as arrow_csv  # an extra
+    from pyarrow import parquet  # an extra
+
+    parquet.write_table(arrow_csv.read_csv(path), path.with_suffix(".parquet"))
+
+
+def _about(service: Service, clutch: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
+    """What an export is of: the release, the settings of the clutch, and the data by their hashes."""
+    runs = service.pages(f"/v1/clutches/{clutch['clutch_id']}/runs")
+    return {
+        "clutch_id": clutch["clutch_id"],
+        "exported_at": datetime.now(UTC).isoformat(timespec="seconds"),
+        "release": CODE_VERSION,
+        "revision": clutch["revision"],
+        "settings": record,
+        "model": service.get(f"/v1/clutches/{clutch['clutch_id']}/model"),
+        "data": [{name: run[name] for name in ("run_id", "state", "cycles", "content_sha256")} for run in runs],
+    }
 
 
 def _as_sent(run: dict[str, Any]) -> dict[str, Any]:

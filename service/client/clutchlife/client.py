@@ -148,6 +148,24 @@ class Client:
         """Track a clutch under a diagnosis's extended model; None: under the baseline again."""
         return self.service.put(f"{_clutch(clutch_id)}/model", _body({"diagnosis_id": diagnosis_id}))
 
+    # --- alarms ---
+
+    def alarms(self, **arguments: Any) -> Any:
+        """The rules of alarms as a table."""
+        return self._table("/v1/alarms", **arguments)
+
+    def add_alarm(self, quantity: str, **rule: Any) -> Answer:
+        """Make a rule: `add_alarm("remaining_cycles", clutch_id="e", below=4000)`."""
+        return self.service.post("/v1/alarms", _body({"quantity": quantity, **rule}))
+
+    def events(self, **arguments: Any) -> Any:
+        """What rules have raised as a table, newest first; `state="open"`: what is not over."""
+        return self._table("/v1/alarms/events", **arguments)
+
+    def acknowledge(self, event_id: str, note: str = "") -> Answer:
+        """Say that somebody has seen an alarm."""
+        return self.service.post(f"/v1/alarms/events/{quote(event_id, safe='')}/acknowledge", _body({"note": note}))
+
     def _table(self, address: str, **arguments: Any) -> Any:
         return table(self.service.pages(address, **arguments), self.frames)
 

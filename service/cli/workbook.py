@@ -1,0 +1,79 @@
+"""Tables as an XLSX workbook, a sheet each: what a spreadsheet opens without asking how to read it.
+
+Of ECMA-376 (Office Open XML) the least that a reader needs: sheets of numbers and inline strings, which compute nothing.
+"""
+
+import math
+import re
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from xml.sax.saxutils import escape, quoteattr
+
+#: Characters that XML cannot hold, and the most of a sheet's name and of a cell.
+_ILLEGAL = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_MAX_NAME, _MAX_CELL = 31, 32767
+_MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+_DOCUMENT = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+_PACKAGE = "http://schemas.openxmlformats.org/package/2006"
+_TYPES = "application/vnd.openxmlformats-officedocument.spreadsheetml"
+_HEAD = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
+
+
+def write_workbook(path: Path, sheets: Mapping[str, Iterable[Sequence[str]]]) -> None:
+    """Write rows of texts by sheet; a text that is a finite number becomes one."""
+    names = [name[:_MAX_NAME] for name in sheets]
+    numbers = range(1, len(names) + 1)
+    parts = "".join(
+        f'<Override PartName="/xl/worksheets/sheet{n}.xml" ContentType="{_TYPES}.worksheet+xml"/>' for n in numbers
+    )
+    listed = "".join(
+        f'<sheet name={quoteattr(name)} sheetId="{n}" r:id="r{n}"/>' for n, name in zip(numbers, names, strict=True)
+    )
+    linked = "".join(
+        f'<Relationship Id="r{n}" Type="{_DOCUMENT}/worksheet" Target="worksheets/sheet{n}.xml"/>' for n in numbers
+    )
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as book:
+        book.writestr(
+            "[Content_Types].xml",
+            f'{_HEAD}<Types xmlns="{_PACKAGE}/content-types"><Default Extension="rels" '
+            f'ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Override '
+            f'PartName="/xl/workbook.xml" ContentType="{_TYPES}.sheet.main+xml"/>{parts}</Types>',
+        )
+        book.writestr(
+            "_rels/.rels",
+            f'{_HEAD}<Relationships xmlns="{_PACKAGE}/relationships"><Relationship Id="r1" '
+            f'Type="{_DOCUMENT}/officeDocument" '
+            'Target="xl/workbook.xml"/></Relationships>',
+        )
+        book.writestr(
+            "xl/workbook.xml",
+            f'{_HEAD}<workbook xmlns="{_MAIN}" xmlns:r="{_DOCUMENT}"><sheets>{listed}</sheets></workbook>',
+        )
+        book.writestr(
+            "xl/_rels/workbook.xml.rels",
+            f'{_HEAD}<Relationships xmlns="{_PACKAGE}/relationships">{linked}</Relationships>',
+        )
+        for n, rows in zip(numbers, sheets.values(), strict=True):
+            with book.open(f"xl/worksheets/sheet{n}.xml", "w") as sheet:
+                sheet.write(f'{_HEAD}<worksheet xmlns="{_MAIN}"><sheetData>'.encode())
+                for row in rows:
+                    sheet.write(f"<row>{''.join(map(_cell, row))}</row>".encode())
+                sheet.write(b"</sheetData></worksheet>")
+
+
+def _cell(text: str) -> str:
+    if not text:
+        return "<c/>"
+    if (number := _number(text)) is not None:
+        return f"<c><v>{number!r}</v></c>"
+    kept = escape(_ILLEGAL.sub("", text)[:_MAX_CELL])
+    return f'<c t="inlineStr"><is><t xml:space="preserve">{kept}</t></is></c>'
+
+
+def _number(text: str) -> float | None:
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) and "_" not in text else None
