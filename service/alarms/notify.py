@@ -13,9 +13,18 @@ import subprocess
 import sys
 from contextlib import redirect_stdout
 from typing import Any
-from urllib.parse import urlsplit
 
-from service.alarms.receivers import ATTEMPT_SECONDS, Attempt, NotAllowedError, allowed, post, why_not, wrong_address
+from service.alarms.receivers import (
+    ATTEMPT_SECONDS,
+    Attempt,
+    NotAllowedError,
+    allowed,
+    has_controls,
+    post,
+    scheme_of,
+    why_not,
+    wrong_address,
+)
 from service.alarms.receivers import require_web_address as require_web
 
 _WEB = ("http", "https")
@@ -31,7 +40,7 @@ _SYSTEM_FILES = ("/etc/", "/usr/share/", "/usr/lib/ssl", "/dev/null", "/dev/uran
 
 def require_address(url: str, *, private: bool) -> None:
     """Raise InvalidError where a receiver cannot have this address: it is none, or one that may not be asked."""
-    scheme = urlsplit(url).scheme.lower() if "://" in url else ""
+    scheme = scheme_of(url)
     if scheme not in _WEB:
         _require_apprise(url, scheme)
         return
@@ -45,7 +54,7 @@ def require_address(url: str, *, private: bool) -> None:
 
 
 def _require_apprise(url: str, scheme: str) -> None:
-    if not scheme or scheme in _LOCAL:
+    if not scheme or scheme in _LOCAL or has_controls(url):
         raise wrong_address("url must be a web address such as https://example.org/hook, or one of Apprise's")
     if importlib.util.find_spec("apprise") is None:
         raise wrong_address(
@@ -58,7 +67,7 @@ def _require_apprise(url: str, scheme: str) -> None:
 
 def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool) -> Attempt:
     """One attempt to send a delivery."""
-    if urlsplit(url).scheme.lower() in _WEB:
+    if scheme_of(url) in _WEB:
         return post(url, body, secret=secret, delivery_id=delivery_id, private=private)
     content = json.loads(body)
     event = content["event"]

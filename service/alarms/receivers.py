@@ -50,11 +50,23 @@ def require_web_address(url: str) -> SplitResult:
     try:
         parts = urlsplit(url)
         usable = parts.scheme in _PORTS and bool(parts.hostname) and (parts.port is None or parts.port > 0)
+        (parts.hostname or "").encode("idna")
     except ValueError:
         usable = False
-    if not usable or any(ord(sign) <= 32 or ord(sign) == 127 for sign in url):
+    if not usable or has_controls(url):
         raise wrong_address("url must be a web address such as https://example.org/hook")
     return parts
+
+
+def has_controls(url: str) -> bool:
+    """Whether an address holds blanks or control characters, which none has."""
+    return any(ord(sign) <= 32 or ord(sign) == 127 for sign in url)
+
+
+def scheme_of(url: str) -> str:
+    """What stands before `://`, in small letters; empty where nothing does."""
+    scheme, mark, _ = url.partition("://")
+    return scheme.lower() if mark else ""
 
 
 def wrong_address(message: str) -> InvalidError:
@@ -64,9 +76,9 @@ def wrong_address(message: str) -> InvalidError:
 
 def shown(url: str) -> str:
     """An address without what may be secret in it: password, query, parts of the path that look like tokens."""
+    if scheme_of(url) not in _PORTS:
+        return f"{scheme_of(url)}://***"
     parts = urlsplit(url)
-    if parts.scheme not in _PORTS:
-        return f"{parts.scheme}://***"
     host = f"[{parts.hostname}]" if ":" in (parts.hostname or "") else parts.hostname or ""
     user = "" if parts.username is None else f"{parts.username}:***@" if parts.password is not None else "***@"
     port = "" if parts.port is None else f":{parts.port}"

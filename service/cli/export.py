@@ -5,6 +5,7 @@ that are held, withdrawn or corrected are beside them as they were sent, and so 
 """
 
 import csv
+import importlib
 import importlib.util
 import io
 import json
@@ -105,9 +106,7 @@ def _tables(service: Service, clutch: str, folder: Path) -> None:
 
 
 def _write_parquet(path: Path) -> None:
-    from pyarrow import csv as arrow_csv  # an extra
-    from pyarrow import parquet  # an extra
-
+    arrow_csv, parquet = (importlib.import_module(f"pyarrow.{name}") for name in ("csv", "parquet"))  # an extra
     parquet.write_table(arrow_csv.read_csv(path), path.with_suffix(".parquet"))
 
 

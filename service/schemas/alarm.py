@@ -177,7 +177,7 @@ class WebhookIn(Schema):
         description="`https://...` or `http://...`; with the extra `notify` also an address of Apprise, as `mailtos://...`, "
         "`msteams://...`, `slack://...`, `ntfys://...`"
     )
-    secret: Annotated[str, StringConstraints(max_length=LONGEST_SECRET)] | None = Field(
+    secret: Annotated[str, StringConstraints(max_length=LONGEST_SECRET, pattern=r"^[^\x00]*$")] | None = Field(
         default=None, description="What signs the requests; left out, one is made and answered this once"
     )
     name: Annotated[str, StringConstraints(max_length=LONGEST_NAME)] = Field(
