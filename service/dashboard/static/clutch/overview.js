@@ -42,7 +42,8 @@ export class Overview {
     this.limits = h("div", {});
     const charts = h("div", { class: "charts" }, this.fan.element, this.cof.element, this.shudder.element);
     const more = h("div", { class: "more" });
-    this.body = h("div", { hidden: true }, this.tiles, this.limits, charts, more);
+    const title = h("h2", { class: "hidden" }, "Overview");
+    this.body = h("div", { hidden: true }, title, this.tiles, this.limits, charts, more);
     place.append(this.top, this.body);
     this.planned = new PlannedDuty(more, reader.id);
     this.by = new RemainingBy(more, reader.id);
