@@ -227,8 +227,8 @@ def _stated(held: Mapping[str, Any], names: str) -> float | None:
 def _factor(names: str, unit: str) -> float | None:
     if names == _RATES:
         return _HERTZ.get(unit.lower())
-    found = conversion("time_s", unit or "s")
-    return None if found is None else found.factor
+    converted = conversion("time_s", unit or "s")
+    return None if converted is None else converted.factor
 
 
 def _times(start: float, step: float, rows: int) -> FloatArray:

@@ -323,8 +323,8 @@ def _may_state(channel: str, title: str) -> str | None:
     """A word within a title that is another unit than the channel's own (`Mz [kNm] filtered`); None where there is none."""
     for word in re.finditer(r"[^\W\d_]{2,}(?:/[^\W\d_]+)?", title[:LONGEST_NAME]):
         for part in (word[0], word[0][-3:]):
-            found = conversion(channel, part)
-            if found is not None and not found.is_identity():
+            converted = conversion(channel, part)
+            if converted is not None and not converted.is_identity():
                 return part
     return None
 

@@ -125,9 +125,9 @@ class Numerals:
         if kinds != {str}:
             if kinds <= {int, float, Decimal}:
                 return np.array(cells, dtype=np.float64)
-            each = [self._floats([cell]) if type(cell) in (str, int, float, Decimal) else None for cell in cells]
-            known = [number for number in each if number is not None]
-            return np.concatenate(known) if len(known) == len(cells) else None
+            parsed = [self._floats([cell]) if type(cell) in (str, int, float, Decimal) else None for cell in cells]
+            numbers = [number for number in parsed if number is not None]
+            return np.concatenate(numbers) if len(numbers) == len(cells) else None
         text = "\n".join(cells)
         if " " in text or "\t" in text:
             text = "\n".join([cell.strip() for cell in cells])
