@@ -126,8 +126,8 @@ class Numerals:
             if kinds <= {int, float, Decimal}:
                 return np.array(cells, dtype=np.float64)
             parsed = [self._floats([cell]) if type(cell) in (str, int, float, Decimal) else None for cell in cells]
-            numbers = [number for number in parsed if number is not None]
-            return np.concatenate(numbers) if len(numbers) == len(cells) else None
+            arrays = [number for number in parsed if number is not None]
+            return np.concatenate(arrays) if len(arrays) == len(cells) else None
         text = "\n".join(cells)
         if " " in text or "\t" in text:
             text = "\n".join([cell.strip() for cell in cells])
