@@ -117,6 +117,11 @@ def test_by_keyboard_alone(watched: Watched) -> None:
     assert page.evaluate("document.activeElement.textContent") == "To the clutches"
     page.keyboard.press("Enter")
     assert page.evaluate("document.activeElement.id") == "main"
+    for tab in ("#/clutches", "#/alarms"):
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.hash") == tab
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.id") == "sort"
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.id") == "archived"
     page.keyboard.press("Tab")
