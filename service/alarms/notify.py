@@ -60,7 +60,7 @@ def _require_apprise(url: str, scheme: str) -> None:
         raise wrong_address(
             f"url begins with {scheme[:20]}://, which needs the extra `notify`: pip install 'clutchlife[notify]'"
         )
-    reply = _asked({"url": url, "private": False})
+    reply = _exchange({"url": url, "private": False})
     if not reply.get("understood"):
         raise wrong_address(f"url is no address that Apprise understands ({scheme[:20]}://)")
 
@@ -74,11 +74,11 @@ def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
     over = content["type"] == "alarm.cleared"
     title = f"Clutchlife: {event['name'] or event['quantity'].replace('_', ' ')}" + (" is over" if over else "")
     task = {"url": url, "title": title, "body": event["message"], "private": private}
-    reply = _asked(task)
+    reply = _exchange(task)
     return Attempt() if reply.get("sent") else Attempt(problem=reply.get("problem", "it could not be sent"))
 
 
-def _asked(task: dict[str, Any]) -> dict[str, Any]:
+def _exchange(task: dict[str, Any]) -> dict[str, Any]:
     """What the process of its own answers: a message is sent where the task has one, else the address is looked at."""
     command = [sys.executable, "-m", "service.alarms.notify"]
     try:

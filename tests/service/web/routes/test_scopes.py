@@ -18,7 +18,8 @@ CLUTCH = "/v1/clutches/{clutch_id}"
 OPEN = [
     ("GET", path)
     for path in (
-        "/", "/clutches/{clutch_id}", "/assets/{digest}/{name:path}", "/livez", "/readyz", "/openapi.json", "/docs",
+        "/", "/clutches/{clutch_id}", "/compare",
+        "/assets/{digest}/{name:path}", "/livez", "/readyz", "/openapi.json", "/docs",
         "/docs/start.js", "/help", "/help/{name:path}", "/static-offline-docs",
     )
 ]  # fmt: skip
@@ -62,7 +63,9 @@ _READ = (
     "", "/changes", "/changes.csv", "/runs", "/runs.csv", "/runs/{run_id}", "/runs/{run_id}/file", "/remaining-useful-life",
     "/remaining-useful-life.csv", "/degradation", "/degradation.csv", "/stribeck", "/stribeck.csv", "/engagement",
     "/surfaces", "/surfaces.csv", "/scores", "/scores.csv", "/loops", "/loops.csv", "/series", "/series.csv", "/diagnoses",
-    "/diagnoses/{diagnosis_id}", "/model", "/inspections", "/inspections.csv", "/inspections/{inspection_id}",
+    "/diagnoses/{diagnosis_id}",
+    "/diagnoses/{diagnosis_id}/plan", "/diagnoses/{diagnosis_id}/plan.csv", "/model",
+    "/inspections", "/inspections.csv", "/inspections/{inspection_id}",
     "/inspections/{inspection_id}/photographs/{photograph_id}",
 )  # fmt: skip
 OF_ONE: dict[tuple[str, str], Scope] = {("GET", f"{CLUTCH}{path}"): "read" for path in _READ}
