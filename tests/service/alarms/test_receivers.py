@@ -120,7 +120,11 @@ def endless_continues(connection: socket.socket) -> None:
         connection.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")
 
 
-@pytest.mark.parametrize("write", [drip, endless_headers, endless_continues, lambda _: time.sleep(30)], ids=str)
+@pytest.mark.parametrize(
+    "write",
+    [drip, endless_headers, endless_continues, lambda _: time.sleep(30)],
+    ids=["drip", "headers", "continues", "silence"],
+)
 def test_a_receiver_that_never_ends_is_cut_off(write: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(receivers, "ATTEMPT_SECONDS", 1.0)
     started = time.monotonic()
