@@ -224,22 +224,22 @@ def _as_its_kind(
     exact = np.array([not life.censored for life in lives], dtype=bool)
     if np.count_nonzero(exact) < FEWEST_ENDED or len({test.progress for test in tests}) < FEWEST_TESTS:
         return None
-    seen = _Seen.of(tests, None if offset is None else np.array(offset), lives[0].fraction)
-    if seen is None:
+    decline = _Decline.of(tests, None if offset is None else np.array(offset), lives[0].fraction)
+    if decline is None:
         return None
     log_ends = np.log([life.end for life in lives])
     variance = np.array([life.deviation**2 for life in lives])
     centre = float(np.median(log_ends[exact]))
     of_ends = _predictive(log_ends - centre, variance, exact, VAGUE, END_WORTH)
-    now, earliest = math.log(as_of), math.log(seen.span) - _BEFORE
+    now, earliest = math.log(as_of), math.log(decline.span) - _BEFORE
     latest = max(float(log_ends.max()), now) + _BEYOND
     log_end = np.linspace(earliest, latest, _ENDS)
-    clock = seen.progress / np.exp(log_end)[:, None]
+    clock = decline.progress / np.exp(log_end)[:, None]
     courses = [life for life, counts in zip(lives, exact, strict=True) if counts]
-    kin = seen.nodes(log_end, np.concatenate([[life.course(clock) for life in courses], _plain_courses(clock)]))
+    kin = decline.nodes(log_end, np.concatenate([[life.course(clock) for life in courses], _plain_courses(clock)]))
     pace = np.array([*(life.final_pace for life in courses), *_PLAIN_PACES])
     wander = np.repeat(COURSE_STRETCH_SD, COURSE_SCATTERS.size) * math.sqrt(1.0 + 2.0 / len(courses))
-    middle, deviation, share = kin.crossings(seen, log_end, pace, as_of, wander)
+    middle, deviation, share = kin.crossings(decline, log_end, pace, as_of, wander)
     places = now + (latest + _BEYOND - now) * np.linspace(0.0, 1.0, _PLACES + 1)[1:] ** 1.5
     density = np.exp(-0.5 * np.square((places[:, None] - middle) / deviation)) @ (share / deviation)
     log_prior = of_ends.log_density(places - centre)
@@ -247,7 +247,7 @@ def _as_its_kind(
     if not stated.any():
         return None
     log_anywhere = np.linspace(earliest, earliest + _ANYWHERE, _ENDS)
-    others = seen.nodes(log_anywhere, _plain_courses(seen.progress / np.exp(log_anywhere)[:, None]))
+    others = decline.nodes(log_anywhere, _plain_courses(decline.progress / np.exp(log_anywhere)[:, None]))
     log_prior = of_ends.log_density(log_end - centre)
     log_prior -= logsumexp(log_prior)
     log_odds = logsumexp(kin.log_evidence + log_prior[:, None, None]) - math.log(pace.size)
@@ -259,7 +259,7 @@ def _as_its_kind(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Seen:
+class _Decline:
     """A clutch's tests in the coordinates in which both its scatter and δ are independent from number to number: `damage`
     [n], `features` [n, p] (x and the steps, for deviations of 1), `turn` [n, n] that leads there, and δ's variances `walk`
     [n] for q = 1 at the `span`; and their `progress` [n]. `sizes` [p] is how far each feature moves the crossing."""
@@ -273,7 +273,7 @@ class _Seen:
     walk: FloatArray
 
     @classmethod
-    def of(cls, tests: Sequence[Measurement], offset: FloatArray | None, fraction: float) -> "_Seen | None":
+    def of(cls, tests: Sequence[Measurement], offset: FloatArray | None, fraction: float) -> "_Decline | None":
         progress, value, variance, epoch = np.array([(t.progress, t.value, t.variance, t.epoch) for t in tests]).T
         value = value if offset is None else value + offset
         first = value[progress.argmin()]
@@ -341,7 +341,7 @@ class _Nodes:
     courses: FloatArray
 
     def crossings(
-        self, seen: _Seen, log_end: FloatArray, pace: FloatArray, as_of: float, wander: FloatArray
+        self, decline: _Decline, log_end: FloatArray, pace: FloatArray, as_of: float, wander: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the threshold is crossed, under the nodes that hold nearly all of the evidence: the logarithm of ζ [m], its
         deviation [m], and the nodes' shares of the evidence [m]. `pace` [j] is that of every course at its
@@ -352,15 +352,17 @@ class _Nodes:
         held = order[: int(np.searchsorted(within, _HELD * within[-1])) + 1]
         e, k, j = np.unravel_index(held, self.log_evidence.shape)
         end, weight, variance = np.exp(log_end[e]), self.weight[e, k], np.square(self.size[e, k])
-        ahead = np.maximum(end / seen.span, 1.0)
-        across = _walked(seen.progress / seen.span, ahead[:, None]) @ seen.turn
+        ahead = np.maximum(end / decline.span, 1.0)
+        across = _walked(decline.progress / decline.span, ahead[:, None]) @ decline.turn
         left = (
-            seen.damage
-            - self.features[e, k, j] @ seen.features.T
+            decline.damage
+            - self.features[e, k, j] @ decline.features.T
             - (1.0 + self.taller[e, k, j])[:, None] * self.courses[e, :, j]
         )
         beyond = (
-            self.taller[e, k, j] + self.features[e, k, j] @ seen.sizes + variance * (across * weight * left).sum(axis=1)
+            self.taller[e, k, j]
+            + self.features[e, k, j] @ decline.sizes
+            + variance * (across * weight * left).sum(axis=1)
         )
         spread = variance * ahead**3 - np.square(variance) * (np.square(across) * weight).sum(axis=1)
         spread = np.maximum(spread, 0.0) + self.taller_variance[e, k, j]
