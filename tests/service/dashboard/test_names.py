@@ -22,7 +22,7 @@ QUAINT = (
     "told apart",
     "misses by",
     "worked out",
-    "again",
+    "anew",
 )
 TEXTS = {name: asset.body.decode() for name, asset in assets.load().by_name.items() if not name.startswith("plotly")}
 MODULES = {name: text for name, text in TEXTS.items() if name.endswith(".js")}
