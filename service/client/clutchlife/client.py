@@ -1,8 +1,8 @@
 """The client for scripts: one method a question.
 
-    from clutchlife import Client
+from clutchlife import Client
 
-    cycles = Client("http://127.0.0.1:8000").remaining_useful_life("e")["at_least"]
+cycles = Client("http://127.0.0.1:8000").remaining_useful_life("e")["at_least"]
 """
 
 import json
