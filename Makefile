@@ -27,6 +27,7 @@
 #              make figures: the figures of docs/
 # make docs    the site of docs/, which the service serves at /help; warnings and dead links are errors
 # make reference  the pages of docs/reference that are made from the code
+# make gallery    the figures of docs/gallery.md, drawn by the lines that stand beside them
 # make architecture  the picture, the ways and the examples of docs/explanation/architecture.md, from the code
 PYTHON ?= python3
 VENV ?= .venv
@@ -39,14 +40,16 @@ HELP := service/dashboard/help
 # what checks JavaScript: of `make check` alone, everything else needs Python only
 JAVASCRIPT := tests/javascript/node_modules
 
-# what filterpy declares for its plots and nothing here imports: 98 MB that stay out of every lock, which is why locked
+# what filterpy declares for its plots and no part of the product imports: 98 MB that stay out of every lock but that of the
+# tests, which draw the gallery; which is why locked
 # packages are installed with --no-deps
 UNUSED := matplotlib contourpy cycler fonttools kiwisolver pillow
 # versions age a week before they are locked; no index is named
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
-	--custom-compile-command "make lock" $(foreach name,$(UNUSED),--no-emit-package $(name))
+	--custom-compile-command "make lock"
+SLIM := $(LOCK) $(foreach name,$(UNUSED),--no-emit-package $(name))
 
-.PHONY: docs reference adoption demo shell test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
+.PHONY: docs gallery reference adoption demo shell test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -110,6 +113,9 @@ docs: $(VENV)-docs/.ready
 
 reference: $(VENV)/.tests
 	$(BIN)/python -m tests.documents
+
+gallery: $(VENV)/.tests
+	PYTHONPATH=service/client $(BIN)/python -m tests.documents.gallery
 
 architecture: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.architecture
@@ -176,12 +182,12 @@ $(JAVASCRIPT)/.package-lock.json: tests/javascript/package.json tests/javascript
 	@touch $@
 
 lock:
-	uv pip compile $(LOCK) pyproject.toml -o docker/requirements.txt
-	uv pip compile $(LOCK) pyproject.toml --extra cluster --extra objects --extra postgresql -o docker/requirements-scale.txt
+	uv pip compile $(SLIM) pyproject.toml -o docker/requirements.txt
+	uv pip compile $(SLIM) pyproject.toml --extra cluster --extra objects --extra postgresql -o docker/requirements-scale.txt
 	uv pip compile $(LOCK) pyproject.toml --group test -o tests/requirements.txt
-	uv pip compile $(LOCK) --group docs -o docs/requirements.txt
-	uv pip compile $(LOCK) --group generator -o tests/requirements-generator.txt
-	uv pip compile $(LOCK) --resolution lowest-direct pyproject.toml --group test -o tests/requirements-lowest.txt
+	uv pip compile $(SLIM) --group docs -o docs/requirements.txt
+	uv pip compile $(SLIM) --group generator -o tests/requirements-generator.txt
+	uv pip compile $(SLIM) --resolution lowest-direct pyproject.toml --group test -o tests/requirements-lowest.txt
 
 clean:
 	rm -rf $(JAVASCRIPT) $(VENV) $(VENV)-lowest $(VENV)-generator $(VENV)-rivals $(VENV)-docs $(HELP) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,4 +1,4 @@
-"""What filterpy declares for its plots, and nothing here imports, is not installed."""
+"""What filterpy declares for its plots, and no part of the product imports, is installed for the tests alone."""
 
 import subprocess
 import sys
@@ -12,7 +12,7 @@ LOCKS = sorted(
     [
         *(ROOT / "docker").glob("requirements*.txt"),
         *(ROOT / "docs").glob("*.txt"),
-        *(ROOT / "tests").glob("requirements*.txt"),
+        *(ROOT / "tests").glob("requirements-*.txt"),
     ]
 )
 UNUSED = ("matplotlib", "contourpy", "cycler", "fonttools", "kiwisolver", "pillow")

@@ -1,0 +1,63 @@
+"""`make gallery`: the figures of docs/gallery.md, by its own lines from a simulated clutch, into docs/figures/gallery."""
+
+import re
+import sys
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+from service.cli.main import app
+from tests.documents.reference import ROOT
+from tests.support import serving
+
+PAGE = ROOT / "docs" / "gallery.md"
+FIGURES = ROOT / "docs" / "figures" / "gallery"
+
+
+def blocks() -> list[str]:
+    """The page's blocks of Python: what all need, then one a figure."""
+    return re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+
+
+def draw(url: str, folder: Path) -> list[Path]:
+    """Every figure from the clutch sim-7 of a service; the same clutch gives the same bytes."""
+    mpl.use("svg")
+    mpl.rcParams |= {"svg.hashsalt": "clutchlife", "figure.constrained_layout.use": True}
+    preamble, *figures = blocks()
+    names: dict[str, Any] = {"URL": url}
+    exec(compile(preamble, "the first block", "exec"), names)  # noqa: S102  (the page's own lines)
+    drawn = []
+    for number, block in enumerate(figures, start=1):
+        exec(compile(block, f"figure {number}", "exec"), names)  # noqa: S102
+        path = folder / f"{number}.svg"
+        names["fig"].savefig(path, metadata={"Date": None})
+        names["plt"].close(names["fig"])
+        drawn.append(path)
+    names["rig"].close()
+    return drawn
+
+
+def simulated(url: str, folder: Path) -> None:
+    """Simulate the clutch of the page and send it."""
+    campaign = str(folder / "campaign")
+    options = ["--seed", "7", "--tests", "6", "--frequency", "0.1", "--film"]
+    called = partial(app, standalone_mode=False)
+    called(["simulate", *options, "--out", campaign])
+    called(["push", campaign, "--clutch", "sim-7", "--url", url, "--spool", str(folder / "spool")])
+
+
+def main() -> int:
+    """Draw all of them."""
+    FIGURES.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder, serving(Path(folder) / "gallery.db") as server:
+        simulated(server.url, Path(folder))
+        for path in draw(server.url, FIGURES):
+            print(path.relative_to(ROOT), path.stat().st_size)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
