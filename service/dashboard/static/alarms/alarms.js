@@ -111,7 +111,11 @@ export class Alarms {
       h("h2", {}, "Receivers"),
       rows.length === 0
         ? h("p", { class: "quiet" }, "Nobody is called: alarms stand on this page alone.")
-        : h("div", { class: "panel" }, scrolling("Receivers", table("Receivers", ["Name", "Address", "Of", "Action"], rows))),
+        : h(
+            "div",
+            { class: "panel" },
+            scrolling("Receivers", table("Receivers", ["Name", "Address", "Of", "Action"], rows)),
+          ),
       h("button", { type: "button", onclick: add }, "New receiver …"),
     );
   }
