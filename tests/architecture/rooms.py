@@ -23,8 +23,8 @@ from tests.support import stationary
 COUNTED = ("service", "storage")
 PRESSURES = (4.0, 5.0, 6.0)
 EARLIER_RUNS = 4
-#: Threads that look for jobs and keep hold of them.
-JOBS: Set[str] = {"jobs", "lease"}
+#: Threads that look for jobs and keep hold of them, and the one that looks for what receivers of alarms are to be sent.
+JOBS: Set[str] = {"jobs", "lease", "outbox"}
 
 
 class Watch:
