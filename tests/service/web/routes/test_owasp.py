@@ -115,19 +115,21 @@ def test_api6_a_life_is_not_changed_by_asking_often(client: TestClient) -> None:
     assert client.delete(f"{CLUTCHES}/c1/runs/a", headers=headers).status_code == 405
 
 
-#: What opens connections to others; the command line alone does.
+#: What opens connections to others.
 _CLIENTS = re.compile(
     r"^\s*(?:import|from) (httpx2|urllib\.request|http\.client|requests|aiohttp|socket)\b", re.MULTILINE
 )
 
 
-def test_api7_the_service_asks_no_address_that_it_is_sent() -> None:
-    """No part of it but the command line can open a connection; its readers cannot even by force: test_sandbox.py."""
-    sources = [path for path in (ROOT / "service").rglob("*.py") if "cli" not in path.parts]
+def test_api7_the_service_asks_no_address_that_it_is_sent_but_receivers_of_alarms() -> None:
+    """No other part of it than the command line and the client can open a connection; its readers cannot even by force:
+    test_sandbox.py. Which addresses receivers may have: tests/service/alarms/test_receivers.py."""
+    sources = [path.relative_to(ROOT / "service") for path in (ROOT / "service").rglob("*.py")]
     assert len(sources) > 80
-    assert [str(path) for path in sources if _CLIENTS.search(path.read_text(encoding="utf-8"))] == []
-    command_line = (ROOT / "service" / "cli").rglob("*.py")
-    assert any(_CLIENTS.search(path.read_text(encoding="utf-8")) for path in command_line), "nothing would be found"
+    opening = {path for path in sources if _CLIENTS.search((ROOT / "service" / path).read_text(encoding="utf-8"))}
+    inside = {path.as_posix() for path in opening if path.parts[0] not in ("cli", "client")}
+    assert inside == {"alarms/receivers.py"}
+    assert len(opening) > len(inside), "nothing would be found"
 
 
 @pytest.mark.parametrize("path", ["/", "/clutches/c1", "/docs", "/docs/start.js", CLUTCHES, "/nowhere", "/livez"])
