@@ -174,7 +174,9 @@ def test_units_are_chosen_and_kept(browser: Browser, life: Server) -> None:
     expect(note).to_contain_text("At 73 psi")
     with page.expect_download() as sheet:
         page.locator("#chart-stribeck").get_by_role("button", name="XLSX").click()
-    rows = list(openpyxl.load_workbook(sheet.value.path()).active.iter_rows(values_only=True))
+    rows = list(
+        openpyxl.load_workbook(io.BytesIO(Path(sheet.value.path()).read_bytes())).active.iter_rows(values_only=True)
+    )
     assert rows[0] == ("kind", "cycles", "pressure, bar", "speed, rpm", "coefficient of friction µ")
     assert 0.05 < rows[1][4] < 0.25
     watched.close()
@@ -218,7 +220,7 @@ def test_what_the_page_says_is_what_the_service_says(watched: Watched) -> None:
     turned(page, "runs")
     page.locator("#runs .runs > details").first.wait_for()
     # a note is text, never markup
-    assert page.locator("#runs").get_by_text("<img src=x onerror=alert(1)>").is_visible()
+    expect(page.locator("#runs").get_by_text("<img src=x onerror=alert(1)>")).to_be_visible()
     warned = page.locator("#runs details").filter(has=page.locator(".warned")).first
     warned.locator("summary").first.click()
     warned.locator(".warnings li").first.wait_for()
@@ -304,7 +306,7 @@ def test_the_report_is_one_page_and_light(browser: Browser, life: Server) -> Non
     page.emulate_media(media="print", color_scheme="dark")
     assert not page.locator("main").is_visible()
     report = page.locator("#report")
-    for part in ("sim-1", "Remaining cycles", "Threshold", "Diagnosis:", "The last tests", "Made of: Clutchlife 0."):
+    for part in ("sim-1", "Remaining cycles", "Threshold", "Diagnosis:", "The last tests", "Made of: Clutchlife "):
         assert part in report.inner_text()
     assert not seen(browser, report.screenshot()).is_dark
     watched.close()
