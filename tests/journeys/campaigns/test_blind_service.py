@@ -3,6 +3,7 @@
 from typing import Any
 
 import httpx2
+import pytest
 
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.sent import runs
@@ -39,12 +40,14 @@ def test_a_hidden_effect_is_found(http: httpx2.Client) -> None:
     assert len(report["summary"]) > 40
 
 
+@pytest.mark.slow
 def test_where_nothing_is_hidden_the_model_is_adequate(http: httpx2.Client) -> None:
     report = diagnosed(http, hide((31, 2)))
     assert report["verdict"] == "model_adequate"
     assert report["causes"] == []
 
 
+@pytest.mark.slow
 def test_what_no_catalogue_has_is_not_named(http: httpx2.Client) -> None:
     report = diagnosed(http, hide((31, 3), ("speed_bump",), 100.0))
     assert report["verdict"] == "unexplained_structure"

@@ -65,7 +65,7 @@ def test_the_fleet(browser: Browser, url: str, scheme: str, viewport: dict[str, 
     watched.context.close()
 
 
-@pytest.mark.parametrize(("scheme", "viewport"), [("light", PHONE), ("dark", WIDE)])
+@pytest.mark.parametrize(("scheme", "viewport"), [("light", PHONE), pytest.param("dark", WIDE, marks=pytest.mark.slow)])
 def test_a_clutch_with_a_diagnosis_and_all_that_opens(
     browser: Browser, url: str, scheme: str, viewport: dict[str, int]
 ) -> None:
