@@ -115,12 +115,14 @@ def public(
 
 
 def _remaining(report: Report, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
-    """What adopting the extension would do to the median of the remaining life, in a sentence; nothing without one."""
+    """What adopting the extension would do to the median of the remaining life, in a sentence; nothing without one.
+
+    Two digits: a filter's draws move the third, and with them the clutch's name."""
     medians = [(forecast.get("remaining_cycles") or {}).get("0.5") for forecast in (before, after)]
     if report.extension is None or None in medians:
         return ""
-    now, then = (f"{median:,.0f}" for median in medians)
-    return f"Adopting it changes the median of the remaining life from {now} to {then} cycles."
+    now, then = (f"{float(f'{median:.2g}'):,.0f}" for median in medians)
+    return f"Adopting it changes the median of the remaining life from about {now} to about {then} cycles."
 
 
 def _step(step: Step, origin: float) -> dict[str, Any]:

@@ -153,8 +153,9 @@ def test_the_focus_stays_while_the_rows_about_it_change(watched: Watched) -> Non
     link.focus()
     settled(page)
     for number in range(61, 130):
-        page.keyboard.press("Tab")
-        assert page.evaluate("document.activeElement.closest('tr').dataset.clutch") == name(number)
+        for _ in ("the box that chooses it", "its name"):
+            page.keyboard.press("Tab")
+            assert page.evaluate("document.activeElement.closest('tr').dataset.clutch") == name(number)
         if number % 10 == 0:  # nobody is faster than the rows ahead
             page.get_by_role("link", name=name(number + 11), exact=True).wait_for(state="attached")
     assert page.locator(ROWS).count() <= MAX_ROWS

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from service.lives.plausibility.doubts import Judged
 from tests.journeys.faults.test_kills import findings, kills, stored
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import granted, revoke_all
@@ -58,7 +59,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> type[Clock]:
     for module in readers:
         monkeypatch.setattr(module, "datetime", Clock)
     for workflow in ("ingest_run", "change_run"):
-        monkeypatch.setattr(f"service.workflows.{workflow}.doubts", lambda *_: ())
+        monkeypatch.setattr(f"service.workflows.{workflow}.doubts_together", lambda *_, **__: Judged())
     monkeypatch.setattr(Clock, "off", timedelta())
     return Clock
 
