@@ -94,7 +94,7 @@ def test_a_recorders_file_is_pushed_as_it_is(server: Server, tmp_path: Path) -> 
     ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
     push: tuple[str | Path, ...] = ("push", tmp_path / "test.csv", "--clutch", "c1", "--url", server.url)
     push = (*push, "--spool", tmp_path / "spool")
-    assert "give --kind and --cycles" in clutchlife(*push, code=64)
+    assert "give --rig, or --kind and --cycles" in clutchlife(*push, code=64)
     push = (*push, "--kind", "stationary_stribeck", "--cycles", "0", "--map", "torque_nm:Mz")
     assert "1 stored, 0 known already" in clutchlife(*push)
     assert "0 stored, 1 known already" in clutchlife(*push)
