@@ -47,7 +47,10 @@ def _quantile(sent: float) -> float:
 
 
 Probability = Annotated[
-    float, Field(strict=True, json_schema_extra={"enum": list(QUANTILES)}), AfterValidator(_quantile)
+    float,
+    # an enum of numbers is none that generators of clients write
+    Field(strict=True, json_schema_extra={"oneOf": [{"const": quantile} for quantile in QUANTILES]}),
+    AfterValidator(_quantile),
 ]
 Limit = Annotated[float, Field(ge=-LARGEST_LIMIT, le=LARGEST_LIMIT, allow_inf_nan=False, strict=True)]
 Material = Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_NAME)]

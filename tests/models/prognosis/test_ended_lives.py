@@ -118,7 +118,7 @@ def test_it_is_alive_now() -> None:
 def test_the_evidence_is_that_of_the_normal_written_out() -> None:
     """Of every course, end and pair of deviations, with x, a, the step and δ integrated out: by dense covariances."""
     tests = measured(1_100.0, 0.5, step=0.02)
-    seen = ended_lives._Seen.of(tests, None, 0.5)
+    seen = ended_lives._Decline.of(tests, None, 0.5)
     assert seen is not None
     log_end = np.log([900.0, 1_300.0])
     progress, damage = seen.progress, (1.0 - np.array([t.value for t in tests]) / tests[0].value) / 0.5
