@@ -27,8 +27,8 @@ from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import Projected, projections_of
 
 #: Gauss-Newton steps of a refit at most: it is followed to its end. With 10, a running-in was 49 nats short of it and stood
-#: behind what it was; 31 and 35 steps ended the longest two of 30 refits near the best (`make blind SEED=23 SIZE=0.03`), and a
-#: zero shift that eq. 6 had absorbed was not at its end after 40.
+#: behind what it was; 31 and 35 steps ended the longest two of 30 refits near the best (`make blind SEED=23 SIZE=0.03`), 48
+#: that of a zero shift which eq. 6 had absorbed.
 STEPS = 80
 
 
