@@ -33,7 +33,7 @@ _CHANNELS = ("pressure", "speed", "torque", "oil_temperature", "plate_temperatur
 
 
 class Sampled(Protocol):
-    """What a `Record` holds, in SI units; a channel may be computed anew at each access."""
+    """What a `Record` holds, in SI units; a channel may be computed again at each access."""
 
     @property
     def time(self) -> FloatArray: ...

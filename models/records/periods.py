@@ -236,7 +236,7 @@ def _explained(time: FloatArray, value: FloatArray, frequencies: FloatArray) -> 
 
 def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, tolerance: float) -> Cycle | str:
     """Gauss-Newton on frequency, mean and `count` harmonics until the frequency moves by less than `tolerance`/duration;
-    outliers are determined anew in the first steps."""
+    outliers are determined again in the first steps."""
     origin, duration = 0.5 * float(time[0] + time[-1]), float(time[-1] - time[0])
     order, highest = np.arange(1, count + 1), 0.5 / max(sample_interval(time), 1e-12)
     keep, steady = np.ones(time.size, dtype=np.bool_), beside(value)

@@ -82,7 +82,7 @@ def _without_ramps(smooth: FloatArray, start: int, stop: int, gap: float) -> tup
     """[start, stop) without the rows at its ends where pressure is off the level by more than its usual wander.
 
     Level and wander are those of the middle half, so that a pressure which wanders all the time keeps its ends. They are
-    computed anew after each cut: half of a long ramp may lie in the first middle.
+    computed again after each cut: half of a long ramp may lie in the first middle.
     """
     for _ in range(_CUTS):
         quarter = (stop - start) // 4

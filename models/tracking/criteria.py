@@ -97,10 +97,10 @@ HEALTHY, STARVED = 0.5, 0.25
 KEPT = 0.05
 #: Steps of a move, at most, and the share of particles after which they end. Chosen; no table.
 MOVES, MOVED = 8, 0.9
-#: The unscented filters' running mean of squared innovations forgets at this rate; above LOST they start anew. Chosen; no
+#: The unscented filters' running mean of squared innovations forgets at this rate; above LOST they start again. Chosen; no
 #: table.
 FORGET, LOST = 0.3, 4.0
-#: They also start anew when progress has grown by this factor. Chosen; no table.
+#: They also start again when progress has grown by this factor. Chosen; no table.
 GROWN = 2.0
 #: A size of the discrepancy with a smaller share of the probability gets no unscented filter. Chosen; no table.
 FEW = 0.02

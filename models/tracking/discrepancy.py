@@ -1,7 +1,7 @@
 """What a clutch does beside eq. 6: a smooth discrepancy δ(ζ), and steps of the level at events.
 
 No clutch follows eq. 6 exactly, and its deviation is no scatter: it is smooth. δ starts at 0 with slope 0, and its
-curvature is drawn anew on each of a few stretches of progress (an integrated random walk). With T the progress measured
+curvature is drawn again on each of a few stretches of progress (an integrated random walk). With T the progress measured
 so far, its deviation at T is q · size: q = 0 is eq. 6 itself, and the data choose among a few others. Beyond T it
 continues with the slope it has and further curvature on stretches that grow with ζ, so that its deviation grows as
 (ζ/T)^1.5: a discrepancy observed today widens every forecast, the further ahead the more. At ten times T it levels off:

@@ -120,7 +120,7 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
 
 
 def _speed_cycle(time: FloatArray, velocity: FloatArray, before: Cycle | None) -> Cycle | str:
-    """The stretch's speed cycle: with the frequency of the stretch before where that fits here as well, else fitted anew."""
+    """The stretch's speed cycle: with the frequency of the stretch before where that fits here too, else fitted again."""
     count = SPEED_HARMONICS if before is None else before.cosine.size
     step = 1 if count > SPEED_HARMONICS else max(1, time.size // CYCLE_SAMPLES)
     t, v = time[::step], velocity[::step]

@@ -71,7 +71,7 @@ def fit_baseline(design: Design) -> Baseline:
 
 def from_better(baseline: Baseline, better: Fit) -> Baseline:
     """The baseline from a fit that does better, with the noise that this one's residuals show. Raises IndeterminateError."""
-    noise = replace(baseline.problem.noise, curve_gain=0.0)  # estimated anew, as all of the noise is
+    noise = replace(baseline.problem.noise, curve_gain=0.0)  # estimated again, as all of the noise is
     return _with_its_noise(baseline.start, baseline.problem.with_noise(noise), better)
 
 

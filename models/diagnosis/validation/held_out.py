@@ -214,7 +214,7 @@ def _bridged(laws: Laws, design: Design, out: BoolArray) -> Laws:
 def _reduction(
     curve: NDArray[np.intp], before: FloatArray, after: FloatArray, rng: np.random.Generator
 ) -> tuple[float, float]:
-    """By how much the RMSE falls [%], and its deviation: whole curves are drawn anew, both models on the same ones."""
+    """By how much the RMSE falls [%], and its deviation: whole curves are drawn again, both models on the same ones."""
     _, index = np.unique(curve, return_inverse=True)
     sums = np.stack([np.bincount(index, weights=errors**2) for errors in (before, after)])
     drawn = rng.integers(sums.shape[1], size=(_RESAMPLES, sums.shape[1]))

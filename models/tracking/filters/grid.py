@@ -37,7 +37,7 @@ BLEND = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GridState:
-    """All measurements: the posterior is computed anew over the whole history, so nothing else is carried on."""
+    """All measurements: the posterior is computed again over the whole history, so nothing else is carried on."""
 
     prior: Prior
     history: History

@@ -8,7 +8,7 @@ level to the state: one common step would book the sum of all on the last event.
 
 The prior is far too wide for sigma points: φ spans decades within them, and a filter started there does not recover.
 So the filters start, one for each form, from the means and covariances of the exact posterior of the first measurements
-together. They start anew when their innovations become too large, when progress has doubled (the law is curved, and
+together. They start again when their innovations become too large, when progress has doubled (the law is curved, and
 the reference moves along), or when a run comes out of order.
 
 A run may be outlying: each update is that of a sound run and of an outlying one, mixed by how probable either is. The
@@ -121,7 +121,7 @@ class Ukf:
         )
 
     def update(self, state: UkfState, measurement: Measurement, rng: np.random.Generator | None = None) -> UkfState:  # noqa: ARG002
-        """The state after one more measurement: predict, update, symmetrise, keep to the domain; or start anew."""
+        """The state after one more measurement: predict, update, symmetrise, keep to the domain; or start again."""
         before, prior = state.history, state.prior
         history = before.append(measurement, prior)
         backwards = measurement.progress < before.span or measurement.epoch < before.epoch.max(initial=0.0)

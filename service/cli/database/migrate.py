@@ -16,7 +16,7 @@ def migrate(
     Interrupted, it goes on where it was when the command is given again. The target is used by no service until all tables
     are the same on both sides, and every run is as it was sent.
     """
-    from service.queries.verification import (
+    from service.queries.verification import (  # start-up time
         check_inspections,  # start-up time
         check_runs,  # start-up time
     )

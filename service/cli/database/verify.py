@@ -19,7 +19,7 @@ def verify(
 
     Prints what is wrong, a line each; ends with 1 where anything is. Also while the service runs, and for a backup.
     """
-    from service.queries.verification import (
+    from service.queries.verification import (  # start-up time
         check_inspections,  # start-up time
         check_results,  # start-up time
         check_runs,  # start-up time
