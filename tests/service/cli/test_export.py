@@ -4,7 +4,9 @@ import csv
 import json
 import zipfile
 from pathlib import Path
+from time import gmtime
 
+import pytest
 from python_calamine import CalamineWorkbook
 
 from service.cli.export import TABLES
@@ -54,3 +56,15 @@ def test_a_workbook_computes_nothing_and_takes_any_text(tmp_path: Path) -> None:
     book = CalamineWorkbook.from_path(str(path))
     assert book.sheet_names == ["x" * 31]
     assert book.get_sheet_by_index(0).to_python() == [["=1+1", 1000.0, "", "a<b & c", "1_000", "nan"]]
+
+
+def test_the_same_tables_are_the_same_workbook_whenever_they_are_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = []
+    for seconds in (1_700_000_000.0, 1_800_000_000.0):
+        monkeypatch.setattr("time.time", lambda at=seconds: at)
+        monkeypatch.setattr("time.localtime", lambda _=None, at=seconds: gmtime(at))
+        write_workbook(tmp_path / "a.xlsx", {"x": [["cycles", "mean_cof"], ["1000", ".13"]]})
+        written.append((tmp_path / "a.xlsx").read_bytes())
+    assert written[0] == written[1]
