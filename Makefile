@@ -1,13 +1,14 @@
 # make demo    a simulated clutch's life, posted run by run, with its prognosis      (ARGS=--exit to end by itself)
 # make shell   a shell in which clutchlife is a command
 # make test    all tests but those of `make slow`
+# make quick   those that need no browser and no server, in one process: half a minute to think by
 # make slow    what takes long and rarely fails: what intervals promise, counted over many lives; further ways to the same
 #              answer, files cut off anywhere, charts drawn by the large library                               (30 minutes)
 # make faults  kills the service and its commands hundreds of times, and sends what nobody sends: schemathesis over whole
 #              sequences of requests, and files of every format with bytes changed, MINUTES=10 of each
 #              (two and a half hours; ARGS="-k kills")
 # make check   formatting, lint, types, layers; of the dashboard's JavaScript and styles too, for which it needs npm
-# make lowest  tests that meet every dependency, on the oldest releases that pyproject.toml allows
+# make lowest  tests that meet every dependency, on the oldest releases that pyproject.toml allows; wanted where those change
 # make score   how good the prognosis is, on simulated lives: the tables of docs/appendix/prognosis.md  (SEED= SIZE= PARTS= ARGS=--write)
 # make rivals  the same beside other packages, in an environment of their own                (SEED= SIZE=)
 # make blind   hides effects and wants them found: the table of docs/appendix/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
@@ -49,7 +50,7 @@ LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --
 	--custom-compile-command "make lock"
 SLIM := $(LOCK) $(foreach name,$(UNUSED),--no-emit-package $(name))
 
-.PHONY: docs gallery reference adoption demo shell test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
+.PHONY: docs gallery reference adoption demo shell test quick slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -59,11 +60,14 @@ shell: $(VENV)/.runs
 	@echo "clutchlife is a command in this shell; exit leaves it"
 	@PATH="$(abspath $(BIN)):$$PATH" VIRTUAL_ENV="$(abspath $(VENV))" $${SHELL:-/bin/sh}
 
-test: $(VENV)/.tests $(VENV)-generator/.ready
+test: $(VENV)/.tests
 	$(BIN)/python -m tests.browser
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow" $(ARGS)
 
-slow: $(VENV)/.tests
+quick: $(VENV)/.tests
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "not slow and not outside" $(ARGS)
+
+slow: $(VENV)/.tests $(VENV)-generator/.ready
 	$(BIN)/python -m tests.browser
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m slow $(ARGS)
 
@@ -86,6 +90,7 @@ lowest: $(VENV)-lowest/.tests
 	OPENBLAS_NUM_THREADS=1 $(VENV)-lowest/bin/python -m pytest -n 2 -m "not slow" -W default::DeprecationWarning tests/storage tests/service/run_files/test_upload.py \
 		tests/service/readers tests/models/friction/test_identification.py \
 		tests/models/tracking/filters tests/models/diagnosis/test_extension.py tests/journeys/test_contract.py $(ARGS)
+	sha256sum tests/requirements-lowest.txt > tests/lowest.tried
 
 picture: $(VENV)/.tests
 	$(BIN)/python -m tests.picture

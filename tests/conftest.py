@@ -21,6 +21,20 @@ settings.register_profile("untimed", deadline=None, suppress_health_check=[Healt
 settings.load_profile("untimed")
 
 
+#: Fixtures, and values of fixtures, that start a server or a browser.
+OUTSIDE = {"postgresql", "s3", "on_server", "in_bucket", "browser", "server"}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What needs more than its own process is marked `outside`: `make quick` leaves it out."""
+    for item in items:
+        drawn = getattr(getattr(item, "callspec", None), "params", {})
+        used = {*getattr(item, "fixturenames", ()), *(value for value in drawn.values() if isinstance(value, str))}
+        if used & OUTSIDE or "journeys" in item.path.parts:
+            item.add_marker("outside")
+
+
 @pytest.fixture(scope="session")
 def postgresql() -> Iterator[PostgresServer]:
     with postgresql_server() as server:

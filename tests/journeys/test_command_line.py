@@ -179,7 +179,7 @@ def test_keys_open_and_close_the_service(server: Server) -> None:
 
 
 def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops_and_inspections() -> None:
-    """Until Ctrl-C. That `--exit` ends by itself instead, `.ci/run` sees before the tests."""
+    """Until Ctrl-C; `--exit` ends by itself instead."""
     called = [sys.executable, "-u", "-m", "service.cli.main", "demo", "--no-browser"]
     with subprocess.Popen(called, stdout=subprocess.PIPE, text=True, start_new_session=True) as demo:
         assert demo.stdout is not None
@@ -210,3 +210,10 @@ def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops
     assert {inspection["origin"] for inspection in inspections} == {"simulated"}
     assert "closing" in rest
     assert demo.returncode == 0
+
+
+@pytest.mark.slow
+def test_the_demo_ends_by_itself_where_it_is_asked_to() -> None:
+    called = [sys.executable, "-m", "service.cli.main", "demo", "--no-browser", "--exit"]
+    ended = subprocess.run(called, capture_output=True, text=True, check=True)
+    assert "Hidden was oil_temperature: found." in ended.stdout

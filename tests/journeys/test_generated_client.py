@@ -12,7 +12,7 @@ import pytest
 
 from tests.support import ONCE, Server, serving, stationary
 
-#: `make test` sets it up: the generator asks for other releases than ours, and its clients for none of our packages.
+#: `make slow` sets it up: the generator asks for other releases than ours, and its clients for none of our packages.
 ENVIRONMENT = Path(f"{sys.prefix}-generator") / "bin"
 
 CALLS = """
@@ -54,8 +54,9 @@ def sends_an_image(operation: dict[str, Any]) -> bool:
     return any(kind.startswith("image/") for kind in operation.get("requestBody", {}).get("content", {}))
 
 
+@pytest.mark.slow
 def test_a_client_is_generated_that_compiles_and_posts_a_run(server: Server, tmp_path: Path) -> None:
-    assert ENVIRONMENT.is_dir(), f"{ENVIRONMENT} is not there: make test sets it up"
+    assert ENVIRONMENT.is_dir(), f"{ENVIRONMENT} is not there: make slow sets it up"
     description = tmp_path / "openapi.json"
     description.write_bytes(ONCE.get(f"{server.url}/openapi.json").content)
     output = ("--output-path", "written", "--meta", "none")

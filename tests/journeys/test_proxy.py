@@ -70,6 +70,7 @@ def below(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield url
 
 
+@pytest.mark.slow
 def test_the_command_line_finds_the_service_below_the_path(below: str, tmp_path: Path) -> None:
     assert "sim-7" in clutchlife("life", "sim-7", "--url", f"{below}/")
     assert "verdict" in clutchlife("diagnose", "sim-7", "--url", below, "--json").lower()

@@ -5,6 +5,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.support import ONCE, Server, clutchlife, serving, stationary
 
 PRESSURES = (4.0, 6.0)
@@ -24,6 +26,7 @@ def life(server: Server, clutch: str) -> Any:
     return {name: value for name, value in answer.items() if name != "revision"}
 
 
+@pytest.mark.slow
 def test_slips_are_seen_and_mended_in_the_terminal(server: Server, tmp_path: Path) -> None:
     ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
     at = ("--url", server.url)

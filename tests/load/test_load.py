@@ -256,6 +256,7 @@ def test_each_demand_can_fail_by_itself() -> None:
 # --- all of it ---
 
 
+@pytest.mark.slow
 def test_a_small_load_has_no_error_and_loses_nothing(tmp_path: Path) -> None:
     # the first test of the first life of this seed is a raw file
     options = Options(seconds=4.0, rigs=3, clients=3, seed=4, raw=True, tests=6, samples=2_000, states=2, loaded=True)

@@ -58,6 +58,7 @@ def test_a_slip_changes_the_run_or_is_none() -> None:
     assert slips.CYCLES["cycles x 10"](rng, honest | {"cycles": 0}) is None
 
 
+@pytest.mark.slow
 def test_each_group_of_slips_is_drawn() -> None:
     for group in slips.GROUPS:
         outcome = trials.one_slip(np.random.default_rng([7, 1]), trials.of_simulated, "simulated rig", group)

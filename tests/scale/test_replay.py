@@ -3,6 +3,7 @@
 from contextlib import closing
 from pathlib import Path
 
+import pytest
 import sqlalchemy as sa
 
 from storage.engine.opening import open_database
@@ -12,6 +13,7 @@ from tests.scale.replay import on_cluster, replayed, source
 CLUTCHES = 8
 
 
+@pytest.mark.slow
 def test_a_replay_stores_the_same_rows_in_this_process_in_a_pool_and_on_a_cluster_with_a_killed_worker(
     tmp_path: Path,
 ) -> None:

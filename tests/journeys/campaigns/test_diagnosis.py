@@ -19,6 +19,7 @@ def post_tests(http: httpx2.Client, *cycles: float) -> None:
         assert http.post(f"{BASE}/runs", json=stationary(count, run_id=f"r{count:g}")).status_code == 201
 
 
+@pytest.mark.slow
 def test_a_diagnosis_whose_service_is_killed_is_made_by_the_next(tmp_path: Path) -> None:
     server = Server(tmp_path / "clutchlife.db", loaded=True)
     server.start()

@@ -3,11 +3,13 @@
 import json
 
 import httpx2
+import pytest
 
 from models.rig import campaign
 from service.run_files.simulated import simulated_body
 
 
+@pytest.mark.slow
 def test_a_tracked_clutch_engages_slower_as_it_wears(http: httpx2.Client) -> None:
     http.post("/v1/clutches", json={"clutch_id": "c1", "origin": "simulated"})
     assert http.get("/v1/clutches/c1/engagement").status_code == 404

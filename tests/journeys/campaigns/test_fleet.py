@@ -4,6 +4,7 @@ import json
 import math
 
 import httpx2
+import pytest
 
 from tests.support import Server, clutchlife, stationary
 
@@ -18,6 +19,7 @@ def post(http: httpx2.Client, name: str, scale: float, last: int) -> None:
         assert http.post(f"/v1/clutches/{name}/runs", json=body).status_code == 201
 
 
+@pytest.mark.slow
 def test_a_fleet_is_refreshed_and_scored_beside_the_service(server: Server, http: httpx2.Client) -> None:
     database = ("--database", f"sqlite:///{server.database}")
     assert "no prior has been learned" in clutchlife("fleet", *database)

@@ -23,6 +23,7 @@ def test_screw_drives_are_fitted(http: httpx2.Client) -> None:
         assert fit["noise_nm"] > 0
 
 
+@pytest.mark.slow
 def test_traction_sweeps_get_no_confident_number(http: httpx2.Client) -> None:
     """A contact that does not wear out as eq. 6 says: the answer is no number of cycles that one could plan with."""
     http.post("/v1/clutches", json=loaders.TRACTION_CLUTCH)

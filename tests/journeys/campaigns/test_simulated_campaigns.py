@@ -3,9 +3,12 @@
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.support import ONCE, Server, clutchlife
 
 
+@pytest.mark.slow
 def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(server: Server, tmp_path: Path) -> None:
     for form in ("csv", "mdf4"):
         folder = tmp_path / form

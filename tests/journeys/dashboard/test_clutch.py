@@ -182,6 +182,7 @@ def test_units_are_chosen_and_kept(browser: Browser, life: Server) -> None:
     watched.close()
 
 
+@pytest.mark.slow
 def test_dark_and_light_are_chosen_and_the_charts_follow(browser: Browser, watched: Watched) -> None:
     page = opened(watched)
     button = page.locator("#theme")

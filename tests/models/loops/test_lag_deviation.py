@@ -42,6 +42,7 @@ def pull(fit: LagFit, truth: float) -> float:
     return (fit.lag - truth) / fit.lag_sd
 
 
+@pytest.mark.slow
 @BOTH
 def test_errors_are_as_large_as_they_are_stated_to_be(law: Law, truth: float, made: Torque) -> None:
     """Loops, each behind a curve that was fitted to a stationary test of its own: errors over stated deviations (pulls).

@@ -124,6 +124,7 @@ def test_a_curve_wrong_in_shape_moves_the_attractor_little(monkeypatch):
     assert fit.noise < bare.noise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [ATTRACTOR, SQUEEZE_FILM], ids=lambda law: law.name)
 def test_the_curve_s_error_is_the_lag_s(law):
     """The delta method against fits with curves drawn from the covariance: 60 of them tell a deviation to 9 %."""

@@ -76,6 +76,7 @@ def test_a_dwell_that_lost_samples_is_no_crest() -> None:
     assert np.round(cut.plateaus.speed / RPM, -2).tolist() == [200.0, 1000.0, 1000.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag", [0.2, 0.4])
 @pytest.mark.parametrize("rate", [50.0, 100.0])
 def test_hardly_a_share_of_the_plateau_before_is_left_whatever_the_order(lag: float, rate: float) -> None:

@@ -161,6 +161,7 @@ def test_no_track_sees_an_open_test_at_a_state(client: TestClient, database_url:
     assert client.get(CLUTCH).headers["etag"] == etag
 
 
+@pytest.mark.slow
 def test_an_open_test_that_came_first_leaves_the_reference_to_the_first_with_load(client: TestClient) -> None:
     post(client, *life())
     before = told(client)

@@ -32,6 +32,7 @@ def test_a_life_that_has_not_ended_has_no_scores(client: TestClient) -> None:
     assert client.get("/v1/clutches/nobody/scores").status_code == 404
 
 
+@pytest.mark.slow
 def test_a_life_that_ended_is_scored(client: TestClient) -> None:
     post_life(client)
     wear = [0.9 * (1 - (1 + cycles / 6000) ** -0.9) for cycles in range(22_001)]

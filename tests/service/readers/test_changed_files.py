@@ -124,6 +124,7 @@ def is_of_the_reader(refusal: ServiceError) -> bool:
     return any(error.code == "too_slow" for error in refusal.errors) or "its reader" in refusal.detail
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "number"),
     # a reader of CSV is a function, the others are processes of which the one of MDF4 takes longest to start
@@ -187,6 +188,7 @@ def test_files_that_are_changed_for_minutes_are_read_or_refused(name: str, tmp_p
     assert number > 0
 
 
+@pytest.mark.slow
 def test_what_is_not_changed_is_read(tmp_path: Path) -> None:
     for name, write in WRITERS.items():
         columns = read_file(write(tmp_path / name, COLUMNS, units=UNITS), filename=name).columns

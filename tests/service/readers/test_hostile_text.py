@@ -73,6 +73,7 @@ def test_a_line_that_never_ends_is_given_up_early() -> None:
     assert outcome("a," * 100_000) == "line_too_long"
 
 
+@pytest.mark.slow
 def test_two_million_wrong_cells_are_refused_block_by_block() -> None:
     """The errors of the first block that has any, not those of the file."""
     text = HEAD + "1,x\n" * 500_000

@@ -53,6 +53,7 @@ def test_units_are_converted_and_names_understood(tmp_path: Path, write: Writer,
         np.testing.assert_allclose(got[channel], column, rtol=1e-13)
 
 
+@pytest.mark.slow
 @WRITERS
 def test_half_a_file_is_refused(tmp_path: Path, write: Writer, name: str) -> None:
     whole = write(tmp_path / name, record(), units=UNITS).read_bytes()
@@ -63,6 +64,7 @@ def test_half_a_file_is_refused(tmp_path: Path, write: Writer, name: str) -> Non
             read(cut)
 
 
+@pytest.mark.slow
 @WRITERS
 def test_damaged_files_raise_nothing_but_contract_errors(tmp_path: Path, write: Writer, name: str) -> None:
     whole = write(tmp_path / name, record(50), units=UNITS).read_bytes()

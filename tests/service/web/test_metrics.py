@@ -72,7 +72,14 @@ def test_clutches_runs_and_what_waits_are_counted_together(client: TestClient) -
 
 
 def cost(client: TestClient) -> tuple[int, set[str]]:
-    """Statements that a question for the metrics makes, and the series that it gives but for those of requests."""
+    """Statements that a question for the metrics makes, and the series that it gives but for those of requests.
+
+    The fewest of three: what a service does by itself meanwhile (alarms, jobs) counts statements too."""
+    tried = [_cost(client) for _ in range(3)]
+    return min(number for number, _ in tried), tried[-1][1]
+
+
+def _cost(client: TestClient) -> tuple[int, set[str]]:
     statements: list[str] = []
     engine = context_of(client).database._engine
 

@@ -2,6 +2,8 @@
 
 from contextlib import closing
 
+import pytest
+
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.service.work.replaying import (
@@ -37,6 +39,7 @@ def test_a_cancelled_replay_leaves_whole_clutches(in_file: Database) -> None:
     assert stored(in_file) == expected
 
 
+@pytest.mark.slow
 def test_the_replay_of_a_killed_service_is_made_again(database: Database) -> None:
     expected = stock(database)
     age(database)
@@ -56,6 +59,7 @@ def test_the_replay_of_a_killed_service_is_made_again(database: Database) -> Non
     assert stored(database) == expected
 
 
+@pytest.mark.slow
 def test_a_replay_is_made_again_where_postgresql_is_killed() -> None:
     with postgresql_server() as postgres:
         url = postgres.fresh()

@@ -93,6 +93,7 @@ def test_the_result_has_few_reasons_and_the_log_all(capsys: pytest.CaptureFixtur
     assert len(capsys.readouterr().err.splitlines()) == MAX_REASONS + 5
 
 
+@pytest.mark.slow
 def test_a_fleet_refresh_stores_what_one_in_process_does(in_file: Database, tmp_path: Path) -> None:
     before = stock(in_file, 4, tests=6)
     back_up(in_file.url, tmp_path / "copy.db")

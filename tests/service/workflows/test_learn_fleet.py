@@ -92,6 +92,7 @@ def accelerating(cycles: float, end: float) -> float:
     return 0.5 * (cycles / end) ** 3
 
 
+@pytest.mark.slow
 def test_lives_that_ended_calibrate_the_next(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """They accelerate, and forecasts of such lives are late at first: the next is stated to end where the others did."""
     monkeypatch.setattr("service.workflows.ingest_run.doubts_together", lambda *_, **__: Judged())
@@ -142,6 +143,7 @@ def test_a_refresh_that_learns_nothing_new_changes_nothing(url: str) -> None:
         assert client.get(LIFE.format("new"), headers={"If-None-Match": said.headers["etag"]}).status_code == 304
 
 
+@pytest.mark.slow
 def test_posting_on_and_tracking_anew_agree_under_a_fleets_prior(tmp_path: Path) -> None:
     """One step on from stored states, and all of it again (a test that comes late), give the same answer."""
     answers = []
@@ -165,6 +167,7 @@ def test_posting_on_and_tracking_anew_agree_under_a_fleets_prior(tmp_path: Path)
     assert answers[0] == answers[1]
 
 
+@pytest.mark.slow
 def test_a_run_that_comes_before_its_clutch_is_brought_up_is_tracked_under_the_prior_of_those_before_it(
     url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -189,6 +192,7 @@ def test_a_run_that_comes_before_its_clutch_is_brought_up_is_tracked_under_the_p
             assert records.answers(connection, "new") == before
 
 
+@pytest.mark.slow
 def test_a_clutch_that_gets_a_run_whenever_it_is_tracked_anew_is_left_to_the_next_refresh(
     url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

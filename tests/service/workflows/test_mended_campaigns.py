@@ -61,6 +61,7 @@ def mend(bench: Bench, sent: Sent) -> None:
         bench.confirm(name)
 
 
+@pytest.mark.slow
 @settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(campaign=campaigns(), adopted=st.booleans(), severity=st.sampled_from(["cycles", "dissipated_energy"]))
 def test_a_mended_clutch_answers_as_one_without_slips(

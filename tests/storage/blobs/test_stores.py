@@ -57,6 +57,7 @@ def test_a_second_put_mends_what_was_damaged_and_is_new(store: BlobStore) -> Non
     assert second > first
 
 
+@pytest.mark.slow
 def test_more_names_than_a_page_of_s3_holds_are_listed(in_bucket: str) -> None:
     store = open_store(in_bucket)
     store.set_mark("ours")

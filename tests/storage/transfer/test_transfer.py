@@ -175,6 +175,7 @@ def test_a_target_with_other_content_and_another_source_are_refused(in_file: str
         moved(other, begun)
 
 
+@pytest.mark.slow
 def test_it_is_refused_while_a_service_runs_on_either_side(in_file: str, target: str) -> None:
     fill(in_file)
     for used in (in_file, target):

@@ -137,7 +137,11 @@ export class Chart {
       return;
     }
     const figure = this.figure();
-    if (turn !== this.turn || figure === null) return;
+    if (turn !== this.turn) return;
+    if (figure === null) {
+      this.stale = true; // its tab was left meanwhile: drawn when it is next looked at
+      return;
+    }
     await library.react(this.plot, figure.data, figure.layout, config(this.spatial));
     this.plot.querySelector(".sketch, .nothing")?.remove();
     this.element.dataset.drawn = "yes";
@@ -145,13 +149,13 @@ export class Chart {
   }
 
   /**
-   * Data and layout in the colours of now, or of a scheme; null where there is nothing to draw.
+   * Data and layout in the colours of now, or of a scheme; null where there is nothing to draw, or no room (a hidden tab).
    * @param {Scheme} [scheme]
    * @param {Partial<Size> & { compact?: boolean }} [size]
    * @returns {SettledFigure | (WholeFigure & { ticks?: undefined }) | null}
    */
   figure(scheme = null, { width = this.plot.clientWidth, height = this.height, compact = width < 480 } = {}) {
-    if (!this.spec?.figure || this.element.classList.contains("empty")) return null;
+    if (!this.spec?.figure || this.element.classList.contains("empty") || width <= 0) return null;
     const c = colours(scheme);
     const { data, layout } = this.spec.figure(c);
     const whole = { data, layout: base(c, layout, { height, compact }) };

@@ -52,6 +52,7 @@ def test_every_line_of_a_service_is_json_from_its_start_to_its_stop(tmp_path: Pa
     assert any("no keys are configured" in line["message"] for line in lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [("--log-level", "ERROR"), ()])
 def test_the_level_is_that_of_the_option_or_else_of_the_environment_and_a_start_warns_at_any(
     tmp_path: Path, arguments: tuple[str, ...]
