@@ -11,7 +11,7 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from service.schemas.examples import EXAMPLES
+from service.schemas.examples import example_of
 
 Json = dict[str, Any]
 
@@ -167,7 +167,7 @@ def _example(schema: Json, owner: str, name: str) -> Any:
             return kind["const"] if "const" in kind else kind["enum"][0]
         if kind.get("type") == "boolean":
             return False
-    value = EXAMPLES.get(f"{owner}.{name}", EXAMPLES.get(name))
+    value = example_of(owner, name)
     return None if value is None else _shaped(schema, value)
 
 
