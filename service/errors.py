@@ -36,6 +36,9 @@ class ServiceError(Exception):
     slug = "internal-error"
     title = "An error inside the service"
 
+    def __init_subclass__(cls, *, slug: str, title: str, status: int | None = None) -> None:
+        cls.slug, cls.title, cls.status = slug, title, cls.status if status is None else status
+
     def __init__(self, detail: str, *, errors: Sequence[FieldError] = (), total: int | None = None) -> None:
         super().__init__(detail)
         self.detail = detail
@@ -43,20 +46,12 @@ class ServiceError(Exception):
         self.total = len(errors) if total is None else total
 
 
-class InvalidError(ServiceError):
+class InvalidError(ServiceError, status=422, slug="invalid-content", title="The content is not valid"):
     """The request is understood and its content is wrong."""
 
-    status = 422
-    slug = "invalid-content"
-    title = "The content is not valid"
 
-
-class NotFoundError(ServiceError):
+class NotFoundError(ServiceError, status=404, slug="not-found", title="Not found"):
     """No object has that name."""
-
-    status = 404
-    slug = "not-found"
-    title = "Not found"
 
 
 def unknown_clutch(clutch_id: str) -> NotFoundError:
@@ -66,109 +61,61 @@ def unknown_clutch(clutch_id: str) -> NotFoundError:
     )
 
 
-class ConflictError(ServiceError):
+class ConflictError(ServiceError, status=409, slug="conflict", title="This name is taken by other content"):
     """That name is taken by other content."""
 
-    status = 409
-    slug = "conflict"
-    title = "This name is taken by other content"
 
-
-class ArchivedError(ConflictError):
+class ArchivedError(ConflictError, slug="archived", title="The clutch is archived"):
     """The clutch is archived: it takes in no more runs."""
 
-    slug = "archived"
-    title = "The clutch is archived"
 
-
-class LifeEndedError(ConflictError):
+class LifeEndedError(ConflictError, slug="life-ended", title="The life has ended"):
     """The life was declared ended: it takes in no later duty or tests, and no other end."""
 
-    slug = "life-ended"
-    title = "The life has ended"
 
-
-class NotPossibleNowError(ConflictError):
+class NotPossibleNowError(ConflictError, slug="not-possible-now", title="This is not possible now"):
     """What is asked for makes no sense in the state that the thing is in."""
 
-    slug = "not-possible-now"
-    title = "This is not possible now"
 
-
-class NothingToAdoptError(ConflictError):
+class NothingToAdoptError(ConflictError, slug="nothing-to-adopt", title="There is nothing to adopt"):
     """A diagnosis has no extension that could be adopted, or is of another life."""
 
-    slug = "nothing-to-adopt"
-    title = "There is nothing to adopt"
 
-
-class TooLargeError(ServiceError):
+class TooLargeError(ServiceError, status=413, slug="too-large", title="The request is too large"):
     """The request is larger than the service accepts."""
 
-    status = 413
-    slug = "too-large"
-    title = "The request is too large"
 
-
-class NoRoomError(ServiceError):
+class NoRoomError(ServiceError, status=507, slug="no-room", title="There is no room on the disk"):
     """The disk has no room for what was sent; after room was made, the same request may succeed."""
 
-    status = 507
-    slug = "no-room"
-    title = "There is no room on the disk"
 
-
-class UnsupportedMediaTypeError(ServiceError):
+class UnsupportedMediaTypeError(
+    ServiceError, status=415, slug="unsupported-media-type", title="The body has a type that is not accepted here"
+):
     """The body is not of a type that this address accepts."""
 
-    status = 415
-    slug = "unsupported-media-type"
-    title = "The body has a type that is not accepted here"
 
-
-class NotAcceptableError(ServiceError):
+class NotAcceptableError(
+    ServiceError, status=406, slug="not-acceptable", title="The answer is not given in this format here"
+):
     """The answer cannot be given in the format that was asked for."""
 
-    status = 406
-    slug = "not-acceptable"
-    title = "The answer is not given in this format here"
 
-
-class TooSlowError(ServiceError):
+class TooSlowError(ServiceError, status=408, slug="too-slow", title="The request took too long to arrive"):
     """The request's body took too long to arrive."""
 
-    status = 408
-    slug = "too-slow"
-    title = "The request took too long to arrive"
 
-
-class TooManyError(ServiceError):
+class TooManyError(ServiceError, status=429, slug="too-many-requests", title="Too many requests"):
     """The caller asks more often, or for more at once, than one caller may."""
 
-    status = 429
-    slug = "too-many-requests"
-    title = "Too many requests"
 
-
-class BusyError(ServiceError):
+class BusyError(ServiceError, status=503, slug="busy", title="Busy"):
     """Too many requests of this kind are waiting; the same request may succeed a little later."""
 
-    status = 503
-    slug = "busy"
-    title = "Busy"
 
-
-class UnauthorizedError(ServiceError):
+class UnauthorizedError(ServiceError, status=401, slug="unauthorized", title="A valid key is needed"):
     """A key is needed and no valid one was sent."""
 
-    status = 401
-    slug = "unauthorized"
-    title = "A valid key is needed"
 
-
-class ForbiddenError(ServiceError):
+class ForbiddenError(ServiceError, status=403, slug="forbidden", title="Not allowed"):
     """The caller's key, or its address where no keys are configured, does not allow this."""
-
-    status = 403
-    slug = "forbidden"
-    title = "Not allowed"
