@@ -1,26 +1,28 @@
-"""`clutchlife register`, `list`, `status`, `watch`: clutches made known, and how they are."""
+"""`clutchlife register`, `list`, `status`, `watch`, `edit`, `archive`, `model`: clutches, their states and records."""
 
 import json
 import time
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 import httpx2
 import typer
 
-from service.cli.answers.tables import cycles, show_table
-from service.cli.changes.clutch_changes import assign
-from service.cli.connection import service_at
-from service.cli.options import URL, ClutchId, Json, Key, Patience, Url, err, errors_in_a_line, out
+from service.cli.connection import asking, listed
+from service.cli.options import EX_USAGE, URL, ClutchId, Json, Key, Patience, Reason, Url, err, fail, out, print_line
+from service.cli.tables import cycles, show_table
 from service.client.clutchlife import Client, ClutchlifeError
+from service.client.clutchlife.transport import Service
 
 #: What `status` ends with, as plugins of monitoring programs do: all is well, a warning, critical, unknown.
 OK, WARNING, CRITICAL, UNKNOWN = range(4)
 _CODES = {"normal": OK, "failure": CRITICAL}
 
 
+@asking
 def register(
+    service: Service,
     clutch: ClutchId,
     set_fields: Annotated[
         list[str] | None,
@@ -29,43 +31,35 @@ def register(
     record: Annotated[
         Path | None, typer.Option(exists=True, dir_okay=False, help="A JSON file with the clutch's record")
     ] = None,
-    url: Url = URL,
-    key: Key = None,
-    patience: Patience = 10.0,
 ) -> None:
     """Register a clutch, so that runs of it can be sent; what is not given has the reference's values."""
-    with errors_in_a_line():
-        fields: dict[str, Any] = {} if record is None else json.loads(record.read_bytes())
-        if not isinstance(fields, dict):
-            raise ValueError(f"{record} must hold a JSON object")  # noqa: TRY004  (a wrong file, not a wrong call)
-        for assignment in set_fields or ():
-            assign(fields, {}, assignment)
-        with service_at(url, key, patience) as service:
-            service.post("/v1/clutches", json.dumps(fields | {"clutch_id": clutch}).encode())
-    out.print(f"{clutch} is registered; send runs with: clutchlife push FILES --clutch {clutch}", markup=False)
+    fields: dict[str, Any] = {} if record is None else json.loads(record.read_bytes())
+    if not isinstance(fields, dict):
+        raise ValueError(f"{record} must hold a JSON object")  # noqa: TRY004  (a wrong file, not a wrong call)
+    for assignment in set_fields or ():
+        _assign(fields, {}, assignment)
+    service.post("/v1/clutches", json.dumps(fields | {"clutch_id": clutch}).encode())
+    print_line(f"{clutch} is registered; send runs with: clutchlife push FILES --clutch {clutch}")
 
 
+@asking
 def list_clutches(
+    service: Service,
     state: Annotated[str | None, typer.Option(help="Of this state only, as maintenance")] = None,
     find: Annotated[str | None, typer.Option(help="Whose name, friction material or fluid holds this")] = None,
     archived: Annotated[bool, typer.Option("--archived", help="The archived ones")] = False,
     as_json: Json = False,
-    url: Url = URL,
-    key: Key = None,
-    patience: Patience = 10.0,
 ) -> None:
     """List clutches, worst first, with their state and the cycles that remain."""
     chosen = {"state": state, "find": find, "archived": "true" if archived else None}
-    with service_at(url, key, patience) as service:
-        items = list(
-            service.pages("/v1/clutches", **{name: value for name, value in chosen.items() if value is not None})
-        )
-    if as_json:
-        out.print_json(json.dumps(items))
-    elif not items:
-        out.print("no clutch; register one with: clutchlife register ID", markup=False)
-    else:
-        show_table(("clutch", "state", "at", "at least", "most likely", "held"), map(_row, items))
+    items = service.pages("/v1/clutches", **{name: value for name, value in chosen.items() if value is not None})
+    columns = ("clutch", "state", "at", "at least", "most likely", "held")
+    listed(
+        items,
+        as_json,
+        lambda items: show_table(columns, map(_row, items)),
+        "no clutch; register one with: clutchlife register ID",
+    )
 
 
 def _row(item: dict[str, Any]) -> list[str]:
@@ -82,44 +76,111 @@ def status(clutch: ClutchId, as_json: Json = False, url: Url = URL, key: Key = N
         with Client(url, key, patience=patience) as client:
             item = client.clutch(clutch)
     except (ClutchlifeError, httpx2.InvalidURL, ValueError, OSError) as error:
-        _unknown(str(error))
+        err.print(f"clutchlife: unknown: {error}", markup=False, soft_wrap=True)
+        raise typer.Exit(UNKNOWN) from None
     if as_json:
         out.print_json(json.dumps(item))
     else:
-        _show(item)
+        print_line(_headline(item))
+        print_line(item["action"])
     raise typer.Exit(_CODES.get(item["state"]["name"], WARNING))
 
 
+@asking
 def watch(
+    service: Service,
     clutch: ClutchId,
     every: Annotated[float, typer.Option(min=0.1, help="Seconds between two looks")] = 5.0,
     looks: Annotated[int | None, typer.Option(min=1, help="End after so many looks; left out, at Ctrl-C")] = None,
-    url: Url = URL,
-    key: Key = None,
-    patience: Patience = 10.0,
 ) -> None:
     """Print a clutch's line whenever it changes, until Ctrl-C."""
     before, count = "", 0
-    with service_at(url, key, patience) as service:
-        while looks is None or count < looks:
-            if count:
-                time.sleep(every)
-            item = service.get(f"/v1/clutches/{clutch}")
-            line = _line(item)
-            if line != before:
-                out.print(f"{datetime.now().astimezone():%H:%M:%S}  {line}", markup=False, soft_wrap=True)
-            before, count = line, count + 1
+    while looks is None or count < looks:
+        if count:
+            time.sleep(every)
+        headline = _headline(service.get(f"/v1/clutches/{clutch}"))
+        if headline != before:
+            print_line(f"{datetime.now().astimezone():%H:%M:%S}  {headline}")
+        before, count = headline, count + 1
 
 
-def _show(item: dict[str, Any]) -> None:
-    out.print(_line(item), markup=False, soft_wrap=True)
-    out.print(item["action"], markup=False, soft_wrap=True)
-
-
-def _line(item: dict[str, Any]) -> str:
+def _headline(item: dict[str, Any]) -> str:
     return f"{item['clutch_id']}: {item['headline']}"
 
 
-def _unknown(reason: str) -> NoReturn:
-    err.print(f"clutchlife: unknown: {reason}", markup=False, soft_wrap=True)
-    raise typer.Exit(UNKNOWN)
+@asking
+def edit(
+    service: Service,
+    clutch: ClutchId,
+    reason: Reason,
+    set_fields: Annotated[
+        list[str], typer.Option("--set", metavar="FIELD=VALUE", help="As end_of_life.cof_fraction=0.4; may be repeated")
+    ],
+) -> None:
+    """Change fields of a clutch's record; all results are computed again."""
+    address = f"/v1/clutches/{clutch}"
+    record = service.get(address)
+    fields: dict[str, Any] = {}
+    for assignment in set_fields:
+        _assign(fields, record, assignment)
+    changed = service.patch(address, json.dumps(fields | {"reason": reason}).encode())
+    for name in fields:
+        print_line(f"{clutch}: {name} = {json.dumps(changed[name])}")
+
+
+@asking
+def archive(
+    service: Service,
+    clutch: ClutchId,
+    undo: Annotated[bool, typer.Option("--undo", help="Bring it back")] = False,
+    reason: Reason = "",
+) -> None:
+    """Leave a finished clutch out of lists; it takes in no more runs, and fleets still learn from it."""
+    body = json.dumps({"archived": not undo, "reason": reason}).encode()
+    changed = service.patch(f"/v1/clutches/{clutch}", body)
+    print_line(f"{clutch} is {'archived' if changed['archived'] else 'in use'}")
+
+
+def _assign(fields: dict[str, Any], record: dict[str, Any], assignment: str) -> None:
+    """Put `geometry.friction_faces=4` into the field that is sent, whose other parts stay as they are in the record."""
+    name, equals, text = assignment.partition("=")
+    field, dot, part = name.strip().partition(".")
+    if not equals or not field:
+        fail(f"--set takes FIELD=VALUE, got {assignment!r}", EX_USAGE)
+    try:
+        value = json.loads(text)
+    except ValueError:
+        value = text
+    if not dot:
+        fields[field] = value
+        return
+    whole = fields.get(field, record.get(field, {}))
+    if not isinstance(whole, dict):
+        fail(f"{field} has no parts that could be set", EX_USAGE)
+    fields[field] = whole | {part: value}
+
+
+@asking
+def model(
+    service: Service,
+    clutch: ClutchId,
+    adopt: Annotated[str | None, typer.Option(metavar="DIAGNOSIS", help="Adopt this diagnosis' extended model")] = None,
+    baseline: Annotated[bool, typer.Option("--baseline", help="Return to the baseline")] = False,
+) -> None:
+    """Show the model that a clutch is tracked under, adopt an extended one, or return to the baseline."""
+    if adopt is not None and baseline:
+        fail("use --adopt or --baseline, not both", EX_USAGE)
+    address = f"/v1/clutches/{clutch}/model"
+    if adopt is None and not baseline:
+        current = service.get(address)
+    else:
+        current = service.put(address, json.dumps({"diagnosis_id": adopt}).encode())
+    print_line(f"{clutch} is tracked under: {_named(current['model'])}")
+    for version in current["versions"]:
+        since = f"  version {version['version']}, {version['adopted_at']}: {_named(version['model'])}"
+        print_line(since + (f" by {version['diagnosis_id']}" if version["diagnosis_id"] else ""))
+
+
+def _named(model: dict[str, Any]) -> str:
+    effects = ", ".join(model["effects"])
+    return f"{model['name']} ({effects})" if effects else str(model["name"])

@@ -6,32 +6,31 @@ from typing import Annotated
 import typer
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from service.cli.connection import service_at
+from service.cli.connection import asking
 from service.cli.diagnosis_view import shown
-from service.cli.options import URL, ClutchId, Key, Patience, Url, err, fail, out
+from service.cli.options import ClutchId, err, fail, out, print_line
 from service.client.clutchlife.client import diagnosed
+from service.client.clutchlife.transport import Service
 
 
+@asking
 def diagnose(
+    service: Service,
     clutch: ClutchId,
-    url: Url = URL,
-    key: Key = None,
-    patience: Patience = 10.0,
     adopt: Annotated[bool, typer.Option("--adopt", help="Track under the extended model, if there is one")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON")] = False,
 ) -> None:
     """Show what the simulation gets wrong about a clutch, name the cause, and show what an extended model gains."""
-    with service_at(url, key, patience) as service:
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-        with Progress(*columns, console=err, transient=True) as progress:
-            progress.add_task("diagnosing", total=None)
-            report = diagnosed(service, clutch, adopt=adopt)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=err, transient=True) as progress:
+        progress.add_task("diagnosing", total=None)
+        report = diagnosed(service, clutch, adopt=adopt)
     if as_json:
         typer.echo(json.dumps(report, indent=1, ensure_ascii=False))
     elif report["status"] == "finished":
         for part in shown(report):
             out.print(part)
         if report["adoptable"] and not report["adopted"]:
-            out.print(f"To track under it: clutchlife model {clutch} --adopt {report['diagnosis_id']}", markup=False)
+            print_line(f"To track under it: clutchlife model {clutch} --adopt {report['diagnosis_id']}")
     if report["status"] != "finished":
         fail(f"the diagnosis failed: {report['problem']}")

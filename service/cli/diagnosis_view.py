@@ -10,7 +10,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from service.cli.answers.tables import cycles, number
+from service.cli.tables import cycles, number
 
 _Table = list[list[float | None]]
 _VERDICTS = {

@@ -19,8 +19,8 @@ from typing import Annotated, Any, get_args
 import typer
 from rich.progress import Progress
 
-from service.cli.connection import service_at
-from service.cli.options import URL, ClutchId, Key, Patience, Url, err, errors_in_a_line, out
+from service.cli.connection import asking
+from service.cli.options import ClutchId, err, print_line
 from service.cli.workbook import write_workbook
 from service.client.clutchlife.transport import Service
 from service.run_files import manifest
@@ -38,59 +38,57 @@ TABLES = (
 _SENT = ("run_id", "kind", "cycles", "started_at", "origin", "duty", "event", "reason", "note", "channels")
 
 
+@asking
 def export(
+    service: Service,
     clutch: ClutchId,
     out_folder: Annotated[Path, typer.Option("--out", help="The folder to write to, or with --archive the file")],
     archive: Annotated[bool, typer.Option("--archive", help="Write one ZIP archive in place of a folder")] = False,
-    url: Url = URL,
-    key: Key = None,
-    patience: Patience = 10.0,
 ) -> None:
     """Write a clutch's record, its runs with their raw channels, all results, and its inspections with their photographs."""
-    if archive:
-        with errors_in_a_line(), tempfile.TemporaryDirectory(prefix="clutchlife-export-") as place:
-            folder = Path(place) / _safe(clutch)
-            _export(clutch, folder, url, key, patience)
-            made = Path(shutil.make_archive(str(Path(place) / "archive"), "zip", place, folder.name))
-            out_folder.parent.mkdir(parents=True, exist_ok=True)
-            shutil.move(made, out_folder)
-        out.print(f"all of it is in {out_folder}", markup=False, soft_wrap=True)
+    if not archive:
+        _export(service, clutch, out_folder)
         return
-    _export(clutch, out_folder, url, key, patience)
+    with tempfile.TemporaryDirectory(prefix="clutchlife-export-") as place:
+        folder = Path(place) / _safe(clutch)
+        _export(service, clutch, folder)
+        made = Path(shutil.make_archive(str(Path(place) / "archive"), "zip", place, folder.name))
+        out_folder.parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(made, out_folder)
+    print_line(f"all of it is in {out_folder}")
 
 
-def _export(clutch: str, out_folder: Path, url: str, key: str | None, patience: float) -> None:
+def _export(service: Service, clutch: str, out_folder: Path) -> None:
     from service.schemas.clutch import ClutchIn  # start-up time
 
     results = out_folder / "results"
-    with errors_in_a_line():
-        results.mkdir(parents=True, exist_ok=True)
-        with service_at(url, key, patience) as service, Progress(console=err, transient=True) as progress:
-            task = progress.add_task("exporting", total=None)
-            clutch_out = service.get(f"/v1/clutches/{clutch}")
-            record = {name: value for name, value in clutch_out.items() if name in ClutchIn.model_fields}
-            manifest.write(out_folder / manifest.CLUTCH_FILE, record)
-            count = 0
-            for receipt in service.pages(f"/v1/clutches/{clutch}/runs"):
-                run = service.get(f"/v1/clutches/{clutch}/runs/{receipt['run_id']}")
-                name = f"{count:05d}-{_safe(receipt['run_id'])}.json"
-                counts, corrected = run["state"] == "accepted", run["cycles"] != run["sent_cycles"]
-                if counts:
-                    manifest.write(out_folder / name, _as_sent(run))
-                if corrected or not counts:
-                    (out_folder / AS_SENT).mkdir(exist_ok=True)
-                    manifest.write(out_folder / AS_SENT / name, _as_sent(run | {"cycles": run["sent_cycles"]}))
-                if run["file"] is not None:
-                    (out_folder / FILES).mkdir(exist_ok=True)
-                    sent = service.file(f"/v1/clutches/{clutch}/runs/{receipt['run_id']}/file")
-                    (out_folder / FILES / f"{count:05d}-{_safe(run['file']['filename'])}").write_bytes(sent)
-                count += 1
-                progress.advance(task)
-            _results(service, clutch, results)
-            _inspections(service, clutch, results)
-            _tables(service, clutch, results)
-            _write(results / "about.json", _about(service, clutch_out, record))
-        out.print(f"{count} runs of {clutch} in {out_folder}, results in {results}", markup=False, soft_wrap=True)
+    results.mkdir(parents=True, exist_ok=True)
+    with Progress(console=err, transient=True) as progress:
+        task = progress.add_task("exporting", total=None)
+        clutch_out = service.get(f"/v1/clutches/{clutch}")
+        record = {name: value for name, value in clutch_out.items() if name in ClutchIn.model_fields}
+        manifest.write(out_folder / manifest.CLUTCH_FILE, record)
+        count = 0
+        for receipt in service.pages(f"/v1/clutches/{clutch}/runs"):
+            run = service.get(f"/v1/clutches/{clutch}/runs/{receipt['run_id']}")
+            name = f"{count:05d}-{_safe(receipt['run_id'])}.json"
+            counts, corrected = run["state"] == "accepted", run["cycles"] != run["sent_cycles"]
+            if counts:
+                manifest.write(out_folder / name, _as_sent(run))
+            if corrected or not counts:
+                (out_folder / AS_SENT).mkdir(exist_ok=True)
+                manifest.write(out_folder / AS_SENT / name, _as_sent(run | {"cycles": run["sent_cycles"]}))
+            if run["file"] is not None:
+                (out_folder / FILES).mkdir(exist_ok=True)
+                sent = service.file(f"/v1/clutches/{clutch}/runs/{receipt['run_id']}/file")
+                (out_folder / FILES / f"{count:05d}-{_safe(run['file']['filename'])}").write_bytes(sent)
+            count += 1
+            progress.advance(task)
+        _results(service, clutch, results)
+        _inspections(service, clutch, results)
+        _tables(service, clutch, results)
+        _write(results / "about.json", _about(service, clutch_out, record))
+    print_line(f"{count} runs of {clutch} in {out_folder}, results in {results}")
 
 
 def _tables(service: Service, clutch: str, folder: Path) -> None:

@@ -1,11 +1,24 @@
-"""`clutchlife fleet`: the priors learned from clutches of a kind; works on the database, while the service runs."""
+"""`clutchlife fleet`, `score`: the priors learned from clutches of a kind, and how right predictions were; works on the
+database, while the service runs.
+"""
 
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.options import DATABASE, Database, Scheduler, err, executor, existing, out, read_only
+from service.cli.options import (
+    DATABASE,
+    EX_USAGE,
+    Database,
+    Scheduler,
+    err,
+    executor,
+    existing,
+    fail,
+    print_line,
+    read_only,
+)
 
 if TYPE_CHECKING:
     from service.work.background import AtOnce
@@ -24,9 +37,9 @@ def show(context: typer.Context, database: Database = DATABASE) -> None:
     with read_only(database) as opened:
         priors = newest(opened)
     for item in priors:
-        out.print(_line(item), markup=False, soft_wrap=True)
+        print_line(_line(item))
     if not priors:
-        out.print("no prior has been learned from a fleet yet: run `clutchlife fleet refresh`", markup=False)
+        print_line("no prior has been learned from a fleet yet: run `clutchlife fleet refresh`")
 
 
 @app.command()
@@ -51,13 +64,13 @@ def refresh(
     for item in priors:
         new = item["kind"] in done.kinds
         if new or not quiet:
-            out.print(_line(item) + (" (new)" if new else ""), markup=False, soft_wrap=True)
+            print_line(_line(item) + (" (new)" if new else ""))
     for clutch_id in done.changed:
-        out.print(f"{clutch_id}: predictions updated", markup=False)
+        print_line(f"{clutch_id}: predictions updated")
     for clutch_id, reason in done.left.items():
-        out.print(f"{clutch_id}: {reason}", markup=False)
+        print_line(f"{clutch_id}: {reason}")
     if not priors and not quiet:
-        out.print("no kind has three clutches with six tests each: all priors stay weak", markup=False)
+        print_line("no kind has three clutches with six tests each: all priors stay weak")
 
 
 def _line(item: dict[str, Any]) -> str:
@@ -67,4 +80,37 @@ def _line(item: dict[str, Any]) -> str:
         f"{made}: version {item['version']}, {item['clutches']} clutches; "
         f"change {population['change']['median']:.2f} of the initial value, "
         f"scale {population['scale_cycles']['median']:.0f} cycles"
+    )
+
+
+def score(
+    method: Annotated[str, typer.Option(help="particle, ukf or grid")] = "particle", database: Database = DATABASE
+) -> None:
+    """Score the prediction at every test of every life that has ended."""
+    from service.lives.tracks import METHODS  # start-up time
+    from service.queries import scores  # start-up time
+    from storage import clutches  # start-up time
+
+    if method not in METHODS:
+        fail(f"method must be one of {', '.join(METHODS)}, got {method!r}", EX_USAGE)
+    with read_only(database) as opened:
+        with opened.reading() as connection:
+            clutch_ids = clutches.all_ids(connection)
+        fleet = scores.of_fleet((scores.of_clutch(opened, name, method) for name in clutch_ids), method=method)
+    for life in fleet["lives"]:
+        print_line(f"{life['clutch_id']}: ended at {life['end_of_life_cycles']:.0f} cycles")
+    if not fleet["lives"]:
+        print_line("no clutch has reached its threshold yet: there is nothing to score")
+        return
+    print_line("share of life  predictions  CRPS/life  interval/life  coverage  alpha-lambda")
+    for row in [*fleet["stages"], fleet["overall"]]:
+        print_line(_score(row))
+
+
+def _score(row: dict[str, Any]) -> str:
+    stage = f"{row['share_of_life']:.1f}" if "share_of_life" in row else "all"
+    shares = (row[name] for name in ("crps_share", "interval_share", "coverage", "alpha_lambda"))
+    columns = ["-" if value is None else f"{value:.3f}" for value in shares]
+    return (
+        f"{stage:>13}  {row['predictions']:>11}  {columns[0]:>9}  {columns[1]:>13}  {columns[2]:>8}  {columns[3]:>12}"
     )

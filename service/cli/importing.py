@@ -7,9 +7,9 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from service.cli.changes.runs import run_line
-from service.cli.connection import service_at
-from service.cli.options import EX_DATAERR, URL, Key, Patience, Url, errors_in_a_line, fail, out
+from service.cli.connection import asking
+from service.cli.options import EX_DATAERR, fail, out, print_line
+from service.cli.runs import run_line
 from service.client.clutchlife.transport import Service
 
 _KINDS = ("stationary_stribeck", "dynamic_stribeck")
@@ -17,7 +17,9 @@ _KINDS = ("stationary_stribeck", "dynamic_stribeck")
 _ROWS = 3
 
 
+@asking
 def import_file(
+    service: Service,
     file: Annotated[
         Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False, help="A file of the rig's recorder")
     ],
@@ -31,42 +33,35 @@ def import_file(
         str | None, typer.Option("--save", help="Keep how it is read as a rig profile of this name")
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Ask nothing; end where something is missing")] = False,
-    url: Url = URL,
-    key: Key = None,
-    patience: Patience = 10.0,
 ) -> None:
     """Show how a file is read, ask for what is missing, send it, and keep the answers as a rig profile.
 
     The next file of the rig needs no answer: `clutchlife push --rig NAME`, or import again.
     """
-    with errors_in_a_line(), service_at(url, key, patience) as service:
-        given: dict[str, Any] = {"kind": kind, "cycles": cycles, "rig": rig}
-        profile: dict[str, Any] | None = None
+    given: dict[str, Any] = {"kind": kind, "cycles": cycles, "rig": rig}
+    profile: dict[str, Any] | None = None
+    shown = _preview(service, file, clutch, given, profile)
+    _show(shown)
+    while shown["missing"] and shown["problem"] is None and not yes:
+        profile = _answered(shown, given, profile)
         shown = _preview(service, file, clutch, given, profile)
         _show(shown)
-        while shown["missing"] and shown["problem"] is None and not yes:
-            profile = _answered(shown, given, profile)
-            shown = _preview(service, file, clutch, given, profile)
-            _show(shown)
-        if shown["problem"] is not None:
-            fail(shown["problem"], EX_DATAERR)
-        if shown["missing"]:
-            fail(f"still to be given: {', '.join(shown['missing'])}", EX_DATAERR)
-        if shown["rig"] is None and save is None and not yes:
-            save = (
-                typer.prompt("Keep this as the rig profile (a name, or nothing)", default="", show_default=False)
-                or None
-            )
-        if save is not None:
-            _save(service, save, shown)
-            given["rig"], profile = save, None
-        elif profile is None:
-            given["rig"] = shown["rig"]
-        if not yes and not typer.confirm(f"Send it to {clutch}?", default=True):
-            raise typer.Exit(0)
-        given |= {"kind": given["kind"] or shown["kind"], "cycles": shown["cycles"]}
-        receipt = _sent(service, f"/v1/clutches/{clutch}/runs/file", file, given, profile)
-        out.print(run_line(receipt), markup=False, soft_wrap=True)
+    if shown["problem"] is not None:
+        fail(shown["problem"], EX_DATAERR)
+    if shown["missing"]:
+        fail(f"still to be given: {', '.join(shown['missing'])}", EX_DATAERR)
+    if shown["rig"] is None and save is None and not yes:
+        save = typer.prompt("Keep this as the rig profile (a name, or nothing)", default="", show_default=False) or None
+    if save is not None:
+        _save(service, save, shown)
+        given["rig"], profile = save, None
+    elif profile is None:
+        given["rig"] = shown["rig"]
+    if not yes and not typer.confirm(f"Send it to {clutch}?", default=True):
+        raise typer.Exit(0)
+    given |= {"kind": given["kind"] or shown["kind"], "cycles": shown["cycles"]}
+    receipt = _sent(service, f"/v1/clutches/{clutch}/runs/file", file, given, profile)
+    print_line(run_line(receipt))
 
 
 def _preview(
@@ -105,7 +100,7 @@ def _show(shown: dict[str, Any]) -> None:
         grid.add_row(str(index + 1), column["title"], *cells, *rows)
     out.print(grid)
     for warning in shown["warnings"]:
-        out.print(f"{warning['code']}: {warning['message']}", markup=False, soft_wrap=True)
+        print_line(f"{warning['code']}: {warning['message']}")
     pieces = f", {len(shown['pieces'])} pieces are cut" if shown["pieces"] else ""
     cycles = "no cycles" if shown["cycles"] is None else f"{shown['cycles']:g} cycles"
     out.print(
@@ -141,7 +136,7 @@ def _answered(shown: dict[str, Any], given: dict[str, Any], profile: dict[str, A
 def _choice(question: str, values: list[str]) -> str:
     """One of the values, by its number."""
     for place, value in enumerate(values, 1):
-        out.print(f"  {place}  {value}", markup=False)
+        print_line(f"  {place}  {value}")
     while True:
         number: int = typer.prompt(f"{question} (1 to {len(values)})", type=int)
         if 1 <= number <= len(values):
@@ -154,4 +149,4 @@ def _save(service: Service, name: str, shown: dict[str, Any]) -> None:
     service.post("/v1/rigs", json.dumps(body).encode())
     pattern = body["file_name"]
     cycles = f"file names such as {pattern} give the cycles" if pattern else "the cycles are to be given with each file"
-    out.print(f"saved as rig {name}; {cycles}", markup=False, soft_wrap=True)
+    print_line(f"saved as rig {name}; {cycles}")

@@ -8,9 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.answers.tables import number, show_table
-from service.cli.connection import service_at
-from service.cli.options import EX_USAGE, URL, ClutchId, Json, Key, Patience, Url, fail, out
+from service.cli.connection import asking, listed
+from service.cli.options import EX_USAGE, ClutchId, Json, fail, print_line
+from service.cli.tables import number, show_table
+from service.client.clutchlife.transport import Service
 
 #: The media type of a photograph by its file's suffix.
 MEDIA_TYPES = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
@@ -19,7 +20,9 @@ _PHOTOGRAPHS_ONLY = "photographs"
 _COLUMNS = ("inspection", "lining", "state", "cycles", "R_a, µm", "R_sk", "photographs")
 
 
+@asking
 def inspect(
+    service: Service,
     clutch: ClutchId,
     cycles: Annotated[float, typer.Option(min=0, help="Duty cycles since new when the surface was inspected")],
     ra: Annotated[float | None, typer.Option("--ra", help="Roughness R_a of the surface profile [µm]")] = None,
@@ -30,9 +33,6 @@ def inspect(
     photo: Annotated[
         list[Path] | None, typer.Option("--photo", help="A photograph, PNG, JPEG or WebP; may be repeated")
     ] = None,
-    url: Url = URL,
-    key: Key = None,
-    patience: Patience = 10.0,
 ) -> None:
     """Send what was found on a clutch's friction surface: roughness, skewness, a note, photographs. Safe to repeat."""
     photographs = {path: _media_type(path) for path in photo or []}
@@ -41,31 +41,23 @@ def inspect(
     body = {"cycles": cycles, "roughness_um": ra, "skewness": rsk, "lining": lining, "note": note}
     if at is not None:
         body["performed_at"] = at.astimezone().isoformat()
-    with service_at(url, key, patience) as service:
-        address = f"/v1/clutches/{clutch}/inspections"
-        inspection = service.post(address, json.dumps(body).encode())
-        address = f"{address}/{inspection['inspection_id']}"
-        for path, media_type in photographs.items():
-            service.post_photograph(f"{address}/photographs", path, media_type)
-        inspection = service.get(address)
+    address = f"/v1/clutches/{clutch}/inspections"
+    inspection = service.post(address, json.dumps(body).encode())
+    address = f"{address}/{inspection['inspection_id']}"
+    for path, media_type in photographs.items():
+        service.post_photograph(f"{address}/photographs", path, media_type)
+    inspection = service.get(address)
     _show([inspection])
     if inspection["state"] == "withdrawn":
         text = "was stored before and withdrawn since: it stays withdrawn until it is restored on the clutch's page"
-        out.print(f"{inspection['inspection_id']} {text}", markup=False, soft_wrap=True)
+        print_line(f"{inspection['inspection_id']} {text}")
 
 
-def inspections(
-    clutch: ClutchId, as_json: Json = False, url: Url = URL, key: Key = None, patience: Patience = 10.0
-) -> None:
+@asking
+def inspections(service: Service, clutch: ClutchId, as_json: Json = False) -> None:
     """List a clutch's inspections by cycles."""
-    with service_at(url, key, patience) as service:
-        items = list(service.pages(f"/v1/clutches/{clutch}/inspections"))
-    if as_json:
-        out.print_json(json.dumps(items))
-    elif items:
-        _show(items)
-    else:
-        out.print(f"{clutch} has no inspections", markup=False)
+    items = service.pages(f"/v1/clutches/{clutch}/inspections")
+    listed(items, as_json, _show, f"{clutch} has no inspections")
 
 
 def _media_type(path: Path) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, existing, fail, out, read_only
+from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, existing, fail, print_line, read_only
 
 if TYPE_CHECKING:
     from storage.keys import KeyRow
@@ -42,7 +42,7 @@ def create(
     secret, row = make_key(scope, note, created_at=_now(), clutches=clutch or None, days=expires)
     with errors_in_a_line(), closing(open_database(database)) as opened, opened.writing() as connection:
         keys.insert(connection, row)
-    out.print(secret, markup=False, soft_wrap=True)
+    print_line(secret)
 
 
 @app.command(name="list")
@@ -56,7 +56,7 @@ def list_keys(database: Database = DATABASE) -> None:
         used = "never used" if row.last_used_at is None else f"used {row.last_used_at}"
         clutches = "" if row.clutches is None else f"  only {', '.join(row.clutches)}"
         line = f"{row.key_id}  {row.scope:<6}  {row.created_at}  {_state(row)}  {used}{clutches}  {row.note}"
-        out.print(line, markup=False, soft_wrap=True)
+        print_line(line)
 
 
 def _state(row: "KeyRow") -> str:

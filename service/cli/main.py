@@ -1,16 +1,26 @@
 """The command `clutchlife`: every command, in the order in which `--help` lists them."""
 
+from collections.abc import Callable
 from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from service.cli import alarms, clutches, diagnose, export, fleet, importing, inspections, key, model, score, simulate
-from service.cli.answers import degradation, engagement, life, loops
-from service.cli.changes import clutch_changes, run_changes, trail
-from service.cli.changes import runs as run_list
-from service.cli.database import backup, migrate, raw, replay, restore, verify
+from service.cli import (
+    alarms,
+    answers,
+    clutches,
+    diagnose,
+    export,
+    fleet,
+    importing,
+    inspections,
+    key,
+    runs,
+    simulate,
+)
+from service.cli.database import backup, migrate, raw, replay, verify
 from service.cli.demo import demo
 from service.cli.options import EX_USAGE, fail
 from service.cli.sending import push, spool_commands
@@ -60,39 +70,18 @@ def main(
     """Condition monitoring and prognostics of wet friction clutches."""
 
 
-app.command()(serve.serve)
-app.command()(demo.demo)
-app.command()(simulate.simulate)
-app.command()(push.push)
-app.command("import")(importing.import_file)
-app.command()(clutches.register)
-app.command("list")(clutches.list_clutches)
-app.command()(clutches.status)
-app.command()(clutches.watch)
-app.command()(alarms.alarms)
-app.command()(life.life)
-app.command()(degradation.degradation)
-app.command()(loops.loops)
-app.command()(engagement.engagement)
-app.command()(inspections.inspect)
-app.command()(inspections.inspections)
-app.command()(diagnose.diagnose)
-app.command()(model.model)
-app.command()(run_list.runs)
-app.command()(run_changes.withdraw)
-app.command()(restore.restore)
-app.command()(run_changes.end)
-app.command()(run_changes.confirm)
-app.command()(run_changes.correct)
-app.command()(clutch_changes.edit)
-app.command()(clutch_changes.archive)
-app.command()(trail.changes)
-app.command()(export.export)
-app.command()(score.score)
-app.command()(replay.replay)
-app.command()(backup.backup)
-app.command()(verify.verify)
-app.command()(migrate.migrate)
+_COMMANDS: tuple[Callable[..., None], ...] = (
+    serve.serve, demo.demo, simulate.simulate, push.push, importing.import_file, clutches.register,
+    clutches.list_clutches, clutches.status, clutches.watch, alarms.alarms, answers.life, answers.degradation,
+    answers.loops, answers.engagement, inspections.inspect, inspections.inspections, diagnose.diagnose,
+    clutches.model, runs.runs, runs.withdraw, backup.restore, runs.end, runs.confirm, runs.correct, clutches.edit,
+    clutches.archive, runs.changes, export.export, fleet.score, replay.replay, backup.backup, verify.verify,
+    migrate.migrate,
+)  # fmt: skip
+#: Names that Python or typer has for something else.
+_OTHER_NAMES: dict[Callable[..., None], str] = {importing.import_file: "import", clutches.list_clutches: "list"}
+for _command in _COMMANDS:
+    app.command(_OTHER_NAMES.get(_command))(_command)
 app.add_typer(spool_commands.app, name="spool")
 app.add_typer(key.app, name="key")
 app.add_typer(raw.app, name="raw")

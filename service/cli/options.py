@@ -37,6 +37,7 @@ Key = Annotated[str | None, typer.Option("--key", envvar="CLUTCHLIFE_KEY", help=
 Patience = Annotated[float, typer.Option(min=0, help="Seconds to keep trying while the service is away")]
 Seed = Annotated[int, typer.Option(min=0, help="The simulated clutch and its noise; the same seed, the same bits")]
 
+Reason = Annotated[str, typer.Option("--reason", help="Why; the audit trail keeps it")]
 Json = Annotated[bool, typer.Option("--json", help="As the service answers it")]
 
 Scheduler = Annotated[str, typer.Option("--scheduler", help=f"Where it is computed: {SCHEDULERS}")]
@@ -108,6 +109,11 @@ def require_file(url: str, instead: str) -> None:
 
     if is_on_server(url):
         fail(f"the database is on a PostgreSQL server: {instead}", EX_USAGE)
+
+
+def print_line(text: str) -> None:
+    """A line on standard output, however narrow the terminal is."""
+    out.print(text, markup=False, soft_wrap=True)
 
 
 def fail(message: str, code: int = 1) -> NoReturn:

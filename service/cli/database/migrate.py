@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli.options import err, errors_in_a_line, fail, out, require_database
+from service.cli.options import err, errors_in_a_line, fail, print_line, require_database
 
 
 def migrate(
@@ -43,8 +43,8 @@ def migrate(
                     findings += check_inspections(moving.target, clutch_id).findings
                     advance()
             for finding in findings:
-                out.print(finding, markup=False, soft_wrap=True)
+                print_line(finding)
             if findings:
                 fail(f"{len(findings)} findings: the target is not used. Remove it, and migrate again")
             moving.release()
-    out.print(f"{rows} rows of {len(ids)} clutches are the same in both databases", markup=False, soft_wrap=True)
+    print_line(f"{rows} rows of {len(ids)} clutches are the same in both databases")

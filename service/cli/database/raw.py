@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 from rich.progress import Progress
 
-from service.cli.options import DATABASE, Database, err, existing, out
+from service.cli.options import DATABASE, Database, err, existing, print_line
 
 app = typer.Typer(help="Where long raw records are kept beside the database.", no_args_is_help=True)
 
@@ -27,9 +27,9 @@ def list_stores(database: Database = DATABASE) -> None:
     for store in stores:
         columns, blobs = numbers.get(store.address, (0, 0))
         used = ", in use" if store.in_use else ""
-        out.print(f"{store.address}: {columns} columns in {blobs} blobs{used}", markup=False, soft_wrap=True)
+        print_line(f"{store.address}: {columns} columns in {blobs} blobs{used}")
     if not any(store.in_use for store in stores):
-        out.print("new raw records go into the database", markup=False)
+        print_line("new raw records go into the database")
 
 
 @app.command()
@@ -43,7 +43,7 @@ def move(to: Address, database: Database = DATABASE) -> None:
     with existing(database) as opened, Progress(console=err, transient=True) as progress:
         task = progress.add_task("moving columns", total=None)
         moved = move_all(opened, to, tell=lambda count: progress.update(task, completed=count))
-    out.print(f"{moved} columns are moved", markup=False)
+    print_line(f"{moved} columns are moved")
 
 
 @app.command()
@@ -60,7 +60,7 @@ def relocate(
 
     with existing(database) as opened:
         count = look_at(opened, address, to)
-    out.print(f"{count} blobs are looked for there", markup=False)
+    print_line(f"{count} blobs are looked for there")
 
 
 @app.command()
@@ -76,4 +76,4 @@ def collect(
     with existing(database) as opened:
         for store in collect_all(opened, grace=grace_hours * _SECONDS_AN_HOUR):
             line = f"{store.address}: {store.named} blobs in use, {store.removed} removed, {store.new} too new to be removed"
-            out.print(line, markup=False, soft_wrap=True)
+            print_line(line)

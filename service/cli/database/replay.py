@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.options import DATABASE, Database, Scheduler, err, executor, existing, fail, out
+from service.cli.options import DATABASE, Database, Scheduler, err, executor, existing, fail, print_line
 
 if TYPE_CHECKING:
     from service.work.background import AtOnce
@@ -32,7 +32,7 @@ def replay(
                 left.append(replayed.clutch_id)
                 err.print(f"{replayed.clutch_id}: not replayed: {replayed.error}", markup=False, soft_wrap=True)
             else:
-                out.print(f"{replayed.clutch_id}: {replayed.runs} runs", markup=False)
+                print_line(f"{replayed.clutch_id}: {replayed.runs} runs")
             advance()
         return left
 

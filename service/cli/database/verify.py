@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 from rich.progress import Progress
 
-from service.cli.options import DATABASE, Database, err, fail, out, read_only
+from service.cli.options import DATABASE, Database, err, fail, print_line, read_only
 
 
 def verify(
@@ -34,7 +34,7 @@ def verify(
 
     def tell(lines: "list[str] | tuple[str, ...]") -> int:
         for line in lines:
-            out.print(line, markup=False, soft_wrap=True)
+            print_line(line)
         return len(lines)
 
     with read_only(database) as opened, Progress(console=err, transient=True) as progress:
@@ -60,12 +60,12 @@ def verify(
             progress.advance(task)
     for version, count in sorted(earlier.items()):
         note = f"{count} results were made by release {version}: they can be computed again, and may differ (replay)"
-        out.print(note, markup=False, soft_wrap=True)
+        print_line(note)
     if inspections:
-        out.print(f"{inspections} inspections with {photographs} photographs are checked", markup=False, soft_wrap=True)
+        print_line(f"{inspections} inspections with {photographs} photographs are checked")
     summary = (
         f"{runs} runs of {len(ids)} clutches are checked, {len(chosen)} clutches computed again: {findings} findings"
     )
     if findings:
         fail(summary)
-    out.print(summary, markup=False, soft_wrap=True)
+    print_line(summary)

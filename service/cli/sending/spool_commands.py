@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.options import EX_DATAERR, EX_TEMPFAIL, URL, Key, Patience, Url, errors_in_a_line, fail, out
+from service.cli.options import EX_DATAERR, EX_TEMPFAIL, URL, Key, Patience, Url, errors_in_a_line, fail, print_line
 from service.cli.sending.entry import INSPECTIONS, Entry
 from service.cli.sending.folder_lock import HeldError
 from service.cli.sending.push import SPOOL, SpoolFolder
@@ -49,7 +49,7 @@ def list_runs(
             return
         _print(kept)
         if not kept:
-            out.print(f"nothing is in the spool {spool}", markup=False, soft_wrap=True)
+            print_line(f"nothing is in the spool {spool}")
 
 
 @app.command()
@@ -71,7 +71,7 @@ def send(
                 whose = f"{kept.clutch_id} at {kept.url}" if kept.url else "a clutch that is not stated: give --clutch"
                 say(f"{len(kept.waiting())} runs in {kept.folder} are not sent: they are of {whose}")
         if not here:
-            out.print(f"nothing waits for {url}", markup=False, soft_wrap=True)
+            print_line(f"nothing waits for {url}")
             return
         transmit(here, url, key, patience, lambda service, kept: service.get(f"/v1/clutches/{kept.clutch_id}"))
 
@@ -87,7 +87,7 @@ def empty(
     with errors_in_a_line():
         kept = [run for run in _kept(spool, clutch) if run.place or not refused]
         if not kept:
-            out.print("nothing to delete", markup=False)
+            print_line("nothing to delete")
             return
         _print(kept)
         waiting = sum(not run.place for run in kept)
@@ -102,7 +102,7 @@ def empty(
                             owner.discard(run.place, run.entry)
         except HeldError:
             fail("a process is sending from the spool: try again when it has ended", EX_TEMPFAIL)
-        out.print(f"{len(kept)} deleted, {waiting} of them never stored", markup=False)
+        print_line(f"{len(kept)} deleted, {waiting} of them never stored")
 
 
 def _kept(folder: Path, clutch: str | None) -> list[Kept]:
@@ -154,8 +154,8 @@ def _print(kept: list[Kept]) -> None:
             name = (
                 f"{owner.clutch_id} at {owner.url}" if owner.clutch_id else "clutch not stated (an earlier release's)"
             )
-            out.print(f"{name}, in {owner.folder}", markup=False, soft_wrap=True)
-        out.print(f"  {_line(run)}", markup=False, soft_wrap=True)
+            print_line(f"{name}, in {owner.folder}")
+        print_line(f"  {_line(run)}")
 
 
 def _line(run: Kept) -> str:

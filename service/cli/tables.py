@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from service.cli.options import out
+from service.cli.options import out, print_line
 
 BEYOND_HORIZON = "beyond the horizon"
 UNKNOWN = "unknown"
@@ -62,4 +62,4 @@ def place(value: float | None) -> str:
 def warn(warnings: Iterable[Mapping[str, Any]]) -> None:
     """The warnings of an answer, a line each."""
     for notice in warnings:
-        out.print(f"{notice['code']}: {notice['message']}", markup=False, soft_wrap=True)
+        print_line(f"{notice['code']}: {notice['message']}")

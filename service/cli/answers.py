@@ -1,0 +1,348 @@
+"""`clutchlife life`, `degradation`, `loops`, `engagement`: the answers about a clutch as tables, and as JSON or CSV."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+import typer
+
+from service.cli.connection import asking
+from service.cli.options import EX_USAGE, ClutchId, Json, errors_in_a_line, fail, out, print_line
+from service.cli.tables import coefficient, cycles, number, place, show_table, warn, with_deviation
+from service.cli.tables import pressure as pressure_of
+from service.client.clutchlife.transport import Service
+
+Method = Annotated[str | None, typer.Option(help="The filter: particle, ukf or grid")]
+AtCycles = Annotated[float | None, typer.Option(help="As it would have been answered at these duty cycles")]
+Arguments = Annotated[
+    list[str] | None,
+    typer.Option("--query", metavar="NAME=VALUE", help="Any other argument of the route; may be repeated"),
+]
+Csv = Annotated[bool, typer.Option("--csv", help="As rows for a spreadsheet")]
+
+
+def _arguments(given: list[str] | None, **named: Any) -> dict[str, Any]:
+    """The route's arguments: those with an option of their own, where they are given, and those of `--query`."""
+    arguments = {name: value for name, value in named.items() if value is not None}
+    for assignment in given or []:
+        name, equals, value = assignment.partition("=")
+        if not equals or not name:
+            fail(f"--query takes NAME=VALUE, got {assignment!r}", EX_USAGE)
+        arguments[name] = value
+    return arguments
+
+
+def _answer(
+    service: Service,
+    address: str,
+    arguments: Mapping[str, Any],
+    show: Callable[[dict[str, Any]], object],
+    *,
+    as_json: bool,
+    as_csv: bool = False,
+) -> None:
+    """Print the answer at an address as a table, as JSON or as CSV."""
+    if as_json and as_csv:
+        fail("use --json or --csv, not both", EX_USAGE)
+    if as_csv:
+        typer.echo(service.table(f"{address}.csv", **arguments), nl=False)
+    elif as_json:
+        out.print_json(json.dumps(service.get(address, **arguments)))
+    else:
+        show(service.get(address, **arguments))
+
+
+#: Quantiles that fit a line; `--json` has all of them.
+_SHOWN = ("0.05", "0.25", "0.5", "0.75", "0.95")
+_BLOCK = "CYCLES:KJ[:SD]"
+_CRITERIA = ("criterion", "bar", "rpm", "Hz", "now", "limit", "end, 5 %", "50 %", "95 %", "is the first")
+
+
+@asking
+def life(
+    service: Service,
+    clutch: ClutchId,
+    method: Method = None,
+    pressure: Annotated[
+        float | None, typer.Option(help="Line pressure, bar; left out, the mean over the pressures")
+    ] = None,
+    at_cycles: AtCycles = None,
+    quantity: Annotated[
+        str | None, typer.Option(help="By this quantity, as `slope`; left out, by what ends the clutch's life")
+    ] = None,
+    life_number: Annotated[
+        int | None, typer.Option("--life", help="Of an earlier life of a clutch that was rebuilt: 1 is the first")
+    ] = None,
+    query: Arguments = None,
+    plan: Annotated[Path | None, typer.Option(help="Planned duty: the forecast's request body as a JSON file")] = None,
+    block: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar=_BLOCK,
+            help="Planned duty: cycles, energy of each in kJ, its deviation; may be repeated",
+        ),
+    ] = None,
+    pace: Annotated[
+        float | None, typer.Option(help="Duty cycles an hour of the planned duty, idle hours included, for dates")
+    ] = None,
+    as_json: Json = False,
+    as_csv: Csv = False,
+) -> None:
+    """Show the duty cycles that remain until the end of life; with --plan or --block those under planned duty."""
+    arguments = _arguments(
+        query, method=method, pressure_bar=pressure, at_cycles=at_cycles, quantity=quantity, life=life_number
+    )
+    address = f"/v1/clutches/{clutch}/remaining-useful-life"
+    if plan is None and not block:
+        if pace is not None:
+            fail("--pace goes with --plan or --block", EX_USAGE)
+        _answer(service, address, arguments, _show_life, as_json=as_json, as_csv=as_csv)
+        return
+    if as_csv:
+        fail("planned duty is answered as a table or with --json, not as --csv", EX_USAGE)
+    body = json.dumps(_programme(plan, block or [], pace)).encode()
+    answer = service.post(f"{address}/forecast?{urlencode(arguments)}", body)
+    if as_json:
+        out.print_json(json.dumps(answer))
+    else:
+        _show_life(answer)
+
+
+def _show_life(answer: Mapping[str, Any]) -> None:
+    """A prediction as a table: where the clutch stands, and the quantiles of what remains."""
+    at = "" if answer["as_of_cycles"] is None else f" at {answer['as_of_cycles']:,.0f} cycles"
+    out.print(f"{answer['clutch_id']}{at}: {answer['statement']}", markup=False, style="bold")
+    for text in _lines(answer):
+        print_line(text)
+    with_quantiles = [row for row in _quantiles(answer) if any(row[1].get(q) is not None for q in _SHOWN)]
+    if with_quantiles:
+        rows = [(name, *(shown(quantity.get(q)) for q in _SHOWN)) for name, quantity, shown in with_quantiles]
+        show_table(["probability", *(f"{100 * float(q):g} %" for q in _SHOWN)], rows)
+    criteria = answer.get("criteria", [])
+    if len(criteria) > 1 or any(end["quantity"] != "mean_cof" for end in criteria):
+        show_table(_CRITERIA, map(_criterion, criteria))
+    warn(answer["warnings"])
+
+
+def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
+    current, criterion = answer["current"], answer["criterion"]
+    if current.get("mean_cof") is not None:
+        cof, fraction = with_deviation(current["mean_cof"], current["mean_cof_sd"]), current["fraction_of_initial"]
+        if fraction is None:
+            yield f"mean COF {cof} as measured at {current['measured_at_cycles']:,.0f} cycles"
+        else:
+            yield f"mean COF {cof}, {100 * fraction:.0f} % of new{_threshold(criterion)}"
+    if answer["at_least_at"] is not None:
+        yield f"at the pace of the runs until {answer['at_least_at'][:10]} at least"
+    course = answer.get("course")
+    described = "" if course is None else f", course {course['name']} (probability {number(course['probability'], 2)})"
+    effects = ", ".join(answer["model"]["effects"])
+    model = f"{answer['model']['name']} ({effects})" if effects else answer["model"]["name"]
+    yield f"{answer['runs_used']} tests, method {answer['method']}, model {model}{described}"
+    if answer.get("pace_cycles_per_hour") is not None:
+        source = {"request": "as planned", "runs": "as of the dated runs"}[answer["pace_from"]]
+        yield f"{number(answer['pace_cycles_per_hour'])} cycles an hour, {source}"
+    severity = [value for value in answer.get("block_severity", ()) if value is not None]
+    if severity:
+        worth = ", ".join(number(value) for value in severity)
+        yield f"a cycle of each block is worth {worth} cycles of recent duty"
+
+
+def _threshold(criterion: Mapping[str, Any]) -> str:
+    """Where the end of life is, of mean COF alone: others have a table of their own."""
+    if criterion["threshold_mean_cof"] is None or criterion["fraction"] is None:
+        return ""
+    return f"; the end of life is at {100 * criterion['fraction']:g} %"
+
+
+def _criterion(end: Mapping[str, Any]) -> list[str]:
+    """A criterion: what it is now, its limit, when that is reached, and how probably it is the first."""
+    first, current = end["probability_first"], end["current"]
+    return [
+        end["quantity"],
+        pressure_of(end["pressure_bar"]),
+        place(end["speed_rpm"]),
+        place(end["frequency_hz"]),
+        with_deviation(current["value"], current["sd"]),
+        number(end["limit"]),
+        *(cycles(end["end_of_life_cycles"][q]) for q in ("0.05", "0.5", "0.95")),
+        "-" if first is None else f"{100 * first:.0f} %",
+    ]
+
+
+def _quantiles(answer: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], Any]]:
+    """(name, quantiles, how one is written) of each row."""
+    yield "remaining cycles", answer["remaining_cycles"], cycles
+    yield "end of life, cycles", answer["end_of_life_cycles"], cycles
+    held = answer.get("held_runs")
+    if held is not None:
+        yield f"with {held['count']} held", held["remaining_cycles"], cycles
+    if "remaining_blocks" in answer:
+        yield "remaining blocks", answer["remaining_blocks"], number
+        yield "under recent duty", answer["recent_duty_cycles"], cycles
+    if answer.get("end_of_life_at") is not None:
+        yield "date (UTC)", answer["end_of_life_at"], lambda date: "-" if date is None else date[:10]
+
+
+def _programme(plan: Path | None, blocks: list[str], pace: float | None) -> dict[str, Any]:
+    """The request body; what is wrong with its content the service says. A pace that is given replaces the file's."""
+    if plan is not None and blocks:
+        fail("use --plan or --block, not both", EX_USAGE)
+    body = {"programme": [_block(text) for text in blocks]} if plan is None else _read(plan)
+    return body if pace is None else body | {"pace_cycles_per_hour": pace}
+
+
+def _read(plan: Path) -> dict[str, Any]:
+    with errors_in_a_line():
+        body = json.loads(plan.read_bytes())
+    if not isinstance(body, dict):
+        fail(f'{plan} must hold an object, {{"programme": [...]}}', EX_USAGE)
+    return body
+
+
+def _block(text: str) -> dict[str, float]:
+    names = ("cycles", "energy_per_cycle_kj", "sd")
+    try:
+        values = [float(part) for part in text.split(":")]
+    except ValueError:
+        values = []
+    if not 2 <= len(values) <= len(names):
+        fail(f"--block takes {_BLOCK}, got {text!r}", EX_USAGE)
+    return dict(zip(names, values, strict=False))
+
+
+_TRACKED = (
+    "quantity", "bar", "rpm", "Hz", "last", "90 % band there", "initial", "change", "scale, cycles", "exponent", "P(eq. 6)",
+)  # fmt: skip
+_COEFFICIENTS = ("initial", "change", "scale_cycles", "exponent")
+
+
+@asking
+def degradation(
+    service: Service,
+    clutch: ClutchId,
+    quantity: Annotated[str | None, typer.Option(help="Only this quantity, as `slope`")] = None,
+    method: Method = None,
+    at_cycles: AtCycles = None,
+    query: Arguments = None,
+    as_json: Json = False,
+    as_csv: Csv = False,
+) -> None:
+    """Show how mean COF and the Stribeck parameters change along a life: the coefficients of eq. 6."""
+    arguments = _arguments(query, quantity=quantity, method=method, at_cycles=at_cycles)
+
+    def show(answer: Mapping[str, Any]) -> None:
+        if answer["items"]:
+            show_table(_TRACKED, map(_tracked, answer["items"]))
+        else:
+            print_line(f"{clutch} has no tracked quantity yet")
+        warn(answer["warnings"])
+
+    _answer(service, f"/v1/clutches/{clutch}/degradation", arguments, show, as_json=as_json, as_csv=as_csv)
+
+
+def _tracked(item: Mapping[str, Any]) -> list[str]:
+    coefficients = item["coefficients"]
+    estimates = [None if coefficients is None else coefficients[name] for name in _COEFFICIENTS]
+    shown = ["-" if part is None else coefficient(part["value"], part["sd"]) for part in estimates]
+    return [
+        item["quantity"],
+        pressure_of(item["pressure_bar"]),
+        place(item["speed_rpm"]),
+        place(item["frequency_hz"]),
+        *_last(item),
+        *shown,
+        number(item["eq6_probability"], 2),
+    ]
+
+
+def _last(item: Mapping[str, Any]) -> tuple[str, str]:
+    """The track at the last measurement: its median and its 90 % band."""
+    measured, band = item["measured"]["cycles"], item["trajectory"]
+    if not measured or band is None or not band["cycles"]:
+        return "-", "-"
+    near = min(range(len(band["cycles"])), key=lambda index: abs(band["cycles"][index] - measured[-1]))
+    return number(band["median"][near]), f"{number(band['lower'][near])} to {number(band['upper'][near])}"
+
+
+_LOOPS = ("run", "law", "cycles", "bar", "Hz", "area, Nm·m/s", "attractor, Nm/s", "film time, s")
+
+
+@asking
+def loops(
+    service: Service,
+    clutch: ClutchId,
+    query: Arguments = None,
+    as_json: Json = False,
+    as_csv: Csv = False,
+) -> None:
+    """Show the friction loops of the dynamic tests: their area and both laws of the lag."""
+
+    def show(answer: Mapping[str, Any]) -> None:
+        if answer["items"]:
+            show_table(_LOOPS, map(_loop, answer["items"]), left=2)
+        else:
+            print_line(f"{clutch} has no loops")
+
+    _answer(service, f"/v1/clutches/{clutch}/loops", _arguments(query), show, as_json=as_json, as_csv=as_csv)
+
+
+def _loop(item: Mapping[str, Any]) -> list[str]:
+    return [
+        item["run_id"],
+        item["better_law"] or item["status"],
+        number(item["cycles"]),
+        f"{item['pressure_bar']:.3g}",
+        number(item["frequency_hz"]),
+        with_deviation(item["loop_area_nm_m_s"], item["loop_area_sd_nm_m_s"]),
+        with_deviation(item["attractor_nm_s"], item["attractor_sd_nm_s"]),
+        with_deviation(item["film_time_s"], item["film_time_sd_s"]),
+    ]
+
+
+#: Lines of the course that are shown. Chosen: with the head they fit a terminal of 24 lines.
+_MAX_LINES = 16
+#: The indicators of measured engagements that fit beside each other; `--json` has all of them.
+_INDICATORS = (
+    "stop_time_s", "engagement_energy_kj", "midpoint_cof", "initial_cof_ratio", "endpoint_cof_ratio", "breakaway_cof_ratio",
+)  # fmt: skip
+
+
+@asking
+def engagement(
+    service: Service, clutch: ClutchId, at_cycles: AtCycles = None, query: Arguments = None, as_json: Json = False
+) -> None:
+    """Show an engagement simulated with the tracked Stribeck parameters, now or at any cycles, and the measured ones."""
+    arguments = _arguments(query, at_cycles=at_cycles)
+    _answer(service, f"/v1/clutches/{clutch}/engagement", arguments, _show_engagement, as_json=as_json)
+
+
+def _show_engagement(answer: Mapping[str, Any]) -> None:
+    """The engagement's outcome, and its course at evenly spaced samples."""
+    end = f"engaged after {answer['duration_s']:.3g} s" if answer["engaged"] else "still slipping at the end"
+    out.print(
+        f"{answer['clutch_id']} at {answer['at_cycles']:,.0f} cycles, simulated: {end}, {number(answer['energy_kj'])} kJ",
+        markup=False,
+        style="bold",
+    )
+    out.print(
+        f"from {answer['initial_speed_rpm']:.0f} rpm, up to {answer['maximum_pressure_bar']:g} bar, "
+        f"motor up to {answer['motor_torque_limit_nm']:g} Nm, model {answer['model']['name']}",
+        markup=False,
+    )
+    columns = list(answer["channels"].values())
+    step = max(1, -(-len(columns[0]) // _MAX_LINES))
+    rows = [[number(value) for value in row] for row in list(zip(*columns, strict=True))[::step]]
+    show_table(list(answer["channels"]), rows, left=0)
+    if answer["measured"]:
+        out.print("measured engagements", style="bold")
+        show_table(["run", "cycles", *_INDICATORS], map(_measured, answer["measured"]))
+
+
+def _measured(item: Mapping[str, Any]) -> list[str]:
+    """A measured engagement: its indicators with their standard errors."""
+    estimates = [item["indicators"][name] for name in _INDICATORS]
+    shown = ["-" if part is None else with_deviation(part["value"], part["sd"]) for part in estimates]
+    return [item["run_id"], number(item["cycles"]), *shown]

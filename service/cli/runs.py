@@ -1,0 +1,130 @@
+"""`clutchlife runs`, `withdraw`, `end`, `confirm`, `correct`, `changes`: the runs of a clutch, what is changed of them
+afterwards, and the audit trail. Nothing is deleted.
+"""
+
+import json
+from typing import Annotated, Any
+
+import typer
+
+from service.cli.connection import asking, listed
+from service.cli.options import EX_USAGE, ClutchId, Json, Reason, fail, print_line
+from service.client.clutchlife.transport import Service
+
+RunId = Annotated[str, typer.Argument(metavar="RUN")]
+
+
+@asking
+def runs(
+    service: Service,
+    clutch: ClutchId,
+    held: Annotated[bool, typer.Option("--held", help="Only runs that wait to be confirmed or corrected")] = False,
+    as_json: Json = False,
+) -> None:
+    """List a clutch's runs by cycles, with doubts and warnings."""
+    items = service.pages(f"/v1/clutches/{clutch}/runs", **({"state": "held"} if held else {}))
+    listed(items, as_json, _print_runs, f"{clutch} has no {'held ' if held else ''}runs")
+
+
+@asking
+def withdraw(
+    service: Service,
+    clutch: ClutchId,
+    run: RunId,
+    reason: Reason,
+    undo: Annotated[bool, typer.Option("--undo", help="Take the withdrawal back")] = False,
+) -> None:
+    """Take a run out of a clutch's history; it stays stored."""
+    _post(service, f"/v1/clutches/{clutch}/runs/{run}/{'restore' if undo else 'withdraw'}", {"reason": reason})
+
+
+@asking
+def end(
+    service: Service,
+    clutch: ClutchId,
+    cycles: Annotated[
+        float | None, typer.Option(min=0, help="Duty cycles since new at the end; left out, those of the last run")
+    ] = None,
+    reason: Annotated[
+        str, typer.Option(help="worn, or other: taken out before its end, which would have come later")
+    ] = "worn",
+    note: Annotated[str, typer.Option(help="A remark")] = "",
+) -> None:
+    """Declare that a clutch's life has ended: no more duty or tests until a rebuild, and its fleet learns from it."""
+    if reason not in ("worn", "other"):
+        fail(f"--reason must be worn or other, got {reason!r}", EX_USAGE)
+    if cycles is None:
+        summary = service.get(f"/v1/clutches/{clutch}")["summary"]
+        cycles = None if summary is None else summary["as_of_cycles"]
+    if cycles is None:
+        fail(f"{clutch} has no run yet: give --cycles", EX_USAGE)
+    declared = {"kind": "maintenance", "event": "end_of_life", "cycles": cycles, "reason": reason, "note": note}
+    receipt = _post(service, f"/v1/clutches/{clutch}/runs", declared)
+    if receipt["state"] == "accepted":
+        undo = f"clutchlife withdraw {clutch} {receipt['run_id']} --reason ..."
+        print_line(f"{clutch}: ended at {receipt['cycles']:,.0f} cycles ({reason}); taken back by: {undo}")
+
+
+@asking
+def confirm(service: Service, clutch: ClutchId, run: RunId, reason: Reason = "") -> None:
+    """Accept a held run as it was sent."""
+    _post(service, f"/v1/clutches/{clutch}/runs/{run}/confirm", {"reason": reason})
+
+
+@asking
+def correct(
+    service: Service,
+    clutch: ClutchId,
+    run: RunId,
+    cycles: Annotated[float, typer.Option(min=0, help="Duty cycles since new when the run was made")],
+    reason: Reason,
+) -> None:
+    """Correct the cycles of a run that was sent with others."""
+    body = json.dumps({"cycles": cycles, "reason": reason}).encode()
+    _show(service.patch(f"/v1/clutches/{clutch}/runs/{run}", body))
+
+
+def _post(service: Service, address: str, content: dict[str, Any]) -> dict[str, Any]:
+    receipt = service.post(address, json.dumps(content).encode())
+    _show(receipt)
+    return receipt
+
+
+def _show(receipt: dict[str, Any]) -> None:
+    _print_runs([receipt | {"warnings": []} | ({} if receipt["state"] == "held" else {"doubts": []})])
+
+
+def _print_runs(items: list[dict[str, Any]]) -> None:
+    for item in items:
+        print_line(run_line(item))
+        for notice in [*item["doubts"], *item["warnings"]]:
+            print_line(f"    {notice['code']}: {notice['message']}")
+
+
+def run_line(receipt: dict[str, Any]) -> str:
+    """A run in a line."""
+    sent = "" if receipt["cycles"] == receipt["sent_cycles"] else f" (sent as {receipt['sent_cycles']:g})"
+    return f"{receipt['cycles']:>12g}  {receipt['state']:<9}  {receipt['kind']:<19}  {receipt['run_id']}{sent}"
+
+
+@asking
+def changes(service: Service, clutch: ClutchId, as_json: Json = False) -> None:
+    """List the audit trail of a clutch, newest first."""
+
+    def show(items: list[dict[str, Any]]) -> None:
+        for item in items:
+            print_line(_change(item))
+
+    listed(service.pages(f"/v1/clutches/{clutch}/changes"), as_json, show, f"nothing was changed of {clutch}")
+
+
+def _change(item: dict[str, Any]) -> str:
+    of_run = "" if item["run_id"] is None else f" {item['run_id']}"
+    names = [name for name in item["after"] if name != "doubts" and item["before"].get(name) != item["after"][name]]
+    changed = ", ".join(f"{name} {_shown(item['before'].get(name))} -> {_shown(item['after'][name])}" for name in names)
+    reason = f": {item['reason']}" if item["reason"] else ""
+    return f"{item['at']}  {item['by']}  {item['action']}{of_run} ({changed}){reason}"
+
+
+def _shown(value: object) -> str:
+    return "-" if value is None else value if isinstance(value, str) else json.dumps(value)
