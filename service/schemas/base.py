@@ -15,14 +15,7 @@ from pydantic import (
 )
 
 from service.columns import whole
-from service.schemas.limits import (
-    EARLIEST_START,
-    IDENTIFIER_PATTERN,
-    LARGEST_NUMBER,
-    LATEST_START,
-    LONGEST_REASON,
-    MAX_CYCLES,
-)
+from service.schemas import limits
 
 
 class Schema(BaseModel):
@@ -39,15 +32,15 @@ class Answer(BaseModel):
 
 # --- in requests ---
 
-Identifier = Annotated[str, StringConstraints(pattern=IDENTIFIER_PATTERN)]
+Identifier = Annotated[str, StringConstraints(pattern=limits.IDENTIFIER_PATTERN)]
 
-Cycles = Annotated[float, Field(ge=0, le=MAX_CYCLES, allow_inf_nan=False, strict=True), PlainSerializer(whole)]
+Cycles = Annotated[float, Field(ge=0, le=limits.MAX_CYCLES, allow_inf_nan=False, strict=True), PlainSerializer(whole)]
 
-PositiveNumber = Annotated[float, Field(gt=0, le=LARGEST_NUMBER, allow_inf_nan=False, strict=True)]
-NotNegativeNumber = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_nan=False, strict=True)]
+PositiveNumber = Annotated[float, Field(gt=0, le=limits.LARGEST_NUMBER, allow_inf_nan=False, strict=True)]
+NotNegativeNumber = Annotated[float, Field(ge=0, le=limits.LARGEST_NUMBER, allow_inf_nan=False, strict=True)]
 
 #: ISO 8601 with a time zone.
-StartedAt = Annotated[AwareDatetime, Field(ge=EARLIEST_START, le=LATEST_START)]
+StartedAt = Annotated[AwareDatetime, Field(ge=limits.EARLIEST_START, le=limits.LATEST_START)]
 
 #: A column is checked by `service.columns`, which names row and value among millions.
 Column = Annotated[
@@ -58,7 +51,7 @@ Column = Annotated[
 Origin = Annotated[Literal["measured", "simulated"], Field(description="Whether a rig measured it or it is simulated")]
 
 #: Why something is changed.
-Reason = Annotated[str, StringConstraints(max_length=LONGEST_REASON, strip_whitespace=True)]
+Reason = Annotated[str, StringConstraints(max_length=limits.LONGEST_REASON, strip_whitespace=True)]
 
 # --- in answers ---
 

@@ -12,11 +12,11 @@ import re
 import time
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from fastapi import Request
+from fastapi import Depends, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 from pydantic import BaseModel
@@ -26,13 +26,14 @@ from service.errors import UnsupportedMediaTypeError, unknown_clutch
 from service.lists import ALL_ITEMS, Place, from_cursor, sliced
 from service.queries.cache import Answer, Page, name_of, revision_and_json, shared_answer, to_json
 from service.schemas.parameters import ClutchId
-from service.web.auth import Reader, name_of_caller, snapshot_of
-from service.web.context import Context, Cursor, Whole
-from service.web.limits import LONGEST_WAIT_SECONDS, WAIT_SECONDS
+from service.web.auth import Admin, Reader, name_of_caller, snapshot_of
+from service.web.context import Context, Cursor, Limit, Whole
+from service.web.limits import LONGEST_WAIT_SECONDS, USUAL_ITEMS, WAIT_SECONDS
 from service.web.middleware import Again, remember
 from service.web.revalidation import Made
 from service.work.workers import Lane
 from storage import clutches
+from storage.engine.database import Database
 
 Rows = Iterable[Mapping[str, Any]]
 #: Rows of a page, and the cursor of the next one; None on the last.
@@ -101,35 +102,73 @@ async def kept(context: Context, key: Hashable, version: Hashable, make: Callabl
     return await run_in_threadpool(context.cache.answer, key, version, make)
 
 
-async def clutch_bytes(
-    request: Request, context: Context, clutch_id: str, name: str, make: Callable[[], bytes]
-) -> bytes:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OfClutch:
+    """A request about one clutch: which page of the answer."""
+
+    request: Request
+    context: Context
+    clutch_id: str
+    limit: int = ALL_ITEMS
+    after: Place | None = None
+
+    @property
+    def database(self) -> Database:
+        """The service's."""
+        return self.context.database
+
+
+async def _of_clutch(request: Request, context: Reader, clutch_id: ClutchId) -> OfClutch:
+    return OfClutch(request=request, context=context, clutch_id=clutch_id)
+
+
+async def _change_of_clutch(request: Request, context: Admin, clutch_id: ClutchId) -> OfClutch:
+    return OfClutch(request=request, context=context, clutch_id=clutch_id)
+
+
+#: A request about one clutch that its sender may read, and one that the sender may change.
+Of = Annotated[OfClutch, Depends(_of_clutch)]
+ChangeOf = Annotated[OfClutch, Depends(_change_of_clutch)]
+
+
+async def _page_of_clutch(of: Of, limit: Limit = USUAL_ITEMS, cursor: Cursor = None) -> OfClutch:
+    return replace(of, limit=limit, after=from_cursor(cursor))
+
+
+async def _whole_of_clutch(of: Of, limit: Whole = ALL_ITEMS, cursor: Cursor = None) -> OfClutch:
+    return replace(of, limit=limit, after=from_cursor(cursor))
+
+
+#: The same for a page of a list, of the usual length or, where no limit is given, of all of it.
+PageOf = Annotated[OfClutch, Depends(_page_of_clutch)]
+WholeOf = Annotated[OfClutch, Depends(_whole_of_clutch)]
+
+
+async def clutch_bytes(of: OfClutch, name: str, make: Callable[[], bytes]) -> bytes:
     """What follows from a clutch's revision and is needed to answer, not the answer itself. Raises NotFoundError."""
-    return (await kept(context, (clutch_id, name), _revision(request, clutch_id), make)).body
+    return (await kept(of.context, (of.clutch_id, name), _revision(of.request, of.clutch_id), make)).body
 
 
-async def clutch_answer(
-    request: Request, context: Context, clutch_id: str, name: str, make: Callable[[], bytes], *arguments: Hashable
-) -> Response:
+async def clutch_answer(of: OfClutch, name: str, make: Callable[[], bytes], *arguments: Hashable) -> Response:
     """A GET's answer that follows from a clutch's revision, JSON made by `make`. Raises NotFoundError.
 
     `name` and `arguments` tell the clutch's answers apart. Where it was made for this revision already, nothing is read.
     """
-    revision = _revision(request, clutch_id)
+    context, revision = of.context, _revision(of.request, of.clutch_id)
     # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
-    key = (clutch_id, name, *arguments)
+    key = (of.clutch_id, name, *arguments)
     held = await kept(context, key, revision, make)
 
     def again(request: Request) -> Response | None:
         held = context.cache.held(key, snapshot_of(request).revision)
         return None if held is None else tagged(request, held, JSON_TYPE, snapshot_of(request).revision)
 
-    remember(request, again)
-    return tagged(request, held, JSON_TYPE, revision)
+    remember(of.request, again)
+    return tagged(of.request, held, JSON_TYPE, revision)
 
 
 async def clutch_table(
-    of: "TablePage", name: str, make: Callable[[], RowsAndNext], columns: Sequence[str], *arguments: Hashable
+    of: OfClutch, name: str, make: Callable[[], RowsAndNext], columns: Sequence[str], *arguments: Hashable
 ) -> Response:
     """The CSV export of an answer that follows from a clutch's revision, a page of it. Raises NotFoundError."""
     revision = _revision(of.request, of.clutch_id)
@@ -139,35 +178,31 @@ async def clutch_table(
 
 
 async def computed_answer(
-    request: Request,
-    context: Context,
-    clutch_id: str,
+    of: OfClutch,
     query: Callable[..., dict[str, Any]],
     *arguments: Hashable,
-    limit: int = ALL_ITEMS,
-    cursor: str | None = None,
     prefer: str | None = None,
     lane: Lane = Lane.ANSWERS,
 ) -> Response:
     """A GET's answer that takes long: `query(database, clutch_id, *arguments)`, computed by a worker of that lane; a page of
     its items where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError."""
-    after = from_cursor(cursor)
+    request, context, clutch_id = of.request, of.context, of.clutch_id
     revision = _revision(request, clutch_id)
     revision, whole = await _computed(request, context, clutch_id, revision, query, arguments, prefer, lane)
-    if limit == ALL_ITEMS and after is None:
+    if of.limit == ALL_ITEMS and of.after is None:
         remember(request, _computed_again(context, clutch_id, query, arguments))
         return tagged(request, whole, JSON_TYPE, revision)
 
     def one_page() -> bytes:
         payload = json.loads(whole.body)
-        return to_json(payload | sliced(payload["items"], limit, after))
+        return to_json(payload | sliced(payload["items"], of.limit, of.after))
 
-    key = (clutch_id, f"{name_of(query)}.page", *arguments, limit, after)
+    key = (clutch_id, f"{name_of(query)}.page", *arguments, of.limit, of.after)
     return tagged(request, await kept(context, key, revision, one_page), JSON_TYPE, revision)
 
 
 async def computed_table(
-    of: "TablePage",
+    of: OfClutch,
     query: Callable[..., dict[str, Any]],
     rows: Callable[[Any], Rows],
     columns: Sequence[str],
@@ -189,24 +224,6 @@ async def computed_table(
 
     key = (of.clutch_id, f"{name_of(query)}.csv", *arguments, limit, after)
     return tagged(of.request, await kept(of.context, key, revision, one_page), CSV_TYPE, revision)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TablePage:
-    """A request for a table of one clutch: which page of it."""
-
-    request: Request
-    context: Context
-    clutch_id: str
-    limit: int
-    after: Place | None
-
-
-async def table_page(
-    request: Request, context: Reader, clutch_id: ClutchId, limit: Whole = ALL_ITEMS, cursor: Cursor = None
-) -> TablePage:
-    """A dependency: the page that a request for a table asks for, allowed to those who may read the clutch."""
-    return TablePage(request=request, context=context, clutch_id=clutch_id, limit=limit, after=from_cursor(cursor))
 
 
 async def computed_of_each(
@@ -309,6 +326,11 @@ def _following(request: Request, cursor: str) -> str:
     """The address of the next page, relative to this service: behind a proxy its own name is not known."""
     url = request.url.include_query_params(cursor=cursor)
     return f"{url.path}?{url.query}"
+
+
+def json_answer(content: object, status: int = 200, **headers: str) -> Response:
+    """An answer to a change, or to a question that is asked once: JSON without a tag."""
+    return Response(content=to_json(content), status_code=status, media_type=JSON_TYPE, headers=headers)
 
 
 def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:

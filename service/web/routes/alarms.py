@@ -11,34 +11,11 @@ from pydantic import Field
 from service.alarms.notify import require_address
 from service.lists import from_cursor
 from service.queries import alarms
-from service.queries.cache import to_json
 from service.run_files.json_run import checked
 from service.schemas import alarm as schemas
-from service.schemas.alarm import (
-    AcknowledgeIn,
-    AlarmIn,
-    AlarmOut,
-    AlarmPage,
-    DeliveryPage,
-    EventOut,
-    EventPage,
-    TestedOut,
-    WebhookIn,
-    WebhookOut,
-    WebhookPage,
-)
 from service.schemas.limits import IDENTIFIER_PATTERN, LONGEST_IDENTIFIER
-from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, until_ended
-from service.web.auth import (
-    Admin,
-    OwnAdmin,
-    OwnIngester,
-    OwnReader,
-    Reader,
-    name_of_caller,
-    own_clutches,
-    require_clutch,
-)
+from service.web import auth
+from service.web.answers import answer, described_body, json_answer, json_body, now, until_ended
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
 from service.web.problems import CHANGING, READING, SENDING
@@ -65,31 +42,31 @@ OfClutch = Annotated[
 ]
 
 
-@router.get("", response_model=AlarmPage, responses=READING)
+@router.get("", response_model=schemas.AlarmPage, responses=READING)
 async def list_alarms(
-    request: Request, context: OwnReader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+    request: Request, context: auth.OwnReader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
     """Rules by name; of a key that is bound to clutches, those of these clutches."""
-    after, own = from_cursor(cursor), own_clutches(request)
+    after, own = from_cursor(cursor), auth.own_clutches(request)
     return await answer(request, lambda: alarms.page(context.database, limit=limit, after=after, only=own))
 
 
 @router.post(
     "",
     status_code=201,
-    response_model=AlarmOut,
-    responses=SENDING | {200: {"model": AlarmOut, "description": "The rule is there already"}},
-    openapi_extra=described_body(AlarmIn, schemas.EXAMPLE),
+    response_model=schemas.AlarmOut,
+    responses=SENDING | {200: {"model": schemas.AlarmOut, "description": "The rule is there already"}},
+    openapi_extra=described_body(schemas.AlarmIn, schemas.EXAMPLE),
 )
-async def post_alarm(request: Request, context: OwnIngester) -> Response:
+async def post_alarm(request: Request, context: auth.OwnIngester) -> Response:
     """Make a rule; what it raises of the clutches as they are is raised at once."""
     return await _saved(request, context, None)
 
 
-@router.get("/events", response_model=EventPage, responses=READING)
+@router.get("/events", response_model=schemas.EventPage, responses=READING)
 async def list_events(
     request: Request,
-    context: OwnReader,
+    context: auth.OwnReader,
     state: OfEventState = None,
     alarm_id: OfAlarm = None,
     clutch_id: OfClutch = None,
@@ -97,9 +74,9 @@ async def list_events(
     cursor: Cursor = None,
 ) -> Response:
     """What rules have raised, newest first; of a key that is bound to clutches, of these."""
-    after, own = from_cursor(cursor), own_clutches(request)
+    after, own = from_cursor(cursor), auth.own_clutches(request)
     if clutch_id is not None:
-        require_clutch(request, clutch_id)
+        auth.require_clutch(request, clutch_id)
         own = frozenset({clutch_id})
     listed = partial(
         alarms.events, context.database, limit=limit, after=after, state=state, alarm_id=alarm_id, only=own
@@ -107,67 +84,68 @@ async def list_events(
     return await answer(request, listed)
 
 
-@router.get("/events/{event_id}", response_model=EventOut, responses=READING)
-async def read_event(request: Request, context: OwnReader, event_id: EventId) -> Response:
+@router.get("/events/{event_id}", response_model=schemas.EventOut, responses=READING)
+async def read_event(request: Request, context: auth.OwnReader, event_id: EventId) -> Response:
     """One alarm."""
-    own = own_clutches(request)
+    own = auth.own_clutches(request)
     return await answer(request, lambda: alarms.event(context.database, event_id, only=own))
 
 
 @router.post(
     "/events/{event_id}/acknowledge",
-    response_model=EventOut,
+    response_model=schemas.EventOut,
     responses=CHANGING,
-    openapi_extra=described_body(AcknowledgeIn, {"note": "a new set is ordered"})
-    | {"requestBody": described_body(AcknowledgeIn, {"note": "ordered"})["requestBody"] | {"required": False}},
+    openapi_extra={
+        "requestBody": described_body(schemas.AcknowledgeIn, {"note": "ordered"})["requestBody"] | {"required": False}
+    },
 )
-async def acknowledge_event(request: Request, context: OwnIngester, event_id: EventId) -> Response:
+async def acknowledge_event(request: Request, context: auth.OwnIngester, event_id: EventId) -> Response:
     """Say that somebody has seen an alarm; the body may be left out."""
     body = await json_body(request) if await request.body() else b"{}"
-    remark = checked(AcknowledgeIn, body)
-    await run_in_threadpool(alarms.event, context.database, event_id, only=own_clutches(request))
-    acknowledge = partial(change_alarms.acknowledge, note=remark.note, by=name_of_caller(request), at=now())
-    return _json(await run_in_threadpool(acknowledge, context.database, event_id))
+    remark = checked(schemas.AcknowledgeIn, body)
+    await run_in_threadpool(alarms.event, context.database, event_id, only=auth.own_clutches(request))
+    acknowledge = partial(change_alarms.acknowledge, note=remark.note, by=auth.name_of_caller(request), at=now())
+    return json_answer(await run_in_threadpool(acknowledge, context.database, event_id))
 
 
-@router.get("/{alarm_id}", response_model=AlarmOut, responses=READING)
-async def read_alarm(request: Request, context: OwnReader, alarm_id: AlarmId) -> Response:
+@router.get("/{alarm_id}", response_model=schemas.AlarmOut, responses=READING)
+async def read_alarm(request: Request, context: auth.OwnReader, alarm_id: AlarmId) -> Response:
     """A rule in force."""
-    own = own_clutches(request)
+    own = auth.own_clutches(request)
     return await answer(request, lambda: alarms.look_up(context.database, alarm_id, only=own))
 
 
 @router.put(
     "/{alarm_id}",
-    response_model=AlarmOut,
+    response_model=schemas.AlarmOut,
     responses=CHANGING,
-    openapi_extra=described_body(AlarmIn, schemas.EXAMPLE),
+    openapi_extra=described_body(schemas.AlarmIn, schemas.EXAMPLE),
 )
-async def put_alarm(request: Request, context: OwnAdmin, alarm_id: AlarmId) -> Response:
+async def put_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Replace a rule; what it has raised is cleared where the new one would not keep it."""
-    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=own_clutches(request))
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.own_clutches(request))
     return await _saved(request, context, alarm_id)
 
 
 @router.delete("/{alarm_id}", status_code=204, response_class=Response, responses=READING)
-async def delete_alarm(request: Request, context: OwnAdmin, alarm_id: AlarmId) -> Response:
+async def delete_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Delete a rule; what it has raised is cleared and stays listed."""
-    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=own_clutches(request))
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.own_clutches(request))
     await run_in_threadpool(change_alarms.remove, context.database, alarm_id)
     return Response(status_code=204)
 
 
-@router.post("/{alarm_id}/test", response_model=TestedOut, responses=CHANGING)
-async def test_alarm(request: Request, context: OwnAdmin, alarm_id: AlarmId) -> Response:
+@router.post("/{alarm_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
+async def test_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Send a test to each of the rule's receivers, and say how it went."""
-    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=own_clutches(request))
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.own_clutches(request))
     names = await run_in_threadpool(change_alarms.test, context.database, alarm_id)
     return await _tested(context, names)
 
 
-@webhook_router.get("", response_model=WebhookPage, responses=READING)
+@webhook_router.get("", response_model=schemas.WebhookPage, responses=READING)
 async def list_webhooks(
-    request: Request, context: Reader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+    request: Request, context: auth.Reader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
     """Receivers, without what is secret in their addresses."""
     after = from_cursor(cursor)
@@ -177,61 +155,59 @@ async def list_webhooks(
 @webhook_router.post(
     "",
     status_code=201,
-    response_model=WebhookOut,
+    response_model=schemas.WebhookOut,
     responses=SENDING,
-    openapi_extra=described_body(WebhookIn, {"url": "https://example.org/hook", "secret": "wet-clutch-7000"}),
+    openapi_extra=described_body(schemas.WebhookIn, {"url": "https://example.org/hook", "secret": "wet-clutch-7000"}),
 )
-async def post_webhook(request: Request, context: Admin) -> Response:
+async def post_webhook(request: Request, context: auth.Admin) -> Response:
     """Add a receiver. Where no secret is given one is made, and answered this once."""
-    receiver = checked(WebhookIn, await json_body(request))
+    receiver = checked(schemas.WebhookIn, await json_body(request))
     private = await run_in_threadpool(
         change_webhooks.inside_allowed, context.database, context.settings.private_receivers
     )
     await run_in_threadpool(require_address, receiver.url, private=private)
-    add = partial(change_webhooks.add, by=name_of_caller(request), at=now())
+    add = partial(change_webhooks.add, by=auth.name_of_caller(request), at=now())
     row = await run_in_threadpool(add, context.database, receiver)
     made = None if receiver.secret else row.secret
-    content = alarms.receiver_out(row, secret=made)
-    return _json(content, status=201, headers={"Location": f"/v1/webhooks/{row.webhook_id}"})
+    return json_answer(alarms.receiver_out(row, secret=made), 201, Location=f"/v1/webhooks/{row.webhook_id}")
 
 
-@webhook_router.get("/{webhook_id}", response_model=WebhookOut, responses=READING)
-async def read_webhook(request: Request, context: Reader, webhook_id: WebhookId) -> Response:
+@webhook_router.get("/{webhook_id}", response_model=schemas.WebhookOut, responses=READING)
+async def read_webhook(request: Request, context: auth.Reader, webhook_id: WebhookId) -> Response:
     """A receiver, without what is secret in its address."""
     return await answer(request, lambda: alarms.receiver(context.database, webhook_id))
 
 
 @webhook_router.delete("/{webhook_id}", status_code=204, response_class=Response, responses=READING)
-async def delete_webhook(context: Admin, webhook_id: WebhookId) -> Response:
+async def delete_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
     """Delete a receiver, its secret and its deliveries; what waits for it is not sent."""
     await run_in_threadpool(change_webhooks.remove, context.database, webhook_id)
     return Response(status_code=204)
 
 
-@webhook_router.get("/{webhook_id}/deliveries", response_model=DeliveryPage, responses=READING)
+@webhook_router.get("/{webhook_id}/deliveries", response_model=schemas.DeliveryPage, responses=READING)
 async def list_deliveries(
-    request: Request, context: Reader, webhook_id: WebhookId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+    request: Request, context: auth.Reader, webhook_id: WebhookId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
     """What a receiver was sent or is to be sent, newest first."""
     after = from_cursor(cursor)
     return await answer(request, lambda: alarms.deliveries(context.database, webhook_id, limit=limit, after=after))
 
 
-@webhook_router.post("/{webhook_id}/test", response_model=TestedOut, responses=CHANGING)
-async def test_webhook(context: Admin, webhook_id: WebhookId) -> Response:
+@webhook_router.post("/{webhook_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
+async def test_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
     """Send a test to a receiver, and say how it went."""
     names = await run_in_threadpool(change_webhooks.test, context.database, webhook_id, at=now())
     return await _tested(context, names)
 
 
 async def _saved(request: Request, context: Context, alarm_id: str | None) -> Response:
-    rule = checked(AlarmIn, await json_body(request))
-    require_clutch(request, rule.clutch_id)
-    save = partial(change_alarms.save, by=name_of_caller(request), at=now(), alarm_id=alarm_id)
+    rule = checked(schemas.AlarmIn, await json_body(request))
+    auth.require_clutch(request, rule.clutch_id)
+    save = partial(change_alarms.save, by=auth.name_of_caller(request), at=now(), alarm_id=alarm_id)
     row, new = await run_in_threadpool(save, context.database, rule)
     context.outbox.wake()
-    headers = {"Location": f"/v1/alarms/{row.alarm_id}"}
-    return _json(alarms.rule_out(row), status=201 if new else 200, headers=headers)
+    return json_answer(alarms.rule_out(row), 201 if new else 200, Location=f"/v1/alarms/{row.alarm_id}")
 
 
 async def _tested(context: Context, names: list[str]) -> Response:
@@ -243,8 +219,4 @@ async def _tested(context: Context, names: list[str]) -> Response:
     )
     taken = sum(row["state"] == "delivered" for row in items)
     message = f"{taken} of {len(items)} receivers took the test" if items else "there is no receiver: add a webhook"
-    return _json({"deliveries": items, "message": message})
-
-
-def _json(content: object, *, status: int = 200, headers: dict[str, str] | None = None) -> Response:
-    return Response(content=to_json(content), status_code=status, media_type=JSON_TYPE, headers=headers)
+    return json_answer({"deliveries": items, "message": message})

@@ -17,27 +17,7 @@ from service.schemas.clutch import ClutchEdit, ClutchIn, ClutchOut, ClutchPage
 from service.schemas.fleet import FleetTotals
 from service.schemas.parameters import Archived, ClutchId, ClutchStateName, Find, Held, Offset, Sort
 from service.schemas.run import ChangePage
-from service.web.answers import (
-    JSON_TYPE,
-    answer,
-    begin_computed,
-    clutch_answer,
-    described_body,
-    json_body,
-    kept,
-    now,
-    tagged,
-)
-from service.web.auth import (
-    Admin,
-    OwnIngester,
-    OwnReader,
-    Reader,
-    name_of_caller,
-    own_clutches,
-    require_clutch,
-    snapshot_of,
-)
+from service.web import answers, auth
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
 from service.web.middleware import remember
@@ -67,29 +47,28 @@ EXAMPLE = {
     status_code=201,
     response_model=ClutchOut,
     responses=SENDING | {200: {"model": ClutchOut, "description": "Known already, with the same content"}},
-    openapi_extra=described_body(ClutchIn, EXAMPLE),
+    openapi_extra=answers.described_body(ClutchIn, EXAMPLE),
 )
-async def register_clutch(request: Request, context: OwnIngester) -> Response:
+async def register_clutch(request: Request, context: auth.OwnIngester) -> Response:
     """Register a clutch. Everything but `clutch_id` has a default: the reference's clutch."""
-    body = await json_body(request)
+    body = await answers.json_body(request)
     wanted = checked(ClutchIn, body)
-    require_clutch(request, wanted.clutch_id)
+    auth.require_clutch(request, wanted.clutch_id)
     clutch, new = await run_in_threadpool(_register, context, wanted)
     if new:
-        await begin_computed(context, str(clutch["clutch_id"]), degradation)
-    headers = {"Location": f"/v1/clutches/{clutch['clutch_id']}"}
-    return Response(content=to_json(clutch), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+        await answers.begin_computed(context, str(clutch["clutch_id"]), degradation)
+    return answers.json_answer(clutch, 201 if new else 200, Location=f"/v1/clutches/{clutch['clutch_id']}")
 
 
 def _register(context: Context, clutch: ClutchIn) -> tuple[dict[str, object], bool]:
-    new = registration.register(context.database, clutch, created_at=now())
+    new = registration.register(context.database, clutch, created_at=answers.now())
     return clutch_list.look_up(context.database, clutch.clutch_id), new
 
 
 @router.get("", response_model=ClutchPage, responses=READING)
 async def list_clutches(
     request: Request,
-    context: OwnReader,
+    context: auth.OwnReader,
     archived: Archived = False,
     state: ClutchStateName = None,
     held: Held = False,
@@ -103,7 +82,7 @@ async def list_clutches(
 
     Whoever reads all of them sorts by name: then none is missed or repeated however they change meanwhile.
     """
-    choice = Choice(archived=archived, only=own_clutches(request), state=state, held=held, find=find)
+    choice = Choice(archived=archived, only=auth.own_clutches(request), state=state, held=held, find=find)
     after = from_cursor(cursor)
 
     def make() -> bytes:
@@ -115,9 +94,9 @@ async def list_clutches(
 
 
 @fleet_router.get("/totals", response_model=FleetTotals, responses=READING)
-async def totals(request: Request, context: OwnReader, archived: Archived = False, find: Find = "") -> Response:
+async def totals(request: Request, context: auth.OwnReader, archived: Archived = False, find: Find = "") -> Response:
     """How many clutches that the key is for there are, by their states: what a page shows beside a part of their list."""
-    choice = Choice(archived=archived, only=own_clutches(request), find=find)
+    choice = Choice(archived=archived, only=auth.own_clutches(request), find=find)
     return await _of_all(
         request, context, ("totals", choice), lambda: to_json(clutch_list.totals(context.database, choice))
     )
@@ -127,50 +106,48 @@ async def _of_all(request: Request, context: Context, key: Hashable, make: Calla
     """A GET's answer that any commit may change, made once for what is committed."""
 
     def again(request: Request) -> Response | None:
-        held = context.cache.held(key, snapshot_of(request).version)
-        return None if held is None else tagged(request, held, JSON_TYPE)
+        held = context.cache.held(key, auth.snapshot_of(request).version)
+        return None if held is None else answers.tagged(request, held, answers.JSON_TYPE)
 
     # the version before the rows are read: what is committed meanwhile makes another
-    held = await kept(context, key, snapshot_of(request).version, make)
-    if own_clutches(request) is None:
+    held = await answers.kept(context, key, auth.snapshot_of(request).version, make)
+    if auth.own_clutches(request) is None:
         remember(request, again)
-    return tagged(request, held, JSON_TYPE)
+    return answers.tagged(request, held, answers.JSON_TYPE)
 
 
 @router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)
-async def read_clutch(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
+async def read_clutch(request: Request, context: auth.Reader, clutch_id: ClutchId) -> Response:
     """One clutch."""
-    return await answer(request, lambda: clutch_list.look_up(context.database, clutch_id))
+    return await answers.answer(request, lambda: clutch_list.look_up(context.database, clutch_id))
 
 
 @router.patch(
     "/{clutch_id}",
     response_model=ClutchOut,
     responses=CHANGING,
-    openapi_extra=described_body(
+    openapi_extra=answers.described_body(
         ClutchEdit, {"reason": "the drawing says so", "geometry": {"inner_diameter_mm": 98, "outer_diameter_mm": 133}}
     ),
 )
-async def edit_clutch(request: Request, context: Admin, clutch_id: ClutchId) -> Response:
+async def edit_clutch(request: Request, context: auth.Admin, clutch_id: ClutchId) -> Response:
     """Edit a clutch's record, each given field as a whole, and archive it or bring it back; results are computed again."""
-    wanted = checked(ClutchEdit, await json_body(request))
-    made = partial(edit, archived=wanted.archived, reason=wanted.reason, by=name_of_caller(request), at=now())
+    wanted = checked(ClutchEdit, await answers.json_body(request))
+    made = partial(
+        edit, archived=wanted.archived, reason=wanted.reason, by=auth.name_of_caller(request), at=answers.now()
+    )
     editing = context.workers.submit(
         Lane.RUNS, made, clutch_id, wanted.fields(), turn=clutch_id, seconds=CHANGE_SECONDS
     )
     await asyncio.wrap_future(editing)
-    clutch = await run_in_threadpool(clutch_list.look_up, context.database, clutch_id)
-    return Response(content=to_json(clutch), media_type=JSON_TYPE)
+    return answers.json_answer(await run_in_threadpool(clutch_list.look_up, context.database, clutch_id))
 
 
 @router.get("/{clutch_id}/changes", response_model=ChangePage, responses=READING)
-async def list_changes(
-    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
-) -> Response:
+async def list_changes(of: answers.PageOf) -> Response:
     """Who changed what of the clutch and its runs, when and why: the newest first."""
-    after = from_cursor(cursor)
 
     def make() -> bytes:
-        return to_json(page(*runs.trail(context.database, clutch_id, limit=limit, after=after)))
+        return to_json(page(*runs.trail(of.database, of.clutch_id, limit=of.limit, after=of.after)))
 
-    return await clutch_answer(request, context, clutch_id, "changes", make, limit, after)
+    return await answers.clutch_answer(of, "changes", make, of.limit, of.after)

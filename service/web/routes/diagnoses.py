@@ -8,17 +8,15 @@ from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.lists import from_cursor, page
+from service.lists import page
 from service.logging import request_id
 from service.queries import diagnoses
-from service.queries.cache import to_json
 from service.run_files.json_run import checked
 from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut, PlanOut
 from service.schemas.parameters import ClutchId, DiagnosisId
-from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait, until_ended
-from service.web.auth import Admin, Ingester, Reader, name_of_caller, require
-from service.web.context import Cursor, Limit
-from service.web.limits import USUAL_ITEMS, WAIT_SECONDS
+from service.web import answers
+from service.web.auth import Admin, Ingester, name_of_caller, require
+from service.web.limits import WAIT_SECONDS
 from service.web.problems import READING, SENDING
 from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import adopt_model, run_diagnosis
@@ -36,11 +34,11 @@ Prefer = Annotated[
     status_code=201,
     response_model=DiagnosisOut,
     responses=SENDING | {202: {"model": DiagnosisOut, "description": "It still runs: look again at `Location`"}},
-    openapi_extra=described_body(DiagnosisIn, {"adopt": False}),
+    openapi_extra=answers.described_body(DiagnosisIn, {"adopt": False}),
 )
 async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
     """Have all runs of the clutch's present life diagnosed. A question while the same runs are being diagnosed joins in."""
-    question = checked(DiagnosisIn, await json_body(request))
+    question = checked(DiagnosisIn, await answers.json_body(request))
     if question.adopt:
         require(request, "admin")
     ask = partial(
@@ -49,67 +47,56 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
         adopt=question.adopt,
         request=request_id.get(),
         most=context.settings.most_diagnoses,
-        created_at=now(),
+        created_at=answers.now(),
     )
     diagnosis_id, _ = await run_in_threadpool(ask, context.database, clutch_id)
     context.jobs.wake()
-    preferred = preferred_wait(prefer)
+    preferred = answers.preferred_wait(prefer)
     wait = WAIT_SECONDS if preferred is None else preferred
     look = partial(diagnoses.diagnosis, context.database, clutch_id, diagnosis_id)
-    report = await until_ended(look, lambda diagnosis: diagnosis["status"] != "running", wait)
+    report = await answers.until_ended(look, lambda diagnosis: diagnosis["status"] != "running", wait)
     headers = {"Location": f"/v1/clutches/{clutch_id}/diagnoses/{diagnosis_id}"}
     if preferred is not None:
         headers["Preference-Applied"] = f"wait={wait}"
     status = 202 if report["status"] == "running" else 201
-    return Response(content=to_json(report), status_code=status, media_type=JSON_TYPE, headers=headers)
+    return answers.json_answer(report, status, **headers)
 
 
 @router.get("/diagnoses", response_model=DiagnosisPage, responses=READING)
-async def list_diagnoses(
-    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
-) -> Response:
+async def list_diagnoses(of: answers.PageOf) -> Response:
     """Diagnoses without their maps and loops, newest first."""
-    after = from_cursor(cursor)
-    return await answer(request, lambda: page(*diagnoses.page(context.database, clutch_id, limit=limit, after=after)))
+    make = partial(diagnoses.page, of.database, of.clutch_id, limit=of.limit, after=of.after)
+    return await answers.answer(of.request, lambda: page(*make()))
 
 
 @router.get("/diagnoses/{diagnosis_id}", response_model=DiagnosisOut, responses=READING)
-async def read_diagnosis(request: Request, context: Reader, clutch_id: ClutchId, diagnosis_id: DiagnosisId) -> Response:
+async def read_diagnosis(of: answers.Of, diagnosis_id: DiagnosisId) -> Response:
     """One diagnosis with its maps and loops."""
-    return await answer(request, lambda: diagnoses.diagnosis(context.database, clutch_id, diagnosis_id))
+    return await answers.answer(of.request, partial(diagnoses.diagnosis, of.database, of.clutch_id, diagnosis_id))
 
 
 @router.get("/diagnoses/{diagnosis_id}/plan", response_model=PlanOut, responses=READING)
-async def read_plan(request: Request, context: Reader, clutch_id: ClutchId, diagnosis_id: DiagnosisId) -> Response:
+async def read_plan(of: answers.Of, diagnosis_id: DiagnosisId) -> Response:
     """The tests that a diagnosis advises as a protocol that a rig can run."""
-    return await answer(request, lambda: diagnoses.plan(context.database, clutch_id, diagnosis_id))
+    return await answers.answer(of.request, partial(diagnoses.plan, of.database, of.clutch_id, diagnosis_id))
 
 
 @router.get("/model", response_model=ModelOut, responses=READING)
-async def read_model(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
+async def read_model(of: answers.Of) -> Response:
     """The model that tracking and remaining life use, and all that were adopted."""
-    return await answer(request, lambda: diagnoses.model(context.database, clutch_id))
+    return await answers.answer(of.request, partial(diagnoses.model, of.database, of.clutch_id))
 
 
 @router.put(
     "/model",
     response_model=ModelOut,
     responses=SENDING,
-    openapi_extra=described_body(ModelIn, {"diagnosis_id": "3f9a1c0b7d2e4f56"}),
+    openapi_extra=answers.described_body(ModelIn, {"diagnosis_id": "3f9a1c0b7d2e4f56"}),
 )
 async def put_model(request: Request, context: Admin, clutch_id: ClutchId) -> Response:
     """Adopt what a diagnosis found, or return to the baseline; all is tracked again before this is answered."""
-    wanted = checked(ModelIn, await json_body(request))
-    adopting = context.workers.submit(
-        Lane.RUNS,
-        adopt_model.adopt,
-        clutch_id,
-        wanted.diagnosis_id,
-        now(),
-        name_of_caller(request),
-        turn=clutch_id,
-        seconds=CHANGE_SECONDS,
-    )
+    wanted = checked(ModelIn, await answers.json_body(request))
+    arguments = (clutch_id, wanted.diagnosis_id, answers.now(), name_of_caller(request))
+    adopting = context.workers.submit(Lane.RUNS, adopt_model.adopt, *arguments, turn=clutch_id, seconds=CHANGE_SECONDS)
     await asyncio.wrap_future(adopting)
-    answered = await run_in_threadpool(diagnoses.model, context.database, clutch_id)
-    return Response(content=to_json(answered), media_type=JSON_TYPE)
+    return answers.json_answer(await run_in_threadpool(diagnoses.model, context.database, clutch_id))

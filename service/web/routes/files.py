@@ -14,25 +14,11 @@ from service.queries import rigs
 from service.queries.raw_run import copy_file, file_sha256
 from service.readers.read_file import reading_of
 from service.run_files.upload import read_file_run
+from service.schemas import parameters
 from service.schemas.base import Origin
-from service.schemas.parameters import (
-    ClutchId,
-    FileCycles,
-    FileDecimal,
-    FileKind,
-    FileMap,
-    FileName,
-    FileRig,
-    FileRunId,
-    FileSkipRows,
-    FileStartedAt,
-    FileTable,
-    FileTime,
-    RunId,
-)
 from service.schemas.run import Receipt
-from service.web.answers import JSON_TYPE, now, unchanged
-from service.web.auth import Ingester, Reader, name_of_caller
+from service.web.answers import JSON_TYPE, Of, now, unchanged
+from service.web.auth import Ingester, name_of_caller
 from service.web.files import received, streamed
 from service.web.problems import READING, SENDING, described
 from service.work.workers import Lane
@@ -60,18 +46,18 @@ _BODY = {
 async def post_run_file(
     request: Request,
     context: Ingester,
-    clutch_id: ClutchId,
-    kind: FileKind = None,
-    cycles: FileCycles = None,
-    rig: FileRig = None,
-    map: FileMap = None,  # noqa: A002
-    table: FileTable = "",
-    time: FileTime = "",
-    decimal: FileDecimal = "",
-    skip_rows: FileSkipRows = 0,
-    filename: FileName = "upload",
-    run_id: FileRunId = None,
-    started_at: FileStartedAt = None,
+    clutch_id: parameters.ClutchId,
+    kind: parameters.FileKind = None,
+    cycles: parameters.FileCycles = None,
+    rig: parameters.FileRig = None,
+    map: parameters.FileMap = None,  # noqa: A002
+    table: parameters.FileTable = "",
+    time: parameters.FileTime = "",
+    decimal: parameters.FileDecimal = "",
+    skip_rows: parameters.FileSkipRows = 0,
+    filename: parameters.FileName = "upload",
+    run_id: parameters.FileRunId = None,
+    started_at: parameters.FileStartedAt = None,
     origin: Origin = "measured",
 ) -> Response:
     """Post a run as CSV, XLSX, ODS, TDMS, MDF4, MATLAB, HDF5 or Parquet, plain, gzipped or in a ZIP archive.
@@ -113,14 +99,14 @@ _READING_FILE = READING | {
 
 
 @router.get("/{run_id}/file", response_class=Response, responses=_READING_FILE)
-async def read_run_file(request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId) -> Response:
+async def read_run_file(of: Of, run_id: parameters.RunId) -> Response:
     """The file that a run was read from, as it was sent."""
-    sha256 = await run_in_threadpool(file_sha256, context.database, clutch_id, run_id)
+    sha256 = await run_in_threadpool(file_sha256, of.database, of.clutch_id, run_id)
     headers = {"Cache-Control": "no-cache", "ETag": f'"{sha256}"', "Content-Disposition": "attachment"}
-    if held := unchanged(request, headers):
+    if held := unchanged(of.request, headers):
         return held
-    with tempfile.TemporaryDirectory(dir=context.folder) as folder:
+    with tempfile.TemporaryDirectory(dir=of.context.folder) as folder:
         path = Path(folder) / "file"
-        await asyncio.wrap_future(context.workers.submit(Lane.RECORDS, copy_file, clutch_id, run_id, path))
+        await asyncio.wrap_future(of.context.workers.submit(Lane.RECORDS, copy_file, of.clutch_id, run_id, path))
         body = path.open("rb")  # its name goes with the folder, its content when it is closed
     return streamed(body, _FILE_TYPE, headers)

@@ -9,18 +9,15 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.errors import TooLargeError, UnsupportedMediaTypeError
-from service.lists import from_cursor, page
+from service.lists import page
 from service.queries import inspections
-from service.queries.cache import to_json
 from service.run_files.json_run import checked
 from service.schemas.inspection import InspectionIn, InspectionOut, InspectionPage, MediaType, PhotographOut
 from service.schemas.limits import MAX_PHOTOGRAPH_BYTES
 from service.schemas.parameters import ClutchId, InspectionId, PhotographId
 from service.schemas.run import Withdrawal
-from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, unchanged
-from service.web.auth import Admin, Ingester, Reader, name_of_caller
-from service.web.context import Context, Cursor, Limit
-from service.web.limits import USUAL_ITEMS
+from service.web import answers
+from service.web.auth import Ingester, Reader, name_of_caller
 from service.web.problems import CHANGING, READING, SENDING
 from service.workflows import inspect_clutch
 
@@ -59,58 +56,50 @@ EXAMPLE = {
     response_model=InspectionOut,
     responses=SENDING
     | {200: {"model": InspectionOut, "description": "The same inspection again; withdrawn where its `state` says so"}},
-    openapi_extra=described_body(InspectionIn, EXAMPLE),
+    openapi_extra=answers.described_body(InspectionIn, EXAMPLE),
 )
 async def post_inspection(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Post what was found on the friction surface after so many cycles: roughness R_a, skewness R_sk, a note."""
-    sent = checked(InspectionIn, await json_body(request))
+    sent = checked(InspectionIn, await answers.json_body(request))
     store = partial(inspect_clutch.inspect, context.database, clutch_id, sent)
-    inspection, new = await run_in_threadpool(store, by=name_of_caller(request), at=now())
+    inspection, new = await run_in_threadpool(store, by=name_of_caller(request), at=answers.now())
     address = f"/v1/clutches/{clutch_id}/inspections/{inspection['inspection_id']}"
-    return _stored(inspection, address, new=new)
+    return answers.json_answer(inspection, 201 if new else 200, Location=address)
 
 
 @router.get("", response_model=InspectionPage, responses=READING)
-async def list_inspections(
-    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
-) -> Response:
+async def list_inspections(of: answers.PageOf) -> Response:
     """Inspections by cycles."""
-    after = from_cursor(cursor)
-    return await answer(request, lambda: page(*inspections.page(context.database, clutch_id, limit=limit, after=after)))
+    make = partial(inspections.page, of.database, of.clutch_id, limit=of.limit, after=of.after)
+    return await answers.answer(of.request, lambda: page(*make()))
 
 
 @router.get("/{inspection_id}", response_model=InspectionOut, responses=READING)
-async def read_inspection(
-    request: Request, context: Reader, clutch_id: ClutchId, inspection_id: InspectionId
-) -> Response:
+async def read_inspection(of: answers.Of, inspection_id: InspectionId) -> Response:
     """One inspection."""
-    return await answer(request, lambda: inspections.look_up(context.database, clutch_id, inspection_id))
+    return await answers.answer(of.request, partial(inspections.look_up, of.database, of.clutch_id, inspection_id))
 
 
 @router.post(
     "/{inspection_id}/withdraw",
     response_model=InspectionOut,
     responses=CHANGING,
-    openapi_extra=described_body(Withdrawal, {"reason": "it was the disc of the bench beside it"}),
+    openapi_extra=answers.described_body(Withdrawal, {"reason": "it was the disc of the bench beside it"}),
 )
-async def withdraw_inspection(
-    request: Request, context: Admin, clutch_id: ClutchId, inspection_id: InspectionId
-) -> Response:
+async def withdraw_inspection(of: answers.ChangeOf, inspection_id: InspectionId) -> Response:
     """Withdraw an inspection. It stays stored and listed, with its photographs."""
-    return await _changed(inspect_clutch.withdraw, request, context, clutch_id, inspection_id)
+    return await _changed(inspect_clutch.withdraw, of, inspection_id)
 
 
 @router.post(
     "/{inspection_id}/restore",
     response_model=InspectionOut,
     responses=CHANGING,
-    openapi_extra=described_body(Withdrawal, {"reason": "it was this disc after all"}),
+    openapi_extra=answers.described_body(Withdrawal, {"reason": "it was this disc after all"}),
 )
-async def restore_inspection(
-    request: Request, context: Admin, clutch_id: ClutchId, inspection_id: InspectionId
-) -> Response:
+async def restore_inspection(of: answers.ChangeOf, inspection_id: InspectionId) -> Response:
     """Take a withdrawal back."""
-    return await _changed(inspect_clutch.restore, request, context, clutch_id, inspection_id)
+    return await _changed(inspect_clutch.restore, of, inspection_id)
 
 
 @router.post(
@@ -126,9 +115,9 @@ async def post_photograph(
     """Add a photograph to an inspection: the file itself as the body, PNG, JPEG or WebP, 16 MiB at most."""
     media_type = _media_type(request)
     add = partial(inspect_clutch.add_photograph, context.database, clutch_id, inspection_id, await _file(request))
-    photograph, new = await run_in_threadpool(add, media_type, by=name_of_caller(request), at=now())
+    photograph, new = await run_in_threadpool(add, media_type, by=name_of_caller(request), at=answers.now())
     address = f"/v1/clutches/{clutch_id}/inspections/{inspection_id}/photographs/{photograph['photograph_id']}"
-    return _stored(photograph, address, new=new)
+    return answers.json_answer(photograph, 201 if new else 200, Location=address)
 
 
 @router.get("/{inspection_id}/photographs/{photograph_id}", response_class=Response, responses=_READING_FILE)
@@ -139,7 +128,7 @@ async def read_photograph(
     wanted = (context.database, clutch_id, inspection_id, photograph_id)
     media_type = await run_in_threadpool(inspections.media_type, *wanted)
     headers = _OF_A_FILE | {"ETag": f'"{photograph_id}"'}
-    if held := unchanged(request, headers):
+    if held := answers.unchanged(request, headers):
         return held
     content = await run_in_threadpool(inspections.photograph, *wanted)
     return Response(content=content, media_type=media_type, headers=headers)
@@ -163,16 +152,8 @@ async def _file(request: Request) -> bytes:
     return bytes(content)
 
 
-def _stored(stored: dict[str, Any], address: str, *, new: bool) -> Response:
-    status = 201 if new else 200
-    return Response(content=to_json(stored), status_code=status, media_type=JSON_TYPE, headers={"Location": address})
-
-
-async def _changed(
-    change: Callable[..., dict[str, Any]], request: Request, context: Context, clutch_id: str, inspection_id: str
-) -> Response:
+async def _changed(change: Callable[..., dict[str, Any]], of: answers.OfClutch, inspection_id: str) -> Response:
     """The inspection after a change."""
-    wanted = checked(Withdrawal, await json_body(request))
-    made = partial(change, reason=wanted.reason, by=name_of_caller(request), at=now())
-    inspection = await run_in_threadpool(made, context.database, clutch_id, inspection_id)
-    return Response(content=to_json(inspection), media_type=JSON_TYPE)
+    wanted = checked(Withdrawal, await answers.json_body(of.request))
+    made = partial(change, reason=wanted.reason, by=name_of_caller(of.request), at=answers.now())
+    return answers.json_answer(await run_in_threadpool(made, of.database, of.clutch_id, inspection_id))

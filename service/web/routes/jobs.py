@@ -10,11 +10,10 @@ from fastapi.responses import Response
 from service.lists import from_cursor, page
 from service.logging import request_id
 from service.queries import jobs
-from service.queries.cache import to_json
 from service.run_files.json_run import checked
 from service.schemas.diagnosis import JobIn, JobOut, JobPage
 from service.schemas.parameters import JobId, OfState
-from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait, until_ended
+from service.web.answers import answer, described_body, json_answer, json_body, now, preferred_wait, until_ended
 from service.web.auth import OwnAdmin, OwnReader, name_of_caller, own_clutches, require_clutch
 from service.web.context import Cursor, Limit
 from service.web.limits import USUAL_ITEMS
@@ -57,7 +56,7 @@ async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -
     if wait is not None:
         headers["Preference-Applied"] = f"wait={wait}"
     status = 202 if row.state in OPEN else 200
-    return Response(content=to_json(jobs.shown(row)), status_code=status, media_type=JSON_TYPE, headers=headers)
+    return json_answer(jobs.shown(row), status, **headers)
 
 
 @router.get("", response_model=JobPage, responses=READING)
@@ -82,5 +81,4 @@ async def delete_job(request: Request, context: OwnAdmin, job_id: JobId) -> Resp
     """Cancel a job: one that waits is not begun, one that runs is ended in seconds. One that has ended stays as it is."""
     row = await run_in_threadpool(jobs.find, context.database, job_id, only=own_clutches(request))
     cancel = partial(cancel_job.cancel, context.database, row, by=name_of_caller(request), at=now())
-    cancelled = await run_in_threadpool(cancel)
-    return Response(content=to_json(jobs.shown(cancelled)), media_type=JSON_TYPE)
+    return json_answer(jobs.shown(await run_in_threadpool(cancel)))

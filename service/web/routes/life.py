@@ -1,11 +1,12 @@
 """Remaining useful life, degradation, Stribeck curves, loops and flat series."""
 
 import asyncio
+from dataclasses import replace
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter
 from fastapi.responses import Response
 
-from service.lists import ALL_ITEMS, from_cursor, paged
+from service.lists import ALL_ITEMS, paged
 from service.lives.tracks import CARRIED
 from service.queries import runs, scores
 from service.queries import series as series_query
@@ -23,11 +24,9 @@ from service.schemas.degradation import Degradation, Surfaces
 from service.schemas.engagement import EngagementOut
 from service.schemas.fleet import Scores
 from service.schemas.life import Method, PlannedLife, ProgrammeIn, RemainingLife
-from service.schemas.parameters import ClutchId, Draws, EngagementRun, LifeNumber, Quantity, TrackedQuantity
-from service.web.answers import JSON_TYPE, clutch_answer, clutch_bytes, computed_answer, described_body, json_body
-from service.web.auth import Reader
-from service.web.context import AtCycles, Cursor, Limit, Prefer, PressureBar, Whole
-from service.web.limits import USUAL_ITEMS
+from service.schemas.parameters import Draws, EngagementRun, LifeNumber, Quantity, TrackedQuantity
+from service.web import answers
+from service.web.context import AtCycles, Prefer, PressureBar
 from service.web.problems import CHANGING, READING
 from service.work.workers import Lane
 
@@ -36,9 +35,7 @@ router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["remaining life"])
 
 @router.get("/remaining-useful-life", response_model=RemainingLife, responses=READING)
 async def remaining_useful_life(
-    request: Request,
-    context: Reader,
-    clutch_id: ClutchId,
+    of: answers.Of,
     method: Method = "particle",
     pressure_bar: PressureBar = None,
     at_cycles: AtCycles = None,
@@ -51,26 +48,24 @@ async def remaining_useful_life(
 
     That is mean COF, which has fallen to a fraction, unless the clutch's record names others.
     """
-    own = await clutch_bytes(request, context, clutch_id, "criteria", lambda: criteria_of(context.database, clutch_id))
+    own = await answers.clutch_bytes(of, "criteria", lambda: criteria_of(of.database, of.clutch_id))
     if own != NO_CRITERIA or (quantity, criterion, life) != (None, None, None):
         arguments = (method, pressure_bar, at_cycles, quantity, criterion, life)
-        return await computed_answer(request, context, clutch_id, life_by_criteria, *arguments, prefer=prefer)
+        return await answers.computed_answer(of, life_by_criteria, *arguments, prefer=prefer)
     if method not in CARRIED or pressure_bar is not None:
-        return await computed_answer(
-            request, context, clutch_id, remaining_life, method, pressure_bar, at_cycles, prefer=prefer
-        )
+        return await answers.computed_answer(of, remaining_life, method, pressure_bar, at_cycles, prefer=prefer)
 
     def make() -> bytes:
-        return to_json(remaining_life(context.database, clutch_id, method, pressure_bar, at_cycles))
+        return to_json(remaining_life(of.database, of.clutch_id, method, pressure_bar, at_cycles))
 
-    return await clutch_answer(request, context, clutch_id, "remaining-useful-life", make, method, at_cycles)
+    return await answers.clutch_answer(of, "remaining-useful-life", make, method, at_cycles)
 
 
 @router.post(
     "/remaining-useful-life/forecast",
     response_model=PlannedLife,
     responses=CHANGING,
-    openapi_extra=described_body(
+    openapi_extra=answers.described_body(
         ProgrammeIn,
         {
             "programme": [
@@ -81,27 +76,21 @@ async def remaining_useful_life(
         },
     ),
 )
-async def planned_remaining_life(
-    request: Request, context: Reader, clutch_id: ClutchId, method: Method = "particle"
-) -> Response:
+async def planned_remaining_life(of: answers.Of, method: Method = "particle") -> Response:
     """The same under planned duty: blocks that are run one after the other, over and over. Nothing is stored."""
-    planned = checked(ProgrammeIn, await json_body(request))
-    answer = context.workers.submit(Lane.SIMULATIONS, planned_life, clutch_id, method, planned)
-    return Response(content=to_json(await asyncio.wrap_future(answer)), media_type=JSON_TYPE)
+    planned = checked(ProgrammeIn, await answers.json_body(of.request))
+    answer = of.context.workers.submit(Lane.SIMULATIONS, planned_life, of.clutch_id, method, planned)
+    return answers.json_answer(await asyncio.wrap_future(answer))
 
 
 @router.get("/degradation", response_model=Degradation, responses=READING)
 async def degradation(
-    request: Request,
-    context: Reader,
-    clutch_id: ClutchId,
+    of: answers.WholeOf,
     method: Method = "grid",
     quantity: TrackedQuantity = None,
     at_cycles: AtCycles = None,
     life: LifeNumber = None,
     draws: Draws = 0,
-    limit: Whole = ALL_ITEMS,
-    cursor: Cursor = None,
     prefer: Prefer = None,
 ) -> Response:
     """Tracks along a life by any filter: coefficients of eq. 6, measurements, trajectory with its 90 % band.
@@ -109,90 +98,52 @@ async def degradation(
     Of one quantity wherever it was measured, or of mean COF and every Stribeck parameter.
     """
     arguments = degradation_arguments(method, quantity, at_cycles, life, draws)
-    return await computed_answer(
-        request, context, clutch_id, degradation_of, *arguments, limit=limit, cursor=cursor, prefer=prefer
-    )
+    return await answers.computed_answer(of, degradation_of, *arguments, prefer=prefer)
 
 
 @router.get("/stribeck", response_model=StribeckPage, responses=READING)
-async def stribeck(
-    request: Request,
-    context: Reader,
-    clutch_id: ClutchId,
-    limit: Limit = USUAL_ITEMS,
-    cursor: Cursor = None,
-    prefer: Prefer = None,
-) -> Response:
+async def stribeck(of: answers.PageOf, prefer: Prefer = None) -> Response:
     """The Stribeck curves of the stationary tests by cycles, and the pressure laws through them (fig. 9)."""
-    return await computed_answer(
-        request, context, clutch_id, stribeck_query.curves, limit, from_cursor(cursor), prefer=prefer
-    )
+    whole = replace(of, limit=ALL_ITEMS, after=None)  # the query makes the page
+    return await answers.computed_answer(whole, stribeck_query.curves, of.limit, of.after, prefer=prefer)
 
 
 @router.get("/engagement", response_model=EngagementOut, responses=READING)
 async def engagement(
-    request: Request,
-    context: Reader,
-    clutch_id: ClutchId,
-    at_cycles: AtCycles = None,
-    run_id: EngagementRun = None,
-    prefer: Prefer = None,
+    of: answers.Of, at_cycles: AtCycles = None, run_id: EngagementRun = None, prefer: Prefer = None
 ) -> Response:
     """A simulated engagement of the tracked clutch (fig. 3's pressure against the motor's 20 Nm), the indicators of measured
     ones, and one of these beside what the tracked model gives for its pressure and drive."""
-    return await computed_answer(
-        request, context, clutch_id, engaged, at_cycles, run_id, prefer=prefer, lane=Lane.SIMULATIONS
-    )
+    return await answers.computed_answer(of, engaged, at_cycles, run_id, prefer=prefer, lane=Lane.SIMULATIONS)
 
 
 @router.get("/surfaces", response_model=Surfaces, responses=READING)
-async def surfaces(request: Request, context: Reader, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
+async def surfaces(of: answers.Of, prefer: Prefer = None) -> Response:
     """The tracked Stribeck parameters over pressure and cycles (figs. 10, 11), and torque over speed besides."""
-    return await computed_answer(request, context, clutch_id, surface, prefer=prefer)
+    return await answers.computed_answer(of, surface, prefer=prefer)
 
 
 @router.get("/scores", response_model=Scores, responses=READING)
-async def clutch_scores(
-    request: Request,
-    context: Reader,
-    clutch_id: ClutchId,
-    method: Method = "particle",
-    limit: Whole = ALL_ITEMS,
-    cursor: Cursor = None,
-    prefer: Prefer = None,
-) -> Response:
+async def clutch_scores(of: answers.WholeOf, method: Method = "particle", prefer: Prefer = None) -> Response:
     """How right the predictions were of those of its lives that came to their end."""
-    return await computed_answer(
-        request, context, clutch_id, scores.of_clutch, method, limit=limit, cursor=cursor, prefer=prefer
-    )
+    return await answers.computed_answer(of, scores.of_clutch, method, prefer=prefer)
 
 
 @router.get("/loops", response_model=LoopPage, responses=READING)
-async def loops(
-    request: Request, context: Reader, clutch_id: ClutchId, limit: Whole = ALL_ITEMS, cursor: Cursor = None
-) -> Response:
+async def loops(of: answers.WholeOf) -> Response:
     """Friction loops of the dynamic tests by cycles and pressure."""
-    after = from_cursor(cursor)
 
     def make() -> bytes:
-        return to_json(paged(runs.loops(context.database, clutch_id), limit, after))
+        return to_json(paged(runs.loops(of.database, of.clutch_id), of.limit, of.after))
 
-    return await clutch_answer(request, context, clutch_id, "loops", make, limit, after)
+    return await answers.clutch_answer(of, "loops", make, of.limit, of.after)
 
 
 @router.get("/series", response_model=SeriesPage, responses=READING)
-async def series(
-    request: Request,
-    context: Reader,
-    clutch_id: ClutchId,
-    quantity: Quantity = None,
-    limit: Whole = ALL_ITEMS,
-    cursor: Cursor = None,
-) -> Response:
+async def series(of: answers.WholeOf, quantity: Quantity = None) -> Response:
     """Flat rows for dashboards and spreadsheets: fitted quantities, indicators of engagements, then predictions."""
-    after = from_cursor(cursor)
 
     def make() -> bytes:
-        return to_json(paged(series_query.series(context.database, clutch_id, quantity), limit, after))
+        return to_json(paged(series_query.series(of.database, of.clutch_id, quantity), of.limit, of.after))
 
-    return await clutch_answer(request, context, clutch_id, "series", make, quantity, limit, after)
+    return await answers.clutch_answer(of, "series", make, quantity, of.limit, of.after)

@@ -12,13 +12,12 @@ from fastapi.responses import Response
 from service.errors import FieldError, InvalidError
 from service.lists import from_cursor
 from service.queries import rigs
-from service.queries.cache import to_json
 from service.queries.import_preview import preview
 from service.run_files.json_run import checked
 from service.run_files.rig_profile import require_usable
 from service.schemas.parameters import FileCycles, FileKind, FileName, FileRig, OfClutch, RigName
 from service.schemas.rig import Preview, RigIn, RigOut, RigPage
-from service.web.answers import JSON_TYPE, answer, described_body, json_body, now
+from service.web.answers import answer, described_body, json_answer, json_body, now
 from service.web.auth import Admin, Ingester, OwnIngester, OwnReader, name_of_caller, require_clutch
 from service.web.context import Context, Cursor, Limit
 from service.web.files import received
@@ -99,9 +98,7 @@ async def _saved(request: Request, context: Context, name: str | None) -> Respon
     replacing = name is not None
     made = partial(save, context.database, rig, by=name_of_caller(request), at=now(), replacing=replacing)
     saved, new = await run_in_threadpool(made)
-    headers = {"Location": f"/v1/rigs/{saved.name}"}
-    content = to_json(saved.model_dump(mode="json"))
-    return Response(content=content, status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+    return json_answer(saved.model_dump(mode="json"), 201 if new else 200, Location=f"/v1/rigs/{saved.name}")
 
 
 @import_router.post("/preview", response_model=Preview, responses=CHANGING, openapi_extra=_BODY)
@@ -126,4 +123,4 @@ async def preview_file(
             preview, filename=filename, rig=rig, profile=profile, kind=kind, cycles=cycles, clutch_id=clutch_id
         )
         shown = await asyncio.wrap_future(context.workers.submit(Lane.FILES, made, path))
-    return Response(content=to_json(shown), media_type=JSON_TYPE)
+    return json_answer(shown)

@@ -12,17 +12,15 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.errors import NotAcceptableError, NotFoundError
-from service.lists import from_cursor
 from service.queries import runs
 from service.queries.raw_run import Kind, entity_tag, write_run
 from service.run_files.json_run import checked, read_run, read_run_on_disk
 from service.schemas.parameters import ClutchId, Points, RunId, RunKind, State
 from service.schemas.run import RUN_IN, Confirmation, Correction, Receipt, RunOut, RunPage, Withdrawal
-from service.web.answers import JSON_TYPE, clutch_answer, described_body, json_body, now, require_json, unchanged
-from service.web.auth import Admin, Ingester, Reader, name_of_caller
-from service.web.context import Context, Cursor, Limit
+from service.web import answers
+from service.web.auth import Ingester, Reader, name_of_caller
 from service.web.files import PARQUET_TYPE, kept_body, preferred, streamed
-from service.web.limits import LARGE_BODY_BYTES, USUAL_ITEMS
+from service.web.limits import LARGE_BODY_BYTES
 from service.web.problems import CHANGING, READING, SENDING, described
 from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import change_run
@@ -55,11 +53,11 @@ EXAMPLE = {
     status_code=201,
     response_model=Receipt,
     responses=SENDING | {200: {"model": Receipt, "description": "The same run again: the same receipt"}},
-    openapi_extra=described_body(RUN_IN.json_schema(), EXAMPLE),
+    openapi_extra=answers.described_body(RUN_IN.json_schema(), EXAMPLE),
 )
 async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Post a run, in any order of cycles. The receipt says what was made of it; by then it is stored for good."""
-    require_json(request)
+    answers.require_json(request)
     by = name_of_caller(request)
     async with kept_body(request, context.folder) as body:
         is_short = isinstance(body, bytes) and len(body) <= LARGE_BODY_BYTES
@@ -68,32 +66,25 @@ async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> 
             ingest_posted,
             clutch_id,
             partial(read_run, body) if isinstance(body, bytes) else partial(read_run_on_disk, body),
-            now(),
+            answers.now(),
             by,
             turn=clutch_id,
         )
         receipt, new = await asyncio.wrap_future(taken_in)
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
-    return Response(content=to_text(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+    return Response(
+        content=to_text(receipt), status_code=201 if new else 200, media_type=answers.JSON_TYPE, headers=headers
+    )
 
 
 @router.get("", response_model=RunPage, responses=READING)
-async def list_runs(
-    request: Request,
-    context: Reader,
-    clutch_id: ClutchId,
-    state: State = None,
-    kind: RunKind = None,
-    limit: Limit = USUAL_ITEMS,
-    cursor: Cursor = None,
-) -> Response:
+async def list_runs(of: answers.PageOf, state: State = None, kind: RunKind = None) -> Response:
     """Receipts by cycles."""
-    after = from_cursor(cursor)
 
     def make() -> bytes:
-        return runs.page_as_json(context.database, clutch_id, limit=limit, after=after, state=state, kind=kind)
+        return runs.page_as_json(of.database, of.clutch_id, limit=of.limit, after=of.after, state=state, kind=kind)
 
-    return await clutch_answer(request, context, clutch_id, "runs", make, state, kind, limit, after)
+    return await answers.clutch_answer(of, "runs", make, state, kind, of.limit, of.after)
 
 
 @router.get("/{run_id}", response_model=RunOut, responses=READING_RUN)
@@ -101,7 +92,7 @@ async def read_run_with_channels(
     request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId, points: Points = None
 ) -> Response:
     """One receipt with the run's channels: as they were sent or thinned for a plot, as Parquet where `Accept` prefers it."""
-    media_type = preferred(request, (JSON_TYPE, PARQUET_TYPE))
+    media_type = preferred(request, (answers.JSON_TYPE, PARQUET_TYPE))
     kind: Kind = "parquet" if media_type == PARQUET_TYPE else "json"
     packed = kind == "json" and points is not None and "gzip" in request.headers.get("accept-encoding", "")
     headers = {"Cache-Control": "no-cache", "Vary": "Accept, Accept-Encoding"}
@@ -109,7 +100,7 @@ async def read_run_with_channels(
     headers["ETag"] = await run_in_threadpool(
         entity_tag, context.database, clutch_id, run_id, points=points, kind=kind, compressed=packed
     )
-    if held := unchanged(request, headers):
+    if held := answers.unchanged(request, headers):
         return held
     with tempfile.TemporaryDirectory(dir=context.folder) as folder:
         path = Path(folder) / "body"
@@ -123,65 +114,59 @@ async def read_run_with_channels(
     "/{run_id}",
     response_model=Receipt,
     responses=CHANGING,
-    openapi_extra=described_body(Correction, {"cycles": 7000, "reason": "typed a zero too many"}),
+    openapi_extra=answers.described_body(Correction, {"cycles": 7000, "reason": "typed a zero too many"}),
 )
-async def correct_run(request: Request, context: Admin, clutch_id: ClutchId, run_id: RunId) -> Response:
+async def correct_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     """Correct a run's cycles, or read its file again by a rig's profile; it counts where it is plausible so. What was sent
     stays stored."""
-    wanted = checked(Correction, await json_body(request))
+    wanted = checked(Correction, await answers.json_body(of.request))
     if wanted.rig is not None:
-        again = partial(change_run.read_again, rig=wanted.rig, folder=context.folder)
-        return await _changed(again, request, context, clutch_id, run_id, reason=wanted.reason)
-    return await _changed(
-        change_run.correct, request, context, clutch_id, run_id, cycles=wanted.cycles, reason=wanted.reason
-    )
+        again = partial(change_run.read_again, rig=wanted.rig, folder=of.context.folder)
+        return await _changed(again, of, run_id, wanted.reason)
+    return await _changed(change_run.correct, of, run_id, wanted.reason, cycles=wanted.cycles)
 
 
 @router.post(
     "/{run_id}/withdraw",
     response_model=Receipt,
     responses=CHANGING,
-    openapi_extra=described_body(Withdrawal, {"reason": "the torque sensor was unplugged"}),
+    openapi_extra=answers.described_body(Withdrawal, {"reason": "the torque sensor was unplugged"}),
 )
-async def withdraw_run(request: Request, context: Admin, clutch_id: ClutchId, run_id: RunId) -> Response:
+async def withdraw_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     """Take a run out of the clutch's history. It stays stored and listed."""
-    wanted = checked(Withdrawal, await json_body(request))
-    return await _changed(change_run.withdraw, request, context, clutch_id, run_id, reason=wanted.reason)
+    reason = checked(Withdrawal, await answers.json_body(of.request)).reason
+    return await _changed(change_run.withdraw, of, run_id, reason)
 
 
 @router.post(
     "/{run_id}/restore",
     response_model=Receipt,
     responses=CHANGING,
-    openapi_extra=described_body(Withdrawal, {"reason": "it was the other sensor"}),
+    openapi_extra=answers.described_body(Withdrawal, {"reason": "it was the other sensor"}),
 )
-async def restore_run(request: Request, context: Admin, clutch_id: ClutchId, run_id: RunId) -> Response:
+async def restore_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     """Take a withdrawal back: the run is accepted or held as it was before."""
-    wanted = checked(Withdrawal, await json_body(request))
-    return await _changed(change_run.restore, request, context, clutch_id, run_id, reason=wanted.reason)
+    reason = checked(Withdrawal, await answers.json_body(of.request)).reason
+    return await _changed(change_run.restore, of, run_id, reason)
 
 
 @router.post(
     "/{run_id}/confirm",
     response_model=Receipt,
     responses=CHANGING,
-    openapi_extra=described_body(Confirmation, {"reason": "the clutch was run over the weekend"}),
+    openapi_extra=answers.described_body(Confirmation, {"reason": "the clutch was run over the weekend"}),
 )
-async def confirm_run(request: Request, context: Admin, clutch_id: ClutchId, run_id: RunId) -> Response:
+async def confirm_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     """Accept a held run as it was sent."""
-    wanted = checked(Confirmation, await json_body(request))
-    return await _changed(change_run.confirm, request, context, clutch_id, run_id, reason=wanted.reason)
+    reason = checked(Confirmation, await answers.json_body(of.request)).reason
+    return await _changed(change_run.confirm, of, run_id, reason)
 
 
 async def _changed(
-    change: Callable[..., dict[str, Any]],
-    request: Request,
-    context: Context,
-    clutch_id: str,
-    run_id: str,
-    **wanted: Any,
+    change: Callable[..., dict[str, Any]], of: answers.OfClutch, run_id: str, reason: str, **more: Any
 ) -> Response:
     """The receipt after a change."""
-    made = partial(change, **wanted, by=name_of_caller(request), at=now())
-    changing = context.workers.submit(Lane.RUNS, made, clutch_id, run_id, turn=clutch_id, seconds=CHANGE_SECONDS)
-    return Response(content=to_text(await asyncio.wrap_future(changing)), media_type=JSON_TYPE)
+    made = partial(change, reason=reason, **more, by=name_of_caller(of.request), at=answers.now())
+    clutch_id, submit = of.clutch_id, of.context.workers.submit
+    changing = submit(Lane.RUNS, made, clutch_id, run_id, turn=clutch_id, seconds=CHANGE_SECONDS)
+    return Response(content=to_text(await asyncio.wrap_future(changing)), media_type=answers.JSON_TYPE)
