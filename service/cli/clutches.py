@@ -11,7 +11,7 @@ import typer
 
 from service.cli.connection import asking, listed
 from service.cli.options import EX_USAGE, URL, ClutchId, Json, Key, Patience, Reason, Url, err, fail, out, print_line
-from service.cli.tables import cycles, show_table
+from service.cli.tables import cycles, number, show_table
 from service.client.clutchlife import Client, ClutchlifeError
 from service.client.clutchlife.transport import Service
 
@@ -63,10 +63,13 @@ def list_clutches(
 
 
 def _row(item: dict[str, Any]) -> list[str]:
-    summary = item["summary"] or {"as_of_cycles": None, "at_least": None, "remaining_cycles": {"0.5": None}}
-    numbers = (summary["as_of_cycles"], summary["at_least"], summary["remaining_cycles"]["0.5"])
     held = str(item["held"]) if item["held"] else ""
-    return [item["clutch_id"], item["state"]["name"].replace("_", " "), *map(cycles, numbers), held]
+    summary, numbers = item["summary"], ["-", "-", "-"]
+    if summary:
+        numbers = [number(summary["as_of_cycles"]), number(summary["at_least"]), "-"]
+        if summary["status"] != "insufficient_data":
+            numbers[2] = cycles(summary["remaining_cycles"]["0.5"])
+    return [item["clutch_id"], item["state"]["name"].replace("_", " "), *numbers, held]
 
 
 def status(clutch: ClutchId, as_json: Json = False, url: Url = URL, key: Key = None, patience: Patience = 10.0) -> None:

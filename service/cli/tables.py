@@ -4,9 +4,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from models.prognosis.criteria import HORIZON
 from service.cli.options import out, print_line
 
-BEYOND_HORIZON = "beyond the horizon"
+BEYOND_HORIZON = f"over {HORIZON:,.0f}"
 UNKNOWN = "unknown"
 
 
@@ -45,7 +46,7 @@ def coefficient(value: float, deviation: float) -> str:
 
 
 def cycles(value: float | None) -> str:
-    """Duty cycles in whole numbers; a quantile that is null lies beyond the horizon."""
+    """Duty cycles in whole numbers; one that is null lies beyond the horizon, up to which ends are predicted."""
     return BEYOND_HORIZON if value is None else f"{value:,.0f}"
 
 

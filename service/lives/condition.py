@@ -31,7 +31,7 @@ STATE_WORDS = dict(
     zip(STATES, ("Failure", "Maintenance required", "Function check", "Out of specification", "Normal"), strict=True)
 )
 #: Verdicts by which data and model disagree.
-DISAGREES = ("cause_named", "cause_ambiguous", "unexplained_structure")
+DISAGREES = NAMED, AMBIGUOUS, _ = ("cause_named", "cause_ambiguous", "unexplained_structure")
 #: What of a prediction is stored with a clutch.
 SUMMARY = (
     "status",
@@ -128,7 +128,7 @@ def _interval_in_words(remaining: Mapping[str, float | None]) -> str:
     low, median, high = (remaining[quantile] for quantile in ("0.05", "0.5", "0.95"))
     if median is None:
         return "an unknown number of" if low is None else f"at least {low:,.0f}"
-    upper = "beyond the horizon" if high is None else f"{high:,.0f}"
+    upper = f"over {HORIZON:,.0f}" if high is None else f"{high:,.0f}"
     return f"{median:,.0f} (90 %: {low:,.0f} to {upper})"
 
 
@@ -187,15 +187,25 @@ def top_line(
     at_least = lower_bound(summary["at_least"], among)
     at = _at_pace(summary, at_least)
     date = None if at is None else _day_in_words(at)
-    says = _numbers_in_words(summary, at_least, date)
+    says = _numbers_in_words(summary, among, at_least, date)
     return {
         "headline": f"{words}: {reason}; {says}" if reason else f"{words}: {says}",
         "action": _action(name, summary, date, diagnosis),
     }
 
 
-def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, date: str | None) -> str:
-    """The safe bound, its date and the median; else the statement, where there is no number to give."""
+def _numbers_in_words(
+    summary: Mapping[str, Any], among: Mapping[str, Any] | None, at_least: float | None, date: str | None
+) -> str:
+    """The safe bound, its date and the median; else the statement, where there is no number to give.
+
+    `among`: the prediction with the held runs; where they lower the bound, both are said."""
+    own = summary["at_least"]
+    if own is not None and own >= 1.0 and among is not None and at_least is not None and at_least < own:
+        runs = "the held run" if summary.get("held") == 1 else "the held runs"
+        if at_least < 1.0:
+            return f"with {runs} no cycles are left for certain, without at least {rounded_down(own)} (95 %)"
+        return f"at least {rounded_down(at_least)} more cycles (95 %), without {runs} {rounded_down(own)}"
     if summary["status"] in (REACHED, INSUFFICIENT, ENDED) or at_least is None or at_least < 1.0:
         return statement_of(summary, at_least)
     bound = f"at least {rounded_down(at_least)} more cycles (95 %)"
@@ -218,15 +228,16 @@ def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: 
         return "See why the rig sends nothing."
     if name == CHECK:
         missing = FEWEST_TESTS - summary.get("runs_used", 0)
-        tests = "one more stationary test" if missing == 1 else f"{missing} stationary tests at different cycles"
-        return f"Run {tests}: a prognosis needs {FEWEST_TESTS}."
+        tests = "one more stationary test" if missing == 1 else f"{missing} more stationary tests, at different cycles"
+        return f"Run {tests}: then the remaining life is predicted."
     if name == NORMAL or diagnosis is None:
         return "Its life has ended: nothing to do." if summary.get("ended") else "Nothing to do: carry on testing."
     causes = [_cause_in_words(cause) for cause in diagnosis["causes"]]
-    if diagnosis["adoptable"]:
+    if diagnosis["adoptable"] and diagnosis["verdict"] == NAMED:
         return f"Adopt the model with {' and '.join(causes)}: it explains where data and model disagree."
     if (advice := diagnosis["advice"]) is not None:
-        return f"Run a {advice['test'].removeprefix('the ')}: {_decides(advice['separates'])}."
+        unclear = "The cause is not clear yet. " if diagnosis["verdict"] == AMBIGUOUS else ""
+        return f"{unclear}Run a {advice['test'].removeprefix('the ')}: {_decides(advice['separates'])}."
     return "Read the diagnosis before you rely on the forecast."
 
 
@@ -280,14 +291,14 @@ def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
 def _left_open(bound: str, payload: Mapping[str, Any]) -> str:
     """An interval that reaches the horizon: its safe bound is the number that counts, and how probable an end is."""
     chance = chance_in_words(payload["probability_of_reaching"])
-    within = f"the end of life is reached within {HORIZON:,.0f} cycles with a probability of {chance}"
-    return f"the tests cannot tell yet: {bound}; {within}"
+    within = f"the end comes within {HORIZON:,.0f} with a probability of {chance}"
+    return f"{bound}; how many more, the tests cannot tell yet ({within})"
 
 
 def bound_in_words(at_least: float | None) -> str:
     """The safe bound of the remaining cycles, rounded down to two digits."""
     if at_least is None or at_least < 1.0:
-        return "nothing is certain of the cycles that are left"
+        return "no cycles are left for certain"
     return f"at least {rounded_down(at_least)} cycles are left with 95 %"
 
 
@@ -322,7 +333,7 @@ def chance_in_words(probability: float) -> str:
     """A probability in per cent, never rounded to certainty."""
     if probability > 0.995:
         return "more than 99 %"
-    return "less than 1 %" if probability < 0.005 else f"{100 * probability:.0f} %"
+    return "less than 1 %" if probability < 0.005 else f"{math.floor(100 * probability + 0.5)} %"
 
 
 def recent(events: Sequence[Event], series: Series) -> dict[str, Any]:

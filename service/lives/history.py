@@ -304,10 +304,10 @@ def require_within_ends(events: Sequence[Event]) -> None:
     beyond = beyond_end(events)
     if beyond is not None:
         end, event = beyond
-        later = "second end" if event.end else f"{event.kind} {event.run_id!r} at {event.cycles:g} cycles"
+        later = "a second end" if event.end else f"{event.kind} {event.run_id!r}"
         raise LifeEndedError(
-            f"a life that was declared ended at {end.cycles:g} cycles (run {end.run_id!r}) has no {later}: "
-            "post a rebuild, correct the cycles, or withdraw the declared end"
+            f"{later} at {event.cycles:g} cycles is after the declared end at {end.cycles:g} cycles (run {end.run_id!r}): "
+            "declare the end there or later, post a rebuild, correct the cycles, or withdraw the end"
         )
 
 

@@ -10,8 +10,10 @@ where `file`, `kind` and `cycles` are needed. Nothing outside the folder is read
 must not name other files of the machine, neither by a path nor by a link.
 """
 
+import itertools
 import json
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -85,14 +87,21 @@ def _in_folder(folder: Path) -> list[RunFile]:
 
 
 def unlisted(paths: Iterable[Path]) -> list[Path]:
-    """The record files in the folders among `paths` that no manifest lists: their kind and cycles are unknown."""
+    """The record files in the folders among `paths` that no manifest lists: their kind and cycles are unknown.
+
+    Those of a folder come by the numbers in their names, so that run-2000.csv is before run-10000.csv."""
     return [
         file
         for path in paths
         if path.is_dir()
-        for file in sorted(path.iterdir())
+        for file in sorted(path.iterdir(), key=_by_numbers)
         if _is_record(file) and file not in _listed(path)
     ]
+
+
+def _by_numbers(path: Path) -> list[tuple[str, int]]:
+    parts = re.split(r"(\d+)", path.name)
+    return [(text, int(digits or 0)) for text, digits in itertools.zip_longest(parts[::2], parts[1::2])]
 
 
 def _is_record(path: Path) -> bool:

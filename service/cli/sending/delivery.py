@@ -105,7 +105,7 @@ def _stays(spool: Spool, entry: Entry, sent: Sent, report: Report, reason: str) 
 def _refused(spool: Spool, entry: Entry, error: RefusedError, report: Report) -> None:
     aside = spool.refuse(entry, error.problem)
     place = "a newer version has replaced it" if aside is None else str(aside)
-    report(f"refused, {error}: {place}")
+    report(f"{entry.label} is refused, {error}; kept: {place}")
     if error.other_content:
         report(
             f"{entry.label}: the service holds other content under this run_id: it was corrected since, or the name is "

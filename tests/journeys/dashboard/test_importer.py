@@ -118,7 +118,7 @@ def test_the_importer_is_used_by_keyboard_and_passes_axe(watched: Watched) -> No
     dialog = page.get_by_role("dialog", name="Send a run")
     expect(dialog.get_by_label("Channel of M_z1")).to_be_visible()
     dialog.get_by_label("Channel of M_z1").focus()
-    page.keyboard.type("torque nm")
+    page.keyboard.type("torque, nm")
     expect(dialog.get_by_label("Unit of M_z1")).to_have_value("kNm")
     expect(dialog.get_by_label("Channel of M_z1")).to_be_focused()
     expect(dialog.get_by_label("Channel of M_z1")).to_have_value("torque_nm")

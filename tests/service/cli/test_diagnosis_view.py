@@ -40,7 +40,7 @@ def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
         "torque_zero_shift",
         "1.5 ± - Nm zero shift",
         "0.3 Nm before, 0.25 Nm after, 16.7 ± 2 % less",
-        "Remaining life, baseline: 12,346 cycles (90 %: 4,000 to beyond the horizon)",
+        "Remaining life, baseline: 12,346 cycles (90 %: 4,000 to over 1,000,000)",
         "Remaining life, extended: the end of life is reached",
         "The extended model is adopted",
         "read the unloaded zero (expected evidence: strong)",

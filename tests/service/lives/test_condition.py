@@ -166,7 +166,7 @@ def summary(left: float | None, **other: Any) -> dict[str, Any]:
         (summary(9000.0, status="may_never_reach", current={"health": 0.27}), False, "normal", "probability of 94 %"),
         (
             summary(9000.0, status="may_never_reach"), False, "normal",
-            "the tests cannot tell yet: at least 9,000 cycles are left with 95 %; ",
+            "at least 9,000 cycles are left with 95 %; how many more, the tests cannot tell yet (the end comes",
         ),
         ({}, False, "check", "no run yet"),
     ],
@@ -185,8 +185,9 @@ HELD = {"held": 1, "with_held": {"particle": {"status": "predicted", "at_least":
 
 def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool = False) -> dict[str, Any]:
     """A diagnosis as it goes out."""
+    verdict = {0: "unexplained_structure", 1: "cause_named"}.get(len(causes), "cause_ambiguous")
     advised = advice and {"test": "stationary test with the oil at 60 °C", "separates": advice}
-    return {"causes": causes, "advice": advised, "adoptable": adoptable}
+    return {"verdict": verdict, "causes": causes, "advice": advised, "adoptable": adoptable}
 
 
 @pytest.mark.parametrize(
@@ -206,26 +207,35 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
         (summary(2000.0), None, "Maintenance required: ", "Replace it soon."),
         (
             summary(9450.0, status="may_never_reach", pace=PACE), None,
-            "Normal: the tests cannot tell yet: at least 9,400 more cycles (95 %), that is until 10 Dec 2026 at this pace; ",
+            "Normal: at least 9,400 more cycles (95 %), that is until 10 Dec 2026 at this pace; how many more, the tests",
             "Nothing to do: carry on testing.",
         ),
         (summary(0.0, status="reached"), None, "Failure: the end of life is reached: slope", "Replace the clutch."),
         (
             summary(9000.0, **HELD), None,
-            "Function check: 1 run is held and does not count; at least 3,100 more cycles (95 %), most likely 9,000",
+            "Function check: 1 run is held and does not count; at least 3,100 more cycles (95 %), without the held run 9",
             "Confirm, correct or withdraw one held run.",
+        ),
+        (
+            summary(9000.0, held=2, with_held={"particle": HELD["with_held"]["particle"] | {"at_least": 0.0}}), None,
+            "Function check: 2 runs are held and do not count; with the held runs no cycles are left for certain, ",
+            "Confirm, correct or withdraw 2 held runs.",
         ),
         (
             summary(800.0, status="insufficient_data", runs_used=2), None,
             "Function check: 2 of the 3 tests that a prognosis needs; the tests cannot tell yet: at least 800 cycles",
-            "Run one more stationary test: a prognosis needs 3.",
+            "Run one more stationary test: then the remaining life is predicted.",
         ),
-        ({}, None, "Function check: no run yet", "Run 3 stationary tests at different cycles: a prognosis needs 3."),
+        ({}, None, "Function check: no run yet", "Run 3 more stationary tests, at different cycles: then "),
         (summary(9000.0), found(["oil_temperature"], adoptable=True), "Out of specification: ", "Adopt the model with oil"),
         (
             summary(9000.0), found(["inertia_torque", "squeeze_film"], ["inertia_torque", "squeeze_film"]),
             "Out of specification: ",
-            "Run a stationary test with the oil at 60 °C: it decides between inertia torque and squeeze film.",
+            "The cause is not clear yet. Run a stationary test with the oil at 60 °C: it decides between inertia torque ",
+        ),
+        (
+            summary(9000.0), found(["inertia_torque", "drag"], ["inertia_torque", "drag"], adoptable=True),
+            "Out of specification: ", "The cause is not clear yet. Run a stationary test",
         ),
         (
             summary(9000.0), found(["oil_temperature"], ["oil_temperature", "baseline"]), "Out of specification: ",

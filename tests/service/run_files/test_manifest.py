@@ -99,3 +99,8 @@ class TestManifest:
         self.write(folder, entries)
         for pushed in (folder, tmp_path / "by-another-name"):
             assert [run.path.name for run in manifest.find([pushed])] == ["a.csv", "b.csv", "c.csv"]
+
+    def test_records_that_no_manifest_lists_come_by_the_numbers_in_their_names(self, tmp_path: Path) -> None:
+        for name in ("run-10000.csv", "run-2000.csv", "run-0.csv"):
+            (tmp_path / name).write_text("torque_nm\n1\n", encoding="utf-8")
+        assert [path.name for path in manifest.unlisted([tmp_path])] == ["run-0.csv", "run-2000.csv", "run-10000.csv"]

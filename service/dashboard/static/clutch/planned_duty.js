@@ -222,7 +222,7 @@ function shown(life) {
   const numbers = (quantiles, decimals) =>
     SHOWN.map((quantile) => {
       const value = quantiles[quantile] ?? null;
-      return value === null ? "beyond the horizon" : fixed(value, decimals);
+      return value === null ? "over 1,000,000" : fixed(value, decimals);
     });
   if (life.status === "insufficient_data") return [h("p", { class: "notice" }, sentence(life.statement))];
   const rows = [

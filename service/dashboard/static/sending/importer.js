@@ -4,7 +4,7 @@
 
 import { send, sendJson } from "../shared/api.js";
 import { field, h, scrolling, svg } from "../shared/dom.js";
-import { words } from "../shared/format.js";
+import { quantity, words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { warnings } from "./receipt.js";
 
@@ -88,7 +88,7 @@ export class Importer {
       if (shown.cycles !== null) this.run.cycles.value = String(shown.cycles);
     }
     const focused = document.activeElement?.id;
-    const left = shown.missing.map((name) => words(name)).join(", ");
+    const left = shown.missing.map(quantity).join(", ");
     const state = shown.problem ?? (left ? `Still to be given: ${left}.` : "Can be sent.");
     this.lead.replaceChildren(this.rig === null ? "" : h("b", {}, `Read by the rig profile ${this.rig}. `), state);
     this.element.open ||= shown.problem !== null || this.channelsLack();
@@ -164,7 +164,7 @@ export class Importer {
    * @param {string[]} channels
    */
   channel({ title, channel }, index, channels) {
-    const options = channels.map((name) => h("option", { value: name, selected: name === channel }, words(name)));
+    const options = channels.map((name) => h("option", { value: name, selected: name === channel }, quantity(name)));
     const label = { id: this.id(index, "channel"), "aria-label": `Channel of ${title}` };
     const choose = (/** @type {any} */ event) => {
       const value = event.target.value || null;

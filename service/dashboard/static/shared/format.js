@@ -96,7 +96,7 @@ export function cycles(value, low = null, high = null) {
 export function interval(quantiles) {
   const [low, high] = [quantiles["0.05"], quantiles["0.95"]];
   if (low === null && high === null) return NONE;
-  if (high === null) return `over ${cycles(low)}`;
+  if (high === null) return `over ${roundedDown(low ?? 0)}`;
   return `${cycles(low, low, high)} to ${cycles(high, low, high)}`;
 }
 
@@ -105,7 +105,7 @@ export function interval(quantiles) {
  * @param {Quantiles} quantiles
  */
 export const aboutCycles = (quantiles) =>
-  quantiles["0.5"] === null ? "beyond the horizon" : cycles(quantiles["0.5"], quantiles["0.05"], quantiles["0.95"]);
+  quantiles["0.5"] === null ? "over 1,000,000" : cycles(quantiles["0.5"], quantiles["0.05"], quantiles["0.95"]);
 
 /**
  * The safe bound of remaining cycles, rounded down to two digits.
@@ -113,8 +113,16 @@ export const aboutCycles = (quantiles) =>
  */
 export function atLeast(bound) {
   if (bound === null || bound < 1) return "none is certain";
-  const unit = 10 ** Math.max(0, Math.floor(Math.log10(bound)) - 1);
-  return `at least ${fixed(Math.floor(bound / unit) * unit)} with 95 %`;
+  return `at least ${roundedDown(bound)} with 95 %`;
+}
+
+/**
+ * Cycles, rounded down to two digits.
+ * @param {number} value
+ */
+function roundedDown(value) {
+  const unit = 10 ** Math.max(0, Math.floor(Math.log10(Math.max(1, value))) - 1);
+  return fixed(Math.floor(value / unit) * unit);
 }
 
 /**

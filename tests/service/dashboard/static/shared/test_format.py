@@ -134,8 +134,8 @@ def test_cycles_are_rounded_to_what_their_interval_allows(shown: Module, values:
     [
         (1234, 5678, "1,200 to 5,700"),
         (0, 400, "0 to 400"),
-        (1234, None, "over 1,234"),
-        (12_345, None, "over 12,350"),
+        (1234, None, "over 1,200"),
+        (12_345, None, "over 12,000"),
         (None, None, NONE),
         (None, 5678, "– to 5,680"),
         (100, 100, "100 to 100"),
