@@ -50,7 +50,7 @@ LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --
 	--custom-compile-command "make lock"
 SLIM := $(LOCK) $(foreach name,$(UNUSED),--no-emit-package $(name))
 
-.PHONY: docs gallery reference adoption demo shell test quick slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
+.PHONY: help docs gallery reference adoption demo shell test quick slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -58,7 +58,11 @@ demo: $(VENV)/.runs
 
 shell: $(VENV)/.runs
 	@echo "clutchlife is a command in this shell; exit leaves it"
-	@PATH="$(abspath $(BIN)):$$PATH" VIRTUAL_ENV="$(abspath $(VENV))" $${SHELL:-/bin/sh}
+	@PATH="$(abspath $(BIN)):$$PATH" VIRTUAL_ENV="$(abspath $(VENV))" $${SHELL:-/bin/sh} || true
+
+# what each target is for, as it stands above
+help:
+	@sed -n '/^# make/,/^PYTHON/{s/^# \{0,1\}//p}' Makefile
 
 test: $(VENV)/.tests
 	$(BIN)/python -m tests.browser
@@ -115,6 +119,7 @@ docs: $(VENV)-docs/.ready
 	rm -rf $(HELP)
 	$(VENV)-docs/bin/python -m sphinx --quiet --fail-on-warning --keep-going --builder html --fresh-env \
 		--doctree-dir $(VENV)-docs/doctrees docs $(HELP)
+	@echo "the site is in $(HELP); a service that is started now shows it at /help"
 
 reference: $(VENV)/.tests
 	$(BIN)/python -m tests.documents

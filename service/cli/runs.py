@@ -76,12 +76,15 @@ def correct(
     service: Service,
     clutch: ClutchId,
     run: RunId,
-    cycles: Annotated[float, typer.Option(min=0, help="Duty cycles since new when the run was made")],
     reason: Reason,
+    cycles: Annotated[float | None, typer.Option(min=0, help="Duty cycles since new when the run was made")] = None,
+    rig: Annotated[str | None, typer.Option(help="Read the run's file again, by this rig profile")] = None,
 ) -> None:
-    """Correct the cycles of a run that was sent with others."""
-    body = json.dumps({"cycles": cycles, "reason": reason}).encode()
-    _show(service.patch(f"/v1/clutches/{clutch}/runs/{run}", body))
+    """Correct the cycles of a run that was sent with others, or read its file again by the right rig profile."""
+    if (cycles is None) == (rig is None):
+        raise typer.BadParameter("give --cycles, or --rig")
+    change = {"rig": rig} if cycles is None else {"cycles": cycles}
+    _show(service.patch(f"/v1/clutches/{clutch}/runs/{run}", json.dumps(change | {"reason": reason}).encode()))
 
 
 def _post(service: Service, address: str, content: dict[str, Any]) -> dict[str, Any]:

@@ -47,7 +47,11 @@ def test_an_empty_service_says_what_to_do_and_fills_by_itself(browser: Browser, 
     page = watched.open("/")
     page.get_by_role("heading", name="No clutch is registered yet").wait_for()
     commands = "\n".join(page.locator("pre").all_inner_texts())
-    for part in ("clutchlife simulate", f"clutchlife push campaign --clutch sim-7 --url {server.url}", "curl "):
+    for part in (
+        "clutchlife simulate",
+        f"clutchlife push campaign --clutch sim-7 --url {server.url}",
+        "clutchlife register",
+    ):
         assert part in commands
     page.get_by_role("button", name="Copy: clutchlife simulate").click()
     page.get_by_text("copied", exact=True).wait_for()

@@ -57,3 +57,21 @@ def test_what_is_missing_ends_it_where_nothing_may_be_asked(
     shown = terminal("import", file, "--clutch", "c1", "--yes", "--cycles", "7000", code=EX_DATAERR)
     assert "still to be given: torque_nm, kind" in shown
     assert client.get("/v1/clutches/c1/runs").json()["items"] == []
+
+
+def test_a_run_whose_torque_was_read_by_a_wrong_factor_is_read_again(
+    terminal: Terminal, client: TestClient, tmp_path: Path
+) -> None:
+    (tmp_path / "Stat_7000.csv").write_bytes(german(7000))
+    terminal("import", tmp_path / "Stat_7000.csv", "--clutch", "c1", answers="1\n1\n7000\nbench-3\ny\n")
+    run = client.get("/v1/clutches/c1/runs").json()["items"][0]["run_id"]
+    saved = ("version", "saved_at", "saved_by")
+    profile = {name: value for name, value in client.get("/v1/rigs/bench-3").json().items() if name not in saved}
+    columns = [each | ({"scale": 0.1} if each["channel"] == "torque_nm" else {}) for each in profile["columns"]]
+    assert client.put("/v1/rigs/bench-3", json=profile | {"columns": columns}).status_code == 200
+    before = client.get(f"/v1/clutches/c1/runs/{run}").json()["channels"]["torque_nm"]
+    terminal("correct", "c1", run, "--rig", "bench-3", "--reason", "the amplifier was set to ten times")
+    after = client.get(f"/v1/clutches/c1/runs/{run}").json()["channels"]["torque_nm"]
+    assert after == pytest.approx([0.1 * value for value in before])
+    refused = terminal("correct", "c1", run, "--reason", "nothing is given", code=2)
+    assert "--rig" in refused

@@ -4,10 +4,6 @@
 import { here } from "./address.js";
 import { copyable, h } from "./dom.js";
 
-/** @param {string} id */
-const registration = (id) =>
-  `curl ${here()}/v1/clutches -H 'Content-Type: application/json' -d '{"clutch_id": "${id}"}'`;
-
 /** No clutch is registered yet. */
 export function welcome() {
   return h(
@@ -19,13 +15,13 @@ export function welcome() {
     copyable(`clutchlife simulate --seed 7 --out campaign\nclutchlife push campaign --clutch sim-7 --url ${here()}`),
     h("h3", {}, "Connect a rig"),
     h("p", {}, "Register the clutch; what you leave out takes the reference clutch's values:"),
-    copyable(registration("bench3-017")),
+    copyable(`clutchlife register bench3-017 --url ${here()}`),
     h(
       "p",
       {},
-      "Then send run files (JSON, CSV, TDMS, MDF4 or Parquet) as they are written, or drop them on this page:",
+      "Then drop a recorder's file on this page (CSV, Excel, TDMS, MDF4, MATLAB, HDF5 or Parquet), or send it from a terminal:",
     ),
-    copyable(`clutchlife push run-0001.csv --clutch bench3-017 --url ${here()}`),
+    copyable(`clutchlife import run-0001.csv --clutch bench3-017 --url ${here()}`),
     h("p", {}, h("a", { href: "/docs" }, "The API"), " describes everything that can be sent, with examples."),
   );
 }
