@@ -73,5 +73,5 @@ def test_a_run_whose_torque_was_read_by_a_wrong_factor_is_read_again(
     terminal("correct", "c1", run, "--rig", "bench-3", "--reason", "the amplifier was set to ten times")
     after = client.get(f"/v1/clutches/c1/runs/{run}").json()["channels"]["torque_nm"]
     assert after == pytest.approx([0.1 * value for value in before])
-    refused = terminal("correct", "c1", run, "--reason", "nothing is given", code=2)
+    refused = terminal("correct", "c1", run, "--reason", "nothing is given", code=64)
     assert "--rig" in refused
