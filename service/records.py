@@ -33,7 +33,9 @@ from service.lives.recomputation import Adoption, ClutchState, Levels, Results, 
 from service.lives.run_analysis import LevelFit, Value
 from service.lives.tracks import CARRIED, States, Tracked
 from service.logging import request_id
+from service.schemas.base import of_row
 from service.schemas.clutch import ClutchIn
+from service.schemas.inspection import PhotographOut
 from service.schemas.rig import RigOut
 from service.settings import CODE_VERSION
 from storage import assumptions, changes, clutches, diagnoses, inspections, jobs, results, rigs, runs
@@ -488,10 +490,4 @@ def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) ->
 
 def photograph_answer(row: PhotographRow) -> dict[str, Any]:
     """A photograph as it is answered."""
-    return {
-        "photograph_id": row.sha256,
-        "media_type": row.media_type,
-        "bytes": row.bytes,
-        "received_at": row.received_at,
-        "received_by": row.received_by,
-    }
+    return of_row(PhotographOut, row, photograph_id=row.sha256)

@@ -8,6 +8,8 @@ from service.alarms import raising, receivers
 from service.errors import NotFoundError
 from service.lists import Place
 from service.lists import page as page_of
+from service.schemas.alarm import DeliveryOut
+from service.schemas.base import of_row
 from storage import alarms, webhooks
 from storage.alarms import AlarmRow
 from storage.engine.database import Database
@@ -109,19 +111,8 @@ def delivered(database: Database, delivery_ids: Collection[str]) -> list[dict[st
 def delivery_out(row: DeliveryRow) -> dict[str, Any]:
     """A delivery as it goes out."""
     again = row.state == webhooks.WAITING and row.due > 0.0
-    return {
-        "delivery_id": row.delivery_id,
-        "webhook_id": row.webhook_id,
-        "event_id": row.event_id,
-        "state": row.state,
-        "attempts": row.attempts,
-        "status": row.status,
-        "problem": row.problem,
-        "created_at": row.created_at,
-        "last_attempt_at": row.last_attempt_at,
-        "delivered_at": row.delivered_at,
-        "next_attempt_at": datetime.fromtimestamp(row.due, UTC).isoformat(timespec="seconds") if again else None,
-    }
+    next_attempt = datetime.fromtimestamp(row.due, UTC).isoformat(timespec="seconds") if again else None
+    return of_row(DeliveryOut, row, next_attempt_at=next_attempt)
 
 
 def _receiver(row: WebhookRow | None, webhook_id: str) -> WebhookRow:

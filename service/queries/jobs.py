@@ -5,15 +5,11 @@ from typing import Any
 
 from service.errors import NotFoundError
 from service.lists import Place
+from service.schemas.base import of_row
+from service.schemas.diagnosis import JobOut
 from storage import jobs
 from storage.engine.database import Database
 from storage.jobs import JobRow
-
-#: What an answer shows of a row.
-_SHOWN = (
-    "job_id", "kind", "clutch_id", "state", "asked_at", "asked_by", "started_at", "finished_at", "attempts", "progress",
-    "problem",
-)  # fmt: skip
 
 
 def find(database: Database, job_id: str, *, only: Collection[str] | None) -> JobRow:
@@ -38,8 +34,8 @@ def page(
 
 def shown(row: JobRow) -> dict[str, Any]:
     """A job as it is answered."""
-    answered = {name: getattr(row, name) for name in _SHOWN}
-    result = None if row.progress is None else row.progress.get("result")
+    progress = row.progress or {}
+    result = progress.get("result")
     if result is not None:
-        answered["progress"] = {name: value for name, value in answered["progress"].items() if name != "result"}
-    return answered | {"result": result}
+        progress = {name: value for name, value in progress.items() if name != "result"}
+    return of_row(JobOut, row, progress=None if row.progress is None else progress, result=result)

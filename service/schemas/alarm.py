@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from models.prognosis.criteria import QUANTILES
-from service.schemas.base import Answer, Identifier, Next, NotNegativeNumber, PositiveNumber, Reason, Schema
+from service.schemas.base import Answer, Identifier, NotNegativeNumber, PositiveNumber, Reason, Schema, page_of
 from service.schemas.limits import (
     LARGEST_LIMIT,
     LONGEST_ADDRESS,
@@ -133,11 +133,7 @@ class AlarmOut(AlarmIn):
     saved_by: str = Field(description="Who saved it")
 
 
-class AlarmPage(Answer):
-    """Rules by name."""
-
-    items: list[AlarmOut] = Field(description="The rules")
-    next: Next
+AlarmPage = page_of("AlarmPage", AlarmOut, "Rules by name.", "The rules")
 
 
 class EventOut(Answer):
@@ -160,11 +156,7 @@ class EventOut(Answer):
     cleared_at: str | None = Field(description="When what raised it was over")
 
 
-class EventPage(Answer):
-    """Alarms, newest first."""
-
-    items: list[EventOut] = Field(description="The alarms")
-    next: Next
+EventPage = page_of("EventPage", EventOut, "Alarms, newest first.", "The alarms")
 
 
 class AcknowledgeIn(Schema):
@@ -211,11 +203,7 @@ class WebhookOut(Answer):
     created_by: str = Field(description="Who made it")
 
 
-class WebhookPage(Answer):
-    """Receivers by name."""
-
-    items: list[WebhookOut] = Field(description="The receivers")
-    next: Next
+WebhookPage = page_of("WebhookPage", WebhookOut, "Receivers by name.", "The receivers")
 
 
 class DeliveryOut(Answer):
@@ -236,11 +224,7 @@ class DeliveryOut(Answer):
     next_attempt_at: str | None = Field(description="When it is tried again; null where it is not")
 
 
-class DeliveryPage(Answer):
-    """Deliveries, newest first."""
-
-    items: list[DeliveryOut] = Field(description="The deliveries")
-    next: Next
+DeliveryPage = page_of("DeliveryPage", DeliveryOut, "Deliveries, newest first.", "The deliveries")
 
 
 class TestedOut(Answer):

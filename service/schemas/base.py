@@ -12,6 +12,7 @@ from pydantic import (
     PlainSerializer,
     StringConstraints,
     WithJsonSchema,
+    create_model,
 )
 
 from service.columns import whole
@@ -60,6 +61,17 @@ RunName = Annotated[str, Field(description="The run's name")]
 RunCycles = Annotated[float, Field(description="Duty cycles since new when the run was made")]
 Revision = Annotated[int, Field(description="Increases with every change of the clutch's results")]
 Next = Annotated[str | None, Field(description="The `cursor` of the next page; null on the last one")]
+
+
+def of_row(schema: type[BaseModel], row: object, **own: Any) -> dict[str, Any]:
+    """A stored row as the schema has it, field by field; `own` are those that the row calls otherwise or has not."""
+    return {name: own[name] if name in own else getattr(row, name) for name in schema.model_fields}
+
+
+def page_of(name: str, item: type[BaseModel], says: str, items: str) -> type[Answer]:
+    """The schema of a list that is answered a page at a time; `says` and `items` describe it and its items."""
+    fields: Any = {"items": (list[item], Field(description=items)), "next": (Next, ...)}  # type: ignore[valid-type]
+    return create_model(name, __base__=Answer, __doc__=says, **fields)
 
 
 class ProblemError(Answer):

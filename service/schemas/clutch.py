@@ -12,7 +12,6 @@ from service.schemas.base import (
     Answer,
     ClutchName,
     Identifier,
-    Next,
     NotNegativeNumber,
     Origin,
     PositiveNumber,
@@ -21,6 +20,7 @@ from service.schemas.base import (
     RunCycles,
     RunName,
     Schema,
+    page_of,
 )
 from service.schemas.life import (
     AtLeast,
@@ -273,8 +273,6 @@ class ClutchOut(Answer):
     diagnosis: LatestDiagnosis | None = Field(description="The newest finished diagnosis; null without one")
 
 
-class ClutchPage(Answer):
-    """Clutches, the fewest remaining cycles first or by name."""
-
-    items: list[ClutchOut] = Field(description="The clutches of this page")
-    next: Next
+ClutchPage = page_of(
+    "ClutchPage", ClutchOut, "Clutches, the fewest remaining cycles first or by name.", "The clutches of this page"
+)

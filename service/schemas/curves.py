@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from service.schemas.base import Answer, Next, RunCycles, RunName
+from service.schemas.base import Answer, RunCycles, RunName, page_of
 from service.schemas.run import Fit, Loop
 
 
@@ -43,11 +43,7 @@ class StribeckItem(Answer):
     pressure_laws: PressureLawsOut | None = Field(description="The pressure laws; null with too few pressures")
 
 
-class StribeckPage(Answer):
-    """Stationary tests by cycles."""
-
-    items: list[StribeckItem] = Field(description="The tests of this page")
-    next: Next
+StribeckPage = page_of("StribeckPage", StribeckItem, "Stationary tests by cycles.", "The tests of this page")
 
 
 class LoopItem(Loop):
@@ -57,11 +53,7 @@ class LoopItem(Loop):
     cycles: RunCycles
 
 
-class LoopPage(Answer):
-    """Friction loops by cycles and pressure."""
-
-    items: list[LoopItem] = Field(description="The loops of this page")
-    next: Next
+LoopPage = page_of("LoopPage", LoopItem, "Friction loops by cycles and pressure.", "The loops of this page")
 
 
 class SeriesItem(Answer):
@@ -85,8 +77,4 @@ class SeriesItem(Answer):
     speed_rpm: float | None = Field(description="Speed of a slope, rpm; null for all else")
 
 
-class SeriesPage(Answer):
-    """Flat rows for dashboards and spreadsheets."""
-
-    items: list[SeriesItem] = Field(description="The rows of this page")
-    next: Next
+SeriesPage = page_of("SeriesPage", SeriesItem, "Flat rows for dashboards and spreadsheets.", "The rows of this page")

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.schemas.base import Answer, ClutchName, Identifier, Next, Revision, Schema
+from service.schemas.base import Answer, ClutchName, Identifier, Revision, Schema, page_of
 from service.schemas.life import ModelName
 from service.schemas.limits import LONGEST_DIAGNOSIS_ID
 
@@ -253,11 +253,7 @@ class DiagnosisOut(DiagnosisListed):
     loops: list[LoopTraceOut] = Field(description="Measured friction loops beside both models'")
 
 
-class DiagnosisPage(Answer):
-    """Diagnoses, newest first."""
-
-    items: list[DiagnosisListed] = Field(description="The diagnoses of this page")
-    next: Next
+DiagnosisPage = page_of("DiagnosisPage", DiagnosisListed, "Diagnoses, newest first.", "The diagnoses of this page")
 
 
 class ModelVersion(Answer):
@@ -345,8 +341,4 @@ class JobOut(Answer):
     result: JobResult | None = Field(description="What it did; null before its end, and of a diagnosis")
 
 
-class JobPage(Answer):
-    """A page of jobs, newest first."""
-
-    items: list[JobOut] = Field(description="The jobs")
-    next: Next
+JobPage = page_of("JobPage", JobOut, "A page of jobs, newest first.", "The jobs")

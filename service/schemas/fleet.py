@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from service.schemas.base import Answer, ClutchName, Next, Origin, Revision
+from service.schemas.base import Answer, ClutchName, Next, Origin, Revision, page_of
 from service.schemas.life import Method, Model, Prior, Quantiles, SeverityUsed
 
 
@@ -64,11 +64,9 @@ class FleetPriorOut(Answer):
     )
 
 
-class FleetPriorPage(Answer):
-    """The newest version of every kind's prior."""
-
-    items: list[FleetPriorOut] = Field(description="The priors of this page")
-    next: Next
+FleetPriorPage = page_of(
+    "FleetPriorPage", FleetPriorOut, "The newest version of every kind's prior.", "The priors of this page"
+)
 
 
 class ScoreSummary(Answer):

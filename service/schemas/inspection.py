@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.schemas.base import Answer, ClutchName, Cycles, Next, Origin, PositiveNumber, Schema, StartedAt
+from service.schemas.base import Answer, ClutchName, Cycles, Origin, PositiveNumber, Schema, StartedAt, page_of
 from service.schemas.limits import LARGEST_SKEWNESS, LONGEST_NAME, LONGEST_NOTE
 
 Skewness = Annotated[float, Field(ge=-LARGEST_SKEWNESS, le=LARGEST_SKEWNESS, allow_inf_nan=False, strict=True)]
@@ -71,8 +71,4 @@ class InspectionOut(Answer):
     photographs: list[PhotographOut] = Field(description="Its photographs, in the order in which they came")
 
 
-class InspectionPage(Answer):
-    """Inspections by cycles."""
-
-    items: list[InspectionOut] = Field(description="The inspections of this page")
-    next: Next
+InspectionPage = page_of("InspectionPage", InspectionOut, "Inspections by cycles.", "The inspections of this page")

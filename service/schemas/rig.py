@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.schemas.base import Answer, Identifier, Next, Schema
+from service.schemas.base import Answer, Identifier, Schema, page_of
 from service.schemas.limits import LARGEST_NUMBER, LONGEST_NAME, LONGEST_TITLE, MAX_COLUMNS, MAX_SKIPPED, MAX_WORDS
 from service.schemas.run import Fit, Warned
 
@@ -95,11 +95,7 @@ class RigOut(RigIn):
     saved_by: str = Field(description="Who: `key:` with the key's id and note, or `local`")
 
 
-class RigPage(Answer):
-    """Rig profiles by name."""
-
-    items: list[RigOut] = Field(description="The profiles of this page")
-    next: Next
+RigPage = page_of("RigPage", RigOut, "Rig profiles by name.", "The profiles of this page")
 
 
 class PreviewColumn(Answer):

@@ -10,7 +10,6 @@ from service.schemas.base import (
     Column,
     Cycles,
     Identifier,
-    Next,
     NotNegativeNumber,
     Origin,
     PositiveNumber,
@@ -19,6 +18,7 @@ from service.schemas.base import (
     RunName,
     Schema,
     StartedAt,
+    page_of,
 )
 from service.schemas.limits import LONGEST_NOTE, MAX_CYCLES
 
@@ -347,11 +347,7 @@ class Change(Answer):
     after: dict[str, Any] = Field(description="What changed, as it is from then on")
 
 
-class ChangePage(Answer):
-    """The audit trail, newest first."""
-
-    items: list[Change] = Field(description="The entries of this page")
-    next: Next
+ChangePage = page_of("ChangePage", Change, "The audit trail, newest first.", "The entries of this page")
 
 
 class RunOut(Receipt):
@@ -369,8 +365,4 @@ class RunOut(Receipt):
     )
 
 
-class RunPage(Answer):
-    """Receipts by cycles."""
-
-    items: list[Receipt] = Field(description="The receipts of this page")
-    next: Next
+RunPage = page_of("RunPage", Receipt, "Receipts by cycles.", "The receipts of this page")
