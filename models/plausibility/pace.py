@@ -138,9 +138,10 @@ def _of_gaps(gaps: FloatArray) -> FloatArray:
     log_before = np.log(np.maximum(before, 0.5))
     same = (weight * (np.abs(before - gaps[:, :, None]) < 0.5)).sum(axis=2)
     like = (weight * _log_normal(log_gap[:, :, None], log_before, criteria.LIKE_GAP_SD)).sum(axis=2)
-    growing = present[:, :, 0] & present[:, :, 1] if criteria.MEMORY > 1 else np.zeros(gaps.shape, dtype=bool)
+    growing = present[:, :, 0] & present[:, :, 1]
     grown = 2.0 * log_before[:, :, 0] - log_before[:, :, 1]
-    like = np.where(growing, 0.8 * like + 0.2 * _log_normal(log_gap, grown, criteria.LIKE_GAP_SD), like)
+    further = _log_normal(log_gap, grown, criteria.LIKE_GAP_SD)
+    like = np.where(growing, (1.0 - criteria.GROWING) * like + criteria.GROWING * further, like)
     similar = _log_normal(log_gap, (weight * log_before).sum(axis=2), criteria.SIMILAR_GAP_SD)
     anything = np.exp(log_anywhere(gaps))
     by_earlier = criteria.SAME_GAP * same + criteria.LIKE_GAP * like + criteria.SIMILAR_GAP * similar
