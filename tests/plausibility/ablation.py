@@ -26,7 +26,7 @@ def _slips_but(*names: str) -> Any:
 
 def _anywhere(cycles: FloatArray, *_: Any) -> FloatArray:
     there = np.isfinite(cycles)
-    return np.where(there, pace.log_anywhere(np.where(there, cycles, 1.0)), 0.0).sum(axis=1)
+    return np.asarray(np.where(there, pace.log_anywhere(np.where(there, cycles, 1.0)), 0.0).sum(axis=1))
 
 
 def _changed(**values: float) -> Patches:
