@@ -117,8 +117,8 @@ def _by_gaps(cycles: FloatArray) -> FloatArray:
     law[:, 0] = criteria.AT_START * (first < 0.5) + (1.0 - criteria.AT_START) * np.exp(log_anywhere(first))
     if count > 1:
         with np.errstate(invalid="ignore"):
-            gaps = np.nan_to_num(np.diff(ascending, axis=1), nan=0.0, posinf=0.0)
-        law[:, 1:] = _of_gaps(gaps)
+            gaps = np.diff(ascending, axis=1)
+        law[:, 1:] = _of_gaps(np.where(np.isfinite(gaps), gaps, 0.0))
     back = np.empty(law.shape)
     np.put_along_axis(back, order, law, axis=1)
     return back
