@@ -87,6 +87,11 @@ def test_all_that_are_held_of_one_cause_are_confirmed_in_one_line(server: Server
         post(server, "c2", cycles, run_id=f"r{cycles:g}")
     odd = [post(server, "c2", cycles, run_id=f"odd-{cycles:g}", gain=60.0) for cycles in (3000.0, 4000.0)]
     assert [receipt["state"] for receipt in odd] == ["held", "held"]
+    for command in ("status", "life", "degradation"):
+        assert "2 runs are held" in clutchlife(command, "c2", *at, code=1 if command == "status" else 0)
+    assert "2 runs are held" in clutchlife("watch", "c2", "--looks", "1", *at)
+    (line,) = [line for line in clutchlife("list", *at).splitlines() if line.lstrip("│| ").startswith("c2")]
+    assert "2" in line.split()
     assert "no runs held for dead_channel" in clutchlife("confirm", "c2", "--doubt", "dead_channel", *at)
     printed = clutchlife("confirm", "c2", "--doubt", odd[0]["doubts"][0]["code"], "--reason", "a new lining", *at)
     assert [line.split()[1] for line in printed.splitlines()] == ["accepted", "accepted"]
