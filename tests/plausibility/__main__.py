@@ -210,7 +210,8 @@ def main() -> int:
     met = met and in_the_end <= MOST_IN_THE_END * of_lives and out >= LEAST_AFTER * len(followed)
     times = sorted(one.answer.seconds for one in honest if one.kind == "stationary_stribeck")
     lines = [
-        f"`make plausibility SEED={seed} CAMPAIGNS={chosen.campaigns} HONEST={chosen.honest} LIVES={chosen.lives}`:",
+        f"`make plausibility SEED={seed} CAMPAIGNS={chosen.campaigns} HONEST={chosen.honest} LIVES={chosen.lives} "
+        f'ARGS="--ablated {chosen.ablated}"`:',
         "",
         "| | runs | held | share | demand |",
         "|---|---|---|---|---|",
