@@ -128,7 +128,7 @@ def _agree(times: FloatArray, others: FloatArray) -> bool:
 def _runs_on(times: FloatArray) -> bool:
     """Whether a column may be a clock: nine of ten of its steps go on. Chosen: of durations in any order half do."""
     steps = np.diff(times[~np.isnan(times)])
-    return steps.size > 0 and np.count_nonzero(steps > 0) >= 0.9 * steps.size
+    return bool(steps.size > 0 and np.count_nonzero(steps > 0) >= 0.9 * steps.size)
 
 
 def _read(
