@@ -8,9 +8,8 @@ baseline      2  the physics: Stribeck curves over pressure and life, friction l
 noise         3  the sensor's noise and the scatter of gains
 effects       4  what could be wrong: the catalogue and the uncatalogued rig faults
 pooled_fit    5  one parameter vector fitted to the whole campaign
-detection     6  is anything there beyond noise
-attribution   7  which cause
-explanations     (beside 6 and 7) both as one posterior, which makes no verdict yet
+raw_records   6  what swings and settles within a record
+explanations  7  what may be behind it, as one posterior, and the verdict
 validation    8  does it predict what was held out
 experiments   9  which test to make next
 report       10  what is said; never changes a verdict

@@ -149,7 +149,7 @@ def _gain(report: Mapping[str, Any]) -> Iterator[RenderableType]:
         yield Text(
             f"Held out ({len(gain['held_out_runs'])} runs): error {number(gain['rmse_before_nm'])} Nm before, "
             f"{number(gain['rmse_after_nm'])} Nm after, {number(gain['reduction_percent'])}{spread} % less; "
-            f"log score gain {number(gain['log_score_gain'])} nats"
+            f"evidence for the extended model there: {_evidence(gain['log_score_gain'])}"
         )
     life = gain["remaining_useful_life"]
     for when, title in (("before", "baseline"), ("after", "extended")):

@@ -68,8 +68,7 @@ class CandidateOut(Answer):
     )
     fit: str | None = Field(
         default=None,
-        description="How that fit ended: `converged`, `stalled`, `out_of_steps` (not at its end: no cause is named by it), "
-        "`not_finite`, `wrong_sign`; `screened` where it was judged linearly only, null where there is none",
+        description="How that fit ended: `converged`, `stalled`, or `out_of_steps` (not at its end); null if there is none",
     )
 
 

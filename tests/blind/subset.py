@@ -2,7 +2,6 @@
 
 SUBSET=  the name under which results are stored (`.blind/NAME`); a run goes on where it ended, some 25 minutes of one core
 SEED=    other campaigns (1)                         ONLY=    rows whose names begin with these
-ENGINE=  posterior: judged by `models.diagnosis.explanations` instead of today's detection and attribution
 ABLATE=  a number of the diagnosis' criteria without which it is judged: `SECOND=0.25`, `MOST_REFITS=6`
 ARGS="--against OTHER": the rows of both beside each other, campaign by campaign the same ones
 """
@@ -15,16 +14,13 @@ import pkgutil
 import sys
 import zlib
 from ast import literal_eval
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import models.diagnosis
-from models.diagnosis.campaign import Campaign
-from models.diagnosis.diagnose import diagnose, verdict_by_posterior
+from models.diagnosis.diagnose import diagnose
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
 from tests.blind.rows import drawn_pairs
 from tests.blind.trials import Diagnose, Trial, judge
@@ -97,29 +93,6 @@ def trials(seed: int) -> dict[str, Trial]:
         for lam in (50.0, 200.0):
             add(f"blindfold/{lam:.0f}", k, "oil_temperature", lam=lam, oil=False, moments=True)
     return made
-
-
-@dataclass(frozen=True)
-class Said:
-    """What the posterior says of a campaign, as far as a report says it too."""
-
-    verdict: str
-    causes: tuple[str, ...]
-    candidates: tuple[Any, ...] = ()
-    baseline: None = None
-    gain: None = None
-    advice: tuple[Any, ...] = ()
-    statistics: Mapping[str, float] = field(default_factory=dict)
-
-
-def by_posterior(seen: Campaign, *, rng: np.random.Generator, without: frozenset[str] = frozenset()) -> Said:
-    """The verdict read off one posterior; it draws nothing from `rng`."""
-    del rng
-    verdict, causes = verdict_by_posterior(seen, without)
-    return Said(verdict=verdict.value, causes=causes)
-
-
-LOOKS = {"": diagnose, "posterior": by_posterior}
 
 
 def judged(name: str, trial: Trial, label: str, look: Diagnose = diagnose) -> Judged | None:
@@ -203,8 +176,7 @@ def main(arguments: Sequence[str]) -> None:
     if os.environ.get("ABLATE"):
         ablate(os.environ["ABLATE"])
     chosen = {name: trial for name, trial in trials(seed).items() if trial.row.startswith(only)}
-    look = LOOKS[os.environ.get("ENGINE") or ""]
-    mine = {name: found for name, trial in chosen.items() if (found := judged(name, trial, label, look)) is not None}
+    mine = {name: found for name, trial in chosen.items() if (found := judged(name, trial, label)) is not None}
     other, against = mine, label
     if "--against" in arguments:
         against = arguments[arguments.index("--against") + 1]

@@ -83,12 +83,12 @@ def product_files() -> list[Path]:
 
 @pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: str(path.relative_to(ROOT)))
 def test_files_that_are_named_shortly_exist(path: Path) -> None:
-    """`decide.py` or `attribution/decide.py`."""
+    """`decide.py` or `explanations/decide.py`."""
     assert missing(own_words(path)) == []
 
 
 def test_a_file_that_is_gone_is_noticed() -> None:
-    assert missing("`decide.py` and `attribution/decide.py`, `models/diagnosis/attribution/decide.py`") == []
+    assert missing("`decide.py` and `explanations/decide.py`, `models/diagnosis/explanations/decide.py`") == []
     assert missing("`repeats.py`, `detection/decide.py`, `cide.py`") == ["repeats.py", "detection/decide.py", "cide.py"]
 
 

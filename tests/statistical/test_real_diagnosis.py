@@ -2,7 +2,7 @@
 
 import pytest
 
-from models.diagnosis.attribution.verdict import Verdict
+from models.diagnosis.explanations.verdict import Verdict
 from tests.real import diagnosis, loaders
 
 pytestmark = [

@@ -10,16 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.criteria import UNCONFIRMED, UNCONFIRMED_EFFECTS
+from models.diagnosis.criteria import LIKELY
 from models.diagnosis.design.design import build_design
-from models.diagnosis.detection.alarm import Alarms, alarms_of
-from models.diagnosis.detection.projected_fit import project_fit
-from models.diagnosis.diagnose import diagnose
-from models.diagnosis.effects.catalogue import effects_for
 from models.diagnosis.effects.catalogued.interface_heating import REFERENCE_FLUX
-from models.diagnosis.effects.grid import columns_of
+from models.diagnosis.explanations.alternative import NOTHING
+from models.diagnosis.explanations.posterior import Posterior, posterior_of
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.diagnosis.report.report import Visible
 from models.diagnosis.report.visible import visible_of
@@ -50,7 +46,7 @@ _PER_UNIT = {
 @dataclass(frozen=True)
 class Shown:
     """What became of a hidden effect: the amplitudes stated and hidden, in the catalogue's unit; whether it was seen; the
-    alarms' values over their thresholds [nats]."""
+    log odds against nothing [nats]."""
 
     seed: tuple[int, ...]
     slug: str
@@ -83,34 +79,18 @@ def shown(seed: tuple[int, ...], slug: str) -> Shown | str:
 
 
 def alarmed(given: Campaign) -> tuple[bool, float]:
-    """Whether the diagnosis calls the model anything but adequate, and the largest excess of its alarms [nats]. Alarms that
-    hold by their own size need no search (`attribution.decide.confirmed`)."""
-    _, alarms = _alarms(given)
-    excess = [
-        each.value - each.threshold - beyond
-        for each, beyond in (
-            (alarms.effects, UNCONFIRMED_EFFECTS),
-            (alarms.contrasts, UNCONFIRMED),
-            (alarms.lines, UNCONFIRMED),
-        )
-    ]
-    largest = max(each.value - each.threshold for each in (alarms.effects, alarms.contrasts, alarms.lines))
-    if max(excess) > 0:
-        return True, largest
-    return diagnose(given, rng=np.random.default_rng(11)).verdict is not Verdict.MODEL_ADEQUATE, largest
+    """Whether the diagnosis calls the model anything but adequate, and the log odds against it [nats]."""
+    probabilities = _posterior(given).probabilities
+    nothing = probabilities[NOTHING]
+    return nothing < LIKELY, float(np.log(max(1.0 - nothing, 1e-300) / max(nothing, 1e-300)))
 
 
-def _alarms(given: Campaign) -> tuple[tuple[Visible, ...], Alarms]:
-    design = build_design(given)
-    baseline = fit_baseline(design)
-    columns = columns_of(effects_for(design.facts, frozenset()), design.facts)
-    projected = project_fit(baseline.problem, baseline.fit, columns)
-    alarms = alarms_of(baseline.problem, projected, np.random.default_rng(11))
-    return visible_of(projected, alarms.effects.threshold), alarms
+def _posterior(given: Campaign) -> Posterior:
+    return posterior_of(fit_baseline(build_design(given)), ())
 
 
 def _visible(given: Campaign) -> tuple[Visible, ...]:
-    return _alarms(given)[0]
+    return visible_of(_posterior(given))
 
 
 def public(effect: Effect, amplitude: float, blank: Hidden) -> float:

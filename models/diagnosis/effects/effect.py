@@ -62,15 +62,6 @@ class Discrepancy(StrEnum):
     MOTION = "motion"
 
 
-class Resemblance(StrEnum):
-    """Whether an effect looks like a change of oil temperature where temperature was not measured; UNLESS_LOGGED: not where
-    maintenance says that it was done."""
-
-    ALWAYS = "always"
-    UNLESS_LOGGED = "unless_logged"
-    NEVER = "never"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShapeParameter:
     """A shape parameter: its name and unit, its bounds; `smooth` where the change may be differentiated in it (then it
@@ -110,7 +101,6 @@ class Effect:
     courses(facts) gives the shapes between which a size is averaged; None: as it was fitted.
     several(scene, settings) -> [P, m] Nm is the same for many (amplitude, shape) at once, where that is cheaper.
     tails: degrees of freedom of the amplitude's prior (`effects.amplitude_prior`), infinite for a normal one.
-    resembles_temperature: whether an oil temperature that was not measured could look like it.
     counts_in_severity: its amplitude is the exponent by which ζ counts engagements (no torque is added along a life).
     named: whether it may be named as a cause; where not, what it explains is uncatalogued and lies on `axis`
     (`design.axes`).
@@ -139,7 +129,6 @@ class Effect:
     courses: Callable[[Facts], tuple[Tried, ...]] | None = None
     several: Callable[[Scene, Sequence[tuple[float, Shape]]], FloatArray] | None = None
     grows_with: Measure | None = None
-    resembles_temperature: Resemblance = Resemblance.NEVER
     counts_in_severity: bool = False
     named: bool = True
     axis: str = ""
@@ -174,7 +163,7 @@ def unit_changes(effect: Effect, scene: Scene, shapes: Sequence[Shape]) -> Float
 
 
 def untried(_facts: Facts) -> tuple[Tried, ...]:
-    """No shapes: what a smooth model does not show is judged on raw records (`detection.raw_records.evidence`)."""
+    """No shapes: what a smooth model does not show is judged on raw records (`raw_records.evidence`)."""
     return ()
 
 

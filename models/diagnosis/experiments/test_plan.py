@@ -2,9 +2,9 @@
 
 With Δ_ab what a trial adds to λ_ab (`experiments.information`), evidence for a against b would, if a is true, be about
 normal afterwards: its mean what it is now, and Δ, and the change of what the freedom of both is worth; its variance
-1 + 2Δ + (PREDICTION_ERROR Δ)². a is left alone where it is above what `attribution.decide` asks for, for every b. Trials are
+1 + 2Δ + (PREDICTION_ERROR Δ)². a is left alone where the odds are those of SURE, for every b. Trials are
 ranked by the probability of that, over the candidates by their evidence, less COST_OF_RUN a run; of those that are sure to
-decide (LEAST_NAMED) the shortest comes first. Of a cause without a rival the size is what is left to learn: the trial that
+decide (SURE) the shortest comes first. Of a cause without a rival the size is what is left to learn: the trial that
 narrows it most, less the same a run.
 """
 
@@ -18,14 +18,11 @@ from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.criteria import (
     COST_OF_RUN,
-    CREDIBLE_MARGIN,
-    CREDIBLE_MARGIN_SHARE,
     LEAST_ADVISED,
-    LEAST_NAMED,
     MOST_ADVISED,
     MOST_RIVALS,
     PREDICTION_ERROR,
-    TOLERANCE,
+    SURE,
     WORTHWHILE,
 )
 from models.diagnosis.design.criteria import REFERENCE_TEMPERATURE
@@ -36,7 +33,7 @@ from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.experiments.candidates import TRIALS, runs_of, with_trial
 from models.diagnosis.experiments.information import CandidateDistances
 from models.diagnosis.experiments.protocol import Step, steps_of
-from models.diagnosis.experiments.rivals import Rival
+from models.diagnosis.explanations.verdict import Fitted
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.gram import Gram
 from models.diagnosis.pooled_fit.problem import FitProblem
@@ -72,7 +69,7 @@ class Advice:
 
 
 def advise(
-    campaign: Campaign, problem: FitProblem, credible: Sequence[Rival], nearby: Sequence[Rival] = ()
+    campaign: Campaign, problem: FitProblem, credible: Sequence[Fitted], nearby: Sequence[Fitted] = ()
 ) -> tuple[Advice, ...]:
     """The trials that leave one of the credible candidates (best first), best trial first. Those nearby cannot be left, but
     may become credible again."""
@@ -107,9 +104,7 @@ def advise(
     ranked.sort(key=lambda trial: trial[0], reverse=True)
     worthy = [advice for i, (_, advice) in enumerate(ranked) if i == 0 or advice.nats >= WORTHWHILE]
     if len(race) > 1:
-        sure = sorted(
-            (advice for advice in worthy if advice.probability >= LEAST_NAMED), key=lambda advice: advice.minutes
-        )
+        sure = sorted((advice for advice in worthy if advice.probability >= SURE), key=lambda advice: advice.minutes)
         worthy = [*sure, *(advice for advice in worthy if advice not in sure)]
     return (*first, *worthy)[:MOST_ADVISED]
 
@@ -124,29 +119,22 @@ def _brought(
     gained, freedom = np.maximum(after[0] - before[0], 0.0), (after[1] - before[1])[:count]
     if not (np.isfinite(gained).all() and np.isfinite(freedom).all()):
         return np.nan, 0, 0.0
-    chance = decided(gained, before[0][:count, -1], evidences, freedom)
+    chance = decided(gained, evidences, freedom)
     if racing == 1:
         return chance, count, float(gained[0, -1])
     expected = gained[0, 1:racing] + np.maximum(freedom[0] - freedom[1:racing], 0.0)
     return chance, 1 + int(expected.argmin()), float(expected.min())
 
 
-def decided(gained: FloatArray, measured: FloatArray, evidences: FloatArray, freedom: FloatArray) -> float:
+def decided(gained: FloatArray, evidences: FloatArray, freedom: FloatArray) -> float:
     """The probability that one candidate is left, by what is gained [k, k + 1] nats for row against column (the last one no
-    effect at all), by λ as measured [k] nats of each already, by their evidences [k] nats, and by what these change by for
-    nothing but the candidates' `freedom` [k] nats: a candidate with more freedom pays more for it when more is measured.
-
-    A lead is compared with the error that a template may have, a share of λ: the larger λ, the larger the lead must be.
-    """
+    effect at all), by their evidences [k] nats, and by what these change by for nothing but the candidates' `freedom` [k]
+    nats: a candidate with more freedom pays more for it when more is measured."""
     count = evidences.size
     after = evidences + freedom
     lead = after[:, None] - after
     rivals = gained[:count, :count] if count > 1 else gained[:1, -1:]
-    total = (measured + gained[:count, -1])[:, None]
-    needed = np.maximum(
-        CREDIBLE_MARGIN + CREDIBLE_MARGIN_SHARE * total,
-        np.log(LEAST_NAMED / (1 - LEAST_NAMED)) * (1 + 0.5 * TOLERANCE * total),
-    )
+    needed = np.log(SURE / (1 - SURE))
     chance = ndtr((lead + rivals - needed) / np.sqrt(1.0 + 2.0 * rivals + (PREDICTION_ERROR * rivals) ** 2))
     if count > 1:
         np.fill_diagonal(chance, 1.0)
@@ -200,7 +188,7 @@ def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[Fit]) -
     distances = CandidateDistances(problem, (usual, _bare(fits[0])))
     nats = float(distances.distances([distances.ahead(added)])[0, 1])
     test = f"{TRIALS[_WARM].text}, and oil temperature recorded from now on"
-    odds = np.log(LEAST_NAMED / (1 - LEAST_NAMED))
+    odds = np.log(SURE / (1 - SURE))
     chance = float(ndtr((nats - odds) / np.sqrt(1.0 + 2.0 * nats + (PREDICTION_ERROR * nats) ** 2)))
     steps = steps_of(campaign, _WARM)
     return [Advice(key=_WARM, test=test, effect=shift, other=effect.slug, nats=nats, probability=chance, steps=steps)]

@@ -2,20 +2,20 @@
 
 from typing import NamedTuple
 
-from models.diagnosis.design.axes import CLOCK, FREQUENCY
-from models.diagnosis.detection.raw_records.evidence import FIXED_LINE
+from models.diagnosis.design.axes import CLOCK, CYCLES, FREQUENCY
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
+from models.diagnosis.raw_records.evidence import FIXED_LINE
 
-#: A line over the tests' clock; lines, with the axes on which they lie.
+#: A line over the tests' clock; lines, with the axes on which they lie. One run that is not like the others.
 LINE = "line"
 LINES = {LINE: CLOCK, FIXED_LINE: FREQUENCY}
-#: Begins the name of a neighbour: something of an effect's kind that no effect of the catalogue is.
-_LIKE = "like "
+OUTLIER = "outlying run"
+_AXES = {**LINES, OUTLIER: CYCLES}
 
 
 class Alternative(NamedTuple):
     """The causes, by slug in order, and what is unknown beside them: an axis of structure (`design.axes`), the slug of an
-    uncatalogued fault, a line, a neighbour of an effect, or nothing (empty)."""
+    uncatalogued fault, a line, an outlying run, or nothing (empty)."""
 
     causes: tuple[str, ...] = ()
     unknown: str = ""
@@ -36,18 +36,13 @@ class Alternative(NamedTuple):
 NOTHING = Alternative()
 
 
-def neighbour_of(slug: str) -> Alternative:
-    """Something like an effect that is not in the catalogue."""
-    return Alternative((), f"{_LIKE}{slug}")
-
-
 def is_axis(unknown: str) -> bool:
     """Whether what is unknown is smooth structure on an axis."""
     return bool(axis_of(unknown)) and axis_of(unknown) == unknown
 
 
 def axis_of(unknown: str) -> str:
-    """The axis on which something unknown lies; a neighbour of an effect lies on none (empty)."""
+    """The axis on which something unknown lies; of nothing unknown none (empty)."""
     if unknown in FAULT_BY_SLUG:
         return FAULT_BY_SLUG[unknown].axis
-    return LINES.get(unknown, "" if unknown.startswith(_LIKE) else unknown)
+    return _AXES.get(unknown, unknown)

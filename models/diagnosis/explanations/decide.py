@@ -3,17 +3,31 @@
 p(nothing) >= LIKELY                                            the model is adequate
 C = the causes of probability >= SURE,
     p(uncatalogued) <= 1 - SURE and p(exactly C) >= LIKELY      C is named
-p(uncatalogued) >= LIKELY of all that is not nothing            structure without a name
+p(uncatalogued) >= LIKELY of all that is not nothing            structure without a name; where C is not empty ambiguous: C
+                                                                and something uncatalogued
 otherwise                                                       ambiguous: the smallest set of explanations that holds
                                                                 SURE of what is not nothing
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 
-from models.diagnosis.attribution.verdict import UNCATALOGUED, Explanation, Verdict, probabilities_by_slug
-from models.diagnosis.criteria import LIKELY, SURE
+from models.diagnosis.criteria import LIKELY, MOST_WORSE, SURE
+from models.diagnosis.effects.faults import FAULT_BY_SLUG
+from models.diagnosis.explanations.alternative import NOTHING, Alternative, axis_of
 from models.diagnosis.explanations.posterior import Posterior
+from models.diagnosis.explanations.verdict import (
+    UNCATALOGUED,
+    Explanation,
+    Fitted,
+    HeldOut,
+    Judgement,
+    Proposal,
+    Verdict,
+    Where,
+    probabilities_by_slug,
+)
 
 
 def explanations_of(posterior: Posterior) -> tuple[Explanation, ...]:
@@ -44,7 +58,7 @@ def decide(explanations: Sequence[Explanation]) -> tuple[Verdict, tuple[str, ...
     if sure and unknown <= 1.0 - SURE and exactly >= LIKELY:
         return Verdict.CAUSE_NAMED, sure
     if unknown >= LIKELY * (1.0 - nothing):
-        return Verdict.UNEXPLAINED_STRUCTURE, ()
+        return (Verdict.CAUSE_AMBIGUOUS, (*sure, UNCATALOGUED)) if sure else (Verdict.UNEXPLAINED_STRUCTURE, ())
     return Verdict.CAUSE_AMBIGUOUS, tuple(dict.fromkeys(slug for effects in smallest(shares) for slug in effects))
 
 
@@ -59,3 +73,75 @@ def smallest(shares: Mapping[tuple[str, ...], float]) -> list[tuple[str, ...]]:
             chosen.append(effects)
             mass += share
     return chosen
+
+
+def judge(posterior: Posterior) -> Judgement:
+    """The judgement before validation: the verdict, and what was fitted behind it."""
+    explanations = explanations_of(posterior)
+    verdict, causes = decide(explanations)
+    fitted = _fitted(posterior, explanations)
+    shares = {explanation.effects: explanation.probability for explanation in explanations}
+    sets = {Verdict.CAUSE_NAMED: [causes], Verdict.CAUSE_AMBIGUOUS: smallest(shares)}.get(verdict, [])
+    chosen = {_averaged_causes(effects, posterior) for effects in sets}
+    stand = tuple(each for each in fitted if frozenset(each.slugs) in chosen)
+    unnamed = [alternative for alternative in posterior.probabilities if alternative.unknown]
+    return Judgement(
+        verdict=verdict,
+        causes=causes,
+        explanations=explanations,
+        stand=stand,
+        others=tuple(each for each in fitted if each not in stand),
+        where=_where({a.unknown: w - posterior.prior(a) for a, w in posterior.weights.items() if not a.causes}),
+        left=_where(posterior.nodes[Alternative(tuple(sorted(stand[0].slugs)))].evidence.structure) if stand else (),
+        likest=unnamed[0].unknown if unnamed and unnamed[0].unknown in FAULT_BY_SLUG else None,
+        evidence={
+            a.causes[0]: w - posterior.prior(a)
+            for a, w in posterior.weights.items()
+            if len(a.causes) == 1 and not a.unknown
+        },
+    )
+
+
+def _averaged_causes(effects: Sequence[str], posterior: Posterior) -> frozenset[str]:
+    """Those of an explanation that averages of plateaus and loops show."""
+    return frozenset(effects) - {UNCATALOGUED, *posterior.vibrations}
+
+
+def _fitted(posterior: Posterior, explanations: Sequence[Explanation]) -> tuple[Fitted, ...]:
+    """The causes that were fitted, alone and in pairs, most probable first."""
+    found = []
+    for alternative, node in posterior.nodes.items():
+        if alternative == NOTHING or alternative.unknown:
+            continue
+        same = frozenset(alternative.causes)
+        found.append(
+            Fitted(
+                slugs=tuple(effect.effect.slug for effect in node.fit.effects),
+                fit=node.fit,
+                evidence=posterior.weights[alternative] - posterior.prior(alternative),
+                probability=sum(e.probability for e in explanations if _averaged_causes(e.effects, posterior) == same),
+            )
+        )
+    return tuple(sorted(found, key=lambda each: -posterior.weights[Alternative(tuple(sorted(each.slugs)))]))
+
+
+def _where(evidence: Mapping[str, float]) -> tuple[Where, ...]:
+    """The axes on which what has no name lies, by the most of its evidence [nats]."""
+    axes: dict[str, float] = {}
+    for unknown, value in evidence.items():
+        if axis := axis_of(unknown):
+            axes[axis] = max(axes.get(axis, 0.0), value)
+    return tuple(Where(axis=axis, strength=value) for axis, value in sorted(axes.items(), key=lambda item: -item[1]))
+
+
+def revise(judgement: Judgement, held_out: HeldOut | None) -> Judgement:
+    """With what validation says of an extension; `held_out` is how the extended model does, None where nothing could be held
+    out. The verdict stays."""
+    proposal = Proposal.PROPOSED if judgement.stand else Proposal.NONE
+    if judgement.stand and held_out is not None:
+        if held_out.rmse_after > MOST_WORSE * held_out.rmse_before:
+            proposal = Proposal.WITHHELD_ERROR
+        elif held_out.log_score_gain < 0:
+            proposal = Proposal.WITHHELD_LOG_SCORE
+    follow = held_out is not None and held_out.forecast_log_score_gain > 0
+    return replace(judgement, proposal=proposal, follow_courses=follow)

@@ -16,13 +16,13 @@ import numpy as np
 from scipy.special import erfcx
 
 from models.arrays import FloatArray
-from models.diagnosis.criteria import CONTRAST_SIZES, NEIGHBOUR_ERRORS, TEMPLATE_ERRORS
+from models.diagnosis.criteria import CONTRAST_SIZES, TEMPLATE_ERRORS
 from models.diagnosis.design.design import Design
-from models.diagnosis.detection.contrasts import contrasts_of, no_contrasts
 from models.diagnosis.effects.amplitude_prior import log_peak
 from models.diagnosis.effects.fitted_effect import effect_precisions, effect_rows, free_shapes
 from models.diagnosis.effects.grid import Column, columns_at_rows
 from models.diagnosis.effects.template_discrepancy import discrepancy_factors
+from models.diagnosis.explanations.contrasts import contrasts_of, no_contrasts
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.gram import Gram, gram_of
@@ -36,13 +36,11 @@ _SPEED, _PRESSURE, _LIFE, _CLOCK, _HARMONICS = 4, 2, 3, 3, 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
-    """About one fit [nats, up to one constant]: `exact` with exact templates, `whole` with their errors, `neighbour` with
-    errors so wide that it is another effect; `structure` by axis what smooth structure adds to `whole`, and `patterns` its
-    likeliest form [N] Nm; `screened` are the given columns projected off the fit, one for each scatter of the gains."""
+    """About one fit [nats, up to one constant]: `whole` with the templates' errors; `structure` by axis what smooth
+    structure adds to it, and `patterns` its likeliest form [N] Nm; `screened` are the given columns projected off the fit,
+    one for each scatter of the gains."""
 
-    exact: float
     whole: float
-    neighbour: float
     structure: Mapping[str, float]
     patterns: Mapping[str, FloatArray]
     screened: tuple[Projected, ...]
@@ -65,23 +63,19 @@ def evidence_of(problem: FitProblem, fitted: Fit, columns: Sequence[Column] = ()
     axes = np.array(contrasts.axes)
     places = {axis: contrasted.start + np.flatnonzero(axes == axis) for axis in dict.fromkeys(contrasts.axes)}
     prior = _log_prior(fitted)
-    exacts, wholes, wides, screened = [], [], [], []
+    wholes, screened = [], []
     structures: dict[str, list[float]] = {axis: [] for axis in places}
-    projections = _projections(gram, problem.noise)
+    projections = projections_beside(gram, problem.noise)
     for projected in projections:
         base = projected.evidence + _beside_bounds(projected, held, outward) + prior
-        exacts.append(base)
         wholes.append(base + _averaged(projected, wrong, own, TEMPLATE_ERRORS))
-        wides.append(base + _averaged(projected, wrong, own, NEIGHBOUR_ERRORS))
         for axis, mine in places.items():
             structures[axis].append(base + _structure(projected.info[np.ix_(mine, mine)], projected.score[mine]))
         info, score = projected.info[catalogue, catalogue], projected.score[catalogue]
         screened.append(replace(projected, info=info, score=score, whole=projected.whole[catalogue], evidence=base))
     whole = log_sum(wholes)
     return Evidence(
-        exact=log_sum(exacts),
         whole=whole,
-        neighbour=log_sum(wides) if fitted.effects else -np.inf,
         structure={axis: log_sum(logs) - whole for axis, logs in structures.items()},
         patterns={
             axis: contrasts.columns[:, axes == axis] @ _likeliest(projections[int(np.argmax(structures[axis]))], mine)
@@ -91,7 +85,7 @@ def evidence_of(problem: FitProblem, fitted: Fit, columns: Sequence[Column] = ()
     )
 
 
-def _projections(gram: Gram, noise: Noise) -> list[Projected]:
+def projections_beside(gram: Gram, noise: Noise) -> list[Projected]:
     """At every second scatter of the runs' gains, with the curves' as estimated without an effect and with none: an effect
     may be what made them scatter."""
     return [project(gram, gain, curve) for curve in sorted({noise.curve_gain, 0.0}) for gain in GAINS[::2].tolist()]

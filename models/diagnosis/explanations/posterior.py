@@ -1,10 +1,10 @@
 """The posterior over what may be behind a campaign: an exclusive list, each with a log prior and a log evidence.
 
-    nothing | e | e + f | u | S_k | e + S_k | e + u | ~e | T | a line
+    nothing | e | e + f | u | S_k | e + S_k | e + u | T | a line | an outlying run
 
-e, f are effects of the catalogue, u faults of the same catalogue that may not be named, S_k smooth structure on axis k, ~e
-something like e that is in no catalogue, T an oil temperature that nobody measured, a line is torque that swings with the
-tests' clock or at one frequency in raw records. Their probabilities sum to one, and a verdict is read off them alone.
+e, f are effects of the catalogue, u faults of the same catalogue that may not be named, S_k smooth structure on axis k, T an
+oil temperature that nobody measured, a line is torque that swings with the tests' clock or at one frequency in raw records.
+Their probabilities sum to one, and a verdict is read off them alone.
 
 The search goes up, best first: what the linear screen about a refitted alternative promises of one thing more is refitted,
 while it could hold more than NEGLIGIBLE of the posterior; the promise errs by a share SLACK of the leader's lead. Then
@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit
 
-from models.diagnosis.attribution.unmeasured_temperature import temperature_evidence
 from models.diagnosis.criteria import (
     ANYTHING_WRONG,
     MOST_REFITS,
@@ -28,21 +27,23 @@ from models.diagnosis.criteria import (
     UNCATALOGUED_SHARE,
     VIBRATION_TRACE,
 )
-from models.diagnosis.detection.periodogram import lines
-from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.effects.catalogue import BY_SLUG, effects_for
 from models.diagnosis.effects.catalogued import oil_temperature
 from models.diagnosis.effects.effect import Kind, Shape
 from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.grid import Column, columns_of
-from models.diagnosis.explanations.alternative import LINE, LINES, NOTHING, Alternative, axis_of, is_axis, neighbour_of
+from models.diagnosis.explanations.alternative import LINE, LINES, NOTHING, OUTLIER, Alternative, is_axis
 from models.diagnosis.explanations.evidence import Evidence, evidence_of
+from models.diagnosis.explanations.lines import lines
+from models.diagnosis.explanations.outlying_run import outlier_evidence
 from models.diagnosis.explanations.refit import refit, refit_beside
 from models.diagnosis.explanations.screen import Start, starts, stiff
+from models.diagnosis.explanations.unmeasured_temperature import temperature_evidence
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.raw_records.evidence import RawEvidence
 from models.gaussian_evidence import log_sum
 
 #: What kinds of shapes that were not refitted may add to those that were at most [nats] (numerical: a bound on an estimate).
@@ -97,7 +98,7 @@ class Posterior:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prior:
     """Log prior odds against nothing at work: ANYTHING_WRONG that anything is, UNCATALOGUED_SHARE of it nothing of the
-    catalogue (half of that a neighbour of an effect), SECOND a second thing beside the first; evenly within each."""
+    catalogue, SECOND a second thing beside the first; evenly within each."""
 
     effects: int
     unknowns: int
@@ -107,10 +108,9 @@ class Prior:
             return 0.0
         wrong = np.log(ANYTHING_WRONG / (1 - ANYTHING_WRONG))
         of_effect = np.log1p(-UNCATALOGUED_SHARE) - np.log(self.effects)
-        of_unknown = np.log(UNCATALOGUED_SHARE / 2) - np.log(self.unknowns)
+        of_unknown = np.log(UNCATALOGUED_SHARE) - np.log(self.unknowns)
         if not alternative.causes:
-            has_axis = bool(axis_of(alternative.unknown))
-            return float(wrong + (of_unknown if has_axis else np.log(UNCATALOGUED_SHARE / 2) - np.log(self.effects)))
+            return float(wrong + of_unknown)
         value = wrong + of_effect
         if len(alternative.causes) > 1:  # in either order
             value += np.log(SECOND) + np.log(2.0) + np.log1p(-UNCATALOGUED_SHARE) - np.log(max(self.effects - 1, 1))
@@ -133,7 +133,7 @@ class Search:
             raise ArithmeticError("the baseline's evidence is not finite")
         faults = {column.effect.slug for column in self._columns} & set(FAULT_BY_SLUG)
         self.prior = Prior(
-            effects=max(len(effects), 1), unknowns=len(null.evidence.structure) + len(faults) + len(LINES)
+            effects=max(len(effects), 1), unknowns=len(null.evidence.structure) + len(faults) + len(LINES) + 1
         )
         firsts = [kinds[0] for kinds in starts(self._columns, null.evidence.screened).values()]
         best = max(firsts, key=lambda start: start.promise, default=None)
@@ -145,6 +145,8 @@ class Search:
         self.nodes: dict[Alternative, list[Node]] = {NOTHING: [null]}
         self.refits = 0
         self._promises: dict[tuple[Alternative, Shape], tuple[float, Node, Start | None]] = {}
+        self._failed = set[Alternative]()
+        self._nearest: dict[tuple[Alternative, Shape], tuple[float, float]] = {}
         self._promise(NOTHING, null)
 
     @property
@@ -165,7 +167,7 @@ class Search:
             self._down(leader)
 
     def weights(self) -> dict[Alternative, float]:
-        """Log weights of everything about the nodes: themselves, structure beside them, neighbours of single effects."""
+        """Log weights of everything about the nodes: themselves, and structure beside them."""
         out: dict[Alternative, float] = {}
         for alternative, nodes in self.nodes.items():
             out[alternative] = self._evidence(alternative) + self.prior(alternative)
@@ -176,10 +178,6 @@ class Search:
                 if beside not in self.nodes:
                     logs = [node.log_evidence + node.evidence.structure[axis] for node in nodes]
                     out[beside] = log_sum(logs) + self.prior(beside)
-            if alternative.causes:
-                like = neighbour_of(alternative.causes[0])
-                logs = [n.log_evidence - n.evidence.whole + n.evidence.neighbour for n in nodes]
-                out[like] = log_sum(logs) + self.prior(like)
         return out
 
     def _evidence(self, alternative: Alternative) -> float:
@@ -200,7 +198,12 @@ class Search:
             hopes = {key: self._hope(key, leader, slack) for key in self._promises}
             key = max(hopes, key=lambda key: hopes[key])
             if hopes[key] < log_sum(list(weights.values())) + np.log(NEGLIGIBLE):
-                return
+                causes = [key for key in hopes if key[0].causes]
+                if not causes or leader.causes or not leader.unknown or any(other.causes for other in self.nodes):
+                    return
+                key = max(
+                    causes, key=lambda key: hopes[key]
+                )  # structure leads causes only once one of them was refitted
             promise, parent, start = self._promises.pop(key)
             self.refits += 1
             if start is None:
@@ -208,6 +211,8 @@ class Search:
             else:
                 shape_evidence = (*parent.shape_evidence, start.column.log_weight_around)
                 self._add(key[0], parent.fit, (*parent.fit.effects, start.fitted), shape_evidence, promise)
+            if key[0] not in self.nodes:
+                self._failed.add(key[0])
 
     def _hope(self, key: tuple[Alternative, Shape], leader: Alternative, slack: float) -> float:
         """A promise, less what refits of the same alternative fell short of theirs, and the slack where it explains what the
@@ -290,20 +295,26 @@ class Search:
             if more not in self.nodes:
                 promises[more, ()] = (node.log_evidence + gained + self.prior(more), node, None)
         for key, promise in promises.items():
+            self._nearest[key] = max(self._nearest.get(key, (-np.inf, -np.inf)), (node.log_evidence, promise[0]))
             if key not in self._promises or promise[0] > self._promises[key][0]:
                 self._promises[key] = promise
 
     def posterior(self, raw: Sequence[RawEvidence], without: frozenset[str]) -> Posterior:
-        """The list as far as it was searched; what was not refitted counts as it was screened."""
+        """The list as far as it was searched; what was not refitted counts as it was screened
+        about the likeliest parent, no more than what was refitted; a refit that failed excludes it."""
         weights = self.weights()
-        for (alternative, _), (promise, _, start) in self._promises.items():
-            if alternative not in self.nodes and start is not None:
-                weights[alternative] = float(np.logaddexp(weights.get(alternative, -np.inf), promise))
+        most = max(weights.values())
+        for key, (_, _, start) in self._promises.items():
+            if key[0] not in self.nodes and key[0] not in self._failed and start is not None:
+                promise = min(self._nearest[key][1], most)
+                weights[key[0]] = float(np.logaddexp(weights.get(key[0], -np.inf), promise))
         null = self.null
         swinging = {record.effect: record.log_evidence for record in raw if record.effect in LINES}
-        for unknown, value in {LINE: _worth(lines(self.problem, null.fit.residual).p_value), **swinging}.items():
+        for unknown, value in {LINE: lines(self.problem, null.fit.residual).evidence, **swinging}.items():
             line = Alternative((), unknown)
             weights[line] = null.log_evidence + value + self.prior(line)
+        outlier = Alternative((), OUTLIER)
+        weights[outlier] = outlier_evidence(self.problem, null.fit) + self.prior(outlier)
         facts = self.problem.design.facts
         if not facts.temperature_measured and oil_temperature.EFFECT.slug not in without:
             warm = Alternative((oil_temperature.EFFECT.slug,))
@@ -325,12 +336,6 @@ class Search:
             columns=tuple(self._columns),
             refits=self.refits,
         )
-
-
-def _worth(p_value: float) -> float:
-    """What a p-value is worth at most [nats], 1/(-e p ln p) (Sellke, Bayarri and Berger, Am. Stat. 55 (2001) 62)."""
-    rare = -float(np.log(max(p_value, 1e-300)))
-    return rare - 1.0 - float(np.log(rare)) if rare > 1.0 else 0.0
 
 
 def is_vibration(record: RawEvidence) -> bool:

@@ -34,9 +34,8 @@ class IndeterminateError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Baseline:
-    """The pooled fit without effects, its problem (with the noise estimated), where it started, and notes for the report."""
+    """The pooled fit without effects, its problem (with the noise estimated), and notes for the report."""
 
-    start: Laws
     problem: FitProblem
     fit: Fit
     notes: tuple[str, ...]
@@ -66,16 +65,10 @@ def fit_baseline(design: Design) -> Baseline:
     problem, _ = _with_estimated_noise(problem, first)
     # with a noise that was only assumed the first fit may have ended in another valley
     second = _best_of(problem, starts, _ROUGH)
-    return _with_its_noise(start, problem, _best_of(problem, (first.laws, second.laws), STEPS))
+    return _with_its_noise(problem, _best_of(problem, (first.laws, second.laws), STEPS))
 
 
-def from_better(baseline: Baseline, better: Fit) -> Baseline:
-    """The baseline from a fit that does better, with the noise that this one's residuals show. Raises IndeterminateError."""
-    noise = replace(baseline.problem.noise, curve_gain=0.0)  # estimated again, as all of the noise is
-    return _with_its_noise(baseline.start, baseline.problem.with_noise(noise), better)
-
-
-def _with_its_noise(start: Laws, problem: FitProblem, fitted: Fit) -> Baseline:
+def _with_its_noise(problem: FitProblem, fitted: Fit) -> Baseline:
     """A fit followed to its end under the noise that its residuals show."""
     problem, assumed = _with_estimated_noise(replace(problem, fitted=fitted.torque), fitted)
     fitted = fit(problem, fitted.laws)
@@ -84,7 +77,7 @@ def _with_its_noise(start: Laws, problem: FitProblem, fitted: Fit) -> Baseline:
     if curve_gain > 0.0:
         problem = problem.with_noise(replace(problem.noise, curve_gain=curve_gain))
         fitted = fit(problem, fitted.laws)
-    return Baseline(start=start, problem=problem, fit=fitted, notes=_notes(problem.design, fitted, assumed))
+    return Baseline(problem=problem, fit=fitted, notes=_notes(problem.design, fitted, assumed))
 
 
 def _require_weights(problem: FitProblem, fitted: Fit) -> None:
@@ -116,7 +109,7 @@ def _notes(design: Design, fitted: Fit, assumed: bool) -> tuple[str, ...]:
     if assumed:
         notes.append("Too few rows to estimate the noise: 1 % of the torque is assumed.")
     if not design.facts.temperature_measured:
-        notes.append("No oil temperature was measured: no cause that it could imitate is named.")
+        notes.append("No oil temperature was measured: any slow course of it competes with the other causes.")
     if fitted.status is FitStatus.OUT_OF_STEPS:
         notes.append(f"The baseline fit had not converged after {fitted.steps} steps.")
     return tuple(notes)

@@ -20,6 +20,9 @@ from scipy.special import logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis.criteria import LEAST_SCATTER_INFORMATION
+from models.diagnosis.noise.covariance import by_curve, gains_of, whitened
+from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import Projected, log_gain_prior
 
 #: Points of the grid over ln σ_g (numerical: the spline is smooth between the gains that were projected).
@@ -59,3 +62,17 @@ def run_scatter(projections: Sequence[Projected]) -> RunScatter:
 
 def _normalised(logs: FloatArray) -> FloatArray:
     return np.asarray(logs - logsumexp(logs), dtype=np.float64)
+
+
+def without_likely_gains(problem: FitProblem, fitted: Fit) -> FloatArray:
+    """The residual [N] Nm less what the likeliest gains of runs and curves make of it: r - M ĝ with the best linear
+    prediction ĝ = σ_g² Mᵀ V⁻¹ r / (1 + σ_g² Mᵀ V⁻¹ M)."""
+    design, noise = problem.design, problem.noise
+    gains = gains_of(design, fitted.torque, noise)
+    white = whitened(fitted.residual[:, None], design, noise)
+    along = by_curve(white, gains)[:, 0]
+    freed = 1 / (1 + noise.curve_gain**2 * gains.squares)
+    squares, sums = gains.by_run(freed * gains.squares), gains.by_run(freed * along)
+    of_run = (noise.run_gain**2 * sums / (1 + noise.run_gain**2 * squares))[gains.run_of_curve]
+    of_curve = noise.curve_gain**2 * freed * (along - gains.squares * of_run)
+    return np.asarray(fitted.residual - fitted.torque * (of_run + of_curve)[gains.curve], dtype=np.float64)

@@ -5,49 +5,42 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.diagnosis.attribution.evidence import Hypothesis
-from models.diagnosis.attribution.sizes import Size
-from models.diagnosis.attribution.verdict import Explanation, Judgement
 from models.diagnosis.criteria import LEAST_LISTED
-from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import sized
 from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.explanations.sizes import Size
+from models.diagnosis.explanations.verdict import Explanation, Judgement
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import amplitude_deviations
+from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.report import Candidate
 
 
 def candidates_of(
-    problem: FitProblem,
-    judgement: Judgement,
-    hypotheses: Sequence[Hypothesis],
-    raw: Sequence[RawEvidence],
-    sizes: Mapping[str, Size],
+    problem: FitProblem, judgement: Judgement, raw: Sequence[RawEvidence], sizes: Mapping[str, Size]
 ) -> tuple[Candidate, ...]:
     """Each effect as the verdict has it, else alone, else beside the one that it goes with best."""
     records = {record.effect: record for record in raw}
-    alone = [hypothesis for hypothesis in hypotheses if len(hypothesis.effects) == 1 and hypothesis.usable]
-    unmeasured = judgement.comparison.unmeasured if judgement.comparison is not None else None
+    alone = [fitted for fitted in judgement.others if len(fitted.slugs) == 1]
     candidates = []
     for slug, probability in judgement.probabilities.items():
         if probability < LEAST_LISTED and slug not in judgement.causes:
             continue
-        beside: tuple[str, ...] = ()
-        hypothesis = next((h for h in (*judgement.credible, *alone, *hypotheses) if slug in h.slugs), None)
-        if hypothesis is not None and hypothesis.fit is not None:
-            place = hypothesis.slugs.index(slug)
-            deviation = amplitude_deviations(problem, hypothesis.fit)[place]
-            estimate = _estimate(slug, hypothesis.fit.effects[place].amplitude, deviation)
+        fitted = next((f for f in (*judgement.stand, *alone, *judgement.others) if slug in f.slugs), None)
+        evidence = judgement.evidence.get(slug, 0.0)
+        if fitted is not None:
+            place = fitted.slugs.index(slug)
+            estimate = _estimate(
+                slug, fitted.fit.effects[place].amplitude, amplitude_deviations(problem, fitted.fit)[place]
+            )
             if slug in sizes:
                 estimate = _sized(slug, sizes[slug])
-            evidence = hypothesis.evidence
-            beside = tuple(other for other in hypothesis.slugs if other != slug)
+            evidence = fitted.evidence
         elif slug in records:
             estimate, evidence = _finite_estimate(records[slug].estimate), records[slug].log_evidence
         else:  # screened only, or an oil temperature that was not measured
             estimate = _estimate(slug, 0.0, sized(BY_SLUG[slug], problem.design.facts).prior_sd)
-            evidence = hypothesis.evidence if hypothesis is not None else (unmeasured or 0.0)
         candidates.append(
             Candidate(
                 effect=slug,
@@ -55,8 +48,8 @@ def candidates_of(
                 probability=probability,
                 log_evidence_gain=_finite(evidence),
                 estimate=estimate,
-                beside=beside,
-                fit=None if hypothesis is None else hypothesis.status,
+                beside=() if fitted is None else tuple(other for other in fitted.slugs if other != slug),
+                fit=None if fitted is None else fitted.fit.status,
             )
         )
     return tuple(candidates)

@@ -1,10 +1,10 @@
 """The extension that a judgement proposes for adoption, and why none is."""
 
-from models.diagnosis.attribution.sizes import Size, Sizes
-from models.diagnosis.attribution.verdict import Judgement, Proposal
 from models.diagnosis.criteria import SIGN_UNDETERMINED
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.template_discrepancy import ranges_of
+from models.diagnosis.explanations.sizes import Size, Sizes
+from models.diagnosis.explanations.verdict import Judgement, Proposal
 from models.diagnosis.extension import Extension, build_extension
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.report.wording import effect_name, number

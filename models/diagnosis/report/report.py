@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from models.arrays import FloatArray
-from models.diagnosis.attribution.evidence import HypothesisStatus
-from models.diagnosis.attribution.verdict import Explanation, Verdict
-from models.diagnosis.detection.lack_of_fit import Misfit
 from models.diagnosis.effects.estimate import Estimate
 from models.diagnosis.experiments.test_plan import Advice
+from models.diagnosis.explanations.verdict import Explanation, Verdict
 from models.diagnosis.extension import Extension
+from models.diagnosis.pooled_fit.gauss_newton import FitStatus
+from models.diagnosis.report.lack_of_fit import Misfit
 from models.diagnosis.validation.held_out import Gain
 
 
@@ -25,7 +25,7 @@ class Candidate:
     log_evidence_gain: float
     estimate: Estimate
     beside: tuple[str, ...] = ()
-    fit: HypothesisStatus | None = None
+    fit: FitStatus | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,39 +1,27 @@
-"""The engine's numbers in a report, by public name: alarm statistics, their thresholds, p-values of the check,
-the scatter from run to run."""
+"""Numbers of the computation in a report, by public name."""
 
 import numpy as np
 
-from models.diagnosis.attribution.verdict import Comparison
-from models.diagnosis.detection.alarm import Alarms
-from models.diagnosis.effects.catalogued import oil_temperature
+from models.diagnosis.explanations.alternative import NOTHING
+from models.diagnosis.explanations.posterior import Posterior
+from models.diagnosis.explanations.verdict import Judgement
 from models.diagnosis.pooled_fit.run_scatter import RunScatter
 
 
-def statistics_of(alarms: Alarms, comparison: Comparison | None, scatter: RunScatter) -> dict[str, float]:
-    """All finite numbers [nats; p-values and scatter as they are]; those of a comparison where hypotheses were compared."""
-    numbers: dict[str, float] = {
+def statistics_of(posterior: Posterior, judgement: Judgement, scatter: RunScatter) -> dict[str, float]:
+    """All finite numbers: the scatter from run to run, the log evidence [nats] of what is likeliest over nothing and the
+    same with its prior, the evidence of the strongest axis, refits."""
+    probabilities = posterior.probabilities
+    best = next(iter(probabilities))
+    numbers = {
         "run_scatter": scatter.median,
         "run_scatter_lower": scatter.lower,
         "run_scatter_upper": scatter.upper,
         "run_scatter_information": scatter.information,
+        "probability_nothing": probabilities[NOTHING],
+        "log_evidence": posterior.weights[best] - posterior.prior(best),
+        "log_posterior_odds": posterior.weights[best],
+        "structure": judgement.where[0].strength if judgement.where else 0.0,
+        "refits": float(posterior.refits),
     }
-    for name, alarm in (("effects", alarms.effects), ("contrasts", alarms.contrasts), ("lines", alarms.lines)):
-        numbers |= {
-            f"{name}_value": alarm.value,
-            f"{name}_threshold": alarm.threshold,
-            f"{name}_p_value": alarm.p_value,
-        }
-    if comparison is not None:
-        check = comparison.check
-        numbers |= {
-            "lambda": comparison.best_drop,
-            "structure": comparison.structure,
-            "tolerance": comparison.tolerance,
-            "standing": float(comparison.credible),
-            "undoing": check.undoing,
-        }
-        for name, statistic in (("closure", check.left), ("parts", check.parts), ("left_lines", check.lines)):
-            numbers |= {f"{name}_value": statistic.value, f"{name}_p_value": statistic.p_value}
-        if comparison.unmeasured is not None:
-            numbers[f"{oil_temperature.EFFECT.slug}_unmeasured"] = comparison.unmeasured
     return {name: value for name, value in numbers.items() if np.isfinite(value)}

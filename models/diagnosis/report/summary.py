@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from models.diagnosis.attribution.explanations import credible_explanations
-from models.diagnosis.attribution.verdict import UNCATALOGUED, Explanation, Verdict
 from models.diagnosis.criteria import (
     COMPANION_FROM,
     FAR_FROM_FIT,
@@ -21,11 +19,13 @@ from models.diagnosis.criteria import (
     WORTHWHILE,
 )
 from models.diagnosis.design.axes import PRESSURE
-from models.diagnosis.detection.lack_of_fit import Misfit
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.experiments.test_plan import BASELINE, Advice
+from models.diagnosis.explanations.decide import smallest
+from models.diagnosis.explanations.outlying_run import ADVICE
+from models.diagnosis.explanations.verdict import UNCATALOGUED, Explanation, Verdict
 from models.diagnosis.pooled_fit.run_scatter import RunScatter
-from models.diagnosis.report.outlying_run import ADVICE
+from models.diagnosis.report.lack_of_fit import Misfit
 from models.diagnosis.report.report import Candidate, Visible
 from models.diagnosis.report.wording import (
     axis_name,
@@ -175,10 +175,9 @@ def _ambiguous(findings: Findings) -> list[Sentence]:
     """The explanations among which the choice is, each with its probability, and each effect's size where it first comes."""
     sized = {candidate.effect: candidate.estimate for candidate in findings.candidates}
     listed = []
-    for item in credible_explanations(findings.explanations):
-        names = (
-            [effect_name(slug) for slug in item.effects if slug != UNCATALOGUED] if item.effects else ["nothing at all"]
-        )
+    near = smallest({item.effects: item.probability for item in findings.explanations})
+    for item in (item for item in findings.explanations if item.effects in near):
+        names = [effect_name(slug) for slug in item.effects if slug != UNCATALOGUED]
         if UNCATALOGUED in item.effects:
             names.append(
                 f"something that is not in the catalogue{f', such as {findings.resembles}' if findings.resembles else ''}"

@@ -5,8 +5,11 @@ what the effect does, and costs evidence. So an amplitude counts as visible wher
 
     a = max over σ of √(2 (λ_90 - L* + L(σ))₊/info(σ)),     λ_90 = ½ (√(2 t) + 1.28)²
 
-with L(σ) the evidence of a scatter, L* the largest, and t the alarm's threshold [nats]: the alarm is a maximum over normal
-deviates, and that of an effect with λ_90 exceeds √(2 t) nine times in ten.
+with L(σ) the evidence of a scatter and L* the largest. The model is called wrong where the effect's posterior odds against
+nothing are even: where the drop of the cost pays for the prior odds of the effect, for that of its shape and for the freedom
+of its amplitude, of prior deviation s in the narrower or the wider of two (`amplitude_prior.SCALES`),
+
+    t = -ln(prior odds) - ln p(shape) + ln 2 + min over s of ½ ln(1 + s² info).
 """
 
 import numpy as np
@@ -14,19 +17,20 @@ from scipy.special import ndtri
 
 from models.arrays import FloatArray
 from models.diagnosis.criteria import LEAST_VISIBLE_SHARE, VISIBLE_POWER
-from models.diagnosis.detection.projected_fit import ProjectedFit
+from models.diagnosis.effects.amplitude_prior import SCALES
+from models.diagnosis.explanations.alternative import Alternative
+from models.diagnosis.explanations.posterior import Posterior
 from models.diagnosis.report.report import Visible
 
 
-def visible_of(projected: ProjectedFit, threshold: float) -> tuple[Visible, ...]:
-    """What each effect's alarm, raised beyond `threshold` [nats], shows with a probability of VISIBLE_POWER: in whatever of
-    its shapes, and in the one that shows best. Infinite where a shape would be absorbed at any amplitude; effects of which
-    nothing shows are left out."""
-    amplitudes = _amplitudes(projected, threshold)
+def visible_of(posterior: Posterior) -> tuple[Visible, ...]:
+    """What each effect would be seen by with a probability of VISIBLE_POWER: in whatever of its shapes, and in the one that
+    shows best. Infinite where a shape would be absorbed at any amplitude; effects of which nothing shows are left out."""
     sizes: dict[str, list[float]] = {}
-    effects = {column.effect.slug: column.effect for column in projected.columns}
-    for column, amplitude in zip(projected.columns, amplitudes.tolist(), strict=True):
-        sizes.setdefault(column.effect.slug, []).append(amplitude * column.effect.scale)
+    effects = {column.effect.slug: column.effect for column in posterior.columns}
+    for column, amplitude in zip(posterior.columns, _amplitudes(posterior).tolist(), strict=True):
+        if column.effect.named:
+            sizes.setdefault(column.effect.slug, []).append(amplitude * column.effect.scale)
     return tuple(
         Visible(
             effect=slug,
@@ -40,15 +44,20 @@ def visible_of(projected: ProjectedFit, threshold: float) -> tuple[Visible, ...]
     )
 
 
-def _amplitudes(projected: ProjectedFit, threshold: float) -> FloatArray:
+def _amplitudes(posterior: Posterior) -> FloatArray:
     """The formula above for each column [m], in SI units."""
-    needed = 0.5 * (np.sqrt(2 * threshold) + float(ndtri(VISIBLE_POWER))) ** 2
-    best = projected.likely.evidence
-    largest = np.zeros(len(projected.columns))
-    for projection in projected.projections:
-        info = np.diag(projection.info)[projected.effects]
-        shown = info > LEAST_VISIBLE_SHARE * projection.whole[projected.effects]
-        left = max(needed - best + projection.evidence, 0.0)
+    columns, projections = posterior.columns, posterior.null.evidence.screened
+    best = max(projected.evidence for projected in projections)
+    sd = np.array([column.effect.prior_sd for column in columns])
+    odds = posterior.prior(Alternative(("",)))
+    paid = np.array([-odds - column.log_weight for column in columns]) + np.log(len(SCALES))
+    largest = np.zeros(len(columns))
+    for projected in projections:
+        info = np.maximum(np.diag(projected.info), 0.0)
+        freedom = 0.5 * np.min([np.log1p((scale * sd) ** 2 * info) for scale in SCALES], axis=0)
+        needed = 0.5 * (np.sqrt(2 * (paid + freedom)) + float(ndtri(VISIBLE_POWER))) ** 2
+        left = np.maximum(needed - best + projected.evidence, 0.0)
+        shown = info > LEAST_VISIBLE_SHARE * projected.whole
         amplitude = np.sqrt(2 * left / np.where(shown, info, 1.0))
-        largest = np.maximum(largest, np.where(shown, amplitude, np.inf if left > 0 else 0.0))
+        largest = np.maximum(largest, np.where(shown, amplitude, np.where(left > 0, np.inf, 0.0)))
     return largest

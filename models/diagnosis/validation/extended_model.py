@@ -1,12 +1,10 @@
 """The extended model of a judgement: the effects that it names, fitted together; its gain is that of `held_out`."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from models.diagnosis.attribution.verdict import HeldOut, Judgement, Verdict
-from models.diagnosis.detection.structure_axes import Where
+from models.diagnosis.explanations.verdict import HeldOut, Judgement, Verdict
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.validation.held_out import Gain, measure_gain
@@ -33,12 +31,10 @@ class Validation:
         )
 
 
-def validate(
-    problem: FitProblem, baseline: Fit, judgement: Judgement, where: Iterable[Where], rng: np.random.Generator
-) -> Validation:
-    """Extend the baseline by the likeliest hypothesis, or by a smooth correction on the axes of unexplained structure."""
-    extended = next((hypothesis.fit for hypothesis in judgement.credible if hypothesis.fit is not None), None)
+def validate(problem: FitProblem, baseline: Fit, judgement: Judgement, rng: np.random.Generator) -> Validation:
+    """Extend the baseline by the likeliest causes, or by a smooth correction on the axes of unexplained structure."""
+    extended = judgement.stand[0].fit if judgement.stand else None
     if judgement.verdict is Verdict.UNEXPLAINED_STRUCTURE:
-        extended = smooth_fit(problem, baseline, [axis.axis for axis in where if axis.axis in AXES])
+        extended = smooth_fit(problem, baseline, [axis.axis for axis in judgement.where if axis.axis in AXES])
     gain = None if extended is None else measure_gain(problem, baseline, extended, rng)
     return Validation(extended=extended, gain=gain)

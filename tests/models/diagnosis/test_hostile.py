@@ -7,9 +7,9 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
 from models.diagnosis.diagnose import diagnose
+from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.report.report import Report
 from models.records.runs import Plateaus, Record
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.diagnose import diagnose
+from models.diagnosis.explanations.verdict import Verdict
 from tests.models.diagnosis.rehearsals import rehearsal
 
 

@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from models.diagnosis.attribution.verdict import Explanation, Verdict
 from models.diagnosis.campaign import Campaign, StationaryRun
-from models.diagnosis.detection.lack_of_fit import Misfit
-from models.diagnosis.detection.structure_axes import Where
 from models.diagnosis.effects.estimate import Estimate
 from models.diagnosis.experiments.protocol import Step
 from models.diagnosis.experiments.test_plan import Advice
+from models.diagnosis.explanations.verdict import Explanation, Verdict, Where
 from models.diagnosis.extension import Extension
+from models.diagnosis.report.lack_of_fit import Misfit
 from models.diagnosis.report.report import Candidate, LoopTrace, Maps, Report, Visible
 from models.diagnosis.validation.held_out import Gain
 
@@ -57,7 +56,7 @@ def _report(campaign: Campaign, extension: Extension | None) -> Report:
         rmse=0.3,
         noise=0.25,
         unexplained_share=0.3,
-        where=(Where(axis="oil_temperature_c", strength=30.0, p_value=1e-9),),
+        where=(Where(axis="oil_temperature_c", strength=30.0),),
     )
     table = np.arange(6.0).reshape(2, 3)
     table[0, 0] = np.nan

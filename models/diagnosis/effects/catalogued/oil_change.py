@@ -5,7 +5,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Resemblance, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
 
 #: Log prior odds [nats] of an unlogged change against a logged one (chosen; no table).
 _UNLOGGED = -2.0
@@ -53,5 +53,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=True,
     discrepancies=(Discrepancy.SPEED, Discrepancy.LIFE),
-    resembles_temperature=Resemblance.UNLESS_LOGGED,  # warmer oil is thinner, as fresh oil may be
 )

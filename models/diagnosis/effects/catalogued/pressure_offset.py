@@ -13,7 +13,6 @@ from models.diagnosis.effects.effect import (
     Family,
     Kind,
     Measure,
-    Resemblance,
     Shape,
     ShapeParameter,
     Tried,
@@ -92,5 +91,4 @@ EFFECT = Effect(
     grows_with=Measure.PRESSURE,
     before_lag=True,
     discrepancies=(Discrepancy.LIFE,),
-    resembles_temperature=Resemblance.ALWAYS,
 )

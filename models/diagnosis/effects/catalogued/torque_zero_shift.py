@@ -11,7 +11,6 @@ from models.diagnosis.effects.effect import (
     Family,
     Kind,
     Measure,
-    Resemblance,
     Shape,
     ShapeParameter,
     Tried,
@@ -134,5 +133,4 @@ EFFECT = Effect(
     grows_with=Measure.TORQUE,
     before_lag=False,
     discrepancies=(Discrepancy.LIFE, Discrepancy.CLOCK),
-    resembles_temperature=Resemblance.ALWAYS,
 )

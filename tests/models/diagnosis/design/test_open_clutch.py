@@ -5,20 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.baseline.laws import OPEN_DRAG, Laws
 from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
-from models.diagnosis.criteria import LEAST_NAMED, WORTHWHILE
+from models.diagnosis.criteria import SURE, WORTHWHILE
 from models.diagnosis.design.design import Design, build_design
-from models.diagnosis.detection.contrasts import contrasts_of
-from models.diagnosis.detection.projected_fit import parts_of
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.effects.effect import unit_changes
 from models.diagnosis.experiments.candidates import PASSES, TRIALS, runs_of, with_trial
-from models.diagnosis.experiments.rivals import Rival
 from models.diagnosis.experiments.test_plan import advise
+from models.diagnosis.explanations.contrasts import contrasts_of
+from models.diagnosis.explanations.evidence import evidence_of
+from models.diagnosis.explanations.verdict import Fitted, Verdict
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, missing_for_baseline
 from models.diagnosis.pooled_fit.starts import starting_laws
 from models.diagnosis.report.maps import loop_traces, residual_maps
@@ -161,12 +160,12 @@ def test_an_open_clutch_is_advised_where_it_decides(swung: Study) -> None:
         swung.extended(("inertia_torque", 0.001, ())),
         swung.extended(("squeeze_film", 0.005, (0.4, 0.8, 0.05, 0.7, 1.0, 1.0))),
     ]
-    standing = [Rival(fit=each, evidence=0.0) for each in fits]
+    standing = [Fitted(slugs=(), fit=each, evidence=0.0, probability=0.5) for each in fits]
     found = advise(swung.campaign, swung.problem, standing)
     opened_up = next(advice for advice in found if advice.key == "open_clutch")
     assert opened_up.nats > WORTHWHILE
     # of those that are sure to decide the shortest comes first
-    assert all(advice.probability >= LEAST_NAMED for advice in (found[0], opened_up))
+    assert all(advice.probability >= SURE for advice in (found[0], opened_up))
     assert found[0].minutes <= opened_up.minutes
 
 
@@ -178,7 +177,7 @@ def test_nothing_that_is_said_of_open_rows_is_no_number(given: Study, swung: Stu
     assert (noise.deviation > 0).all()
     assert np.isfinite(noise.deviation).all()
     extended = given.extended(("inertia_torque", 0.001, ()))
-    assert np.isfinite(parts_of(design, extended)).all()
+    assert np.isfinite(evidence_of(given.problem, extended).whole)
     maps = residual_maps(given.problem, fit, extended)
     assert maps is not None
     np.testing.assert_array_equal(maps.pressure, swung.design.levels)

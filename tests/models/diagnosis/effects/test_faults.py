@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.campaign import Campaign
@@ -14,6 +13,7 @@ from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import Effect
 from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
+from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.pooled_fit.starts import starting_laws
 from models.friction.stribeck import torque
 from tests.models.diagnosis.campaigns import Planted, Where, campaign

@@ -2,8 +2,8 @@
 
 import pytest
 
-from models.diagnosis.attribution.verdict import UNCATALOGUED, Explanation, Verdict
 from models.diagnosis.explanations.decide import decide
+from models.diagnosis.explanations.verdict import UNCATALOGUED, Explanation, Verdict
 
 U = UNCATALOGUED
 
@@ -26,6 +26,8 @@ def listed(shares: dict[tuple[str, ...], float]) -> tuple[Explanation, ...]:
         ({("a",): 0.85, (U,): 0.15}, Verdict.CAUSE_AMBIGUOUS, ("a", U)),
         ({("a",): 0.8, ("a", U): 0.2}, Verdict.CAUSE_AMBIGUOUS, ("a", U)),
         ({(U,): 0.5, ("a",): 0.3, (): 0.2}, Verdict.UNEXPLAINED_STRUCTURE, ()),
+        ({("a", U): 0.92, (U,): 0.08}, Verdict.CAUSE_AMBIGUOUS, ("a", U)),
+        ({("a", U): 0.8, (U,): 0.2}, Verdict.UNEXPLAINED_STRUCTURE, ()),
         ({(): 0.4, (U,): 0.35, ("a",): 0.25}, Verdict.UNEXPLAINED_STRUCTURE, ()),
         ({(): 0.4, (U,): 0.2, ("a",): 0.4}, Verdict.CAUSE_AMBIGUOUS, ("a", U)),
     ],

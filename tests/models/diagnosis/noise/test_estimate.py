@@ -7,11 +7,11 @@ import pytest
 from scipy.signal import lfilter
 
 from models.arrays import FloatArray
-from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.autocorrelation import Correlation, arma
 from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.diagnose import diagnose
+from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.noise.covariance import Noise, gains_of, whitened, without_gains
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline

@@ -5,16 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.diagnosis.attribution.check import Checks
-from models.diagnosis.attribution.decide import revise
-from models.diagnosis.attribution.evidence import Hypothesis
-from models.diagnosis.attribution.explanations import explanations_of
-from models.diagnosis.attribution.investigate import Investigation
-from models.diagnosis.attribution.search import SearchResult
-from models.diagnosis.attribution.sizes import Size, Sizes, sizes_of
-from models.diagnosis.attribution.verdict import Comparison, Judgement, Proposal, Verdict
-from models.diagnosis.detection.alarm import alarms_of
-from models.diagnosis.detection.projected_fit import project_fit
+from models.diagnosis.explanations.decide import judge, revise
+from models.diagnosis.explanations.posterior import Posterior, posterior_of
+from models.diagnosis.explanations.sizes import Size, Sizes, sizes_of
+from models.diagnosis.explanations.verdict import Proposal, Verdict
 from models.diagnosis.report.assemble import report_of
 from models.diagnosis.report.proposed_extension import reason_against
 from models.diagnosis.validation.extended_model import Validation
@@ -24,65 +18,43 @@ from tests.models.diagnosis.fitted import Study, study
 from tests.models.diagnosis.report.test_summary import GAIN
 from tests.models.diagnosis.test_diagnose import late
 
-PLANTED = ("unsettled_dwell", 0.1, (0.0, 0.5))
-BESIDE = ("viscous_exponent", 0.01, ())
 WORSE = replace(GAIN, log_score_gain=-1.0)
+LARGER = replace(GAIN, rmse_after=1.1 * GAIN.rmse_before)
 
 
 @pytest.fixture(scope="module")
 def given() -> Study:
-    return study(campaign(4, late, cycles=(0.0, 3000.0), loops=False))
+    return study(campaign(4, late, cycles=(0.0, 1500.0, 3000.0, 4500.0), loops=False))
+
+
+@pytest.fixture(scope="module")
+def posterior(given: Study) -> Posterior:
+    return posterior_of(given.baseline, ())
 
 
 @pytest.mark.parametrize(
-    ("effects", "gain", "verdict"),
+    ("gain", "proposal"),
     [
-        ((PLANTED, BESIDE), WORSE, Verdict.CAUSE_AMBIGUOUS),
-        ((PLANTED, BESIDE), GAIN, Verdict.CAUSE_NAMED),
-        ((PLANTED, BESIDE), None, Verdict.CAUSE_NAMED),
-        ((PLANTED,), WORSE, Verdict.CAUSE_NAMED),
+        (GAIN, Proposal.PROPOSED),
+        (None, Proposal.PROPOSED),
+        (WORSE, Proposal.WITHHELD_LOG_SCORE),
+        (LARGER, Proposal.WITHHELD_ERROR),
     ],
 )
-def test_two_causes_that_predict_worse_than_none_are_not_named(
-    given: Study,
-    effects: tuple[tuple[str, float, tuple[float, ...]], ...],
-    gain: Gain | None,
-    verdict: Verdict,
+def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(
+    given: Study, posterior: Posterior, gain: Gain | None, proposal: Proposal
 ) -> None:
-    problem, fit, rng = given.problem, given.extended(*effects), np.random.default_rng(1)
-    projected = project_fit(problem, given.baseline.fit)
-    hypothesis = Hypothesis(effects=tuple(each.effect for each in fit.effects), evidence=30.0, drop=40.0, fit=fit)
-    made = Checks(problem, rng)(hypothesis)
-    check = replace(made, parts=replace(made.parts, p_value=0.001))
-    judgement = Judgement(
-        verdict=Verdict.CAUSE_NAMED,
-        causes=hypothesis.slugs,
-        credible=(hypothesis,),
-        explanations=explanations_of({hypothesis.slugs: 0.9, (): 0.1}),
-        comparison=Comparison(best_drop=40.0, structure=0.0, tolerance=2.0, credible=1, check=check),
-    )
-    investigation = Investigation(
-        baseline=given.baseline,
-        projected=projected,
-        alarms=alarms_of(problem, projected, rng),
-        search=SearchResult(problem=problem, hypotheses=(hypothesis,)),
-        raw=(),
-        where=(),
-    )
-    validation = Validation(extended=fit, gain=gain)
+    judgement = judge(posterior)
+    assert (judgement.verdict, judgement.causes) == (Verdict.CAUSE_NAMED, ("unsettled_dwell",))
+    validation = Validation(extended=judgement.stand[0].fit, gain=gain)
     revised = revise(judgement, validation.held_out)
-    report = report_of(investigation, revised, validation, sizes_of(problem, revised, rng), ())
-    assert report.verdict is verdict
-    assert (report.causes == hypothesis.slugs) == (verdict is Verdict.CAUSE_NAMED)
-    assert set(hypothesis.slugs) <= set(report.causes)
-    beside = "together with something that is not in the catalogue" in report.summary
-    assert beside == (verdict is Verdict.CAUSE_AMBIGUOUS)
-    # of the second cause a hundredth was planted, of which these data do not even know the sign
-    unsure = [] if gain is WORSE or len(effects) == 1 else ["do not determine the size of viscous exponent"]
-    assert (report.extension is None) == (gain is WORSE or bool(unsure))
-    assert all(reason in report.not_adoptable for reason in unsure)
-    assert report.statistics["lambda"] == 40.0
-    assert report.statistics["parts_p_value"] == 0.001
+    assert revised.proposal is proposal
+    sizes = sizes_of(posterior.problem, revised, np.random.default_rng(1))
+    report = report_of(given.baseline, posterior, revised, (), validation, sizes, ())
+    assert (report.verdict, report.causes) == (judgement.verdict, judgement.causes)
+    assert (report.extension is None) == (proposal is not Proposal.PROPOSED)
+    assert report.statistics["log_evidence"] == pytest.approx(report.candidates[0].log_evidence_gain)
+    assert sum(each.probability for each in report.explanations) == pytest.approx(1.0)
 
 
 def test_why_an_extension_is_not_proposed_is_said() -> None:

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.diagnosis.detection.lack_of_fit import misfit_of, without_likely_gains
 from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.pooled_fit.run_scatter import without_likely_gains
+from models.diagnosis.report.lack_of_fit import misfit_of
 from models.diagnosis.report.maps import MOST_BINS, SHOWN, loop_traces, residual_maps
 from tests.models.diagnosis.campaigns import CYCLES, PRESSURES, SPEEDS, campaign
 from tests.models.diagnosis.fitted import Study, bump, study

@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from models.diagnosis.attribution.verdict import UNCATALOGUED, Explanation, Verdict
 from models.diagnosis.criteria import MAX_WORDS
-from models.diagnosis.detection.lack_of_fit import Misfit
-from models.diagnosis.detection.structure_axes import Where
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.effects.estimate import Estimate
 from models.diagnosis.experiments.test_plan import Advice
+from models.diagnosis.explanations.verdict import UNCATALOGUED, Explanation, Verdict, Where
 from models.diagnosis.pooled_fit.run_scatter import RunScatter
+from models.diagnosis.report.lack_of_fit import Misfit
 from models.diagnosis.report.report import Candidate, Visible
 from models.diagnosis.report.summary import Findings, summarise
 from models.diagnosis.validation.held_out import Gain, Hardest
@@ -22,8 +21,8 @@ MISFIT = Misfit(
     noise=0.1012,
     unexplained_share=0.123,
     where=(
-        Where(axis="oil_temperature_c", strength=31.0, p_value=1e-9),
-        Where(axis="cycles", strength=4.0, p_value=0.1),
+        Where(axis="oil_temperature_c", strength=31.0),
+        Where(axis="cycles", strength=4.0),
     ),
 )
 GAIN = Gain(

@@ -1,0 +1,259 @@
+"""How large the causes are: a sample of what the diagnosis does not know of them, and the few draws that stand for it.
+
+A size bends with the course over life that is assumed for it: a pressure that grows as ζ^0.5 and one that grows as ζ^1.5
+leave the same trace behind eq. 6 with opposite signs. Nor is it shrunk as the search for causes shrinks it, where most are
+small: that it is there is known by now. So every explanation that stands is refitted under each course of its
+effects (`Effect.courses`), and the courses are weighed by their evidence. About each refit amplitude, smooth shapes and
+the template's discrepancies are jointly normal, with the mean that the discrepancies move it to,
+
+    (a, s, b) ~ N(fit + C g, C),     C = (Jᵀ V⁻¹ J)⁻¹, everything else free, g the gradient of the likelihood there
+
+and the size that is stated is that after the last state, a (1 + Σ_k b_k φ_k). Explanations count with their probability;
+what is left to one is nothing at work.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.criteria import COURSE_NEGLIGIBLE, COURSE_STEPS, DRAWS, SIZE_TAILS, SIZES_SAMPLED
+from models.diagnosis.effects.draw import Draw, DrawnEffect
+from models.diagnosis.effects.effect import Effect, Tried
+from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns, effect_rows, smooth_places
+from models.diagnosis.effects.template_discrepancy import discrepancy_factors
+from models.diagnosis.explanations.evidence import evidence_of
+from models.diagnosis.explanations.verdict import Judgement
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.gram import gram_of
+from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.projection import projections_of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Size:
+    """The size of an effect after the last state, given that it is at work: mean and deviation, the 90 % interval; the
+    probability that it is at work with the less likely sign; `courses` whether likely courses ask for different signs."""
+
+    value: float
+    sd: float
+    interval: tuple[float, float]
+    other_sign: float
+    courses: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sizes:
+    """The draws that stand for a judgement, and the size of each cause by slug."""
+
+    draws: tuple[Draw, ...] = ()
+    by_slug: Mapping[str, Size]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Component:
+    """A refit with its weight: mean and root of the covariance of (amplitude, smooth shapes) of each effect, then their b;
+    `trend` is what a draw changes between the first state and the last, and its derivatives; `last` φ after the last state
+    by effect."""
+
+    weight: float
+    fit: Fit
+    mean: FloatArray
+    root: FloatArray
+    trend: tuple[float, FloatArray]
+    last: tuple[FloatArray, ...]
+
+    def drawn(self, normals: FloatArray) -> FloatArray:
+        """Samples [n, m] of what the mean is of."""
+        return np.asarray(self.mean + normals[:, : self.mean.size] @ self.root.T)
+
+    def effects(self, off: FloatArray) -> tuple[DrawnEffect, ...]:
+        """The effects at one sample [m]."""
+        drawn, at, after = [], 0, sum(1 + len(smooth_places(fitted.effect)) for fitted in self.fit.effects)
+        for fitted, last in zip(self.fit.effects, self.last, strict=True):
+            shape = list(fitted.shape)
+            for place, move in zip(smooth_places(fitted.effect), off[at + 1 :], strict=False):
+                parameter = fitted.effect.shapes[place]
+                shape[place] = float(np.clip(shape[place] + move, parameter.lowest, parameter.highest))
+            amplitude = fitted.amplitude + float(off[at])
+            drawn.append(
+                DrawnEffect(
+                    effect=fitted.effect,
+                    amplitude=max(amplitude, 0.0) if fitted.effect.positive else amplitude,
+                    shape=tuple(shape),
+                    factors=tuple(off[after : after + last.size].tolist()),
+                )
+            )
+            at, after = at + 1 + len(smooth_places(fitted.effect)), after + last.size
+        return tuple(drawn)
+
+    def sizes(self, drawn: Sequence[DrawnEffect]) -> list[float]:
+        """The size of each effect after the last state."""
+        return [
+            effect.amplitude * max(1.0 + float(last @ np.array(effect.factors)), 0.0)
+            for effect, last in zip(drawn, self.last, strict=True)
+        ]
+
+
+def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator) -> Sizes:
+    """The sizes of a judgement's causes, and DRAWS draws or fewer of equal weight; none where nothing was fitted."""
+    components = [
+        component for fitted, share in _shares(judgement) for component in _components(problem, fitted, share)
+    ]
+    if not components:
+        return Sizes(by_slug={})
+    weight = np.array([component.weight for component in components])
+    counts = np.diff(np.floor(np.cumsum(weight) * SIZES_SAMPLED + rng.random()), prepend=0.0).astype(int)
+    width = max(component.mean.size for component in components)
+    samples: list[tuple[float, int, tuple[DrawnEffect, ...]]] = []
+    sized: dict[str, list[tuple[float, int]]] = {}
+    for index, (component, count) in enumerate(zip(components, counts.tolist(), strict=True)):
+        offs = component.drawn(rng.standard_normal((count, width)))
+        trends = component.trend[0] + offs @ component.trend[1]
+        for off, trend in zip(offs, trends.tolist(), strict=True):
+            effects = component.effects(off)
+            for effect, size in zip(effects, component.sizes(effects), strict=True):
+                sized.setdefault(effect.effect.slug, []).append((size, index))
+            samples.append(
+                (trend, index, tuple(effect for effect in effects if effect.effect.slug in judgement.causes))
+            )
+    nothing = max(SIZES_SAMPLED - len(samples), 0)
+    samples += [(0.0, 0, ())] * nothing
+    samples.sort(key=lambda sample: sample[0])
+    strata = np.array_split(np.arange(len(samples)), min(DRAWS, len(samples)))
+    chosen = [samples[stratum[stratum.size // 2]] for stratum in strata]
+    return Sizes(
+        draws=tuple(
+            Draw(weight=1.0 / len(chosen), laws=components[index].fit.laws, effects=effects)
+            for _, index, effects in chosen
+        ),
+        by_slug={slug: _size(pairs) for slug, pairs in sized.items() if slug in judgement.causes},
+    )
+
+
+def _shares(judgement: Judgement) -> list[tuple[Fit, float]]:
+    """The fitted explanations that stand with their probabilities, which sum to one at most."""
+    return [(each.fit, each.probability) for each in judgement.stand if each.probability > 0.0]
+
+
+def _size(pairs: Sequence[tuple[float, int]]) -> Size:
+    sizes, of = np.array([size for size, _ in pairs]), np.array([index for _, index in pairs])
+    positive = float((sizes > 0).mean())
+    signs = {bool((sizes[of == index] > 0).mean() > 0.5) for index in np.unique(of) if (of == index).mean() > 0.02}
+    low, high = np.quantile(sizes, (0.05, 0.95)).tolist()
+    return Size(
+        value=float(sizes.mean()),
+        sd=float(sizes.std()),
+        interval=(low, high),
+        other_sign=min(positive, float((sizes < 0).mean())) * sizes.size / SIZES_SAMPLED,
+        courses=len(signs) > 1,
+    )
+
+
+def _components(problem: FitProblem, original: Fit, share: float) -> Iterator[_Component]:
+    """A fit's effects refitted under each of their courses, weighed by evidence; as they were found where they have none."""
+    fitted = replace(original, effects=tuple(_unshrunk(effect) for effect in original.effects))
+    courses = list(_courses(problem, fitted))
+    if not courses:
+        courses = [(0.0, fit(problem, fitted.laws, fitted.effects, steps=COURSE_STEPS))]
+    logs = np.array([log for log, _ in courses])
+    weights = np.exp(logs - logs.max())
+    for weight, (_, fitted) in zip((share * weights / weights.sum()).tolist(), courses, strict=True):
+        if weight > share / SIZES_SAMPLED:
+            yield _component(problem, fitted, weight)
+
+
+def _unshrunk(fitted: FittedEffect) -> FittedEffect:
+    """An effect whose size has a prior that is nearly flat in its logarithm: that it is at work is decided already."""
+    return replace(fitted, effect=replace(fitted.effect, tails=min(fitted.effect.tails, SIZE_TAILS)))
+
+
+def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
+    """Log weight [nats] and refit of every course that counts. Of each kind the course most like the fitted one is refitted
+    first, and then its neighbours as long as they count."""
+    best = -np.inf
+    for place, effect in enumerate(fitted.effects):
+        if effect.effect.courses is None:
+            continue
+        held = replace(
+            effect.effect,
+            shapes=tuple(replace(shape, smooth=shape.smooth and not shape.held) for shape in effect.effect.shapes),
+        )
+        for kind in _kinds(effect.effect, problem):
+            first = _most_alike(fitted, effect, kind)
+            for way in (range(first, len(kind)), range(first - 1, -1, -1)):
+                near, laws = fitted.effects, fitted.laws
+                for index in way:
+                    shape = _with_free(kind[index].shape, effect)
+                    tried = replace(near[place], effect=held, shape=shape)
+                    refit = fit(problem, laws, (*near[:place], tried, *near[place + 1 :]), steps=COURSE_STEPS)
+                    if not np.isfinite(refit.cost) or refit.wrong_sign:
+                        break
+                    log = evidence_of(problem, refit, smooth=False).whole + kind[index].log_weight
+                    best = max(best, log)
+                    if log < best - COURSE_NEGLIGIBLE:
+                        break
+                    near, laws = refit.effects, refit.laws
+                    yield log, refit
+
+
+def _kinds(effect: Effect, problem: FitProblem) -> list[list[Tried]]:
+    """The courses of an effect by their kind, the first of its shapes."""
+    kinds: dict[float, list[Tried]] = {}
+    for tried in effect.courses(problem.design.facts) if effect.courses is not None else ():
+        kinds.setdefault(tried.shape[0], []).append(tried)
+    return list(kinds.values())
+
+
+def _with_free(shape: tuple[float, ...], fitted: FittedEffect) -> tuple[float, ...]:
+    """A course's shape, smooth shapes that are not held as they were fitted where it is of the same kind."""
+    if shape[0] != fitted.shape[0]:
+        return shape
+    own = zip(shape, fitted.shape, fitted.effect.shapes, strict=True)
+    return tuple(was if parameter.smooth and not parameter.held else value for value, was, parameter in own)
+
+
+def _most_alike(fitted: Fit, effect: FittedEffect, kind: Sequence[Tried]) -> int:
+    """Which of the courses changes torque most like an effect as it is fitted."""
+    scene = fitted.prediction.scene
+    change = effect.effect.change(scene, effect.amplitude, effect.shape)
+    others = effect.effect.changes(scene, [(effect.amplitude, tried.shape) for tried in kind])
+    along = np.abs(change @ others) / np.maximum(np.linalg.norm(others, axis=0), 1e-300)
+    return int(np.argmax(along))
+
+
+def _component(problem: FitProblem, fitted: Fit, weight: float) -> _Component:
+    design = problem.design
+    gram = gram_of(problem, fitted)
+    gains = max(projections_of(gram, problem.noise), key=lambda projected: projected.evidence)
+    matrix = gram.with_gains(gains.run_gain, gains.curve_gain)[0]
+    corner = matrix[: gram.base, : gram.base]
+    scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
+    inverse = np.linalg.pinv(corner * scale[:, None] * scale, hermitian=True) * scale[:, None] * scale
+    own = slice(int(problem.priors.free.sum()), gram.base)
+    values, vectors = np.linalg.eigh(inverse[own, own])
+    rows = [effect_rows(design, fitted.prediction, effect) for effect in fitted.effects]
+    factors = [discrepancy_factors(design, effect.effect) for effect in fitted.effects]
+    steady = design.closed & design.rows.steady
+    states = design.rows.cycles[steady]
+    last, first = steady & (design.rows.cycles == states.max()), steady & (design.rows.cycles == states.min())
+    columns = np.concatenate(
+        [
+            *(effect_columns(design, fitted.prediction, effect) for effect in fitted.effects),
+            *(change[:, None] * own_factors for change, own_factors in zip(rows, factors, strict=True)),
+        ],
+        axis=1,
+    )
+    whole = np.sum(rows, axis=0)
+    return _Component(
+        weight=weight,
+        fit=fitted,
+        mean=(inverse @ matrix[: gram.base, -1])[own],
+        root=vectors * np.sqrt(np.maximum(values, 0.0)),
+        trend=(
+            float(whole[last].mean() - whole[first].mean()),
+            columns[last].mean(axis=0) - columns[first].mean(axis=0),
+        ),
+        last=tuple(own_factors[last].mean(axis=0) for own_factors in factors),
+    )

@@ -1,0 +1,122 @@
+"""Verdict, explanations and judgement, as values; `decide` makes them."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
+
+
+class Verdict(StrEnum):
+    """The honest answers: nothing beyond noise, these causes, one of these, something else, too little data."""
+
+    MODEL_ADEQUATE = "model_adequate"
+    CAUSE_NAMED = "cause_named"
+    CAUSE_AMBIGUOUS = "cause_ambiguous"
+    UNEXPLAINED_STRUCTURE = "unexplained_structure"
+    INSUFFICIENT_DATA = "insufficient_data"
+
+
+#: Stands for something that no effect of the catalogue is.
+UNCATALOGUED = "uncatalogued"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Explanation:
+    """Slugs of the effects at work (UNCATALOGUED among them, or none), the probability that these and no others are, and
+    the probability that the estimated amplitudes have the right signs (None where nothing was estimated)."""
+
+    effects: tuple[str, ...]
+    probability: float
+    sign_probability: float | None = None
+
+
+def probabilities_by_slug(explanations: Iterable[Explanation]) -> dict[str, float]:
+    """The probability that each effect of the catalogue is at work, alone or beside others; largest first."""
+    found: dict[str, float] = {}
+    for explanation in explanations:
+        for slug in set(explanation.effects) - {UNCATALOGUED}:
+            found[slug] = min(found.get(slug, 0.0) + explanation.probability, 1.0)
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Where:
+    """An axis on which structure lies (`design.axes`), the evidence of it [nats], and the p-value that bounds."""
+
+    axis: str
+    strength: float
+
+    @property
+    def p_value(self) -> float:
+        """A likelihood ratio of so many nats is as rare as e^-strength."""
+        return float(np.exp(-np.clip(self.strength, 0.0, 700.0)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fitted:
+    """Causes that were fitted together: by slug in the order of the fit's effects, their evidence [nats] over nothing, and
+    the probability that they and no others of the catalogue are at work."""
+
+    slugs: tuple[str, ...]
+    fit: Fit
+    evidence: float
+    probability: float
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether the fit ran out of steps: its evidence is a lower bound."""
+        return self.fit.status is FitStatus.OUT_OF_STEPS
+
+
+class Proposal(StrEnum):
+    """Whether the extended model is proposed for adoption: there is none; it is; it is withheld, for its error on held-out
+    runs is larger than the baseline's, or its log score there is lower."""
+
+    NONE = "none"
+    PROPOSED = "proposed"
+    WITHHELD_ERROR = "withheld_error"
+    WITHHELD_LOG_SCORE = "withheld_log_score"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeldOut:
+    """How an extended model does on runs that were held out, against the baseline: RMS errors [Nm], gain of log score
+    [nats], and the gain of log score when the last states are predicted from the first ones [nats]."""
+
+    rmse_before: float
+    rmse_after: float
+    log_score_gain: float
+    forecast_log_score_gain: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """The verdict and its causes, read off the explanations (most probable first); of what was fitted the causes that
+    `stand`, best first, and the `others`; the axes on which structure lies, most evidence first; `likest` the slug of the
+    fault that is the likeliest of all that has no name, if one is; evidence [nats] by slug of effects alone; after
+    validation, what is proposed and whether effects of use are followed beyond the data."""
+
+    verdict: Verdict
+    causes: tuple[str, ...] = ()
+    explanations: tuple[Explanation, ...] = ()
+    stand: tuple[Fitted, ...] = ()
+    others: tuple[Fitted, ...] = ()
+    where: tuple[Where, ...] = ()
+    left: tuple[Where, ...] = ()
+    likest: str | None = None
+    evidence: Mapping[str, float]
+    proposal: Proposal = Proposal.NONE
+    follow_courses: bool = False
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """The probability of each effect of the catalogue, largest first."""
+        return probabilities_by_slug(self.explanations)
+
+    @property
+    def open(self) -> bool:
+        """Whether something is left to be found out."""
+        return self.verdict in {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}

@@ -1,0 +1,130 @@
+"""Evidence that only raw records hold: lines at the shaft's orders, stick-slip, dwells that end before torque has settled.
+
+- `shaft_ripple`: torque swings k times a revolution (a wobbling shaft, a disc out of true, teeth of a coupling). Its
+  frequency goes with the speed, so one order k is looked for in all records together (`shaft_orders`).
+- `stick_slip`: at low speed, where torque falls with speed, the shaft's torsional mode is excited: a line of one
+  frequency, whatever the speed, that is there below some speed and not above it (`fixed_frequency`). A line of
+  one frequency at all speeds alike (mains, a pump, structure) is neither; it is reported in a note.
+- `unsettled_dwell`: the exponential approach on a dwell is too slow for the dwell's length (`settling_transient`).
+
+Evidence of a swing is the log of a likelihood ratio that is averaged over everything that was not known beforehand (size
+and its law, order or frequency, how long the phase is kept, below which speed): the search is paid for.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
+from models.diagnosis.effects.catalogued import shaft_ripple, stick_slip, unsettled_dwell
+from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.raw_records.criteria import (
+    FASTER_SHAFT,
+    LEAST_EVIDENCE,
+    SAME_LINE,
+)
+from models.diagnosis.raw_records.fixed_frequency import best_line, best_slow_line
+from models.diagnosis.raw_records.limits import FEW_RECORDS, MANY_SAMPLES
+from models.diagnosis.raw_records.line import Line
+from models.diagnosis.raw_records.settling_transient import settling_evidence
+from models.diagnosis.raw_records.shaft_orders import best_order
+from models.diagnosis.raw_records.whitened_torque import WhitenedRecord, whitened_record
+from models.records.cleaning import UnusableRecordError
+from models.records.plateaus import PlateauCut, cut_plateaus
+from models.records.runs import Record
+
+#: A line of one frequency at all speeds: structure that is no effect of the catalogue.
+FIXED_LINE = "fixed_line"
+
+Run = TypeVar("Run", StationaryRun, DynamicRun)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RawEvidence:
+    """Of one effect: log_evidence [nats] against none, its amplitude, and a sentence on how it shows."""
+
+    effect: str
+    log_evidence: float
+    estimate: Estimate
+    note: str
+
+
+def raw_evidence(campaign: Campaign) -> tuple[RawEvidence, ...]:
+    """What the raw records of a campaign show; nothing where there are none or they are too slow or too short."""
+    stationary = [(run, run.record) for run in campaign.stationary if run.record is not None]
+    cuts = [(record, _cut(record)) for _, record in _evenly(stationary)]
+    dwells = [(record, cut) for record, cut in cuts if cut is not None]
+    records = [whitened_record(record, np.stack([cut.start, cut.stop], axis=1)) for record, cut in dwells]
+    records += [whitened_record(record) for _, record in _evenly([(run, run.record) for run in campaign.dynamic])]
+    return (*_lines([record for record in records if record is not None]), *_unsettled(dwells))
+
+
+def _evenly(runs: Sequence[tuple[Run, Record]]) -> Sequence[tuple[Run, Record]]:
+    """Runs evenly over life, as many as hold few enough samples."""
+    usual = float(np.median([record.time.size for _, record in runs])) if runs else 1.0
+    most = max(FEW_RECORDS, int(MANY_SAMPLES / usual))
+    if len(runs) <= most:
+        return runs
+    return [runs[i] for i in np.linspace(0, len(runs) - 1, most).round().astype(int)]
+
+
+def _cut(record: Record) -> PlateauCut | None:
+    try:
+        return cut_plateaus(record)
+    except UnusableRecordError:  # a record without dwells: the run that it came with has reported it
+        return None
+
+
+def _lines(records: list[WhitenedRecord]) -> list[RawEvidence]:
+    """Ripple and stick-slip; the one with more evidence is taken out of the records before the other is looked for again."""
+    if not records:
+        return []
+    order, (line, slow) = best_order(records), _fixed_line(records, None)
+    if order.evidence >= line.evidence > LEAST_EVIDENCE:
+        line, slow = _fixed_line(records, order)
+    elif line.evidence > order.evidence > LEAST_EVIDENCE:
+        order = best_order(records, line)
+    lines = []
+    if order.evidence > LEAST_EVIDENCE and order.amplitude > 0:
+        note = f"torque swings {order.position:g} times a revolution at every speed"
+        lines.append(_line_evidence(shaft_ripple.EFFECT.slug, order, "ripple amplitude", note))
+    if line.evidence > LEAST_EVIDENCE and line.amplitude > 0:
+        low = f"below {100 * line.speed_share:.0f} % of the highest speed and not above"
+        note = f"torque swings at {line.position:.3g} Hz {low if slow else 'at all speeds alike'}"
+        lines.append(_line_evidence(stick_slip.EFFECT.slug if slow else FIXED_LINE, line, "line amplitude", note))
+    return lines
+
+
+def _fixed_line(records: list[WhitenedRecord], order: Line | None) -> tuple[Line, bool]:
+    """The best line, and whether it is at low speed only: there, and not where the shaft is much faster."""
+    slow = best_slow_line(records, order)
+    if slow.evidence <= LEAST_EVIDENCE:
+        return best_line(records, order), False
+    fast = best_line(records, order, above=FASTER_SHAFT * slow.speed_share)
+    if fast.evidence > LEAST_EVIDENCE and abs(fast.position - slow.position) < SAME_LINE:
+        return best_line(records, order), False
+    return slow, True
+
+
+def _line_evidence(effect: str, line: Line, name: str, note: str) -> RawEvidence:
+    # λ goes with A², so log L near its maximum has a curvature of about 4 log L / A²
+    deviation = line.amplitude / max(2.0 * math.sqrt(max(line.peak, 0.0)), 1.0)
+    estimate = Estimate(name=name, value=line.amplitude, sd=deviation, unit="Nm")
+    return RawEvidence(effect=effect, log_evidence=line.evidence, estimate=estimate, note=note)
+
+
+def _unsettled(dwells: list[tuple[Record, PlateauCut]]) -> list[RawEvidence]:
+    """Dwells that ended before torque had settled, by the evidence of all their transients together: one that looks late
+    without it adds nothing."""
+    settling = settling_evidence(dwells)
+    if settling.evidence <= LEAST_EVIDENCE:
+        return []
+    seconds = f"{settling.time_constant:.2g} s"
+    note = f"after each step torque settles from the side of the last level, with a time constant of {seconds}"
+    estimate = Estimate(name="settling time constant", value=settling.time_constant, sd=settling.deviation, unit="s")
+    return [
+        RawEvidence(effect=unsettled_dwell.EFFECT.slug, log_evidence=settling.evidence, estimate=estimate, note=note)
+    ]

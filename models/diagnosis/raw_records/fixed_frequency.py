@@ -1,0 +1,176 @@
+"""Torque that swings at one frequency, whatever the speed: at low speed only (stick-slip), or at all speeds."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.special import logsumexp
+
+from models.arrays import FloatArray
+from models.diagnosis.design.points import IntArray
+from models.diagnosis.raw_records.criteria import (
+    AMPLITUDE_WEIGHTS,
+    FARTHEST_BIN,
+    FEWEST_WINDOWS,
+    HIGHEST_SLOW,
+    LEAST_WINDOW_SHARE,
+    LONGEST_SLOW_WINDOW,
+    LONGEST_WINDOW,
+    LOUD,
+    MOST_PER_STRETCH,
+    NEAREST_BIN,
+    PRIOR_STRETCHES,
+    SECOND_HARMONIC,
+    SECOND_PROBABILITY,
+    SLOW_SHARES,
+    SPACING,
+    TIED_FREQUENCIES,
+)
+from models.diagnosis.raw_records.incoherent import amplitude, log_likelihood_ratios, trial_amplitudes
+from models.diagnosis.raw_records.line import Line
+from models.diagnosis.raw_records.whitened_torque import WhitenedRecord
+from models.diagnosis.raw_records.windows import Bools, ComplexArray, Windows, windows_of
+
+#: Phases of the first harmonic, and lags of the second, over which a tied second harmonic is averaged.
+_PHASES, _LAGS = 16, 6
+
+
+def best_slow_line(records: Sequence[WhitenedRecord], order: Line | None = None) -> Line:
+    """The evidence of a line at low speed, its size by the load's root; windows in which `order` passes its frequency are
+    left out."""
+    lines = []
+    for share in SLOW_SHARES:
+        windows = windows_of(records, share, LONGEST_SLOW_WINDOW, HIGHEST_SLOW)
+        if windows is not None:
+            size = np.sqrt(windows.torque / max(float(np.mean(windows.torque)), 1e-300))
+            lines.append(_line(windows, size, order, share))
+    return _averaged(lines, len(SLOW_SHARES))
+
+
+def best_line(records: Sequence[WhitenedRecord], order: Line | None = None, above: float = 0.0) -> Line:
+    """The evidence of a line at all speeds alike, or at all above a share of the highest."""
+    windows = windows_of(records, 1.0, LONGEST_WINDOW, np.inf, above)
+    return Line() if windows is None else _averaged([_line(windows, np.ones_like(windows.torque), order, 1.0)], 1)
+
+
+def _averaged(lines: list[Line], tried: int) -> Line:
+    """The best line, with the evidence averaged over as many speed shares as were tried."""
+    if not lines:
+        return Line()
+    best = max(lines, key=lambda line: line.evidence)
+    evidence = float(logsumexp([line.evidence for line in lines]) - np.log(tried))
+    return Line(
+        evidence=evidence,
+        position=best.position,
+        amplitude=best.amplitude,
+        speed_share=best.speed_share,
+        peak=best.peak,
+    )
+
+
+def _line(windows: Windows, size: FloatArray, order: Line | None, share: float) -> Line:
+    """The evidence of a line in these windows, its relative size in each [w], averaged over all frequencies with a prior
+    ∝ 1/f; with a second harmonic in it at low speed."""
+    clear = _clear_of_order(windows, order)
+    visible, beside = windows.visible & clear, windows.beside & clear
+    least = max(FEWEST_WINDOWS, LEAST_WINDOW_SHARE * visible.shape[0])
+    frequencies = np.flatnonzero(visible.sum(axis=0) >= least)  # as multiples of SPACING
+    if frequencies.size == 0:
+        return Line(speed_share=share)
+    power = np.where(beside, np.abs(windows.sums) ** 2 / np.maximum(windows.weight, 1e-300), 0.0)
+    noise = _noise_levels(power, beside, SPACING * windows.length)
+    sums = np.where(visible, windows.sums * size[:, np.newaxis] / noise, 0.0)
+    weight = np.where(visible, windows.weight * (size**2)[:, np.newaxis] / noise, 0.0)
+    power = np.where(visible, power / noise, 0.0)
+    logs = _log_likelihoods(power, sums, weight, frequencies, second_harmonic=share < 1.0)
+    prior = 1.0 / frequencies / float(np.sum(1.0 / frequencies))
+    evidence = float(logsumexp(logs, b=AMPLITUDE_WEIGHTS[:, np.newaxis] * prior))
+    _, _, column = np.unravel_index(int(logs.argmax()), logs.shape)
+    near = frequencies[np.abs(frequencies - frequencies[column]) < NEAREST_BIN]
+    best = near[
+        int((power[:, near] * weight[:, near]).sum(axis=0).argmax())
+    ]  # where the windows with most weight agree
+    shown = visible[:, best]
+    return Line(
+        evidence=evidence,
+        position=float(SPACING * best),
+        amplitude=amplitude(power[shown, best], weight[shown, best]),
+        speed_share=share,
+        peak=float(logs.max()),
+    )
+
+
+def _log_likelihoods(
+    power: FloatArray, sums: ComplexArray, weight: FloatArray, frequencies: IntArray, *, second_harmonic: bool
+) -> FloatArray:
+    """log L(a)/L(0) [2, s, f] without and with a second harmonic, the log of their prior probabilities included.
+
+    At the frequencies where a second harmonic promises most its phase is tied to the first's; elsewhere it is free."""
+    amplitudes = trial_amplitudes(weight[:, frequencies])
+    first = log_likelihood_ratios(power[:, frequencies], weight[:, frequencies], amplitudes)
+    both = first.copy()
+    if second_harmonic:
+        double = 2 * frequencies
+        inside = np.flatnonzero(double < power.shape[1])
+        both[:, inside] += log_likelihood_ratios(
+            power[:, double[inside]], weight[:, double[inside]], SECOND_HARMONIC * amplitudes[:, inside]
+        )
+        for column in inside[np.argsort(-both[:, inside].max(axis=0))[:TIED_FREQUENCIES]]:
+            pair = [frequencies[column], double[column]]
+            both[:, column] = _tied(sums[:, pair], weight[:, pair], amplitudes[:, column])
+    return np.stack([first + np.log(1 - SECOND_PROBABILITY), both + np.log(SECOND_PROBABILITY)])
+
+
+def _tied(sums: ComplexArray, weight: FloatArray, amplitudes: FloatArray) -> FloatArray:
+    """log L(a)/L(0) [s] of a first and a second harmonic, D and N [w, 2], whose phases keep a lag ψ that all windows share:
+
+    Σ_w ln mean_φ exp(a Re[D₁ e^{-iφ} + q D₂ e^{-i(2φ + ψ)}] - a² (N₁ + q² N₂)/4),   averaged over ψ
+    """
+    phases = np.exp(-2j * np.pi * np.arange(_PHASES) / _PHASES)
+    lags = np.exp(-2j * np.pi * np.arange(_LAGS) / _LAGS)
+    first = (sums[:, :1] * phases).real
+    second = (lags[:, np.newaxis, np.newaxis] * (sums[:, 1:] * phases**2)).real
+    along, cost = first + SECOND_HARMONIC * second, 0.25 * (weight[:, 0] + SECOND_HARMONIC**2 * weight[:, 1])
+    top = along.max(axis=-1)
+    logs = []
+    for a in amplitudes:
+        by_window = a * top + np.log(np.exp(a * (along - top[..., np.newaxis])).mean(axis=-1)) - a**2 * cost
+        logs.append(logsumexp(np.minimum(by_window, MOST_PER_STRETCH).sum(axis=-1)) - np.log(_LAGS))
+    return np.array(logs)
+
+
+def _clear_of_order(windows: Windows, order: Line | None) -> Bools:
+    """[w, f]: false where the order, or its double, passes the frequency in the window."""
+    frequency = SPACING * np.arange(windows.sums.shape[1])
+    if order is None:
+        return np.ones(windows.sums.shape, dtype=np.bool_)
+    low, high = (order.position / (2 * np.pi) * speed[:, np.newaxis] for speed in (windows.slowest, windows.fastest))
+    edge = 2.0 / windows.length
+    clear = (frequency < low - edge) | (frequency > high + edge)
+    return clear & ((frequency < 2 * low - edge) | (frequency > 2 * high + edge))
+
+
+def _noise_levels(power: FloatArray, beside: Bools, independent: float) -> FloatArray:
+    """The mean of u [f] beside each frequency: that of the louder side, 1 unless many windows show another.
+
+    Where it is LOUD, something other than noise remains, with crests of its own: there it is the highest crest.
+    `independent` is how many independent values a bin counts for."""
+    total, count = np.where(beside, power, 0.0).sum(axis=0), beside.sum(axis=0).astype(float)
+    own = max(1, round(1.0 / independent))
+    near, side = max(NEAREST_BIN, 3 * own // 2), max(FARTHEST_BIN - NEAREST_BIN, 4 * own)
+    mean = _smoothed(total, count, side, independent, PRIOR_STRETCHES)
+    loud = _smoothed(total, count, side, independent, 1.0)
+    crest = maximum_filter1d(_smoothed(total, count, own, independent, 1.0), side)
+    pad, shift = near + side, near + side // 2
+    padded = np.arange(total.size) + pad
+    mean, loud, crest = (
+        np.maximum(*(np.pad(level, pad, mode="edge")[padded + offset] for offset in (-shift, shift)))
+        for level in (mean, loud, crest)
+    )
+    return np.asarray(np.where(mean > LOUD, np.maximum(loud, crest), mean))
+
+
+def _smoothed(total: FloatArray, count: FloatArray, width: int, independent: float, prior: float) -> FloatArray:
+    """The mean of u [f] over `width` bins, 1 unless more than `prior` windows show another."""
+    sums, counts = (independent * width * uniform_filter1d(values, width, mode="constant") for values in (total, count))
+    return np.asarray((sums + prior) / (counts + prior))

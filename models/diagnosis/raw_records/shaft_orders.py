@@ -1,0 +1,188 @@
+"""Order tracking: torque that swings k times a revolution, demodulated along the shaft's angle in stretches.
+
+The phase may be kept over one or several stretches, and the size may go with the load or with the speed; evidence is
+averaged over both and over the orders by their prior probabilities.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from models.arrays import FloatArray
+from models.diagnosis.design.points import IntArray
+from models.diagnosis.raw_records.criteria import (
+    ABOVE_ORDER,
+    AMPLITUDE_WEIGHTS,
+    BELOW_ORDER,
+    COHERENT_STRETCHES,
+    FEWEST_STRETCHES,
+    LEAST_VISIBLE,
+    LINE_SPEED,
+    LINE_WIDTH,
+    ORDERS,
+    PAIRED_ORDERS,
+    PAIRED_PROBABILITY,
+    STRETCH,
+)
+from models.diagnosis.raw_records.incoherent import (
+    amplitude,
+    log_likelihood_ratios,
+    noise_level,
+    trial_amplitudes,
+)
+from models.diagnosis.raw_records.line import Line
+from models.diagnosis.raw_records.whitened_torque import WhitenedRecord
+
+#: Laws of the size: with the load (the torque's root, between independent of it and proportional), or with the speed.
+_LAWS = ("load", "speed")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DemodulatedOrder:
+    """D and N [b] of an order in the stretches of all records."""
+
+    sums: NDArray[np.complex128]
+    weight: FloatArray
+
+
+def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> Line:
+    """The evidence of ripple and its best order; samples in which `line` would lie on the order are left out."""
+    stretches = [_stretch_starts(record) for record in records]
+    groups = _coherent_groups(records)
+    sizes = _relative_sizes(records, stretches)
+    orders = sorted({round(k + offset, 1) for k in ORDERS for offset in (*BELOW_ORDER, 0.0, *ABOVE_ORDER)})
+    demodulated = _demodulated(records, stretches, orders, line)
+    by_order: dict[float, FloatArray] = {}
+    best, highest = Line(), -np.inf
+    for order, probability in ORDERS.items():
+        logs = np.zeros((len(_LAWS), len(COHERENT_STRETCHES)))
+        for i, law in enumerate(_LAWS):
+            for j, kept in enumerate(COHERENT_STRETCHES):
+                evidence, size, peak = _order_evidence(demodulated, order, sizes[law], groups[kept])
+                logs[i, j] = evidence
+                if evidence + np.log(probability) > highest and peak > 0:
+                    highest = evidence + float(np.log(probability))
+                    best = Line(position=order, amplitude=size, peak=peak)
+        by_order[order] = logs
+    parts = [np.log(probability / by_order[k].size) + by_order[k].ravel() for k, probability in ORDERS.items()]
+    both = by_order[PAIRED_ORDERS[0]] + by_order[PAIRED_ORDERS[1]]
+    parts.append(np.log(PAIRED_PROBABILITY / both.size) + both.ravel())
+    evidence = float(logsumexp(np.concatenate(parts)))
+    return Line(evidence=evidence, position=best.position, amplitude=best.amplitude, peak=best.peak)
+
+
+def _stretch_count(record: WhitenedRecord, first: int, stop: int) -> int:
+    return max(1, round((stop - first) * record.step / STRETCH))
+
+
+def _stretch_starts(record: WhitenedRecord) -> IntArray:
+    """First samples of the stretches of a record."""
+    starts = []
+    for first, stop in zip(record.starts[:-1], record.starts[1:], strict=True):
+        count = _stretch_count(record, first, stop)
+        starts.append(np.linspace(first, stop, count + 1)[:-1].astype(np.intp))
+    return np.concatenate(starts)
+
+
+def _coherent_groups(records: Sequence[WhitenedRecord]) -> dict[int, IntArray]:
+    """For each number of stretches over which the phase is kept: the first stretches of the groups, which stay within a
+    piece."""
+    groups: dict[int, list[int]] = {kept: [] for kept in COHERENT_STRETCHES}
+    before = 0
+    for record in records:
+        for first, stop in zip(record.starts[:-1], record.starts[1:], strict=True):
+            count = _stretch_count(record, first, stop)
+            for kept in COHERENT_STRETCHES:
+                parts = max(1, round(count / kept))
+                groups[kept] += (before + np.linspace(0, count, parts + 1)[:-1].astype(np.intp)).tolist()
+            before += count
+    return {kept: np.array(firsts, dtype=np.intp) for kept, firsts in groups.items()}
+
+
+def _relative_sizes(records: Sequence[WhitenedRecord], stretches: list[IntArray]) -> dict[str, FloatArray]:
+    """Each law's relative size [b] in the stretches, 1 on average."""
+
+    def means(channels: list[FloatArray]) -> FloatArray:
+        by_record = [
+            np.add.reduceat(np.abs(channel), firsts) / np.diff(np.append(firsts, channel.size))
+            for channel, firsts in zip(channels, stretches, strict=True)
+        ]
+        values = np.concatenate(by_record)
+        return values / max(float(np.sqrt(np.mean(values**2))), 1e-300)
+
+    return {
+        "load": np.sqrt(means([record.torque for record in records])),
+        "speed": means([record.speed for record in records]),
+    }
+
+
+def _demodulated(
+    records: Sequence[WhitenedRecord], stretches: list[IntArray], orders: list[float], line: Line | None
+) -> dict[float, DemodulatedOrder]:
+    """D and N of every order (multiples of a tenth, ascending)."""
+    highest = max(float(np.abs(record.speed).max()) for record in records)
+    parts: dict[float, list[tuple[FloatArray, FloatArray]]] = {order: [] for order in orders}
+    for record, firsts in zip(records, stretches, strict=True):
+        hertz = record.speed / (2 * np.pi)
+        steps = np.diff(record.time, prepend=record.time[0])
+        angle = 2 * np.pi * np.cumsum(hertz * steps)
+        hertz = np.abs(hertz)
+        # e^{-ikφ} of each order from that of the one before, by powers of e^{-iφ/10}
+        tenths = {1: np.exp(-0.1j * angle)}
+        for k in range(2, 11):
+            tenths[k] = tenths[k - 1] * tenths[1]
+        carrier, carrier_tenths = np.ones(angle.size, dtype=np.complex128), 0
+        counts = np.diff(np.append(firsts, angle.size))
+        for order in orders:
+            while carrier_tenths < round(10 * order):
+                step = min(10, round(10 * order) - carrier_tenths)
+                carrier, carrier_tenths = carrier * tenths[step], carrier_tenths + step
+            frequency = order * hertz
+            visible = (frequency > record.lowest) & (frequency < record.highest)
+            if line is not None:
+                distance = np.minimum(np.abs(frequency - line.position), np.abs(frequency - 2 * line.position))
+                slow = hertz * 2 * np.pi <= LINE_SPEED * line.speed_share * highest
+                visible &= ~((distance < LINE_WIDTH) & slow)
+            weight = record.weight * visible
+            total = np.add.reduceat(carrier * (record.matched * visible), firsts)
+            power = np.add.reduceat(weight * record.response(frequency), firsts)
+            enough = np.add.reduceat(visible.astype(float), firsts) > LEAST_VISIBLE * counts
+            parts[order].append((total * enough, power * enough))
+    return {
+        order: DemodulatedOrder(
+            sums=np.concatenate([total for total, _ in of_records]),
+            weight=np.concatenate([power for _, power in of_records]),
+        )
+        for order, of_records in parts.items()
+    }
+
+
+def _powers(order: DemodulatedOrder, size: FloatArray, firsts: IntArray) -> tuple[FloatArray, FloatArray]:
+    """u and N of the groups in which the order is visible."""
+    total = np.add.reduceat(order.sums * size, firsts)
+    weight = np.add.reduceat(order.weight * size**2, firsts)
+    visible = weight > 0
+    return np.abs(total[visible]) ** 2 / weight[visible], weight[visible]
+
+
+def _order_evidence(
+    demodulated: dict[float, DemodulatedOrder], order: float, size: FloatArray, firsts: IntArray
+) -> tuple[float, float, float]:
+    """Evidence of an order, its amplitude, and the largest log likelihood ratio."""
+    power, weight = _powers(demodulated[order], size, firsts)
+    if power.size < FEWEST_STRETCHES:
+        return 0.0, 0.0, 0.0
+    sides = []
+    for offsets in (BELOW_ORDER, ABOVE_ORDER):
+        beside = [_powers(demodulated[round(order + offset, 1)], size, firsts)[0] for offset in offsets]
+        sides.append((float(sum(values.sum() for values in beside)), float(sum(values.size for values in beside))))
+    noise = noise_level(*sides)
+    logs = log_likelihood_ratios(power / noise, weight / noise, trial_amplitudes(weight / noise))
+    return (
+        float(logsumexp(logs, b=AMPLITUDE_WEIGHTS)),
+        amplitude(power / noise, weight / noise),
+        float(logs.max()),
+    )

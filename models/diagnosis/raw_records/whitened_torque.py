@@ -1,0 +1,174 @@
+"""Raw torque made ready for a search of swings: freed of everything slow, and its noise whitened.
+
+    torque = smooth spline + x,    A(L) x / σ ~ white noise of deviation 1
+
+A is an autoregression estimated from the record's own spectrum (above what the spline absorbs), σ the local deviation of
+A(L) x. A swing s(t) of unknown size and phase is then looked for by its matched filter,
+
+    D = Σ s* A(1/L) [A(L) x / σ²],    N = Σ |A(ω) s|² / σ²,    |D|²/N ~ exponential of mean 1 where there is none.
+
+The spline's knots are so close that no friction curve passed at the record's pace leaves anything above its cut-off.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_lsq_spline
+from scipy.linalg import solve_toeplitz
+from scipy.ndimage import uniform_filter1d
+
+from models.arrays import FloatArray
+from models.diagnosis.raw_records.criteria import (
+    AUTOREGRESSION_ORDER,
+    BLURRED,
+    CONSTANT_SPEED,
+    COUNT_SAMPLES,
+    FEWEST_BETWEEN_KNOTS,
+    HIGHEST_SHARE,
+    KNOT_SHARE,
+    KNOT_SPACING,
+    LARGEST_SQUARE,
+    LEAST_VARIANCE_SHARE,
+    LOCAL_TIME,
+    LOWEST_CYCLES,
+    RATE,
+    SEGMENT,
+)
+from models.diagnosis.raw_records.pieces import Piece, pieces_of
+from models.records.cleaning import UnusableRecordError, clean
+from models.records.runs import Record
+
+#: Points at which the autoregression's gain is tabulated.
+_GAINS = 512
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WhitenedRecord:
+    """The samples of a record's pieces, one after the other: time [n] s, speed [n] rad/s, torque [n] Nm (the spline's).
+
+    matched [n] is A(1/L) [A(L) x/σ²], weight [n] 1/σ²; `starts` are the pieces' first samples and n. `step` [s] is the
+    sample interval, `lowest` and `highest` [Hz] bound the frequencies that can be seen, `gain` is |A|² evenly from 0 to half
+    the rate.
+    """
+
+    time: FloatArray
+    speed: FloatArray
+    torque: FloatArray
+    matched: FloatArray
+    weight: FloatArray
+    starts: tuple[int, ...]
+    step: float
+    lowest: float
+    gain: FloatArray
+
+    @property
+    def highest(self) -> float:
+        return HIGHEST_SHARE / self.step
+
+    def response(self, frequency: FloatArray) -> FloatArray:
+        """|A|² at frequencies [Hz] up to half the rate; beyond, the last value."""
+        place = frequency * (2 * (self.gain.size - 1) * self.step)
+        return np.asarray(self.gain[np.minimum(place, self.gain.size - 1).astype(np.intp)])
+
+
+def whitened_record(record: Record, spans: FloatArray | None = None) -> WhitenedRecord | None:
+    """Of a record, within spans [k, 2] s where they are given, else where its pressure is constant; None where it holds too
+    few samples, or samples too far apart."""
+    try:
+        cleaned, period, _ = clean(record)
+    except UnusableRecordError:
+        return None
+    count = max(1, int(1.0 / (RATE * period)))
+    step = count * period
+    pieces = pieces_of(cleaned, spans, period, count)
+    if not pieces:
+        return None
+    spacing = min(KNOT_SPACING, *(KNOT_SHARE * _speed_period(piece.speed, step) for piece in pieces))
+    between = round(spacing / step)
+    if between < FEWEST_BETWEEN_KNOTS or not LOWEST_CYCLES / (between * step) < HIGHEST_SHARE / step:
+        return None
+    averaged_out = cleaned.torque[: cleaned.torque.size // count * count].reshape(-1, count).var(axis=1).mean()
+    return _whitened(pieces, step, between, (BLURRED * _recorder_count(cleaned.torque)) ** 2 - float(averaged_out))
+
+
+def _recorder_count(torque: FloatArray) -> float:
+    """The least step [Nm] between recorded values."""
+    steps = np.abs(np.diff(torque[:COUNT_SAMPLES]))
+    steps = steps[steps > 1e-9 * float(np.abs(torque).max())]
+    return float(steps.min()) if steps.size else 0.0
+
+
+def _speed_period(speed: FloatArray, step: float) -> float:
+    """The period [s] of the strongest oscillation of a speed; infinite where it is constant."""
+    window = np.hanning(speed.size)
+    power = np.abs(np.fft.rfft((speed - speed.mean()) * window))
+    if 2 * power.max() <= CONSTANT_SPEED * np.abs(speed).max() * window.sum():  # an encoder's noise is no oscillation
+        return np.inf
+    return float(speed.size * step / max(1, int(power.argmax())))
+
+
+def _whitened(pieces: Sequence[Piece], step: float, between: int, least_variance: float) -> WhitenedRecord | None:
+    """None where noise is too small beside the recorder's steps (its median variance at most `least_variance` [Nm²])."""
+    from scipy.signal import lfilter  # start-up time
+
+    smooth = [_spline(piece.torque, between) for piece in pieces]
+    fast = [piece.torque - slow for piece, slow in zip(pieces, smooth, strict=True)]
+    largest = max(float(np.abs(piece.torque).max()) for piece in pieces)
+    deviations = [float(series.std()) for series in fast]
+    if not (min(deviations) > 1e-9 * largest and float(np.median(deviations)) ** 2 > least_variance):
+        return None
+    scaled = [series / deviation for series, deviation in zip(fast, deviations, strict=True)]
+    polynomial = _autoregression(scaled, 1.0 / between)
+    innovations = [lfilter(polynomial, 1.0, series) for series in fast]
+    usual = float(np.median([np.square(series[polynomial.size :]).mean() for series in innovations]))
+    least = LEAST_VARIANCE_SHARE * usual
+    if not least > 0:
+        return None
+    weights = [_weight(series, polynomial.size, round(LOCAL_TIME / step), least) for series in innovations]
+    matched = [
+        lfilter(polynomial, 1.0, (series * weight)[::-1])[::-1]
+        for series, weight in zip(innovations, weights, strict=True)
+    ]
+    return WhitenedRecord(
+        time=np.concatenate([piece.time for piece in pieces]),
+        speed=np.concatenate([piece.speed for piece in pieces]),
+        torque=np.concatenate(smooth),
+        matched=np.concatenate(matched),
+        weight=np.concatenate(weights),
+        starts=tuple(np.cumsum([0, *(series.size for series in fast)]).tolist()),
+        step=step,
+        lowest=LOWEST_CYCLES / (between * step),
+        gain=np.asarray(np.abs(np.fft.rfft(polynomial, 2 * _GAINS)) ** 2, dtype=np.float64),
+    )
+
+
+def _weight(innovations: FloatArray, order: int, local: int, least: float) -> FloatArray:
+    """1/σ² [n] of innovations [n], 0 for the first `order`, which lack their past."""
+    squares = innovations**2
+    squares[:order] = squares[order:].mean()
+    squares = np.minimum(squares, LARGEST_SQUARE * squares.mean())
+    weight = 1.0 / np.maximum(uniform_filter1d(squares, min(local, innovations.size), mode="reflect"), least)
+    weight[:order] = 0.0
+    return np.asarray(weight, dtype=np.float64)
+
+
+def _spline(torque: FloatArray, between: int) -> FloatArray:
+    """The cubic spline through torque [n] with a knot every `between` samples."""
+    place = np.arange(torque.size, dtype=np.float64)
+    inner = max(0, round(torque.size / between) - 1)
+    knots = np.concatenate([np.zeros(4), np.linspace(0, place[-1], inner + 2)[1:-1], np.full(4, place[-1])])
+    return np.asarray(make_lsq_spline(place, torque, knots, 3)(place), dtype=np.float64)
+
+
+def _autoregression(series: Sequence[FloatArray], lowest: float) -> FloatArray:
+    """A [p + 1] (Yule-Walker) for series whose spectrum below `lowest` [cycles a sample] goes on flat as it is above."""
+    size = min(SEGMENT, min(part.size for part in series))
+    window = np.hanning(size)
+    segments = [part[first : first + size] for part in series for first in range(0, part.size - size + 1, size // 2)]
+    power = np.mean(np.abs(np.fft.rfft(np.array(segments) * window, axis=1)) ** 2, axis=0)
+    edge = max(1, int(np.ceil(lowest * size)))
+    power[:edge] = power[edge : max(edge + 2, round(1.6 * edge))].mean()
+    covariance = np.fft.irfft(power)[: AUTOREGRESSION_ORDER + 1]
+    covariance[0] *= 1 + 1e-9
+    return np.concatenate([[1.0], -solve_toeplitz(covariance[:-1], covariance[1:])])

@@ -1,0 +1,139 @@
+"""What swings with a test's clock is found where noise goes with torque, noise alone is not; a sensor's waves too."""
+
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from models.arrays import FloatArray
+from models.diagnosis.design.autocorrelation import Correlation
+from models.diagnosis.design.axes import TORQUE
+from models.diagnosis.design.design import Design, build_design
+from models.diagnosis.explanations import contrasts
+from models.diagnosis.explanations.evidence import evidence_of
+from models.diagnosis.explanations.lines import HighestLine, lines
+from models.diagnosis.noise.covariance import Noise
+from models.diagnosis.noise.estimate import first_noise
+from models.diagnosis.pooled_fit.priors import Priors
+from models.diagnosis.pooled_fit.problem import FitProblem
+from models.friction.stribeck import torque
+from tests.models.diagnosis.campaigns import Where, campaign
+from tests.models.diagnosis.fitted import study
+
+#: A sensor's wave [Nm].
+WAVE = 2.5
+SEED = 7
+
+
+@pytest.fixture(scope="module")
+def design() -> Design:
+    return build_design(campaign(1))
+
+
+@pytest.fixture(scope="module")
+def noise(design: Design) -> Noise:
+    return replace(first_noise(design), plateaus=Correlation(), deviation=0.01 * design.torque)
+
+
+def line_of(design: Design, noise: Noise, residual: FloatArray) -> HighestLine:
+    """The highest line in a residual; no prior is in it."""
+    return lines(FitProblem(design=design, noise=noise, priors=cast(Priors, None)), residual)
+
+
+def raised(line: HighestLine) -> bool:
+    """Rarer than one in a thousand."""
+    return line.p_value < 1e-3
+
+
+def drawn(design: Design, noise: Noise, seed: int) -> FloatArray:
+    white = np.random.default_rng([SEED, seed]).standard_normal(design.torque.size)
+    gains = 0.003 * np.random.default_rng([SEED, seed, 1]).standard_normal(len(design.runs))
+    return noise.deviation * white + gains[design.rows.run] * design.torque
+
+
+def test_noise_alone_has_no_line(design: Design, noise: Noise) -> None:
+    found = [line_of(design, noise, drawn(design, noise, seed)) for seed in range(200)]
+    assert not any(raised(each) for each in found)
+    # p-values are bounds: no more of them are small than should be (10 of 200 below 0.05, deviation 3.1)
+    assert 1 <= sum(each.p_value < 0.05 for each in found) <= 20
+
+
+def test_a_line_that_is_nearly_as_slow_as_a_test_stands_out(design: Design, noise: Noise) -> None:
+    """At the lower end of the frequencies its own flanks are no neighbourhood."""
+    rows = design.rows
+    longest = float(rows.clock[rows.steady].max())
+    for cycles in (2.5, 2.8, 3.1):
+        wave = np.sin(2 * np.pi * cycles * rows.clock / longest + rows.run) * rows.steady
+        assert raised(line_of(design, noise, drawn(design, noise, 0) + 0.006 * wave * np.median(design.torque)))
+
+
+@pytest.mark.parametrize("share", [False, True], ids=["so many Nm", "a share of the torque"])
+def test_a_swing_is_found_whatever_its_phase_in_each_run(design: Design, noise: Noise, share: bool) -> None:
+    rows = design.rows
+    phase = np.random.default_rng(SEED).uniform(0, 2 * np.pi, len(design.runs))[rows.run]
+    wave = np.sin(2 * np.pi * rows.clock / 90.0 + phase) * rows.steady
+    swing = 0.005 * wave * (design.torque if share else np.median(design.torque))
+    found = line_of(design, noise, drawn(design, noise, 0) + swing)
+    assert raised(found)
+    assert found.p_value < 1e-3
+    assert line_of(design, noise, drawn(design, noise, 0) + 0.02 * swing).p_value > 0.01
+
+
+def slow(kind: str, unit: FloatArray) -> FloatArray:
+    """A course [n] over a test, 0 ... 1, that has no period, of about unit size."""
+    courses = {
+        "ramp": 2.0 * unit - 1.0,
+        "parabola": 6.0 * (unit - 0.5) ** 2 - 0.5,
+        "settling": 3.0 * np.exp(-unit / 0.1) - 0.3,
+        "step": np.where(unit > 0.4, 0.8, -1.2),
+    }
+    return np.asarray(courses[kind], dtype=np.float64)
+
+
+@pytest.mark.parametrize("kind", ["ramp", "parabola", "settling", "step"])
+def test_structure_that_has_no_period_has_no_line(design: Design, noise: Noise, kind: str) -> None:
+    """Of twenty draws, with a course of its own in every run, as large as a line that is seen and three times as large."""
+    rows = design.rows
+    course = slow(kind, rows.clock / rows.clock[rows.steady].max()) * design.torque * rows.steady
+    for seed in range(10):
+        size = np.random.default_rng([SEED, seed]).standard_normal(len(design.runs))[rows.run]
+        for strength in (0.015, 0.05):
+            found = line_of(design, noise, drawn(design, noise, seed) + strength * size * course)
+            assert not raised(found), (kind, seed, strength)
+
+
+def test_pauses_and_odd_runs_do_not_hide_a_swing(design: Design, noise: Noise) -> None:
+    rows = design.rows
+    swing = 0.008 * design.torque * np.sin(2 * np.pi * rows.clock / 30.0 + rows.run) * rows.steady
+    residual = drawn(design, noise, 0) + swing
+    assert raised(line_of(design, noise, residual))
+    paused = np.where((rows.run == 0) & (rows.clock > 300.0), rows.clock + 12 * 3600.0, rows.clock)
+    slower = np.where(rows.run == 0, 4.0 * rows.clock, rows.clock)
+    for clock in (paused, slower):
+        assert raised(line_of(replace(design, rows=replace(rows, clock=clock)), noise, residual))
+    standing = replace(design, rows=replace(rows, clock=np.zeros_like(rows.clock)))
+    assert not raised(line_of(standing, noise, residual))
+
+
+def test_too_few_plateaus_show_no_line() -> None:
+    """Of one run the first 120 plateaus show the swing, the first 40 do not say so."""
+    given = campaign(1)
+    one = build_design(replace(given, stationary=given.stationary[:1], dynamic=()))
+    known = replace(first_noise(one), deviation=0.01 * one.torque)
+    swing = 0.03 * one.torque * np.sin(2 * np.pi * one.rows.clock / 30.0)
+    assert raised(line_of(one, known, swing))
+    assert not raised(line_of(replace(one, plateaus=40, chains=one.chains), known, swing))
+
+
+def test_a_sensor_that_is_wavy_over_its_range_is_structure_on_its_reading(monkeypatch: pytest.MonkeyPatch) -> None:
+    def waves(at: Where) -> FloatArray:
+        return np.asarray(0.1 * np.sin(2 * np.pi * torque(at.velocity, at.parameters) / WAVE), dtype=np.float64)
+
+    given = study(campaign(3, waves))
+    found = {}
+    for most in (20, 4):
+        monkeypatch.setattr(contrasts, "TORQUE_WAVES", most)
+        found[most] = evidence_of(given.problem, given.baseline.fit).structure[TORQUE]
+    assert found[20] > 20.0
+    assert found[4] < 0.2 * found[20], found  # the control: few waves hardly show it
