@@ -23,7 +23,8 @@
 # make scale    requests and commands with 1,000 clutches of 200 tests in one file, beside 10: a table of docs/appendix/scale.md
 #              (ARGS="--clutches 10000 --states 5"); needs 7 GB of disk. python -m tests.scale.replay --clutches 300: a replay
 #              in one process, in a pool and on a Dask cluster of which a worker is killed
-# make plausibility  sends mistyped and honest runs: the tables of docs/appendix/plausibility.md  (SEED= CAMPAIGNS= HONEST= ARGS=--write)
+# make plausibility  sends mistyped and honest runs: the tables of docs/appendix/plausibility.md; ARGS="--store FILE" goes on where
+#              it ended                                          (SEED= CAMPAIGNS= HONEST= LIVES= ARGS=--write)
 # make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
 #              make figures: the figures of docs/
 # make docs    the site of docs/, which the service serves at /help; warnings and dead links are errors
@@ -140,7 +141,7 @@ adoption: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.adoption $(ARGS)
 
 plausibility: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.plausibility $(if $(SEED),--seed $(SEED)) $(if $(CAMPAIGNS),--campaigns $(CAMPAIGNS)) $(if $(HONEST),--honest $(HONEST)) $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.plausibility $(if $(SEED),--seed $(SEED)) $(if $(CAMPAIGNS),--campaigns $(CAMPAIGNS)) $(if $(HONEST),--honest $(HONEST)) $(if $(LIVES),--lives $(LIVES)) $(ARGS)
 
 score: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.score $(PARTS) $(if $(SEED),--seed $(SEED)) $(if $(SIZE),--size $(SIZE)) $(ARGS)

@@ -72,8 +72,8 @@ def rig(connection: Connection, name: str) -> RigOut:
     """A rig profile in force, or NotFoundError."""
     row = rigs.get(connection, name)
     if row is None:
-        known = ", ".join(repr(each.name) for each in rigs.page(connection, limit=10))
-        raise NotFoundError(f"no rig is known as {name!r}; known: {known or 'none yet'}")
+        names = ", ".join(repr(profile.name) for profile in rigs.page(connection, limit=10))
+        raise NotFoundError(f"no rig is known as {name!r}; known: {names or 'none yet'}")
     return rig_out(row)
 
 

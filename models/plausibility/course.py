@@ -11,10 +11,11 @@ course of eq. 6 is one of them, and so are knees, courses that level off and cou
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.plausibility import criteria
@@ -139,6 +140,7 @@ class Fit:
         """log posterior probability of the nodes [g]."""
         return np.asarray(self.log_evidence_by_node - np.logaddexp.reduce(self.log_evidence_by_node))
 
+    @cached_property
     def without(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Each test as the others predict it: mean [g, n], variance of the test [g, n], log weight of the nodes [g, n]."""
         own = np.diagonal(self.precision, axis1=1, axis2=2)
@@ -187,6 +189,10 @@ class Predicted:
     log_weight: FloatArray
     mean: FloatArray
     variance: FloatArray
+
+    def at(self, places: NDArray[np.intp]) -> "Predicted":
+        """The same at these places of its cycles [k]."""
+        return replace(self, mean=self.mean[:, places], variance=self.variance[:, places])
 
     def log_density(self, log_cof: FloatArray, spread: FloatArray, new_level: FloatArray) -> FloatArray:
         """log density [m] of log COF [m] whose own deviation is `spread` [m], at the cycles of the prediction; with

@@ -58,6 +58,8 @@ MAX_TESTS, MAX_RUNS = 40, 80
 JOINS, TILES, STARTS, EQUALS = 0.5, 0.5, 0.05, 0.25
 #: A gap of exactly one of the last ones, a gap like one of them, a gap of their order; what is left: of any size.
 SAME_GAP, LIKE_GAP, SIMILAR_GAP = 0.3, 0.3, 0.2
+#: Share of the gaps like an earlier one that grow, or shrink, as the last one did.
+GROWING = 0.2
 #: Deviation of log gap about an earlier one, and of one of their order [-]; how many gaps back.
 LIKE_GAP_SD, SIMILAR_GAP_SD, MEMORY = 0.3, 1.5, 5
 #: A life's first run is made at its start; a run repeats another of its kind at the same cycles.

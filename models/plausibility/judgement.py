@@ -80,7 +80,7 @@ def judge(runs: Sequence[Run], in_question: Collection[int], doubted: Collection
         weighed[optimum.belief] = optimum.log_probability
         if best is None or optimum.log_probability > best.log_probability:
             best = optimum
-    if best is None:
+    if best is None or not (best.belief.slipped or doubted or best.doubts):
         return {}
     for index, log_odds in best.log_odds.items():
         other = replace(best.belief, slipped=best.belief.slipped ^ {index})
@@ -123,6 +123,22 @@ class _Clutch:
     runs: tuple[Run, ...]
     in_question: frozenset[int]
     fits: dict[tuple[Any, ...], Fit] = field(default_factory=dict)
+    _slips: dict[int, list[Slip]] = field(default_factory=dict)
+
+    def slips(self, index: int, expected: float) -> list[Slip]:
+        """All slips of a run; its cycles were most likely `expected` where they are mistaken altogether."""
+        run = self.runs[index]
+        if index not in self._slips:
+            self._slips[index] = list(slips_of(run, expected))
+        return [
+            replace(slip, likely=replace(run.sent, cycles=expected)) if slip.name == OTHER_CYCLES else slip
+            for slip in self._slips[index]
+        ]
+
+    @cached_property
+    def place(self) -> dict[int, int]:
+        """The place of each run of `near`."""
+        return {i: k for k, i in enumerate(self.near)}
 
     @cached_property
     def cycles(self) -> FloatArray:
@@ -283,7 +299,7 @@ class _Weighed:
 
     def _sets(self, changes: Sequence[Mapping[int, float]]) -> FloatArray:
         """The cycles of `near` as the belief has them, and with each of the changes; infinite: none. [1 + h, n]."""
-        place = {i: k for k, i in enumerate(self.clutch.near)}
+        place = self.clutch.place
         now = self.clutch.cycles[self.clutch.near].copy()
         now[[k for i, k in place.items() if i in self.belief.slipped]] = math.inf
         sets = np.tile(now, (1 + len(changes), 1))
@@ -322,11 +338,11 @@ class _Weighed:
             by_life.setdefault(at, []).append(reading)
         values: dict[int, float] = {}
         for at, of_life in by_life.items():
-            cycles = np.array([reading.cycles for reading in of_life])
-            predicted = self._predicted(index, at, cycles)
+            cycles, of = np.unique([reading.cycles for reading in of_life], return_inverse=True)
+            predicted = self._predicted(index, at, cycles).at(of)
             log_cof = np.array([reading.log_cof for reading in of_life], dtype=np.float64)
             spread = np.array([reading.spread for reading in of_life])
-            new_level = np.array([self._new_level(index, at, value) for value in cycles.tolist()])
+            new_level = np.array([self._new_level(index, at, value) for value in cycles.tolist()])[of]
             density = predicted.log_density(log_cof, spread, new_level) + log_physics(log_cof)
             values |= {
                 id(reading): value for reading, value in zip(of_life, np.maximum(density, _LEAST).tolist(), strict=True)
@@ -363,7 +379,7 @@ class _Weighed:
         weighed = {}
         for i in sorted(self.suspects | self.belief.slipped):
             run = self.clutch.runs[i]
-            slips = list(slips_of(run, self.expected(i)))
+            slips = self.clutch.slips(i, self.expected(i))
             if all(own in ([], [i]) for _, own in self.fits):
                 slips = [slip for slip in slips if slip.name not in OF_CLUTCH]
             readings = [run.sent, *(slip.likely for slip in slips)]
@@ -383,11 +399,12 @@ class _Weighed:
 
     def _log_cycles(self, index: int, cycles: Sequence[float]) -> list[float]:
         """log P of a run's cycles given the others."""
-        if index not in self.clutch.near:
+        if index not in self.clutch.place:
             return [0.0] * len(cycles)
-        sets = self._sets([{index: math.inf}, *({index: value} for value in cycles)])
+        values, of = np.unique(cycles, return_inverse=True)
+        sets = self._sets([{index: math.inf}, *({index: value} for value in values.tolist())])
         made = self.clutch.log_cycles(sets[1:])
-        return [float(value) for value in made[1:] - made[0]]
+        return [float(value) for value in (made[1:] - made[0])[of]]
 
     @cached_property
     def suspects(self) -> frozenset[int]:
@@ -395,7 +412,7 @@ class _Weighed:
         surprise: dict[int, float] = {}
         for fit, own in self.fits:
             if len(own) > 1:
-                mean, variance, log_weight = fit.without()
+                mean, variance, log_weight = fit.without
                 of_cof = log_outlying(fit.tests.log_cof - mean, variance, log_weight)
                 for i, value in zip(own, of_cof.tolist(), strict=True):
                     surprise[i] = min(value - _SUSPICIOUS_COF, 0.0)
@@ -425,7 +442,7 @@ class _Weighed:
         for fit, own in self.fits:
             if not own:
                 continue
-            mean, variance, log_weight = fit.without()
+            mean, variance, log_weight = fit.without
             off = fit.tests.log_cof - mean
             sign = np.array([-1.0 if i in belief.outlying else 1.0 for i in own])
             now, then = (

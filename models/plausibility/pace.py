@@ -117,8 +117,8 @@ def _by_gaps(cycles: FloatArray) -> FloatArray:
     law[:, 0] = criteria.AT_START * (first < 0.5) + (1.0 - criteria.AT_START) * np.exp(log_anywhere(first))
     if count > 1:
         with np.errstate(invalid="ignore"):
-            gaps = np.nan_to_num(np.diff(ascending, axis=1), nan=0.0, posinf=0.0)
-        law[:, 1:] = _of_gaps(gaps)
+            gaps = np.diff(ascending, axis=1)
+        law[:, 1:] = _of_gaps(np.where(np.isfinite(gaps), gaps, 0.0))
     back = np.empty(law.shape)
     np.put_along_axis(back, order, law, axis=1)
     return back
@@ -138,9 +138,10 @@ def _of_gaps(gaps: FloatArray) -> FloatArray:
     log_before = np.log(np.maximum(before, 0.5))
     same = (weight * (np.abs(before - gaps[:, :, None]) < 0.5)).sum(axis=2)
     like = (weight * _log_normal(log_gap[:, :, None], log_before, criteria.LIKE_GAP_SD)).sum(axis=2)
-    growing = present[:, :, 0] & present[:, :, 1] if criteria.MEMORY > 1 else np.zeros(gaps.shape, dtype=bool)
+    growing = present[:, :, 0] & present[:, :, 1]
     grown = 2.0 * log_before[:, :, 0] - log_before[:, :, 1]
-    like = np.where(growing, 0.8 * like + 0.2 * _log_normal(log_gap, grown, criteria.LIKE_GAP_SD), like)
+    further = _log_normal(log_gap, grown, criteria.LIKE_GAP_SD)
+    like = np.where(growing, (1.0 - criteria.GROWING) * like + criteria.GROWING * further, like)
     similar = _log_normal(log_gap, (weight * log_before).sum(axis=2), criteria.SIMILAR_GAP_SD)
     anything = np.exp(log_anywhere(gaps))
     by_earlier = criteria.SAME_GAP * same + criteria.LIKE_GAP * like + criteria.SIMILAR_GAP * similar

@@ -20,6 +20,7 @@ from service.lives.condition import (
     SHOWN,
     STATE_WORDS,
     bound_in_words,
+    held_in_words,
     lower_bound,
     silence_in_words,
 )
@@ -76,10 +77,11 @@ def keeps(rule: AlarmIn, result: Finding | None) -> bool:
 
 
 def message(rule: AlarmIn, facts: Facts, result: Finding) -> str:
-    """An alarm as a sentence."""
-    unit = _UNITS.get(rule.quantity)
+    """An alarm as a sentence, with how many runs are held beside it."""
+    unit, held = _UNITS.get(rule.quantity), facts.summary.get("held", 0)
     limit = "" if rule.limit is None or unit is None else f" (limit: {rule.limit:,.6g}{unit})"
-    return f"{facts.clutch_id}: {result.words}{limit}"
+    waiting = f"; {held_in_words(held)}" if held and rule.quantity != "held_runs" else ""
+    return f"{facts.clutch_id}: {result.words}{limit}{waiting}"
 
 
 def _passes(rule: AlarmIn, result: Finding, hysteresis: float) -> bool:

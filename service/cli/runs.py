@@ -66,9 +66,26 @@ def end(
 
 
 @asking
-def confirm(service: Service, clutch: ClutchId, run: RunId, reason: Reason = "") -> None:
-    """Accept a held run as it was sent."""
-    _post(service, f"/v1/clutches/{clutch}/runs/{run}/confirm", {"reason": reason})
+def confirm(
+    service: Service,
+    clutch: ClutchId,
+    runs: Annotated[list[str] | None, typer.Argument(metavar="[RUN]...")] = None,
+    every: Annotated[bool, typer.Option("--all", help="All runs that are held")] = False,
+    doubt: Annotated[str, typer.Option(help="All runs that are held for this code, as cycles_off_pace")] = "",
+    reason: Reason = "",
+) -> None:
+    """Accept held runs as they were sent: one, or several in one step."""
+    if bool(runs) + every + bool(doubt) != 1:
+        fail("give the runs, or --all, or --doubt CODE", EX_USAGE)
+    if not runs:
+        held = service.pages(f"/v1/clutches/{clutch}/runs", state="held")
+        runs = [run["run_id"] for run in held if every or doubt in {each["code"] for each in run["doubts"]}]
+    if not runs:
+        print_line(f"{clutch} has no {f'runs held for {doubt}' if doubt else 'held runs'}")
+        return
+    body = json.dumps({"run_ids": runs, "reason": reason}).encode()
+    for receipt in service.post(f"/v1/clutches/{clutch}/runs/confirm", body)["items"]:
+        _show(receipt)
 
 
 @asking

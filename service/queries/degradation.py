@@ -48,6 +48,7 @@ COLUMNS = (
     "speed_rpm",
     "frequency_hz",
     *(f"{name}{part}" for name in COEFFICIENTS for part in ("", "_sd")),
+    "held_runs",
 )
 _MEAN_COF = QUANTITIES["mean_cof"]
 
@@ -74,6 +75,7 @@ def degradation(
     measured = measured_life(state, chosen, evidence)
     held = held_notices(len(state.held))
     head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}
+    head |= {"held_runs": len(state.held)}
     if measured is None or (wanted is None and not measured.life.reference):
         nothing: dict[str, Any] = {
             "items": [],
@@ -158,6 +160,7 @@ def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     for item in payload["items"]:
         yield (
             {name: item[name] for name in COLUMNS[:5]}
+            | {"held_runs": payload["held_runs"]}
             | {name: _part(item, name, "value") for name in COEFFICIENTS}
             | {f"{name}_sd": _part(item, name, "sd") for name in COEFFICIENTS}
         )

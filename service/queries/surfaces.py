@@ -36,7 +36,8 @@ def surface(database: Database, clutch_id: str) -> dict[str, Any]:
         state, levels = records.state(connection, clutch_id), records.levels(connection, clutch_id)
     assumptions = state.assumptions()
     grids = surfaces(clutch_id, state.events, assumptions, levels, state.geometry)
-    return {"clutch_id": clutch_id, "revision": state.revision} | grids | assumptions.named()
+    head = {"clutch_id": clutch_id, "revision": state.revision, "held_runs": len(state.held)}
+    return head | grids | assumptions.named()
 
 
 def surfaces(
@@ -93,7 +94,7 @@ def rows(grids: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [
         {"cycles": cycles, "pressure_bar": pressure, "speed_rpm": speed}
         | {name: grid[i][j] for name, grid in grids["parameters"].items()}
-        | {"torque_nm": grids["torque_nm"][i][j][k]}
+        | {"torque_nm": grids["torque_nm"][i][j][k], "held_runs": grids["held_runs"]}
         for i, cycles in enumerate(grids["cycles"])
         for j, pressure in enumerate(grids["pressure_bar"])
         for k, speed in enumerate(grids["speed_rpm"])

@@ -4,23 +4,19 @@ A vector is a column; a matrix is several, with the names that a list of as many
 what stands beside an array under the usual names: attributes of HDF5, fields and variables of MATLAB.
 """
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from models.arrays import FloatArray
-from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice
+from service.errors import FieldError, InvalidError, Notice
+from service.readers.clocks import UNITS, stated_clock
 from service.readers.column_names import column_of, known_channel
 from service.readers.limits import Limits
 from service.readers.table import Clock, Column, Reading, Table, only
-from service.readers.unit_table import conversion
 
-_UNITS = ("unit", "units", "unit_string", "yunit", "einheit")
 _NAMES = (
     "names",
     "name",
@@ -34,11 +30,6 @@ _NAMES = (
     "variablenames",
 )
 _DATA = ("data", "values", "value", "y", "samples")
-#: What states a clock: a step, a rate or a start, with the units that each may have. A name may end in its unit (`dt_ms`).
-_STEPS = "dt|ts|delta_t|delta_x|wf_increment|sampl(?:e|ing)_(?:interval|time|period)|t_s"
-_RATES = "fs|f_s|sampl(?:e|ing)_?(?:rate|frequency)|rate"
-_STARTS = "t0|x0|wf_start_offset"
-_HERTZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "1/s": 1.0, "s/s": 1.0, "sps": 1.0, "samples/s": 1.0}
 #: Factors that a file states beside raw counts; whether they were applied already only its program knows.
 _GAINS, _OFFSETS = ("gain", "scale", "factor", "slope", "multiplier", "sensitivity", "calibration"), ("offset", "zero")
 _CHARACTERS = "SUO"
@@ -71,7 +62,7 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
 
     Raises InvalidError where it holds no array that could be a channel.
     """
-    sources = list(_sources(tree, "", 0))
+    sources = list(_sources(tree, "", 0, {}))
     groups = tuple(dict.fromkeys(source.column.group for source in sources))
     if reading.table:
         chosen = groups[only(groups, reading.table, "group")]
@@ -112,8 +103,9 @@ def _complete(sources: list[_Source]) -> list[str]:
     return [group for group, names in channels_by_group.items() if {"torque_nm", "speed_rpm", "pressure_bar"} <= names]
 
 
-def _sources(tree: Tree, group: str, depth: int) -> Iterator[_Source]:
-    """The columns of a folder and of those in it."""
+def _sources(tree: Tree, group: str, depth: int, above: Tree) -> Iterator[_Source]:
+    """The columns of a folder and of those in it; `above` is what the folders above state."""
+    stated = {**above, **_scalars(tree)}
     for name, node in tree.items():
         path = f"{group}/{name}" if group else name
         if isinstance(node, Mapping):
@@ -124,14 +116,16 @@ def _sources(tree: Tree, group: str, depth: int) -> Iterator[_Source]:
             ]
             if data is not None and not [key for key in rest if known_channel(key) != "time_s"]:
                 label = _text(lowered.get("label")) or _text(lowered.get("name")) or name
-                times = [_source(key, node[key], path, node) for key in node if known_channel(key) == "time_s"]
+                times = [
+                    _source(key, node[key], path, {**stated, **node}) for key in node if known_channel(key) == "time_s"
+                ]
                 yield from (time for time in times if time is not None)
                 data = replace(data, attributes={**node, **data.attributes})
-                yield from _columns(label, data, path if times else group, node)
+                yield from _columns(label, data, path if times else group, {**stated, **node})
             elif depth < _DEEPEST:
-                yield from _sources(node, path, depth + 1)
+                yield from _sources(node, path, depth + 1, stated)
         elif isinstance(node, Leaf):
-            yield from _columns(name, node, group, tree)
+            yield from _columns(name, node, group, {**above, **tree})
 
 
 def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Source]:
@@ -151,7 +145,7 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
     width = shape[across]
     lists = {key.lower(): _texts(value) for key, value in {**beside, **leaf.attributes}.items()}
     names = next((lists[key] for key in _NAMES if len(lists.get(key, ())) == width), [])
-    units = next((lists[key] for key in _UNITS if len(lists.get(key, ())) == width), [])
+    units = next((lists[key] for key in UNITS if len(lists.get(key, ())) == width), [])
     for index in range(width):
         title = names[index] if names else f"{name}[{index + 1}]"
         place = (index, slice(None)) if across == 0 else (slice(None), index)
@@ -173,9 +167,9 @@ def _source(name: str, node: Any, group: str, beside: Tree) -> _Source | None:
     if not isinstance(node, Leaf) or not (rows := _rows(node)):
         return None
     lowered = {key.lower(): value for key, value in node.attributes.items()}
-    stated = next((_text(lowered[key]) for key in _UNITS if _text(lowered.get(key))), None)
+    stated = next((_text(lowered[key]) for key in UNITS if _text(lowered.get(key))), None)
     if stated is None and any(key.lower() in _DATA for key in beside):
-        stated = next((_text(value) for key, value in beside.items() if key.lower() in _UNITS and _text(value)), None)
+        stated = next((_text(value) for key, value in beside.items() if key.lower() in UNITS and _text(value)), None)
     moments = node.data.dtype.kind in "Mm"
     column = Column(**_titled(name, None if moments else stated, group))
     unit = "s" if moments else column.unit
@@ -189,50 +183,24 @@ def _rows(leaf: Leaf) -> int:
     return int(max(shape)) if vector and leaf.data.dtype.kind in "iufMm" else 0
 
 
+def _scalars(tree: Tree) -> dict[str, float | str]:
+    """The single numbers and texts of a folder, and of folders in it that hold nothing else; a number's unit beside it."""
+    held: dict[str, float | str] = {}
+    for key, value in tree.items():
+        number = _number(value)
+        if isinstance(value, Mapping):
+            if not any(isinstance(node, Leaf) and node.data.size > 1 for node in value.values()):
+                held = _scalars(value) | held
+        elif number is not None or _text(value):
+            held[key] = _text(value) if number is None else number
+            attributes = value.attributes if isinstance(value, Leaf) else {}
+            held |= {f"{key}_{name}": _text(attributes[name]) for name in UNITS if _text(attributes.get(name))}
+    return held
+
+
 def _clock(leaf: Leaf, beside: Tree, rows: int) -> Clock | None:
-    """A clock that is stated as a step or a rate, at the array or beside it. Raises InvalidError on an unknown unit."""
-    held = {"_".join(key.lower().split()): value for key, value in {**beside, **leaf.attributes}.items()}
-    step, rate, start = (_stated(held, names) for names in (_STEPS, _RATES, _STARTS))
-    if step is None and rate:
-        step = 1.0 / rate
-    if step is None or not step > 0:
-        return None
-    start = start or 0.0
-    return Clock((start, step, rows), partial(_times, start, step, rows), counts=step == 1.0 and start == 0.0)
-
-
-def _stated(held: Mapping[str, Any], names: str) -> float | None:
-    """A number that stands under one of the names, in s or Hz by its unit: in the name, the text, or an attribute."""
-    for key, value in held.items():
-        match = re.fullmatch(rf"(?:{names})(?:_?[\[(]?(?P<unit>[^\W_]+/?[^\W_]*)[\])]?)?", key)
-        number, unit = _number(value), match["unit"] if match else None
-        if match is None or (unit and _factor(names, unit) is None):
-            continue
-        text = re.fullmatch(r"\s*([\d.]+(?:[eE][+-]?\d+)?)\s*(\D*)", _text(value))
-        if number is None and text:
-            number, unit = float(text[1]), unit or text[2].strip()
-        if number is None:
-            continue
-        attributes = value.attributes if isinstance(value, Leaf) else {}
-        beside = [held.get(f"{key}_{name}") for name in _UNITS] + [attributes.get(name) for name in _UNITS]
-        unit = unit or next((_text(stated) for stated in beside if _text(stated)), "")
-        factor = _factor(names, unit)
-        if factor is None:
-            message = f"the unit of {key} must be known, got {unit[:MAX_QUOTED]!r}"
-            raise InvalidError(message, errors=[FieldError(pointer="", code="unknown_unit", message=message)])
-        return number * factor
-    return None
-
-
-def _factor(names: str, unit: str) -> float | None:
-    if names == _RATES:
-        return _HERTZ.get(unit.lower())
-    converted = conversion("time_s", unit or "s")
-    return None if converted is None else converted.factor
-
-
-def _times(start: float, step: float, rows: int) -> FloatArray:
-    return start + step * np.arange(rows, dtype=np.float64)
+    """The clock that is stated at the array, beside it or in a folder above."""
+    return stated_clock({**_scalars(beside), **_scalars(leaf.attributes)}, lambda: rows)
 
 
 def _number(value: Any) -> float | None:

@@ -4,7 +4,6 @@ What was left out or resampled is in the notices. Each column has its own time: 
 its recorder's clock, else the one time column of the table.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,8 +16,8 @@ from service.columns import LineOf, check_arrays
 from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice, TooLargeError
 from service.readers.column_names import Taken, choose, is_counter, known_channel
 from service.readers.limits import Limits
-from service.readers.numerals import Numerals
-from service.readers.table import NO_TIME, Clock, Column, Reading, Table, only
+from service.readers.numerals import Numerals, empty_cells
+from service.readers.table import NO_TIME, Clock, Column, Reading, Table, labels, only
 
 #: The code of the notice that lists unused columns.
 LEFT_OUT = "columns_left_out"
@@ -27,6 +26,8 @@ _SECOND = np.timedelta64(1, "s")
 _LEADING = ("torque_nm", "speed_rpm", "pressure_bar")
 #: Steps of the time that repeated titles may interrupt a table for. Chosen: a printed page takes none, a new test minutes.
 _LONGEST_PAUSE = 10
+#: Empty cells that show a channel of a lower rate. Chosen: fewer may have been left empty by hand.
+_MIN_GAPS = 4
 #: Columns that one notice names.
 _MAX_NAMED = 20
 
@@ -60,15 +61,14 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     many values.
     """
     taken = choose(table.columns, reading)
-    clocks = {} if reading.time == NO_TIME else _clocks(table.columns, taken)
-    series, counts = _read(table, taken, clocks, reading, limits)
+    series, taken, counts = _read(table, taken, reading, limits)
     notices = [*table.notices, *_left_out(table.columns, taken, reading)]
     columns = _on_one_clock(series, notices)
     columns, first = _one_table(columns, table, reading)
     line_in_file = table.line_of
     line_of = None if line_in_file is None else lambda row: line_in_file(first + row)
     check_arrays(columns, line_of=line_of)
-    return Channels(columns=columns, notices=tuple(notices), counts=counts, line_of=line_of, labels=labels(table))
+    return Channels(columns=columns, notices=tuple(notices), counts=counts, line_of=line_of, labels=labels(table.above))
 
 
 def _one_table(columns: dict[str, FloatArray], table: Table, reading: Reading) -> tuple[dict[str, FloatArray], int]:
@@ -88,19 +88,9 @@ def _one_table(columns: dict[str, FloatArray], table: Table, reading: Reading) -
     return {name: column[starts[number] : starts[number + 1]] for name, column in columns.items()}, starts[number]
 
 
-def labels(table: Table) -> dict[str, str]:
-    """What the lines above the table say: `label: value`, `label = value` or a label and its value in two cells."""
-    values_by_label: dict[str, str] = {}
-    for row in table.above:
-        cells = [cell for cell in row if cell]
-        if len(cells) == 1:
-            cells = [part.strip() for part in re.split(r"[:=]", cells[0], maxsplit=1)]
-        if len(cells) > 1:
-            values_by_label.setdefault(cells[0][:MAX_QUOTED], cells[1][:MAX_QUOTED])
-    return values_by_label
-
-
-def _clocks(columns: Sequence[Column], taken: Sequence[Taken]) -> dict[int, int | Clock | None]:
+def _clocks(
+    columns: Sequence[Column], taken: Sequence[Taken], values: Mapping[int, FloatArray]
+) -> dict[int, int | Clock | None]:
     """For each column that is taken and is no time, what times it: a column's index, a recorder's clock, or nothing."""
     times = [column.index for column in taken if column.channel == "time_s"]
     clocks: dict[int, int | Clock | None] = {}
@@ -113,18 +103,38 @@ def _clocks(columns: Sequence[Column], taken: Sequence[Taken]) -> dict[int, int 
             clocks[column.index] = before[-1] if before else own[0]
         else:
             clocks[column.index] = columns[column.index].clock or (times[0] if len(times) == 1 else None)
-    unused = [index for index in times if index not in clocks.values()]
-    if unused and len(times) > 1:
-        shown = " and ".join(columns[index].shown() for index in times[:_MAX_NAMED])
-        message = f"time_s must be one column, got {shown}; time=NAME chooses one"
-        raise InvalidError(message, errors=[FieldError(pointer="/time", code="ambiguous", message=message)])
+    for place, unused in enumerate(times):
+        if len(times) == 1 or unused in clocks.values():
+            continue
+        following = times[place + 1] if place + 1 < len(times) else None
+        if following is None or not _agree(values[unused], values[following]):
+            shown = " and ".join(columns[index].title or columns[index].shown() for index in times[:_MAX_NAMED])
+            message = f"time_s must be one column, got {shown}; time=NAME chooses one"
+            raise InvalidError(message, errors=[FieldError(pointer="/time", code="ambiguous", message=message)])
+        if np.unique(values[unused]).size > np.unique(values[following]).size:
+            clocks = {index: unused if clock == following else clock for index, clock in clocks.items()}
     return clocks
 
 
+def _agree(times: FloatArray, others: FloatArray) -> bool:
+    """Whether two columns tell the same time since their beginning, within the resolution of the coarser."""
+    if times.size != others.size:
+        return False
+    steps = [own[own > 0].min(initial=np.inf) for own in (np.diff(times), np.diff(others))]
+    apart = np.abs(times - times[0] - others + others[0]).max()
+    return bool(apart <= max(steps) * (1 + 1e-9))
+
+
+def _runs_on(times: FloatArray) -> bool:
+    """Whether a column may be a clock: nine of ten of its steps go on. Chosen: of durations in any order half do."""
+    steps = np.diff(times[~np.isnan(times)])
+    return bool(steps.size > 0 and np.count_nonzero(steps > 0) >= 0.9 * steps.size)
+
+
 def _read(
-    table: Table, taken: Sequence[Taken], clocks: Mapping[int, int | Clock | None], reading: Reading, limits: Limits
-) -> tuple[dict[str, _Series], bool]:
-    """The channels' values and times; and whether their one clock may only count."""
+    table: Table, taken: Sequence[Taken], reading: Reading, limits: Limits
+) -> tuple[dict[str, _Series], list[Taken], bool]:
+    """The channels' values and times, the columns that they are from, and whether their one clock may only count."""
     indices = [column.index for column in taken]
     stated = sum(table.columns[index].rows or 0 for index in indices)
     if stated > limits.most_values:
@@ -141,6 +151,8 @@ def _read(
         values[column.index], valid[column.index] = _numbers(column, read.pop(column.index))
         if column.channel == "time_s" and column.assumed:
             _refuse_serials(table.columns[column.index], values[column.index])
+    taken = [column for column in taken if not column.guessed or _runs_on(values[column.index])]
+    clocks = {} if reading.time == NO_TIME else _clocks(table.columns, taken, values)
     used = [clock for clock in clocks.values() if isinstance(clock, Clock)]
     times: dict[object, FloatArray] = {}
     for recorder_clock in used:
@@ -152,15 +164,41 @@ def _read(
             clock = clocks.get(column.index)
             key = clock.key if isinstance(clock, Clock) else clock
             own = times[key] if isinstance(clock, Clock) else None if clock is None else values[clock]
-            mask = valid[column.index]
-            series[column.channel] = _Series(values[column.index], mask, key, own)
+            one = _Series(values[column.index], valid[column.index], key, own)
+            series[column.channel] = _without_gaps(column.channel, one, table)
     if not series:  # a time alone: shown as such, and refused for what it lacks
         series = {"time_s": _Series(values[indices[0]], None, None, None)}
     counts = bool(used) and len(times) == 1 and used[0].counts
     for index in {clock for clock in clocks.values() if isinstance(clock, int)}:
-        # LabVIEW's text files count where they have no clock
+        # LabVIEW's text files count where they have no clock, and a clock that was found may be none
         counts = is_counter(table.columns[index]) and np.array_equal(values[index], np.arange(values[index].size))
-    return series, counts
+        counts = counts or any(column.guessed for column in taken if column.index == index)
+    return series, taken, counts
+
+
+def _without_gaps(name: str, own: _Series, table: Table) -> _Series:
+    """A channel without the rows that hold neither it nor its time. Where at least every second of its cells is empty, its
+    rate is lower than that of the rows: it is the samples that are there.
+
+    Raises InvalidError on any other empty cell.
+    """
+    missing, invalid = np.isnan(own.values), own.valid
+    if table.line_of is not None:
+        own.valid = None  # a cell's mask says that it is empty
+    if own.times is not None and own.times.size == missing.size and missing.any() and not missing.all():
+        held = ~(missing & np.isnan(own.times))
+        gaps = np.count_nonzero(missing & held)
+        if gaps >= _MIN_GAPS and 2 * gaps >= np.count_nonzero(held) - 1:
+            held &= ~missing
+        if not held.all():
+            valid = None if own.valid is None else own.valid[held]
+            own = _Series(own.values[held], valid, (own.clock, name), own.times[held])
+            missing, invalid = missing[held], None if invalid is None else invalid[held]
+    if table.line_of is not None and invalid is not None and not invalid.all():
+        raise empty_cells(name, np.flatnonzero(~invalid).tolist(), table.line_of, missing.size - 1)
+    if own.times is not None and table.line_of is not None and np.isnan(own.times).any():
+        raise empty_cells("time_s", np.flatnonzero(np.isnan(own.times)).tolist(), table.line_of, own.times.size - 1)
+    return own
 
 
 def _cells(column: NDArray[Any]) -> list[Any]:
@@ -302,7 +340,7 @@ def _resampled(
     if own.valid is not None and own.times.size > 1:
         valid = own.valid[after - 1] & own.valid[after]
     # a sample of a slower channel stands until the next one is due
-    reach = max(0.0, _step(own.times) - _step(lead.times))
+    reach = max(0.0, _step(own.times) - _step(lead.times)) * (1 + 1e-9)
     inside = (lead.times >= own.times[0] - reach) & (lead.times <= own.times[-1] + reach)
     return np.interp(lead.times, own.times, own.values), valid, inside
 

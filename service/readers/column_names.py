@@ -40,6 +40,23 @@ _WORDS = {
     "temperature_plate_rear theta_plate_rear plattentemperatur_hinten lamellentemperatur_hinten t_platte_hinten "
     "t_lamelle_hinten",
 }
+#: Words of time, within any name.
+_TIMES = (
+    "time",
+    "zeit",
+    "temps",
+    "tiempo",
+    "tempo",
+    "stamp",
+    "date",
+    "datum",
+    "index",
+    "时间",
+    "時間",
+    "時刻",
+    "日時",
+    "время",
+)
 #: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports.
 _SECONDS = frozenset({"x_value", "timestamps"})
 
@@ -51,13 +68,15 @@ _MAX_NAMED = 10
 class Taken:
     """A column that is taken: the file's `index`-th as `channel`, with its conversion to the channel's unit.
 
-    `assumed`: neither file nor caller states a unit, and the channel's own was taken.
+    `assumed`: neither file nor caller states a unit, and the channel's own was taken. `guessed`: a time by its unit and a
+    word in its name, which its values must bear out.
     """
 
     channel: str
     index: int
     conversion: Conversion
     assumed: bool = False
+    guessed: bool = False
 
 
 def _key(name: str) -> str:
@@ -84,8 +103,8 @@ _BETWEEN = re.compile(r"\s*[,;:|]\s*|\s*/\s*|\s+in\s+|[\s_]+")
 
 
 def known_channel(name: str) -> str | None:
-    """The public channel that a name stands for, or None."""
-    bare = name.strip()
+    """The public channel that a name stands for, or None; what follows a backslash names a device (`torque\\CAN:1`)."""
+    bare = name.partition("\\")[0].strip()
     return _LETTERS.get(bare) or (_BY_KEY.get(_key(bare)) if 1 < len(bare) <= LONGEST_NAME else None)
 
 
@@ -143,7 +162,7 @@ def bare_unit(text: str) -> str | None:
     """A unit without its brackets; None where nothing is stated."""
     unit = text.translate(_WIDE).strip()
     unit = (unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()", "{}", "<>") else unit).strip().removeprefix("in ")
-    return None if unit in ("", "-", "--", "_", "?") else unit
+    return unit if re.search(r"[^-_=?.*/|\s]", unit) else None
 
 
 def with_unit(column: Column, unit: str | None) -> Column:
@@ -234,8 +253,19 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
     for channel, positions in indices.items():
         if len(positions) > 1 and channel != "time_s":
             raise _twice(channel, *(columns[index] for index in positions))
+    guessed = {
+        index
+        for index, column in enumerate(columns)
+        if not ({"time_s"} & {*indices, *named})
+        and reading.time != NO_TIME
+        and not reading.only_named
+        and index not in by_map
+        and _may_be_time(column)
+    }
     if not indices:
         raise InvalidError(f"the file holds no known channel: it has {_list(columns)}; {remedy(columns)}")
+    if guessed:
+        indices["time_s"] = sorted(guessed)
     taken, without_unit = [], []
     for channel, positions in indices.items():
         for index in positions:
@@ -245,12 +275,24 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
             if unit is None and choice is None and not public:
                 without_unit.append((channel, columns[index]))
                 continue
-            taken.append(
-                Taken(channel, index, _conversion(channel, columns[index], choice, unit), unit is None and not public)
-            )
+            converted = _conversion(channel, columns[index], choice, unit)
+            assumed = unit is None and not public
+            taken.append(Taken(channel, index, converted, assumed, channel == "time_s" and index in guessed))
     if without_unit:
         raise _no_unit(without_unit, reading)
     return sorted(taken, key=lambda column: column.index)
+
+
+def _may_be_time(column: Column) -> bool:
+    """Whether a column in a unit of time has a word of time in its name, or no name."""
+    name = column.name.casefold()
+    timed = not name or any(word in name for word in _TIMES)
+    return (
+        timed
+        and known_channel(name) is None
+        and column.unit is not None
+        and conversion("time_s", column.unit) is not None
+    )
 
 
 def _no_unit(columns: Sequence[tuple[str, Column]], reading: Reading) -> InvalidError:

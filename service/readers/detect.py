@@ -9,7 +9,7 @@ from enum import StrEnum
 from pathlib import Path, PurePath
 from typing import BinaryIO, Protocol
 
-from service.errors import MAX_QUOTED, InvalidError, TooLargeError
+from service.errors import MAX_QUOTED, BusyError, FieldError, InvalidError, TooLargeError
 from service.readers.limits import Limits
 
 
@@ -148,3 +148,14 @@ def _of_archive(path: Path) -> Format:
         return Format.ZIP
     workbook = "[Content_Types].xml" in names or {"mimetype", "content.xml"} <= set(names)
     return Format.WORKBOOK if workbook else Format.ZIP
+
+
+def too_slow(kind: Format, limits: Limits) -> InvalidError:
+    """The error of a file that takes more of a processor's time than it may."""
+    message = f"the {kind} file cannot be read: it took longer than {limits.seconds} s of a processor"
+    return InvalidError(message, errors=[FieldError(pointer="", code="too_slow", message=message)])
+
+
+def overdue(kind: Format, limits: Limits) -> BusyError:
+    """The error of a file that was waited for too long, though its reader has not used the time that it may."""
+    return BusyError(f"the {kind} file was not read within {limits.wall_seconds} s: the machine has too much to do")

@@ -6,7 +6,7 @@ name over several columns may stand there too.
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any
@@ -16,7 +16,7 @@ from service.readers.column_names import bare_unit, column_of, known_channel, re
 from service.readers.limits import LONGEST_TITLE
 from service.readers.numerals import is_stamp
 from service.readers.table import Column
-from service.readers.unit_table import is_unit
+from service.readers.unit_table import conversion, is_unit
 
 Row = Sequence[Any]
 
@@ -24,12 +24,15 @@ Row = Sequence[Any]
 MAX_ROWS = 500
 #: Rows of a run by which two candidates are compared; longer ones count the same. Chosen: more than header blocks have.
 _LONG_RUN = 8
-#: Rows of titles and units above the data, at most; blank rows between them do not count.
-_MAX_TITLE_ROWS = 4
+#: Rows of text above the data among which titles and units are, at most; others between them do not count. Chosen: recorders
+#: write six (channel, title, unit, filter, place, sensor).
+_MAX_TITLE_ROWS = 12
 #: What a row begins with that names the units of the columns beside it.
-_UNIT_LABELS = re.compile(r"(y_)?units?(_label)?s?:?|einheit(en)?:?|单位", re.IGNORECASE)
+_UNIT_LABELS = re.compile(
+    r"[a-z]{0,2}_?unit[éàs]*(_label)?s?:?|einheit(en)?:?|unidad(es)?:?|单位|單位|単位", re.IGNORECASE
+)
 NUMERIC = re.compile(
-    r"[+−-]?(\d[\d.,'’\u00a0\u202f\u2009]*+|[.,]\d++)( ?[eE][+-]?\d{1,4})?|[+−-]?(nan|inf|infinity)",
+    r"[+−-]? *(\d[\d.,'’\u00a0\u202f\u2009]*+|[.,]\d++)( ?[dDeE][+-]?\d{1,4})?|[+−-]?(nan|inf|infinity)",
     re.IGNORECASE | re.ASCII,
 )
 
@@ -64,9 +67,18 @@ def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[st
 
     `comments` are rows that may hold titles and no data; `named` are titles that the caller names.
     """
-    runs = list(_runs(rows, comments)) or [(len(rows), 0)]  # titles without data are a table too
+    runs = list(_runs(rows, comments)) or [(len(rows), 0)]
     layouts = [_layout([*rows, ()], comments, start, length, named) for start, length in runs]
-    candidates = [layout for layout in layouts if layout]
+    # titles without data are a table too, where they are known and nothing but units is under them
+    candidates = [
+        layout
+        for layout in layouts
+        if layout
+        and (
+            layout.score[3]
+            or (layout.score[0] and all(is_blank(row) or _are_units(row) for row in rows[layout.titles + 1 :]))
+        )
+    ]
     best = max(candidates, key=lambda layout: layout.score, default=None)
     # titles that are repeated within the data do not begin another table
     return next((layout for layout in candidates if best and layout.texts() == best.texts()), None)
@@ -130,8 +142,8 @@ def _layout(
     rows: Sequence[Row], comments: frozenset[int], start: int, length: int, named: Sequence[str]
 ) -> Layout | None:
     """The layout of the data from row `start` on: the row above them that knows most channels has the titles."""
-    above = _text_rows_above(rows, comments, start)
     start, labelled = _without_labelled(rows[:-1], comments, start, length)
+    above = _text_rows_above(rows, comments, start)
     width = max((index + 1 for index, cell in enumerate(rows[start]) if cell not in (None, "")), default=0)
     best: tuple[tuple[int, int, int], list[str], int] | None = None
     for place, at in enumerate(above):
@@ -149,24 +161,26 @@ def _layout(
     if best is None:
         return None
     rank, titles, at = best
-    units = _units(rows, [row for row in above if row > at], at, start)
+    units = _units(rows, [row for row in above if row > at], at, start, titles)
     groups = _filled([_text(cell) for cell in rows[at - 1]], len(titles)) if at - 1 in above else []
     twice = len(set(filter(None, titles))) < sum(map(bool, titles))
-    headings = zip_longest(
-        titles, units[: len(titles)], groups if twice else (), rows[start][: len(titles)], fillvalue=""
-    )
-    score = (rank[0], rank[1], min(length - labelled, _LONG_RUN), sum(map(is_value, rows[start])))
-    return Layout(headings=tuple(headings), titles=at, start=start, labelled=labelled, score=score)
+    beside = (units[: len(titles)], groups if twice else (), rows[start][: len(titles)])
+    headings = tuple(zip_longest(titles, *beside, fillvalue=""))
+    misfits = sum(bool(unit) and not _fits(title, unit) for title, unit, _, _ in headings)
+    score = (rank[0] - misfits, rank[1], min(length - labelled, _LONG_RUN), sum(map(is_value, rows[start])))
+    return Layout(headings=headings, titles=at, start=start, labelled=labelled, score=score)
 
 
 def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) -> list[int]:
-    """The nearest rows of text above the data, the lowest first."""
+    """The nearest rows of text above the data, the lowest first. Numbers with a label (`Length;12;12`), and those of the
+    columns, may stand between them."""
     text_rows: list[int] = []
     for index in range(start - 1, -1, -1):
-        if index not in comments and any(map(is_value, rows[index])):
+        row = rows[index]
+        if index in comments or not any(map(is_value, row)):
+            text_rows += [] if is_blank(row) else [index]
+        elif not is_footer(row, rows[start]) and [_text(cell) for cell in row] != [str(k + 1) for k in range(len(row))]:
             break
-        if not is_blank(rows[index]):
-            text_rows.append(index)
         if len(text_rows) == _MAX_TITLE_ROWS:
             break
     return text_rows
@@ -202,25 +216,31 @@ def _text(cell: Any) -> str:
     return "" if cell is None else str(cell).strip()
 
 
-def _are_units(texts: Sequence[str]) -> bool:
+def _are_units(row: Row) -> bool:
     """Whether all that is there are units."""
-    stated = [unit for unit in map(bare_unit, texts) if unit]
+    stated = [unit for unit in map(bare_unit, map(_text, row)) if unit]
     return bool(stated) and all(map(is_unit, stated))
 
 
-def _units(rows: Sequence[Row], below: Sequence[int], at: int, start: int) -> list[str]:
-    """The units beside the titles in row `at`: a row of them under it or above it, or a row that is labelled so."""
+def _units(rows: Sequence[Row], below: Sequence[int], at: int, start: int, titles: Sequence[str]) -> list[str]:
+    """The units beside the titles in row `at`: of the rows under it, one over it and those that are labelled so, the one
+    that holds most units of its titles."""
     texts = {index: [_text(cell) for cell in rows[index]] for index in range(max(0, start - MAX_ROWS), start)}
-    candidates = [index for index in below if texts[index] != texts[at]]
-    best = max(candidates, key=lambda index: sum(map(is_unit, filter(None, texts[index]))), default=None)
-    if best is None and at and _are_units(texts[at - 1]):
-        best = at - 1
-    labelled = [index for index, row in texts.items() if row and _UNIT_LABELS.fullmatch(row[0]) and index != at]
-    if best is None and labelled:
-        best = labelled[-1]
-    if best is None:
-        return []
-    return ["" if _UNIT_LABELS.fullmatch(unit) else unit for unit in texts[best]]
+    labelled = [index for index, row in texts.items() if row and _UNIT_LABELS.fullmatch(row[0])]
+    over = [at - 1] if at and _are_units(texts[at - 1]) else []
+    fitting = {
+        index: sum(map(_fits, titles, texts[index]))
+        for index in (*below, *over, *labelled)
+        if index != at and texts[index] != texts[at]
+    }
+    best = max(fitting, key=lambda index: fitting[index], default=at)
+    return ["" if _UNIT_LABELS.fullmatch(unit) else unit for unit in texts[best]] if fitting.get(best) else []
+
+
+def _fits(title: str, cell: str) -> bool:
+    """Whether a cell is a unit of its title, or any where the title is not known."""
+    unit, channel = bare_unit(cell) or "", known_channel(title)
+    return is_unit(unit) if channel is None else conversion(channel, unit) is not None
 
 
 def left_out(number: int, where: str, first: str) -> Notice:
@@ -229,8 +249,17 @@ def left_out(number: int, where: str, first: str) -> Notice:
     return Notice(code="lines_left_out", message=message)
 
 
-def no_table(line: int, got: str) -> InvalidError:
-    """The error of a text or sheet without a row of titles over numbers."""
-    shown = got.strip()[:MAX_QUOTED]
-    message = f"line {line} must be a header with the channels' names, above rows of numbers, got {shown!r}"
+def no_table(
+    rows: Sequence[Row], named: Sequence[str], line_of: Callable[[int], int] = lambda row: row + 1
+) -> InvalidError:
+    """The error of a text or sheet without a row of titles over numbers: what stands where the one or the others should."""
+    filled = [index for index, row in enumerate(rows) if not is_blank(row)] or [0]
+    best = max(filled, key=lambda index: recognised(list(map(_text, rows[index])), named) if rows else 0)
+    under = next((index for index in filled if index > best), None)
+    if under is not None and recognised(list(map(_text, rows[best])), named):
+        place, rule = under, f"must be a row of numbers, under the titles of line {line_of(best)}"
+    else:
+        place, rule = filled[0], "must be a header with the channels' names, above rows of numbers"
+    shown = " ".join(map(_text, rows[place] if rows else ())).strip()[:MAX_QUOTED]
+    message = f"line {line_of(place)} {rule}, got {shown!r}"
     return InvalidError(message, errors=[FieldError(pointer="", code="no_header", message=message, value=shown)])

@@ -74,7 +74,8 @@ class Numerals:
         line_of: Callable[[int], int] | None = None,
         before: int = 0,
     ) -> list[NDArray[Any]]:
-        """Columns [n] by their index, each for a channel: numbers as float64, points in time as numpy has them.
+        """Columns [n] by their index, each for a channel: numbers as float64, masked where cells are empty; points in time
+        as numpy has them.
 
         `before` rows were read already. Raises InvalidError naming the rows of cells that are neither, or may be read in two
         ways.
@@ -92,6 +93,7 @@ class Numerals:
             # the time last: a block is read again where another column is wrong
             values = self._moments(index, cells) if name == "time_s" and not wrong else None
             values = self._floats(cells) if values is None else values
+            values = self._with_gaps(cells) if values is None else values
             for row, rule in self._wrong(cells, name == "time_s") if values is None else ():
                 total += 1
                 if total <= MAX_ERRORS:
@@ -139,13 +141,23 @@ class Numerals:
                 return None
             text = text.replace(other, "")
         text = text.replace(",", ".")
+        if "+ " in text or "- " in text:
+            text = re.sub(r"(?m)^([+-]) +(?=[.\d])", r"\1", text)
         if not text.translate(_PLAIN):
             # by jiter, to which +5, .5 and 007 are no numbers
             with contextlib.suppress(ValueError, OverflowError):
                 numbers = np.array(pydantic_core.from_json(f"[{text.replace(chr(10), ',')}]"), dtype=np.float64)
                 return numbers if numbers.size == len(cells) else None
-        cells = text.split("\n")
+        cells = re.sub(r"(?<=[.\d])[dD](?=[+-]?\d)", "e", text).split("\n")
         return np.array([float(cell) for cell in cells]) if all(map(NUMBER.fullmatch, cells)) else None
+
+    def _with_gaps(self, cells: Sequence[Any]) -> NDArray[Any] | None:
+        """Cells as numbers, masked where they are empty; None where another one is no number."""
+        gaps = [cell is None or (isinstance(cell, str) and not cell.strip()) for cell in cells]
+        values = (
+            self._floats(["nan" if gap else cell for cell, gap in zip(cells, gaps, strict=True)]) if any(gaps) else None
+        )
+        return None if values is None else np.ma.MaskedArray(values, mask=gaps)
 
     def _wrong(self, cells: Sequence[Any], timed: bool) -> Iterator[tuple[int, str]]:
         """The rows of a column that are no numbers, each with the rule that it breaks."""
@@ -171,6 +183,12 @@ _EMPTY = ": fill the cell, or take its row out of the file"
 
 def _place(name: str, row: int, line_of: Callable[[int], int] | None) -> str:
     return f"{name}[{row}]" + (f" (line {line_of(row)})" if line_of else "")
+
+
+def empty_cells(name: str, rows: Sequence[int], line_of: Callable[[int], int] | None, last: int) -> InvalidError:
+    """The error of cells that should hold numbers and are empty."""
+    wrong = [(row, name, "", "must be a number") for row in rows[:MAX_ERRORS]]
+    return _wrong(wrong, len(rows), line_of, last)
 
 
 def _wrong(

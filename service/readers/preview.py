@@ -4,9 +4,8 @@ from typing import Any
 
 from service.columns import CHANNELS
 from service.errors import MAX_QUOTED, InvalidError
-from service.readers.channels import labels
 from service.readers.column_names import choices_of, choose, known_channel
-from service.readers.table import Reading, Table
+from service.readers.table import Reading, Table, labels
 from service.readers.unit_table import conversion
 
 #: Lines above the table that are shown. Chosen: a screenful.
@@ -20,7 +19,8 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
     `factor` and `offset` to the channel's unit (null: the unit is not known). `problem` says why it cannot be read as it is.
     """
     try:
-        taken = {column.index: column for column in choose(table.columns, reading)}
+        chosen = choose(table.columns, reading)
+        taken = {column.index: column for column in chosen if not column.guessed or _differ(table, column.index)}
         problem = None
     except InvalidError as error:
         taken, problem = {}, error.detail
@@ -49,10 +49,16 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
         "table": table.name,
         "tables": list(table.others),
         "above": [[cell[:MAX_QUOTED] for cell in row] for row in table.above[-_MAX_LINES:]],
-        "labels": labels(table),
+        "labels": labels(table.above),
         "first_line": table.first_line,
         "head": [[cell[:MAX_QUOTED] for cell in row] for row in table.head],
         "columns": columns,
         "problem": problem,
         "notices": [{"code": notice.code, "message": notice.message} for notice in table.notices],
     }
+
+
+def _differ(table: Table, index: int) -> bool:
+    """Whether the first cells of a column differ, as times do."""
+    cells = [row[index] for row in table.head if index < len(row)]
+    return len(set(cells)) == len(cells)

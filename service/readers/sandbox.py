@@ -28,7 +28,7 @@ from service.columns import CHANNELS
 from service.errors import BusyError, FieldError, InvalidError, Notice, ServiceError, TooLargeError
 from service.readers.channels import Channels, to_channels
 from service.readers.confinement import close_files, close_network_and_processes
-from service.readers.detect import Format, is_packed, opened
+from service.readers.detect import Format, is_packed, opened, overdue, too_slow
 from service.readers.limits import Limits
 from service.readers.preview import preview
 from service.readers.table import Choice, Reading
@@ -54,8 +54,6 @@ _MAX_QUOTED, _LONGEST_DETAIL = 200, 4000
 _CRASHES = (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT)
 #: Files that the reading process has open at once. Chosen: importing the libraries takes a dozen.
 _MAX_OPEN_FILES = 64
-#: Added to the limit on reading, for the interpreter to start and import the library.
-_STARTING_SECONDS = 10
 #: Environment variables that the reading process gets; no others, so no keys.
 _ENVIRONMENT = (
     "PATH",
@@ -73,8 +71,8 @@ def read_isolated(kind: Format, path: Path, *, reading: Reading, limits: Limits)
 
     What is unpacked is kept beside the file meanwhile.
     Raises InvalidError where the file cannot be read, or makes its reader crash or take too long; TooLargeError where it
-    needs more memory than is allowed or holds more values; BusyError where its reader is not installed or cannot start, or
-    somebody else ended it.
+    needs more memory than is allowed or holds more values; BusyError where its reader is not installed or cannot start, is
+    overdue without having used its time of a processor, or was ended by somebody else.
     """
     channels: Channels = _unpacked(kind, path, "channels", reading, limits)
     return channels
@@ -134,17 +132,17 @@ def _run(kind: Format, path: Path, answer: str, reading: Reading, limits: Limits
                 stderr=subprocess.DEVNULL,
                 pass_fds=[result.fileno()],
                 env=environment,
-                timeout=limits.seconds + _STARTING_SECONDS,
+                timeout=limits.wall_seconds,
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            raise _too_slow(kind, limits) from None
+            raise overdue(kind, limits) from None
         result.seek(0)
         if result.read(len(_STARTED)) != _STARTED and ended.returncode != -signal.SIGTERM:
             why = f"it ended with {_ending(ended.returncode)} before it looked at the file"
             raise BusyError(f"the reader of {kind} files cannot start here, which is not the file's fault: {why}")
         if ended.returncode == -signal.SIGXCPU:
-            raise _too_slow(kind, limits)
+            raise too_slow(kind, limits)
         if ended.returncode == -signal.SIGTERM:
             raise BusyError("the service is ending: send the file again in a little while")
         if ended.returncode == -signal.SIGABRT and kind is Format.WORKBOOK:  # how a library in Rust ends without memory
@@ -156,10 +154,6 @@ def _run(kind: Format, path: Path, answer: str, reading: Reading, limits: Limits
         if ended.returncode:
             raise _unreadable(kind, f"its reader ended with {_ending(ended.returncode)}")
         return _answer(result, kind, answer, limits)
-
-
-def _too_slow(kind: Format, limits: Limits) -> InvalidError:
-    return _unreadable(kind, f"it took longer than {limits.seconds} s", "too_slow")
 
 
 def _unreadable(kind: Format, why: str, code: str = "unreadable") -> InvalidError:

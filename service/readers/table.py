@@ -3,6 +3,7 @@
 A reader finds the table and says what the file says: titles, units, clocks. It decides nothing of channels.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -103,6 +104,18 @@ class Table:
     line_of: LineOf | None = None
     breaks: Sequence[int] = ()
     notices: Sequence[Notice] = ()
+
+
+def labels(above: Sequence[Sequence[str]]) -> dict[str, str]:
+    """What the lines above a table say: `label: value`, `label = value` or a label and its value in two cells."""
+    values_by_label: dict[str, str] = {}
+    for row in above:
+        cells = [cell for cell in row if cell]
+        if len(cells) == 1:
+            cells = [part.strip() for part in re.split(r"[:=]", cells[0], maxsplit=1)]
+        if len(cells) > 1:
+            values_by_label.setdefault(cells[0][:MAX_QUOTED], cells[1][:MAX_QUOTED])
+    return values_by_label
 
 
 def only(names: Sequence[str], wanted: str, kind: str) -> int:

@@ -12,8 +12,8 @@ import numpy as np
 from nptdms import TdmsFile  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from models.arrays import FloatArray
 from service.errors import MAX_QUOTED, FieldError, InvalidError
+from service.readers.clocks import evenly, stated_clock
 from service.readers.column_names import column_of
 from service.readers.limits import Limits
 from service.readers.table import Clock, Column, Reading, Table, cut_short
@@ -32,7 +32,11 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     channels = [channel for group in groups for channel in group.channels() if len(channel)]
     if len(channels) > limits.most_columns:
         raise InvalidError(f"a file must not have more than {limits.most_columns} channels, got {len(channels)}")
-    clocks = _clocks(channels)
+    beside = {group.name: _stated({**file.properties, **group.properties}) for group in groups}
+    clocks = [
+        clock or stated_clock(beside[channel.group_name] | _stated(channel.properties), partial(len, channel))
+        for channel, clock in zip(channels, _clocks(channels), strict=True)
+    ]
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
         return [channels[index][:] for index in taken]
@@ -45,6 +49,15 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         name=reading.table,
         others=tuple(group.name for group in file.groups()),
     )
+
+
+def _stated(properties: Mapping[str, Any]) -> dict[str, float | str]:
+    """What a file, a group or a channel states, but for the waveform's own properties."""
+    return {
+        str(name): value
+        for name, value in properties.items()
+        if isinstance(value, float | int | str) and not str(name).startswith("wf_")
+    }
 
 
 def _column(channel: Any, grouped: bool, clock: Clock | None) -> Column:
@@ -82,9 +95,5 @@ def _clock(channel: Any, start: Any, earliest: Any) -> Clock | None:
     # a waveform without a start cannot be told from the others' start: its own key keeps it from passing for theirs
     key = (None if start is None and earliest is not None else shift, offset * factor, step * factor, rows)
     return Clock(
-        key, partial(_times, shift + offset * factor, step * factor, rows), counts=step == 1.0 and offset == 0.0
+        key, partial(evenly, shift + offset * factor, step * factor, rows), counts=step == 1.0 and offset == 0.0
     )
-
-
-def _times(start: float, step: float, rows: int) -> FloatArray:
-    return start + step * np.arange(rows, dtype=np.float64)

@@ -14,7 +14,6 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,12 +22,13 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, Notice, TooLargeError
+from service.readers.clocks import stated_clock
 from service.readers.column_names import choices_of, is_counter, recognised
-from service.readers.detect import ByteSource
+from service.readers.detect import ByteSource, Format, overdue, too_slow
 from service.readers.grid import MAX_ROWS, Layout, find_table, is_footer, left_out, no_table
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
-from service.readers.numerals import NUMBER, Numerals, is_stamp
-from service.readers.table import Clock, Column, Reading, Table
+from service.readers.numerals import Numerals, is_stamp
+from service.readers.table import Column, Reading, Table, labels
 
 #: Bytes of the first block, which must hold the titles, and of each block after it.
 _FIRST_BLOCK, _BLOCK = 1 << 17, 1 << 18
@@ -38,6 +38,8 @@ _NEWLINE, _COMMA = b"\n,"
 _ENCODINGS = ("cp1252", "gb18030", "shift_jis", "euc_jp", "big5", "euc_kr", "cp1251")
 #: Pairs of bytes as Chinese text has them, and single ones as Western text has them.
 _CHINESE = re.compile(rb"(?:[\x00-\x7f]|[\xa1-\xf7][\xa1-\xfe])*")
+#: Cells of which the last is in quotes and goes on; a quotation mark within a cell is no other (3/4").
+_OPEN = re.compile(r'(?:(?:[ \t]*"(?:[^"]|"")*+"[^;,\t|\n]*|(?![ \t]*")[^;,\t|\n]*)[;,\t|\n])*+[ \t]*"(?:[^"]|"")*+')
 #: Lines that one cell in quotes may go over, in the rows of titles.
 _MAX_CELL_LINES = 5
 
@@ -72,13 +74,13 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
         raise wrong_line(1, "is empty, and no header came after it", "no_header")
     form = _form(first, reading, limits)
     body = _Body(opened, form, reading, limits)
-    above = tuple(tuple(_cells(line, form.separator)) for line in form.lines[: form.at[form.layout.titles]])
+    cells = tuple(tuple(_cells(line, form.separator)) for line in form.lines[: form.first_line + 19])
     return Table(
-        columns=tuple(_with_clocks(form.layout.columns(), above, body)),
+        columns=tuple(_with_clocks(form.layout.columns(), cells[: form.first_line - 1], body)),
         read=body.read,
-        above=above,
+        above=cells[: form.at[form.layout.titles]],
         first_line=form.first_line,
-        head=tuple(tuple(_cells(line, form.separator)) for line in form.lines[form.first_line - 1 :][:20]),
+        head=cells[form.first_line - 1 :],
         line_of=body.lines.of,
         breaks=body.breaks,
         notices=body.notices,
@@ -86,18 +88,18 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
 
 
 def _with_clocks(columns: Sequence[Column], above: Sequence[Sequence[str]], body: "_Body") -> Iterator[Column]:
-    """Columns with the clocks that LabVIEW states above them where its column of times is empty: X0 + k · Delta_X."""
-    named = {row[0]: row for row in above if row}
-    stated = {name: named[name] for name in ("X0", "Delta_X") if name in named}
+    """Columns with the clock that the lines above them state, each with its own where a line has as many cells.
+
+    LabVIEW's column of times may be empty: then it is none.
+    """
     for place, column in enumerate(columns):
-        cells = [stated[name][place].replace(",", ".") for name in stated if len(stated[name]) > place]
         if is_counter(column) and body.first[place : place + 1] == [""]:
             yield Column("", title=column.title)
-        elif len(cells) == 2 and body.first[:1] == [""] and all(map(NUMBER.fullmatch, cells)):
-            start, step = map(float, cells)
-            yield replace(column, clock=Clock((start, step), partial(body.times, start, step), counts=step == 1.0))
         else:
-            yield column
+            stated = labels(
+                [(row[0], row[place]) if place and len(row) > place and row[place] else row for row in above]
+            )
+            yield replace(column, clock=stated_clock(stated, body.rows))
 
 
 # --- bytes -> lines ---
@@ -125,7 +127,7 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[str]:
             rule = f"or a line soon after it is not {encoding.upper()}, as the file's beginning says: save it as UTF-8"
             raise wrong_line(line, rule, "not_text") from None
         end = text.rfind("\n") + 1
-        if not last and text.count('"', 0, end) % 2:
+        if not last and _is_open(text[:end]):
             end = text.rfind("\n", 0, text.rfind('"', 0, end)) + 1
         if len(text) - end > LONGEST_LINE_BYTES + _BLOCK * ('"' in text[end:]):
             rule = f"must not be longer than {LONGEST_LINE_BYTES} bytes"
@@ -189,8 +191,8 @@ def _form(first: bytes, reading: Reading, limits: Limits) -> _Form:
         if best is not None and encoding.startswith("utf"):
             break
     if best is None:
-        line = next((index for index, row in enumerate(text) if row.strip()), 0)
-        raise no_table(line + 1, text[line] if text else "")
+        separator = _separators(text, reading.skip_rows)[0]
+        raise no_table([_cells(line, separator) for line in text[:MAX_ROWS]], _named(reading))
     if len(best.layout.headings) > limits.most_columns:
         rule = f"must not have more than {limits.most_columns} columns, got {len(best.layout.headings)}"
         raise wrong_line(best.first_line, rule, "too_wide")
@@ -215,7 +217,7 @@ def _with_separator(encoding: str, separator: str, lines: list[str], reading: Re
         if index < reading.skip_rows or re.fullmatch(r"sep=.?", line.strip(), re.IGNORECASE):
             continue
         whole, begun = line, index
-        while whole.count('"') % 2 and separator.strip() and index - begun < _MAX_CELL_LINES:
+        while separator.strip() and _is_open(whole) and index - begun < _MAX_CELL_LINES:
             following = next(numbered, None)
             if following is None:
                 break
@@ -225,10 +227,15 @@ def _with_separator(encoding: str, separator: str, lines: list[str], reading: Re
             whole = whole.lstrip('#%/;" \t').rstrip('"')
         rows.append(_cells(whole, separator))
         at.append(begun)
-    layout = find_table(rows, frozenset(comments), [choice.column for choice in choices_of(reading).values()])
+    layout = find_table(rows, frozenset(comments), _named(reading))
     if layout is None:
         return None
     return _Form(encoding=encoding, separator=separator, layout=layout, lines=lines, at=at)
+
+
+def _named(reading: Reading) -> list[str]:
+    """The titles that the caller names."""
+    return [choice.column for choice in choices_of(reading).values()]
 
 
 def is_comment(line: str, separator: str) -> bool:
@@ -237,6 +244,11 @@ def is_comment(line: str, separator: str) -> bool:
         return False
     bare = line.lstrip().lstrip('"')
     return bare.startswith(_COMMENTS) or (bare.startswith(";") and separator != ";")
+
+
+def _is_open(text: str) -> bool:
+    """Whether a text ends within a cell in quotes."""
+    return text.count('"') % 2 == 1 and _OPEN.fullmatch(text) is not None
 
 
 def _cells(line: str, separator: str) -> list[str]:
@@ -306,9 +318,9 @@ class _Body:
             first = form.lines[form.at[form.layout.start - labelled]]
             self.notices.append(left_out(labelled, "above the first row of", first))
 
-    def times(self, start: float, step: float) -> FloatArray:
-        """The times of the rows that were read [n] s, by a clock that is stated above them."""
-        return start + step * np.arange(self._rows, dtype=np.float64)
+    def rows(self) -> int:
+        """How many rows were read."""
+        return self._rows
 
     def read(self, channels: Mapping[int, str]) -> list[NDArray[Any]]:
         """The columns [n] by index. Raises InvalidError naming line and value, TooLargeError past the limits."""
@@ -316,12 +328,13 @@ class _Body:
         dated = any(name == "time_s" and is_stamp("".join(self.first[at : at + 1])) for at, name in channels.items())
         parts: list[list[NDArray[Any]]] = [[] for _ in channels]
         most = self._limits.most_values // len(channels)
-        end = time.monotonic() + self._limits.seconds
+        end, late = time.thread_time() + self._limits.seconds, time.monotonic() + self._limits.wall_seconds
         with self._opened() as source:
             for block, last in _with_last(self._blocks(source)):
-                if time.monotonic() > end:
-                    message = f"the CSV file cannot be read: it took longer than {self._limits.seconds} s"
-                    raise InvalidError(message, errors=[FieldError(pointer="", code="too_slow", message=message)])
+                if time.thread_time() > end:
+                    raise too_slow(Format.TEXT, self._limits)
+                if time.monotonic() > late:
+                    raise overdue(Format.TEXT, self._limits)
                 text = self._without_footer(block) if last else block
                 numbers = None if dated else self._plain(text)
                 if numbers is None:
@@ -335,7 +348,9 @@ class _Body:
                     raise TooLargeError(f"a file of {len(channels)} channels must not have more than {most} rows")
         joined = []
         while parts:
-            joined.append(np.concatenate(parts.pop(0) or [np.empty(0)]))
+            part = parts.pop(0) or [np.empty(0)]
+            masked = any(isinstance(values, np.ma.MaskedArray) for values in part)
+            joined.append((np.ma.concatenate if masked else np.concatenate)(part))
         return joined
 
     def _blocks(self, source: ByteSource) -> Iterator[str]:

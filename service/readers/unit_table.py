@@ -52,37 +52,43 @@ _TIME = (
     | _spelled(86400.0, "d day days tag tage jours días giorni 天")
 )
 _PRESSURE = (
-    _spelled(1.0, "bar barg бар 巴")
+    _spelled(1.0, "bar barg barrel barü daN/cm2 бар 巴")
     | _spelled(1e-3, "mbar hPa")
     | _spelled(1 / PASCALS_PER_BAR, "Pa N/m2 pascal")
     | _spelled(1e3 / PASCALS_PER_BAR, "kPa кПа 千帕")
-    | _spelled(1e6 / PASCALS_PER_BAR, "MPa N/mm2 МПа 兆帕")
+    | _spelled(1e6 / PASCALS_PER_BAR, "MPa N/mm2 MN/m2 МПа 兆帕")
     | _spelled(_PASCALS_PER_PSI / PASCALS_PER_BAR, "psi psig lbf/in2 lb/in2")
+    | _spelled(1e3 * _PASCALS_PER_PSI / PASCALS_PER_BAR, "ksi")
+    | _spelled(101_325 / 760 / PASCALS_PER_BAR, "Torr mmHg")
     | _spelled(_NEWTONS_PER_KILOPOND * 1e4 / PASCALS_PER_BAR, "kgf/cm2 kg/cm2 kp/cm2 кгс/см2")
 )
 _SPEED = (
     _spelled(
         1.0,
-        "rpm 1/min min-1 /min U/min r/min rmin-1 rev/min revmin-1 Upm revolutions/min tr/min trs/min tr/mn giri/min",
+        "rpm 1/min min-1 /min U/min r/min rmin-1 rev/min revmin-1 Upm Umdr/min revolutions/min tr/min trs/min tr/mn "
+        "giri/min",
     )
     | _spelled(1.0, "об/мин мин-1 转/分 转/分钟 轉/分 回転/分 回/分")
-    | _spelled(1e3, "krpm")
+    | _spelled(1e3, "krpm 1000/min 1000rpm")
     | _spelled(60.0, "U/s r/s rev/s rps tr/s об/с 转/秒")
     | _spelled(1 / RADIANS_PER_SECOND_PER_RPM, "rad/s rad/sec rads rads-1 рад/с 弧度/秒")
     | _spelled(1 / 6, "deg/s °/s")
 )
 _TORQUE = (
-    _spelled(1.0, "Nm newtonmeter newtonmetre Нм 牛米")
+    _spelled(1.0, "Nm newtonmeter newtonmeters newtonmetre newtonmetres Нм 牛米")
     | _spelled(1e3, "kNm кНм 千牛米")
     | _spelled(1e-3, "mNm Nmm")
-    | _spelled(1e-2, "Ncm")
+    | _spelled(1e-2, "Ncm cNm")
+    | _spelled(10.0, "daNm")
     | _spelled(_NEWTONS_PER_KILOPOND, "kgfm kpm кгсм")
+    | _spelled(_NEWTONS_PER_KILOPOND / 100, "kgfcm kpcm")
     | _spelled(_NEWTON_METRES_PER_POUND_FOOT, "lbfft lbft ftlbf ftlb ftlbs")
     | _spelled(_NEWTON_METRES_PER_POUND_FOOT / 12, "lbfin lbin inlbf inlb inlbs")
+    | _spelled(_NEWTON_METRES_PER_POUND_FOOT / 192, "ozfin ozin inoz inozf")
 )
 _TEMPERATURE = (
     _spelled(1.0, "°C degC degreeC degreesC C celsius cel 摄氏度")
-    | _spelled(1.0, "K kelvin", -ZERO_CELSIUS)
+    | _spelled(1.0, "K degK kelvin", -ZERO_CELSIUS)
     | _spelled(5 / 9, "°F degF F fahrenheit", -160 / 9)
 )
 #: By the channel's unit: the spellings that may be stated.

@@ -43,8 +43,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         ]
         layout = find_table(rows[reading.skip_rows : reading.skip_rows + MAX_ROWS], frozenset(), named)
         if layout is None:
-            line = next((index for index, row in enumerate(rows) if not is_blank(row)), 0)
-            refused.append(no_table(line + 1, " ".join(map(str, rows[line] if rows else ()))))
+            refused.append(no_table(rows[: reading.skip_rows + MAX_ROWS], named))
         elif len(sheets) == 1 or recognised([heading[0] for heading in layout.headings], named):
             tables[name] = rows, layout
     if not tables and refused:

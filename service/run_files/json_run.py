@@ -21,7 +21,7 @@ from service.lives.incoming_run import IncomingRun, name_run
 from service.schemas.limits import LONGEST_NOTE, MAX_MARKS
 from service.schemas.run import RUN_IN, DutyRunIn, MaintenanceRunIn
 
-#: Items of a list and characters of a name that are checked by a schema: more than a message quotes.
+#: Items of a list and characters of a name of a run that are checked by its schema: more than a message quotes.
 _MAX_SHOWN = 100
 
 #: Byte order marks that are not UTF-8's; that of UTF-16 in little-endian order begins that of UTF-32.
@@ -78,7 +78,7 @@ def read_run_on_disk(path: Path) -> IncomingRun:
 
 def checked(schema: type[Body], body: bytes) -> Body:
     """Any other JSON body as its schema has it; raises InvalidError naming every place that is wrong."""
-    return _parsed(body, partial(_validated, schema.model_validate_json))
+    return _parsed(body, partial(_validated, schema.model_validate_json, items=MAX_MARKS))
 
 
 def _parsed(body: bytes, read: Callable[[Any], Answer]) -> Answer:
@@ -155,22 +155,23 @@ def _other_encoding(why: str) -> InvalidError:
     return InvalidError(message, errors=[FieldError(pointer="", code="encoding", message=message)])
 
 
-def _validated(validate: Callable[[bytes], Answer], sent: object) -> Answer:
-    """The sent value by its schema, long lists and texts cut: a channel is a list here, `check_columns` reads its values.
+def _validated(validate: Callable[[bytes], Answer], sent: object, items: int = _MAX_SHOWN) -> Answer:
+    """The sent value by its schema, texts cut, and names and lists after so many `items`: of a run these are channels, whose
+    values `check_columns` reads.
 
     pydantic copies whatever is wrong, with all that it holds, once an error.
     """
     try:
-        return validate(pydantic_core.to_json(_cut(sent), inf_nan_mode="constants"))
+        return validate(pydantic_core.to_json(_cut(sent, items), inf_nan_mode="constants"))
     except pydantic.ValidationError as error:
         raise _invalid(error) from None
 
 
-def _cut(value: Any) -> Any:
+def _cut(value: Any, items: int) -> Any:
     if isinstance(value, dict):
-        return {name[:_MAX_SHOWN]: _cut(item) for name, item in value.items()}
+        return {name[:items]: _cut(item, items) for name, item in value.items()}
     if isinstance(value, list):
-        return [item if type(item) is float else _cut(item) for item in value[:_MAX_SHOWN]]
+        return [item if type(item) is float else _cut(item, items) for item in value[:items]]
     return value[: LONGEST_NOTE + 1] if isinstance(value, str) else value
 
 

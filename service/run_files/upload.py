@@ -89,7 +89,7 @@ def run_of(
             errors=errors,
         )
     if kind == "stationary_stribeck" and read.counts and _holds_no_dwell(columns):
-        message = "the recorder's clock counts a second a row, its default: each row was taken for a plateau"
+        message = "by the recorder's clock nothing is held for a while: each row was taken for a plateau"
         notices.append(Notice(code="counting_clock", message=message))
         columns = {name: column for name, column in columns.items() if name != "time_s"}
         check_arrays(columns)  # a plateau has no negative pressure, which a sample may have

@@ -108,6 +108,7 @@ class Degradation(Answer):
     method: MethodName = Field(description="The filter")
     life: LifeNumber = Field(description="The life that the tracks are of")
     items: list[DegradationItem] = Field(description="The quantities of this page, by pressure")
+    held_runs: int = Field(description="Number of runs that are held: the tracks are without them")
     rebuilt: Rebuilt | None = Field(description="COF from the parameters; null with too few tests")
     severity_estimate: SeverityWeighed | None = Field(
         description="The exponent of severity as the tests of this life have it; null where its duty states no work or "
@@ -134,6 +135,7 @@ class Surfaces(Answer):
 
     clutch_id: ClutchName
     revision: Revision
+    held_runs: int = Field(description="Number of runs that are held: the surfaces are without them")
     cycles: list[float] = Field(description="The axis of duty cycles since new")
     pressure_bar: list[float] = Field(description="The axis of line pressure, bar")
     speed_rpm: list[float] = Field(description="The axis of speed, rpm")

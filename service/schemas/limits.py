@@ -40,6 +40,8 @@ LONGEST_NUMBER = 32
 MAX_MARKS = 10_000
 #: Samples of a channel that a plot may ask for: more than any screen has pixels; all samples need no argument.
 MAX_POINTS = 1_000_000
+#: Held runs that are confirmed in one step. As many as a page lists.
+MAX_CONFIRMED = 1000
 #: The limits of a criterion: its number of either sign, its place, and how many a clutch may have. Chosen: beyond any rig.
 LARGEST_LIMIT, MAX_CRITERION_PRESSURE_BAR, MAX_SPEED_RPM, MAX_CRITERIA = 1e9, 1e4, 1e6, 8
 #: The skewness of a surface profile, of either sign. Derived: of n heights it is at most √n, and no profile has 1e8 of them.

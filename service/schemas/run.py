@@ -20,7 +20,7 @@ from service.schemas.base import (
     StartedAt,
     page_of,
 )
-from service.schemas.limits import LONGEST_NOTE, MAX_CYCLES
+from service.schemas.limits import LONGEST_NOTE, MAX_CONFIRMED, MAX_CYCLES
 
 
 class IndicatorEstimate(Answer):
@@ -204,6 +204,13 @@ class Withdrawal(Schema):
 class Confirmation(Schema):
     """Why a held run is accepted."""
 
+    reason: Reason = Field(default="", description="Why")
+
+
+class Confirmations(Schema):
+    """Held runs of a clutch that are accepted together, and why."""
+
+    run_ids: list[Identifier] = Field(min_length=1, max_length=MAX_CONFIRMED, description="The runs")
     reason: Reason = Field(default="", description="Why")
 
 

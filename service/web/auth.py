@@ -275,7 +275,7 @@ def _refuse_unknown_arguments(request: Request) -> None:
     """A mistyped argument must not be answered as if it had not been there."""
     if not request.scope["query_string"]:
         return
-    arguments = _arguments_of(request.scope["route"])
+    arguments = {field.alias for field in query_fields(request.scope["route"])}
     unknown = [name for name in request.query_params if name not in arguments]
     if unknown:
         errors = [
@@ -290,12 +290,12 @@ def _refuse_unknown_arguments(request: Request) -> None:
         raise InvalidError(errors[0].message, errors=errors)
 
 
-def _arguments_of(route: Any) -> frozenset[str]:
-    """The names of a route's arguments, those of what it depends on among them."""
+def query_fields(route: Any) -> list[Any]:
+    """A route's arguments, those of what it depends on among them."""
     parts = [route.dependant]
     for part in parts:
         parts += part.dependencies
-    return frozenset(field.alias for part in parts for field in part.query_params)
+    return [field for part in parts for field in part.query_params]
 
 
 Reader = Annotated[Context, Depends(allowed("read"))]

@@ -34,7 +34,7 @@ from service.errors import (
 )
 from service.logging import access, log_request, request_id, sane
 from service.web import limits
-from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context_of, route_of, snapshot_at
+from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context_of, query_fields, route_of, snapshot_at
 from service.web.files import PARQUET_TYPE
 from service.web.metrics import Metrics
 from service.web.problems import refused, unexpected
@@ -396,7 +396,7 @@ def _arguments(route: Any, query: bytes) -> Hashable:
     """A query's arguments as the route checks them; None where they are wrong, which the usual way says."""
     if not query:
         return ()
-    sent, fields = QueryParams(query), route.dependant.query_params
+    sent, fields = QueryParams(query), query_fields(route)
     values, errors = request_params_to_args(fields, sent)
     if errors or not sent.keys() <= {field.alias for field in fields}:
         return None

@@ -1,4 +1,5 @@
-"""A run is withdrawn, restored, confirmed, corrected or read again: its clutch's history and all that follows change.
+"""A run is withdrawn, restored, confirmed (or several at once), corrected or read again: the history of its clutch and all
+that follows change.
 
 Nothing is deleted: what was sent and its hash stay, and the audit trail keeps who changed what and why. Of a run that was
 sent as a file this is the file: its channels are replaced where it is read again by another profile. What
@@ -7,7 +8,7 @@ has changed meanwhile.
 """
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -55,10 +56,11 @@ from storage.runs import RunRow
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Request:
-    """What is asked for, by whom, when and why; `cycles` where a run is corrected."""
+    """What is asked for, of which runs, by whom, when and why; `cycles` where a run is corrected. Several runs are only
+    confirmed."""
 
     clutch_id: str
-    run_id: str
+    run_ids: tuple[str, ...]
     action: str
     reason: str
     by: str
@@ -68,29 +70,51 @@ class _Request:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Loaded:
-    """A run and its clutch at one revision: `state` holds the run where it is accepted, `event` is it in any case."""
+    """Runs and their clutch at one revision: `state` holds those that are accepted, `events` are all of them in the order of
+    the history, `rows` too."""
 
-    row: RunRow
-    event: Event
+    rows: tuple[RunRow, ...]
+    events: tuple[Event, ...]
     state: ClutchState
     levels: Levels
     receipts: Mapping[str, Receipt]
     withdrawn_from: str
     again: Arrival | None = None
 
+    @property
+    def row(self) -> RunRow:
+        """The only run."""
+        (row,) = self.rows
+        return row
+
+    @property
+    def event(self) -> Event:
+        """The same as the history sees it."""
+        (event,) = self.events
+        return event
+
+    def without(self, rows: Collection[RunRow]) -> "_Loaded":
+        """The same of the other runs."""
+        gone = {row.run_id for row in rows}
+        return replace(
+            self,
+            rows=tuple(row for row in self.rows if row.run_id not in gone),
+            events=tuple(event for event in self.events if event.run_id not in gone),
+        )
+
     def reader(self, database: Database) -> RunReader:
         """The clutch's runs, this one as its file is read again."""
-        stored = stored_runs.run_reader(database, self.row.clutch_id)
+        stored = stored_runs.run_reader(database, self.state.clutch_id)
         return stored if self.again is None else reader_with(stored, self.again)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Changed:
-    """The run as it is to be, what that changes in the doubts about others, the mean COFs of those of them that are then
+    """The runs as they are to be, what that changes in the doubts about others, the mean COFs of those of them that are then
     not accepted, by run_id, and the results of the clutch's history; whether that changes what an ended life
     `teaches` its fleet."""
 
-    row: RunRow
+    rows: tuple[RunRow, ...]
     judged: Judged
     aside: Mapping[str, ByPressure]
     results: Results
@@ -99,23 +123,32 @@ class _Changed:
 
 def withdraw(database: Database, clutch_id: str, run_id: str, *, reason: str, by: str, at: str) -> Receipt:
     """Take a run out of its clutch's history; returns its receipt. Raises NotFoundError."""
-    return _change(
-        database, _Request(clutch_id=clutch_id, run_id=run_id, action=changes.WITHDRAW, reason=reason, by=by, at=at)
-    )
+    request = _Request(clutch_id=clutch_id, run_ids=(run_id,), action=changes.WITHDRAW, reason=reason, by=by, at=at)
+    return _change(database, request)[0]
 
 
 def restore(database: Database, clutch_id: str, run_id: str, *, reason: str, by: str, at: str) -> Receipt:
     """Take a withdrawal back: the run is accepted or held as before; returns its receipt. Raises NotFoundError."""
-    return _change(
-        database, _Request(clutch_id=clutch_id, run_id=run_id, action=changes.RESTORE, reason=reason, by=by, at=at)
-    )
+    request = _Request(clutch_id=clutch_id, run_ids=(run_id,), action=changes.RESTORE, reason=reason, by=by, at=at)
+    return _change(database, request)[0]
 
 
 def confirm(database: Database, clutch_id: str, run_id: str, *, reason: str, by: str, at: str) -> Receipt:
     """Accept a held run as it is; returns its receipt. Raises NotFoundError."""
-    return _change(
-        database, _Request(clutch_id=clutch_id, run_id=run_id, action=changes.CONFIRM, reason=reason, by=by, at=at)
-    )
+    return confirm_all(database, clutch_id, (run_id,), reason=reason, by=by, at=at)[0]
+
+
+def confirm_all(
+    database: Database, clutch_id: str, run_ids: Sequence[str], *, reason: str, by: str, at: str
+) -> list[Receipt]:
+    """Accept all of these runs that are held, as they are, in one step; returns their receipts in the order asked for.
+
+    Raises NotFoundError where one is none of the clutch's, and then changes nothing.
+    """
+    asked = tuple(dict.fromkeys(run_ids))
+    request = _Request(clutch_id=clutch_id, run_ids=asked, action=changes.CONFIRM, reason=reason, by=by, at=at)
+    receipts = {answer["run_id"]: answer for answer in _change(database, request)}
+    return [receipts[run_id] for run_id in asked]
 
 
 def correct(
@@ -125,12 +158,9 @@ def correct(
 
     Raises NotFoundError, and NotPossibleNowError for a run that is withdrawn.
     """
-    return _change(
-        database,
-        _Request(
-            clutch_id=clutch_id, run_id=run_id, action=changes.CORRECT, reason=reason, by=by, at=at, cycles=cycles
-        ),
-    )
+    action, asked = changes.CORRECT, (run_id,)
+    request = _Request(clutch_id=clutch_id, run_ids=asked, action=action, reason=reason, by=by, at=at, cycles=cycles)
+    return _change(database, request)[0]
 
 
 def read_again(
@@ -169,29 +199,35 @@ def read_again(
     run = replace(run, cycles=row.cycles, content_sha256=row.content_sha256, file=read)
     if read == file:
         return records.receipt(row)
-    request = _Request(clutch_id=clutch_id, run_id=run_id, action=changes.REREAD, reason=reason, by=by, at=at)
-    return _change(database, request, run, stored_runs.placed(database, channels.encoded(run.channels)))
+    request = _Request(clutch_id=clutch_id, run_ids=(run_id,), action=changes.REREAD, reason=reason, by=by, at=at)
+    return _change(database, request, run, stored_runs.placed(database, channels.encoded(run.channels)))[0]
 
 
 def _change(
     database: Database, request: _Request, again: IncomingRun | None = None, columns: Encoded | None = None
-) -> Receipt:
+) -> list[Receipt]:
     attempts = records.attempts(request.clutch_id)
     while True:
         next(attempts)
         loaded = _load(database, request)
         if again is not None:
             loaded = _with(loaded, again)
-        row = _as_asked(database, loaded, request)
-        if again is None and (row.state, row.cycles) == (loaded.row.state, loaded.row.cycles):
-            return records.receipt(loaded.row)
-        changed = _computed(database, loaded, row)
+        asked = {row.run_id: row for row in _as_asked(database, loaded, request)}
+        same = [
+            row
+            for row in loaded.rows
+            if again is None and (row.state, row.cycles) == (asked[row.run_id].state, asked[row.run_id].cycles)
+        ]
+        if len(same) == len(loaded.rows):
+            return [records.receipt(row) for row in same]
+        loaded = loaded.without(same)
+        changed = _computed(database, loaded, [asked[row.run_id] for row in loaded.rows])
         with database.writing(of=request.clutch_id) as connection:
             if records.unchanged(connection, request.clutch_id, loaded.state.revision):
                 if columns is not None:
-                    channels.rewrite(connection, row.run_key, columns)
+                    channels.rewrite(connection, loaded.row.run_key, columns)
                 _store(connection, loaded, changed, request)
-                return records.receipt(changed.row)
+                return [records.receipt(row) for row in (*changed.rows, *same)]
 
 
 def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
@@ -210,8 +246,10 @@ def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
     shown, odd = doubts_alone(run, analysis, loaded.state.geometry)
     return replace(
         loaded,
-        event=replace(
-            loaded.event, speed_range=analysis.speed_range, oil_temperature=analysis.oil_temperature, shown=shown
+        events=(
+            replace(
+                loaded.event, speed_range=analysis.speed_range, oil_temperature=analysis.oil_temperature, shown=shown
+            ),
         ),
         levels={**loaded.levels, run_id: analysis.fits},
         receipts={**loaded.receipts, run_id: answer},
@@ -227,15 +265,21 @@ def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
 
 
 def _load(database: Database, request: _Request) -> _Loaded:
-    clutch_id, run_id = request.clutch_id, request.run_id
+    clutch_id = request.clutch_id
     with database.reading() as connection:
-        row = stored_runs.run(connection, clutch_id, run_id)
+        rows = {run_id: stored_runs.run(connection, clutch_id, run_id) for run_id in request.run_ids}
         state = records.state(connection, clutch_id)
-        events = {event.run_id: event for event in state.events} | records.set_aside(connection, clutch_id)
-        trail = changes.page(connection, clutch_id, run_id=run_id) if row.state == runs.WITHDRAWN else []
+        known = {event.run_id: event for event in state.events} | records.set_aside(connection, clutch_id)
+        events = order([known[run_id] for run_id in rows])
+        trail = [
+            change
+            for run_id, row in rows.items()
+            if row.state == runs.WITHDRAWN
+            for change in changes.page(connection, clutch_id, run_id=run_id)
+        ]
         return _Loaded(
-            row=row,
-            event=events[run_id],
+            rows=tuple(rows[event.run_id] for event in events),
+            events=events,
             state=state,
             levels=records.levels(connection, clutch_id),
             receipts=records.receipts(connection, clutch_id),
@@ -243,15 +287,19 @@ def _load(database: Database, request: _Request) -> _Loaded:
         )
 
 
-def _as_asked(database: Database, loaded: _Loaded, request: _Request) -> RunRow:
-    """The run as it is asked for; as it is where that changes nothing."""
+def _as_asked(database: Database, loaded: _Loaded, request: _Request) -> tuple[RunRow, ...]:
+    """The runs as they are asked for; each as it is where that changes nothing."""
+    if request.action == changes.CONFIRM:
+        return tuple(replace(row, state=runs.ACCEPTED) if row.state == runs.HELD else row for row in loaded.rows)
+    return (_one_as_asked(database, loaded, request),)
+
+
+def _one_as_asked(database: Database, loaded: _Loaded, request: _Request) -> RunRow:
     row = loaded.row
     if request.action == changes.WITHDRAW:
         return replace(row, state=runs.WITHDRAWN)
     if request.action == changes.RESTORE:
         return replace(row, state=loaded.withdrawn_from) if row.state == runs.WITHDRAWN else row
-    if request.action == changes.CONFIRM:
-        return replace(row, state=runs.ACCEPTED) if row.state == runs.HELD else row
     if row.state == runs.WITHDRAWN:
         raise NotPossibleNowError(f"run {row.run_id!r} is withdrawn: restore it before it is changed")
     if loaded.again is not None:
@@ -285,9 +333,12 @@ def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
 
 
 def _others(loaded: _Loaded) -> ClutchState:
-    """The clutch without the run."""
-    events, held = (_without(events, loaded.row.run_id) for events in (loaded.state.events, loaded.state.held))
-    return replace(loaded.state, events=events, held=held)
+    """The clutch without the runs."""
+    return replace(
+        loaded.state,
+        events=_without(loaded.state.events, loaded.events),
+        held=_without(loaded.state.held, loaded.events),
+    )
 
 
 def _together(others: ClutchState, changed: Event | None) -> Judged:
@@ -295,38 +346,42 @@ def _together(others: ClutchState, changed: Event | None) -> Judged:
     return doubts_together(others.events, others.held, changed, others.geometry, corrected=corrected)
 
 
-def _judged_with(loaded: _Loaded, row: RunRow) -> Judged:
-    """What becomes of the other runs; the run itself is as it was asked for."""
-    others, event = _others(loaded), loaded.event.at(row.cycles)
-    if row.state == runs.ACCEPTED:
-        event = replace(event, cofs=cofs_among(others, event, loaded.levels.get(row.run_id, ())), confirmed=True)
-        others = replace(others, events=order([*others.events, event]))
+def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
+    """What becomes of the other runs; the runs themselves are as they were asked for, these of them `accepted`."""
+    others = _others(loaded)
+    for event in accepted:
+        cofs = cofs_among(others, event, loaded.levels.get(event.run_id, ()))
+        others = replace(others, events=order([*others.events, replace(event, cofs=cofs, confirmed=True)]))
     return _together(others, None)
 
 
-def _computed(database: Database, loaded: _Loaded, row: RunRow) -> _Changed:
-    """All that follows from the run as it is to be."""
-    before, run_id = loaded.state, row.run_id
-    judged = _judged_with(loaded, row)
-    event = loaded.event.at(row.cycles)
-    own = [event] if row.state == runs.ACCEPTED else []
-    require_within_ends(order([*_without(before.events, run_id), *own]))
-    held = judged.aside(_without(before.held, run_id), [event] if row.state == runs.HELD else [])
-    after = replace(before, events=judged.settled(_without(before.events, run_id), own), held=held)
-    receipts = {**loaded.receipts, run_id: loaded.receipts[run_id] | {"cycles": whole(row.cycles)}}
+def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _Changed:
+    """All that follows from the runs as they are to be."""
+    before, others = loaded.state, _others(loaded)
+    asked = [(row, event.at(row.cycles)) for row, event in zip(rows, loaded.events, strict=True)]
+    own = [event for row, event in asked if row.state == runs.ACCEPTED]
+    out = [event for row, event in asked if row.state != runs.ACCEPTED]
+    judged = _judged_with(loaded, own)
+    require_within_ends(order([*others.events, *own]))
+    held = judged.aside(others.held, [event for row, event in asked if row.state == runs.HELD])
+    after = replace(before, events=judged.settled(others.events, own), held=held)
+    receipts = {**loaded.receipts}
+    receipts |= {row.run_id: receipts[row.run_id] | {"cycles": whole(row.cycles)} for row in rows}
     reader = loaded.reader(database)
     computed = Results()
-    if own or loaded.row.state == runs.ACCEPTED or judged.changes:
+    if own or judged.changes or any(row.state == runs.ACCEPTED for row in loaded.rows):
         tests = reader.stationary_tests(after.lives[-1]) if after.events else iter(())
         evaluated = stationary_tests_of(before.events)
         if loaded.again is not None:  # its own loops, and those that are held against its curves
-            evaluated = {loop: test for loop, test in evaluated.items() if run_id not in (loop, test)}
+            again = loaded.row.run_id
+            evaluated = {loop: test for loop, test in evaluated.items() if again not in (loop, test)}
         after, computed = computed_again(after, loaded.levels, receipts, tests, reader, evaluated=evaluated)
     aside = {}
-    for other in [*judged.held, *([] if own else [event])]:
+    for other in [*judged.held, *out]:
         name = other.run_id
         aside[name], receipts[name] = set_aside(after, other, loaded.levels, receipts[name], reader)
-    changed = {name: receipts[name] for name in (run_id, *aside)} | dict(computed.receipts)
+    own_names = {row.run_id for row in rows}
+    changed = {name: receipts[name] for name in (*own_names, *aside)} | dict(computed.receipts)
     evidence = stored_runs.evidence_for(database, after, reader)
     if evidence is not None:
         evidence = replace(evidence, levels=loaded.levels, receipts={**receipts, **changed})
@@ -334,64 +389,71 @@ def _computed(database: Database, loaded: _Loaded, row: RunRow) -> _Changed:
         summary = {**before.summary, **held_part(after, {}, evidence)}
     else:
         summary = summarised(after, computed.tracking, evidence)
-    computed = replace(computed, receipts=changed, summary=summary)
     teaches = any(
         life_with(state.events, mended).end is not None
         for state in (before, after)
         for mended in state.events
-        if mended.run_id == run_id
+        if mended.run_id in own_names
     )
-    own_receipt = changed[run_id]
     return _Changed(
-        row=replace(row, receipt=own_receipt), judged=judged, aside=aside, results=computed, teaches=teaches
+        rows=tuple(replace(row, receipt=changed[row.run_id]) for row in rows),
+        judged=judged,
+        aside=aside,
+        results=replace(computed, receipts=changed, summary=summary),
+        teaches=teaches,
     )
 
 
-def _without(events: tuple[Event, ...], run_id: str) -> tuple[Event, ...]:
-    return tuple(event for event in events if event.run_id != run_id)
+def _without(events: Iterable[Event], others: Iterable[Event]) -> tuple[Event, ...]:
+    names = {event.run_id for event in others}
+    return tuple(event for event in events if event.run_id not in names)
 
 
 def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: _Request) -> None:
-    """The run as it is to be and what follows, and the entry of the audit trail; the revision moves on."""
-    row = changed.row
-    runs.set_state(
-        connection,
-        row.run_key,
-        state=row.state,
-        cycles=row.cycles,
-        sent_cycles=row.sent_cycles,
-        doubts=row.doubts,
-    )
-    before, after = records.summary(loaded.row), records.summary(row)
-    if loaded.again is not None:
-        run = loaded.again.run
-        runs.set_results(connection, row.run_key, loaded.again.kept, row.receipt, CODE_VERSION)
-        results.write_fits(connection, row.run_key, records.fit_rows(loaded.again.analysis.fits, {}))
-        before, after = before | _read_as(loaded.row.details["file"]), after | _read_as(run.file or {})
-    if row.run_id in changed.aside:
-        fits = records.fit_rows(loaded.levels.get(row.run_id, ()), changed.aside[row.run_id])
-        results.write_fits(connection, row.run_key, fits)
-    records.store(connection, row.clutch_id, changed.results)
-    revision = clutches.bump_revision(connection, row.clutch_id)
+    """The runs as they are to be and what follows, and the entries of the audit trail; the revision moves on."""
+    clutch_id = request.clutch_id
+    for row in changed.rows:
+        runs.set_state(
+            connection,
+            row.run_key,
+            state=row.state,
+            cycles=row.cycles,
+            sent_cycles=row.sent_cycles,
+            doubts=row.doubts,
+        )
+        if loaded.again is not None:
+            analysis = loaded.again.analysis
+            runs.set_results(connection, row.run_key, loaded.again.kept, row.receipt, CODE_VERSION)
+            results.write_fits(connection, row.run_key, records.fit_rows(analysis.fits, {}))
+        if row.run_id in changed.aside:
+            fits = records.fit_rows(loaded.levels.get(row.run_id, ()), changed.aside[row.run_id])
+            results.write_fits(connection, row.run_key, fits)
+    records.store(connection, clutch_id, changed.results)
+    revision = clutches.bump_revision(connection, clutch_id)
     records.store_judged(
-        connection, row.clutch_id, changed.judged, changed.aside, loaded.levels, at=request.at, revision=revision
+        connection, clutch_id, changed.judged, changed.aside, loaded.levels, at=request.at, revision=revision
     )
     if changed.teaches:
         records.ask_fleet_refresh(connection, by=request.by, at=request.at)
-    if before["doubts"] == after["doubts"]:
-        del before["doubts"], after["doubts"]
-    change = NewChange(
-        clutch_id=row.clutch_id,
-        run_id=row.run_id,
-        at=request.at,
-        by=request.by,
-        action=request.action,
-        reason=request.reason,
-        before=before,
-        after=after,
-        revision=revision,
-    )
-    changes.insert(connection, change)
+    for was, row in zip(loaded.rows, changed.rows, strict=True):
+        before, after = records.summary(was), records.summary(row)
+        if loaded.again is not None:
+            before |= _read_as(was.details["file"])
+            after |= _read_as(loaded.again.run.file or {})
+        if before["doubts"] == after["doubts"]:
+            del before["doubts"], after["doubts"]
+        change = NewChange(
+            clutch_id=clutch_id,
+            run_id=row.run_id,
+            at=request.at,
+            by=request.by,
+            action=request.action,
+            reason=request.reason,
+            before=before,
+            after=after,
+            revision=revision,
+        )
+        changes.insert(connection, change)
 
 
 def _read_as(file: Mapping[str, Any]) -> dict[str, Any]:

@@ -46,6 +46,8 @@ def test_slips_are_seen_and_mended_in_the_terminal(server: Server, tmp_path: Pat
     assert "held" in clutchlife("withdraw", "c1", "odd", "--undo", "--reason", "look again", *at)
     assert "accepted" in clutchlife("confirm", "c1", "odd", *at)
     assert life(server, "c1") != whole
+    assert "c1 has no held runs" in clutchlife("confirm", "c1", "--all", *at)
+    assert "give the runs, or --all" in clutchlife("confirm", "c1", "odd", "--all", *at, code=64)
     clutchlife("withdraw", "c1", "odd", "--reason", "in lbf", *at)
     assert life(server, "c1") == whole
     post(server, "c1", 4000.0, run_id="typo", sent=4001.0)
@@ -76,6 +78,24 @@ def test_slips_are_seen_and_mended_in_the_terminal(server: Server, tmp_path: Pat
         "unarchive", "archive", "withdraw", "edit", "correct", "withdraw", "confirm", "restore", "withdraw", "hold",
     ]  # fmt: skip
     exported_and_pushed_elsewhere(server, tmp_path)
+
+
+def test_all_that_are_held_of_one_cause_are_confirmed_in_one_line(server: Server) -> None:
+    ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c2"})
+    at = ("--url", server.url)
+    for cycles in (0.0, 1000.0, 2000.0):
+        post(server, "c2", cycles, run_id=f"r{cycles:g}")
+    odd = [post(server, "c2", cycles, run_id=f"odd-{cycles:g}", gain=60.0) for cycles in (3000.0, 4000.0)]
+    assert [receipt["state"] for receipt in odd] == ["held", "held"]
+    for command in ("status", "life", "degradation"):
+        assert "2 runs are held" in clutchlife(command, "c2", *at, code=1 if command == "status" else 0)
+    assert "2 runs are held" in clutchlife("watch", "c2", "--looks", "1", *at)
+    (line,) = [line for line in clutchlife("list", *at).splitlines() if line.lstrip("│| ").startswith("c2")]
+    assert "2" in line.split()
+    assert "no runs held for dead_channel" in clutchlife("confirm", "c2", "--doubt", "dead_channel", *at)
+    printed = clutchlife("confirm", "c2", "--doubt", odd[0]["doubts"][0]["code"], "--reason", "a new lining", *at)
+    assert [line.split()[1] for line in printed.splitlines()] == ["accepted", "accepted"]
+    assert life(server, "c2")["held_runs"] is None
 
 
 def exported_and_pushed_elsewhere(server: Server, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ Plausibility was developed on the simulated rig with other seeds; the blind rig 
 """
 
 import argparse
+import itertools
 import json
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -67,17 +68,20 @@ def by_source(outcomes: Sequence[Outcome]) -> Iterator[str]:
         yield f"| {name.get(group, group)} | {len(mine)} | {held} | {percent(held, len(mine))} |"
 
 
-def by_mechanism(wrong: Sequence[Outcome], honest: Sequence[Outcome]) -> Iterator[str]:
-    """A row a mechanism that is left out: what is then held."""
-    yield "| left out or changed | slips held, those beside the demand among them | honest held |"
-    yield "|---|---|---|"
+def by_mechanism(
+    wrong: Sequence[Outcome], honest: Sequence[Outcome], lives: Sequence[Mapping[str, int]], runs: int, end: int
+) -> Iterator[str]:
+    """A row a mechanism that is left out: what is then held; of honest lives in the end, `end` of `runs` with all."""
+    yield "| left out or changed | slips held | honest held | honest lives, in the end |"
+    yield "|---|---|---|---|"
     judged = [one for one in honest if one.answer.without]
     held, false = sum(one.held for one in wrong), sum(one.held for one in judged)
-    yield f"| nothing | {held} of {len(wrong)} | {false} of {len(judged)} |"
+    yield f"| nothing | {held} of {len(wrong)} | {false} of {len(judged)} | {end} of {runs} |"
     for name in WITHOUT:
         of_wrong = sum(one.answer.without[name] for one in wrong)
         of_honest = sum(one.answer.without[name] for one in judged)
-        yield f"| {name} | {of_wrong} of {len(wrong)} | {of_honest} of {len(judged)} |"
+        of_lives = sum(one[name] for one in lives)
+        yield f"| {name} | {of_wrong} of {len(wrong)} | {of_honest} of {len(judged)} | {of_lives} of {runs} |"
 
 
 def by_life(lives: Mapping[str, Sequence[Mapping[str, int]]]) -> Iterator[str]:
@@ -118,6 +122,17 @@ class Store:
         return [_outcome(one) for one in self.get(name, lambda: [asdict(outcome) for outcome in make()])]
 
 
+def _honest(store: Store, seed: int, source: str, count: int) -> list[Outcome]:
+    """So many honest runs of a source, or all that there are."""
+    sent: list[Outcome] = []
+    for number in itertools.count():
+        own = store.outcomes(f"honest {seed} {source} {number}", partial(trials.honest, seed, source, number))
+        sent += own
+        if not own or len(sent) >= count:
+            return sent[:count]
+    return sent
+
+
 def _outcome(known: Mapping[str, Any]) -> Outcome:
     answer = dict(known["answer"])
     return Outcome(**{**known, "answer": Answer(**{**answer, "codes": tuple(answer["codes"])})})
@@ -135,18 +150,14 @@ def main() -> int:
     parser.add_argument("--campaigns", type=int, default=200, help="campaigns with one slip each, half of them a rig")
     parser.add_argument("--honest", type=int, default=2000, help="honest runs")
     parser.add_argument("--lives", type=int, default=20, help="honest lives that are no eq. 6, of each kind")
+    parser.add_argument(
+        "--ablated", type=int, default=60, help="campaigns a rig that are judged without each mechanism"
+    )
     parser.add_argument("--store", type=Path, help="a file of what was computed, to go on where a run was ended")
     parser.add_argument("--failures", action="store_true", help="list what was missed and what was held wrongly")
     parser.add_argument("--write", action="store_true", help=f"put the tables into {DOCUMENT.name}")
     chosen = parser.parse_args()
     store, seed = Store(chosen.store), chosen.seed
-    lives = {
-        kind: [
-            store.get(f"life {seed} {kind} {n}", partial(trials.honest_life, seed, kind, n))
-            for n in range(chosen.lives)
-        ]
-        for kind in KINDS
-    }
     rigs = {
         rig: [
             store.outcome(f"slip {seed} {rig} {n}", partial(trials.slipped, seed, rig, n))
@@ -160,7 +171,36 @@ def main() -> int:
         for rig in trials.RIGS
         for n in range(chosen.campaigns // 5)
     ]
-    honest = store.outcomes(f"honest {seed} {chosen.honest}", lambda: list(trials.honest(seed, chosen.honest)))
+    lives = {
+        kind: [
+            store.get(f"life {seed} {kind} {n}", partial(trials.honest_life, seed, kind, n))
+            for n in range(chosen.lives)
+        ]
+        for kind in KINDS
+    }
+    honest = [
+        *_honest(store, seed, "simulated rig", 2 * chosen.honest // 5),
+        *_honest(store, seed, "blind rig", 2 * chosen.honest // 5),
+        *_honest(store, seed, "real", chosen.honest // 5),
+    ]
+    without = [
+        store.outcome(f"slip without {seed} {rig} {n}", partial(trials.slipped, seed, rig, n, ablated=True))
+        for n in range(chosen.ablated)
+        for rig in trials.RIGS
+    ]
+    honest_without = [
+        one
+        for n in range(chosen.ablated // 10)
+        for source in (*trials.RIGS, "real")
+        for one in store.outcomes(
+            f"honest without {seed} {source} {n}", partial(trials.honest, seed, source, n, ablated=True)
+        )
+    ]
+    judged = [(kind, n) for n in range(min(chosen.ablated // 10, chosen.lives)) for kind in KINDS]
+    left_out = [
+        store.get(f"life without {seed} {kind} {n}", partial(trials.honest_life_without, seed, kind, n))
+        for kind, n in judged
+    ]
     held, false = sum(one.held for one in wrong), sum(one.held for one in honest)
     followed = [one for one in wrong if one.out_after is not None]
     out = sum(bool(one.out_after) for one in followed)
@@ -170,7 +210,8 @@ def main() -> int:
     met = met and in_the_end <= MOST_IN_THE_END * of_lives and out >= LEAST_AFTER * len(followed)
     times = sorted(one.answer.seconds for one in honest if one.kind == "stationary_stribeck")
     lines = [
-        f"`make plausibility SEED={chosen.seed} CAMPAIGNS={chosen.campaigns} HONEST={chosen.honest}`:",
+        f"`make plausibility SEED={seed} CAMPAIGNS={chosen.campaigns} HONEST={chosen.honest} LIVES={chosen.lives} "
+        f'ARGS="--ablated {chosen.ablated}"`:',
         "",
         "| | runs | held | share | demand |",
         "|---|---|---|---|---|",
@@ -186,7 +227,13 @@ def main() -> int:
         "",
         *by_life(lives),
         "",
-        *by_mechanism([*wrong, *(one for one in aside if one.slip not in slips.ALIKE)], honest),
+        *by_mechanism(
+            without,
+            honest_without,
+            left_out,
+            sum(lives[kind][n]["runs"] for kind, n in judged),
+            sum(lives[kind][n]["end"] for kind, n in judged),
+        ),
         "",
         f"A stationary test's doubts took {1e3 * times[len(times) // 2]:.1f} ms of a core in the median, "
         f"{1e3 * times[int(0.99 * len(times))]:.1f} ms in 99 % of runs.",

@@ -44,12 +44,12 @@ class Answer:
 
 @dataclass
 class Bench:
-    """One clutch: its record, the runs that were accepted, and those that are held."""
+    """One clutch: its record, the runs that were accepted, those that are held, and the results of each by run_id."""
 
     record: Mapping[str, Any] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
     held: tuple[Event, ...] = ()
-    _analyses: dict[str, Analysis] = field(default_factory=dict)
+    analyses: dict[str, Analysis] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.clutch = ClutchIn.model_validate({"clutch_id": "bench", **self.record})
@@ -100,8 +100,8 @@ class Bench:
 
     def _read(self, body: Body) -> tuple[IncomingRun, Analysis, Event]:
         run = read_run(json.dumps(body).encode())
-        analysis = self._analyses.get(run.run_id) or analyse(run, self.geometry, 0.0)
-        self._analyses[run.run_id] = analysis
+        analysis = self.analyses.get(run.run_id) or analyse(run, self.geometry, 0.0)
+        self.analyses[run.run_id] = analysis
         event = _event(run, analysis)
         life = life_with(order([*self.events, event]), event)
         return (
@@ -124,7 +124,7 @@ class Bench:
     def _cofs(self, life: Life, event: Event) -> Mapping[float, tuple[float, float]]:
         if life.speed_range is None or event.speed_range is None:
             return {}
-        fits = self._analyses[event.run_id].fits
+        fits = self.analyses[event.run_id].fits
         return mean_cofs(fits, reference_velocities(life.speed_range, self.geometry), self.geometry)
 
 

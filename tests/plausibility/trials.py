@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from service.lives.run_analysis import Analysis
 from tests.plausibility import blind, honest_lives, simulated, slips
+from tests.plausibility.ablation import WITHOUT, without
 from tests.plausibility.bench import REFUSED, Answer, Bench, Body
 from tests.plausibility.simulated import Campaign
 
@@ -16,8 +18,8 @@ Draw = Callable[[np.random.Generator], Campaign]
 TESTS_BEFORE = 3
 #: After so many further runs it is looked whether a slip is still out of the track.
 FURTHER = 10
-#: So many honest runs of each source are judged without each mechanism too.
-ABLATED = 100
+#: Of an honest campaign so many runs are sent, and judged without each mechanism every so many.
+LONGEST, EVERY = 40, 5
 
 
 @dataclass(frozen=True)
@@ -52,10 +54,10 @@ def of_blind(rng: np.random.Generator) -> Campaign:
 RIGS: dict[str, Draw] = {"simulated rig": of_simulated, "blind rig": of_blind}
 
 
-def slipped(seed: int, rig: str, number: int) -> Outcome:
+def slipped(seed: int, rig: str, number: int, *, ablated: bool = False) -> Outcome:
     """A campaign of a rig with one slip; the groups of slips take turns."""
     rng = np.random.default_rng([seed, 1, list(RIGS).index(rig), number])
-    return one_slip(rng, RIGS[rig], rig, slips.GROUPS[number % len(slips.GROUPS)])
+    return one_slip(rng, RIGS[rig], rig, slips.GROUPS[number % len(slips.GROUPS)], ablated=ablated)
 
 
 def aside(seed: int, rig: str, number: int) -> Outcome:
@@ -65,7 +67,7 @@ def aside(seed: int, rig: str, number: int) -> Outcome:
     return one_slip(rng, RIGS[rig], rig, names[number % len(names)])
 
 
-def one_slip(rng: np.random.Generator, draw: Draw, source: str, group: str) -> Outcome:
+def one_slip(rng: np.random.Generator, draw: Draw, source: str, group: str, *, ablated: bool = False) -> Outcome:
     """A campaign is sent as it was made until one of its runs slips. The first run is honest."""
     while True:
         made = draw(rng)
@@ -74,7 +76,7 @@ def one_slip(rng: np.random.Generator, draw: Draw, source: str, group: str) -> O
         for k in (first + rng.permutation(max(len(made.runs) - first, 0))).tolist():
             wrong = slip(rng, made.runs[k])
             if wrong is not None and wrong != made.runs[k]:
-                return _sent(made, k, wrong, source, name)
+                return _sent(made, k, wrong, source, name, ablated=ablated)
 
 
 def _after_tests(made: Campaign, count: int) -> int:
@@ -96,15 +98,15 @@ def _slip_of(rng: np.random.Generator, group: str, made: Campaign, draw: Draw) -
     return name, kinds[name]
 
 
-def _sent(made: Campaign, k: int, wrong: Body, source: str, name: str) -> Outcome:
+def _sent(made: Campaign, k: int, wrong: Body, source: str, name: str, *, ablated: bool) -> Outcome:
     bench = Bench(made.record)
     for run in made.runs[:k]:
         bench.accept(run)
     before = sum(1 for event in bench.events if event.cofs)
-    answer = bench.answer(wrong, ablated=True)
+    answer = bench.answer(wrong, ablated=ablated)
     further = made.runs[k + 1 : k + 1 + FURTHER]
     out_after = None
-    if len(further) == FURTHER:
+    if len(further) == FURTHER and not ablated:
         for run in further:
             bench.answer(run)
         refused = REFUSED in answer.codes
@@ -112,32 +114,20 @@ def _sent(made: Campaign, k: int, wrong: Body, source: str, name: str) -> Outcom
     return Outcome(source, name, str(wrong["kind"]), float(wrong["cycles"]), before, answer, out_after)
 
 
-def honest(seed: int, count: int) -> Iterator[Outcome]:
-    """So many honest runs: two fifths of each rig, a fifth measured; in order, shuffled, one late."""
-    for rig, draw in RIGS.items():
-        yield from _honest_of(np.random.default_rng([seed, 3, list(RIGS).index(rig)]), draw, 2 * count // 5)
-    measured = list(blind.real())
-    if measured:
-        rng = np.random.default_rng([seed, 4])
-        order = [measured[0], *(measured[1:][k] for k in rng.permutation(len(measured) - 1))]
-        sent = 0
-        for campaign in order:
-            for outcome in everything(campaign, ablated=sent < ABLATED):
-                if sent < count // 5:
-                    yield outcome
-                sent += 1
-
-
-def _honest_of(rng: np.random.Generator, draw: Draw, count: int) -> Iterator[Outcome]:
-    sent = 0
-    while sent < count:
-        made = draw(rng)
+def honest(seed: int, source: str, number: int, *, ablated: bool = False) -> list[Outcome]:
+    """The runs of one honest campaign of a rig, two of five shuffled or with one late, or of one that was measured; [] where
+    there is none of that number."""
+    if source in RIGS:
+        rng = np.random.default_rng([seed, 3, list(RIGS).index(source), number])
+        made = RIGS[source](rng)
         if rng.random() < 0.4:
             made = simulated.shuffled(rng, made)
-        for outcome in everything(made, ablated=sent < ABLATED):
-            if sent < count:
-                yield outcome
-            sent += 1
+        return list(everything(made, ablated=ablated))
+    measured = list(blind.real())
+    if number >= len(measured):
+        return []
+    order = [0, *(1 + np.random.default_rng([seed, 4]).permutation(len(measured) - 1)).tolist()]
+    return list(everything(measured[order[number]], ablated=ablated))
 
 
 def honest_life(seed: int, kind: str, number: int) -> dict[str, int]:
@@ -148,12 +138,24 @@ def honest_life(seed: int, kind: str, number: int) -> dict[str, int]:
     return {"runs": len(life), "held": arrived, "end": len(bench.held)}
 
 
+def honest_life_without(seed: int, kind: str, number: int) -> dict[str, int]:
+    """How many of its runs are held in the end without each mechanism."""
+    life, ends, known = honest_lives.life(seed, kind, number), dict[str, int](), dict[str, Analysis]()
+    for name in WITHOUT:
+        bench = Bench({}, analyses=known)
+        with without(name):
+            for run in life:
+                bench.answer(run)
+        ends[name] = len(bench.held)
+    return ends
+
+
 def everything(made: Campaign, *, ablated: bool = False) -> Iterator[Outcome]:
-    """All runs of an honest campaign; one that is held is confirmed."""
+    """The first runs of an honest campaign; one that is held is confirmed."""
     bench = Bench(made.record)
-    for run in made.runs:
+    for k, run in enumerate(made.runs[:LONGEST]):
         before = sum(1 for event in bench.events if event.cofs)
-        answer = bench.answer(run, ablated=ablated)
+        answer = bench.answer(run, ablated=ablated and k % EVERY == EVERY - 1)
         yield Outcome(made.source, "", str(run["kind"]), float(run["cycles"]), before, answer)
         if answer.codes and REFUSED not in answer.codes:
             bench.accept(run)

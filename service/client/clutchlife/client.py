@@ -103,6 +103,11 @@ class Client:
             return self.service.post_file(f"{address}/file", path, parameters)
         return self.service.post(address, _body(_content({**({} if run is None else run), **fields})))
 
+    def confirm(self, clutch_id: str, *run_ids: str, reason: str = "") -> Answer:
+        """Accept held runs as they were sent, all of them in one step; their receipts are in `items`."""
+        body = _body({"run_ids": run_ids, "reason": reason})
+        return self.service.post(f"{_clutch(clutch_id)}/runs/confirm", body)
+
     # --- what is known ---
 
     def remaining_useful_life(self, clutch_id: str, **arguments: Any) -> Answer:

@@ -2,7 +2,7 @@
 
 import asyncio
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from service.queries import runs
 from service.queries.raw_run import Kind, entity_tag, write_run
 from service.run_files.json_run import checked, read_run, read_run_on_disk
 from service.schemas.parameters import ClutchId, Points, RunId, RunKind, State
-from service.schemas.run import RUN_IN, Confirmation, Correction, Receipt, RunOut, RunPage, Withdrawal
+from service.schemas.run import RUN_IN, Confirmation, Confirmations, Correction, Receipt, RunOut, RunPage, Withdrawal
 from service.web import answers
 from service.web.auth import Ingester, Reader, name_of_caller
 from service.web.files import PARQUET_TYPE, kept_body, preferred, streamed
@@ -26,6 +26,7 @@ from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import change_run
 from service.workflows.ingest_run import ingest_posted
 from storage.encoding.json_text import to_text
+from storage.engine.database import Database
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
 
@@ -151,6 +152,21 @@ async def restore_run(of: answers.ChangeOf, run_id: RunId) -> Response:
 
 
 @router.post(
+    "/confirm",
+    response_model=RunPage,
+    responses=CHANGING,
+    openapi_extra=answers.described_body(
+        Confirmations, {"run_ids": ["test-7000", "test-8000"], "reason": "the clutch was run over the weekend"}
+    ),
+)
+async def confirm_runs(of: answers.ChangeOf) -> Response:
+    """Accept several held runs as they were sent, in one step: all of them, or none where one is not there. Those that are
+    not held stay as they are."""
+    wanted = checked(Confirmations, await answers.json_body(of.request))
+    return await _changed(_confirmed, of, wanted.run_ids, wanted.reason)
+
+
+@router.post(
     "/{run_id}/confirm",
     response_model=Receipt,
     responses=CHANGING,
@@ -162,10 +178,14 @@ async def confirm_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     return await _changed(change_run.confirm, of, run_id, reason)
 
 
+def _confirmed(database: Database, clutch_id: str, run_ids: Sequence[str], **wanted: Any) -> dict[str, Any]:
+    return {"items": change_run.confirm_all(database, clutch_id, run_ids, **wanted), "next": None}
+
+
 async def _changed(
-    change: Callable[..., dict[str, Any]], of: answers.OfClutch, run_id: str, reason: str, **more: Any
+    change: Callable[..., dict[str, Any]], of: answers.OfClutch, run_id: str | Sequence[str], reason: str, **more: Any
 ) -> Response:
-    """The receipt after a change."""
+    """The receipt, or receipts, after a change."""
     made = partial(change, reason=reason, **more, by=name_of_caller(of.request), at=answers.now())
     clutch_id, submit = of.clutch_id, of.context.workers.submit
     changing = submit(Lane.RUNS, made, clutch_id, run_id, turn=clutch_id, seconds=CHANGE_SECONDS)

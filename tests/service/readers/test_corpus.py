@@ -4,6 +4,7 @@ All hold the same record or the same plateaus; what differs is how it is written
 """
 
 import io
+import re
 import zipfile
 from collections.abc import Callable
 from datetime import datetime, timedelta
@@ -169,6 +170,38 @@ TEXTS: dict[str, tuple[str | bytes, str | None]] = {
     "means-below-numbers.csv": ("Nr," + HEAD + "\n1," + rows().replace("\n", "\n1,")[:-2] + "Mean,5,5,1000,20\n", None),
     "words-below.csv": (GERMAN + "\n" + rows(";", ",") + "Ende der Messung\nPrüfer: Meier\n", None),
     "minus.csv": (HEAD + "\n" + rows().replace("0.0000,", "−0.0000,", 1), None),
+    "catman.asc": (("Datum:\t02.11.2026\nAbtastrate:\t100 Hz\n\nZeit  1 - Standardmessrate\tDrehmoment\tDrehzahl\tDruck\n"
+                    "[s]\t[Nm]\t[1/min]\t[bar]\nT10F\tMX840\tMX460\tP8AP\n"
+                    + rows("\t", ",", ["time_s", "torque_nm", "speed_rpm", "pressure_bar"])).encode("cp1252"), None),
+    "labels-before-each-row.txt": ("Kanal\tZeit\tDruck\tDrehzahl\tMoment\nEinheit\ts\tbar\t1/min\tNm\n"
+                                   "Messrate\t100 Hz\t100 Hz\n"
+                                   "Sensor\t\tP8\tT10F\tT10F\n\t" + rows("\t", ",").replace("\n", "\n\t")[:-1], None),
+    "oscilloscope.csv": ('"Model Name","DL950"\n"TraceName","Pressure","Speed","Torque"\n"BlockSize",12,12,12\n'
+                         '"VUnit","bar","rpm","Nm"\n"HResolution",10,10,10\n"HUnit","ms","ms","ms"\n"Date","2026/11/02"\n"Time","08:00:00"\n\n,'
+                         + rows(names=PLATEAUS).replace("\n", "\n,")[:-1], None),
+    "rate-above.csv": ("Sample rate [kHz];0,1\nOperator;X\n\np [bar];n [rpm];M [Nm]\n" + rows(";", ",", PLATEAUS), None),
+    "interval-above.csv": ("Sampling interval,10ms\n\np [bar],n [rpm],M [Nm]\n" + rows(names=PLATEAUS), None),
+    "six-rows-of-titles.csv": ("Kanal;K1;K2;K3\nZeit;Druck;Drehzahl;Moment\ns;bar;1/min;Nm\nFilter;TP 100 Hz;;\n"
+                               "Ort;Kolben;Welle;Welle\n"
+                               "Sensor;P8;T10;T10\n" + rows(";", ","), None),
+    "numbers-of-columns.csv": ("Zeit;Druck;Drehzahl;Moment\n1;2;3;4\ns;bar;1/min;Nm\n" + rows(";", ","), None),
+    "a-rule-below-titles.txt": ("  Zeit   Druck   Drehzahl   Moment\n  [s]    [bar]    [rpm]   [Nm]\n"
+                                " ------  ------  ------  ------\n" + rows("   "), None),
+    "table-of-markdown.md": ("| t [s] | p [bar] | n [rpm] | M [Nm] |\n|---|---|---|---|\n| "
+                             + rows(" | ").replace("\n", " |\n| ")[:-2], None),
+    "inch-in-a-title.csv": (GERMAN + ';d [3/4"]\n' + rows(";", ",").replace("\n", ";7\n"), None),
+    "signs-apart.csv": (HEAD + "\n" + rows().replace(",", ",+  "), None),
+    "fortran.txt": (HEAD.replace(",", "  ") + "\n" + rows("  ", number="%.6E").replace("E", "D"), None),
+    "time-by-another-name.csv": ("Zeit ab Start [s];Dauer Zeit [s];Druck [bar];Drehzahl [1/min];M [Nm]\n"
+                                 + re.sub(r"^([^;]*);", r"\1;4,5;", rows(";", ","), flags=re.MULTILINE), None),
+    "two-times-that-agree.csv": ("Timestamp;Time (ms);p [bar];n [rpm];M [Nm]\n"
+                                 + "".join(f"2026-11-02 08:00:00;{1000 * float(line[:6]):.0f}{line[6:]}\n"
+                                           for line in rows(";").splitlines()), None),
+    "a-time-a-channel.csv": ("Zeit_p [s];p [bar];Zeit_n [s];n [1/min];Zeit_M [s];M [Nm]\n"
+                             + "".join(f"{t};{p};{t};{n};{t};{m}\n"
+                                       for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
+    "device-behind-the-name.txt": ("time\tp_ist\\CAN:1\tn_ist\\CAN:1\tm_ist\\CAN:1\ns\tbar\trpm\tNm\n"
+                                   "f8\tf8\tf8\tf8\n" + rows("\t"), None),
 }  # fmt: skip
 
 
@@ -187,7 +220,44 @@ def require_record(path: Path, reading: Reading | None = None) -> None:
         np.testing.assert_allclose(columns[channel], values, rtol=1e-9, atol=1e-9, err_msg=channel)
 
 
+def test_a_slower_channel_in_the_same_rows_is_brought_to_their_clock(tmp_path: Path) -> None:
+    """As exporters write several rates into one table: cells are empty where the slower channel has no sample."""
+    lines = [f"{line};{80 + row}" if row % 3 == 0 else f"{line};" for row, line in enumerate(rows(";").splitlines())]
+    (tmp_path / "a.csv").write_text("\n".join([f"{GERMAN};Öltemperatur [°C]", *lines]) + "\n", encoding="utf-8")
+    read = read_file(tmp_path / "a.csv", filename="a.csv")
+    np.testing.assert_allclose(read.columns["oil_temperature_c"], 80 + np.minimum(np.arange(ROWS), 9), rtol=1e-12)
+    assert [notice.code for notice in read.notices] == ["brought_to_one_clock"]
+    lines[5:7] = [line.replace(";", ";;", 1).rpartition(";")[0] for line in lines[5:7]]
+    (tmp_path / "a.csv").write_text("\n".join([f"{GERMAN};Öltemperatur [°C]", *lines]) + "\n", encoding="utf-8")
+    with pytest.raises(InvalidError, match=r"pressure_bar\[5\] \(line 7\) must be a number, got '': fill the cell"):
+        read_file(tmp_path / "a.csv", filename="a.csv")
+
+
+def test_a_shorter_channel_has_the_times_beside_it(tmp_path: Path) -> None:
+    half = [(f"{t}", f"{p}") for t, p in zip(TIME[::2], RECORD["pressure_bar"][::2], strict=True)] + [("", "")] * (
+        ROWS // 2
+    )
+    lines = [
+        f"{t};{m};{n};{';'.join(slow)}"
+        for (t, _, n, m), slow in zip(zip(*RECORD.values(), strict=True), half, strict=True)
+    ]
+    titles = "Zeit_M [s];M [Nm];n [rpm];Zeit_p [s];p [bar]"
+    (tmp_path / "a.csv").write_text("\n".join([titles, *lines]) + "\n", encoding="utf-8")
+    columns = read_file(tmp_path / "a.csv", filename="a.csv").columns
+    np.testing.assert_allclose(columns["pressure_bar"][:-1], RECORD["pressure_bar"][:-1], rtol=1e-9)
+
+
 REFUSED = {
+    "units-in-cells": (
+        "t;M\n0 s;21 Nm\n1 s;22 Nm\n",
+        None,
+        "line 2 must be a row of numbers, under the titles of line 1",
+    ),
+    "two-times-that-differ": (
+        "Timestamp;Time (s);M [Nm]\n" + "".join(f"2026-11-02 08:00:0{s};{2 * s};1\n" for s in range(5)),
+        None,
+        "got Timestamp and Time (s); time=NAME chooses one",
+    ),
     "german-thousands": ("pressure_bar;speed_rpm;torque_nm\n5;800;21\n5;1.100;21\n", None, "may be 1.1 or 1100"),
     "american-thousands": ('pressure_bar,speed_rpm,torque_nm\n5,800,21\n5,"1,100",21\n', None, "may be 1.1 or 1100"),
     "foreign-unit": ("t [s],M [V]\n0,1\n", None, "'V'"),
@@ -393,7 +463,7 @@ def test_files_of_libreoffice_in_three_languages_give_their_numbers() -> None:
 # --- clocks, factors and marks that HDF5 and MATLAB files state ---
 
 
-def rig(file: h5py.File, *, without: tuple[str, ...] = ("time_s",)) -> None:
+def rig(file: h5py.Group, *, without: tuple[str, ...] = ("time_s",)) -> None:
     for channel, unit in (("time_s", "s"), ("pressure_bar", "bar"), ("speed_rpm", "1/min"), ("torque_nm", "Nm")):
         if channel not in without:
             file.create_dataset(channel.rpartition("_")[0], data=RECORD[channel]).attrs["unit"] = unit
@@ -414,6 +484,21 @@ def read_hdf5(path: Path, fill: Callable[[h5py.File], object]) -> Channels:
 def test_a_clock_in_any_unit_is_used(tmp_path: Path, stated: dict[str, object]) -> None:
     columns = read_hdf5(tmp_path / "a.h5", lambda file: (rig(file), file.attrs.update(stated))).columns
     np.testing.assert_allclose(columns["time_s"], TIME, rtol=0, atol=1e-12)
+
+
+def test_a_clock_above_the_group_or_in_a_folder_of_its_own_is_used(tmp_path: Path) -> None:
+    def of_the_file(file: h5py.File) -> None:
+        file.attrs["sample_rate"] = 100.0
+        rig(file.create_group("rig"))
+
+    def beside(file: h5py.File) -> None:
+        for channel, unit in (("pressure_bar", "bar"), ("speed_rpm", "1/min"), ("torque_nm", "Nm")):
+            group = file.create_group(channel)
+            group.create_group("x_values").attrs.update({"start_value": 0.0, "increment": 0.01})
+            group.create_dataset(channel, data=RECORD[channel]).attrs["unit"] = unit
+
+    for fill in (of_the_file, beside):
+        np.testing.assert_allclose(read_hdf5(tmp_path / "a.h5", fill).columns["time_s"], TIME, rtol=0, atol=1e-12)
 
 
 def test_a_clock_in_an_unknown_unit_is_refused(tmp_path: Path) -> None:

@@ -169,3 +169,16 @@ def test_a_database_that_cannot_be_read_is_said_to_be(polled: TestClient, monkey
     monkeypatch.setattr("storage.engine.sqlite.database.FileWatch.snapshots", unreadable)
     answer = polled.get("/v1/clutches/c1/runs")
     assert (answer.status_code, answer.headers["Retry-After"]) == (503, "1")
+
+
+@pytest.mark.parametrize("table", ["runs", "changes", "series", "loops", "degradation", "scores"])
+def test_a_page_that_was_asked_for_is_not_the_answer_for_another(client: TestClient, table: str) -> None:
+    for cycles in (0.0, 1000.0, 2000.0):
+        post(client, cycles)
+    address = f"/v1/clutches/c1/{table}"
+    assert client.get(address).status_code == 200
+    pages = {limit: client.get(f"{address}?limit={limit}").json()["items"] for limit in (1, 2, 1)}
+    assert all(len(items) <= limit for limit, items in pages.items())
+    if table in ("runs", "series", "degradation"):
+        assert [len(items) for items in pages.values()] == [1, 2]
+    assert client.get(f"{address}?cursor=bad").status_code == 422

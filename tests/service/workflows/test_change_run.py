@@ -180,6 +180,29 @@ def test_states_and_what_changes_nothing(benches: tuple[Bench, Bench]) -> None:
         bench.withdraw("nobody")
 
 
+def test_several_held_runs_are_confirmed_in_one_step_or_none(benches: tuple[Bench, Bench]) -> None:
+    together, one_by_one = benches
+    for bench in benches:
+        bench.send(body("test", "a", 0.0))
+        bench.send(body("test", "b", 1000.0))
+        for name, cycles in (("odd-2", 3000.0), ("odd-1", 2000.0)):
+            assert bench.send(body("test", name, cycles, odd=True))["state"] == "held"
+    revision = revision_of(together)
+    asked = ["odd-2", "b", "odd-1"]
+    with pytest.raises(NotFoundError, match="nobody"):
+        change_run.confirm_all(together.database, CLUTCH, [*asked, "nobody"], reason="", by="me", at=AT)
+    assert revision_of(together) == revision
+    receipts = change_run.confirm_all(together.database, CLUTCH, asked, reason="a new lining", by="me", at=AT)
+    assert [(one["run_id"], one["state"]) for one in receipts] == [(name, "accepted") for name in asked]
+    assert revision_of(together) == revision + 1
+    confirmed = [each for each in trail_of(together) if each["action"] == "confirm"]
+    assert sorted(each["run_id"] for each in confirmed) == ["odd-1", "odd-2"]
+    assert {each["reason"] for each in confirmed} == {"a new lining"}
+    for name in ("odd-1", "odd-2"):
+        one_by_one.confirm(name)
+    assert_same(together, one_by_one)
+
+
 def test_what_was_sent_stays_what_was_sent(benches: tuple[Bench, Bench], tmp_path: Path) -> None:
     """The hash is of what was sent: it is known again, and other content is refused, whatever was mended."""
     bench, _ = benches

@@ -1,8 +1,10 @@
 """A life is declared ended: it reads so, takes in nothing later, can be taken back, and teaches its fleet."""
 
+import csv
 from contextlib import closing
 from typing import Any
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
@@ -10,6 +12,7 @@ from service.errors import LifeEndedError
 from service.lives.history import Event, require_within_ends
 from service.workflows.learn_fleet import refresh
 from storage.engine.opening import open_database
+from tests.real import loaders
 from tests.support import stationary
 
 RUNS, LIFE = "/v1/clutches/c1/runs", "/v1/clutches/c1/remaining-useful-life"
@@ -163,3 +166,46 @@ def test_a_life_has_one_end() -> None:
     require_within_ends(events[:1])
     with pytest.raises(LifeEndedError, match="no second end"):
         require_within_ends(events)
+
+
+def _filters(feed: str) -> list[list[tuple[float, float]]]:
+    """Filters of one dust feed, each in twelve tests until 98 % of 600 Pa or until its rig stopped it: seconds, and the
+    share of the first COF that such a pressure stands for, a half at 600 Pa."""
+    with (loaders.FOLDER / "filter_lives" / "filters_odd.csv").open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["dust_feed"] == feed]
+    lives = []
+    for number in dict.fromkeys(row["life"] for row in rows):
+        seconds, pressure = np.array(
+            [(float(row["time_s"]), float(row["differential_pressure_pa"])) for row in rows if row["life"] == number]
+        ).T
+        clogged = np.flatnonzero(pressure >= 0.98 * 600.0)
+        at = np.linspace(0.0, seconds[clogged[0] if clogged.size else -1], 12).round()
+        smooth = [np.median(pressure[np.abs(seconds - t) <= 3.0]) for t in at]
+        lives.append([(float(t), 1.0 - 0.5 * float(p) / 600.0) for t, p in zip(at, smooth, strict=True)])
+    return lives
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not loaders.FOLDER.is_dir(), reason="the measurements are not there")
+def test_ten_filters_that_were_stopped_just_short_of_their_threshold_teach_the_eleventh(
+    client: TestClient, database_url: str
+) -> None:
+    lives = _filters("1.0")[:11]
+    assert len(lives) == 11
+    for number, tests in enumerate(lives):
+        path = f"/v1/clutches/filter-{number}"
+        post(client, {"clutch_id": f"filter-{number}"}, path="/v1/clutches")
+        for part, (seconds, share) in enumerate(tests[:6] if number == 10 else tests):
+            body = stationary(seconds, run_id=f"t{part}", wear=0.0, noise=0.002, **FEW)  # type: ignore[arg-type]
+            torque = [share * value for value in body["channels"]["torque_nm"]]
+            post(client, body | {"channels": body["channels"] | {"torque_nm": torque}}, path=f"{path}/runs")
+        if number < 10:
+            post(client, END | {"cycles": tests[-1][0]}, path=f"{path}/runs")
+        assert client.get(f"{path}/runs?state=held").json()["items"] == []
+    with closing(open_database(database_url)) as database:
+        refresh(database, now="2026-11-26T00:00:00+00:00")
+    now = client.get("/v1/clutches/filter-10/remaining-useful-life").json()
+    assert now["ended_lives"] == 10
+    end = lives[10][-1][0]
+    assert now["end_of_life_cycles"]["0.05"] < end < now["end_of_life_cycles"]["0.95"]
+    assert now["end_of_life_cycles"]["0.5"] == pytest.approx(end, rel=0.5)

@@ -132,7 +132,7 @@ export function answersOf(run) {
 }
 
 /**
- * Answer the doubts about held runs, one after the other.
+ * Answer the doubts about held runs: confirmed together, otherwise one after the other.
  * @param {Answer} answer
  * @param {Receipt[]} runs
  * @returns {Promise<Done>} what was done; where one was refused, how far it came
@@ -140,7 +140,13 @@ export function answersOf(run) {
 export async function answerDoubts(answer, runs) {
   /** @type {Done[]} */
   const all = [];
+  const [only] = runs;
   try {
+    if (answer === "right" && only && runs.length > 1) {
+      const run_ids = runs.map((run) => run.run_id);
+      await sendJson("POST", `${clutchPath(only.clutch_id)}/runs/confirm`, { run_ids, reason: "" });
+      return { text: `${runs.length} runs are confirmed.`, undo: null };
+    }
     for (const run of runs) all.push(await answerDoubt(answer, run));
   } catch (problem) {
     if (!(problem instanceof Problem)) throw problem;

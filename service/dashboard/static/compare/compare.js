@@ -16,6 +16,7 @@ import { fixed } from "../shared/format.js";
 import { withKey } from "../shared/key.js";
 import { Live } from "../shared/live.js";
 import { liveBar } from "../shared/live_bar.js";
+import { heldText } from "../shared/state.js";
 import { named, placeUnits, pressureText, units } from "../shared/units.js";
 
 /** @import { Colours, PlainTrace, Spec } from "../charts/types.js" */
@@ -213,6 +214,7 @@ function drawForm(lives) {
       {},
       h("a", { href: `/clutches/${encodeURIComponent(id)}` }, id),
       " ",
+      life.clutch.held > 0 && h("span", { class: "mark-held" }, heldText(life.clutch.held)),
       numbers.length > 1 && choice("Life", numbers, `${id}:${life.answer.life.number}`, replace),
       h(
         "button",

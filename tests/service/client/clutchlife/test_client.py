@@ -49,6 +49,18 @@ def test_remaining_life_is_the_answer_of_the_api(client: Client) -> None:
     assert planned["pace_from"] == "request"
 
 
+def test_held_runs_are_confirmed_together(client: Client) -> None:
+    client.register("held")
+    for cycles in (0.0, 1000.0, 2000.0):
+        client.post_run("held", stationary(cycles, run_id=f"s{cycles:g}"))
+    for cycles in (3000.0, 4000.0):
+        body = stationary(cycles, run_id=f"odd-{cycles:g}")
+        body["channels"]["torque_nm"] = [60 * torque for torque in body["channels"]["torque_nm"]]
+        assert client.post_run("held", body)["state"] == "held"
+    answer = client.confirm("held", "odd-3000", "odd-4000", reason="a new lining")
+    assert {receipt["state"] for receipt in answer["items"]} == {"accepted"}
+
+
 def test_a_run_may_be_a_content_its_fields_a_frame_or_a_file(client: Client, tmp_path: Path) -> None:
     client.register("forms")
     body = stationary(500.0)

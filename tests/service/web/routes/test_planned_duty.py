@@ -139,6 +139,11 @@ def test_what_cannot_be_counted_is_said(client: TestClient) -> None:
     assert "severity_not_counted" in [warning["code"] for warning in counted["warnings"]]
 
 
+def test_a_plan_of_more_than_a_hundred_blocks_is_answered_with_all_of_them(client: TestClient) -> None:
+    answer = planned(client, *[{"cycles": 10, "energy_per_cycle_kj": 20}] * 150, clutch="c1")
+    assert len(answer["block_severity"]) == 150
+
+
 def test_a_rebuilt_clutch_has_a_whole_horizon_again(client: TestClient) -> None:
     send(client, "c1", {"kind": "maintenance", "event": "rebuild", "cycles": 999_000})
     for place in range(5):
