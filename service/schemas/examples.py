@@ -17,7 +17,8 @@ _SPEEDS, _TORQUES = [20, 120, 520, 1020, 1970], [21.9, 22.8, 22.4, 21.5, 20.8]
 _SHARED: tuple[tuple[Any, str], ...] = (
     (_MOMENT, "_at at time"), ("key:1a2b3c4d bench 3", "_by by"), (_DIAGNOSIS, "_id"),
     (1, "attempts left repeats censored_lives check count failure life out_of_specification total_errors version"),
-    (3, "done periods"), (0, "JobResult.kinds changed skip_rows origin_cycles below"),
+    (3, "done periods"), (0, "Degradation.held_runs Surfaces.held_runs"),
+    (0, "JobResult.kinds changed skip_rows origin_cycles below"),
     ("order a new set", "AlarmIn.name AlarmOut.name EventOut.name"),
     ("shop floor", "WebhookIn.name WebhookOut.name"),
     (0.1, "hysteresis least frequency_hz attractor_sd_nm_s loop_area_sd_nm_m_s"),
@@ -50,6 +51,7 @@ _SHARED: tuple[tuple[Any, str], ...] = (
 _OWN: dict[str, Any] = {
     "step": "reads the runs", "replayed": 39, "SeverityWeighed.basis": "dissipated_energy",
     "SeverityWeighed.exponents": [0.0, 0.5, 1.0, 1.5, 2.0, 3.0],
+    "Confirmations.run_ids": ["test-7000", "test-8000"],
     "SeverityWeighed.probabilities": [0.01, 0.07, 0.83, 0.08, 0.01, 0.0], "clutch_id": "bench3-017",
     "any_of": ["failure", "maintenance"], "EventOut.value": 3900.0, "EventOut.limit": 4000.0,
     "url": "https://example.org/hook", "secret": "wet-clutch-7000", "DeliveryOut.status": 503,
