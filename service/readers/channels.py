@@ -164,8 +164,8 @@ def _read(
             clock = clocks.get(column.index)
             key = clock.key if isinstance(clock, Clock) else clock
             own = times[key] if isinstance(clock, Clock) else None if clock is None else values[clock]
-            one = _Series(values[column.index], valid[column.index], key, own)
-            series[column.channel] = _without_gaps(column.channel, one, table)
+            whole = _Series(values[column.index], valid[column.index], key, own)
+            series[column.channel] = _without_gaps(column.channel, whole, table)
     if not series:  # a time alone: shown as such, and refused for what it lacks
         series = {"time_s": _Series(values[indices[0]], None, None, None)}
     counts = bool(used) and len(times) == 1 and used[0].counts

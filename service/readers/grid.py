@@ -257,9 +257,9 @@ def no_table(
     best = max(filled, key=lambda index: recognised(list(map(_text, rows[index])), named) if rows else 0)
     under = next((index for index in filled if index > best), None)
     if under is not None and recognised(list(map(_text, rows[best])), named):
-        place, rule = under, f"must be a row of numbers, under the titles of line {line_of(best)}"
+        place, rule = under, f"a row of numbers, under the titles of line {line_of(best)}"
     else:
-        place, rule = filled[0], "must be a header with the channels' names, above rows of numbers"
+        place, rule = filled[0], "a header with the channels' names, above rows of numbers"
     shown = " ".join(map(_text, rows[place] if rows else ())).strip()[:MAX_QUOTED]
-    message = f"line {line_of(place)} {rule}, got {shown!r}"
+    message = f"line {line_of(place)} must be {rule}, got {shown!r}"
     return InvalidError(message, errors=[FieldError(pointer="", code="no_header", message=message, value=shown)])
