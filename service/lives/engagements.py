@@ -171,17 +171,6 @@ class StoredEngagement:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class IndicatorColumns:
-    """One indicator over a clutch's runs [n]: cycles since new, value and standard error in the public unit."""
-
-    unit: str
-    run_ids: tuple[str, ...]
-    cycles: FloatArray
-    value: FloatArray
-    sd: FloatArray
-
-
 def stored_engagement(receipt: Mapping[str, Any], details: Mapping[str, Any]) -> StoredEngagement | None:
     """A stored run's engagement; None where it has none, or was evaluated by a release that knew of none."""
     if receipt.get("engagement") is None:
@@ -202,25 +191,6 @@ def engagements_over_life(stored: Sequence[StoredEngagement], lives: Sequence[Co
             basis = None if reference is None or not engagement.of_duty(first[0]) else reference
             rows.append(_row(engagement, basis))
     return rows
-
-
-def indicator_columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, IndicatorColumns]:
-    """The rows of `engagements_over_life` as columns by the indicator's public name, an indicator without values left out.
-
-    This is what a track over life takes: a value and its standard error by cycles since new.
-    """
-    columns = {}
-    for name, indicator in ALL_INDICATORS.items():
-        values = [(row, row["indicators"][name]) for row in rows if row["indicators"][name] is not None]
-        if values:
-            columns[name] = IndicatorColumns(
-                unit=indicator.unit,
-                run_ids=tuple(row["run_id"] for row, _ in values),
-                cycles=np.array([row["cycles"] for row, _ in values], dtype=np.float64),
-                value=np.array([estimate["value"] for _, estimate in values]),
-                sd=np.array([estimate["sd"] for _, estimate in values]),
-            )
-    return columns
 
 
 def _row(engagement: StoredEngagement, reference: Reference | None) -> dict[str, Any]:

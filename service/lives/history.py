@@ -36,7 +36,7 @@ Corrected = Mapping[float, tuple[float, float, tuple[float, ...]]]
 STATIONARY, DYNAMIC, MAINTENANCE = "stationary_stribeck", "dynamic_stribeck", "maintenance"
 REBUILD, END_OF_LIFE = "rebuild", "end_of_life"
 #: Why a life was declared ended: it is worn, or it was taken out before its end, which is later then.
-WORN, OTHER_REASON = "worn", "other"
+WORN = "worn"
 #: The first and the last moment that have a date [s since 1970].
 _MOMENTS = tuple(moment.replace(tzinfo=UTC).timestamp() for moment in (datetime.min, datetime(9999, 12, 31)))
 

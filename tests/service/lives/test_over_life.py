@@ -2,14 +2,14 @@
 
 import csv
 import io
+from contextlib import closing
 from typing import Any
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from service import stored_runs
-from service.lives.engagements import ALL_INDICATORS, indicator_columns
+from service.lives.engagements import ALL_INDICATORS
 from service.workflows.replay import replay_clutch
 from storage.engine.opening import open_database
 from tests.models.engagements.closed_forms import Engagement, constant, record
@@ -108,25 +108,13 @@ def test_indicators_are_followed_over_the_cycles_of_a_life(client: TestClient) -
     assert (again["cycles"], again["value"]) == (3700, pytest.approx(1.0))
 
 
-def test_a_track_gets_cycles_values_and_standard_errors_and_a_replay_changes_none(
-    client: TestClient, database_url: str
-) -> None:
+def test_a_replay_changes_no_indicator(client: TestClient, database_url: str) -> None:
     for cycles in (500, 1000):
         sent(client, engaged(cycles, constant(COF)))
     before = client.get(RUNS).json()["items"]
-    database = open_database(database_url)
-    try:
-        with database.reading() as connection:
-            columns = indicator_columns(stored_runs.engagements(connection, "c1"))
+    with closing(open_database(database_url)) as database:
         replay_clutch(database, "c1")
-    finally:
-        database.close()
     assert client.get(RUNS).json()["items"] == before
-    stop = columns["stop_time_s"]
-    assert stop.cycles.tolist() == [500, 1000]
-    assert stop.run_ids == ("duty-500", "duty-1000")
-    assert (stop.unit, stop.value.shape, bool((stop.sd > 0).all())) == ("s", (2,), True)
-    assert "breakaway_cof" not in columns
 
 
 def test_the_tracked_model_stands_beside_a_measured_engagement(client: TestClient) -> None:
