@@ -69,7 +69,7 @@ def end(
 def confirm(
     service: Service,
     clutch: ClutchId,
-    runs: Annotated[list[str] | None, typer.Argument(metavar="[RUN]...")] = None,
+    runs: Annotated[list[str] | None, typer.Argument(metavar="[RUN]...", help="The names of the runs")] = None,
     every: Annotated[bool, typer.Option("--all", help="All runs that are held")] = False,
     doubt: Annotated[str, typer.Option(help="All runs that are held for this code, as cycles_off_pace")] = "",
     reason: Reason = "",
@@ -79,7 +79,7 @@ def confirm(
         fail("give the runs, or --all, or --doubt CODE", EX_USAGE)
     if not runs:
         held = service.pages(f"/v1/clutches/{clutch}/runs", state="held")
-        runs = [run["run_id"] for run in held if every or doubt in {each["code"] for each in run["doubts"]}]
+        runs = [run["run_id"] for run in held if every or doubt in {question["code"] for question in run["doubts"]}]
     if not runs:
         print_line(f"{clutch} has no {f'runs held for {doubt}' if doubt else 'held runs'}")
         return

@@ -145,10 +145,10 @@ def confirm_all(
 
     Raises NotFoundError where one is none of the clutch's, and then changes nothing.
     """
-    asked = tuple(dict.fromkeys(run_ids))
-    request = _Request(clutch_id=clutch_id, run_ids=asked, action=changes.CONFIRM, reason=reason, by=by, at=at)
+    names = tuple(dict.fromkeys(run_ids))
+    request = _Request(clutch_id=clutch_id, run_ids=names, action=changes.CONFIRM, reason=reason, by=by, at=at)
     receipts = {answer["run_id"]: answer for answer in _change(database, request)}
-    return [receipts[run_id] for run_id in asked]
+    return [receipts[run_id] for run_id in names]
 
 
 def correct(
@@ -158,8 +158,9 @@ def correct(
 
     Raises NotFoundError, and NotPossibleNowError for a run that is withdrawn.
     """
-    action, asked = changes.CORRECT, (run_id,)
-    request = _Request(clutch_id=clutch_id, run_ids=asked, action=action, reason=reason, by=by, at=at, cycles=cycles)
+    request = _Request(
+        clutch_id=clutch_id, run_ids=(run_id,), action=changes.CORRECT, reason=reason, by=by, at=at, cycles=cycles
+    )
     return _change(database, request)[0]
 
 
@@ -212,16 +213,16 @@ def _change(
         loaded = _load(database, request)
         if again is not None:
             loaded = _with(loaded, again)
-        asked = {row.run_id: row for row in _as_asked(database, loaded, request)}
+        wanted = {row.run_id: row for row in _as_asked(database, loaded, request)}
         same = [
             row
             for row in loaded.rows
-            if again is None and (row.state, row.cycles) == (asked[row.run_id].state, asked[row.run_id].cycles)
+            if again is None and (row.state, row.cycles) == (wanted[row.run_id].state, wanted[row.run_id].cycles)
         ]
         if len(same) == len(loaded.rows):
             return [records.receipt(row) for row in same]
         loaded = loaded.without(same)
-        changed = _computed(database, loaded, [asked[row.run_id] for row in loaded.rows])
+        changed = _computed(database, loaded, [wanted[row.run_id] for row in loaded.rows])
         with database.writing(of=request.clutch_id) as connection:
             if records.unchanged(connection, request.clutch_id, loaded.state.revision):
                 if columns is not None:
@@ -269,8 +270,8 @@ def _load(database: Database, request: _Request) -> _Loaded:
     with database.reading() as connection:
         rows = {run_id: stored_runs.run(connection, clutch_id, run_id) for run_id in request.run_ids}
         state = records.state(connection, clutch_id)
-        known = {event.run_id: event for event in state.events} | records.set_aside(connection, clutch_id)
-        events = order([known[run_id] for run_id in rows])
+        by_name = {event.run_id: event for event in state.events} | records.set_aside(connection, clutch_id)
+        events = order([by_name[run_id] for run_id in rows])
         trail = [
             change
             for run_id, row in rows.items()
@@ -358,12 +359,12 @@ def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
 def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _Changed:
     """All that follows from the runs as they are to be."""
     before, others = loaded.state, _others(loaded)
-    asked = [(row, event.at(row.cycles)) for row, event in zip(rows, loaded.events, strict=True)]
-    own = [event for row, event in asked if row.state == runs.ACCEPTED]
-    out = [event for row, event in asked if row.state != runs.ACCEPTED]
+    pairs = [(row, event.at(row.cycles)) for row, event in zip(rows, loaded.events, strict=True)]
+    own = [event for row, event in pairs if row.state == runs.ACCEPTED]
+    out = [event for row, event in pairs if row.state != runs.ACCEPTED]
     judged = _judged_with(loaded, own)
     require_within_ends(order([*others.events, *own]))
-    held = judged.aside(others.held, [event for row, event in asked if row.state == runs.HELD])
+    held = judged.aside(others.held, [event for row, event in pairs if row.state == runs.HELD])
     after = replace(before, events=judged.settled(others.events, own), held=held)
     receipts = {**loaded.receipts}
     receipts |= {row.run_id: receipts[row.run_id] | {"cycles": whole(row.cycles)} for row in rows}
