@@ -9,7 +9,7 @@ import openpyxl
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.driving import Watched
+from tests.browser.driving import Watched, turned
 from tests.browser.dropping import drop
 from tests.journeys.dashboard.test_axe import violations
 from tests.support import ONCE, SPEEDS_RPM, Server, serving, stationary
@@ -123,3 +123,26 @@ def test_the_importer_is_used_by_keyboard_and_passes_axe(watched: Watched) -> No
     expect(dialog.get_by_label("Channel of M_z1")).to_be_focused()
     expect(dialog.get_by_label("Channel of M_z1")).to_have_value("torque_nm")
     assert violations(page) == []
+
+
+def test_a_file_is_read_again_by_the_mended_profile(watched: Watched, server: Server) -> None:
+    columns = [{"title": "p", "channel": "pressure_bar"}, {"title": "n", "channel": "speed_rpm"}]
+    torque = {"title": "Mz", "channel": "torque_nm", "unit": "Nm"}
+    profile = {"name": "bench-4", "kind": "stationary_stribeck", "columns": [*columns, torque]}
+    assert ONCE.post(f"{server.url}/v1/rigs", json=profile).status_code == 201
+    rows = "p [bar],n [1/min],Mz\n5,20,209\n5,120,219\n5,520,214\n5,1020,207\n5,1970,199\n"
+    run = f"{server.url}/v1/clutches/bench3-017/runs"
+    sent = {"rig": "bench-4", "filename": "tenfold.csv", "run_id": "tenfold", "cycles": 6000}
+    assert ONCE.post(f"{run}/file", params=sent, content=rows).status_code == 201
+    mended = profile | {"columns": [*columns, torque | {"scale": 0.1}]}
+    assert ONCE.put(f"{server.url}/v1/rigs/bench-4", json=mended).status_code == 200
+    page = turned(opened(watched), "runs")
+    shown = page.locator("#runs details[data-run='tenfold']")
+    shown.locator("summary").first.click()
+    shown.get_by_role("button", name="Read its file again").click()
+    dialog = page.get_by_role("dialog", name="Read its file again")
+    dialog.get_by_label("Rig profile").select_option("bench-4")
+    dialog.get_by_label("Reason").fill("the amplifier was set to ten times")
+    dialog.get_by_role("button", name="Read again").click()
+    page.get_by_text("is read by the rig profile bench-4").wait_for()
+    assert ONCE.get(f"{run}/tenfold").json()["channels"]["torque_nm"] == pytest.approx([20.9, 21.9, 21.4, 20.7, 19.9])

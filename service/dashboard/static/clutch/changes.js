@@ -3,7 +3,7 @@
 // a question that says what will happen; nothing is ever deleted, and most of it can be undone at once.
 
 import { doubtList } from "../sending/receipt.js";
-import { clutchPath, Problem, sendJson } from "../shared/api.js";
+import { clutchPath, Problem, readAll, sendJson } from "../shared/api.js";
 import { field, h } from "../shared/dom.js";
 import { fixed, kindName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
@@ -11,7 +11,7 @@ import { isCorrected } from "./states.js";
 
 /** @import { DeclaredEnd, InspectionOut, Receipt } from "../shared/types.js" */
 
-/** @typedef {"confirm" | "correct" | "withdraw" | "restore"} RunAction */
+/** @typedef {"confirm" | "correct" | "reread" | "withdraw" | "restore"} RunAction */
 /** @typedef {{ text: string, undo: (() => Promise<Done>) | null }} Done what was done, in a sentence, and how it is undone */
 
 /**
@@ -21,8 +21,9 @@ import { isCorrected } from "./states.js";
  * @property {string} action the button's word
  * @property {boolean} [optional] whether it goes without a reason
  * @property {number} [cycles] asked for, and their value at first
- * @property {boolean} [ends] whether it asks why a life has ended; the reason is then a note
- * @property {(reason: string, cycles: number, why: string) => Promise<Done>} send
+ * @property {{ label: string, options: [string, string][] }} [choice] what is chosen, each value with its words
+ * @property {string} [note] what the reason is called, where it is another thing
+ * @property {(reason: string, cycles: number, chosen: string) => Promise<Done>} send
  */
 
 const LONGEST_REASON = 500;
@@ -31,6 +32,7 @@ const LONGEST_REASON = 500;
 export const LABELS = {
   confirm: "Confirm …",
   correct: "Correct the cycles …",
+  reread: "Read its file again …",
   withdraw: "Withdraw …",
   restore: "Restore …",
 };
@@ -40,9 +42,11 @@ export const LABELS = {
  * @param {Receipt} run
  * @returns {RunAction[]}
  */
-export function actionsOf({ state }) {
+export function actionsOf({ state, file }) {
   if (state === "withdrawn") return ["restore"];
-  return state === "held" ? ["confirm", "correct", "withdraw"] : ["correct", "withdraw"];
+  /** @type {RunAction[]} */
+  const changes = ["correct", ...(file ? /** @type {RunAction[]} */ (["reread"]) : []), "withdraw"];
+  return state === "held" ? ["confirm", ...changes] : changes;
 }
 
 /** @param {Receipt} run */
@@ -169,7 +173,29 @@ async function answerDoubt(answer, run) {
   return { text: `${named(run)} is confirmed.`, undo: null };
 }
 
-/** @type {Record<RunAction, (run: Receipt) => Omit<Question, "lines"> & { lines: Question["lines"] }>} */
+/**
+ * @param {Receipt} run
+ * @returns {Promise<Question>}
+ */
+async function rereading(run) {
+  /** @type {{ name: string }[]} */
+  const rigs = (await readAll("/v1/rigs")).items;
+  return {
+    title: "Read its file again",
+    lines: [
+      "For a column that was read as the wrong channel, unit or factor: mend the rig profile, or choose another. The file " +
+        "is read as it was sent, and everything is computed again.",
+    ],
+    action: "Read again",
+    choice: { label: "Rig profile", options: rigs.map(({ name }) => [name, name]) },
+    send: async (reason, _, rig) => {
+      await sendJson("PATCH", pathOf(run), { rig, reason });
+      return { text: `${named(run)} is read by the rig profile ${rig}.`, undo: null };
+    },
+  };
+}
+
+/** @type {Record<RunAction, (run: Receipt) => Question | Promise<Question>>} */
 const QUESTIONS = {
   confirm: (run) => ({
     title: "Confirm this run",
@@ -191,6 +217,7 @@ const QUESTIONS = {
     cycles: likelyCycles(run) ?? run.cycles,
     send: (reason, cycles) => correct(run, cycles, reason),
   }),
+  reread: rereading,
   withdraw: (run) => ({
     title: "Withdraw this run",
     lines: [
@@ -213,8 +240,8 @@ const QUESTIONS = {
  * @param {Receipt} run
  * @returns {Promise<Done | null>} null where the reader leaves it
  */
-export function askRun(action, run) {
-  const question = QUESTIONS[action](run);
+export async function askRun(action, run) {
+  const question = await QUESTIONS[action](run);
   const name = h("p", {}, h("b", {}, named(run)), " · ", h("code", {}, run.run_id));
   return ask({ ...question, lines: [name, ...question.lines] });
 }
@@ -314,7 +341,14 @@ export const askEnd = (id, cycles) =>
     action: "Declare the end",
     optional: true,
     cycles,
-    ends: true,
+    choice: {
+      label: "Why it has ended",
+      options: [
+        ["worn", "It is worn"],
+        ["other", "Another reason: it would have lasted longer"],
+      ],
+    },
+    note: "Note (may be left out)",
     send: async (note, at, reason) => {
       const end = { kind: "maintenance", event: "end_of_life", cycles: at, reason, note };
       /** @type {{ body: Receipt }} */
@@ -348,13 +382,12 @@ export const askTakeBack = (id, end) =>
  * @param {Question} question
  * @returns {Promise<Done | null>}
  */
-function ask({ title, lines, action, optional = false, cycles, ends = false, send }) {
+function ask({ title, lines, action, optional = false, cycles, choice, note, send }) {
   const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
   const number = h("input", { id: "changed-cycles", value: cycles, ...numeric });
   const reason = h("input", { id: "reason", required: !optional, maxlength: LONGEST_REASON, autocomplete: "off" });
-  const worn = h("option", { value: "worn" }, "It is worn");
-  const other = h("option", { value: "other" }, "Another reason: it would have lasted longer");
-  const why = h("select", { id: "end-reason" }, worn, other);
+  const options = choice?.options.map(([value, text]) => h("option", { value }, text)) ?? [];
+  const chosen = h("select", { id: "chosen", required: true }, ...options);
   const answer = h("div", { class: "answer", "aria-live": "polite" });
   const go = h("button", { class: "main" }, action);
   const dialog = h("dialog", { class: "narrow", "aria-labelledby": "change-title" });
@@ -365,7 +398,7 @@ function ask({ title, lines, action, optional = false, cycles, ends = false, sen
     go.disabled = true;
     answer.replaceChildren(h("p", { class: "quiet" }, "Computing …"));
     try {
-      result = await send(reason.value.trim(), Number(number.value), why.value);
+      result = await send(reason.value.trim(), Number(number.value), chosen.value);
       dialog.close();
     } catch (problem) {
       answer.replaceChildren(problemView(problem, "Nothing was changed. "));
@@ -383,8 +416,8 @@ function ask({ title, lines, action, optional = false, cycles, ends = false, sen
         "div",
         { class: "fields" },
         cycles === undefined ? null : field(number, "Duty cycles since new"),
-        ends ? field(why, "Why it has ended") : null,
-        field(reason, ends ? "Note (may be left out)" : optional ? "Reason (may be left out)" : "Reason"),
+        choice ? field(chosen, choice.label) : null,
+        field(reason, note ?? (optional ? "Reason (may be left out)" : "Reason")),
       ),
       answer,
       h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"), go),
