@@ -48,10 +48,10 @@ FILES: dict[str, tuple[Callable[[int], str], str]] = {
     "digits and a letter": (lambda n: HEAD + "1," + "1" * n + "x\n", "not_a_number"),
     "digits and points": (lambda n: HEAD + "1," + "1." * (n // 2) + "x\n", "not_a_number"),
     "many digits": (lambda n: HEAD + "1," + "1" * n + "\n", "not_finite"),
-    "columns": (lambda n: "a," * (n // 2) + "a\n", "too_wide"),
+    "columns": (lambda n: "a," * (n // 2) + "a\n" + "1," * (n // 2) + "1\n", "too_wide"),
     "empty cells": (lambda n: HEAD + "1,2" + "," * n + "\n", "time_s,torque_nm"),
     "blanks": (lambda n: HEAD + "1," + " " * n + "2\n", "time_s,torque_nm"),
-    "quotation marks": (lambda n: HEAD + '"' * n + "\n", "unknown_unit"),
+    "quotation marks": (lambda n: HEAD + '"' * n + "\n", "no_header"),
 }
 
 
