@@ -79,9 +79,7 @@ def with_held(state: ClutchState, evidence: Evidence) -> ClutchState:
 
 def outlook(state: ClutchState, method: str, evidence: Evidence, filters: States) -> dict[str, Any]:
     """The remaining life by a filter and the clutch's own criteria; `filters` of other measurements are not carried on."""
-    payload = predict_at(
-        state.clutch_id, state.events, state.assumptions(), state.fraction, method=method, carried=filters.get(method)
-    )
+    payload = predict_at(state.events, state.assumptions(), state.fraction, method=method, carried=filters.get(method))
     payload |= by_own_criteria(state, method, payload, evidence, filters)
     return {name: payload[name] for name in ("status", "as_of_cycles", "remaining_cycles", "at_least")}
 

@@ -271,7 +271,7 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
     warnings: dict[str, list[dict[str, str]]] = {}
     for life, whole, start, first_event in walks:
         measured = set(whole.events)
-        walk = follow(state.clutch_id, life, whole, assumptions, state.fraction, start, first_event=first_event)
+        walk = follow(life, whole, assumptions, state.fraction, start, first_event=first_event)
         for index, (after_event, made) in enumerate(walk, start=first_event):
             filters = after_event
             predictions |= {(prediction.cycles, prediction.method): prediction for prediction in made}

@@ -2,9 +2,9 @@
 stored.
 
 A run that comes last in order of cycles carries the stored filter states one step on; any other run makes the life be
-tracked again from its first test. Both ways give the same answer: the random numbers of a step depend on clutch, series and
-step alone. Where a fleet's prior stands beside the weak one a filter runs under both, and its draws are put together by
-their evidence (`models.prognosis.fleet`).
+tracked again from its first test. Both ways give the same answer: the random numbers of a step depend on series and step
+alone, so that the same runs under another clutch name give the same answer. Where a fleet's prior stands beside the weak
+one a filter runs under both, and its draws are put together by their evidence (`models.prognosis.fleet`).
 """
 
 import zlib
@@ -93,7 +93,6 @@ States = Mapping[str, Tracked]
 
 
 def follow(
-    clutch_id: str,
     life: Life,
     whole: Series,
     assumptions: Assumptions,
@@ -112,18 +111,14 @@ def follow(
         runs = series.until(index)
         cycles, end = life.events[index].cycles, life.until(index).end
         if runs:
-            states = {
-                method: advance(clutch_id, method, series, assumptions, states.get(method), runs) for method in CARRIED
-            }
+            states = {method: advance(method, series, assumptions, states.get(method), runs) for method in CARRIED}
         yield (
             states,
             [
                 Prediction(
                     cycles=cycles,
                     method=method,
-                    payload=ended(
-                        predict(clutch_id, method, series, assumptions, states.get(method), cycles, fraction), end
-                    ),
+                    payload=ended(predict(method, series, assumptions, states.get(method), cycles, fraction), end),
                 )
                 for method in CARRIED
             ],
@@ -131,7 +126,6 @@ def follow(
 
 
 def advance(
-    clutch_id: str,
     method: str,
     series: Series,
     assumptions: Assumptions,
@@ -158,15 +152,13 @@ def advance(
     for step in range(tracked.runs, runs):
         measurement = series.measurements[step]
         states = {
-            name: tracker.update(
-                state, branches[name][1][step], step_rng(clutch_id, _purpose(method, name), series, step)
-            )
+            name: tracker.update(state, branches[name][1][step], step_rng(_purpose(method, name), series, step))
             for name, state in tracked.states.items()
         }
         judged = tracked.back_cast.judged(measurement) if back_cast is None else back_cast
         tracked = Tracked(runs=step + 1, states=states, back_cast=judged)
         if back_cast is None and kept_after(step + 1):
-            sample = drawn(clutch_id, method, series, assumptions, tracked)
+            sample = drawn(method, series, assumptions, tracked)
             forecast = tracked.back_cast.forecast(sample, measurement, weak_prior)
             tracked = replace(tracked, back_cast=forecast, sample=sample)
     return tracked
@@ -211,7 +203,7 @@ def _continues(tracked: Tracked, branches: Mapping[str, tuple[Prior, tuple[Measu
     return True
 
 
-def drawn(clutch_id: str, method: str, series: Series, assumptions: Assumptions, tracked: Tracked) -> Posterior:
+def drawn(method: str, series: Series, assumptions: Assumptions, tracked: Tracked) -> Posterior:
     """A weighted sample of the coefficients after `tracked.runs` measurements; the same each time, and drawn once.
 
     Its size is shared among the priors and the draws of the model in force: so a prediction costs about the same.
@@ -224,7 +216,7 @@ def drawn(clutch_id: str, method: str, series: Series, assumptions: Assumptions,
         posteriors = {}
         for prior in assumptions.priors(series.quantity, measurements[0], series.scale):
             name = _branch(prior, draw, series)
-            rng = step_rng(clutch_id, f"{_purpose(method, name)}-posterior", series, tracked.runs)
+            rng = step_rng(f"{_purpose(method, name)}-posterior", series, tracked.runs)
             posteriors[prior] = tracker.posterior(tracked.states[name], size, rng)
         parts.append((weight, assumptions.pooled(posteriors, measurements[0], series.scale)))
     return mixture(parts) if series.draws else parts[0][1]
@@ -235,14 +227,13 @@ def _purpose(method: str, prior: str) -> str:
     return method if prior == WEAK else f"{method}-{prior}"
 
 
-def step_rng(clutch_id: str, purpose: str, series: Series, step: int) -> np.random.Generator:
-    """The random numbers of one step: they depend on clutch, purpose, series and step alone."""
-    name = f"{clutch_id}/{purpose}/{series.quantity}/{series.pressure!r}"
+def step_rng(purpose: str, series: Series, step: int) -> np.random.Generator:
+    """The random numbers of one step: they depend on purpose, series and step alone, not on the clutch's name."""
+    name = f"{purpose}/{series.quantity}/{series.pressure!r}"
     return np.random.default_rng([zlib.crc32(name.encode()), step])
 
 
 def predict(
-    clutch_id: str,
     method: str,
     series: Series,
     assumptions: Assumptions,
@@ -253,7 +244,7 @@ def predict(
     """The prediction at `cycles` of a series, in the public shape."""
     if tracked is None:
         return insufficient(assumptions, cycles, series.pressure, fraction)
-    sample = drawn(clutch_id, method, series, assumptions, tracked)
+    sample = drawn(method, series, assumptions, tracked)
     horizon = float(series.scale.progress(series.scale.origin + HORIZON))
     end = end_of_life(sample, series, assumptions, tracked, cycles, fraction, horizon)
     passage = predict_first_passage(
@@ -335,7 +326,6 @@ def mean_offset_of(series: Series, assumptions: Assumptions) -> Offset | None:
 
 
 def predict_at(
-    clutch_id: str,
     events: Sequence[Event],
     assumptions: Assumptions,
     fraction: float,
@@ -362,8 +352,8 @@ def predict_at(
     series = life.pooled(assumptions) if pressure_bar is None else life.at(assumptions, level)
     if not series.measurements:
         return ended(insufficient(assumptions, cycles, level, fraction), life.end)
-    tracked = advance(clutch_id, method, series, assumptions, carried, len(series.measurements), back_cast=back_cast)
-    return ended(predict(clutch_id, method, series, assumptions, tracked, cycles, fraction), life.end)
+    tracked = advance(method, series, assumptions, carried, len(series.measurements), back_cast=back_cast)
+    return ended(predict(method, series, assumptions, tracked, cycles, fraction), life.end)
 
 
 def _level(life: Life | None, pressure_bar: float) -> float:

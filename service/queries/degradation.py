@@ -111,7 +111,7 @@ def arguments(
 def _all(measured: MeasuredLife, method: str, draws: int) -> tuple[list[dict[str, Any]], dict[str, Any] | None]:
     """Mean COF, every parameter, and mean COF from the parameters."""
     direct = _tracked(measured, measured.series(_MEAN_COF), method)
-    tracks = parameter_tracks(measured.clutch_id, measured.life, measured.assumptions, measured.tests, method)
+    tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, method)
     again = _from_parameters(measured, tracks, {series.pressure: (series, posterior) for series, posterior in direct})
     named = {quantity.internal: quantity for quantity in QUANTITIES.values()}
     items = [
@@ -134,7 +134,7 @@ def _items(measured: MeasuredLife, quantity: Quantity, method: str, draws: int) 
 def _slopes(measured: MeasuredLife, quantity: Quantity, method: str) -> list[dict[str, Any]]:
     """Slopes from the joint tracks of the parameters at their pressure."""
     slopes = measured.series(quantity)
-    tracks = parameter_tracks(measured.clutch_id, measured.life, measured.assumptions, measured.tests, method)
+    tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, method)
     direct = {
         series.pressure: (series, posterior)
         for series, posterior in _tracked(measured, measured.mean_cofs().values(), method)
@@ -148,11 +148,7 @@ def _slopes(measured: MeasuredLife, quantity: Quantity, method: str) -> list[dic
 
 
 def _tracked(measured: MeasuredLife, several: Iterable[Series], method: str) -> list[Track]:
-    return [
-        (series, posterior_of(measured.clutch_id, series, measured.assumptions, method))
-        for series in several
-        if series.measurements
-    ]
+    return [(series, posterior_of(series, measured.assumptions, method)) for series in several if series.measurements]
 
 
 def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
@@ -194,7 +190,7 @@ def _from_parameters(
         horizon=float(series.scale.progress(series.scale.origin + HORIZON)),
         velocities=reference_velocities(life.speed_range, measured.geometry),
         reference_cofs=[cof for cof, _ in life.reference.values()],
-        rng=step_rng(measured.clutch_id, "rebuilt", series, len(series.measurements)),
+        rng=step_rng("rebuilt", series, len(series.measurements)),
     )
     return None if paths is None else _payload(paths, direct[ALL_PRESSURES], measured.assumptions, measured.fraction)
 

@@ -38,7 +38,7 @@ def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id:
     happened = [event for event in state.events if at_cycles is None or event.cycles <= at_cycles]
     if not lives_of(happened):
         raise NotFoundError("there is no stationary test by then, and so no clutch to engage")
-    tracked = _Tracked(clutch_id=clutch_id, life=lives_of(happened)[-1], assumptions=state.assumptions(), fits=levels)
+    tracked = _Tracked(life=lives_of(happened)[-1], assumptions=state.assumptions(), fits=levels)
     cycles = happened[-1].cycles if at_cycles is None else at_cycles
     row = _compared_row(measured, tracked.life, run_id)
     moments = [cycles] if row is None else [cycles, float(row["cycles"])]
@@ -121,7 +121,6 @@ def _beside(beside: Discrepancy, contact: float) -> dict[str, Any]:
 class _Tracked:
     """A life as its Stribeck parameters are tracked."""
 
-    clutch_id: str
     life: Life
     assumptions: Assumptions
     fits: Mapping[str, Sequence[LevelFit]]
@@ -146,7 +145,7 @@ class _Tracked:
         ]
 
     def _medians(self, series: Series, moments: Sequence[float]) -> list[float]:
-        posterior = posterior_of(self.clutch_id, series, self.assumptions)
+        posterior = posterior_of(series, self.assumptions)
         progress = [float(series.scale.progress(cycles)) for cycles in moments]
         values = (posterior.values(np.array([zeta]))[0] for zeta in progress)
         return [float(weighted_quantiles(value, posterior.weight, (0.5,))[0]) for value in values]

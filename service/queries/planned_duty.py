@@ -69,7 +69,7 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
 
 def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[str, Any]:
     """The prediction under recent duty, and in its place what the programme makes of it."""
-    clutch_id, assumptions, fraction = state.clutch_id, state.assumptions(), state.fraction
+    assumptions, fraction = state.assumptions(), state.fraction
     series = state.lives[-1].pooled(assumptions) if state.events else None
     basis = assumptions.severity.basis.value
     unknown = {
@@ -78,18 +78,18 @@ def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[s
         "counted_by": basis,
     }
     if series is None or not series.measurements:
-        recent = predict_at(clutch_id, state.events, assumptions, fraction, method=method)
+        recent = predict_at(state.events, assumptions, fraction, method=method)
         return recent | {"recent_duty_cycles": by_quantile({})} | unknown
     now, runs = state.lives[-1].events[-1].cycles, len(series.measurements)
-    tracked = advance(clutch_id, method, series, assumptions, (state.filters or {}).get(method), runs)
-    sample = drawn(clutch_id, method, series, assumptions, tracked)
+    tracked = advance(method, series, assumptions, (state.filters or {}).get(method), runs)
+    sample = drawn(method, series, assumptions, tracked)
     tracked = replace(tracked, sample=sample)
-    recent = ended(predict(clutch_id, method, series, assumptions, tracked, now, fraction), state.lives[-1].end)
+    recent = ended(predict(method, series, assumptions, tracked, now, fraction), state.lives[-1].end)
     recent["recent_duty_cycles"] = recent["remaining_cycles"]
     if recent["status"] in (INSUFFICIENT, ENDED):
         return recent | unknown
     duty = _counted(state, assumptions.severity, series, planned)
-    rng = step_rng(clutch_id, f"{method}-programme", series, runs)
+    rng = step_rng(f"{method}-programme", series, runs)
     programme = duty.programme(planned.programme, recent["current"]["mean_cof"], rng)
     most = max(series.scale.origin + HORIZON - now, 0.0)
     horizon = float(series.scale.progress(now)) + most * float(programme.rates.max())

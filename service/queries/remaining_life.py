@@ -86,7 +86,6 @@ def remaining_life(
 def _predicted(state: ClutchState, method: str, pressure_bar: float | None, at_cycles: float | None) -> dict[str, Any]:
     carried = (state.filters or {}).get(CARRIED[0])
     return predict_at(
-        state.clutch_id,
         state.events,
         state.assumptions(),
         state.fraction,
@@ -194,7 +193,7 @@ class _Request:
 
 def _by_criteria(state: ClutchState, chosen: ChosenLife, evidence: Evidence, request: _Request) -> dict[str, Any]:
     events = () if chosen.life is None else chosen.life.events
-    by_mean_cof = predict_at(state.clutch_id, events, chosen.assumptions, state.fraction, method=request.method)
+    by_mean_cof = predict_at(events, chosen.assumptions, state.fraction, method=request.method)
     answer = by_mean_cof | {"life": chosen.item(), "criteria": []}
     measured = measured_life(state, chosen, evidence)
     if measured is None:

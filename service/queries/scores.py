@@ -39,9 +39,9 @@ def of_clutch(database: Database, clutch_id: str, method: str) -> dict[str, Any]
     assumptions = state.assumptions()
     items = []
     for life in state.lives:
-        end = end_of_life(clutch_id, life, assumptions, state.fraction)
+        end = end_of_life(life, assumptions, state.fraction)
         if end is not None:
-            made = stored if method in CARRIED else _predictions(clutch_id, life, assumptions, state.fraction, method)
+            made = stored if method in CARRIED else _predictions(life, assumptions, state.fraction, method)
             items.append(_scored(life, assumptions, end, made))
     return {"clutch_id": clutch_id, "method": method, "revision": state.revision, "items": items, "next": None}
 
@@ -65,12 +65,12 @@ def of_fleet(scored: Iterable[Mapping[str, Any]], *, method: str) -> dict[str, A
     }
 
 
-def end_of_life(clutch_id: str, life: Life, assumptions: Assumptions, fraction: float) -> float | None:
+def end_of_life(life: Life, assumptions: Assumptions, fraction: float) -> float | None:
     """The cycles since new at which the tests have passed the threshold; None where they have not."""
     series = life.pooled(assumptions)
     if not series.measurements:
         return None
-    prediction = predict_at(clutch_id, life.events, assumptions, fraction, method="grid", back_cast=BackCast.nothing())
+    prediction = predict_at(life.events, assumptions, fraction, method="grid", back_cast=BackCast.nothing())
     threshold = prediction["criterion"]["threshold_mean_cof"]
     if prediction["status"] == INSUFFICIENT or threshold is None:
         return None
@@ -80,15 +80,13 @@ def end_of_life(clutch_id: str, life: Life, assumptions: Assumptions, fraction: 
     return scoring.measured_end(cycles, values, threshold)
 
 
-def _predictions(
-    clutch_id: str, life: Life, assumptions: Assumptions, fraction: float, method: str
-) -> dict[float, dict[str, Any]]:
+def _predictions(life: Life, assumptions: Assumptions, fraction: float, method: str) -> dict[float, dict[str, Any]]:
     """What a method whose predictions are not stored would have predicted at each test."""
     made = {}
     for index, event in enumerate(life.events):
         if event.cofs:
             happened: Sequence[Event] = life.events[: index + 1]
-            made[event.cycles] = predict_at(clutch_id, happened, assumptions, fraction, method=method)
+            made[event.cycles] = predict_at(happened, assumptions, fraction, method=method)
     return made
 
 

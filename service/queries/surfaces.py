@@ -35,13 +35,12 @@ def surface(database: Database, clutch_id: str) -> dict[str, Any]:
     with database.reading() as connection:
         state, levels = records.state(connection, clutch_id), records.levels(connection, clutch_id)
     assumptions = state.assumptions()
-    grids = surfaces(clutch_id, state.events, assumptions, levels, state.geometry)
+    grids = surfaces(state.events, assumptions, levels, state.geometry)
     head = {"clutch_id": clutch_id, "revision": state.revision, "held_runs": len(state.held)}
     return head | grids | assumptions.named()
 
 
 def surfaces(
-    clutch_id: str,
     events: Sequence[Event],
     assumptions: Assumptions,
     fits: Mapping[str, Sequence[LevelFit]],
@@ -57,7 +56,7 @@ def surfaces(
     if speed_range is None:
         raise NotFoundError("there is no stationary test, and so no surfaces")
     life = history[-1]
-    tracks = parameter_tracks(clutch_id, life, assumptions, tests_of(life, fits))
+    tracks = parameter_tracks(life, assumptions, tests_of(life, fits))
     levels = sorted(level for level in life.reference if all((name, level) in tracks for name in PARAMETER_NAMES))
     if not levels:
         raise NotFoundError("no stationary test determines all four Stribeck parameters: there are no surfaces")

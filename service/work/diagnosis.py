@@ -135,7 +135,7 @@ def before_and_after(
 
     def prediction(life: Life, model: Extension | None) -> dict[str, Any]:
         assumptions = state.assumptions_under(model, life)
-        return predict_at(clutch_id, life.events, assumptions, state.fraction, method=_METHOD)
+        return predict_at(life.events, assumptions, state.fraction, method=_METHOD)
 
     before = prediction(predicted[0], None)
     return before, before if extension is None else prediction(predicted[1], extension)

@@ -121,21 +121,21 @@ def _mean_cof(
     """The end by a share of mean COF as `/remaining-useful-life` states it, and mean COF [2, n] at progress `at` [2]."""
     assumptions, cycles = measured.assumptions, measured.life.events[-1].cycles
     carried = measured.filters.get(method)
-    tracked = advance(measured.clutch_id, method, series, assumptions, carried, len(series.measurements))
-    sample = drawn(measured.clutch_id, method, series, assumptions, tracked)
+    tracked = advance(method, series, assumptions, carried, len(series.measurements))
+    sample = drawn(method, series, assumptions, tracked)
     end = end_of_life(sample, series, assumptions, tracked, cycles, fraction, horizon)
     return (end.ends, end.weight), (track_paths(sample, at, offset_of(series, assumptions)), sample.weight)
 
 
 def _paths(measured: MeasuredLife, quantity: Quantity, series: Series, progress: FloatArray) -> Sample | None:
     """The quantity at progress [k] in every draw [k, n], with the draws' weights [n]; None with too few tests."""
-    clutch_id, assumptions = measured.clutch_id, measured.assumptions
+    assumptions = measured.assumptions
     if quantity.family is not Family.SLOPE:
-        posterior = posterior_of(clutch_id, series, assumptions)
+        posterior = posterior_of(series, assumptions)
         return track_paths(posterior, progress, offset_of(series, assumptions)), posterior.weight
-    tracks = parameter_tracks(clutch_id, measured.life, assumptions, measured.tests, pressures={series.pressure})
+    tracks = parameter_tracks(measured.life, assumptions, measured.tests, pressures={series.pressure})
     cof = measured.mean_cofs()[series.pressure]
-    direct = cof, posterior_of(clutch_id, cof, assumptions)
+    direct = cof, posterior_of(cof, assumptions)
     paths = slopes_along(measured, tracks, direct, series.speed_rpm or 0.0, progress)
     return None if paths is None else (paths, np.full(paths.shape[1], 1.0 / paths.shape[1]))
 
@@ -157,7 +157,7 @@ def criteria_answer(measured: MeasuredLife, ends: Sequence[CriterionEnd], curren
     shares: FloatArray = np.ones(1)
     first: Sample = samples[0]
     if len(samples) > 1:
-        rng = step_rng(measured.clutch_id, "criteria", measured.life.pooled(measured.assumptions), ends[0].tests)
+        rng = step_rng("criteria", measured.life.pooled(measured.assumptions), ends[0].tests)
         draws, shares = first_reached(samples, _DRAWS, rng)
         first = draws, np.full(draws.size, 1.0 / draws.size)
     by_known = iter(shares.tolist())

@@ -144,19 +144,19 @@ _NODES, _ROWS, _LEVELS = TRAJECTORY_LATTICE
 _GRID = Grid(nodes=_NODES, rows=_ROWS, levels=_LEVELS)
 
 
-def posterior_of(clutch_id: str, series: Series, assumptions: Assumptions, method: str = _GRID.name) -> Posterior:
+def posterior_of(series: Series, assumptions: Assumptions, method: str = _GRID.name) -> Posterior:
     """A weighted sample of a series' eq. 6, the same each time; by the exact filter on a lattice fit for plots, else by the
     filter of that name taken through all measurements."""
     if method != _GRID.name:
         runs = len(series.measurements)
-        tracked = advance(clutch_id, method, series, assumptions, None, runs, back_cast=BackCast.nothing())
-        return drawn(clutch_id, method, series, assumptions, tracked)
+        tracked = advance(method, series, assumptions, None, runs, back_cast=BackCast.nothing())
+        return drawn(method, series, assumptions, tracked)
     parts = []
     for weight, measurements in series.weighted:
         posteriors = {}
         for name, prior in assumptions.priors(series.quantity, measurements[0], series.scale).items():
             state = _GRID.from_history(prior, measurements)
-            rng = step_rng(clutch_id, f"trajectory-{name}", series, len(measurements))
+            rng = step_rng(f"trajectory-{name}", series, len(measurements))
             posteriors[name] = _GRID.posterior(state, math.ceil(TRAJECTORY_DRAWS / len(series.weighted)), rng)
         parts.append((weight, assumptions.pooled(posteriors, measurements[0], series.scale)))
     return parts[0][1] if len(parts) == 1 else mixture(parts)
@@ -180,7 +180,6 @@ def parameter_series(
 
 
 def parameter_tracks(
-    clutch_id: str,
     life: Life,
     assumptions: Assumptions,
     tests: Sequence[Sequence[LevelFit]],
@@ -189,7 +188,7 @@ def parameter_tracks(
 ) -> dict[tuple[str, float], Track]:
     """The eq. 6 of Stribeck parameters at every reference pressure where they are known, by name and pressure [Pa]."""
     return {
-        (name, series.pressure): (series, posterior_of(clutch_id, series, assumptions, method))
+        (name, series.pressure): (series, posterior_of(series, assumptions, method))
         for name in PARAMETER_NAMES
         for series in parameter_series(life, assumptions, tests, name)
         if series.measurements and (pressures is None or series.pressure in pressures)
@@ -366,7 +365,7 @@ def slopes_along(
     if np.unique(level.progress).size < FEWEST_TESTS:
         return None
     velocity = float(measured.geometry.sliding_velocity(np.array(speed_rpm * RADIANS_PER_SECOND_PER_RPM)))
-    rng = step_rng(measured.clutch_id, f"slope@{speed_rpm:g}rpm", series, level.progress.size)
+    rng = step_rng(f"slope@{speed_rpm:g}rpm", series, level.progress.size)
     return slope_paths(level, velocity, progress, rng)
 
 

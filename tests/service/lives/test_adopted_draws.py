@@ -42,8 +42,8 @@ def assumptions(*weights: float) -> Assumptions:
 
 def ends(method: str, of: Life, under: Assumptions) -> tuple[np.ndarray, np.ndarray]:
     series = of.pooled(under)
-    tracked = advance("a", method, series, under, None, len(series.measurements))
-    sample = drawn("a", method, series, under, tracked)
+    tracked = advance(method, series, under, None, len(series.measurements))
+    sample = drawn(method, series, under, tracked)
     stated = end_of_life(sample, series, under, tracked, CYCLES[-1], 0.5, 1e6)
     return stated.ends, stated.weight
 
@@ -66,11 +66,11 @@ def test_a_filter_that_is_carried_on_says_what_one_that_starts_again_says(method
     series = of.pooled(under)
     carried = None
     for runs in range(1, len(CYCLES) + 1):
-        carried = advance("a", method, series, under, carried, runs)
-    again = advance("a", method, series, under, None, len(CYCLES))
+        carried = advance(method, series, under, carried, runs)
+    again = advance(method, series, under, None, len(CYCLES))
     assert carried is not None
     assert set(carried.states) == {"weak@0", "weak@1"}
-    said = [predict("a", method, series, under, states, CYCLES[-1], 0.5) for states in (carried, again)]
+    said = [predict(method, series, under, states, CYCLES[-1], 0.5) for states in (carried, again)]
     assert said[0] == said[1]
 
 
@@ -93,7 +93,7 @@ def test_a_test_is_odd_only_where_it_is_under_every_draw() -> None:
     warned = []
     for one in (of, odd_under_one, both):
         series = one.pooled(under)
-        tracked = advance("a", "particle", series, under, None, len(CYCLES))
-        said = predict("a", "particle", series, under, tracked, CYCLES[-1], 0.5)
+        tracked = advance("particle", series, under, None, len(CYCLES))
+        said = predict("particle", series, under, tracked, CYCLES[-1], 0.5)
         warned.append("off_track" in {warning["code"] for warning in said["warnings"]})
     assert warned == [False, False, True]

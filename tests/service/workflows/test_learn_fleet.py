@@ -114,7 +114,9 @@ def test_lives_that_ended_calibrate_the_next(url: str, monkeypatch: pytest.Monke
         assert (before["ended_lives"], after["ended_lives"]) == (0, 4)
         low, middle, high = (after["end_of_life_cycles"][q] for q in ("0.05", "0.5", "0.95"))
         assert low < ends["new"] < high
-        assert 8_200.0 < middle < 9_600.0
+        # nearer to the truth than its own tests alone say, and within the spread of the others' ends
+        assert abs(middle - ends["new"]) < abs(before["end_of_life_cycles"]["0.5"] - ends["new"])
+        assert 8_000.0 < middle < 9_800.0
         assert width(after) < 0.3 * width(before)
         # of the first no life is known to have ended that is as old as it
         assert client.get(LIFE.format("old-0")).json()["ended_lives"] == 0

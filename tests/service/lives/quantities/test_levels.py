@@ -12,8 +12,8 @@ def test_a_level_and_the_curve_of_a_loop_have_the_unbiased_covariance() -> None:
     rng = np.random.default_rng(5)
     measured = measured_life(draw(rng), [0.0, 2_000.0, 4_000.0, 6_000.0], rng)
     pressure, cof = list(measured.mean_cofs().items())[PLACE]
-    tracks = parameter_tracks("scored", measured.life, measured.assumptions, measured.tests, pressures={pressure})
-    direct = cof, posterior_of("scored", cof, measured.assumptions)
+    tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, pressures={pressure})
+    direct = cof, posterior_of(cof, measured.assumptions)
     level = pressure_level(measured, tracks, direct, pressure)
     fits = [levels[PLACE].fit for levels in measured.tests]
     np.testing.assert_array_equal(level.covariance, [fit.unbiased_covariance for fit in fits])
