@@ -83,14 +83,14 @@ def judge(posterior: Posterior) -> Judgement:
     shares = {explanation.effects: explanation.probability for explanation in explanations}
     sets = {Verdict.CAUSE_NAMED: [causes], Verdict.CAUSE_AMBIGUOUS: smallest(shares)}.get(verdict, [])
     chosen = {_averaged_causes(effects, posterior) for effects in sets}
-    stand = tuple(each for each in fitted if frozenset(each.slugs) in chosen)
+    stand = tuple(cause for cause in fitted if frozenset(cause.slugs) in chosen)
     unnamed = [alternative for alternative in posterior.probabilities if alternative.unknown]
     return Judgement(
         verdict=verdict,
         causes=causes,
         explanations=explanations,
         stand=stand,
-        others=tuple(each for each in fitted if each not in stand),
+        others=tuple(cause for cause in fitted if cause not in stand),
         where=_where({a.unknown: w - posterior.prior(a) for a, w in posterior.weights.items() if not a.causes}),
         left=_where(posterior.nodes[Alternative(tuple(sorted(stand[0].slugs)))].evidence.structure) if stand else (),
         likest=unnamed[0].unknown if unnamed and unnamed[0].unknown in FAULT_BY_SLUG else None,
@@ -109,12 +109,12 @@ def _averaged_causes(effects: Sequence[str], posterior: Posterior) -> frozenset[
 
 def _fitted(posterior: Posterior, explanations: Sequence[Explanation]) -> tuple[Fitted, ...]:
     """The causes that were fitted, alone and in pairs, most probable first."""
-    found = []
+    fitted = []
     for alternative, node in posterior.nodes.items():
         if alternative == NOTHING or alternative.unknown:
             continue
         same = frozenset(alternative.causes)
-        found.append(
+        fitted.append(
             Fitted(
                 slugs=tuple(effect.effect.slug for effect in node.fit.effects),
                 fit=node.fit,
@@ -122,7 +122,7 @@ def _fitted(posterior: Posterior, explanations: Sequence[Explanation]) -> tuple[
                 probability=sum(e.probability for e in explanations if _averaged_causes(e.effects, posterior) == same),
             )
         )
-    return tuple(sorted(found, key=lambda each: -posterior.weights[Alternative(tuple(sorted(each.slugs)))]))
+    return tuple(sorted(fitted, key=lambda cause: -posterior.weights[Alternative(tuple(sorted(cause.slugs)))]))
 
 
 def _where(evidence: Mapping[str, float]) -> tuple[Where, ...]:

@@ -134,7 +134,7 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
 
 def _shares(judgement: Judgement) -> list[tuple[Fit, float]]:
     """The fitted explanations that stand with their probabilities, which sum to one at most."""
-    return [(each.fit, each.probability) for each in judgement.stand if each.probability > 0.0]
+    return [(cause.fit, cause.probability) for cause in judgement.stand if cause.probability > 0.0]
 
 
 def _size(pairs: Sequence[tuple[float, int]]) -> Size:

@@ -35,11 +35,11 @@ class Explanation:
 
 def probabilities_by_slug(explanations: Iterable[Explanation]) -> dict[str, float]:
     """The probability that each effect of the catalogue is at work, alone or beside others; largest first."""
-    found: dict[str, float] = {}
+    shares: dict[str, float] = {}
     for explanation in explanations:
         for slug in set(explanation.effects) - {UNCATALOGUED}:
-            found[slug] = min(found.get(slug, 0.0) + explanation.probability, 1.0)
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
+            shares[slug] = min(shares.get(slug, 0.0) + explanation.probability, 1.0)
+    return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

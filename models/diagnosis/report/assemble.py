@@ -107,9 +107,9 @@ def _notes(
     """Of the baseline, of raw records, of fits that did not end, and on an outlying run where the case is open."""
     notes = [*baseline.notes, *(f"{record.effect}: {record.note}." for record in raw)]
     notes += [
-        f"The fit of {' and '.join(effect_name(slug) for slug in each.slugs)} had not converged after {STEPS} steps."
-        for each in judgement.stand
-        if each.fit.status is FitStatus.OUT_OF_STEPS
+        f"The fit of {' and '.join(effect_name(slug) for slug in cause.slugs)} had not converged after {STEPS} steps."
+        for cause in judgement.stand
+        if cause.fit.status is FitStatus.OUT_OF_STEPS
     ]
     if judgement.open:
         # an effect in one run alone may bend a better baseline's laws until that run fits

@@ -48,7 +48,7 @@ def violations(page: Page) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize(("scheme", "viewport"), [("light", WIDE), ("dark", PHONE)])
+@pytest.mark.parametrize(("scheme", "viewport"), [("light", WIDE), pytest.param("dark", PHONE, marks=pytest.mark.slow)])
 def test_the_fleet(browser: Browser, url: str, scheme: str, viewport: dict[str, int]) -> None:
     watched = Watched(browser, url, color_scheme=scheme, viewport=viewport)
     page = watched.open("/")
