@@ -87,7 +87,7 @@ def test_nothing_later_is_taken_in_until_a_rebuild_and_what_is_earlier_still_is(
         problem = post(tested, body, 409)
         assert problem["type"].endswith("life-ended")
         declared = 2500 if body.get("cycles") == 2500 else 3000
-        assert f"ended at {declared} cycles" in problem["detail"]
+        assert f"declared end at {declared} cycles" in problem["detail"]
         if declared == 3000:
             assert end["run_id"] in problem["detail"]
     assert post(tested, END, 200)["duplicate"]
@@ -164,7 +164,7 @@ def _declared(client: TestClient, clutch_id: str) -> str:
 def test_a_life_has_one_end() -> None:
     events = [Event(run_id=str(n), kind="maintenance", cycles=n, moment=n, end="worn") for n in (1.0, 2.0)]
     require_within_ends(events[:1])
-    with pytest.raises(LifeEndedError, match="no second end"):
+    with pytest.raises(LifeEndedError, match="a second end"):
         require_within_ends(events)
 
 

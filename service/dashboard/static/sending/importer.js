@@ -12,6 +12,8 @@ import { warnings } from "./receipt.js";
 
 /** Rows that are shown. */
 const ROWS = 5;
+/** Who chooses by typing a list's words is not interrupted by the answer to their first letter. */
+const PAUSE_MS = 400;
 
 export class Importer {
   /**
@@ -28,6 +30,10 @@ export class Importer {
     /** @type {RigProfile | null} the choices, where they are not those of a saved profile */
     this.chosen = null;
     this.questions = 0;
+    this.soon = 0;
+    // what was typed stays when the rest is drawn again
+    this.name = h("input", { id: `rig-${number}`, autocomplete: "off", spellcheck: "false" });
+    this.pattern = h("input", { id: `pattern-${number}`, autocomplete: "off" });
     this.lead = h("p", { class: "quiet", role: "status" }, "Reading …");
     this.content = h("div", {});
     this.element = h(
@@ -256,15 +262,16 @@ export class Importer {
     const profile = structuredClone(this.chosen ?? this.shown.profile);
     change(profile);
     this.chosen = profile;
-    this.look();
+    this.questions += 1; // an answer to what was chosen before is of no use
+    clearTimeout(this.soon);
+    this.soon = setTimeout(() => this.look(), PAUSE_MS);
   }
 
   /** @param {Preview} shown */
   saving({ profile, missing, problem }) {
     if (this.rig !== null) return h("p", { class: "quiet" }, "The next file with these columns is read the same way.");
-    const { number } = this;
-    const name = h("input", { id: `rig-${number}`, autocomplete: "off", spellcheck: "false" });
-    const pattern = h("input", { id: `pattern-${number}`, value: profile.file_name, autocomplete: "off" });
+    const { name, pattern } = this;
+    pattern.value ||= profile.file_name ?? "";
     const answer = h("div", { role: "status" });
     const save = async () => {
       const kept = { ...profile, name: name.value.trim(), file_name: pattern.value.trim() || null };
