@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from models.prognosis.criteria import HORIZON
 from service.cli.options import out, print_line
 
-BEYOND_HORIZON = f"over {HORIZON:,.0f}"
+#: Ends are predicted up to a million cycles (HORIZON of models.prognosis.criteria, whose numerics no command waits for).
+BEYOND_HORIZON = "over 1,000,000"
 UNKNOWN = "unknown"
 
 

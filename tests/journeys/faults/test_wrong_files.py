@@ -130,7 +130,7 @@ def test_two_million_columns(service: Watched) -> None:
     service.refuse((",".join(["torque_nm"] * 2_000_000) + "\n" + row + "\n").encode())
     service.refuse((",".join(f"c{n}" for n in range(2_000_000)) + "\n" + row + "\n").encode())
     service.refuse((HEADER + row + "\n").encode())
-    narrow = ",".join(f"c{n}" for n in range(2000)) + "\n"
+    narrow = ",".join(f"c{n}" for n in range(2000)) + "\n" + ",".join(["1"] * 2000) + "\n"
     assert codes(service.refuse(narrow.encode())) == {"too_wide"}
 
 
