@@ -135,7 +135,8 @@ def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
         else:
             yield f"mean COF {cof}, {100 * fraction:.0f} % of new{_threshold(criterion)}"
     if answer["at_least_at"] is not None:
-        yield f"at the pace of the runs until {answer['at_least_at'][:10]} at least"
+        pace = "planned pace" if answer.get("pace_from") == "request" else "pace of the runs"
+        yield f"at the {pace} until {answer['at_least_at'][:10]} at least"
     course = answer.get("course")
     described = "" if course is None else f", course {course['name']} (probability {number(course['probability'], 2)})"
     effects = ", ".join(answer["model"]["effects"])

@@ -1,6 +1,7 @@
 """A diagnosis in a terminal: verdict, paragraph, candidates, residual maps, gain, advice."""
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -20,6 +21,8 @@ _VERDICTS = {
     "unexplained_structure": ("A pattern that no effect of the catalogue explains", "red"),
     "insufficient_data": ("Too little data", "cyan"),
 }
+#: An axis is named where chance alone makes such a pattern less often than this.
+_SHOWN_P = 0.01
 #: Candidates that are less probable, or come after this many, are shown by `--json` only. Chosen: a screenful.
 _MIN_PROBABILITY, _MAX_CANDIDATES = 0.005, 6
 #: A gain in log evidence [nats] from which the evidence has this name. Derived: 2 ln B of 6 and 2 in R. E. Kass, A. E.
@@ -32,25 +35,29 @@ _MAX_CELLS = 15
 _MARKS = ((0.75, "##", 160, 27), (0.5, "++", 203, 69), (0.25, "+ ", 217, 153))
 
 
+def _spelt(slug: str) -> str:
+    """An effect or an axis in words, without the unit in its name."""
+    return re.sub(r"_(rpm|bar|s|c|nm)$", "", slug).replace("_", " ")
+
+
 def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     """The parts of a finished report, each to be printed."""
     words, colour = _VERDICTS[report["verdict"]]
-    causes = f": {', '.join(report['causes'])}" if report["causes"] else ""
+    causes = f": {', '.join(map(_spelt, report['causes']))}" if report["causes"] else ""
     yield Panel(Text(report["summary"]), title=Text(f"{words}{causes}", style=f"bold {colour}"), border_style=colour)
     if report["candidates"]:
         likely = [item for item in report["candidates"] if (item["probability"] or 0.0) >= _MIN_PROBABILITY]
         yield _candidates((likely or report["candidates"])[:_MAX_CANDIDATES])
     if report["maps"] is not None:
         yield _maps(report["maps"])
-    if report["baseline"]["where"]:
-        axes = [f"{item['axis']} (p = {number(item['p_value'], 2)})" for item in report["baseline"]["where"]]
-        yield Text(f"The baseline's residuals have structure over: {', '.join(axes)}")
+    axes = [_spelt(item["axis"]) for item in report["baseline"]["where"] if item["p_value"] < _SHOWN_P]
+    if axes:
+        yield Text(f"The model without an effect errs along: {', '.join(axes)}")
     yield from _gain(report)
     for advice in report["advice"]:
         expected = _evidence(advice["nats"])
-        yield Text(
-            f"To distinguish {' from '.join(advice['separates'])}: {advice['test']} (expected evidence: {expected})"
-        )
+        between = " from ".join(map(_spelt, advice["separates"]))
+        yield Text(f"To distinguish {between}: {advice['test']} (expected evidence: {expected})")
     for note in report["notes"]:
         yield Text(f"Note: {note}", style="dim")
 

@@ -265,8 +265,8 @@ AtLeast = Annotated[
 AtLeastAt = Annotated[
     str | None,
     Field(
-        description="When these have been run, at the pace that the `started_at` of the present life's runs show; UTC, ISO "
-        "8601; null where they show none, or for an earlier time"
+        description="When these have been run, at the pace that was asked for, else that the `started_at` of the present "
+        "life's runs show; UTC, ISO 8601; null where they show none, or for an earlier time"
     ),
 ]
 Held = Annotated[

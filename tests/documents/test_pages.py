@@ -73,6 +73,6 @@ def test_the_tutorial_and_the_tasks_run(tmp_path: Path) -> None:
             said[name] = outputs[0].stdout + outputs[1].stdout
     tutorial = said["tutorial/first-life.md"]
     assert "cycles are left with 95 %" in tutorial
-    assert "The cause is named: oil_temperature" in tutorial
+    assert "The cause is named: oil temperature" in tutorial
     assert "extended (oil_temperature)" in tutorial
     assert '"order a set"' in tutorial

@@ -45,7 +45,7 @@ def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
         "The extended model is adopted",
         "read the unloaded zero (expected evidence: strong)",
         "Note: left out",
-        "oil_temperature_c",
+        "The model without an effect errs along: oil temperature",
     ):
         assert words in shown_text, words
     assert report["maps"]["axes"]["cycles"] == [500.0, 1500.0, 2500.0]

@@ -264,7 +264,7 @@ def test_a_clutch_that_shudders_is_no_longer_normal(tmp_path: Path) -> None:
     for number, record in enumerate(({}, {"end_of_life": {"criteria": criteria}})):
         bench = Bench(tmp_path / f"{number}.db", record)
         for cycles in (0.0, 500.0, 1000.0, 1500.0):
-            bench.send(body("test", f"n{cycles:g}", cycles, wear=cycles / 4_000))
+            bench.send(body("test", f"n{cycles:g}", cycles, wear=cycles / 8_000))
         states.append(item(bench)["state"])
         bench.close()
     print(states)
