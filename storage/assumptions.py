@@ -167,7 +167,7 @@ _fleet_forget = delete(fleet_prior).where(
 def insert_fleet_prior(connection: Connection, row: FleetPriorRow) -> None:
     """Store a prior. Raises IntegrityError where this version is there."""
     values = {
-        "fleet": _fleet_key(row.fleet),
+        "fleet": fleet_key(row.fleet),
         "version": row.version,
         "left_out": row.left_out,
         "created_at": row.created_at,
@@ -180,7 +180,7 @@ def insert_fleet_prior(connection: Connection, row: FleetPriorRow) -> None:
 
 def current_fleet_prior(connection: Connection, fleet: Json) -> FleetPriorRow | None:
     """The newest version of a kind of clutch, learned from all of them; None before the first."""
-    row = connection.execute(_fleet_current, {"of_fleet": _fleet_key(fleet)}).first()
+    row = connection.execute(_fleet_current, {"of_fleet": fleet_key(fleet)}).first()
     return None if row is None else _fleet_row(row)
 
 
@@ -196,7 +196,7 @@ def fleet_prior_for(connection: Connection, fleet: Json, clutch_id: str, version
     """
     if version == 0:
         return None
-    values: dict[str, object] = {"of_fleet": _fleet_key(fleet), "of_version": version}
+    values: dict[str, object] = {"of_fleet": fleet_key(fleet), "of_version": version}
     version_row = (
         connection.execute(_fleet_members_of, values).first() or connection.execute(_fleet_members, values).first()
     )
@@ -221,10 +221,11 @@ def count_ended_lives(connection: Connection) -> int:
 
 def forget_left_out(connection: Connection, fleet: Json, *, before: int) -> None:
     """Drop the priors with a clutch left out of all versions before `before`; those learned from all clutches stay."""
-    connection.execute(_fleet_forget, {"of_fleet": _fleet_key(fleet), "before": before})
+    connection.execute(_fleet_forget, {"of_fleet": fleet_key(fleet), "before": before})
 
 
-def _fleet_key(fleet: Json) -> str:
+def fleet_key(fleet: Json) -> str:
+    """A kind of clutch as it is stored."""
     return to_text(dict(sorted(fleet.items())))
 
 

@@ -27,7 +27,7 @@ from service.work.executor import Executor, InProcess
 from service.work.rounds import Ended, Ending, in_rounds
 from storage import assumptions, clutches, results
 from storage.assumptions import NOBODY, FleetPriorRow
-from storage.encoding.json_text import Json, to_text
+from storage.encoding.json_text import Json, to_object
 from storage.engine.database import Database
 
 #: Why a refresh leaves a clutch.
@@ -44,9 +44,11 @@ class Lesson:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fleet:
-    """Clutches of a kind, and what the lives of each have taught."""
+    """Clutches of a kind, the version of its prior that was stored before they were read (0: none), and what the lives of each
+    have taught."""
 
     kind: Json
+    version: int
     lessons: dict[str, list[Lesson]] = field(default_factory=dict)
 
     def without(self, left_out: Collection[str] = ()) -> Json | None:
@@ -97,16 +99,19 @@ def refresh(
     tracks are up to date.
     """
     executor = InProcess() if executor is None else executor
-    fleets: dict[str, Fleet] = {}
-    with database.reading() as connection:
-        names = clutches.all_ids(connection)
-    taught_by = executor.map(lessons_of, (_state(database, clutch_id) for clutch_id in names))
-    for clutch_id, outcome in zip(names, taught_by, strict=True):
-        kind, lessons = outcome.value()
-        if lessons:
-            fleets.setdefault(to_text(kind), Fleet(kind=kind)).lessons[clutch_id] = lessons
-        advance()
-    fresh = [fleet.kind for fleet in fleets.values() if _stored_again(database, fleet, now, at_once, executor)]
+    fresh: set[str] = set()
+    said = advance
+    while True:
+        with database.reading() as connection:
+            names = clutches.all_ids(connection)
+        endings = {
+            kind: _stored_again(database, fleet, now, at_once, executor)
+            for kind, fleet in _fleets(database, executor, names, said).items()
+        }
+        fresh.update(kind for kind, ending in endings.items() if ending is Ending.STORED)
+        if Ending.LEFT not in endings.values():  # else another refresh was quicker, perhaps with less than is known now
+            break
+        said = _silent
     ended = []
     for clutch in _brought_up(database, names, at_once, executor):
         if clutch.error is not None:
@@ -115,7 +120,29 @@ def refresh(
         advance()
     by_ending = {ending: tuple(sorted(clutch.name for clutch in ended if clutch.ending is ending)) for ending in Ending}
     left = dict.fromkeys(by_ending[Ending.LEFT], LEFT)
-    return Refreshed(kinds=tuple(fresh), changed=by_ending[Ending.STORED], left=left)
+    return Refreshed(kinds=tuple(to_object(kind) for kind in sorted(fresh)), changed=by_ending[Ending.STORED], left=left)
+
+
+def _silent() -> None:
+    """Progress that was said already."""
+
+
+def _fleets(
+    database: Database, executor: Executor, names: Sequence[str], advance: Callable[[], object]
+) -> dict[str, Fleet]:
+    """The fleets with what their clutches teach, by kind; `advance` is called for each clutch."""
+    with database.reading() as connection:
+        versions = {assumptions.fleet_key(row.fleet): row.version for row in assumptions.current_fleet_priors(connection)}
+    fleets: dict[str, Fleet] = {}
+    taught_by = executor.map(lessons_of, (_state(database, clutch_id) for clutch_id in names))
+    for clutch_id, outcome in zip(names, taught_by, strict=True):
+        kind, lessons = outcome.value()
+        if lessons:
+            name = assumptions.fleet_key(kind)
+            fleet = fleets.setdefault(name, Fleet(kind=kind, version=versions.get(name, 0)))
+            fleet.lessons[clutch_id] = lessons
+        advance()
+    return fleets
 
 
 def as_job(
@@ -192,25 +219,27 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
     return Lesson(taught=lesson, ended=replace(ended.in_unit(1.0 / unit), energy=done / worked if worked else None))
 
 
-def _stored_again(database: Database, fleet: Fleet, now: str, at_once: AtOnce, executor: Executor) -> bool:
-    """Store a fleet's prior and what it is without each of its clutches, where it is not what is stored already."""
+def _stored_again(database: Database, fleet: Fleet, now: str, at_once: AtOnce, executor: Executor) -> Ending:
+    """Store a fleet's prior, and what it is without each of its clutches, as the version after the one before its lessons.
+
+    NOTHING where it is what is stored already; LEFT where another refresh has stored a version since.
+    """
     (learned,) = executor.map(learned_without, [(fleet, ())])
     with database.reading() as connection:
         stored = assumptions.current_fleet_prior(connection, fleet.kind)
     if learned.value() is None or (stored is not None and stored.content == learned.value()):
-        return False
-    version = 1 if stored is None else stored.version + 1
-    rows = _versions(fleet, learned.value(), version, now, executor)
+        return Ending.NOTHING
+    rows = _versions(fleet, learned.value(), fleet.version + 1, now, executor)
 
-    def store() -> bool:
+    def store() -> Ending:
         with database.writing() as connection:
             newest = assumptions.current_fleet_prior(connection, fleet.kind)
-            if newest is not None and newest.version >= version:  # another refresh was quicker
-                return False
+            if newest is not None and newest.version > fleet.version:
+                return Ending.LEFT
             for row in rows:
                 assumptions.insert_fleet_prior(connection, row)
-            assumptions.forget_left_out(connection, fleet.kind, before=version - 1)  # clutches are still under the last
-        return True
+            assumptions.forget_left_out(connection, fleet.kind, before=fleet.version)  # clutches are still under the last
+        return Ending.STORED
 
     return at_once(store)
 

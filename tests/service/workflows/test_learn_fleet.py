@@ -1,6 +1,7 @@
 """A fleet's prior: learned from others only, named in every answer, refreshed by a command."""
 
 import math
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -55,10 +56,10 @@ def width(said: dict[str, dict[str, float | None]]) -> float:
     return math.log((1e6 if high is None else high) / (1e6 if low is None else low))
 
 
-def refresh(url: str) -> learn_fleet.Refreshed:
+def refresh(url: str, advance: Callable[[], object] = lambda: None) -> learn_fleet.Refreshed:
     database = open_database(url)
     try:
-        return learn_fleet.refresh(database, now="2026-01-01T00:00:00+00:00")
+        return learn_fleet.refresh(database, now="2026-01-01T00:00:00+00:00", advance=advance)
     finally:
         database.close()
 
@@ -143,6 +144,23 @@ def test_a_refresh_that_learns_nothing_new_changes_nothing(url: str) -> None:
         assert again.changed == ()
         assert again.kinds == ()
         assert client.get(LIFE.format("new"), headers={"If-None-Match": said.headers["etag"]}).status_code == 304
+
+
+def test_a_refresh_that_read_before_another_stored_does_not_undo_it(url: str) -> None:
+    with client_of(url) as client:
+        for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
+            post(client, f"old-{number}", scale, last=6000)
+        read = []
+
+        def another_is_quicker() -> None:
+            read.append(len(read))
+            if len(read) == 3:  # all three have taught, nothing is stored
+                post(client, "old-3", 8000.0, last=6000)
+                assert len(refresh(url).kinds) == 1
+
+        refresh(url, another_is_quicker)
+        (prior,) = client.get("/v1/fleet/priors").json()["items"]
+        assert (prior["version"], prior["clutches"]) == (1, 4)
 
 
 @pytest.mark.slow
