@@ -120,7 +120,9 @@ def refresh(
         advance()
     by_ending = {ending: tuple(sorted(clutch.name for clutch in ended if clutch.ending is ending)) for ending in Ending}
     left = dict.fromkeys(by_ending[Ending.LEFT], LEFT)
-    return Refreshed(kinds=tuple(to_object(kind) for kind in sorted(fresh)), changed=by_ending[Ending.STORED], left=left)
+    return Refreshed(
+        kinds=tuple(to_object(kind) for kind in sorted(fresh)), changed=by_ending[Ending.STORED], left=left
+    )
 
 
 def _silent() -> None:
@@ -132,7 +134,9 @@ def _fleets(
 ) -> dict[str, Fleet]:
     """The fleets with what their clutches teach, by kind; `advance` is called for each clutch."""
     with database.reading() as connection:
-        versions = {assumptions.fleet_key(row.fleet): row.version for row in assumptions.current_fleet_priors(connection)}
+        versions = {
+            assumptions.fleet_key(row.fleet): row.version for row in assumptions.current_fleet_priors(connection)
+        }
     fleets: dict[str, Fleet] = {}
     taught_by = executor.map(lessons_of, (_state(database, clutch_id) for clutch_id in names))
     for clutch_id, outcome in zip(names, taught_by, strict=True):
@@ -238,7 +242,9 @@ def _stored_again(database: Database, fleet: Fleet, now: str, at_once: AtOnce, e
                 return Ending.LEFT
             for row in rows:
                 assumptions.insert_fleet_prior(connection, row)
-            assumptions.forget_left_out(connection, fleet.kind, before=fleet.version)  # clutches are still under the last
+            assumptions.forget_left_out(
+                connection, fleet.kind, before=fleet.version
+            )  # clutches are still under the last
         return Ending.STORED
 
     return at_once(store)
