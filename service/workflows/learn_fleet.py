@@ -44,8 +44,8 @@ class Lesson:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fleet:
-    """Clutches of a kind, the version of its prior that was stored before they were read (0: none), and what the lives of each
-    have taught."""
+    """Clutches of a kind, the version of its prior that was stored before they were read (0: none), and what the lives of
+    each have taught."""
 
     kind: Json
     version: int
