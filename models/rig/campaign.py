@@ -16,14 +16,15 @@ import numpy as np
 from models.engagements.simulation import Drive, engage
 from models.friction.speed_protocol import RPM
 from models.records.runs import Record
-from models.rig.programme import CYCLE_ENERGY, QUICK, Ageing, Programme
+from models.rig.programme import CYCLE_ENERGY, QUICK, Ageing, PlannedTest, Programme
 from models.rig.sampled import DynamicTest, engagement_record, sampled_test
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor, stationary_test
 from models.rig.truth import SimulatedClutch, draw
 
-#: The streams of one seed: the clutch, and by cycles the stationary test, the dynamic test and the engagement.
-_CLUTCH, _TEST, _DYNAMIC, _ENGAGEMENT = 0, 1, 2, 3
+#: The streams of one seed: the clutch, by cycles the stationary test, the dynamic test and the engagement, and by number
+#: the tests of plans.
+_CLUTCH, _TEST, _DYNAMIC, _ENGAGEMENT, _PLANNED = 0, 1, 2, 3, 4
 
 #: 1200 rpm and 2000 rpm, both to 8 bar (sections 2.3.1, 2.3.2). The energies go as ω² and are assumed, none is printed:
 #: they stand where no engagement is integrated.
@@ -61,6 +62,32 @@ def simulate(
     return rig.runs(stop_fraction, most_tests)
 
 
+def planned(
+    seed: int,
+    tests: Iterable[PlannedTest],
+    *,
+    clutch: SimulatedClutch,
+    sensor: Sensor,
+    ageing: Ageing,
+    cycles: int,
+    wear: float,
+    made: int = 0,
+) -> Iterator[SimulatedRun]:
+    """The runs of a plan's tests on a clutch that a campaign has brought to `cycles` and `wear`, with the duty cycles up to
+    each. `made`: how many tests of plans it has had, which tells their noise and their names apart."""
+    rig = _Rig(seed=seed, clutch=clutch, sensor=sensor, programme=Programme(engagements=True, ageing=ageing))
+    for test in tests:
+        if test.cycles > cycles:
+            block = rig.duty_run(cycles, test.cycles, wear)
+            yield block
+            cycles, wear = test.cycles, block.wear
+        for _ in range(test.repeats):
+            made += 1
+            run = rig.planned_run(test, cycles, wear, made)
+            yield run
+            wear = run.wear
+
+
 def end_of_life(course: Iterable[tuple[float, float]], clutch: SimulatedClutch, fraction: float = 0.5) -> float | None:
     """Duty cycles at which a simulated clutch truly came to `fraction` of its mean COF; None: not in this campaign.
 
@@ -89,7 +116,7 @@ class _Rig:
         before, wear = 0, 0.0
         for cycles in itertools.islice(cycles_of_tests(), most_tests):
             if cycles > before:
-                block = self._duty_run(before, cycles, wear)
+                block = self.duty_run(before, cycles, wear)
                 yield block
                 wear = block.wear
             failed = self.clutch.mean_cof(wear) < stop
@@ -100,7 +127,8 @@ class _Rig:
                 return
             before = cycles
 
-    def _duty_run(self, before: int, cycles: int, wear: float) -> SimulatedRun:
+    def duty_run(self, before: int, cycles: int, wear: float) -> SimulatedRun:
+        """The block of engagements from `before` to `cycles`."""
         duty, record = self._engaged(replace(_LIFE_TEST, cycles=cycles - before), cycles, wear)
         run_id = f"sim-{self.seed}-duty-{cycles:05d}"
         run = SimulatedRun(run_id=run_id, kind=RunKind.DUTY_CYCLES, cycles=cycles, duty=duty, record=record)
@@ -146,6 +174,19 @@ class _Rig:
             cycles=cycles,
             record=sampled_test(self.clutch, wear, test, rng, self.sensor),
         )
+        return self._aged(run, wear)
+
+    def planned_run(self, test: PlannedTest, cycles: int, wear: float, number: int) -> SimulatedRun:
+        """A plan's test of that number, made at `cycles` at least: a clutch does not grow younger."""
+        rng = _generator(self.seed, _PLANNED, number)
+        name = f"sim-{self.seed}-planned-{number}-{cycles:05d}"
+        if test.frequency is not None:
+            record = sampled_test(self.clutch, wear, test.dynamic(), rng, self.sensor, test.oil)
+            run = SimulatedRun(run_id=name, kind=RunKind.DYNAMIC_STRIBECK, cycles=cycles, record=record)
+        else:
+            pressures, speeds = np.array(test.pressures), np.array(test.speeds)
+            plateaus = stationary_test(self.clutch, wear, rng, self.sensor, pressures, speeds, test.oil)
+            run = SimulatedRun(run_id=name, kind=RunKind.STATIONARY_STRIBECK, cycles=cycles, plateaus=plateaus)
         return self._aged(run, wear)
 
     def _aged(self, run: SimulatedRun, wear: float) -> SimulatedRun:

@@ -26,7 +26,7 @@ from models.rig.oil_viscosity import warmed
 from models.rig.plate import REFERENCE_FLUX, heat_flux
 from models.rig.simulated_runs import SimulatedRun
 from models.rig.stationary import PLATEAU_DURATION
-from models.rig.truth import SimulatedClutch
+from models.rig.truth import OPEN, SimulatedClutch
 
 #: Cycles in which drifts come to half of their size, and a new lining's excess to a quarter.
 _DRIFT, _RUN_IN = 4_000.0, 400.0
@@ -114,7 +114,7 @@ def _changed(
         held=held,
         clock=held.time if isinstance(held, Record) else middles,
         velocity=np.abs(clutch.geometry.sliding_velocity(held.speed)),
-        curve=clutch.parameters(held.pressure, run.wear),
+        curve=clutch.parameters(np.maximum(held.pressure, OPEN), run.wear),
         clutch=clutch,
         cycles=run.cycles,
         wear=run.wear,
@@ -166,7 +166,7 @@ def _torque_zero_shift(size: float, rows: Rows) -> FloatArray:
 
 def _pressure_offset(size: float, rows: Rows) -> FloatArray:
     """The clutch is pressed by more than the gauge says, by ever more bar."""
-    pressed = rows.held.pressure + 1e5 * size * _drift(rows.cycles)
+    pressed = np.maximum(rows.held.pressure + 1e5 * size * _drift(rows.cycles), OPEN)
     really = torque(rows.velocity, rows.clutch.parameters(pressed, rows.wear))
     return np.asarray(rows.held.torque * (really / torque(rows.velocity, rows.curve) - 1), dtype=np.float64)
 

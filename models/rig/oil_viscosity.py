@@ -18,7 +18,7 @@ import numpy as np
 from models.friction.stribeck import torque
 from models.records.runs import Plateaus, Record
 from models.rig.stationary import OIL_TEMPERATURE
-from models.rig.truth import SimulatedClutch
+from models.rig.truth import OPEN, SimulatedClutch
 
 #: Vogel's B and C [K].
 _B, _C = 880.0, 170.0
@@ -35,5 +35,5 @@ def warmed(held: Held, clutch: SimulatedClutch, wear: float, strength: float = 1
         raise ValueError("a test must have an oil_temperature, got None")
     thinner = np.exp(strength * (_B / (held.oil_temperature - _C) - _B / (OIL_TEMPERATURE - _C)))
     velocity = clutch.geometry.sliding_velocity(held.speed)
-    at = clutch.parameters(held.pressure, wear)
+    at = clutch.parameters(np.maximum(held.pressure, OPEN), wear)
     return replace(held, torque=held.torque * torque(velocity * thinner, at) / torque(velocity, at))

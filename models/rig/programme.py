@@ -5,14 +5,37 @@ The default is the quick one: plateaus, and duty blocks whose energies are assum
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3 and fig. 2.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from models.rig.sampled import PROTOCOL, DynamicTest, RawTest
+from models.rig.stationary import OIL_TEMPERATURE
 
 #: Dissipated energy [J] that ages by as much as one cycle, where energy does: what an engagement of the nominal clutch
 #: dissipates over most of its life.
 CYCLE_ENERGY = 8.0e3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedTest:
+    """A test that a diagnosis advises: stationary at `pressures` [Pa] and `speeds` [rad/s] in their order, or, with a
+    `frequency` [Hz], dynamic with so many `periods` a pressure between the lowest and the highest speed; the oil kept at
+    `oil` [K], `repeats` times over, at `cycles` since new."""
+
+    pressures: tuple[float, ...]
+    speeds: tuple[float, ...]
+    cycles: int
+    frequency: float | None = None
+    periods: int = 1
+    oil: float = OIL_TEMPERATURE
+    repeats: int = 1
+
+    def dynamic(self) -> DynamicTest:
+        """Its swings."""
+        low, high = min(self.speeds), max(self.speeds)
+        swing = DynamicTest(frequency=0.1 if self.frequency is None else self.frequency, pressures=self.pressures)
+        middle, duration = 0.5 * (low + high), self.periods / swing.frequency
+        return replace(swing, offset=middle, amplitude=min(middle, 0.5 * (high - low)), duration=duration)
 
 
 class Ageing(StrEnum):

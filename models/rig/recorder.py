@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from models.arrays import FloatArray
 from models.friction.speed_protocol import RPM
 from models.records.runs import Record
-from models.rig.stationary import Sensor, oil_temperature, rounded
+from models.rig.stationary import OIL_TEMPERATURE, Sensor, oil_temperature, rounded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,10 +51,11 @@ class Recorder:
         torque: FloatArray,
         rng: np.random.Generator,
         sensor: Sensor,
+        kept_at: float = OIL_TEMPERATURE,
     ) -> Record:
         """The record of a course [n], evenly sampled: time in s, pressure in Pa, speed in rad/s, torque in Nm.
 
-        `sensor` gives the run's gain and the counts of temperature.
+        `sensor` gives the run's gain and the counts of temperature; the oil is kept at `kept_at` [K].
         """
         count = time.size
         step = float(time[1] - time[0]) if count > 1 else 0.0
@@ -67,7 +68,7 @@ class Recorder:
             rounded(pressure + self.pressure_noise * rng.standard_normal(count), self.pressure_counts),
             rounded(speed + self.speed_noise * rng.standard_normal(count), self.speed_counts),
             rounded(measured, self.torque_counts),
-            oil_temperature(time, rng, sensor),
+            oil_temperature(time, rng, sensor, kept_at),
         )
         kept = slice(None) if self.lost == 0 else rng.random(count) >= self.lost
         at, p, w, m, oil = (column[kept] for column in columns)

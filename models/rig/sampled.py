@@ -18,8 +18,8 @@ from models.engagements.simulation import Engagement
 from models.friction.speed_protocol import REFERENCE_SPEEDS, RPM
 from models.records.runs import Record
 from models.rig.recorder import Recorder
-from models.rig.stationary import PLATEAU_DURATION, Sensor
-from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
+from models.rig.stationary import OIL_TEMPERATURE, PLATEAU_DURATION, Sensor
+from models.rig.truth import OPEN, PROTOCOL_PRESSURES, SimulatedClutch
 
 #: The protocol's pressures [Pa].
 PROTOCOL = tuple(PROTOCOL_PRESSURES.tolist())
@@ -88,12 +88,18 @@ class RawTest:
 
 
 def sampled_test(
-    clutch: SimulatedClutch, cycles: float, test: DynamicTest | RawTest, rng: np.random.Generator, sensor: Sensor
+    clutch: SimulatedClutch,
+    cycles: float,
+    test: DynamicTest | RawTest,
+    rng: np.random.Generator,
+    sensor: Sensor,
+    oil: float = OIL_TEMPERATURE,
 ) -> Record:
-    """The record of a dynamic test or of a raw stationary one, after cycles >= 0."""
+    """The record of a dynamic test or of a raw stationary one, after cycles >= 0, with the oil kept at `oil` [K]."""
     time, pressure, speed = test.course()
-    torque = clutch.moving_torque(time, clutch.geometry.sliding_velocity(speed), pressure, cycles)
-    return test.recorder.record(time, pressure, speed, torque, rng, sensor)
+    velocity = clutch.geometry.sliding_velocity(speed)
+    torque = clutch.moving_torque(time, velocity, np.maximum(pressure, OPEN), cycles)
+    return test.recorder.record(time, pressure, speed, torque, rng, sensor, oil)
 
 
 def engagement_record(trace: Engagement, rng: np.random.Generator, sensor: Sensor) -> Record:

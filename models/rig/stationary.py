@@ -19,7 +19,7 @@ from models.arrays import FloatArray
 from models.friction.speed_protocol import REFERENCE_SPEEDS
 from models.friction.stribeck import torque
 from models.records.runs import Plateaus
-from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
+from models.rig.truth import OPEN, PROTOCOL_PRESSURES, SimulatedClutch
 
 #: Time on one plateau [s] (section 2.3.3).
 PLATEAU_DURATION = 5.0
@@ -63,32 +63,41 @@ def stationary_test(
     rng: np.random.Generator,
     sensor: Sensor | None = None,
     pressures: FloatArray = PROTOCOL_PRESSURES,
+    speeds: FloatArray = REFERENCE_SPEEDS,
+    oil: float = OIL_TEMPERATURE,
 ) -> Plateaus:
-    """Simulate one stationary test after cycles >= 0 at pressures [p] Pa: 40 p rows, by pressure, speed rising.
+    """Simulate one stationary test after cycles >= 0 at pressures [p] Pa and speeds [s] rad/s: p s rows, by pressure.
+
+    The oil is kept at `oil` [K].
 
     Every random number is drawn whatever the sensor, so that two sensors measure the same test.
     """
     sensor = Sensor() if sensor is None else sensor
     true = torque(
-        clutch.geometry.sliding_velocity(REFERENCE_SPEEDS), clutch.parameters(pressures[:, np.newaxis], cycles)
+        clutch.geometry.sliding_velocity(speeds),
+        clutch.parameters(np.maximum(pressures, OPEN)[:, np.newaxis], cycles),
     ).ravel()
     gain = 1.0 + sensor.gain_scatter * float(rng.standard_normal())
     relative, added = rng.standard_normal((2, true.size))
     measured = gain * true * (1.0 + sensor.noise * relative) + sensor.floor * added
     return Plateaus(
-        pressure=np.repeat(pressures, REFERENCE_SPEEDS.size),
-        speed=np.tile(REFERENCE_SPEEDS, pressures.size),
+        pressure=np.repeat(pressures, speeds.size),
+        speed=np.tile(speeds, pressures.size),
         torque=rounded(measured, sensor.torque_counts),
-        oil_temperature=oil_temperature(np.arange(0.0, PLATEAU_DURATION * true.size, PLATEAU_DURATION), rng, sensor),
+        oil_temperature=oil_temperature(
+            np.arange(0.0, PLATEAU_DURATION * true.size, PLATEAU_DURATION), rng, sensor, oil
+        ),
     )
 
 
-def oil_temperature(time: FloatArray, rng: np.random.Generator, sensor: Sensor) -> FloatArray:
-    """Oil temperature [n] K at time [n] s: a swing of the thermostat, within 80 to 90 °C, in the recorder's counts."""
+def oil_temperature(
+    time: FloatArray, rng: np.random.Generator, sensor: Sensor, kept_at: float = OIL_TEMPERATURE
+) -> FloatArray:
+    """Oil temperature [n] K at time [n] s: a swing of the thermostat by at most 4.5 K, in the recorder's counts."""
     amplitude, period = rng.uniform(0.4, 1.0) * OIL_SWING, rng.uniform(600.0, 1500.0)
     phase = rng.uniform(0.0, 2 * math.pi)
     swing = amplitude * np.sin(2 * math.pi * time / period + phase)
-    return OIL_TEMPERATURE + rounded(swing, sensor.temperature_counts)
+    return kept_at + rounded(swing, sensor.temperature_counts)
 
 
 def rounded(values: FloatArray, counts: float) -> FloatArray:

@@ -31,6 +31,9 @@ from models.rig.hysteresis import FrictionLag
 #: The protocol's pressures (section 2.3.3): 4 to 7 bar by 0.5 bar [7] Pa; its 40 speeds are REFERENCE_SPEEDS.
 PROTOCOL_PRESSURES: FloatArray = np.linspace(4.0e5, 7.0e5, 7)
 
+#: An open clutch is pressed by this [Pa], which transfers nothing that a recorder would see.
+OPEN = 1.0
+
 #: The end of life is sought between new and HORIZON duty cycles, on this grid.
 HORIZON = 1_000_000.0
 _BRACKETS = np.concatenate([[0.0], np.geomspace(1.0, HORIZON, 240)])
@@ -52,7 +55,7 @@ class SimulatedClutch:
     """A clutch that exists only here: four pressure laws when fresh, and four courses of eq. 6 that multiply them.
 
     The defaults are the nominal clutch; `draw` makes others around it. Courses are dimensionless (initial = 1), their
-    abscissa is duty cycles. Meant for 4 to 8 bar: below 3.7 bar the nominal Coulomb ratio exceeds 1.
+    abscissa is duty cycles. The laws are meant for 4 to 8 bar; below, torque goes with pressure.
     """
 
     geometry: Geometry = field(default_factory=Geometry)
@@ -67,17 +70,21 @@ class SimulatedClutch:
     lag: FrictionLag = field(default_factory=FrictionLag)
 
     def parameters(self, pressure: float | FloatArray, cycles: float | FloatArray) -> StribeckParameters:
-        """The true parameters at pressure > 0 [Pa] after cycles >= 0; arrays broadcast. Raises ValueError outside."""
-        p, zeta = np.asarray(pressure, dtype=np.float64), np.asarray(cycles, dtype=np.float64)
-        if not (np.isfinite(p).all() and (p > 0).all()):
+        """The true parameters at pressure > 0 [Pa] after cycles >= 0; arrays broadcast. Raises ValueError outside.
+
+        Below the protocol's lowest pressure they are those there, with both torques in proportion to pressure."""
+        given, zeta = np.asarray(pressure, dtype=np.float64), np.asarray(cycles, dtype=np.float64)
+        if not (np.isfinite(given).all() and (given > 0).all()):
             raise ValueError(f"pressure must be finite and positive, got {pressure}")
         if not (np.isfinite(zeta).all() and (zeta >= 0).all()):
             raise ValueError(f"cycles must be finite and not negative, got {cycles}")
+        p = np.maximum(given, PROTOCOL_PRESSURES[0])
+        share = given / p
         return StribeckParameters(
-            static_torque=self.static_torque(p) * value(zeta, self.static_torque_course),
+            static_torque=share * self.static_torque(p) * value(zeta, self.static_torque_course),
             coulomb_ratio=self.coulomb_ratio(p) * value(zeta, self.coulomb_ratio_course),
             stribeck_velocity=self.stribeck_velocity(p) * value(zeta, self.stribeck_velocity_course),
-            viscous_coefficient=self.viscous_coefficient(p) * value(zeta, self.viscous_coefficient_course),
+            viscous_coefficient=share * self.viscous_coefficient(p) * value(zeta, self.viscous_coefficient_course),
         )
 
     def moving_torque(self, time: FloatArray, velocity: FloatArray, pressure: FloatArray, cycles: float) -> FloatArray:
@@ -85,14 +92,11 @@ class SimulatedClutch:
         return self.lag.torque(time, velocity, pressure, self.parameters(pressure, cycles), cycles)
 
     def capacity(self, cycles: float) -> Capacity:
-        """What the clutch can transfer after cycles >= 0; below the protocol's lowest pressure torque goes with pressure."""
-        lowest = float(PROTOCOL_PRESSURES[0])
+        """What the clutch can transfer after cycles >= 0."""
 
         def transferred(pressure: float, velocity: float) -> float:
-            curve_pressure = max(pressure, lowest)
-            return (
-                float(torque(np.array(velocity), self.parameters(curve_pressure, cycles))) * pressure / curve_pressure
-            )
+            at = self.parameters(max(pressure, OPEN), cycles)
+            return float(torque(np.array(velocity), at))
 
         return transferred
 

@@ -1,6 +1,7 @@
 """`clutchlife diagnose`: what the simulation gets wrong about a clutch, and why."""
 
 import json
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -18,6 +19,9 @@ def diagnose(
     service: Service,
     clutch: ClutchId,
     adopt: Annotated[bool, typer.Option("--adopt", help="Track under the extended model, if there is one")] = False,
+    plan: Annotated[
+        Path | None, typer.Option(help="Save the advised tests here as a protocol for the rig, a CSV with a row a step")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON")] = False,
 ) -> None:
     """Show what the simulation gets wrong about a clutch, name the cause, and show what an extended model gains."""
@@ -32,5 +36,7 @@ def diagnose(
             out.print(part)
         if report["adoptable"] and not report["adopted"]:
             print_line(f"To track under it: clutchlife model {clutch} --adopt {report['diagnosis_id']}")
+    if report["status"] == "finished" and plan is not None:
+        plan.write_text(service.table(f"/v1/clutches/{clutch}/diagnoses/{report['diagnosis_id']}/plan.csv"), "utf-8")
     if report["status"] != "finished":
         fail(f"the diagnosis failed: {report['problem']}")

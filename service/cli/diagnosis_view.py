@@ -54,12 +54,22 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     if axes:
         yield Text(f"The model without an effect errs along: {', '.join(axes)}")
     yield from _gain(report)
-    for advice in report["advice"]:
-        expected = _evidence(advice["nats"])
-        between = " from ".join(map(_spelt, advice["separates"]))
-        yield Text(f"To distinguish {between}: {advice['test']} (expected evidence: {expected})")
+    tests = report["advice"]
+    if len(tests) > 1:
+        yield Text("What to test next. One of these is enough; the best comes first:", style="bold")
+    for advice in tests:
+        yield Text(f"{'- ' if len(tests) > 1 else 'What to test next: '}{advice['test']} ({_use(advice)})")
     for note in report["notes"]:
         yield Text(f"Note: {note}", style="dim")
+
+
+def _use(advice: Mapping[str, Any]) -> str:
+    """What a test is good for: it narrows the size of a cause that is named, or distinguishes two."""
+    cause, other = map(_spelt, advice["separates"])
+    if advice["narrows"]:
+        return f"leaves {100 * advice['narrows']:.0f} % of the uncertainty about the size of {cause}"
+    against = "no effect at all" if other == "baseline" else other
+    return f"distinguishes {cause} from {against}; expected evidence: {_evidence(advice['nats'])}"
 
 
 def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:

@@ -1,5 +1,6 @@
 """`clutchlife simulate`: a simulated campaign, a file a run."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -7,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from service.cli.options import EX_USAGE, Seed, err, errors_in_a_line, fail, out
+from service.cli.options import EX_USAGE, Seed, err, errors_in_a_line, fail, out, print_line
 from service.run_files import manifest
 
 if TYPE_CHECKING:
@@ -56,13 +57,22 @@ def simulate(
     pressures: Annotated[
         list[float] | None, typer.Option(min=4, max=8, help="A pressure of the tests [bar]; repeated: all of them")
     ] = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option(
+            help="Run a diagnosis' plan (CSV or JSON) on the clutch that is in --out already; no other option"
+        ),
+    ] = None,
+    alternative: Annotated[
+        int, typer.Option(min=1, help="Which test of the plan: its tests are alternatives, the best first")
+    ] = 1,
 ) -> None:
     """Simulate a clutch's life on the rig and write it, a file a run; `clutchlife push` sends it.
 
     The lining's roughness and skewness at each stationary test are written too, into a folder of inspections.
 
-    Friction lags speed as in the service's own model, so that a diagnosis finds nothing. What --hide hides, and the film of
-    --film, is in answer.json beside the runs, which push does not send. An unknown effect lists all of them.
+    Friction lags speed as in the service's own model, so that a diagnosis finds nothing. The true end of life, what --hide
+    hides, and the film of --film are in answer.json beside the runs, which push does not send. An unknown effect lists all.
 
     Run-in and duty blocks are JSON whatever the format. Tests in another format are listed in runs.json, which push reads.
     """
@@ -71,6 +81,9 @@ def simulate(
     from service.run_files import record_writer, simulated  # start-up time
 
     with errors_in_a_line():
+        if plan is not None:
+            _run_plan(out_folder, plan, alternative)
+            return
         record_format = record_writer.RecordFormat(form)
         record_writer.require_writer(record_format)
         programme = _programme(raw_rate if raw else None, dynamic, ageing, frequency or [], pressures or [])
@@ -80,8 +93,6 @@ def simulate(
         if film:
             sizes.setdefault("squeeze_film", clutch.lag.film_time)
         clutch = hidden.clutch_for(clutch, sizes)
-        if sizes:
-            manifest.write(out_folder / manifest.ANSWER, {"seed": seed, "hidden": hidden.described(sizes)})
         manifest.write(out_folder / manifest.CLUTCH_FILE, simulated.simulated_clutch_body(clutch_id))
         wear_and_cycles: list[tuple[float, float]] = []
         listed: list[dict[str, Any]] = []
@@ -105,8 +116,54 @@ def simulate(
             manifest.write(out_folder / manifest.MANIFEST, listed)
         end = campaign.end_of_life(wear_and_cycles, clutch)
         truth = "has not halved in this campaign" if end is None else f"has halved after {end:.0f} cycles"
+        wear, last = wear_and_cycles[-1]
+        answer = {
+            "seed": seed,
+            "hidden": hidden.described(sizes),
+            "halved_at_cycles": clutch.end_of_life() if ageing == "cycles" else end,
+            "cycles": last,
+            "wear": wear,
+            "noise": sensor.noise,
+            "ageing": ageing,
+            "plate_rise": plate_rise,
+            "planned_tests": 0,
+        }
+        manifest.write(out_folder / manifest.ANSWER, answer)
         out.print(f"{len(wear_and_cycles)} simulated runs of {clutch_id} in {out_folder}", soft_wrap=True)
         out.print(f"the truth: its mean COF {truth}")
+
+
+def _run_plan(folder: Path, plan: Path, alternative: int) -> None:
+    """One test of a plan on the clutch of a campaign that was simulated into the folder, as its `answer.json` has it."""
+    from models.rig import campaign, hidden, plate, stationary  # start-up time
+    from models.rig.programme import Ageing  # start-up time
+    from service.run_files import plan_file, simulated  # start-up time
+
+    if not (folder / manifest.ANSWER).is_file():
+        fail(f"{folder} holds no simulated campaign: simulate one into it first, then run the plan", EX_USAGE)
+    answer = json.loads((folder / manifest.ANSWER).read_bytes())
+    sizes = {effect["effect"]: effect["size"] for effect in answer["hidden"]}
+    clutch = hidden.clutch_for(campaign.simulated_clutch(answer["seed"]), sizes)
+    runs = campaign.planned(
+        answer["seed"],
+        plan_file.planned_tests(plan, alternative),
+        clutch=clutch,
+        sensor=replace(stationary.SHARP, noise=answer["noise"]),
+        ageing=Ageing(answer["ageing"]),
+        cycles=answer["cycles"],
+        wear=answer["wear"],
+        made=answer["planned_tests"],
+    )
+    for run in runs:
+        made = hidden.hidden_in(run, clutch, sizes)
+        if answer["plate_rise"] is not None:
+            made = plate.with_plate(made, clutch.geometry, answer["plate_rise"])
+        manifest.write(folder / f"{made.run_id}.json", simulated.simulated_body(made))
+        answer |= {"cycles": made.cycles, "wear": made.wear}
+        answer["planned_tests"] += made.duty is None
+        print_line(f"{made.kind.value.replace('_', ' ')} at {made.cycles} cycles: {made.run_id}")
+    manifest.write(folder / manifest.ANSWER, answer)
+    print_line(f"now push {folder} again, and diagnose")
 
 
 def _programme(

@@ -37,15 +37,15 @@ def diagnosis(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str
 
 #: The columns of a plan as a table: a row a step.
 PLAN_COLUMNS = (
-    "test", "step", "kind", "pressures_bar", "speeds_rpm", "frequency_hz", "periods", "oil_temperature_c", "repeats",
-    "cycles", "pause_hours", "minutes", "separates", "probability",
+    "test", "choice", "step", "kind", "pressures_bar", "speeds_rpm", "frequency_hz", "periods", "oil_temperature_c",
+    "repeats", "cycles", "pause_hours", "minutes", "separates", "probability", "what",
 )  # fmt: skip
 
 
 def plan(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str, Any]:
-    """The tests that a diagnosis advises, as a protocol. Raises NotFoundError."""
+    """The tests that a diagnosis advises, as a protocol: alternatives, best first. Raises NotFoundError."""
     tests = [test for test in diagnosis(database, clutch_id, diagnosis_id)["advice"] if test.get("steps")]
-    return {"clutch_id": clutch_id, "diagnosis_id": diagnosis_id, "tests": tests}
+    return {"clutch_id": clutch_id, "diagnosis_id": diagnosis_id, "relation": "alternatives", "tests": tests}
 
 
 def plan_rows(protocol: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
@@ -53,8 +53,9 @@ def plan_rows(protocol: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     for number, test in enumerate(protocol["tests"], start=1):
         for place, step in enumerate(test["steps"], start=1):
             lists = {name: " ".join(f"{value:g}" for value in step[name]) for name in ("pressures_bar", "speeds_rpm")}
-            why = {"separates": " ".join(test["separates"]), "probability": test["probability"]}
-            yield {"test": number, "step": place} | step | lists | why
+            choice = {"test": number, "choice": f"one of {len(protocol['tests'])} is enough", "step": place}
+            why = {"separates": " ".join(test["separates"]), "probability": test["probability"], "what": test["test"]}
+            yield choice | step | lists | why
 
 
 def page(

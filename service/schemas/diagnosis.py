@@ -149,11 +149,12 @@ class PlanStep(Answer):
 
 
 class PlanOut(Answer):
-    """The tests that a diagnosis advises as a protocol, at most three, the first one first."""
+    """The tests that a diagnosis advises as a protocol: at most three alternatives, each with its steps in order."""
 
     clutch_id: ClutchName
     diagnosis_id: DiagnosisName
-    tests: list[AdviceOut] = Field(description="The tests, best first")
+    relation: Literal["alternatives"] = Field(description="How the tests are meant: one of them is enough")
+    tests: list[AdviceOut] = Field(description="The tests, best first: alternatives, each with its steps in order")
 
 
 class VisibleOut(Answer):

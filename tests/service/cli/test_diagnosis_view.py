@@ -43,7 +43,7 @@ def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
         "Remaining life, baseline: 12,346 cycles (90 %: 4,000 to over 1,000,000)",
         "Remaining life, extended: the end of life is reached",
         "The extended model is adopted",
-        "read the unloaded zero (expected evidence: strong)",
+        "What to test next: read the unloaded zero (distinguishes torque zero shift from no effect at all;",
         "Note: left out",
         "The model without an effect errs along: oil temperature",
     ):

@@ -22,7 +22,9 @@ def test_what_is_hidden_is_in_a_file_and_not_on_the_screen(tmp_path: Path) -> No
     hide = ("--hide", "torque_zero_shift:1.2", "--hide", "shaft_ripple")
     shown = simulated(tmp_path, *hide, "--frequency", "0.2", "--frequency", "0.5")
     assert "torque_zero_shift" not in shown
-    hidden = json.loads((tmp_path / "answer.json").read_bytes())["hidden"]
+    answer = json.loads((tmp_path / "answer.json").read_bytes())
+    hidden = answer["hidden"]
+    assert answer["halved_at_cycles"] > 1000  # the truth of its life, though the campaign ended long before
     assert [(part["effect"], part["size"], part["unit"]) for part in hidden] == [
         ("torque_zero_shift", 1.2, "Nm"),
         ("shaft_ripple", 0.5, "Nm"),
@@ -66,7 +68,51 @@ def test_a_film_is_in_the_loops_only_where_it_is_asked_for_and_stated(tmp_path: 
     for folder, options in ((tmp_path / "plain", ()), (tmp_path / "film", ("--film",))):
         simulated(folder, *options)
         torques.append(json.loads((folder / "sim-3-dynamic-00000.json").read_bytes())["channels"]["torque_nm"])
-    assert not (tmp_path / "plain" / "answer.json").exists()
+    assert json.loads((tmp_path / "plain" / "answer.json").read_bytes())["hidden"] == []
     (stated,) = json.loads((tmp_path / "film" / "answer.json").read_bytes())["hidden"]
     assert stated["effect"] == "squeeze_film"
     assert max(abs(a - b) for a, b in zip(*torques, strict=True)) > 0.1
+
+
+PLAN = """test,step,kind,pressures_bar,speeds_rpm,frequency_hz,periods,oil_temperature_c,repeats,cycles,pause_hours,minutes
+1,1,stationary_stribeck,4 5,1970 20,,,60.0,2,500.0,0.0,1
+2,1,stationary_stribeck,0,20 1970,,,,1,0.0,0.0,1
+2,2,dynamic_stribeck,1 1.5,0 2000,0.5,2,,1,0.0,0.0,1
+"""
+
+
+def test_a_plan_is_run_on_the_clutch_that_was_simulated_and_never_twice_the_same(tmp_path: Path) -> None:
+    simulated(tmp_path, "--hide", "oil_temperature", "--no-dynamic")
+    plan = tmp_path / "plan.csv"
+    plan.write_text(PLAN, "utf-8")
+    for alternative in ("2", "1", "1"):
+        simulated(tmp_path, "--plan", str(plan), "--alternative", alternative)
+    runs = {path.stem: json.loads(path.read_bytes()) for path in tmp_path.glob("sim-3-planned-*.json")}
+    assert sorted(runs) == [f"sim-3-planned-{name}" for name in (
+        "1-00000", "2-00000", "3-00500", "4-00500", "5-00500", "6-00500"
+    )]  # fmt: skip
+    assert (tmp_path / "sim-3-duty-00500.json").exists()
+    opened, light, warm, again = (runs[f"sim-3-planned-{name}"]["channels"] for name in (
+        "1-00000", "2-00000", "3-00500", "5-00500"
+    ))  # fmt: skip
+    assert max(map(abs, opened["torque_nm"])) < 0.2
+    assert light["time_s"][-1] == pytest.approx(8.1, abs=0.05)
+    assert max(light["speed_rpm"]) == pytest.approx(2000, abs=5)
+    assert warm["speed_rpm"] == [1970.0, 20.0, 1970.0, 20.0]
+    assert warm["oil_temperature_c"] == pytest.approx([60.0] * 4, abs=5)
+    assert warm["torque_nm"] == pytest.approx(again["torque_nm"], rel=0.05)
+    assert warm["torque_nm"] != again["torque_nm"]
+
+
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        ("nothing", "has 0 alternatives, not one of number 1"),
+        (PLAN.replace("4 5", "4 x"), "pressures_bar.1: Input should be a valid number"),
+        ("{}", "is not a plan as the service answers it"),
+    ],
+)
+def test_what_is_no_plan_is_refused_in_a_line(tmp_path: Path, written: str, words: str) -> None:
+    simulated(tmp_path, "--no-dynamic")
+    (tmp_path / "p").write_text(written, "utf-8")
+    assert words in " ".join(simulated(tmp_path, "--plan", str(tmp_path / "p"), code=64).split())

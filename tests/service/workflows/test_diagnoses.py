@@ -9,6 +9,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.diagnosis.extension import Extension, NotFiniteError
+from models.rig.campaign import planned, simulated_clutch
+from models.rig.programme import Ageing
+from models.rig.stationary import Sensor
+from service.run_files.plan_file import planned_tests
+from service.run_files.simulated import simulated_body
 from service.schemas.diagnosis import DiagnosisListed, DiagnosisOut, ModelOut, PlanOut
 from service.web.auth import SCOPES, Scope, make_key
 from service.workflows.replay import replay_clutch
@@ -76,7 +81,9 @@ def test_a_report_is_answered_stored_and_listed(client: TestClient) -> None:
     assert client.get(answer.headers["Location"]).json() == report | {"stale": True}
 
 
-def test_the_plan_of_a_diagnosis_is_a_protocol_that_a_rig_can_run(client: TestClient) -> None:
+def test_the_plan_of_a_diagnosis_is_a_protocol_that_a_rig_can_run(client: TestClient, tmp_path: Path) -> None:
+    """The circle: diagnose, the plan as a file, its tests on the simulated rig, sent, so that a next diagnosis has them.
+    With the real engine tests/documents/test_pages.py goes round it."""
     post_tests(client, 0, 1000, 2000, 3000)
     at = client.post(f"{BASE}/diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"}).headers["Location"]
     plan = client.get(f"{at}/plan")
@@ -89,9 +96,20 @@ def test_the_plan_of_a_diagnosis_is_a_protocol_that_a_rig_can_run(client: TestCl
     table = client.get(f"{at}/plan.csv")
     assert table.headers["content-type"].startswith("text/csv")
     header, row = table.text.splitlines()
-    assert header.split(",")[:4] == ["test", "step", "kind", "pressures_bar"]
-    assert row.startswith("1,1,stationary_stribeck,0 4,95.49 190.99,")
+    assert header.split(",")[:5] == ["test", "choice", "step", "kind", "pressures_bar"]
+    assert row.startswith("1,one of 1 is enough,1,stationary_stribeck,0 4,95.49 190.99,")
     assert client.get(f"{BASE}/diagnoses/unknown/plan").status_code == 404
+
+    (tmp_path / "plan.csv").write_text(table.text, "utf-8")
+    (tmp_path / "plan.json").write_text(plan.text, "utf-8")
+    tests = planned_tests(tmp_path / "plan.csv", 1)
+    assert tests == planned_tests(tmp_path / "plan.json", 1)
+    made = planned(
+        7, tests, clutch=simulated_clutch(7), sensor=Sensor(), ageing=Ageing.CYCLES, cycles=3000, wear=3000.0
+    )
+    sent = [client.post(f"{BASE}/runs", json=simulated_body(run)) for run in made]
+    assert [answer.status_code for answer in sent] == [201] * len(sent)
+    assert client.get(at).json()["stale"]
 
 
 def test_what_is_adopted_moves_every_answer_and_back_again(client: TestClient) -> None:

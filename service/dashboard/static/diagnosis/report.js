@@ -1,7 +1,9 @@
 // @ts-check
 // A finished report in words and tables.
 
+import { clutchPath } from "../shared/api.js";
 import { h, scrolling, svg, table } from "../shared/dom.js";
+import { files } from "../shared/files.js";
 import { cycles, fixed, moment, percent, probability, quantity, significant, withSd, words } from "../shared/format.js";
 import { VERDICTS } from "../shared/state.js";
 import { lifeBars } from "./lifebars.js";
@@ -192,13 +194,18 @@ function where({ baseline }) {
 }
 
 /** @param {DiagnosisOut} diagnosis */
-function advice({ advice: tests = [] }) {
+function advice({ advice: tests = [], clutch_id: clutch, diagnosis_id: name }) {
   if (tests.length === 0) return null;
-  const items = tests.map(({ test, separates }) => {
-    const names = (separates ?? []).map((name) => words(name).toLowerCase()).join(" from ");
-    return h("li", {}, h("b", {}, test), names && h("span", { class: "quiet" }, ` distinguishes ${names}`));
+  const items = tests.map(({ test, separates, narrows }) => {
+    const [cause, other] = separates.map((effect) => words(effect).toLowerCase());
+    const use = narrows
+      ? `leaves ${percent(narrows)} of the uncertainty about the size of ${cause}`
+      : `distinguishes ${cause} from ${other === "baseline" ? "no effect at all" : other}`;
+    return h("li", {}, h("b", {}, test), h("span", { class: "quiet" }, ` ${use}`));
   });
-  return part("The test that would decide", h("ul", {}, items));
+  const one = tests.length > 1 ? h("p", {}, "One of these is enough; the best comes first.") : null;
+  const plan = files(`${clutch}-plan`, `${clutchPath(clutch)}/diagnoses/${name}/plan.csv`);
+  return part("What to test next", one, h("ol", {}, items), h("p", { class: "quiet" }, "As a protocol for the rig: ", plan));
 }
 
 /** @param {DiagnosisOut} diagnosis */
