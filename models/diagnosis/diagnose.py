@@ -3,6 +3,8 @@
 design -> baseline, noise, pooled_fit -> effects, raw_records -> explanations -> validation -> experiments -> report
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from models.diagnosis.campaign import Campaign
@@ -15,15 +17,23 @@ from models.diagnosis.explanations.sizes import sizes_of
 from models.diagnosis.pooled_fit.baseline_fit import IndeterminateError, fit_baseline, missing_for_baseline
 from models.diagnosis.raw_records.evidence import raw_evidence
 from models.diagnosis.report.assemble import insufficient, report_of
+from models.diagnosis.report.isolability import isolability_of
 from models.diagnosis.report.report import Report
 from models.diagnosis.validation.extended_model import validate
 
 
-def diagnose(campaign: Campaign, *, rng: np.random.Generator, without: frozenset[str] = frozenset()) -> Report:
+def diagnose(
+    campaign: Campaign,
+    *,
+    rng: np.random.Generator,
+    without: frozenset[str] = frozenset(),
+    isolability: bool = False,
+) -> Report:
     """What the baseline gets wrong in this campaign, why, and what an extension gains. The same data, the same verdict:
     `rng` only makes the error of a gain and the sample of sizes, each from a stream of its own.
 
-    Effects whose slugs are in `without` are taken out of the catalogue. What data lack is a verdict, `insufficient_data`; an
+    Effects whose slugs are in `without` are taken out of the catalogue. `isolability`: also which causes this design could
+    tell apart. What data lack is a verdict, `insufficient_data`; an
     exception is a bug.
     """
     design = build_design(campaign)
@@ -43,4 +53,5 @@ def diagnose(campaign: Campaign, *, rng: np.random.Generator, without: frozenset
     judgement = revise(judgement, validation.held_out)
     sizes = sizes_of(problem, judgement, of_sizes)
     advice = advise(campaign, problem, *rivals_of(judgement))
-    return report_of(baseline, posterior, judgement, raw, validation, sizes, advice)
+    report = report_of(baseline, posterior, judgement, raw, validation, sizes, advice)
+    return replace(report, isolability=isolability_of(campaign, posterior)) if isolability else report

@@ -22,13 +22,19 @@ def diagnose(
     plan: Annotated[
         Path | None, typer.Option(help="Save the advised tests here as a protocol for the rig, a CSV with a row a step")
     ] = None,
+    isolability: Annotated[
+        bool,
+        typer.Option(
+            "--isolability", help="Show which causes these tests could tell apart, and which test parts the rest"
+        ),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON")] = False,
 ) -> None:
     """Show what the simulation gets wrong about a clutch, name the cause, and show what an extended model gains."""
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=err, transient=True) as progress:
         progress.add_task("diagnosing", total=None)
-        report = diagnosed(service, clutch, adopt=adopt)
+        report = diagnosed(service, clutch, adopt=adopt, isolability=isolability)
     if as_json:
         typer.echo(json.dumps(report, indent=1, ensure_ascii=False))
     elif report["status"] == "finished":

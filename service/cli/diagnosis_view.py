@@ -59,6 +59,8 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
         yield Text("What to test next. One of these is enough; the best comes first:", style="bold")
     for advice in tests:
         yield Text(f"{'- ' if len(tests) > 1 else 'What to test next: '}{advice['test']} ({_use(advice)})")
+    if report["isolability"] is not None:
+        yield from _isolability(report["isolability"])
     for note in report["notes"]:
         yield Text(f"Note: {note}", style="dim")
 
@@ -82,6 +84,28 @@ def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
         evidence = _evidence(candidate["log_evidence_gain"])
         table.add_row(Text(candidate["effect"]), number(candidate["probability"]), evidence, Text(amount))
     return table
+
+
+def _isolability(isolability: Mapping[str, Any]) -> Iterator[RenderableType]:
+    """The pairs that these tests could not tell apart for sure, hardest first, and what they cannot show."""
+    hard = [pair for pair in isolability["pairs"] if not pair["apart"]]
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("could be mistaken", "told apart", "by this test", "then"):
+        table.add_column(name)
+    for pair in hard:
+        before, then = (f"{100 * pair[name]:.0f} %" for name in ("probability", "with_test"))
+        table.add_row(
+            Text(" and ".join(map(_spelt, pair["effects"]))),
+            before,
+            Text(pair["test"] or "no single test parts them"),
+            then,
+        )
+    if hard:
+        yield table
+    sure = len(isolability["pairs"]) - len(hard)
+    yield Text(f"Of {len(isolability['pairs'])} pairs of causes these tests would tell {sure} apart.")
+    if isolability["unseen"]:
+        yield Text(f"These tests cannot show: {', '.join(map(_spelt, isolability['unseen']))}.")
 
 
 def _evidence(gain: float | None) -> str:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from models.diagnosis.extension import Extension
 
 #: What a list does not show.
-_LARGE = ("maps", "loops")
+_LARGE = ("maps", "loops", "isolability")
 
 
 def diagnosis(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str, Any]:

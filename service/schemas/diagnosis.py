@@ -21,6 +21,9 @@ class DiagnosisIn(Schema):
     adopt: Annotated[bool, Field(strict=True)] = Field(
         default=False, description="Whether to adopt the extended model, if there is one"
     )
+    isolability: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="Whether to say which causes these tests could tell apart"
+    )
 
 
 class ModelIn(Schema):
@@ -168,6 +171,28 @@ class VisibleOut(Answer):
     unit: str = Field(description="Its unit")
 
 
+class PairOut(Answer):
+    """Two effects: whether these tests could tell them apart, and the test that would."""
+
+    effects: list[str] = Field(description="Their slugs")
+    probability: Number = Field(
+        description="The probability that either, at twice its visible amplitude, is told from the other"
+    )
+    apart: bool = Field(description="Whether that is sure enough")
+    key: str | None = Field(
+        description="The shortest test that is sure to part them, or the one that helps most; null: none"
+    )
+    test: str | None = Field(description="The same in words")
+    with_test: Number = Field(description="The probability with that test beside these")
+
+
+class IsolabilityOut(Answer):
+    """Which causes these tests could tell apart, from their design alone: before anything is hidden in them."""
+
+    pairs: list[PairOut] = Field(description="The pairs of effects that these tests can show, hardest first")
+    unseen: list[str] = Field(description="The slugs of the effects that these tests cannot show at all")
+
+
 class Axes(Answer):
     """The axes of the residual maps."""
 
@@ -251,6 +276,9 @@ class DiagnosisOut(DiagnosisListed):
 
     maps: MapsOut | None = Field(description="Residual maps; null without a verdict")
     loops: list[LoopTraceOut] = Field(description="Measured friction loops beside both models'")
+    isolability: IsolabilityOut | None = Field(
+        default=None, description="Which causes these tests could tell apart; null where it was not asked for"
+    )
 
 
 DiagnosisPage = page_of("DiagnosisPage", DiagnosisListed, "Diagnoses, newest first.", "The diagnoses of this page")

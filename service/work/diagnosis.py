@@ -34,7 +34,9 @@ _SEED = 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """What is to be diagnosed, by `engine` (module:function): a clutch's runs up to `last_run_key`; and what it may take."""
+    """What is to be diagnosed, by `engine` (module:function): a clutch's runs up to `last_run_key`; and what it may take.
+
+    `isolability`: whether to say which causes its tests could tell apart."""
 
     database: str
     clutch_id: str
@@ -42,6 +44,7 @@ class Task:
     engine: str
     bytes: int
     processor_seconds: int
+    isolability: bool = False
 
 
 def main() -> None:
@@ -69,7 +72,8 @@ def diagnosed(task: Task, say: Callable[[Json], None] = _nothing) -> dict[str, A
     with closing(open_database(task.database)) as database:
         diagnosed_life = read_life(database, task.clutch_id, last_run_key=task.last_run_key, say=say)
         say({"step": "diagnoses"})
-        report = diagnose(diagnosed_life.campaign, rng=np.random.default_rng(_SEED))
+        asked = {"isolability": True} if task.isolability else {}
+        report = diagnose(diagnosed_life.campaign, rng=np.random.default_rng(_SEED), **asked)
         say({"step": "predicts"})
         before, after = before_and_after(database, task.clutch_id, diagnosed_life, report.extension)
     origin = 0.0 if diagnosed_life.life is None else diagnosed_life.life.origin

@@ -15,12 +15,21 @@ from storage.jobs import DIAGNOSIS, JobRow, NewJob
 
 
 def ask(
-    database: Database, clutch_id: str, *, by: str, adopt: bool, request: str, most: int, created_at: str
+    database: Database,
+    clutch_id: str,
+    *,
+    by: str,
+    adopt: bool,
+    request: str,
+    most: int,
+    created_at: str,
+    isolability: bool = False,
 ) -> tuple[str, bool]:
     """Ask for a diagnosis of all runs that are there now; returns its id, and whether it is new.
 
     Where the very same runs are being diagnosed already it is that one. `adopt`: what it finds is adopted in the name of
-    `by`; `request` is the id of the request that asks. Raises NotFoundError, BusyError where `most` wait or run already.
+    `by`; `isolability`: it says which causes its tests could tell apart; `request` is
+    the id of the request that asks. Raises NotFoundError, BusyError where `most` wait or run already.
     """
     with database.writing(of=clutch_id) as connection:
         clutch = records.clutch(connection, clutch_id)
@@ -28,7 +37,8 @@ def ask(
         changed = changes.last_of_history(connection, clutch_id)
         diagnosis_id = diagnoses.running(connection, clutch_id, last_run_key, since=changed)
         job = None if diagnosis_id is None else jobs.get(connection, diagnosis_id)
-        if job is not None and job.state in jobs.OPEN:  # else its end could not be stored
+        same = job is not None and job.arguments["isolability"] >= isolability
+        if job is not None and same and job.state in jobs.OPEN:  # else its end could not be stored
             if adopt and job.arguments["adopt_by"] is None:
                 jobs.set_arguments(connection, job.job_id, job.arguments | {"adopt_by": by})
             return job.job_id, False
@@ -47,7 +57,12 @@ def ask(
             code_version=CODE_VERSION,
         )
         diagnoses.insert(connection, row)
-        arguments = {"last_run_key": last_run_key, "adopt_by": by if adopt else None, "request": request}
+        arguments = {
+            "last_run_key": last_run_key,
+            "adopt_by": by if adopt else None,
+            "isolability": isolability,
+            "request": request,
+        }
         job_row = NewJob(
             job_id=row.diagnosis_id,
             kind=DIAGNOSIS,

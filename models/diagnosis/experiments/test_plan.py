@@ -79,10 +79,10 @@ def advise(
     rivals = [*race, *nearby][: max(len(race), MOST_RIVALS)]
     fits = [rival.fit for rival in rivals]
     evidences = np.array([rival.evidence for rival in rivals], dtype=np.float64)
-    distances = CandidateDistances(problem, (*fits, _bare(fits[0])))
+    distances = CandidateDistances(problem, (*fits, bare(fits[0])))
     before = distances.with_freedom(())
     ranked = []
-    for key, rows in _made(campaign, problem.design, distances).items():
+    for key, rows in trials_of(campaign, problem.design, distances).items():
         chance, other, nats = _brought(before, distances.with_freedom(rows), evidences, len(race))
         if np.isfinite(chance) and nats > LEAST_ADVISED:
             effect, rival = _names(fits[0], fits[other] if len(race) > 1 else None)
@@ -134,11 +134,18 @@ def decided(gained: FloatArray, evidences: FloatArray, freedom: FloatArray) -> f
     after = evidences + freedom
     lead = after[:, None] - after
     rivals = gained[:count, :count] if count > 1 else gained[:1, -1:]
-    needed = np.log(SURE / (1 - SURE))
-    chance = ndtr((lead + rivals - needed) / np.sqrt(1.0 + 2.0 * rivals + (PREDICTION_ERROR * rivals) ** 2))
+    chance = distinguished(rivals, lead)
     if count > 1:
         np.fill_diagonal(chance, 1.0)
     return float(softmax(evidences) @ chance.min(axis=1))
+
+
+def distinguished(nats: FloatArray, lead: FloatArray | float = 0.0) -> FloatArray:
+    """The probability that a candidate, if it is true, is left (SURE) against a rival that is behind by `lead` nats and
+    expected to fall behind by so many `nats` more."""
+    odds = np.log(SURE / (1 - SURE))
+    sd = np.sqrt(1.0 + 2.0 * nats + (PREDICTION_ERROR * nats) ** 2)
+    return np.asarray(ndtr((lead + nats - odds) / sd), dtype=np.float64)
 
 
 def _names(best: Fit, rival: Fit | None) -> tuple[str, str]:
@@ -149,12 +156,12 @@ def _names(best: Fit, rival: Fit | None) -> tuple[str, str]:
     return own[0], next((slug for slug in others if slug not in mine), BASELINE)
 
 
-def _bare(fit: Fit) -> Fit:
+def bare(fit: Fit) -> Fit:
     """Its baseline without the effects."""
     return replace(fit, torque=fit.prediction.torque, effects=())
 
 
-def _made(campaign: Campaign, design: Design, distances: CandidateDistances) -> dict[str, list[list[Gram]]]:
+def trials_of(campaign: Campaign, design: Design, distances: CandidateDistances) -> dict[str, list[list[Gram]]]:
     """By trial what its runs would show, a run each; those that the campaign has a pattern for. Without a thermometer none
     is made at another temperature, without a loop that could be evaluated no loop is predicted."""
     single = {}
@@ -185,11 +192,10 @@ def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[Fit]) -
     added = replace(added, facts=replace(added.facts, reference_temperature=REFERENCE_TEMPERATURE))
     effect = oil_temperature.EFFECT
     usual = replace(fits[0], effects=(FittedEffect(effect=effect, amplitude=effect.prior_sd, shape=(0.0,)),))
-    distances = CandidateDistances(problem, (usual, _bare(fits[0])))
+    distances = CandidateDistances(problem, (usual, bare(fits[0])))
     nats = float(distances.distances([distances.ahead(added)])[0, 1])
     test = f"{TRIALS[_WARM].text}, and oil temperature recorded from now on"
-    odds = np.log(SURE / (1 - SURE))
-    chance = float(ndtr((nats - odds) / np.sqrt(1.0 + 2.0 * nats + (PREDICTION_ERROR * nats) ** 2)))
+    chance = float(distinguished(np.array(nats)))
     steps = steps_of(campaign, _WARM)
     return [Advice(key=_WARM, test=test, effect=shift, other=effect.slug, nats=nats, probability=chance, steps=steps)]
 

@@ -41,6 +41,28 @@ class Visible:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Pair:
+    """Two effects, the probability [0, 1] that either, if it is at work, is told from the other, and whether that is sure.
+    Where it is not: `trial`, the shortest test that is sure to part them, else the one that helps most (a key of
+    `experiments.candidates.TRIALS`; empty where none helps), the `test` in words, and the probability with it."""
+
+    effects: tuple[str, str]
+    probability: float
+    apart: bool
+    trial: str
+    test: str
+    with_trial: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Isolability:
+    """The pairs of effects that a campaign shows, hardest first, and the slugs of those that it cannot show at all."""
+
+    pairs: tuple[Pair, ...]
+    unseen: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Maps:
     """Mean whitened residuals [-] before and after the extension; NaN where nothing was measured.
 
@@ -93,3 +115,5 @@ class Report:
     notes: tuple[str, ...]
     #: Numbers of the engine that a test may want: alarm statistic, its threshold, closure p-values.
     statistics: Mapping[str, float]
+    #: Which causes this design could tell apart, where that was asked for.
+    isolability: Isolability | None = None

@@ -28,7 +28,7 @@ def visible_of(posterior: Posterior) -> tuple[Visible, ...]:
     shows best. Infinite where a shape would be absorbed at any amplitude; effects of which nothing shows are left out."""
     sizes: dict[str, list[float]] = {}
     effects = {column.effect.slug: column.effect for column in posterior.columns}
-    for column, amplitude in zip(posterior.columns, _amplitudes(posterior).tolist(), strict=True):
+    for column, amplitude in zip(posterior.columns, amplitudes_of(posterior).tolist(), strict=True):
         if column.effect.named:
             sizes.setdefault(column.effect.slug, []).append(amplitude * column.effect.scale)
     return tuple(
@@ -44,7 +44,7 @@ def visible_of(posterior: Posterior) -> tuple[Visible, ...]:
     )
 
 
-def _amplitudes(posterior: Posterior) -> FloatArray:
+def amplitudes_of(posterior: Posterior) -> FloatArray:
     """The formula above for each column [m], in SI units."""
     columns, projections = posterior.columns, posterior.null.evidence.screened
     best = max(projected.evidence for projected in projections)

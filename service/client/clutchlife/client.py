@@ -137,10 +137,12 @@ class Client:
 
     # --- diagnoses ---
 
-    def diagnose(self, clutch_id: str, *, adopt: bool = False, wait: float = 600.0) -> Answer:
+    def diagnose(
+        self, clutch_id: str, *, adopt: bool = False, isolability: bool = False, wait: float = 600.0
+    ) -> Answer:
         """Have a clutch diagnosed and wait for the report. Raises DiagnosisFailedError where it failed, TimeoutError where
-        it has not ended after `wait` [s]."""
-        report = diagnosed(self.service, clutch_id, adopt=adopt, wait=wait)
+        it has not ended after `wait` [s]. `isolability`: with it, which causes these tests could tell apart."""
+        report = diagnosed(self.service, clutch_id, adopt=adopt, isolability=isolability, wait=wait)
         if report["status"] != "finished":
             raise DiagnosisFailedError(f"the diagnosis failed: {report['problem']}", {"detail": report["problem"]})
         return report
@@ -176,12 +178,20 @@ class Client:
 
 
 def diagnosed(
-    service: Service, clutch_id: str, *, adopt: bool, wait: float = math.inf, look: Callable[[float], None] = time.sleep
+    service: Service,
+    clutch_id: str,
+    *,
+    adopt: bool,
+    isolability: bool = False,
+    wait: float = math.inf,
+    look: Callable[[float], None] = time.sleep,
 ) -> Answer:
     """The report of a diagnosis that is asked for, once it has ended. Raises TimeoutError after `wait` [s]."""
     address = f"{_clutch(clutch_id)}/diagnoses"
     deadline = time.monotonic() + wait
-    report = service.post(address, _body({"adopt": adopt}), prefer=f"wait={int(min(_WAIT, max(0.0, wait)))}")
+    report = service.post(
+        address, _body({"adopt": adopt, "isolability": isolability}), prefer=f"wait={int(min(_WAIT, max(0.0, wait)))}"
+    )
     while report["status"] == "running":
         if time.monotonic() > deadline:
             raise TimeoutError(f"diagnosis {report['diagnosis_id']} of {clutch_id} has not ended after {wait:g} s")

@@ -14,7 +14,7 @@ from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CE
 if TYPE_CHECKING:  # start-up time: they load the whole diagnosis
     from models.diagnosis.experiments.protocol import Step
     from models.diagnosis.report.lack_of_fit import Misfit
-    from models.diagnosis.report.report import LoopTrace, Maps, Report
+    from models.diagnosis.report.report import Isolability, LoopTrace, Maps, Report
     from models.diagnosis.validation.held_out import Gain
 
 #: Maps and traces are looked at: more digits than these only weigh.
@@ -39,6 +39,7 @@ def empty() -> dict[str, Any]:
         "statistics": {},
         "maps": None,
         "loops": [],
+        "isolability": None,
     }
 
 
@@ -111,7 +112,23 @@ def public(
         "statistics": {name: finite(value) for name, value in report.statistics.items()},
         "maps": None if report.maps is None else _maps(report.maps, origin),
         "loops": [_loop(loop, origin) for loop in report.loops],
+        "isolability": None if report.isolability is None else _isolability(report.isolability),
     }
+
+
+def _isolability(isolability: Isolability) -> dict[str, Any]:
+    pairs = [
+        {
+            "effects": list(pair.effects),
+            "probability": finite(pair.probability),
+            "apart": pair.apart,
+            "key": pair.trial or None,
+            "test": pair.test or None,
+            "with_test": finite(pair.with_trial),
+        }
+        for pair in isolability.pairs
+    ]
+    return {"pairs": pairs, "unseen": list(isolability.unseen)}
 
 
 def _remaining(report: Report, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:

@@ -45,6 +45,7 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
         run_diagnosis.ask,
         by=name_of_caller(request),
         adopt=question.adopt,
+        isolability=question.isolability,
         request=request_id.get(),
         most=context.settings.most_diagnoses,
         created_at=answers.now(),

@@ -64,3 +64,27 @@ def test_a_report_that_says_little_is_shown(report: dict[str, Any]) -> None:
     assert "Too little data" in printed(little)
     report["maps"]["before"] = {"speed_pressure": [[None] * 3] * 2, "pressure_cycles": [[0.0] * 2] * 3}
     assert "·" in printed(report)
+
+
+def test_what_could_be_told_apart_is_shown_where_it_was_asked_for(report: dict[str, Any]) -> None:
+    pair = {
+        "effects": ["hydrodynamic_drag", "torque_zero_shift"],
+        "probability": 0.78,
+        "apart": False,
+        "with_test": 0.98,
+    }
+    sure = {
+        "effects": ["oil_change", "running_in"],
+        "probability": 0.98,
+        "apart": True,
+        "test": None,
+        "with_test": 0.98,
+    }
+    pairs = [pair | {"key": "open_sweep", "test": "stationary test with the clutch open"}, sure | {"key": None}]
+    assert "told apart" not in printed(report)
+    text = printed(report | {"isolability": {"pairs": pairs, "unseen": ["channel_delay"]}})
+    row = next(line for line in text.splitlines() if "hydrodynamic drag and torque zero shift" in line)
+    assert row.split()[-7:-1] == ["test", "with", "the", "clutch", "open", "98"]
+    assert "oil change and running in" not in text
+    assert "Of 2 pairs of causes these tests would tell 1 apart." in text
+    assert "These tests cannot show: channel delay." in text

@@ -1,0 +1,116 @@
+"""Which causes a campaign can tell apart, from its design alone: before anything is hidden in it.
+
+Each effect is thought to be at work at twice the amplitude that the data show with 90 % power (`report.visible`), in its
+most probable shape. What of its change another effect, in whatever of its shapes, cannot imitate beside the baseline is
+
+    λ_ab = min over shapes of b of ½ dᵀ V⁻¹ (1 - P_b) d      [nats]
+
+(`experiments.information`), and what that says of the two is normal as in the plan of tests (`experiments.test_plan`).
+Vibrations are not in the table: they are seen in raw records, where nothing of the rest is.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations, groupby
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.campaign import Campaign
+from models.diagnosis.criteria import SURE
+from models.diagnosis.effects.catalogue import CATALOGUE
+from models.diagnosis.effects.effect import Kind
+from models.diagnosis.effects.fitted_effect import FittedEffect
+from models.diagnosis.effects.grid import Column
+from models.diagnosis.experiments.candidates import TRIALS, runs_of
+from models.diagnosis.experiments.information import CandidateDistances
+from models.diagnosis.experiments.test_plan import bare, distinguished, trials_of
+from models.diagnosis.explanations.posterior import Posterior
+from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.report.report import Isolability, Pair
+from models.diagnosis.report.visible import amplitudes_of
+
+#: The amplitude that is thought to be at work, in visible ones: what `make visible` promises to be seen.
+_TIMES_VISIBLE = 2.0
+
+
+def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
+    """Of the catalogue, which could be told from which."""
+    slugs = [effect.slug for effect in CATALOGUE if effect.kind is not Kind.VIBRATION]
+    grouped = {
+        slug: [(column, float(size)) for column, size in places]
+        for slug, places in groupby(
+            zip(posterior.columns, amplitudes_of(posterior), strict=True), key=lambda place: place[0].effect.slug
+        )
+        if slug in slugs
+    }
+    seen = {slug: shapes for slug, shapes in grouped.items() if any(np.isfinite(size) for _, size in shapes)}
+    null = posterior.null.fit
+    info = posterior.null.evidence.screened[0].info
+    place_of = {id(column): place for place, column in enumerate(posterior.columns)}
+    own = {slug: _likeliest(shapes) for slug, shapes in seen.items()}
+    pairs = []
+    for first, second in combinations(seen, 2):
+        ways = []
+        for true, rival in ((first, second), (second, first)):
+            column, size = own[true]
+            imitation = _best_imitation(info, place_of[id(column)], [place_of[id(c)] for c, _ in seen[rival]], size)
+            other = posterior.columns[imitation[0]]
+            ways.append((_with(null, column, size), _with(null, other, imitation[1])))
+        pairs.append(_pair(campaign, posterior, (first, second), ways))
+    return Isolability(
+        pairs=tuple(sorted(pairs, key=lambda pair: pair.probability)),
+        unseen=tuple(slug for slug in slugs if slug not in seen),
+    )
+
+
+def _likeliest(shapes: Sequence[tuple[Column, float]]) -> tuple[Column, float]:
+    """The most probable shape in which an effect is seen, and the amplitude [SI] that is thought to be at work."""
+    column, size = max((shape for shape in shapes if np.isfinite(shape[1])), key=lambda shape: shape[0].log_weight)
+    return column, _TIMES_VISIBLE * size
+
+
+def _best_imitation(info: FloatArray, true: int, rivals: Sequence[int], size: float) -> tuple[int, float]:
+    """Which of the rival's columns imitates a column of that size best, and at which amplitude."""
+    own = np.maximum(np.diag(info)[rivals], 1e-300)
+    best = int(np.argmax(info[true, rivals] ** 2 / own))
+    return rivals[best], float(size * info[true, rivals[best]] / own[best])
+
+
+def _with(null: Fit, column: Column, amplitude: float) -> Fit:
+    """The baseline's fit with an effect beside it."""
+    amplitude = abs(amplitude) if column.effect.positive else amplitude
+    return replace(bare(null), effects=(FittedEffect(effect=column.effect, amplitude=amplitude, shape=column.shape),))
+
+
+def _pair(campaign: Campaign, posterior: Posterior, effects: tuple[str, str], ways: Sequence[tuple[Fit, Fit]]) -> Pair:
+    """Both ways round, with the campaign and with each test beside it."""
+    now, after = 1.0, dict[str, float]()
+    for true, rival in ways:
+        distances = CandidateDistances(posterior.problem, (true, rival))
+        chance = float(distinguished(distances.distances(())[0, 1]))
+        now = min(now, chance)
+    if now < SURE:
+        for true, rival in ways:
+            distances = CandidateDistances(posterior.problem, (true, rival))
+            for key, rows in trials_of(campaign, posterior.problem.design, distances).items():
+                chance = float(distinguished(distances.distances(rows)[0, 1]))
+                after[key] = min(after.get(key, 1.0), chance)
+    trial = _parting(after, now)
+    return Pair(
+        effects=effects,
+        probability=now,
+        apart=now >= SURE,
+        trial=trial,
+        test=TRIALS[trial].text if trial else "",
+        with_trial=after.get(trial, now),
+    )
+
+
+def _parting(after: Mapping[str, float], now: float) -> str:
+    """The least work that is sure to part two effects, else what helps most; empty where nothing does."""
+    sure = [key for key, chance in after.items() if chance >= SURE]
+    if sure:
+        return min(sure, key=runs_of)
+    best = max(after, key=after.__getitem__, default="")
+    return best if best and after[best] > now else ""
