@@ -14,9 +14,14 @@ alive:
 
     p(T) ∝ t((log T - c - μ)/σ) · Σ w_jqs(T') N(log T; log T', ...),    T > ζ
 
-A clutch of the kind may also take a course that none of them took: three plain ones stand beside theirs. One of another kind
-takes one of all these with an end anywhere, or a plain one: the evidence says how probable that is, and with that
-probability the ended lives say nothing.
+A clutch of the kind may also take a course that none of them took: three plain ones stand beside theirs. Or it follows
+eq. 6: then its own filter knows the end best, and its draws are weighted by the predictive. How probable that is depends on
+the kind: the exact filter knows of every ended life how probably its whole course is eq. 6 with nothing beside it, and the
+share of such lives is the mean of a beta distribution. The clutch's tests do not decide: before a knee they follow it too.
+
+A clutch of another kind takes one of all these courses with an end anywhere, or a plain one, or has the end that its filter
+gives: the evidence says how probable that is, and with that probability the ended lives say nothing. That a clutch has
+outlived the others is part of it.
 
 An end may be uncertain: a life that was declared worn just short of its threshold. Its log T has a deviation, whose square
 the predictive has more in its sum of squares (the expected one). Or it is censored: a life that was taken out at C for
@@ -34,7 +39,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit, gammaincinv, log_ndtr, logsumexp, ndtri
+from scipy.special import gammaincinv, log_ndtr, logsumexp, ndtri
 
 from models.arrays import FloatArray
 from models.prognosis.criteria import (
@@ -48,11 +53,13 @@ from models.prognosis.criteria import (
     FEWEST_ENDED,
     FEWEST_SEVERITIES,
     FEWEST_TESTS,
+    LAWFUL_WORTH,
     MOST_ENDED,
     OTHER_KIND,
     VAGUE,
 )
 from models.prognosis.first_passage import Offset, ends_of_life
+from models.tracking.courses import Course
 from models.tracking.criteria import STEP_SIZE
 from models.tracking.filters.grid import Grid
 from models.tracking.history import later_epochs
@@ -75,6 +82,8 @@ _FARTHEST = 3.0
 _FLATTEST = 0.3
 #: Deviation of x: tests may begin when half of the way is behind.
 _LEVEL_SD = 0.5
+#: Evidence for the kind counts up to this, so that it stays a number.
+_MOST_LOG_ODDS = 50.0
 #: Means, and deviations, that a predictive with censored values is averaged over.
 _NODES = 16
 
@@ -85,7 +94,8 @@ class EndedLife:
     `damage` [t] of its tests, the share of the way to the threshold; the mean energy [J] of its cycles, None where its duty
     does not state it.
 
-    `deviation` is that of the logarithm of an uncertain end; of a `censored` life `end` is when it was taken out before it.
+    `deviation` is that of the logarithm of an uncertain end; of a `censored` life `end` is when it was taken out before it;
+    `lawful` is the probability that its whole course is eq. 6 with nothing beside it.
     """
 
     end: float
@@ -95,6 +105,7 @@ class EndedLife:
     energy: float | None = None
     deviation: float = 0.0
     censored: bool = False
+    lawful: float = 0.0
 
     @property
     def final_pace(self) -> float:
@@ -124,6 +135,7 @@ class EndedLife:
             "energy": self.energy,
             "deviation": self.deviation,
             "censored": self.censored,
+            "lawful": self.lawful,
         }
 
     @classmethod
@@ -137,15 +149,17 @@ class EndedLife:
             energy=stored["energy"],
             deviation=stored["deviation"],
             censored=stored["censored"],
+            lawful=stored["lawful"],
         )
 
 
 def ended_life(
-    progress: FloatArray, values: FloatArray, end: float, *, initial: float, fraction: float
+    progress: FloatArray, values: FloatArray, end: float, *, initial: float, fraction: float, lawful: float = 0.0
 ) -> EndedLife | None:
     """What a life that ended at ζ = `end` > 0 teaches, by its tests at progress [n] >= 0 with values [n].
 
-    `initial` > 0 is the value when new. None where it was measured at fewer than FEWEST_TESTS different ζ before its end.
+    `initial` > 0 is the value when new, `lawful` as `new_and_lawful` has it. None where it was measured at fewer than
+    FEWEST_TESTS different ζ before its end.
     """
     before = np.flatnonzero(progress < end)
     at, where = np.unique(progress[before], return_inverse=True)
@@ -153,13 +167,19 @@ def ended_life(
         return None
     mean = np.bincount(where, weights=values[before]) / np.bincount(where)
     damage = (1.0 - mean / initial) / (1.0 - fraction)
-    return EndedLife(end=end, fraction=fraction, progress=tuple(at.tolist()), damage=tuple(damage.tolist()))
+    return EndedLife(
+        end=end, fraction=fraction, progress=tuple(at.tolist()), damage=tuple(damage.tolist()), lawful=lawful
+    )
 
 
-def value_when_new(history: Sequence[Measurement]) -> float:
-    """ξ0 of a life by its measurements in order, as the exact filter has it in the mean under the weak prior."""
+def new_and_lawful(history: Sequence[Measurement]) -> tuple[float, float]:
+    """Of a life by its measurements in order, as the exact filter has it under the weak prior: ξ0 in the mean, and the
+    probability that its course is eq. 6 without a discrepancy."""
     drawn = _drawn(history)
-    return float(drawn.weight @ drawn.initial)
+    lawful = drawn.course == Course.EQ_6
+    if drawn.discrepancy is not None:
+        lawful &= drawn.discrepancy.size == 0.0
+    return float(drawn.weight @ drawn.initial), float(drawn.weight @ lawful)
 
 
 def _drawn(history: Sequence[Measurement]) -> Posterior:
@@ -197,12 +217,40 @@ def representative(lives: Sequence[EndedLife]) -> list[EndedLife]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kin:
-    """The end of life as lives of the kind have it: a sample [n] with weights [n] that sum to one; and the probability that
-    the clutch is of their kind."""
+    """What ended lives say of a clutch's end of life, by `lawful`, the share of their kind that follows eq. 6.
+
+    If a clutch takes one of their courses: `ends` [n] with weights [n] that sum to one, and the `log_odds` of its tests that
+    it is of their kind. If it follows eq. 6 its own filter knows the end, and `predictive` is that of log(T/`centre`).
+    """
 
     ends: FloatArray
     weight: FloatArray
-    probability: float
+    log_odds: float
+    lawful: float
+    predictive: "_Predictive"
+    centre: float
+
+    def together(self, own: FloatArray, weight: FloatArray, as_of: float) -> tuple[FloatArray, FloatArray]:
+        """The end of life as a sample with its weights, from a filter's `own` ends [n] with weights [n] that sum to one.
+
+        It holds these as they are (all of those behind `as_of`), weighted by the predictive, and `ends`. How well the
+        filter's ends agree with the predictive, against an end anywhere, is evidence that the clutch is of the kind.
+        """
+        ahead = own > as_of
+        near = ahead & np.isfinite(own)
+        agreeing = np.zeros(own.size)
+        agreeing[near] = weight[near] * np.exp(self.predictive.log_density(np.log(own[near] / self.centre)))
+        agreed, left = float(agreeing.sum()), float(weight[ahead].sum())
+        by_law = self.lawful * _ANYWHERE * agreed / left if agreed > 0.0 else 0.0
+        by_course = (1.0 - self.lawful) * math.exp(min(self.log_odds, _MOST_LOG_ODDS))
+        odds = (by_law + by_course) * (1.0 - OTHER_KIND) / OTHER_KIND
+        of_kind = odds / (1.0 + odds)
+        shared = left * of_kind / (by_law + by_course)
+        parts = [np.where(ahead, 1.0 - of_kind, 1.0) * weight, shared * by_course * self.weight]
+        if by_law > 0.0:
+            parts.insert(1, shared * by_law * agreeing / agreed)
+            return np.concatenate([own, own, self.ends]), np.concatenate(parts)
+        return np.concatenate([own, self.ends]), np.concatenate(parts)
 
 
 def as_its_kind(
@@ -248,14 +296,20 @@ def _as_its_kind(
         return None
     log_anywhere = np.linspace(earliest, earliest + _ANYWHERE, _ENDS)
     others = decline.nodes(log_anywhere, _plain_courses(decline.progress / np.exp(log_anywhere)[:, None]))
-    log_prior = of_ends.log_density(log_end - centre)
-    log_prior -= logsumexp(log_prior)
+    step = log_end[1] - log_end[0]
+    log_prior = of_ends.log_density(log_end - centre) + math.log(step)
     log_odds = logsumexp(kin.log_evidence + log_prior[:, None, None]) - math.log(pace.size)
-    along = logsumexp(kin.log_evidence) + math.log((log_end[1] - log_end[0]) / _ANYWHERE) - math.log(pace.size)
+    anywhere = logsumexp(kin.log_evidence) + math.log(step / _ANYWHERE) - math.log(pace.size)
     beside = logsumexp(others.log_evidence) - math.log(_ENDS * others.log_evidence.shape[2])
-    log_odds -= np.logaddexp(along, beside) - math.log(2.0)
-    log_odds += math.log((1.0 - OTHER_KIND) / OTHER_KIND)
-    return Kin(ends=np.exp(places), weight=stated / stated.sum(), probability=float(expit(log_odds)))
+    log_odds -= np.logaddexp(anywhere, beside) - math.log(2.0)
+    return Kin(
+        ends=np.exp(places),
+        weight=stated / stated.sum(),
+        log_odds=float(log_odds),
+        lawful=(LAWFUL_WORTH[0] + sum(life.lawful for life in courses)) / (sum(LAWFUL_WORTH) + len(courses)),
+        predictive=of_ends,
+        centre=math.exp(centre),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -403,19 +457,22 @@ class _Predictive:
     beyond: FloatArray
 
     def log_density(self, values: FloatArray) -> FloatArray:
-        """Log density at values [n], up to a constant."""
+        """Log density at values [n]."""
         if self.beyond.size:
             return self._averaged(values)
         scale, freedom = math.sqrt(self.rate / self.shape * (1.0 + 1.0 / self.precision)), 2.0 * self.shape
         deviations = (values - self.mean) / scale
-        return np.asarray(-0.5 * (freedom + 1.0) * np.log1p(deviations**2 / freedom))
+        height = math.lgamma(0.5 * freedom + 0.5) - math.lgamma(0.5 * freedom)
+        height -= 0.5 * math.log(math.pi * freedom) + math.log(scale)
+        return np.asarray(height - 0.5 * (freedom + 1.0) * np.log1p(deviations**2 / freedom))
 
     def _averaged(self, values: FloatArray) -> FloatArray:
         """Over means and deviations, evenly by their probability, each weighted by what lies beyond."""
         even = (np.arange(_NODES) + 0.5) / _NODES
         deviation = np.repeat(np.sqrt(self.rate / gammaincinv(self.shape, even)), _NODES)
         mean = self.mean + deviation / math.sqrt(self.precision) * np.tile(ndtri(even), _NODES)
-        log_weight = log_ndtr((mean - self.beyond[:, None]) / deviation).sum(axis=0) - np.log(deviation)
+        log_weight = log_ndtr((mean - self.beyond[:, None]) / deviation).sum(axis=0)
+        log_weight -= logsumexp(log_weight) + np.log(deviation) + 0.5 * math.log(2.0 * math.pi)
         off = (values[:, None] - mean) / deviation
         return np.asarray(logsumexp(log_weight - 0.5 * off**2, axis=1))
 

@@ -40,23 +40,14 @@ def stated_end(
     """
     ends = ends_of_life(posterior, fraction, offset=offset, horizon=horizon)
     ends = widened(ends, posterior.weight, as_of=as_of, horizon=horizon, power=power)
-    behind = ends <= as_of
-    passed = float(posterior.weight[behind].sum())
+    passed = float(posterior.weight[ends <= as_of].sum())
     kin = None
     if ended and as_of > 0.0 and passed < 0.5:
         kin = as_its_kind(tests, as_of, ended, _added(posterior, tests, offset))
     if kin is None:
         return StatedEnd(ends=ends, weight=posterior.weight, lives=0)
-    return StatedEnd(
-        ends=np.concatenate([ends, kin.ends]),
-        weight=np.concatenate(
-            [
-                np.where(behind, 1.0, 1.0 - kin.probability) * posterior.weight,
-                (1.0 - passed) * kin.probability * kin.weight,
-            ]
-        ),
-        lives=sum(not life.censored for life in ended),
-    )
+    ends, weight = kin.together(ends, posterior.weight, as_of)
+    return StatedEnd(ends=ends, weight=weight, lives=sum(not life.censored for life in ended))
 
 
 def _added(posterior: Posterior, tests: Sequence[Measurement], offset: Offset | None) -> FloatArray | None:

@@ -6,17 +6,32 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.special import log_ndtr
+from scipy.special import expit, log_ndtr
 from scipy.stats import multivariate_normal
 
 from models.arrays import FloatArray
+from models.degradation import general_order
+from models.degradation.general_order import Degradation, first_passage
 from models.prognosis import ended_lives
-from models.prognosis.criteria import COURSE_SIZE_SD, VAGUE
-from models.prognosis.ended_lives import EndedLife, Kin, as_its_kind, declared_end, ended_life, representative
+from models.prognosis.criteria import COURSE_SIZE_SD, OTHER_KIND, VAGUE
+from models.prognosis.ended_lives import (
+    EndedLife,
+    Kin,
+    as_its_kind,
+    declared_end,
+    ended_life,
+    new_and_lawful,
+    representative,
+)
 from models.prognosis.first_passage import weighted_quantiles
+from models.prognosis.scoring import crps_of_sample
+from models.prognosis.stated_end import stated_end
 from models.tracking.criteria import STEP_SIZE
+from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
+from models.tracking.prior import weak
 
+GRID = Grid()
 ENDS = 1_000.0 * np.exp(0.2 * np.array([-1.5, -1.0, -0.6, -0.3, 0.0, 0.1, 0.4, 0.7, 1.1, 1.6]))
 
 #: The share of the way to the threshold over the share of life.
@@ -69,6 +84,11 @@ def quantiles(kin: Kin) -> list[float]:
     return weighted_quantiles(kin.ends, kin.weight, (0.05, 0.5, 0.95)).tolist()
 
 
+def of_kind(kin: Kin) -> float:
+    """The probability that a clutch that takes one of their courses is of the kind."""
+    return float(expit(kin.log_odds + math.log((1.0 - OTHER_KIND) / OTHER_KIND)))
+
+
 @pytest.mark.parametrize("until", [0.4, 0.6, 0.8])
 def test_a_knee_that_the_others_had_is_expected_before_its_first_sign(until: float) -> None:
     kin = said(measured(1_200.0, until), lives())
@@ -76,7 +96,7 @@ def test_a_knee_that_the_others_had_is_expected_before_its_first_sign(until: flo
     assert low < 1_200.0 < high
     assert 1_050.0 < middle < 1_250.0  # between their median and its own course: the ends count too
     assert high / low < 1.7
-    assert kin.probability > 0.9
+    assert of_kind(kin) > 0.9
 
 
 def test_the_course_says_more_than_where_the_others_ended() -> None:
@@ -98,8 +118,8 @@ def test_two_ended_lives_count_and_one_or_those_taken_out_do_not() -> None:
 def test_a_clutch_that_wears_otherwise_is_hardly_of_the_kind() -> None:
     """It falls at once as none of them did: to a half by a sixth of their shortest life."""
     tests = measured(125.0, 0.9, slowing)
-    assert said(tests, lives()).probability < 0.1
-    assert said(tests, [replace(each.in_unit(7.0)) for each in lives(slowing)]).probability > 0.9
+    assert of_kind(said(tests, lives())) < 0.1
+    assert of_kind(said(tests, [each.in_unit(7.0) for each in lives(slowing)])) > 0.9
 
 
 def test_a_declared_step_of_the_level_is_no_wear() -> None:
@@ -107,6 +127,97 @@ def test_a_declared_step_of_the_level_is_no_wear() -> None:
     plain, stepped = (quantiles(said(measured(1_100.0, 0.85, step=step), lives())) for step in (0.0, 0.02))
     assert stepped[1] == pytest.approx(plain[1], rel=0.1)
     assert stepped[0] < 1_150.0 < stepped[2]
+
+
+def lawful(end: float, until: float, seed: int) -> list[Measurement]:
+    """A life that follows eq. 6, of a kind that does: what is lost and how fast scatter from life to life."""
+    rng = np.random.default_rng(seed)
+    change, scale = -0.075 * math.exp(0.05 * rng.standard_normal()), 0.5 * math.exp(0.2 * rng.standard_normal())
+    law = Degradation(initial=0.1, change=change, scale=scale, exponent=0.7)
+    stretch = end / float(first_passage(0.05, law))
+    shares = np.arange(0.0, until + 1e-9, 1.0 / 30.0) * end
+    values = general_order.value(shares / stretch, law) * (1.0 + 0.003 * rng.standard_normal(shares.size))
+    return [
+        Measurement(progress=x, value=y, variance=0.0) for x, y in zip(shares.tolist(), values.tolist(), strict=True)
+    ]
+
+
+def taught(tests: list[Measurement], end: float) -> EndedLife:
+    initial, share = new_and_lawful(tests)
+    progress, values = (np.array(column) for column in zip(*((t.progress, t.value) for t in tests), strict=True))
+    life = ended_life(progress, values, end, initial=initial, fraction=0.5, lawful=share)
+    assert life is not None
+    return life
+
+
+@pytest.fixture(scope="module")
+def eq_6_kind() -> list[EndedLife]:
+    return [taught(lawful(end, 1.0, seed), end) for seed, end in enumerate(ENDS)]
+
+
+def test_whole_courses_tell_a_kind_that_follows_eq_6_from_one_with_knees(eq_6_kind: list[EndedLife]) -> None:
+    assert np.mean([life.lawful for life in eq_6_kind]) > 0.8
+    assert max(taught(measured(end, 1.0, seed=3), end).lawful for end in ENDS[:3]) < 0.1
+
+
+def mean_crps(stage: float, ended_by: list[EndedLife]) -> float:
+    """Of lives of eq. 6 at a share of them, in lives."""
+    found = []
+    for seed, end in enumerate((800.0, 1_000.0, 1_300.0), start=20):
+        tests = lawful(end, stage, seed)
+        state = GRID.from_history(weak(tests[0], falling=True), tests)
+        posterior = GRID.posterior(state, 500, np.random.default_rng(seed))
+        as_of = tests[-1].progress
+        stated = stated_end(posterior, fraction=0.5, as_of=as_of, horizon=1e6, ended=ended_by, tests=tests)
+        assert stated.weight.sum() == pytest.approx(1.0)
+        found.append(crps_of_sample(np.minimum(stated.ends, 1e6), stated.weight, end) / end)
+    return float(np.mean(found))
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 10])
+def test_ended_lives_of_its_kind_help_and_late_in_a_life_do_not_spoil_what_its_own_tests_say(
+    eq_6_kind: list[EndedLife], count: int
+) -> None:
+    some = [eq_6_kind[index] for index in np.linspace(0, 9, count).round().astype(int).tolist()]
+    assert mean_crps(0.4, some) < 0.8 * mean_crps(0.4, [])
+    assert mean_crps(0.8, some) < 1.3 * mean_crps(0.8, [])
+
+
+@pytest.mark.parametrize("longer", [0.2, 4.0])
+def test_ended_lives_of_another_kind_do_not_move_the_end_once_its_own_tests_speak(
+    eq_6_kind: list[EndedLife], longer: float
+) -> None:
+    """The interval at 80 % of life."""
+    tests = lawful(1_000.0, 0.8, 21)
+    state = GRID.from_history(weak(tests[0], falling=True), tests)
+    posterior, as_of = GRID.posterior(state, 500, np.random.default_rng(21)), tests[-1].progress
+    stated_by = []
+    for others in ([life.in_unit(1.0 / longer) for life in eq_6_kind], []):
+        stated = stated_end(posterior, fraction=0.5, as_of=as_of, horizon=1e6, ended=others, tests=tests)
+        stated_by += weighted_quantiles(np.minimum(stated.ends, 1e6), stated.weight, (0.05, 0.5, 0.95)).tolist()
+    assert stated_by[:3] == pytest.approx(stated_by[3:], rel=0.02)
+
+
+def test_what_is_behind_stays_behind_and_weights_sum_to_one() -> None:
+    kin = said(measured(1_100.0, 0.6), lives())
+    own, weight = np.array([600.0, 900.0, 1_200.0, np.inf]), np.array([0.1, 0.3, 0.4, 0.2])
+    for share in (0.0, 0.9):
+        ends, given = replace(kin, lawful=share).together(own, weight, 660.0)
+        assert given.sum() == pytest.approx(1.0)
+        assert given[ends <= 660.0].sum() == pytest.approx(0.1)
+
+
+def test_a_clutch_that_has_outlived_all_of_them_by_far_is_not_of_their_kind() -> None:
+    tests = measured(8_000.0, 0.6)
+    assert of_kind(said(tests, lives())) < 0.1
+
+
+def test_the_predictive_is_a_density_with_censored_ends_and_without() -> None:
+    at = np.linspace(-6.0, 6.0, 4_001)
+    values = np.array([-0.2, 0.0, 0.1, 0.3])
+    for exact in (np.ones(4, dtype=bool), np.array([True, True, True, False])):
+        density = np.exp(ended_lives._predictive(values, np.zeros(4), exact, VAGUE, (1.0, 0.03)).log_density(at))
+        assert density.sum() * (at[1] - at[0]) == pytest.approx(1.0, abs=0.01)
 
 
 def test_it_is_alive_now() -> None:
