@@ -135,7 +135,7 @@ def child(script: str, *arguments: object) -> Iterator[tuple["subprocess.Popen[s
             process.kill()
 
 
-#: The revision of the first release; its code knows no other, and `later_step` gives it one more.
+#: The revision of the first release; `later_step` gives the newest one more.
 OLD = "s0001_first_tables"
 _LATER = Path(__file__).parent / "later_step"
 

@@ -9,7 +9,9 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
-from storage import channels, clutches, diagnoses
+from models.prognosis.ended_lives import EndedLife
+from storage import assumptions, channels, clutches, diagnoses
+from storage.encoding.json_text import to_text
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseTooNew, StorageUnavailable
 from storage.engine.integrity import other_schema
@@ -87,12 +89,27 @@ def test_an_older_file_is_brought_up_and_keeps_what_it_holds(tmp_path: Path, mon
     with closing(sqlite3.connect(path)) as connection:
         assert "later" not in {row[1] for row in connection.execute("PRAGMA table_info(clutch)")}
     with closing(open_database(f"sqlite:///{path}")) as new, new.writing() as connection:
-        assert migrations.current(connection) == migrations.head() == "s0002_later"
+        assert migrations.current(connection) == migrations.head() == "s9000_later"
         (row,) = connection.exec_driver_sql("SELECT clutch_id, later FROM clutch").fetchall()
         assert tuple(row) == (CLUTCH, None)
         diagnoses.insert(connection, new_diagnosis(0))
         assert diagnoses.running(connection, CLUTCH, 1) == "d0"
     assert integrity(path) == ["ok"]
+
+
+def test_ended_lives_that_were_stored_before_they_had_a_law_can_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = old_database(tmp_path, monkeypatch)
+    ended = {"end": 9e3, "fraction": 0.5, "progress": [0.0, 4e3], "damage": [0.0, 0.3], "energy": None}
+    ended |= {"deviation": 0.0, "censored": False}
+    content = to_text({"clutches": 3, "ended": [ended], "censored": [ended | {"censored": True}]})
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("INSERT INTO fleet_prior VALUES ('{}', 1, '', '', '[]', ?, '1.0.0')", (content,))
+    with closing(open_database(f"sqlite:///{path}")) as database, database.reading() as connection:
+        (row,) = assumptions.current_fleet_priors(connection)
+    lives = [EndedLife.from_dict(life) for name in ("ended", "censored") for life in row.content[name]]
+    assert [life.to_dict() for life in lives] == [ended | {"lawful": 0.0}, ended | {"lawful": 0.0, "censored": True}]
 
 
 def test_steps_are_one_line_and_named_after_their_files() -> None:

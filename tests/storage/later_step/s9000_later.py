@@ -1,10 +1,10 @@
-"""A step as one after the first would be."""
+"""A step as one after the last would be."""
 
 import sqlalchemy as sa
 from alembic import op
 
-revision = "s0002_later"
-down_revision: str | None = "s0001_first_tables"
+revision = "s9000_later"
+down_revision: str | None = "s0002_lawful_lives"
 
 
 def upgrade() -> None:
