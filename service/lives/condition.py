@@ -16,7 +16,7 @@ from service.columns import whole
 from service.errors import Notice
 from service.lives.criteria import MAX_LINE_POINTS, NEAR_LIMIT, SOON
 from service.lives.history import WORN, Event, Series, date_of
-from service.lives.payloads import ENDED, INSUFFICIENT
+from service.lives.payloads import ENDED, INSUFFICIENT, interval_in_words
 
 #: The states of a clutch after NAMUR NE 107; the first that holds is its state.
 STATES = FAILURE, MAINTENANCE, CHECK, OUT_OF_SPECIFICATION, NORMAL = (
@@ -57,11 +57,11 @@ RANK_UNKNOWN = 2 * HORIZON
 
 
 def rank_of(summary: Mapping[str, Any]) -> float:
-    """Where a clutch comes in a list: the fewer cycles remain, the earlier."""
+    """Where a clutch comes in a list: the fewer cycles are left with 95 %, held runs considered, the earlier."""
     if summary.get("status", INSUFFICIENT) == INSUFFICIENT:
         return RANK_UNKNOWN
-    median = summary["remaining_cycles"]["0.5"]
-    return HORIZON if median is None else float(median)
+    bound = lower_bound(summary["at_least"], (summary.get("with_held") or {}).get(SHOWN))
+    return HORIZON if bound is None else bound
 
 
 def beside_held(
@@ -110,7 +110,7 @@ def _held_warning(payload: Mapping[str, Any], held: Mapping[str, Any]) -> dict[s
     elif held["status"] == REACHED:
         message = f"{runs}: with them the end of life would be reached"
     else:
-        message = f"{runs}: with them {_interval_in_words(remaining)} cycles would remain"
+        message = f"{runs}: with them {interval_in_words(remaining)} cycles would remain"
     return {"code": HELD_RUNS, "message": message}
 
 
@@ -122,14 +122,6 @@ def held_notices(count: int) -> list[Notice]:
 def held_in_words(count: int) -> str:
     """How many runs are held, as a clause."""
     return "1 run is held and does not count" if count == 1 else f"{count} runs are held and do not count"
-
-
-def _interval_in_words(remaining: Mapping[str, float | None]) -> str:
-    low, median, high = (remaining[quantile] for quantile in ("0.05", "0.5", "0.95"))
-    if median is None:
-        return "an unknown number of" if low is None else f"at least {low:,.0f}"
-    upper = f"over {HORIZON:,.0f}" if high is None else f"{high:,.0f}"
-    return f"{median:,.0f} (90 %: {low:,.0f} to {upper})"
 
 
 def state_of(summary: Mapping[str, Any], *, disputed: bool, silent: str | None = None) -> dict[str, str]:

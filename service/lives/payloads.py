@@ -32,6 +32,8 @@ OFF_TRACK = "off_track"
 NOT_EQ_6 = "not_eq6"
 #: The warning of a prediction whose forerunners held too few of the tests since.
 MISSED_FORECASTS = "missed_forecasts"
+#: The warning of an answer that another filter's median lies outside of.
+FILTERS_DISAGREE = "filters_disagree"
 #: Warnings of a run in its clutch's history, written again where the history changes: it arrived after a run of more cycles,
 #: its pressures or its oil temperature are not those of the first test, its mean COF is not what those before it predict.
 LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE = "late_arrival", "other_pressures", "other_oil_temperature"
@@ -60,6 +62,28 @@ def missed(back_cast: BackCast) -> list[Notice]:
         f"ten are meant to be: remaining life is stated wider (ratios to its median, to the power {back_cast.widening:.2g})"
     )
     return [Notice(code=MISSED_FORECASTS, message=message)]
+
+
+def filters_disagree(answers: Mapping[str, Mapping[str, Any]]) -> list[Notice]:
+    """The warning where a filter's median lies outside another's 90 % interval, of predictions by their method."""
+    known = {m: a["remaining_cycles"] for m, a in answers.items() if a["status"] not in (INSUFFICIENT, ENDED)}
+    ends = [[math.inf if given[q] is None else given[q] for q in ("0.05", "0.5", "0.95")] for given in known.values()]
+    if all(low <= median <= high for low, _, high in ends for _, median, _ in ends):
+        return []
+    said = "; ".join(f"{interval_in_words(given)} by {method}" for method, given in known.items())
+    message = (
+        f"two filters disagree about the cycles that remain: {said}. Plan with the lowest of them, and test again soon"
+    )
+    return [Notice(code=FILTERS_DISAGREE, message=message)]
+
+
+def interval_in_words(remaining: Mapping[str, float | None]) -> str:
+    """A median of remaining cycles with its 90 % interval."""
+    low, median, high = (remaining[quantile] for quantile in ("0.05", "0.5", "0.95"))
+    if median is None:
+        return "an unknown number of" if low is None else f"at least {low:,.0f}"
+    upper = f"over {HORIZON:,.0f}" if high is None else f"{high:,.0f}"
+    return f"{median:,.0f} (90 %: {low:,.0f} to {upper})"
 
 
 def off_track(posterior: Posterior, measurements: Sequence[Measurement], prior: Prior) -> list[Notice]:

@@ -25,7 +25,7 @@ WITHIN = (0.0, 1e3, 1e4)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Totals:
-    """Clutches, archived ones too; how many of those in use have at most so many remaining cycles (the median); runs, and
+    """Clutches, archived ones too; how many of those in use have at most so many cycles left with 95 %; runs, and
     how many of them are held; ended lives that the fleets' priors know of; diagnoses that wait or run."""
 
     clutches: int
@@ -119,9 +119,9 @@ def totals(database: Database, choice: Choice) -> dict[str, Any]:
 
 
 def _round_above(row: ClutchRow) -> float:
-    """1, 2 or 5 times a power of ten, not below the upper end of a clutch's interval, or its median where that is open."""
+    """1, 2 or 5 times a power of ten, not below the upper end of a clutch's interval, or what is known of it."""
     quantiles = row.summary["remaining_cycles"]
-    end = row.rank if quantiles["0.95"] is None else max(row.rank, quantiles["0.95"])
+    end = max(row.rank, *(end for end in (quantiles["0.5"], quantiles["0.95"]) if end is not None), 1.0)
     unit = 10.0 ** math.floor(math.log10(end))
     return next(step * unit for step in (1, 2, 5, 10) if step * unit >= end)
 

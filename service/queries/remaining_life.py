@@ -8,12 +8,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from sqlalchemy import Connection
+
 from service import records, stored_runs
 from service.errors import NotFoundError, unknown_clutch
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.condition import beside_held
 from service.lives.outlook import Evidence, measured_life, with_held
-from service.lives.payloads import ended
+from service.lives.payloads import ended, filters_disagree, notice_items
 from service.lives.quantities.ends import criteria_answer, criterion_end
 from service.lives.quantities.measured import (
     SLOPE_SPEEDS,
@@ -62,6 +64,7 @@ def remaining_life(
             if pressure_bar is None
             else None
         )
+        disagree = [] if pressure_bar is not None else _disagreement(connection, clutch_id, at_cycles)
         carried_on = pressure_bar is None and at_cycles is None
         state = records.state(connection, clutch_id, carried=carried_on) if stored is None else None
     head = {
@@ -79,8 +82,17 @@ def remaining_life(
     else:
         payload = _predicted(state, method, pressure_bar, at_cycles)
         among = _with_held(database, state, method, pressure_bar) if state.held and now else None
+    payload = {**payload, "warnings": [*payload["warnings"], *disagree]}
     answer = head | payload | beside_held(payload, summary, among)
     return answer | {"criteria": _criteria(payload)}
+
+
+def _disagreement(connection: Connection, clutch_id: str, at_cycles: float | None) -> list[dict[str, Any]]:
+    """The warning where the filters that are carried along a life disagree about the remaining life by mean COF."""
+    stored = {
+        method: results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles) for method in CARRIED
+    }
+    return notice_items(filters_disagree({method: row.payload for method, row in stored.items() if row is not None}))
 
 
 def _predicted(state: ClutchState, method: str, pressure_bar: float | None, at_cycles: float | None) -> dict[str, Any]:
@@ -168,9 +180,12 @@ def life_by_criteria(
         row = records.clutch(connection, clutch_id)
         state = records.state(connection, clutch_id)
         evidence = stored_runs.evidence(connection, clutch_id)
+        plain = quantity is None and life is None and pressure_bar is None
+        disagree = _disagreement(connection, clutch_id, at_cycles) if plain else []
     request = _Request(method=method, quantity=quantity, criterion=criterion, pressure_bar=pressure_bar)
     chosen = chosen_life(state, life, at_cycles)
     answer = _by_criteria(state, chosen, evidence, request)
+    answer["warnings"] = [*answer["warnings"], *disagree]
     now = chosen.number == chosen.of and (at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf))
     among = None
     if state.held and now:

@@ -81,17 +81,12 @@ def _replacement(spool: Spool, entry: Entry) -> str:
 
 
 def _warn_of_others(spool: Spool, digests: set[str]) -> None:
-    """One line where the spool holds other runs of the clutch than those that were just given."""
+    """One line where other runs of the clutch wait than those that were just given; refusals were said when they came."""
     others = [entry for entry in spool.waiting() if entry.digest not in digests]
-    refused = len([entry for entry in spool.refused() if entry.digest not in digests])
-    parts = []
     if others:
         oldest = min(entry.since for entry in others)
-        parts.append(f"{len(others)} other runs of {spool.clutch_id} wait since {oldest} and are sent too")
-    if refused:
-        parts.append(f"{refused} were refused and are not sent")
-    if parts:
-        say(f"{', '.join(parts)}: see clutchlife spool list")
+        count = "1 other run waits" if len(others) == 1 else f"{len(others)} other runs wait"
+        say(f"{count} for {spool.clutch_id} since {oldest} and will be sent too: see clutchlife spool list")
 
 
 def _parameters(file: manifest.RunFile, kind: str | None, cycles: float | None, *, by_rig: bool) -> dict[str, str]:

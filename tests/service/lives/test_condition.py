@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from models.prognosis.criteria import QUANTILES
-from service.lives.condition import STATES, bound_in_words, state_of, top_line
+from service.lives.condition import STATES, bound_in_words, rank_of, state_of, top_line
+from service.lives.payloads import filters_disagree
 from service.queries import clutch_list, degradation, series
 from service.queries.planned_duty import planned_life
 from service.queries.remaining_life import life_by_criteria, remaining_life, rows
@@ -270,3 +271,28 @@ def test_a_clutch_that_shudders_is_no_longer_normal(tmp_path: Path) -> None:
     print(states)
     assert states[0]["name"] == "normal"
     assert states[1]["name"] in ("failure", "maintenance")
+
+
+def test_lists_sort_by_the_bound_that_they_show_first() -> None:
+    """Sorted by the median, a clutch with 300 certain cycles stood below one with 4,000."""
+    sure, unsure = (
+        {"status": "predicted", "at_least": low, "remaining_cycles": {"0.5": median}, "with_held": held}
+        for low, median, held in ((4000.0, 5000.0, None), (4500.0, 9000.0, {"particle": {"at_least": 300.0}}))
+    )
+    assert rank_of(unsure) == 300.0 < rank_of(sure) == 4000.0
+
+
+@pytest.mark.parametrize(
+    ("other", "warns"),
+    [((5000, 9000, 30000), False), ((9000, 20000, None), True), ((4000, None, None), True), ((1, 4999, 20000), True)],
+)
+def test_two_filters_of_which_one_median_is_outside_the_other_interval_warn(
+    other: tuple[float | None, ...], warns: bool
+) -> None:
+    answers = {
+        method: {"status": "predicted", "remaining_cycles": dict(zip(("0.05", "0.5", "0.95"), ends, strict=True))}
+        for method, ends in (("particle", (5000, 8000, 12000)), ("ukf", other))
+    }
+    notices = filters_disagree(answers | {"grid": {"status": "insufficient_data", "remaining_cycles": {}}})
+    assert [notice.code for notice in notices] == ["filters_disagree"] * warns
+    assert all("8,000 (90 %: 5,000 to 12,000) by particle" in notice.message for notice in notices)

@@ -109,6 +109,11 @@ def test_the_plan_of_a_diagnosis_is_a_protocol_that_a_rig_can_run(client: TestCl
     )
     sent = [client.post(f"{BASE}/runs", json=simulated_body(run)) for run in made]
     assert [answer.status_code for answer in sent] == [201] * len(sent)
+    sent_ids = [answer.json()["run_id"] for answer in sent]
+    confirmed = client.post(
+        f"{BASE}/runs/confirm", json={"run_ids": sent_ids, "reason": "so slow a test was asked for"}
+    )
+    assert confirmed.status_code == 200
     assert client.get(at).json()["stale"]
 
 

@@ -28,6 +28,10 @@ const CODES = {
     title: "Runs are held",
     help: "They do not count until someone confirms, corrects or withdraws them. Cycles that are certain are the fewer of both.",
   },
+  filters_disagree: {
+    title: "Two filters disagree",
+    help: "The same tests give different remaining lives by two methods. Plan with the lowest bound, and test again soon.",
+  },
   tracks_disagree: {
     title: "Two predictions disagree",
     help: "Mean COF is predicted in two ways: directly, and from the four Stribeck parameters. They differ by more than their uncertainty. A diagnosis may show why.",

@@ -116,12 +116,12 @@ def test_a_replaced_version_that_may_be_stored_is_named(terminal: Terminal) -> N
 def test_push_names_other_runs_that_wait_in_one_line(terminal: Terminal) -> None:
     terminal.push(body(-1), "bad.json", code=65)
     terminal.service.instead = away
-    assert "other runs" not in terminal.push(body(1), "1.json", code=75).replace("1 were refused", "")
+    assert "refused" not in terminal.push(body(1), "1.json", code=75)  # it was said when it was refused
     terminal.push(body(2), "2.json", code=75)
     terminal.service.instead = present
     (line,) = (line for line in terminal.push(body(3), "3.json").splitlines() if "other runs" in line)
-    assert line.startswith("2 other runs of c1 wait since ")
-    assert line.endswith("and are sent too, 1 were refused and are not sent: see clutchlife spool list")
+    assert line.startswith("2 other runs wait for c1 since ")
+    assert line.endswith("and will be sent too: see clutchlife spool list")
     assert len(terminal.service.stored) == 3
 
 
