@@ -1,4 +1,4 @@
-"""A diagnosis in a terminal: verdict, paragraph, candidates, residual maps, gain, advice."""
+"""A diagnosis in a terminal: verdict, paragraph, candidates, residual maps, gain, advice, what would be seen."""
 
 import math
 import re
@@ -61,6 +61,8 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
         yield Text(f"{'- ' if len(tests) > 1 else 'What to test next: '}{advice['test']} ({_use(advice)})")
     if report["isolability"] is not None:
         yield from _isolability(report["isolability"])
+    if report["visible"]:
+        yield _visible(report["visible"])
     for note in report["notes"]:
         yield Text(f"Note: {note}", style="dim")
 
@@ -76,13 +78,27 @@ def _use(advice: Mapping[str, Any]) -> str:
 
 def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name, side in (("candidate", "left"), ("probability", "right"), ("evidence", "right"), ("estimate", "left")):
-        table.add_column(name, justify="right" if side == "right" else "left")
+    table.add_column("candidate")
+    table.add_column("probability", justify="right")
+    table.add_column("estimate")
     for candidate in candidates:
         estimate = candidate["estimate"]
         amount = f"{number(estimate['value'])} ± {number(estimate['sd'], 2)} {estimate['unit']} {estimate['name']}"
-        evidence = _evidence(candidate["log_evidence_gain"])
-        table.add_row(Text(candidate["effect"]), number(candidate["probability"]), evidence, Text(amount))
+        table.add_row(Text(candidate["effect"]), number(candidate["probability"]), Text(amount))
+    return table
+
+
+def _visible(visible: Sequence[Mapping[str, Any]]) -> Table:
+    """From which size on an effect would be seen: in any of its forms, and in the one that shows best."""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("would be seen", "in any form from", "in its best from"):
+        table.add_column(name, justify="left" if name == "would be seen" else "right")
+    for item in visible:
+        sizes = (
+            "at no size" if size is None else f"{number(size)} {item['unit']}"
+            for size in (item["amplitude"], item["least"])
+        )
+        table.add_row(Text(item["effect"]), *sizes)
     return table
 
 

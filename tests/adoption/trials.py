@@ -9,16 +9,17 @@ import json
 import subprocess
 import time
 import zlib
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tests.blind.lives import ARTEFACTS, DRAWS, LATEST, SOONEST, STATES, forecasts_of, passed_at
+from tests.blind.lives import ARTEFACTS, DRAWS, LATEST, SOONEST, STATES, forecast_of, forecasts_of, passed_at
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.sent import runs
+from tests.blind.rig.world import read
 
 #: How loud the artefacts are, and campaigns of each at each loudness with loops and as many without in the whole table.
 LOUD, EACH = (80.0, 300.0), 20
@@ -43,10 +44,12 @@ class Trial:
 
 @dataclass(frozen=True)
 class Campaign:
-    """What is posted, and the truth: the share of its first mean COF at which the clutch ends, its end [cycles], the cycles
-    measured, the artefact's size in the catalogue's unit and sense after the last state. None: it could not be made."""
+    """What is posted, the same runs with nothing hidden in the same noise, and the truth: the share of its first mean COF at
+    which the clutch ends, its end [cycles], the cycles measured, the artefact's size in the catalogue's unit and sense after
+    the last state. None: it could not be made."""
 
     sent: list[dict[str, Any]]
+    clean: list[dict[str, Any]]
     fraction: float
     end: float
     span: float
@@ -56,7 +59,7 @@ class Campaign:
 @dataclass(frozen=True)
 class Adopted:
     """What came of a trial; `estimates` are by effect the value, its deviation and its 90 % interval, `before` and `after`
-    the end's quantiles; all empty where no campaign could be made."""
+    the end's quantiles, `clean` those of the same runs with nothing hidden; all empty where no campaign could be made."""
 
     trial: Trial
     commit: str
@@ -68,6 +71,7 @@ class Adopted:
     estimates: dict[str, list[float]] = field(default_factory=dict)
     before: dict[str, float | None] = field(default_factory=dict)
     after: dict[str, float | None] = field(default_factory=dict)
+    clean: dict[str, float | None] = field(default_factory=dict)
     end: float = 0.0
     span: float = 0.0
     size: float = 0.0
@@ -117,8 +121,15 @@ def _made(trial: Trial) -> Campaign | None:
         end = float(np.random.default_rng([*seed, k]).uniform(SOONEST, LATEST) * hidden.plan.life.span)
         fraction = passed_at(hidden, end)
         if fraction is not None:
-            return Campaign(runs(hidden), fraction, end, hidden.plan.life.span, size_of(hidden))
+            return Campaign(runs(hidden), runs(without(hidden)), fraction, end, hidden.plan.life.span, size_of(hidden))
     return None
+
+
+def without(hidden: Hidden) -> Hidden:
+    """The same readings with the same noise, nothing hidden in them."""
+    true, plain = (read(hidden.plan, hidden.clutch, effects) for effects in (hidden.effects, ()))
+    triples = zip(hidden.measured, true, plain, strict=True)
+    return replace(hidden, effects=(), measured=[measured - mine + own for measured, mine, own in triples])
 
 
 def size_of(hidden: Hidden) -> float:
@@ -165,6 +176,7 @@ def _adopted(trial: Trial) -> Adopted:
         estimates={candidate["effect"]: _estimate(candidate["estimate"]) for candidate in report["candidates"]},
         before=before["end_of_life_cycles"],
         after=after["end_of_life_cycles"],
+        clean=forecast_of(campaign.clean, campaign.fraction)["end_of_life_cycles"],
         end=campaign.end,
         span=campaign.span,
         size=campaign.size,

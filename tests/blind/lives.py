@@ -8,7 +8,8 @@ mean COF that it passes for the first time after a drawn number of cycles, so th
 import tempfile
 import time
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ LOUD, STATES, LIVES = 50.0, 8, 12
 #: The end in lengths of what was measured; draws until one of them is the first passage of its own value.
 SOONEST, LATEST, DRAWS = 1.3, 2.5, 20
 HORIZON = 1e6
+CLUTCH, REMAINING = "/v1/clutches/blind/", "remaining-useful-life"
 
 
 @dataclass(frozen=True)
@@ -112,27 +114,38 @@ def forecasts_of(
 ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """The report on runs that are posted, and the forecast of the end of life before and after adoption; the same twice
     where nothing is there to adopt."""
+    with _posted(sent, fraction) as http:
+        answer = http.post("diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"})
+        report = answer.raise_for_status().json()
+        while report["status"] == "running":
+            time.sleep(1.0)
+            report = http.get(f"diagnoses/{report['diagnosis_id']}").raise_for_status().json()
+        if report["status"] != "finished":
+            raise RuntimeError(f"a diagnosis ended without a report: {report['problem']}")
+        before = after = http.get(REMAINING).raise_for_status().json()
+        if report["adoptable"]:
+            http.put("model", json={"diagnosis_id": report["diagnosis_id"]}).raise_for_status()
+            after = http.get(REMAINING).raise_for_status().json()
+    return report, before, after
+
+
+def forecast_of(sent: Sequence[dict[str, Any]], fraction: float) -> dict[str, Any]:
+    """The forecast of the end of life from runs that are posted."""
+    with _posted(sent, fraction) as http:
+        return dict(http.get(REMAINING).raise_for_status().json())
+
+
+@contextmanager
+def _posted(sent: Sequence[dict[str, Any]], fraction: float) -> Iterator[TestClient]:
+    """A service that has the runs of a clutch, whose addresses are relative to that clutch."""
     with tempfile.TemporaryDirectory() as folder:
         app = create_app(Settings(workers=0, database=f"sqlite:///{Path(folder) / 'a.db'}"))
-        with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as http:
-            base = "/v1/clutches/blind"
+        with TestClient(app, base_url=f"http://127.0.0.1{CLUTCH}", client=("127.0.0.1", 50000)) as http:
             clutch = {"clutch_id": "blind", "origin": "simulated", "end_of_life": {"cof_fraction": fraction}}
-            http.post("/v1/clutches", json=clutch).raise_for_status()
+            http.post("http://127.0.0.1/v1/clutches", json=clutch).raise_for_status()
             for run in sent:
-                http.post(f"{base}/runs", json=run | {"origin": "simulated"}).raise_for_status()
-            answer = http.post(f"{base}/diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"})
-            report = answer.raise_for_status().json()
-            while report["status"] == "running":
-                time.sleep(1.0)
-                report = http.get(f"{base}/diagnoses/{report['diagnosis_id']}").raise_for_status().json()
-            if report["status"] != "finished":
-                raise RuntimeError(f"a diagnosis ended without a report: {report['problem']}")
-            before = after = http.get(f"{base}/remaining-useful-life").raise_for_status().json()
-            if report["adoptable"]:
-                wanted = {"diagnosis_id": report["diagnosis_id"]}
-                http.put(f"{base}/model", json=wanted).raise_for_status()
-                after = http.get(f"{base}/remaining-useful-life").raise_for_status().json()
-    return report, before, after
+                http.post("runs", json=run | {"origin": "simulated"}).raise_for_status()
+            yield http
 
 
 def _crps(forecast: dict[str, Any], end: float) -> float:

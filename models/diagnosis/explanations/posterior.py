@@ -32,7 +32,7 @@ from models.diagnosis.effects.catalogued import oil_temperature
 from models.diagnosis.effects.effect import Kind, Shape
 from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
 from models.diagnosis.effects.fitted_effect import FittedEffect
-from models.diagnosis.effects.grid import Column, columns_of
+from models.diagnosis.effects.grid import Column, columns_at_rows, columns_of
 from models.diagnosis.explanations.alternative import LINE, LINES, NOTHING, OUTLIER, Alternative, is_axis
 from models.diagnosis.explanations.evidence import Evidence, evidence_of
 from models.diagnosis.explanations.lines import lines
@@ -126,14 +126,15 @@ class Search:
         facts = baseline.problem.design.facts
         effects = effects_for(facts, without)
         self._raw = {r.effect: r.log_evidence for r in raw if r.effect in BY_SLUG and not is_vibration(r)}
-        self._columns = columns_of([*effects, *FAULTS], facts)
         self.problem = baseline.problem
+        self._columns = _shown(self.problem, baseline.fit, columns_of([*effects, *FAULTS], facts))
         null = self._node(baseline.fit, (), ())
         if null is None:
             raise ArithmeticError("the baseline's evidence is not finite")
-        faults = {column.effect.slug for column in self._columns} & set(FAULT_BY_SLUG)
+        shown = {column.effect.slug for column in self._columns}
         self.prior = Prior(
-            effects=max(len(effects), 1), unknowns=len(null.evidence.structure) + len(faults) + len(LINES) + 1
+            effects=max(len(effects), 1),
+            unknowns=len(null.evidence.structure) + len(shown & set(FAULT_BY_SLUG)) + len(LINES) + 1,
         )
         firsts = [kinds[0] for kinds in starts(self._columns, null.evidence.screened).values()]
         best = max(firsts, key=lambda start: start.promise, default=None)
@@ -336,6 +337,13 @@ class Search:
             columns=tuple(self._columns),
             refits=self.refits,
         )
+
+
+def _shown(problem: FitProblem, fitted: Fit, columns: Sequence[Column]) -> list[Column]:
+    """The columns of effects that change a reading: without loops no delay does, without a clock no drift along it."""
+    changes = columns_at_rows(problem.design, fitted.prediction, columns)
+    shown = {column.effect.slug for column, change in zip(columns, changes.T, strict=True) if change.any()}
+    return [column for column in columns if column.effect.slug in shown]
 
 
 def is_vibration(record: RawEvidence) -> bool:

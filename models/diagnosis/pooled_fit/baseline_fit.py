@@ -77,7 +77,7 @@ def _with_its_noise(problem: FitProblem, fitted: Fit) -> Baseline:
     if curve_gain > 0.0:
         problem = problem.with_noise(replace(problem.noise, curve_gain=curve_gain))
         fitted = fit(problem, fitted.laws)
-    return Baseline(problem=problem, fit=fitted, notes=_notes(problem.design, fitted, assumed))
+    return Baseline(problem=problem, fit=fitted, notes=_notes(problem.design, assumed))
 
 
 def _require_weights(problem: FitProblem, fitted: Fit) -> None:
@@ -104,12 +104,10 @@ def _with_estimated_noise(problem: FitProblem, fitted: Fit) -> tuple[FitProblem,
     return problem.with_noise(noise), assumed
 
 
-def _notes(design: Design, fitted: Fit, assumed: bool) -> tuple[str, ...]:
+def _notes(design: Design, assumed: bool) -> tuple[str, ...]:
     notes = list(design.notes)
     if assumed:
         notes.append("Too few rows to estimate the noise: 1 % of the torque is assumed.")
     if not design.facts.temperature_measured:
         notes.append("No oil temperature was measured: any slow course of it competes with the other causes.")
-    if fitted.status is FitStatus.OUT_OF_STEPS:
-        notes.append(f"The baseline fit had not converged after {fitted.steps} steps.")
     return tuple(notes)

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 
+from models.diagnosis.criteria import NEGLIGIBLE
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
 from models.diagnosis.experiments.test_plan import Advice
+from models.diagnosis.explanations.alternative import NOTHING
 from models.diagnosis.explanations.outlying_run import outlying_run
 from models.diagnosis.explanations.posterior import Posterior
-from models.diagnosis.explanations.refit import STEPS
 from models.diagnosis.explanations.sizes import Sizes
 from models.diagnosis.explanations.verdict import Judgement, Verdict
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
@@ -21,7 +22,7 @@ from models.diagnosis.report.proposed_extension import proposed_extension, reaso
 from models.diagnosis.report.report import Report
 from models.diagnosis.report.statistics import statistics_of
 from models.diagnosis.report.summary import Findings, summarise
-from models.diagnosis.report.visible import visible_of
+from models.diagnosis.report.visible import unseen_of, visible_of
 from models.diagnosis.report.wording import effect_name
 from models.diagnosis.validation.extended_model import Validation
 
@@ -42,6 +43,7 @@ def report_of(
     scatter = run_scatter(posterior.null.evidence.screened)
     candidates = candidates_of(problem, judgement, raw, sizes.by_slug)
     extended = validation.extended
+    visible = visible_of(posterior)
     findings = Findings(
         verdict=judgement.verdict,
         causes=judgement.causes,
@@ -51,7 +53,8 @@ def report_of(
         extended=None if extended is None else misfit_of(problem, extended, judgement.left),
         gain=validation.gain,
         advice=advice,
-        visible=visible_of(posterior),
+        visible=visible,
+        unseen=unseen_of(posterior, visible, raw),
         notes=notes,
         tests=len(problem.design.runs),
         states=int(problem.design.facts.states.size),
@@ -69,7 +72,7 @@ def report_of(
         extended=findings.extended,
         gain=validation.gain,
         advice=advice,
-        visible=findings.visible,
+        visible=visible,
         maps=residual_maps(problem, fitted, extended),
         loops=loop_traces(problem, fitted, extended),
         extension=proposed_extension(problem, judgement, sizes, reason),
@@ -106,10 +109,14 @@ def _notes(
 ) -> tuple[str, ...]:
     """Of the baseline, of raw records, of fits that did not end, and on an outlying run where the case is open."""
     notes = [*baseline.notes, *(f"{record.effect}: {record.note}." for record in raw)]
+    unfinished = [
+        " and ".join(effect_name(slug) for slug in cause.slugs) for cause in judgement.stand if cause.unfinished
+    ]
+    if posterior.null.fit.status is FitStatus.OUT_OF_STEPS and posterior.probabilities[NOTHING] > NEGLIGIBLE:
+        unfinished.append("nothing at work")
     notes += [
-        f"The fit of {' and '.join(effect_name(slug) for slug in cause.slugs)} had not converged after {STEPS} steps."
-        for cause in judgement.stand
-        if cause.fit.status is FitStatus.OUT_OF_STEPS
+        f"The fit with {name} ended before its optimum: its probability may be larger than stated."
+        for name in unfinished
     ]
     if judgement.open:
         # an effect in one run alone may bend a better baseline's laws until that run fits

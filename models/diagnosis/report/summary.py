@@ -4,6 +4,7 @@ Sentences in the order in which one would ask, of MAX_WORDS words at most: where
 left out. The numbers behind them are the report's fields.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -56,8 +57,8 @@ class Sentence(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Findings:
-    """What a report says, before its paragraph; `resembles` is the fault that what has no name most resembles, `scatter`
-    that of the runs' gains, `withheld` why nothing may be adopted."""
+    """What a report says, before its paragraph; `resembles` is the fault that what has no name most resembles, `unseen`
+    effects of which these data show nothing, `scatter` that of the runs' gains, `withheld` why nothing may be adopted."""
 
     verdict: Verdict
     causes: tuple[str, ...]
@@ -72,6 +73,7 @@ class Findings:
     tests: int
     states: int
     resembles: str = ""
+    unseen: tuple[str, ...] = ()
     scatter: RunScatter | None = None
     withheld: str = ""
 
@@ -115,23 +117,40 @@ def _adequate(findings: Findings) -> list[Sentence]:
             f"from run to run{_scatter(findings.scatter)}."
         )
     ]
-    reach = [visible for visible in findings.visible if visible.amplitude <= LARGE_AMPLITUDE * visible.usual]
-    if reach:
-        sizes = conjunction([_detectable(visible, visible.amplitude) for visible in reach[:VISIBLE_MENTIONED]])
-        sentences.append(Sentence(f"These data would have shown {sizes}, nine times in ten.", SHOULD))
-    partly = [v for v in findings.visible if v not in reach and v.least <= LARGE_AMPLITUDE * v.usual]
-    if partly:
-        sizes = conjunction([_detectable(visible, visible.least) for visible in partly[:VISIBLE_MENTIONED]])
-        sentences.append(Sentence(f"Only in some of its forms, others being absorbed by the baseline: {sizes}.", MAY))
-    hidden = [visible.effect for visible in findings.visible if visible not in reach and visible not in partly]
-    if hidden:
-        names = conjunction([effect_name(slug) for slug in hidden])
-        sentences.append(Sentence(f"Even a large effect would be absorbed by the baseline for: {names}.", SHOULD))
+    sentences += _unseen(findings)
     if findings.states < FEW_STATES:
         say = "says" if findings.states == 1 else "say"
         few = f"{count_of(findings.states, 'state')} of use {say} little about a course over life."
         sentences.append(Sentence(few, SHOULD))
     return sentences
+
+
+def _unseen(findings: Findings) -> list[Sentence]:
+    """What these data would miss: the effects that must be largest against what is usual to be seen."""
+    short = [v for v in findings.visible if v.amplitude > LARGE_AMPLITUDE * v.usual]
+    worst = sorted(short, key=lambda v: (-v.least / v.usual, -v.amplitude / v.usual))
+    missed = [_missed(visible) for visible in worst[:VISIBLE_MENTIONED]]
+    sentences = [Sentence(f"These data would miss {conjunction(missed)}.")] if missed else []
+    if reach := [v for v in findings.visible if v not in short]:
+        reach.sort(key=lambda v: v.amplitude / v.usual)
+        seen = [f"{effect_name(v.effect)} from {_amount(v.amplitude, v.unit)}" for v in reach[:VISIBLE_MENTIONED]]
+        sentences.append(Sentence(f"Nine times in ten they would have shown {conjunction(seen)}.", SHOULD))
+    if findings.unseen:
+        names = conjunction([effect_name(slug) for slug in findings.unseen])
+        sentences.append(Sentence(f"Nothing of these would show at any size: {names}.", SHOULD))
+    return sentences
+
+
+def _missed(visible: Visible) -> str:
+    """How large an effect may be without being seen, in some of its forms or in all of them."""
+    name, least = effect_name(visible.effect), _amount(visible.least, visible.unit)
+    if math.isinf(visible.amplitude):
+        return f"{name} below {least}, in some forms at any size"
+    return f"{name} below {_amount(visible.amplitude, visible.unit)}"
+
+
+def _amount(value: float, unit: str) -> str:
+    return with_unit(number(value), unit)
 
 
 def _scatter(scatter: RunScatter | None) -> str:
@@ -142,10 +161,6 @@ def _scatter(scatter: RunScatter | None) -> str:
     if scatter.assumed:
         return f" (assumed to be {median} % of the torque; these data hardly show it)"
     return f" ({median} % of the torque; 90 % interval {lower} to {upper} %)"
-
-
-def _detectable(visible: Visible, amplitude: float) -> str:
-    return f"{effect_name(visible.effect)} from {with_unit(number(amplitude), visible.unit)}"
 
 
 def _named(findings: Findings) -> list[Sentence]:

@@ -12,14 +12,18 @@ of its amplitude, of prior deviation s in the narrower or the wider of two (`amp
     t = -ln(prior odds) - ln p(shape) + ln 2 + min over s of ½ ln(1 + s² info).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
 from models.diagnosis.criteria import LEAST_VISIBLE_SHARE, VISIBLE_POWER
 from models.diagnosis.effects.amplitude_prior import SCALES
+from models.diagnosis.effects.catalogue import CATALOGUE
 from models.diagnosis.explanations.alternative import Alternative
 from models.diagnosis.explanations.posterior import Posterior
+from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.report import Visible
 
 
@@ -42,6 +46,15 @@ def visible_of(posterior: Posterior) -> tuple[Visible, ...]:
         for slug, by_shape in sizes.items()
         if np.isfinite(min(by_shape))
     )
+
+
+def unseen_of(posterior: Posterior, visible: Sequence[Visible], raw: Sequence[RawEvidence]) -> tuple[str, ...]:
+    """The effects of the catalogue of which these data show nothing at any size; an oil temperature that nobody measured
+    competes without a shape."""
+    shaped = {column.effect.slug for column in posterior.columns}
+    shapeless = {slug for alternative in posterior.weights for slug in alternative.causes} - shaped
+    known = shapeless | {each.effect for each in visible} | {record.effect for record in raw}
+    return tuple(effect.slug for effect in CATALOGUE if effect.slug not in known)
 
 
 def amplitudes_of(posterior: Posterior) -> FloatArray:

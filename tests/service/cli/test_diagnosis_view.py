@@ -44,6 +44,7 @@ def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
         "Remaining life, extended: the end of life is reached",
         "The extended model is adopted",
         "What to test next: read the unloaded zero (distinguishes torque zero shift from no effect at all;",
+        "torque_zero_shift            0.2 Nm            0.1 Nm",
         "Note: left out",
         "The model without an effect errs along: oil temperature",
     ):

@@ -94,11 +94,10 @@ function candidates({ candidates: all = [], causes = [] }) {
     return [
       h("span", { class: causes.includes(effect) ? "named" : null, title: effect }, title || words(effect)),
       h("span", { class: "chance" }, chance(candidate.probability), probability(candidate.probability)),
-      evidence(candidate.log_evidence_gain),
       estimated(candidate),
     ];
   });
-  const columns = ["Cause", "Probability", "Evidence", "Estimate"];
+  const columns = ["Cause", "Probability", "Estimate"];
   return h(
     "div",
     { class: "part wide" },

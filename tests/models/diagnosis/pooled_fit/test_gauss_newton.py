@@ -7,7 +7,6 @@ import pytest
 
 from models.diagnosis.baseline.laws import Laws
 from models.diagnosis.baseline.prediction import frame_of
-from models.diagnosis.pooled_fit.baseline_fit import _notes
 from models.diagnosis.pooled_fit.gauss_newton import FitStatus, fit
 from models.diagnosis.pooled_fit.starts import starting_laws
 from tests.models.diagnosis.campaigns import campaign
@@ -46,10 +45,3 @@ def test_numbers_that_cannot_be_fitted_are_a_status(given: Study) -> None:
     broken = fit(replace(given.problem, design=replace(given.design, torque=torque)), start_of(given))
     assert broken.status is FitStatus.NOT_FINITE
     assert np.isinf(broken.cost)
-
-
-def test_a_baseline_that_ran_out_of_steps_is_noted(given: Study) -> None:
-    cut = replace(given.baseline.fit, status=FitStatus.OUT_OF_STEPS, steps=30)
-    assert "The baseline fit had not converged after 30 steps." in _notes(given.design, cut, assumed=False)
-    ended = replace(cut, status=FitStatus.CONVERGED)
-    assert not any("converged" in note for note in _notes(given.design, ended, assumed=False))

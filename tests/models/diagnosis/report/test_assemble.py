@@ -8,7 +8,8 @@ import pytest
 from models.diagnosis.explanations.decide import judge, revise
 from models.diagnosis.explanations.posterior import Posterior, posterior_of
 from models.diagnosis.explanations.sizes import Size, Sizes, sizes_of
-from models.diagnosis.explanations.verdict import Proposal, Verdict
+from models.diagnosis.explanations.verdict import Judgement, Proposal, Verdict
+from models.diagnosis.pooled_fit.gauss_newton import FitStatus
 from models.diagnosis.report.assemble import report_of
 from models.diagnosis.report.proposed_extension import reason_against
 from models.diagnosis.validation.extended_model import Validation
@@ -55,6 +56,30 @@ def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(
     assert (report.extension is None) == (proposal is not Proposal.PROPOSED)
     assert report.statistics["log_evidence"] == pytest.approx(report.candidates[0].log_evidence_gain)
     assert sum(each.probability for each in report.explanations) == pytest.approx(1.0)
+
+
+def test_a_fit_that_ran_out_of_steps_is_said_with_what_follows_from_it(given: Study, posterior: Posterior) -> None:
+    judgement = judge(posterior)
+    (cause,) = judgement.stand
+    cut = replace(cause, fit=replace(cause.fit, status=FitStatus.OUT_OF_STEPS))
+    nothing = Validation(extended=None, gain=None)
+
+    def noted(judged: Judgement) -> tuple[str, ...]:
+        return report_of(given.baseline, posterior, judged, (), nothing, Sizes(by_slug={}), ()).notes
+
+    expected = "The fit with unsettled dwell ended before its optimum: its probability may be larger than stated."
+    assert expected in noted(replace(judgement, stand=(cut,)))
+    assert expected not in noted(judgement)
+
+
+def test_what_no_reading_shows_is_no_candidate(given: Study, posterior: Posterior) -> None:
+    """Without loops a delay of 80 ms stood among the candidates."""
+    report = report_of(
+        given.baseline, posterior, judge(posterior), (), Validation(extended=None, gain=None), Sizes(by_slug={}), ()
+    )
+    loops_only = {"channel_delay", "inertia_torque", "squeeze_film"}
+    assert not loops_only & {each.effect for each in report.candidates}
+    assert not loops_only & {slug for each in report.explanations for slug in each.effects}
 
 
 def test_why_an_extension_is_not_proposed_is_said() -> None:

@@ -1,5 +1,6 @@
 """The paragraph: every verdict has one, in words and units, and none says nan."""
 
+import math
 import re
 from dataclasses import replace
 
@@ -171,16 +172,18 @@ def test_what_was_not_measured_cannot_be_excluded() -> None:
     assert "or oil temperature (0.30; not measured, so it cannot be excluded)" in said
 
 
-def test_effects_out_of_reach_are_said_to_be() -> None:
+def test_what_these_data_would_miss_is_said_the_worst_first() -> None:
     found = findings(Verdict.MODEL_ADEQUATE)
-    said = summarise(replace(found, visible=(visible("pressure_offset", 10.0),)))
-    assert "absorbed by the baseline for: pressure offset" in said
-    assert "absorbed" not in summarise(found)
-    some = replace(visible("pressure_offset", 3.0), least=0.1)  # seen in one of its shapes, in most not
-    said = summarise(replace(found, visible=(some,)))
+    assert "would miss" not in summarise(found)
+    short = tuple(visible(slug, sizes) for slug, sizes in (("pressure_offset", 10.0), ("torque_zero_shift", 12.0)))
+    said = summarise(replace(found, visible=short))
+    assert "These data would miss torque zero shift below 6 Nm and pressure offset below 1.5 bar." in said
     assert "would have shown" not in said
-    assert "Even a large effect" not in said
-    assert "Only in some of its forms, others being absorbed by the baseline: pressure offset" in said
+    some = replace(visible("pressure_offset", 3.0), amplitude=math.inf, least=0.1)  # seen in one of its shapes alone
+    said = summarise(replace(found, visible=(some,)))
+    assert "would miss pressure offset below 0.1 bar, in some forms at any size." in said
+    said = summarise(replace(found, unseen=("channel_delay", "stick_slip")))
+    assert "Nothing of these would show at any size: channel delay and stick slip." in said
 
 
 def test_of_a_course_over_life_two_states_say_little() -> None:
