@@ -73,7 +73,12 @@ _newest = (
     .order_by(alarm_event.c.event_key.desc())
     .limit(bindparam("most"))
 )
-_clear = update(alarm_event).where(alarm_event.c.event_id == bindparam("wanted")).values(cleared_at=bindparam("at"))
+_clear = (
+    update(alarm_event)
+    .where(alarm_event.c.event_id == bindparam("wanted"))
+    .values(cleared_at=bindparam("at"), content=bindparam("new_content"))
+)
+_reopen = update(alarm_event).where(alarm_event.c.event_id == bindparam("wanted")).values(cleared_at=None)
 _acknowledge = (
     update(alarm_event)
     .where(alarm_event.c.event_id == bindparam("wanted"))
@@ -166,9 +171,14 @@ def events(
     return [_event(row) for row in connection.execute(query, values)]
 
 
-def clear(connection: Connection, event_id: str, at: str) -> None:
-    """Note that what raised an alarm is over."""
-    connection.execute(_clear, {"wanted": event_id, "at": at})
+def clear(connection: Connection, event_id: str, at: str, content: Json) -> None:
+    """Note that what raised an alarm is over, with what is said of it from now on."""
+    connection.execute(_clear, {"wanted": event_id, "at": at, "new_content": to_text(content)})
+
+
+def reopen(connection: Connection, event_id: str) -> None:
+    """Note that an alarm is not over: it is as it was, acknowledged or not."""
+    connection.execute(_reopen, {"wanted": event_id})
 
 
 def acknowledge(connection: Connection, event_id: str, *, at: str, by: str, note: str) -> None:

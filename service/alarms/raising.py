@@ -2,7 +2,8 @@
 goes into the outbox with it.
 
 An alarm is raised once: while it is not cleared, its rule raises no other of the clutch. It is cleared when its value has
-come back by the hysteresis, or when nothing can be said any more: after a rebuild, where the rule is gone.
+come back by the hysteresis, or when nothing can be said any more: after a rebuild, where the rule is gone. One that ended
+with its life is as before where that end is taken back.
 """
 
 import json
@@ -32,6 +33,8 @@ from storage.results import FitRow
 from storage.webhooks import NewDelivery, WebhookRow
 
 SILENT = "silent_hours"
+#: In the content of an alarm that a declared end has cleared: the life that ended.
+_ENDED_LIFE = "ended_life"
 #: What a body is about.
 RAISED, CLEARED, TEST = "alarm.raised", "alarm.cleared", "alarm.test"
 
@@ -56,7 +59,7 @@ def evaluate(connection: Connection, clutch_id: str) -> None:
             row = _with_silence(connection, row, kept, facts)
     for alarm_id, event in before.items():
         if alarm_id not in kept:
-            _clear(connection, event, at)
+            _clear(connection, event, facts)
 
 
 def concerns(rule: AlarmIn, record: ClutchIn) -> bool:
@@ -79,7 +82,7 @@ def event_out(row: EventRow) -> dict[str, Any]:
         "alarm_id": row.alarm_id,
         "clutch_id": row.clutch_id,
         "quantity": row.quantity,
-        **row.content,
+        **{name: value for name, value in row.content.items() if name != _ENDED_LIFE},
         "state": row.state,
         "raised_at": row.raised_at,
         "acknowledged_at": row.acknowledged_at,
@@ -146,8 +149,9 @@ def _judged(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, 
         return {row.alarm_id}
     if finding is not None and rules.raises(rule, finding):
         if before is not None:
-            _clear(connection, before, facts.now)
-        _raise(connection, row, rule, facts, finding)
+            _clear(connection, before, facts)
+        if not _reopened(connection, row, rule, facts, finding):
+            _raise(connection, row, rule, facts, finding)
         return {row.alarm_id}
     return set()
 
@@ -178,8 +182,26 @@ def _raise(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, f
     _tell(connection, RAISED, new.event_id, receivers_of(connection, facts.clutch_id))
 
 
-def _clear(connection: Connection, event: EventRow, at: str) -> None:
-    alarms.clear(connection, event.event_id, at)
+def _reopened(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> bool:
+    """Whether the alarm is one that the declared end of this life has cleared, and the end was taken back: it goes on, and
+    only receivers that were sent that it was over are sent it again."""
+    if facts.summary.get("ended") is not None:
+        return False
+    of_clutch = alarms.events(connection, alarm_id=row.alarm_id, only=[facts.clutch_id], state=alarms.CLEARED)
+    for event in of_clutch:
+        ended = event.content.get(_ENDED_LIFE)
+        if ended is not None and ended == facts.summary.get("life", "") and _is_of(event, rule, finding):
+            alarms.reopen(connection, event.event_id)
+            told = [row for row in receivers_of(connection, facts.clutch_id) if row.content["cleared"]]
+            _tell(connection, RAISED, event.event_id, told)
+            return True
+    return False
+
+
+def _clear(connection: Connection, event: EventRow, facts: Facts) -> None:
+    ended = {} if facts.summary.get("ended") is None else {_ENDED_LIFE: facts.summary.get("life", "")}
+    content = {name: value for name, value in event.content.items() if name != _ENDED_LIFE}
+    alarms.clear(connection, event.event_id, facts.now, content | ended)
     receivers = [row for row in receivers_of(connection, event.clutch_id) if row.content["cleared"]]
     _tell(connection, CLEARED, event.event_id, receivers)
 

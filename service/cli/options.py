@@ -54,7 +54,9 @@ def errors_in_a_line() -> Iterator[None]:
         fail(str(error))
     except httpx2.InvalidURL as error:
         fail(f"the address is not valid: {error}", EX_USAGE)
-    except (ValueError, OSError) as error:
+    except OSError as error:
+        fail(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error), EX_USAGE)
+    except ValueError as error:
         fail(str(error), EX_USAGE)
 
 

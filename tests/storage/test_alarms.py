@@ -54,7 +54,7 @@ def test_a_rule_has_one_open_alarm_of_a_clutch(database: Database) -> None:
     with pytest.raises(IntegrityError), database.writing() as connection:
         alarms.insert_event(connection, replace(EVENT, event_id="e2"))
     with database.writing() as connection:
-        alarms.clear(connection, "e1", AT)
+        alarms.clear(connection, "e1", AT, EVENT.content)
         alarms.insert_event(connection, replace(EVENT, event_id="e2"))
         alarms.acknowledge(connection, "e2", at=AT, by="me", note="seen")
         states = {row.event_id: row.state for row in alarms.events(connection)}

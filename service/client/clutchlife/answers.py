@@ -62,7 +62,8 @@ class RefusedError(ClutchlifeError):
     """The service refused the request; repeating it would be refused again. `problem["errors"]` says what is wrong where."""
 
     def __init__(self, status: int, problem: dict[str, Any]) -> None:
-        super().__init__(f"{status}: {problem.get('detail') or problem.get('title') or 'refused'}", problem)
+        reason = str(problem.get("detail") or problem.get("title") or "refused")
+        super().__init__(f"{status}: {reason}" if status else reason, problem)
         self.status = status
 
     @property
@@ -98,7 +99,7 @@ def passing(response: httpx2.Response, answer: object | None) -> str | None:
         target = response.headers.get("Location", "nowhere")[:_MAX_QUOTED]
         return f"status {status}, a redirect to {target}: is the address right?"
     if status in _TRANSIENT or status > 500:
-        return f"status {status}"
+        return f"busy or not ready, status {status}"
     return None
 
 

@@ -129,9 +129,10 @@ class Service:
             try:
                 response = self._try(method, path, file, request)
             except httpx2.UnsupportedProtocol as error:
-                raise RefusedError(0, {"detail": f"{self.http.base_url}: {error}"}) from error
+                detail = f"the address {str(self.http.base_url).rstrip('/')} is not valid: {error}"
+                raise RefusedError(0, {"detail": detail}) from error
             except httpx2.RequestError as error:
-                reason = f"no answer ({type(error).__name__})"
+                reason = f"no answer ({type(error).__name__}); is the service running there?"
                 unsure = unsure or not isinstance(error, _NOT_SENT)
             else:
                 answer = read(response)

@@ -139,7 +139,7 @@ def test_a_file_is_read_again_by_the_mended_profile(watched: Watched, server: Se
     page = turned(opened(watched), "runs")
     shown = page.locator("#runs details[data-run='tenfold']")
     shown.locator("summary").first.click()
-    shown.get_by_role("button", name="Read its file again").click()
+    shown.get_by_role("button", name="A column was read wrongly").click()
     dialog = page.get_by_role("dialog", name="Read its file again")
     dialog.get_by_label("Rig profile").select_option("bench-4")
     dialog.get_by_label("Reason").fill("the amplifier was set to ten times")

@@ -93,6 +93,22 @@ def test_an_acknowledged_alarm_is_not_raised_again(life: TestClient) -> None:
     assert life.post(f"{address}/acknowledge").json() == still
 
 
+def test_an_acknowledged_alarm_goes_on_where_an_end_is_taken_back(life: TestClient) -> None:
+    """It was raised again, and who had acknowledged it was called again."""
+    rule(life, quantity="remaining_cycles", below=1e9)
+    (raised,) = events(life)
+    before = life.post(f"/v1/alarms/events/{raised['event_id']}/acknowledge").json()
+    for cycles in (4000, 4100):
+        end = {"kind": "maintenance", "event": "end_of_life", "cycles": cycles, "reason": "other"}
+        run_id = life.post("/v1/clutches/e/runs", json=end).json()["run_id"]
+        assert [event["state"] for event in events(life)] == ["cleared"]
+        assert life.post(f"/v1/clutches/e/runs/{run_id}/withdraw", json={"reason": "too early"}).status_code == 200
+        assert events(life) == [before]
+    life.put(f"/v1/alarms/{raised['alarm_id']}", json={"clutch_id": "e", "quantity": "remaining_cycles", "below": 1.0})
+    life.put(f"/v1/alarms/{raised['alarm_id']}", json={"clutch_id": "e", "quantity": "remaining_cycles", "below": 1e9})
+    assert [event["state"] for event in events(life)] == ["raised", "cleared"]
+
+
 def test_it_is_cleared_by_the_hysteresis_and_raised_again(life: TestClient) -> None:
     value = at_least(life)
     made = rule(life, quantity="remaining_cycles", below=value + 1, hysteresis=0.0)

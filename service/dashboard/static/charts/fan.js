@@ -123,7 +123,7 @@ function safeBound({ at_least: left, as_of_cycles: now, status }, last, c) {
     shapes: [
       { type: "line", x0: x, x1: x, y0: 0, y1: 1, yref: "paper", line: { color: c.normal, width: 2, dash: "dot" } },
     ],
-    annotations: [{ x, y: 0, yref: "paper", yanchor: "bottom", xanchor: "right", text, showarrow: false, font }],
+    annotations: [{ x, y: 1, yref: "paper", yanchor: "top", xanchor: "right", text, showarrow: false, font }],
   };
 }
 
@@ -161,7 +161,8 @@ function past(predictions, threshold, c) {
 }
 
 /**
- * Eq. 6 with its band, led on to the threshold where the prediction reaches it past the law's last point.
+ * Eq. 6 with its band, led on to the threshold where the prediction reaches it past the law's last point: along its slope
+ * there, which then flattens or steepens as a power of the way that is left.
  * @param {Trajectory} trajectory
  * @param {RemainingLife} life
  * @param {Colours} c
@@ -174,10 +175,18 @@ function law(trajectory, life, c) {
   const median = end["0.5"];
   const beyond = life.status === "predicted" && median !== null && median > last;
   /** @type {(values: number[], at: number | null) => { x: number[], y: number[] }} */
-  const joined = (values, at) =>
-    beyond && threshold !== null && at !== null && at > last
-      ? { x: [...trajectory.cycles, at], y: [...values, threshold] }
-      : { x: trajectory.cycles, y: values };
+  const joined = (values, at) => {
+    const { cycles: x } = trajectory;
+    const [before = 0, y = 0] = values.slice(-2);
+    if (!beyond || threshold === null || at === null || at <= last || y <= threshold) return { x, y: values };
+    const slope = (before - y) / (last - (x.at(-2) ?? 0));
+    const power = slope > 0 ? (slope * (at - last)) / (y - threshold) : 1;
+    const shares = Array.from({ length: 20 }, (_, index) => (index + 1) / 20);
+    return {
+      x: [...x, ...shares.map((share) => last + share * (at - last))],
+      y: [...values, ...shares.map((share) => threshold + (y - threshold) * (1 - share) ** power)],
+    };
+  };
   return [
     ...band("its 90 % band", joined(trajectory.lower, end["0.05"]), joined(trajectory.upper, end["0.95"]), c),
     {

@@ -130,17 +130,30 @@ export function settled({ data, layout }, { width, height }) {
   const yTicks = ticksOf(y.range, inside, 40);
   const widest = Math.max(0, ...yTicks.map(({ text }) => widthOf(text, font)));
   const l = Math.round(Math.max(56, widest + 1.3 * font.size + 24));
+  const xTicks = ticksOf(x.range, width - l - margin.r, 80);
+  const r = Math.max(margin.r, overhang(xTicks.at(-1), x.range, width - l - margin.r, font));
   return {
     data,
     layout: {
       ...layout,
       showlegend: legend.rows > 0,
-      margin: { ...margin, l, b },
+      margin: { ...margin, l, r, b },
       xaxis: x,
       yaxis: y,
       legend: { ...layout.legend, y: -below / inside },
     },
-    ticks: { x: ticksOf(x.range, width - l - margin.r, 80), y: yTicks },
+    ticks: { x: xTicks, y: yTicks },
     legend: { entries: legend.entries, top: height - b + below },
   };
+}
+
+/**
+ * How far the last value of the abscissa reaches past the axes, px.
+ * @param {{ at: number, text: string } | undefined} last
+ * @param {Range} range
+ * @param {number} inside width of the axes, px
+ * @param {TextFont} font
+ */
+function overhang(last, [from, to], inside, font) {
+  return last ? Math.ceil(0.5 * widthOf(last.text, font) - (inside * (to - last.at)) / (to - from)) + 3 : 0;
 }

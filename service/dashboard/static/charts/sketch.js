@@ -225,13 +225,14 @@ function ruled({ x0, x1, y0, y1, xref, yref, line }, { x, y, l, t, inside }) {
  * @param {Annotation} annotation
  * @param {Frame} frame
  */
-function noted({ x: at, y: level, xref, yref, text, textangle = 0, yanchor, font }, { x, y, l, t, inside }) {
+function noted({ x: at, y: level, xref, yref, text, textangle = 0, xanchor, yanchor, font }, { x, y, l, t, inside }) {
   const size = font?.size ?? 12;
-  const left = l + (xref === "paper" ? at * inside.width : x(at)) + 2;
+  const before = xanchor === "right";
+  const left = l + (xref === "paper" ? at * inside.width : x(at)) + (before ? -4 : 2);
   const top = t + (yref === "paper" ? (1 - level) * inside.height : y(level)) + (yanchor === "top" ? 2 : -1.4 * size);
   const place = textangle
     ? { transform: `translate(${px(left + 3)} ${px(top)}) rotate(${textangle})` }
-    : { x: px(left), y: px(top + size) };
+    : { x: px(left), y: px(top + size), "text-anchor": before ? "end" : "start" };
   return label(text, { ...place, fill: font?.color ?? "currentColor", "font-size": size });
 }
 

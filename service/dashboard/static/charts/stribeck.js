@@ -108,7 +108,7 @@ export function flat(answers) {
   const drawn = drawnOf(answers, chosen, (level) => !byState || level === pressure);
   if (drawn.length === 0) return { empty: "No stationary Stribeck test yet at this pressure." };
   const place = byState
-    ? `At ${pressureText(pressure)}: points measured, lines fitted, from the first test to the last.`
+    ? `At ${pressureText(pressure)}: points measured, lines fitted, from the first test to the last.${leftOut(tests, drawn.length)}`
     : `After ${fixed(drawn[0].cycles)} cycles, at every pressure: points measured, lines fitted.`;
   /** @param {Drawn} curve */
   const label = (curve) => (byState ? `${fixed(curve.cycles)} cycles` : pressureText(curve.pressure));
@@ -124,6 +124,16 @@ export function flat(answers) {
     }),
   };
 }
+
+/**
+ * That some tests are not drawn, where there are more of them.
+ * @param {StribeckItem[]} tests
+ * @param {number} drawn
+ */
+const leftOut = (tests, drawn) =>
+  drawn < tests.length
+    ? ` ${drawn} of ${tests.length} tests are drawn, evenly spread; by pressure each can be chosen.`
+    : "";
 
 /**
  * @param {Drawn} curve

@@ -32,7 +32,7 @@ const LONGEST_REASON = 500;
 export const LABELS = {
   confirm: "Confirm …",
   correct: "Correct the cycles …",
-  reread: "Read its file again …",
+  reread: "A column was read wrongly …",
   withdraw: "Withdraw …",
   restore: "Restore …",
 };
