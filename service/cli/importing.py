@@ -1,6 +1,7 @@
 """`clutchlife import`: a rig's file as it would be read, asked about where that is open, sent, and kept as a rig profile."""
 
 import json
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -8,13 +9,16 @@ import typer
 from rich.table import Table
 
 from service.cli.connection import asking
-from service.cli.options import EX_DATAERR, fail, out, print_line
+from service.cli.options import EX_DATAERR, ChannelMap, Decimal, Missing, fail, out, print_line
 from service.cli.runs import run_line
+from service.client.clutchlife.answers import RefusedError
 from service.client.clutchlife.transport import Service
 
 _KINDS = ("stationary_stribeck", "dynamic_stribeck")
 #: Rows that are shown.
 _ROWS = 3
+#: Characters of a run's name.
+_MAX_NAME = 128
 
 
 @asking
@@ -29,6 +33,9 @@ def import_file(
     ] = None,
     kind: Annotated[str | None, typer.Option(help=f"The kind of run: {' or '.join(_KINDS)}")] = None,
     cycles: Annotated[float | None, typer.Option(min=0, help="Duty cycles since new")] = None,
+    channel_map: ChannelMap = None,
+    decimal: Decimal = None,
+    missing: Missing = None,
     save: Annotated[
         str | None, typer.Option("--save", help="Keep how it is read as a rig profile of this name")
     ] = None,
@@ -39,6 +46,7 @@ def import_file(
     The next file of the rig needs no answer: `clutchlife push --rig NAME`, or import again.
     """
     given: dict[str, Any] = {"kind": kind, "cycles": cycles, "rig": rig}
+    given |= {"map": channel_map, "decimal": decimal, "missing": missing}
     profile: dict[str, Any] | None = None
     shown = _preview(service, file, clutch, given, profile)
     _show(shown)
@@ -50,18 +58,38 @@ def import_file(
         fail(shown["problem"], EX_DATAERR)
     if shown["missing"]:
         fail(f"still to be given: {', '.join(shown['missing'])}", EX_DATAERR)
+    if not yes and not typer.confirm(f"Send it to {clutch}?", default=True):
+        raise typer.Exit(0)
     if shown["rig"] is None and save is None and not yes:
         save = typer.prompt("Keep this as the rig profile (a name, or nothing)", default="", show_default=False) or None
     if save is not None:
         _save(service, save, shown)
-        given["rig"], profile = save, None
+        given, profile = given | {"rig": save, "map": None}, None
     elif profile is None:
         given["rig"] = shown["rig"]
-    if not yes and not typer.confirm(f"Send it to {clutch}?", default=True):
-        raise typer.Exit(0)
     given |= {"kind": given["kind"] or shown["kind"], "cycles": shown["cycles"]}
-    receipt = _sent(service, f"/v1/clutches/{clutch}/runs/file", file, given, profile)
-    print_line(run_line(receipt))
+    print_line(run_line(_posted(service, clutch, file, given | {"run_id": shown["run_id"] or _name(file)}, profile)))
+
+
+def _name(file: Path) -> str | None:
+    """The name of a file's run: the file's own, with dashes for what a name may not hold."""
+    stem = file.name.removesuffix(".gz").rpartition(".")[0] or file.name
+    return re.sub(r"[^A-Za-z0-9._:@+-]+", "-", stem).strip("-._:@+")[:_MAX_NAME] or None
+
+
+def _posted(
+    service: Service, clutch: str, file: Path, given: dict[str, Any], profile: dict[str, Any] | None
+) -> dict[str, Any]:
+    """The receipt of the run; where another has its name, as of a recorder that writes each test into one file, the service
+    names it."""
+    path = f"/v1/clutches/{clutch}/runs/file"
+    try:
+        return _sent(service, path, file, given, profile)
+    except RefusedError as error:
+        if error.status != 409 or given["run_id"] is None:
+            raise
+        print_line(f"the clutch has another run of the name {given['run_id']}: the service names this one")
+        return _sent(service, path, file, given | {"run_id": None}, profile)
 
 
 def _preview(
@@ -77,7 +105,8 @@ def _sent(
     parameters = {name: str(value) for name, value in given.items() if value is not None} | {"filename": file.name}
     if profile is None:
         return service.post_file(path, file, parameters)
-    parameters.pop("rig", None)
+    for name in ("rig", "map"):  # the profile holds both
+        parameters.pop(name, None)
     return service.post_form(path, file, profile, parameters)
 
 

@@ -37,6 +37,13 @@ Key = Annotated[str | None, typer.Option("--key", envvar="CLUTCHLIFE_KEY", help=
 Patience = Annotated[float, typer.Option(min=0, help="Seconds to keep trying while the service is away")]
 Seed = Annotated[int, typer.Option(min=0, help="The simulated clutch and its noise; the same seed, the same bits")]
 
+ChannelMap = Annotated[str | None, typer.Option("--map", help="Channels by name: torque_nm:Mz,speed_rpm:n")]
+Decimal = Annotated[str | None, typer.Option(help="The decimal sign of text files, . or , ; left out, it is found")]
+Missing = Annotated[
+    str | None,
+    typer.Option(help="Marks of missing values, as -9999,n/a, whose rows are left out; none: all numbers are measured"),
+]
+
 Reason = Annotated[str, typer.Option("--reason", help="Why; the audit trail keeps it")]
 Json = Annotated[bool, typer.Option("--json", help="As the service answers it")]
 

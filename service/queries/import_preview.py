@@ -42,8 +42,10 @@ def preview(
     kind: str | None = None,
     cycles: float | None = None,
     clutch_id: str | None = None,
+    reading: Reading | None = None,
 ) -> dict[str, Any]:
     """What would be made of a file by `profile`, by that of `rig`, or by the one whose columns it has; else by its titles.
+    What `reading` says of columns, decimal sign and missing values comes before either.
 
     `clutch_id`: the clutch whose geometry and torque filter evaluate it, where it is registered already. Raises InvalidError
     or TooLargeError where no table is found, NotFoundError where the rig is unknown.
@@ -52,12 +54,18 @@ def preview(
     if profile is None and rig is not None:
         with database.reading() as connection:
             profile = records.rig(connection, rig)
-    shown = preview_file(path, filename=filename, reading=reading_with(profile, Reading()))
+    reading = reading or Reading()
+    shown = preview_file(path, filename=filename, reading=reading_with(profile, reading))
     if profile is None:
         rig, profile = _fitting(database, shown, filename)
-        shown = preview_file(path, filename=filename, reading=reading_with(profile, Reading())) if profile else shown
+        shown = preview_file(path, filename=filename, reading=reading_with(profile, reading)) if profile else shown
     own = Named() if profile is None else named(profile, filename, shown["labels"])
     used = _by_titles(shown) if profile is None else profile
+    if used is not None:
+        stated = {name: value for name in ("decimal", "missing") if (value := getattr(reading, name))}
+        used = used.model_copy(update=stated)
+        if reading.mapping and (titled := _by_titles(shown)):
+            used = used.model_copy(update={"columns": titled.columns})
     kind, cycles = kind or own.kind, own.cycles if cycles is None else cycles
     evaluated = _evaluated(path, filename, used, kind, geometry, torque_filter)
     kind = kind or (evaluated["kinds"][0] if len(evaluated["kinds"]) == 1 else None)
@@ -127,7 +135,8 @@ def _by_titles(shown: Mapping[str, Any]) -> RigProfile | None:
     for column, channel in zip(shown["columns"], channels, strict=True):
         if column["name"]:
             only = channel is not None and channels.count(channel) == 1
-            columns.setdefault(_title(column), {"title": _title(column), "channel": channel if only else None})
+            kept = {"channel": channel, "unit": column["stated"]} if only else {"channel": None}
+            columns.setdefault(_title(column), {"title": _title(column)} | kept)
     if not any(column["channel"] for column in columns.values()):
         return None
     return RigProfile.model_validate({"columns": list(columns.values())})

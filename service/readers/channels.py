@@ -16,8 +16,9 @@ from service.columns import LineOf, check_arrays
 from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice, TooLargeError
 from service.readers.column_names import Taken, choose, is_counter, known_channel
 from service.readers.limits import Limits
+from service.readers.no_values import refuse_stand_ins, without_stated, without_totals
 from service.readers.numerals import Numerals, empty_cells
-from service.readers.table import NO_TIME, Clock, Column, Reading, Table, labels, only
+from service.readers.table import NO_TIME, Clock, Column, Reading, Table, labels, marks, only
 
 #: The code of the notice that lists unused columns.
 LEFT_OUT = "columns_left_out"
@@ -61,13 +62,19 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     many values.
     """
     taken = choose(table.columns, reading)
-    series, taken, counts = _read(table, taken, reading, limits)
+    series, table, taken, counts = _read(table, taken, reading, limits)
     notices = [*table.notices, *_left_out(table.columns, taken, reading)]
     columns = _on_one_clock(series, notices)
     columns, first = _one_table(columns, table, reading)
     line_in_file = table.line_of
     line_of = None if line_in_file is None else lambda row: line_in_file(first + row)
-    check_arrays(columns, line_of=line_of)
+    try:
+        check_arrays(columns, line_of=line_of)
+    except InvalidError as error:
+        if not error.errors or error.errors[0].value != "nan":
+            raise
+        detail = f"{error.detail}: missing=nan leaves such rows out"
+        raise InvalidError(detail, errors=error.errors, total=error.total) from None
     return Channels(columns=columns, notices=tuple(notices), counts=counts, line_of=line_of, labels=labels(table.above))
 
 
@@ -133,8 +140,9 @@ def _runs_on(times: FloatArray) -> bool:
 
 def _read(
     table: Table, taken: Sequence[Taken], reading: Reading, limits: Limits
-) -> tuple[dict[str, _Series], list[Taken], bool]:
-    """The channels' values and times, the columns that they are from, and whether their one clock may only count."""
+) -> tuple[dict[str, _Series], Table, list[Taken], bool]:
+    """The channels' values and times, the table without totals at its end, the columns that they are from, and whether their
+    one clock may only count."""
     indices = [column.index for column in taken]
     stated = sum(table.columns[index].rows or 0 for index in indices)
     if stated > limits.most_values:
@@ -143,8 +151,12 @@ def _read(
     read = dict(zip(indices, table.read(channels), strict=True))
     cells = {index: _cells(column) for index, column in read.items() if column.dtype.kind in "OUS"}
     named = {index: channels[index] for index in cells}
-    parsed = Numerals(reading.decimal).values(named, list(cells.values()), table.line_of)
+    parsed = Numerals(reading).values(named, list(cells.values()), table.line_of)
     read |= dict(zip(cells, parsed, strict=True))
+    read, table = without_totals(read, [column.index for column in taken if column.channel != "time_s"], table)
+    for column in taken:
+        read[column.index] = without_stated(read[column.index], reading)
+        refuse_stand_ins(column.channel, read[column.index], table.line_of, reading)
     values: dict[int, FloatArray] = {}
     valid: dict[int, NDArray[np.bool_] | None] = {}
     for column in taken:
@@ -165,7 +177,7 @@ def _read(
             key = clock.key if isinstance(clock, Clock) else clock
             own = times[key] if isinstance(clock, Clock) else None if clock is None else values[clock]
             whole = _Series(values[column.index], valid[column.index], key, own)
-            series[column.channel] = _without_gaps(column.channel, whole, table)
+            series[column.channel] = _without_gaps(column.channel, whole, table, bool(marks(reading.missing)))
     if not series:  # a time alone: shown as such, and refused for what it lacks
         series = {"time_s": _Series(values[indices[0]], None, None, None)}
     counts = bool(used) and len(times) == 1 and used[0].counts
@@ -173,20 +185,21 @@ def _read(
         # LabVIEW's text files count where they have no clock, and a clock that was found may be none
         counts = is_counter(table.columns[index]) and np.array_equal(values[index], np.arange(values[index].size))
         counts = counts or any(column.guessed for column in taken if column.index == index)
-    return series, taken, counts
+    return series, table, taken, counts
 
 
-def _without_gaps(name: str, own: _Series, table: Table) -> _Series:
+def _without_gaps(name: str, own: _Series, table: Table, leave_out: bool) -> _Series:
     """A channel without the rows that hold neither it nor its time. Where at least every second of its cells is empty, its
     rate is lower than that of the rows: it is the samples that are there.
 
-    Raises InvalidError on any other empty cell.
+    `leave_out`: rows with any other empty cell are left out; else InvalidError is raised on them.
     """
     missing, invalid = np.isnan(own.values), own.valid
-    if table.line_of is not None:
+    if table.line_of is not None and not leave_out:
         own.valid = None  # a cell's mask says that it is empty
-    if own.times is not None and own.times.size == missing.size and missing.any() and not missing.all():
-        held = ~(missing & np.isnan(own.times))
+    if own.times is not None and own.times.size == missing.size and not missing.all():
+        timeless = np.isnan(own.times)
+        held = ~timeless if leave_out else ~(missing & timeless)
         gaps = np.count_nonzero(missing & held)
         if gaps >= _MIN_GAPS and 2 * gaps >= np.count_nonzero(held) - 1:
             held &= ~missing
@@ -194,7 +207,7 @@ def _without_gaps(name: str, own: _Series, table: Table) -> _Series:
             valid = None if own.valid is None else own.valid[held]
             own = _Series(own.values[held], valid, (own.clock, name), own.times[held])
             missing, invalid = missing[held], None if invalid is None else invalid[held]
-    if table.line_of is not None and invalid is not None and not invalid.all():
+    if table.line_of is not None and not leave_out and invalid is not None and not invalid.all():
         raise empty_cells(name, np.flatnonzero(~invalid).tolist(), table.line_of, missing.size - 1)
     if own.times is not None and table.line_of is not None and np.isnan(own.times).any():
         raise empty_cells("time_s", np.flatnonzero(np.isnan(own.times)).tolist(), table.line_of, own.times.size - 1)
@@ -295,7 +308,7 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
         notices.append(_brought(series, leading, kept))
     if invalid:
         shown = ", ".join(f"{name} {count}" for name, count in invalid.items())
-        message = f"samples that the recorder marks invalid were left out, with all channels at their times: {shown}"
+        message = f"samples without a valid value were left out, with all channels at their times: {shown}"
         notices.append(Notice(code="invalid_samples", message=message))
     if kept.all():
         return columns

@@ -286,10 +286,10 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
 def _may_be_time(column: Column) -> bool:
     """Whether a column in a unit of time has a word of time in its name, or no name."""
     name = column.name.casefold()
-    timed = not name or any(word in name for word in _TIMES)
+    timed = name in ("", "t") or any(word in name for word in _TIMES)
     return (
         timed
-        and known_channel(name) is None
+        and known_channel(column.name) is None
         and column.unit is not None
         and conversion("time_s", column.unit) is not None
     )

@@ -68,7 +68,8 @@ def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[st
     `comments` are rows that may hold titles and no data; `named` are titles that the caller names.
     """
     runs = list(_runs(rows, comments)) or [(len(rows), 0)]
-    layouts = [_layout([*rows, ()], comments, start, length, named) for start, length in runs]
+    rows = [*rows, ()]
+    layouts = [_layout(rows, comments, start, length, named) for start, length in runs]
     # titles without data are a table too, where they are known and nothing but units is under them
     candidates = [
         layout
@@ -80,8 +81,15 @@ def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[st
         )
     ]
     best = max(candidates, key=lambda layout: layout.score, default=None)
-    # titles that are repeated within the data do not begin another table
-    return next((layout for layout in candidates if best and layout.texts() == best.texts()), None)
+    # titles that are repeated within the data do not begin another table, nor do numbers with a label above them
+    return next(
+        (
+            layout
+            for layout in candidates
+            if best and layout.texts() == best.texts() and not is_footer(rows[layout.start], rows[best.start])
+        ),
+        None,
+    )
 
 
 def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, int]]:
@@ -217,8 +225,9 @@ def _text(cell: Any) -> str:
 
 
 def _are_units(row: Row) -> bool:
-    """Whether all that is there are units."""
-    stated = [unit for unit in map(bare_unit, map(_text, row)) if unit]
+    """Whether all that is there are units, under a word that says so or none."""
+    labelled = bool(row) and _UNIT_LABELS.fullmatch(_text(row[0])) is not None
+    stated = [unit for unit in map(bare_unit, map(_text, row[labelled:])) if unit]
     return bool(stated) and all(map(is_unit, stated))
 
 
@@ -241,6 +250,17 @@ def _fits(title: str, cell: str) -> bool:
     """Whether a cell is a unit of its title, or any where the title is not known."""
     unit, channel = bare_unit(cell) or "", known_channel(title)
     return is_unit(unit) if channel is None else conversion(channel, unit) is not None
+
+
+def turned(rows: Sequence[Row]) -> list[Row]:
+    """The rows of a table that lies on its side: a line a channel."""
+    return list(zip_longest(*rows, fillvalue=""))
+
+
+def was_turned() -> Notice:
+    """The notice of such a table."""
+    message = "the table has a line for each channel: its columns were read as rows"
+    return Notice(code="turned", message=message)
 
 
 def left_out(number: int, where: str, first: str) -> Notice:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
+from service.readers.table import Reading, marks, place
 
 #: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_arrays` refuses with their row. Digits
 #: are never given back, or a long run of them with a letter behind it would be tried from every digit to every other.
@@ -49,8 +50,9 @@ class Numerals:
     """The cells of one file: its decimal sign is given, or shown by the first cell that can be read in one way ("" until
     then), and the dates of each column follow one order."""
 
-    def __init__(self, decimal: str = "") -> None:
-        self.decimal = decimal
+    def __init__(self, reading: Reading) -> None:
+        self.decimal = reading.decimal
+        self._missing = {"", *marks(reading.missing)}
         self._stamps: dict[int, Stamps] = {}
 
     def settle(self, columns: Sequence[Sequence[Any]]) -> bool:
@@ -152,8 +154,8 @@ class Numerals:
         return np.array([float(cell) for cell in cells]) if all(map(NUMBER.fullmatch, cells)) else None
 
     def _with_gaps(self, cells: Sequence[Any]) -> NDArray[Any] | None:
-        """Cells as numbers, masked where they are empty; None where another one is no number."""
-        gaps = [cell is None or (isinstance(cell, str) and not cell.strip()) for cell in cells]
+        """Cells as numbers, masked where they are empty or marks of a missing value; None where another one is no number."""
+        gaps = [cell is None or (isinstance(cell, str) and cell.strip().casefold() in self._missing) for cell in cells]
         values = (
             self._floats(["nan" if gap else cell for cell, gap in zip(cells, gaps, strict=True)]) if any(gaps) else None
         )
@@ -161,7 +163,7 @@ class Numerals:
 
     def _wrong(self, cells: Sequence[Any], timed: bool) -> Iterator[tuple[int, str]]:
         """The rows of a column that are no numbers, each with the rule that it breaks."""
-        swapped = Numerals("," if self.decimal == "." else ".")
+        swapped = Numerals(Reading(decimal="," if self.decimal == "." else "."))
         for row, cell in enumerate(cells):
             if self._floats([cell]) is None:
                 rule = "must be a number"
@@ -177,12 +179,11 @@ def _shown(cell: Any) -> str:
     return str("" if cell is None else cell).strip()[:MAX_QUOTED]
 
 
-#: What helps where a cell is empty.
-_EMPTY = ": fill the cell, or take its row out of the file"
-
-
-def _place(name: str, row: int, line_of: Callable[[int], int] | None) -> str:
-    return f"{name}[{row}]" + (f" (line {line_of(row)})" if line_of else "")
+def _remedy(shown: str) -> str:
+    """What helps where a cell is empty, or holds a word or a sign that may stand for no value."""
+    if not shown:
+        return ": fill the cell, or take its row out of the file; missing=empty leaves such rows out"
+    return "" if any(map(str.isdigit, shown)) or "," in shown else f": missing={shown} leaves such rows out"
 
 
 def empty_cells(name: str, rows: Sequence[int], line_of: Callable[[int], int] | None, last: int) -> InvalidError:
@@ -201,7 +202,7 @@ def _wrong(
             row=row + 1,
             value=shown,
             code="not_a_number",
-            message=f"{_place(name, row, line_of)} {rule}, got {shown!r}" + ("" if shown else _EMPTY),
+            message=f"{place(name, row, line_of)} {rule}, got {shown!r}{_remedy(shown)}",
         )
         for row, name, shown, rule in wrong
     ]
@@ -215,7 +216,7 @@ def _doubtful(name: str, row: int, cell: str, line_of: Callable[[int], int] | No
     sign, other = (",", ".") if "," in cell else (".", ",")
     as_decimal, as_thousands = f"{float(cell.replace(sign, '.')):.9g}", cell.replace(sign, "")
     message = (
-        f"{_place(name, row, line_of)} may be {as_decimal} or {as_thousands}, got {cell!r}: every {sign!r} of the file "
+        f"{place(name, row, line_of)} may be {as_decimal} or {as_thousands}, got {cell!r}: every {sign!r} of the file "
         f"stands before exactly three digits; decimal={sign} reads {as_decimal}, decimal={other} reads {as_thousands}"
     )
     error = FieldError(pointer="/decimal", row=row + 1, value=cell, code="ambiguous_number", message=message)

@@ -4,7 +4,7 @@ from typing import Any
 
 from service.columns import CHANNELS
 from service.errors import MAX_QUOTED, InvalidError
-from service.readers.column_names import choices_of, choose, known_channel
+from service.readers.column_names import choices_of, choose, column_of, known_channel
 from service.readers.table import Reading, Table, labels
 from service.readers.unit_table import conversion
 
@@ -15,7 +15,8 @@ _MAX_LINES = 50
 def preview(table: Table, reading: Reading) -> dict[str, Any]:
     """The table and its columns.
 
-    `columns`: of each its `title`, the `unit` that the file states, the `channel` that it would be (null: left out) and the
+    `columns`: of each its `title`, the `unit` that the file states, the one `stated` by the
+    caller's map, the `channel` that it would be (null: left out) and the
     `factor` and `offset` to the channel's unit (null: the unit is not known). `problem` says why it cannot be read as it is.
     """
     try:
@@ -25,6 +26,7 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
     except InvalidError as error:
         taken, problem = {}, error.detail
     named = {choice.column: channel for channel, choice in choices_of(reading).items()}
+    stated_in_map = {channel: column_of(choice.column).unit for channel, choice in choices_of(reading).items()}
     columns = []
     for index, column in enumerate(table.columns):
         channel = taken[index].channel if index in taken else named.get(column.title) or known_channel(column.name)
@@ -37,6 +39,7 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
                 "name": column.name,
                 "group": column.group,
                 "unit": column.unit,
+                "stated": None if channel is None else stated_in_map.get(channel),
                 "channel": channel,
                 "channel_unit": None if channel is None else CHANNELS[channel].unit,
                 "factor": None if understood is None else understood.factor,

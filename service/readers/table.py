@@ -17,6 +17,8 @@ from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice
 LineOf = Callable[[int], int]
 #: The time option that takes no clock: each row is a plateau.
 NO_TIME = "none"
+#: The option of missing values by which every number is a measurement.
+NO_MISSING = "none"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +41,8 @@ class Reading:
 
     `mapping`: channel -> its column; `only_named`: no other column is taken. `table`: the sheet, group or archived file.
     `time`: the title of the time column, or NO_TIME. `decimal`: the decimal sign, "." or ",". `skip_rows`: lines above that
-    are not looked at.
+    are not looked at. `missing`: marks of values that are missing, such as `-9999,n/a`; where any is given, rows without a
+    value are left out; NO_MISSING: every number is a measurement.
     """
 
     mapping: Mapping[str, Choice] = field(default_factory=dict)
@@ -48,6 +51,7 @@ class Reading:
     time: str = ""
     decimal: str = ""
     skip_rows: int = 0
+    missing: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +108,16 @@ class Table:
     line_of: LineOf | None = None
     breaks: Sequence[int] = ()
     notices: Sequence[Notice] = ()
+
+
+def marks(missing: str) -> list[str]:
+    """The marks in a list such as `-9999,n/a`, in small letters."""
+    return [] if missing == NO_MISSING else [mark.strip().casefold() for mark in missing.split(",") if mark.strip()]
+
+
+def place(name: str, row: int, line_of: LineOf | None) -> str:
+    """A value of a channel, for a message."""
+    return f"{name}[{row}]" + (f" (line {line_of(row)})" if line_of else "")
 
 
 def labels(above: Sequence[Sequence[str]]) -> dict[str, str]:

@@ -12,7 +12,7 @@ import time
 from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,7 +25,7 @@ from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, Not
 from service.readers.clocks import stated_clock
 from service.readers.column_names import choices_of, is_counter, recognised
 from service.readers.detect import ByteSource, Format, overdue, too_slow
-from service.readers.grid import MAX_ROWS, Layout, find_table, is_footer, left_out, no_table
+from service.readers.grid import MAX_ROWS, Layout, find_table, is_footer, left_out, no_table, turned, was_turned
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
 from service.readers.numerals import Numerals, is_stamp
 from service.readers.table import Column, Reading, Table, labels
@@ -72,7 +72,13 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
         first = first[: first.rindex(b"\n") + 1]
     if not first.strip():
         raise wrong_line(1, "is empty, and no header came after it", "no_header")
-    form = _form(first, reading, limits)
+    try:
+        form = _form(first, reading, limits)
+    except InvalidError:
+        if len(first) == _FIRST_BLOCK or (on_its_side := _turned(first, reading)) is None:
+            raise
+        table = read_text(lambda: nullcontext(io.BytesIO(on_its_side)), reading, limits)
+        return replace(table, notices=[*table.notices, was_turned()])
     body = _Body(opened, form, reading, limits)
     cells = tuple(tuple(_cells(line, form.separator)) for line in form.lines[: form.first_line + 19])
     return Table(
@@ -199,6 +205,16 @@ def _form(first: bytes, reading: Reading, limits: Limits) -> _Form:
     return best
 
 
+def _turned(first: bytes, reading: Reading) -> bytes | None:
+    """A whole text whose lines are channels with its lines as columns, by the separator by which it is a table then."""
+    text = "".join(_blocks(io.BytesIO(first), _encodings(first)[0])).split("\n")[reading.skip_rows : -1]
+    for separator in _separators(text, 0):
+        rows = turned([_cells(line, separator) for line in text if line.strip()])
+        if len(rows) > 2 and find_table(rows[:MAX_ROWS], frozenset(), _named(reading)):
+            return "\n".join("\t".join(row) for row in rows).encode()
+    return None
+
+
 def _separators(lines: Sequence[str], skipped: int) -> list[str]:
     """The separators that are tried: the one that the text names, or all that it holds."""
     for line in lines[skipped : skipped + MAX_ROWS]:
@@ -309,7 +325,7 @@ class _Body:
         )
         named = len(form.layout.headings)
         self._width = named if any(self.first[named:]) else max(named, len(self.first))
-        self._numerals = Numerals(reading.decimal)
+        self._numerals = Numerals(reading)
         self.lines = _Lines(form.first_line)
         self._rows = 0
         self.breaks: list[int] = []

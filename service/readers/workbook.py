@@ -5,6 +5,7 @@ number is read as CSV's.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,18 @@ from python_calamine import CalamineWorkbook, SheetTypeEnum
 from service.errors import InvalidError
 from service.readers.archive import check_archive
 from service.readers.column_names import choices_of, recognised
-from service.readers.grid import MAX_ROWS, Layout, find_table, is_blank, is_footer, is_value, left_out, no_table
+from service.readers.grid import (
+    MAX_ROWS,
+    Layout,
+    find_table,
+    is_blank,
+    is_footer,
+    is_value,
+    left_out,
+    no_table,
+    turned,
+    was_turned,
+)
 from service.readers.limits import Limits
 from service.readers.table import Reading, Table, only
 
@@ -37,11 +49,17 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         sheets = [sheets[only(sheets, sheet if sheet in sheets and number.isdecimal() else reading.table, "sheet")]]
     tables: dict[str, tuple[list[Sequence[Any]], Layout]] = {}
     refused: list[InvalidError] = []
+    on_side: set[str] = set()
     for name in sheets:
         rows: list[Sequence[Any]] = [
             _trimmed(row) for row in book.get_sheet_by_name(name).to_python(skip_empty_area=False)
         ]
         layout = find_table(rows[reading.skip_rows : reading.skip_rows + MAX_ROWS], frozenset(), named)
+        if layout is None and len(rows) <= MAX_ROWS:
+            on_its_side = [_trimmed(row) for row in turned(rows)]
+            layout = find_table(on_its_side[:MAX_ROWS], frozenset(), named)
+            if layout is not None:
+                rows, on_side = on_its_side, {*on_side, name}
         if layout is None:
             refused.append(no_table(rows[: reading.skip_rows + MAX_ROWS], named))
         elif len(sheets) == 1 or recognised([heading[0] for heading in layout.headings], named):
@@ -49,7 +67,8 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     if not tables and refused:
         raise refused[0]
     name = list(tables)[only(list(tables) or sheets, "", "sheet")]
-    return _table(name, *tables[name], reading, tuple(sheets), limits)
+    table = _table(name, *tables[name], reading, tuple(sheets), limits)
+    return replace(table, notices=[*table.notices, was_turned()]) if name in on_side else table
 
 
 def _trimmed(row: Sequence[Any]) -> Sequence[Any]:

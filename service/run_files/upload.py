@@ -124,6 +124,7 @@ def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:
         table=reading.table or profile.table or "",
         decimal=reading.decimal or profile.decimal or "",
         skip_rows=reading.skip_rows or profile.skip_rows,
+        missing=reading.missing or profile.missing or "",
     )
 
 

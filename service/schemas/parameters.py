@@ -150,6 +150,14 @@ FileTime = Annotated[
 FileDecimal = Annotated[
     Literal["", ".", ","], Field(description="The decimal sign; needed where 1.100 may be 1.1 or 1100")
 ]
+FileMissing = Annotated[
+    str,
+    Field(
+        max_length=LONGEST_FILENAME,
+        description="Marks of missing values, as -9999,n/a: rows with one, or with an empty cell, are left out; `none`: all "
+        "numbers are measured",
+    ),
+]
 FileSkipRows = Annotated[
     int, SHORT, Field(ge=0, le=MAX_SKIPPED, description="Lines above the table that are not looked at")
 ]

@@ -57,6 +57,11 @@ class RigProfile(Schema):
     skip_rows: Annotated[int, Field(ge=0, le=MAX_SKIPPED)] = Field(
         default=0, description="Lines above the titles that are not looked at"
     )
+    missing: Text | None = Field(
+        default=None,
+        description="Marks of missing values, as `-9999,n/a`: rows with one, or with an empty cell, are left out; `none`: "
+        "all numbers are measured; null: a file with numbers that may be such marks is refused",
+    )
     kind: FileKindName | None = Field(default=None, description="The kind of run; null: by `file_name`, or asked for")
     file_name: Text | None = Field(
         default=None,

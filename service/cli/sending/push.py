@@ -1,12 +1,25 @@
 """`clutchlife push`: send run files, keep what could not be sent, safe to repeat."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from service.cli.options import EX_DATAERR, EX_USAGE, URL, Key, Patience, Url, errors_in_a_line, fail
+from service.cli.options import (
+    EX_DATAERR,
+    EX_USAGE,
+    URL,
+    ChannelMap,
+    Decimal,
+    Key,
+    Missing,
+    Patience,
+    Url,
+    errors_in_a_line,
+    fail,
+)
 from service.cli.sending.entry import INSPECTIONS, RUNS, Entry
 from service.cli.sending.spool import Spool, default_folder
 from service.cli.sending.transmission import say, transmit
@@ -30,7 +43,9 @@ def push(
     rig: Annotated[
         str | None, typer.Option(help="For files that are not JSON: the rig by whose profile they are read")
     ] = None,
-    channel_map: Annotated[str | None, typer.Option("--map", help="Channels by name: torque_nm:Mz,speed_rpm:n")] = None,
+    channel_map: ChannelMap = None,
+    decimal: Decimal = None,
+    missing: Missing = None,
 ) -> None:
     """Send run files: JSON, or CSV, TDMS, MDF4 and Parquet, with their kind and cycles in a runs.json or in options.
 
@@ -39,6 +54,7 @@ def push(
     Runs that the service cannot store now wait in the spool and are sent first next time. A file that is pushed again with
     other content takes the place of the version that waits.
     """
+    reading = {"map": channel_map, "decimal": decimal, "missing": missing}
     with errors_in_a_line():
         try:
             files = manifest.find(paths)
@@ -52,7 +68,7 @@ def push(
         if _record(paths) is None:
             _require_known(url, key, clutch)
         waiting = Spool.of(spool, url, clutch)
-        runs = [_request(file, kind, cycles, channel_map, rig) for file in files if not file.of_inspection]
+        runs = [_request(file, kind, cycles, reading, rig) for file in files if not file.of_inspection]
         inspections = [(file.path, None) for file in files if file.of_inspection]
         digests: set[str] = set()
         for resource, requests in ((RUNS, runs), (INSPECTIONS, inspections)):
@@ -65,12 +81,12 @@ def push(
 
 
 def _request(
-    file: manifest.RunFile, kind: str | None, cycles: float | None, channel_map: str | None, rig: str | None
+    file: manifest.RunFile, kind: str | None, cycles: float | None, reading: Mapping[str, str | None], rig: str | None
 ) -> tuple[Path, dict[str, str] | None]:
     """A file and the parameters of its request; None for a JSON body."""
     if file.path.suffix == ".json":
         return file.path, None
-    given = {name: value for name, value in (("map", channel_map), ("rig", rig)) if value is not None}
+    given = {name: value for name, value in {**reading, "rig": rig}.items() if value is not None}
     return file.path, given | _parameters(file, kind, cycles, by_rig=rig is not None)
 
 

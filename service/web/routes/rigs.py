@@ -13,9 +13,20 @@ from service.errors import FieldError, InvalidError
 from service.lists import from_cursor
 from service.queries import rigs
 from service.queries.import_preview import preview
+from service.readers.read_file import reading_of
 from service.run_files.json_run import checked
 from service.run_files.rig_profile import require_usable
-from service.schemas.parameters import FileCycles, FileKind, FileName, FileRig, OfClutch, RigName
+from service.schemas.parameters import (
+    FileCycles,
+    FileDecimal,
+    FileKind,
+    FileMap,
+    FileMissing,
+    FileName,
+    FileRig,
+    OfClutch,
+    RigName,
+)
 from service.schemas.rig import Preview, RigIn, RigOut, RigPage
 from service.web.answers import answer, described_body, json_answer, json_body, now
 from service.web.auth import Admin, Ingester, OwnIngester, OwnReader, name_of_caller, require_clutch
@@ -110,6 +121,9 @@ async def preview_file(
     kind: FileKind = None,
     cycles: FileCycles = None,
     clutch_id: OfClutch = None,
+    map: FileMap = None,  # noqa: A002
+    decimal: FileDecimal = "",
+    missing: FileMissing = "",
 ) -> Response:
     """What would be made of a file: its first rows, each column's channel and unit, what would be cut and fitted. Nothing is
     stored. Without `rig`, and without a `profile` beside the file in a form, the profile that has the file's columns is
@@ -120,7 +134,14 @@ async def preview_file(
         path = Path(folder) / "run"
         filename, profile = await received(request, path, filename)
         made = partial(
-            preview, filename=filename, rig=rig, profile=profile, kind=kind, cycles=cycles, clutch_id=clutch_id
+            preview,
+            filename=filename,
+            rig=rig,
+            profile=profile,
+            kind=kind,
+            cycles=cycles,
+            clutch_id=clutch_id,
+            reading=reading_of(map, decimal=decimal, missing=missing),
         )
         shown = await asyncio.wrap_future(context.workers.submit(Lane.FILES, made, path))
     return json_answer(shown)

@@ -179,6 +179,11 @@ TEXTS: dict[str, tuple[str | bytes, str | None]] = {
     "oscilloscope.csv": ('"Model Name","DL950"\n"TraceName","Pressure","Speed","Torque"\n"BlockSize",12,12,12\n'
                          '"VUnit","bar","rpm","Nm"\n"HResolution",10,10,10\n"HUnit","ms","ms","ms"\n"Date","2026/11/02"\n"Time","08:00:00"\n\n,'
                          + rows(names=PLATEAUS).replace("\n", "\n,")[:-1], None),
+    "oscilloscope-with-places-of-memory.csv": (
+        '"TraceName","Druck","Drehzahl","Moment"\n"VUnit","bar","rpm","Nm"\n"BlockSize",12,12,12\n"VDataType","IS2","IS2","IS2"\n'
+        '"HResolution",0.01,0.01,0.01\n"HUnit","s","s","s"\n\n,' + rows(names=PLATEAUS).replace("\n", "\n,")[:-1], None),
+    "tribometer-with-a-large-t.csv": ("T,n,M,p\nsec,rpm,N*m,bar\n"
+                                      + rows(names=["time_s", "speed_rpm", "torque_nm", "pressure_bar"]), None),
     "rate-above.csv": ("Sample rate [kHz];0,1\nOperator;X\n\np [bar];n [rpm];M [Nm]\n" + rows(";", ",", PLATEAUS), None),
     "interval-above.csv": ("Sampling interval,10ms\n\np [bar],n [rpm],M [Nm]\n" + rows(names=PLATEAUS), None),
     "six-rows-of-titles.csv": ("Kanal;K1;K2;K3\nZeit;Druck;Drehzahl;Moment\ns;bar;1/min;Nm\nFilter;TP 100 Hz;;\n"
@@ -287,6 +292,8 @@ REFUSED = {
         None,
         "(line 2) must be a number, got '': fill the cell, or take its row out",
     ),
+    "a-word-for-no-value": (HEAD + "\n0,5,n/a,20\n", None, "got 'n/a': missing=n/a leaves such rows out"),
+    "not-a-number": (HEAD + "\n0,5,NaN,20\n", None, "got nan: missing=nan leaves such rows out"),
     "words-among-rows": (HEAD + "\n" + rows() + "Mittelwert\n" + rows(), None, "line 14 must have 4 cells"),
 }
 
@@ -298,6 +305,97 @@ def test_a_text_is_refused_with_words_that_help(tmp_path: Path, name: str) -> No
     with pytest.raises(InvalidError) as caught:
         read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of(mapping))
     assert words in caught.value.detail
+
+
+# --- numbers that are no measurements ---
+
+
+@pytest.mark.parametrize(
+    ("channel", "mark"),
+    [(channel, mark) for channel in ("pressure_bar", "speed_rpm", "torque_nm")
+     for mark in ("-9999", "9999", "-999", "-999.25", "99999", "32767", "-32768", "1e30", "6.9e6", "-9999.000")]
+    + [("time_s", "-9999"), ("time_s", "9999"), ("torque_nm", "999"), ("pressure_bar", "999")],
+)  # fmt: skip
+def test_a_number_that_may_stand_for_no_value_is_refused_until_an_option_settles_it(
+    tmp_path: Path, channel: str, mark: str
+) -> None:
+    lines = [line.split(",") for line in rows().splitlines()]
+    lines[-1][list(RECORD).index(channel)] = mark
+    (tmp_path / "a.csv").write_text("\n".join([HEAD, *map(",".join, lines)]) + "\n", encoding="utf-8")
+    with pytest.raises(InvalidError, match=rf"{channel}\[11\] \(line 13\)") as caught:
+        read_file(tmp_path / "a.csv", filename="a.csv")
+    missing = re.search(r"missing=(\S+) leaves it out", caught.value.detail)
+    assert missing is not None
+    read = read_file(tmp_path / "a.csv", filename="a.csv", reading=Reading(missing=missing[1]))
+    assert {name: column.tolist() for name, column in read.columns.items()} == {
+        name: values[:-1].tolist() for name, values in RECORD.items()
+    }
+    assert channel == "time_s" or [notice.code for notice in read.notices] == ["invalid_samples"]
+
+
+MEASURED = {
+    "speeds-in-steps-of-ten": [1, 10, 100, 999],
+    "an-idle-valve": [0, 0.01, 0.02, 0.01, 5, 5, 5, 5],
+    "set-points": [0, 0, 0, 20, 20, 20],
+    "both-directions": [-999, -500, 500, 999],
+    "a-spike": [20.1, 20.3, 20.2, 20.1, 350.5, 20.2],
+}
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_measured_numbers_are_read(tmp_path: Path, name: str) -> None:
+    (tmp_path / "a.csv").write_text("\n".join(["torque_nm", *map(str, MEASURED[name])]) + "\n", encoding="utf-8")
+    assert read_file(tmp_path / "a.csv", filename="a.csv").columns["torque_nm"].tolist() == MEASURED[name]
+
+
+def test_a_drop_to_a_number_of_nines_within_the_range_is_refused(tmp_path: Path) -> None:
+    speeds = [f"{1500 + row % 3 if row != 30 else 999}" for row in range(60)]
+    (tmp_path / "a.csv").write_text("\n".join(["speed_rpm", "0", *speeds]) + "\n", encoding="utf-8")
+    with pytest.raises(InvalidError, match=r"speed_rpm\[31\] .*got 999.*missing=999"):
+        read_file(tmp_path / "a.csv", filename="a.csv")
+
+
+def test_one_option_leaves_out_every_row_without_a_value(tmp_path: Path) -> None:
+    text = rows().replace("0.0300,5.0003", ",5.0003").replace("0.0500,5.0005", "0.0500,NaN").replace("20.0909", "---")
+    (tmp_path / "a.csv").write_text(f"{HEAD}\n{text}", encoding="utf-8")
+    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=Reading(missing="---")).columns
+    assert columns["time_s"].tolist() == np.delete(TIME, [3, 5, 5]).tolist()
+
+
+STATISTICS: dict[str, Callable[[np.ndarray], float]] = {
+    "means": np.mean, "sums": np.sum, "maxima": np.max, "minima": np.min, "medians": np.median,
+    "standard deviations": lambda column: np.std(column, ddof=1),
+}  # fmt: skip
+FIVE = {"pressure_bar": [5.0] * 5, "speed_rpm": [20, 120, 520, 1020, 1970], "torque_nm": [20.9, 21.9, 21.4, 20.7, 19.9]}
+
+
+@pytest.mark.parametrize("names", [*([name] for name in STATISTICS), ["means", "maxima", "minima"]], ids="-".join)
+@pytest.mark.parametrize("held", [FIVE, RECORD], ids=["plateaus", "record"])
+def test_rows_made_of_those_above_are_left_out_with_a_warning(
+    tmp_path: Path, held: dict[str, np.ndarray], names: list[str]
+) -> None:
+    lines = [",".join(map(str, row)) for row in zip(*held.values(), strict=True)]
+    made = [",".join(f"{STATISTICS[name](np.array(column)):.2f}" for column in held.values()) for name in names]
+    if held is RECORD and not {"maxima", "minima"} & set(names):
+        made = ["," + line.partition(",")[2] for line in made]
+    else:
+        made = [",".join(f"{STATISTICS[name](np.array(column)):.10g}" for column in held.values()) for name in names]
+    (tmp_path / "a.csv").write_text("\n".join([",".join(held), *lines, "", *made]) + "\n", encoding="utf-8")
+    read = read_file(tmp_path / "a.csv", filename="a.csv")
+    assert {name: column.tolist() for name, column in read.columns.items()} == {k: list(v) for k, v in held.items()}
+    (notice,) = read.notices
+    line = len(lines) + 3
+    assert notice.message.startswith(f"{len(names)} rows, from line {line} on, were left out: they are the ")
+    assert ", ".join(names) in notice.message or (held is RECORD and names == ["medians"])  # which are its means too
+
+
+def test_a_table_on_its_side_is_read(tmp_path: Path) -> None:
+    for titles in ([f"{name};{{}}" for name in FIVE], ["Druck;bar;{}", "Drehzahl;1/min;{}", "Drehmoment;Nm;{}"]):
+        lines = [title.format(";".join(map(str, column))) for title, column in zip(titles, FIVE.values(), strict=True)]
+        (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        read = read_file(tmp_path / "a.csv", filename="a.csv")
+        assert {name: column.tolist() for name, column in read.columns.items()} == FIVE
+        assert [notice.code for notice in read.notices] == ["turned"]
 
 
 MS = ["t.ms", "Time..ms.", "timeMs", "T_MS", "time-ms", "Uhr, ms", "ms", "Time ms:", "Time (in ms)", "Time - ms",

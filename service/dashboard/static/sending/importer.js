@@ -243,10 +243,18 @@ export class Importer {
         h("option", { value: name, selected: name === profile.table }, name || "the only one"),
       ),
     );
+    const missing = h("input", {
+      id: `missing-${number}`,
+      value: profile.missing ?? "",
+      autocomplete: "off",
+      onchange: (/** @type {any} */ event) =>
+        this.edit((edited) => Object.assign(edited, { missing: event.target.value.trim() || null })),
+    });
     return h(
       "div",
       { class: "fields" },
       field(decimal, "Decimal mark"),
+      field(missing, "Missing values", h("small", {}, "such as -9999, n/a; none: every number is measured")),
       tables.length > 1 && field(table, "Sheet or test"),
     );
   }
