@@ -160,11 +160,22 @@ class _Clutch:
         """The tests that are looked at."""
         return self._nearest([i for i, run in enumerate(self.runs) if run.tests], criteria.MAX_TESTS)
 
+    @cached_property
+    def compared(self) -> frozenset[int]:
+        """The runs that are no farther away than the tests that are looked at: beyond these the course is only a guess."""
+        left_out = [i for i, run in enumerate(self.runs) if run.tests and i not in set(self.tests)]
+        reach = self._apart(left_out).min(initial=math.inf)
+        return frozenset(np.flatnonzero(self._apart(range(len(self.runs))) < reach).tolist())
+
     def _nearest(self, indices: Sequence[int], most: int) -> list[int]:
         if len(indices) <= most:
             return list(indices)
-        apart = np.abs(self.cycles[list(indices)][:, None] - self.centres).min(axis=1)
-        return sorted(indices[k] for k in np.argsort(apart, kind="stable")[:most].tolist())
+        nearest = np.argsort(self._apart(indices), kind="stable")
+        return sorted(indices[k] for k in nearest[:most].tolist())
+
+    def _apart(self, indices: Sequence[int]) -> FloatArray:
+        """How far runs are from what is looked at [k]."""
+        return np.asarray(np.abs(self.cycles[list(indices), None] - self.centres).min(axis=1))
 
     @cached_property
     def rank(self) -> NDArray[np.intp]:
@@ -408,7 +419,7 @@ class _Weighed:
 
     @cached_property
     def suspects(self) -> frozenset[int]:
-        """Runs that are in question, and others that surprise."""
+        """Runs that are in question, and others near them that surprise."""
         surprise: dict[int, float] = {}
         for fit, own in self.fits:
             if len(own) > 1:
@@ -419,6 +430,7 @@ class _Weighed:
         for i, value in zip(self.clutch.near, self.clutch.surprise(self._sets([])[0]).tolist(), strict=True):
             surprise[i] = surprise.get(i, 0.0) + min(value - _SUSPICIOUS_CYCLES, 0.0)
         odd = [i for i, value in sorted(surprise.items(), key=lambda item: item[1]) if value < 0.0]
+        odd = [i for i in odd if i in self.clutch.compared]
         return self.clutch.in_question.union(odd[:_SUSPECTS])
 
     @property

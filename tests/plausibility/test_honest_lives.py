@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from models.rig import campaign
+from service.run_files.simulated import simulated_body
 from tests.plausibility import slips
 from tests.plausibility.bench import Bench
 from tests.plausibility.honest_lives import KINDS, life
@@ -60,6 +62,17 @@ def test_a_new_level_is_asked_about_at_most_once(share: float) -> None:
         bench, states = sent([*before[:7], *(event if declared else []), *after])
         assert states.count("h") <= 1
         assert bench.held == ()
+
+
+def test_an_early_test_of_a_long_life_is_not_doubted_by_what_came_much_later() -> None:
+    """The first tests are closer together than the others; of 53 tests not all are looked at."""
+    runs = [run for run in campaign.simulate(1, stop_fraction=0.01, most_tests=53) if run.plateaus is not None]
+    bench, held = Bench({}), list[str]()
+    for run in runs:
+        bench.answer(simulated_body(run))
+        held += [event.run_id for event in bench.held]
+    assert len(runs) == 53
+    assert held == []
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
