@@ -3,7 +3,7 @@
 Particles carry (log φ, log ε, log s), the form (`courses`) and, of every run, whether it was outlying; given
 these, all else is linear and integrated out in closed form (Rao-Blackwell). The coefficients do not move, so
 resampling alone would soon leave copies of one particle. After it every particle takes Metropolis-Hastings steps that
-leave the exact marginal posterior over the whole history as it is (iterated batch importance sampling), until eight in
+leave the exact marginal posterior over the whole history as it is (iterated batch importance sampling), until seven in
 ten have moved.
 
 A measurement that would starve the cloud at once is introduced by degrees: the cloud passes through targets that lie
