@@ -61,11 +61,12 @@ def degradation(
     at_cycles: float | None = None,
     life: int | None = None,
     draws: int = 0,
+    until: float | None = None,
 ) -> dict[str, Any]:
     """The tracks of a life by a filter: of one quantity wherever it was measured, or of mean COF and every parameter.
 
     As it was at `at_cycles`, of the present life or of an earlier one by its number; with so many joint `draws` of the
-    coefficients. Raises NotFoundError, and InvalidError for a quantity that is none.
+    coefficients, and trajectories up to `until` cycles. Raises NotFoundError, and InvalidError for a quantity that is none.
     """
     wanted = None if quantity is None else quantity_named(quantity)
     with database.reading() as connection:
@@ -86,10 +87,10 @@ def degradation(
         return head | nothing | chosen.assumptions.named() | {"next": None}
     estimate = None
     if wanted is None:
-        items, again = _all(measured, method, draws)
+        items, again = _all(measured, method, draws, until)
         estimate = severity_estimate(measured.life, measured.assumptions)
     else:
-        items, again = _items(measured, wanted, method, draws), None
+        items, again = _items(measured, wanted, method, draws, until), None
     doubted = [] if estimate is None else estimate.doubts(measured.assumptions.severity)
     answered = {
         "items": items,
@@ -101,37 +102,46 @@ def degradation(
 
 
 def arguments(
-    method: str, quantity: str | None, at_cycles: float | None, life: int | None, draws: int = 0
+    method: str,
+    quantity: str | None,
+    at_cycles: float | None,
+    life: int | None,
+    draws: int = 0,
+    until: float | None = None,
 ) -> tuple[Hashable, ...]:
     """The arguments of `degradation` behind the clutch; none where all are left out: so the answer is kept under one key."""
-    whole = (method, quantity, at_cycles, life, draws)
-    return () if whole == ("grid", None, None, None, 0) else whole
+    whole = (method, quantity, at_cycles, life, draws, until)
+    return () if whole == ("grid", None, None, None, 0, None) else whole
 
 
-def _all(measured: MeasuredLife, method: str, draws: int) -> tuple[list[dict[str, Any]], dict[str, Any] | None]:
+def _all(
+    measured: MeasuredLife, method: str, draws: int, until: float | None
+) -> tuple[list[dict[str, Any]], dict[str, Any] | None]:
     """Mean COF, every parameter, and mean COF from the parameters."""
     direct = _tracked(measured, measured.series(_MEAN_COF), method)
     tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, method)
     again = _from_parameters(measured, tracks, {series.pressure: (series, posterior) for series, posterior in direct})
     named = {quantity.internal: quantity for quantity in QUANTITIES.values()}
     items = [
-        track_item(named[series.quantity], series, posterior, measured.assumptions, draws)
+        track_item(named[series.quantity], series, posterior, measured.assumptions, draws, until)
         for series, posterior in (*direct, *tracks.values())
     ]
     return items, again
 
 
-def _items(measured: MeasuredLife, quantity: Quantity, method: str, draws: int) -> list[dict[str, Any]]:
+def _items(
+    measured: MeasuredLife, quantity: Quantity, method: str, draws: int, until: float | None
+) -> list[dict[str, Any]]:
     """One quantity wherever it was measured."""
     if quantity.family is Family.SLOPE:
-        return _slopes(measured, quantity, method)
+        return _slopes(measured, quantity, method, until)
     return [
-        track_item(quantity, series, posterior, measured.assumptions, draws)
+        track_item(quantity, series, posterior, measured.assumptions, draws, until)
         for series, posterior in _tracked(measured, measured.series(quantity), method)
     ]
 
 
-def _slopes(measured: MeasuredLife, quantity: Quantity, method: str) -> list[dict[str, Any]]:
+def _slopes(measured: MeasuredLife, quantity: Quantity, method: str, until: float | None) -> list[dict[str, Any]]:
     """Slopes from the joint tracks of the parameters at their pressure."""
     slopes = measured.series(quantity)
     tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, method)
@@ -141,9 +151,9 @@ def _slopes(measured: MeasuredLife, quantity: Quantity, method: str) -> list[dic
     }
     items = []
     for series in slopes:
-        at = series.scale.progress(trajectory_cycles(series))
+        at = series.scale.progress(trajectory_cycles(series, until))
         paths = slopes_along(measured, tracks, direct[series.pressure], series.speed_rpm or 0.0, at)
-        items.append(paths_item(quantity, series, paths))
+        items.append(paths_item(quantity, series, paths, until=until))
     return items
 
 

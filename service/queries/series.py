@@ -108,13 +108,19 @@ def _indicators(row: dict[str, Any]) -> Iterator[dict[str, Any]]:
     for quantity, indicator in ALL_INDICATORS.items():
         estimate = row["indicators"][quantity]
         if estimate is not None:
-            of_run = {"cycles": row["cycles"], "time": row["time"], "run_id": row["run_id"], **_NOWHERE}
+            of_run = {
+                "cycles": row["cycles"],
+                "time": row["time"],
+                "run_id": row["run_id"],
+                "source": "run",
+                **_NOWHERE,
+            }
             yield of_run | _row(quantity, indicator.unit, estimate["value"], estimate["sd"])
 
 
 def _of_run(receipt: dict[str, Any]) -> dict[str, Any]:
     time = receipt["started_at"] or receipt["received_at"]
-    return {"cycles": receipt["cycles"], "time": time, "run_id": receipt["run_id"], **_NOWHERE}
+    return {"cycles": receipt["cycles"], "time": time, "run_id": receipt["run_id"], "source": "run", **_NOWHERE}
 
 
 def _row(quantity: str, unit: str, value: float | None, sd: float) -> dict[str, Any]:
@@ -152,6 +158,7 @@ def _ahead_row(
         "cycles": whole(cycles),
         "time": None,
         "run_id": None,
+        "source": "track",
         "quantity": quantity,
         "unit": unit,
         **_NOWHERE,

@@ -274,5 +274,5 @@ class ClutchOut(Answer):
 
 
 ClutchPage = page_of(
-    "ClutchPage", ClutchOut, "Clutches, the fewest remaining cycles first or by name.", "The clutches of this page"
+    "ClutchPage", ClutchOut, "Clutches, the lowest safe bound first or by name.", "The clutches of this page"
 )

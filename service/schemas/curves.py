@@ -1,5 +1,7 @@
 """What tests look like: Stribeck curves, friction loops, and flat series."""
 
+from typing import Literal
+
 from pydantic import Field
 
 from service.schemas.base import Answer, RunCycles, RunName, page_of
@@ -75,6 +77,9 @@ class SeriesItem(Answer):
     upper: float | None = Field(description="95 % quantile")
     frequency_hz: float | None = Field(description="Frequency of a friction loop, Hz, to two digits; null for all else")
     speed_rpm: float | None = Field(description="Speed of a slope, rpm; null for all else")
+    source: Literal["run", "track"] = Field(
+        description="`run`: fitted or measured in one run alone; `track`: what all runs up to these cycles say"
+    )
 
 
 SeriesPage = page_of("SeriesPage", SeriesItem, "Flat rows for dashboards and spreadsheets.", "The rows of this page")

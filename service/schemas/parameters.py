@@ -100,7 +100,7 @@ Find = Annotated[
 Sort = Annotated[
     Literal["worst", "name", "kind"],
     Field(
-        description="`worst`: the fewest remaining cycles first, a view of the moment: a clutch whose remaining cycles "
+        description="`worst`: the lowest safe bound first, a view of the moment: a clutch whose remaining cycles "
         "change between two pages may be on both or on neither. `name`: by name; a walk from page to page meets each "
         "clutch once. `kind`: those of the same friction material, reaction plate and fluid together, the worst first"
     ),

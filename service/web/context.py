@@ -88,6 +88,11 @@ PressureBar = Annotated[
         description="A pressure of the first stationary test; left out, their mean",
     ),
 ]
+Until = Annotated[
+    float | None,
+    SHORT,
+    Query(gt=0, le=HORIZON * MAX_HORIZONS, allow_inf_nan=False, description="Trajectories go up to these cycles"),
+]
 AtCycles = Annotated[
     float | None,
     SHORT,

@@ -28,6 +28,10 @@ from service.client.clutchlife.transport import Service, connect
 from service.run_files import manifest
 
 SPOOL = default_folder()
+_REMEDY = (
+    "Push a file with --kind and --cycles, or with --rig where a profile finds them; list it in a "
+    f"{manifest.MANIFEST} beside it; or use clutchlife import, which asks"
+)
 SpoolFolder = Annotated[Path, typer.Option("--spool", help="Where runs wait until the service has stored them")]
 
 
@@ -63,8 +67,9 @@ def push(
         unlisted = manifest.unlisted(paths)
         if rig is not None:
             files += [manifest.RunFile(path=record) for record in unlisted]
-        for record in [] if rig else unlisted:
-            say(f"{record} is not listed in {manifest.MANIFEST} and not sent")
+        elif unlisted:
+            names = ", ".join(str(record) for record in unlisted)
+            say(f"not sent, for their kind and cycles are not known: {names}. {_REMEDY}")
         if _record(paths) is None:
             _require_known(url, key, clutch)
         waiting = Spool.of(spool, url, clutch)
@@ -113,8 +118,7 @@ def _parameters(file: manifest.RunFile, kind: str | None, cycles: float | None, 
         given = {"kind": kind, "cycles": None if cycles is None else repr(cycles), "filename": file.path.name}
         return {name: value for name, value in given.items() if value is not None}
     if kind is None or cycles is None:
-        remedy = f"give --rig, or --kind and --cycles, or list it in a {manifest.MANIFEST} beside it"
-        fail(f"{file.path} is no JSON file: {remedy}", EX_USAGE)
+        fail(f"the kind and the cycles of {file.path} are not known. {_REMEDY}", EX_USAGE)
     return {"kind": kind, "cycles": repr(cycles), "filename": file.path.name}
 
 

@@ -8,7 +8,7 @@ cycles = Client("http://127.0.0.1:8000").remaining_useful_life("e")["at_least"]
 import json
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -76,8 +76,9 @@ class Client:
     # --- runs ---
 
     def runs(self, clutch_id: str, **arguments: Any) -> Any:
-        """The receipts of a clutch's runs as a table, by cycles; `state="held"`: those that wait for a person."""
-        return self._table(f"{_clutch(clutch_id)}/runs", **arguments)
+        """A clutch's runs as a table, by cycles, a row a run; `state="held"`: those that wait for a person. In a frame its
+        fits and loops are left out: `stribeck` and `loops` have them."""
+        return self._table(f"{_clutch(clutch_id)}/runs", without=("fits", "loops"), **arguments)
 
     def run(self, clutch_id: str, run_id: str, **arguments: Any) -> Answer:
         """One run with its channels; `points=2000` thins them."""
@@ -124,15 +125,15 @@ class Client:
         return self.service.get(f"{_clutch(clutch_id)}/degradation", **arguments)
 
     def stribeck(self, clutch_id: str, **arguments: Any) -> Any:
-        """The fitted curves of all stationary tests as a table."""
-        return self._table(f"{_clutch(clutch_id)}/stribeck", **arguments)
+        """The fitted curves of all stationary tests as a table; in a frame a row a curve, by test and pressure."""
+        return self._table(f"{_clutch(clutch_id)}/stribeck", each="fits", **arguments)
 
     def loops(self, clutch_id: str, **arguments: Any) -> Any:
         """The friction loops of all dynamic tests as a table."""
         return self._table(f"{_clutch(clutch_id)}/loops", **arguments)
 
     def series(self, clutch_id: str, **arguments: Any) -> Any:
-        """Every quantity over cycles as flat rows."""
+        """Every quantity over cycles as flat rows; `source`: of one "run" alone, or the "track" of all up to there."""
         return self._table(f"{_clutch(clutch_id)}/series", **arguments)
 
     # --- diagnoses ---
@@ -173,8 +174,8 @@ class Client:
         """Say that somebody has seen an alarm."""
         return self.service.post(f"/v1/alarms/events/{quote(event_id, safe='')}/acknowledge", _body({"note": note}))
 
-    def _table(self, address: str, **arguments: Any) -> Any:
-        return table(self.service.pages(address, **arguments), self.frames)
+    def _table(self, address: str, *, each: str | None = None, without: Sequence[str] = (), **arguments: Any) -> Any:
+        return table(self.service.pages(address, **arguments), self.frames, each=each, without=without)
 
 
 def diagnosed(

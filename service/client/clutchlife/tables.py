@@ -7,17 +7,28 @@ from typing import Any, Literal
 
 #: What a table is: a frame of this library, a list of dictionaries, or (`auto`) the first that is installed, in this order.
 Frames = Literal["auto", "pandas", "polars", "list"]
+#: Lists of what is odd, each with its code.
+_NOTICES = ("warnings", "doubts")
 
 
-def table(items: Iterable[Mapping[str, Any]], frames: Frames = "auto") -> Any:
+def table(
+    items: Iterable[Mapping[str, Any]], frames: Frames = "auto", *, each: str | None = None, without: Sequence[str] = ()
+) -> Any:
     """The items as rows; in frames an object within an item is columns of its own, `state.name`, and lists are cells.
 
-    Raises ImportError where the library that is asked for is not installed.
+    In frames an item with a list named `each` is a row for every member of it, an item without one a row, and the fields
+    `without` are left out: methods of the client have them as tables of their own. Of warnings and doubts the codes stand
+    in a cell. Raises ImportError where the library that is asked for is not installed.
     """
     library = _chosen(frames)
     if library == "list":
         return [dict(item) for item in items]
-    rows = [dict(_cells(item)) for item in items]
+    left_out = {each, *without}
+    rows: list[dict[str, Any]] = []
+    for item in items:
+        shared = {name: value for name, value in item.items() if name not in left_out}
+        parts: Sequence[Mapping[str, Any]] = (item.get(each) if each else None) or ({},)
+        rows += [dict(_cells(shared | dict(part))) for part in parts]
     if library == "pandas":
         return importlib.import_module("pandas").DataFrame(rows)
     # of all rows: the first ones may have nulls where later ones have numbers
@@ -49,5 +60,7 @@ def _cells(item: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
     for name, value in item.items():
         if isinstance(value, Mapping) and value:
             yield from _cells(value, f"{prefix}{name}.")
+        elif name in _NOTICES:
+            yield f"{prefix}{name}", ", ".join(notice["code"] for notice in value)
         else:
             yield f"{prefix}{name}", value

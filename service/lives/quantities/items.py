@@ -22,20 +22,26 @@ COEFFICIENTS = ("initial", "change", "scale_cycles", "exponent")
 _POINTS, _AHEAD = 40, 1.5
 
 
-def trajectory_cycles(series: Series) -> FloatArray:
-    """The cycles since new [k] at which a trajectory is shown."""
+def trajectory_cycles(series: Series, until: float | None = None) -> FloatArray:
+    """The cycles since new [k] at which a trajectory is shown, up to `until` where that is asked for."""
     origin, last = series.scale.origin, float(series.scale.cycles(series.measurements[-1].progress))
-    return origin + np.linspace(0.0, max(1.0, last - origin) * _AHEAD, _POINTS)
+    length = max(1.0, last - origin) * _AHEAD if until is None else max(1.0, until - origin)
+    return origin + np.linspace(0.0, length, _POINTS)
 
 
 def track_item(
-    quantity: Quantity, series: Series, posterior: Posterior, assumptions: Assumptions, draws: int = 0
+    quantity: Quantity,
+    series: Series,
+    posterior: Posterior,
+    assumptions: Assumptions,
+    draws: int = 0,
+    until: float | None = None,
 ) -> dict[str, Any]:
     """A quantity that has a track of its own; the course of the model in force is put back on. `draws` > 0: with so many
     joint draws of the coefficients. With too few tests there is only what was measured."""
     if len({measurement.progress for measurement in series.measurements}) < FEWEST_TESTS:
         return paths_item(quantity, series, None, assumptions)
-    cycles = trajectory_cycles(series)
+    cycles = trajectory_cycles(series, until)
     course = assumptions.offsets(series.quantity, series.pressure, cycles)
     values = posterior.values(series.scale.progress(cycles)) + posterior.beside(course)
     band = np.array([weighted_quantiles(row, posterior.weight, BAND) for row in values])
@@ -50,13 +56,17 @@ def track_item(
 
 
 def paths_item(
-    quantity: Quantity, series: Series, paths: FloatArray | None, assumptions: Assumptions | None = None
+    quantity: Quantity,
+    series: Series,
+    paths: FloatArray | None,
+    assumptions: Assumptions | None = None,
+    until: float | None = None,
 ) -> dict[str, Any]:
     """A quantity that follows from others' tracks, whose `paths` [k, n] over `trajectory_cycles` are equal draws (None: too
     few tests): it has no coefficients of its own. `assumptions` where the model in force has a course of it."""
     item = {"coefficients": None, "correlations": None, "eq6_probability": None, "draws": None}
     band = np.zeros((0, len(BAND))) if paths is None else np.quantile(paths, BAND, axis=1).T
-    cycles = trajectory_cycles(series)[: band.shape[0]]
+    cycles = trajectory_cycles(series, until)[: band.shape[0]]
     return _head(quantity, series) | item | _measured(series, assumptions or Assumptions()) | _trajectory(cycles, band)
 
 

@@ -78,7 +78,7 @@ async def list_clutches(
     limit: Limit = USUAL_ITEMS,
     cursor: Cursor = None,
 ) -> Response:
-    """The clutches that the key is for, with health and remaining life: the fewest remaining cycles first, or by name.
+    """The clutches that the key is for, with health and remaining life: the lowest safe bound first, or by name.
 
     Whoever reads all of them sorts by name: then none is missed or repeated however they change meanwhile.
     """

@@ -26,7 +26,7 @@ from service.schemas.fleet import Scores
 from service.schemas.life import Method, PlannedLife, ProgrammeIn, RemainingLife
 from service.schemas.parameters import Draws, EngagementRun, LifeNumber, Quantity, TrackedQuantity
 from service.web import answers
-from service.web.context import AtCycles, Prefer, PressureBar
+from service.web.context import AtCycles, Prefer, PressureBar, Until
 from service.web.problems import CHANGING, READING
 from service.work.workers import Lane
 
@@ -91,13 +91,14 @@ async def degradation(
     at_cycles: AtCycles = None,
     life: LifeNumber = None,
     draws: Draws = 0,
+    until: Until = None,
     prefer: Prefer = None,
 ) -> Response:
     """Tracks along a life by any filter: coefficients of eq. 6, measurements, trajectory with its 90 % band.
 
     Of one quantity wherever it was measured, or of mean COF and every Stribeck parameter.
     """
-    arguments = degradation_arguments(method, quantity, at_cycles, life, draws)
+    arguments = degradation_arguments(method, quantity, at_cycles, life, draws, until)
     return await answers.computed_answer(of, degradation_of, *arguments, prefer=prefer)
 
 

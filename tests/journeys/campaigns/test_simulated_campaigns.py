@@ -35,5 +35,6 @@ def test_a_record_that_no_manifest_lists_is_named(server: Server, tmp_path: Path
     (folder / "lonely.csv").write_text("torque_nm\n1\n", encoding="utf-8")
     push = ("push", folder, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
     output = clutchlife(*push)
-    assert "lonely.csv is not listed in runs.json and not sent" in output
+    assert "not sent, for their kind and cycles are not known: " in output
+    assert "lonely.csv" in output
     assert "3 stored" in output

@@ -273,6 +273,15 @@ def test_a_clutch_that_shudders_is_no_longer_normal(tmp_path: Path) -> None:
     assert states[1]["name"] in ("failure", "maintenance")
 
 
+def test_a_trajectory_goes_on_as_far_as_is_asked(bench: Bench) -> None:
+    for cycles in (0.0, 1000.0, 2000.0):
+        bench.send(body("test", f"t{cycles:g}", cycles))
+    for until, last in ((None, 3000.0), (20_000.0, 20_000.0)):
+        (track,) = degradation.degradation(bench.database, CLUTCH, "ukf", "static_torque_nm", until=until)["items"][:1]
+        assert track["trajectory"]["cycles"][-1] == pytest.approx(last)
+        assert len(track["trajectory"]["median"]) == len(track["trajectory"]["cycles"])
+
+
 def test_lists_sort_by_the_bound_that_they_show_first() -> None:
     """Sorted by the median, a clutch with 300 certain cycles stood below one with 4,000."""
     sure, unsure = (

@@ -15,7 +15,7 @@ export const COLUMNS = [
   "State",
   "Clutch",
   "Health",
-  "Remaining cycles, 90 % interval",
+  "Remaining cycles",
   "Mean COF over cycles",
   "Last run",
   "Diagnosis",
@@ -85,11 +85,12 @@ function remaining(summary, scale) {
   if (summary === null) return ["–", small("after three tests")];
   const { ended } = summary;
   if (ended) return [ended.reason === "worn" ? number("0") : "–", small(`ended at ${fixed(ended.cycles)}`)];
-  const certain = small(atLeast(summary.at_least));
-  if (summary.status === "insufficient_data") return ["–", certain];
+  const [certain, odds] = atLeast(summary.at_least).split(/ (?=with)/);
+  if (summary.status === "insufficient_data") return ["–", small(atLeast(summary.at_least))];
   if (summary.status === "reached") return [number("0"), small("reached")];
   const q = summary.remaining_cycles;
-  return [number(aboutCycles(q)), intervalBar(q, scale), small(interval(q)), certain];
+  const likely = `${odds ? `${odds}; ` : ""}most likely ${aboutCycles(q)} (90 %: ${interval(q)})`;
+  return [number(certain), intervalBar(q, scale), small(likely)];
 }
 
 /** @param {ClutchOut} clutch */

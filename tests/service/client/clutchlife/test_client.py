@@ -114,6 +114,23 @@ def test_tables_have_a_column_for_each_part_of_an_item() -> None:
     assert isinstance(table(ITEMS, "polars"), polars.DataFrame)
 
 
+def test_a_frame_has_a_row_for_each_measurement() -> None:
+    items = [
+        {
+            "run_id": "a",
+            "fits": [{"pressure_bar": 4, "mean_cof": 0.1}, {"pressure_bar": 5, "mean_cof": 0.2}],
+            "doubts": [],
+        },
+        {"run_id": "b", "fits": [], "doubts": [{"code": "unit", "message": "?"}, {"code": "dead", "message": "?"}]},
+    ]
+    rows = table(items, "pandas", each="fits")
+    assert rows["run_id"].tolist() == ["a", "a", "b"]
+    assert rows["pressure_bar"].tolist()[:2] == [4, 5]
+    assert rows["doubts"].tolist() == ["", "", "unit, dead"]
+    assert table(items, "pandas", without=["fits"]).columns.tolist() == ["run_id", "doubts"]
+    assert table(items, "list", each="fits") == items
+
+
 def test_channels_of_any_kind_are_lists() -> None:
     assert columns(pd.DataFrame({"torque_nm": [1.0, 2.0]})) == {"torque_nm": [1.0, 2.0]}
     assert columns({"torque_nm": (1, 2)}) == {"torque_nm": [1, 2]}
