@@ -15,6 +15,19 @@ def ends_of(target: FloatArray, keep: FloatArray) -> FloatArray:
     return np.asarray(solve_banded((1, 0), bands, (1.0 - keep) * target), dtype=np.float64)
 
 
+def followed(target: FloatArray, points: Points, settling: float) -> FloatArray:
+    """The mean over each plateau [P] of what approaches its target [P] in `settling` s, from what the one before left; loops
+    stay as they are."""
+    follows = np.flatnonzero(points.previous >= 0)  # each follows the point just before it
+    before = points.previous[follows]
+    ratio = np.maximum(points.clock[follows] - points.clock[before], 1e-6) / settling
+    keep = np.zeros(points.previous.size)
+    keep[follows] = np.exp(-ratio)
+    out = target.copy()
+    out[follows] += (ends_of(target, keep)[before] - target[follows]) * (1.0 - keep[follows]) / ratio
+    return out
+
+
 def phases_of(points: Points, looping: np.ndarray[Any, np.dtype[np.intp]]) -> int:
     """How many points a loop has; `looping` [n] are the indices of loops' points, loop after loop."""
     return int(np.flatnonzero(np.diff(points.loop[looping], append=-2))[0]) + 1

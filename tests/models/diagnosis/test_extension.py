@@ -47,7 +47,7 @@ def extension_of(given: Study, *effects: tuple[str, float, tuple[float, ...]], c
     return extended(given, drawn(given, *effects), courses=courses)
 
 
-TEMPERATURE = ("oil_temperature", 0.4, (0.0,))
+TEMPERATURE = ("oil_temperature", 0.4, (0.0, -40.0))  # a film that has the oil's temperature
 WEAR = ("accelerated_wear", 0.05, (ONSET, 1.0))
 
 

@@ -11,7 +11,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
-from models.diagnosis.effects.first_order_lag import ends_of, phases_of
+from models.diagnosis.effects.first_order_lag import followed, phases_of
 
 #: The heat flux to which the amplitude refers [W/m²]: the reference's 20 Nm at 1970 rpm and some, on two faces.
 REFERENCE_FLUX = 0.32e6
@@ -55,20 +55,7 @@ def _computed(scene: Scene, settling: float, saturation: float) -> FloatArray:
     power = np.abs(scene.curve) * scene.points.velocity / geometry.mean_radius
     heat = power / (geometry.friction_faces * geometry.lining_area * REFERENCE_FLUX)
     heat = heat * (1.0 + saturation) / (1.0 + saturation * heat)
-    return _around(_along(heat, scene, settling), scene, settling)
-
-
-def _along(heat: FloatArray, scene: Scene, settling: float) -> FloatArray:
-    """Plateaus: the interface approaches each one's own warmth, from what the one before left; the mean of a plateau."""
-    previous, clock = scene.points.previous, scene.points.clock
-    follows = np.flatnonzero(previous >= 0)  # each follows the point just before it
-    ratio = np.maximum(clock[follows] - clock[previous[follows]], 1e-6) / settling
-    keep = np.zeros(previous.size)
-    keep[follows] = np.exp(-ratio)
-    left = ends_of(heat, keep)
-    out = heat.copy()
-    out[follows] += (left[previous[follows]] - heat[follows]) * (1.0 - keep[follows]) / ratio
-    return out
+    return _around(followed(heat, scene.points, settling), scene, settling)
 
 
 def _around(heat: FloatArray, scene: Scene, settling: float) -> FloatArray:

@@ -111,9 +111,25 @@ def test_friction_that_hangs_on_speed_times_viscosity_is_within_reach(scene: Sce
     steady = points.steady
     thinner = np.exp(log_viscosity_ratio(points.temperature, scene.facts.reference_temperature, scene.facts.oil))
     expected = scene.curve_at(velocity=points.velocity * thinner) - scene.curve
-    change = BY_SLUG["oil_temperature"].change(scene, GAMMA, (HERSEY,))
+    change = BY_SLUG["oil_temperature"].change(scene, GAMMA, (HERSEY, -40.0))  # a film that has the oil's temperature
     assert np.abs(expected[steady]).max() > 0.01
     np.testing.assert_allclose(change[steady], expected[steady], atol=1e-9)
+
+
+def test_a_film_that_follows_the_oil_late_shows_a_step_of_its_temperature_later(scene: Scene) -> None:
+    """The mean of 1 - e^{-t/τ} over the plateau of the step and over the next: dwells of 5 s, τ of 5 s."""
+    points = scene.points
+    run = np.flatnonzero((points.run == 0) & points.steady)[:12]
+    reference = scene.facts.reference_temperature
+    warmer = np.where(np.arange(points.run.size) >= run[5], reference + 1.0, reference)
+    stepped = replace(scene, points=replace(points, temperature=warmer))
+    change = BY_SLUG["oil_temperature"].change
+    at_once, late = (change(stepped, 1e-3, (0.0, log))[run] / scene.viscous[run] for log in (-40.0, np.log(5.0)))
+    followed = late[5:7] / at_once[5:7]
+    dwell = float(np.diff(points.clock[run])[0])
+    means = 1 - 5.0 / dwell * np.exp(-dwell / 5.0 * np.arange(2)) * -np.expm1(-dwell / 5.0)
+    np.testing.assert_allclose(followed, means, rtol=1e-3)
+    assert np.abs(late[:5]).max() == 0.0
 
 
 def test_a_delay_is_the_torque_of_a_moment_before(scene: Scene) -> None:

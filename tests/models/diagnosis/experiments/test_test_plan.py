@@ -10,6 +10,7 @@ from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun
 from models.diagnosis.criteria import WORTHWHILE
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.catalogued.oil_temperature import AT_ONCE
 from models.diagnosis.effects.catalogued.torque_zero_shift import STRAIGHT
 from models.diagnosis.effects.fitted_effect import FittedEffect, effect_rows
 from models.diagnosis.experiments import candidates
@@ -80,20 +81,20 @@ def of_size(given: Study, slug: str, amplitude: float, shape: tuple[float, ...])
 
 def test_what_was_predicted_is_what_the_test_brings(warm):
     """The advised test is made in simulation; the drop between refits without and with the effect rises as predicted."""
-    extended = warm.extended(("oil_temperature", 0.3, (0.5,)))
+    extended = warm.extended(("oil_temperature", 0.3, (0.5, AT_ONCE)))
     found = advised(warm, extended)
     assert found[0].key in {"sweep_60c", "sweeps_60c"}
     best = next(each for each in found if each.key == "sweep_60c")
     assert best.other == "baseline"
     drops = [warm.baseline.fit.cost - extended.cost]
     made = study(with_measured(warm.campaign, best.key, extended))
-    drops.append(made.baseline.fit.cost - made.extended(("oil_temperature", 0.3, (0.5,))).cost)
+    drops.append(made.baseline.fit.cost - made.extended(("oil_temperature", 0.3, (0.5, AT_ONCE))).cost)
     print(best, drops)
     # linear in the effect and by a noise that is re-estimated: right within a factor of two
     assert 0.5 < (drops[1] - drops[0]) / best.nats < 2.0
     # the control: repeating the test as it was brings far less
     again = study(with_measured(warm.campaign, "repeats", extended))
-    repeated = again.baseline.fit.cost - again.extended(("oil_temperature", 0.3, (0.5,))).cost
+    repeated = again.baseline.fit.cost - again.extended(("oil_temperature", 0.3, (0.5, AT_ONCE))).cost
     assert repeated - drops[0] < 0.2 * best.nats
 
 
@@ -260,7 +261,7 @@ def test_loops_are_not_predicted_where_none_could_be_evaluated():
     given = study(replace(moving_oil, dynamic=tuple(still)))
     assert given.design.loops == 0
     found = advised(
-        given, given.extended(("oil_temperature", 0.1, (0.0,))), given.extended(("viscous_exponent", 0.1, ()))
+        given, given.extended(("oil_temperature", 0.1, (0.0, AT_ONCE))), given.extended(("viscous_exponent", 0.1, ()))
     )
     assert found
     assert not any(moving(each.key) for each in found)

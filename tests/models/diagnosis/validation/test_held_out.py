@@ -10,6 +10,7 @@ from models.diagnosis.baseline.laws import ATTRACTOR, Scene
 from models.diagnosis.design.autocorrelation import Correlation
 from models.diagnosis.effects import amplitude_prior
 from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.catalogued.oil_temperature import AT_ONCE
 from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.validation.held_out import (
@@ -25,7 +26,7 @@ from models.diagnosis.validation.held_out import (
 from tests.models.diagnosis.campaigns import CYCLES, campaign
 from tests.models.diagnosis.fitted import Study, study, warmth
 
-TEMPERATURE = ("oil_temperature", 0.3, (0.5,))
+TEMPERATURE = ("oil_temperature", 0.3, (0.5, AT_ONCE))
 
 
 @pytest.fixture(scope="module")
@@ -126,8 +127,10 @@ def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
         rows = priors.rows[:, priors.free]
         precision[: rows.shape[1], : rows.shape[1]] += rows.T @ rows
         if own:
-            weak = [amplitude_prior.precision(each.effect, each.amplitude) for each in found.effects]
-            precision[[-2, -1], [-2, -1]] += [*weak, 1.5**-2.0]
+            (each,) = found.effects  # half the width of a shape's bounds is its prior's deviation
+            widths = [0.5 * (shape.highest - shape.lowest) for shape in each.effect.shapes]
+            weak = [amplitude_prior.precision(each.effect, each.amplitude), *(width**-2.0 for width in widths)]
+            precision[[-3, -2, -1], [-3, -2, -1]] += weak
         scale = 1 / np.sqrt(np.diag(precision))
         spread = np.linalg.inv(precision * scale[:, None] * scale) * scale[:, None] * scale
         covariance = np.eye(int(out.sum())) + unit[out] @ spread @ unit[out].T
