@@ -43,7 +43,9 @@ def main() -> None:
             turned(page, "overview")
             page.locator("#report img").nth(1).wait_for(state="attached")
             page.emulate_media(media="print")
-            page.set_viewport_size({"width": 760, "height": 1040})
+            page.add_style_tag(content="body { padding: 24px }")  # a printer's margins
+            page.set_viewport_size({"width": 808, "height": 1130})
+            page.evaluate("scrollTo(0, 0)")
             page.wait_for_timeout(500)
             _take(page, "report")
         with _page(browser, 390, 844) as page:

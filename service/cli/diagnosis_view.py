@@ -76,6 +76,11 @@ def _use(advice: Mapping[str, Any]) -> str:
     return f"distinguishes {cause} from {against}; expected evidence: {_evidence(advice['nats'])}"
 
 
+def _in_unit(value: str, unit: str) -> str:
+    """A value with its unit, "-" where it has none."""
+    return value if unit == "-" else f"{value} {unit}"
+
+
 def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("candidate")
@@ -83,7 +88,8 @@ def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
     table.add_column("estimate")
     for candidate in candidates:
         estimate = candidate["estimate"]
-        amount = f"{number(estimate['value'])} ± {number(estimate['sd'], 2)} {estimate['unit']} {estimate['name']}"
+        size = f"{number(estimate['value'])} ± {number(estimate['sd'], 2)}"
+        amount = f"{_in_unit(size, estimate['unit'])} {estimate['name']}"
         table.add_row(Text(candidate["effect"]), number(candidate["probability"]), Text(amount))
     return table
 
@@ -95,7 +101,7 @@ def _visible(visible: Sequence[Mapping[str, Any]]) -> Table:
         table.add_column(name, justify="left" if name == "would be seen" else "right")
     for item in visible:
         sizes = (
-            "at no size" if size is None else f"{number(size)} {item['unit']}"
+            "at no size" if size is None else _in_unit(number(size), item["unit"])
             for size in (item["amplitude"], item["least"])
         )
         table.add_row(Text(item["effect"]), *sizes)

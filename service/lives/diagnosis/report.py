@@ -139,6 +139,8 @@ def _remaining(report: Report, before: Mapping[str, Any], after: Mapping[str, An
     if report.extension is None or None in medians:
         return ""
     now, then = (f"{float(f'{median:.2g}'):,.0f}" for median in medians)
+    if now == then == "0":
+        return ""
     if now == then:
         return f"Adopting it leaves the median of the remaining life at about {now} cycles."
     return f"Adopting it changes the median of the remaining life from about {now} to about {then} cycles."

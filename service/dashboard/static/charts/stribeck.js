@@ -131,9 +131,7 @@ export function flat(answers) {
  * @param {number} drawn
  */
 const leftOut = (tests, drawn) =>
-  drawn < tests.length
-    ? ` ${drawn} of ${tests.length} tests are drawn, evenly spread; by pressure each can be chosen.`
-    : "";
+  drawn < tests.length ? ` ${drawn} of ${tests.length} tests are drawn; coloured by pressure, any one of them.` : "";
 
 /**
  * @param {Drawn} curve

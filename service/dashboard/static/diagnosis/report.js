@@ -200,7 +200,7 @@ function advice({ advice: tests = [], clutch_id: clutch, diagnosis_id: name }) {
     const use = narrows
       ? `leaves ${percent(narrows)} of the uncertainty about the size of ${cause}`
       : `distinguishes ${cause} from ${other === "baseline" ? "no effect at all" : other}`;
-    return h("li", {}, h("b", {}, test), h("span", { class: "quiet" }, ` ${use}`));
+    return h("li", {}, h("b", {}, test), h("span", { class: "quiet" }, `: ${use}`));
   });
   const one = tests.length > 1 ? h("p", {}, "One of these is enough; the best comes first.") : null;
   const plan = files(`${clutch}-plan`, `${clutchPath(clutch)}/diagnoses/${name}/plan.csv`);
