@@ -17,6 +17,7 @@ from service.work.progress import progress
 from tests.score import off_prior, on_prior, paper
 from tests.score.after_end import after_end
 from tests.score.belief import belief, knees
+from tests.score.ended import ended
 from tests.score.fleets import fleets
 from tests.score.severity import severity
 from tests.score.table import timed, written
@@ -45,6 +46,7 @@ def main() -> None:
         "never": partial(off_prior.never, lives(1_000), seed + 4),
         "events": partial(off_prior.after_event, lives(100), seed + 5),
         "fleets": partial(fleets, lives(40), seed + 6),
+        "ended": partial(ended, max(2, round(10 * chosen.size)), seed + 14),
         "slopes": partial(paper.slopes, lives(200), seed + 9),
         "shudder": partial(paper.shudder, lives(500), seed + 10),
         "lag": partial(paper.lag, lives(200), seed + 11),

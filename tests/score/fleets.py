@@ -30,7 +30,7 @@ def kind(rng: np.random.Generator, change: float, scale: float, exponent: float)
     return Life(truth, 0.003 * initial, float(first_passage(0.5 * initial, truth)))
 
 
-def _taught(history: list[Measurement], end: float) -> EndedLife | None:
+def taught(history: list[Measurement], end: float) -> EndedLife | None:
     progress, values = (np.array(column) for column in zip(*((m.progress, m.value) for m in history), strict=True))
     initial, lawful = new_and_lawful(history)
     return ended_life(progress, values, end, initial=initial, fraction=0.5, lawful=lawful)
@@ -52,7 +52,7 @@ def fleets(count: int, seed: int) -> str:
                 fleet = [kind(rng, 0.75, 5_000.0 * other, 0.7) for _ in range(size)]
                 taught_by = [(each.end, each.measured(1.0, 25, rng)) for each in fleet if math.isfinite(each.end)]
                 learned = learn([history for _, history in taught_by])
-                lives = [_taught(history, end) for end, history in taught_by]
+                lives = [taught(history, end) for end, history in taught_by]
                 ended = [each for each in lives if each is not None]
             life = kind(rng, 0.75, 5_000.0, 0.7)
             assert learned is not None
@@ -62,9 +62,9 @@ def fleets(count: int, seed: int) -> str:
             ours, theirs = weak(measurements[0], falling=True), learned.prior_for(measurements[0])
             for stage in STAGES:
                 seen = measurements[: round(stage * 30) + 1]
-                plain, taught = (GRID.posterior(GRID.from_history(p, seen), 1_000, rng) for p in (ours, theirs))
+                plain, informed = (GRID.posterior(GRID.from_history(p, seen), 1_000, rng) for p in (ours, theirs))
                 scores.add("weak", stage, plain, life.end)
-                together, now = learned.together(plain, taught, measurements[0]), seen[-1].progress
+                together, now = learned.together(plain, informed, measurements[0]), seen[-1].progress
                 scores.add("fleet", stage, together, life.end)
                 stated = stated_end(together, fraction=0.5, as_of=now, horizon=HORIZON, ended=ended, tests=seen)
                 scores.add_sample("ended", stage, np.minimum(stated.ends, HORIZON), stated.weight, life.end)
