@@ -49,6 +49,11 @@ class ServiceError(Exception):
 class InvalidError(ServiceError, status=422, slug="invalid-content", title="The content is not valid"):
     """The request is understood and its content is wrong."""
 
+    @classmethod
+    def of(cls, error: FieldError) -> "InvalidError":
+        """The one thing that is wrong."""
+        return cls(error.message, errors=[error])
+
 
 class NotFoundError(ServiceError, status=404, slug="not-found", title="Not found"):
     """No object has that name."""

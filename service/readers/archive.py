@@ -12,21 +12,8 @@ from service.readers.limits import Limits
 
 #: Suffixes of what is never a record; files in an archive are often accompanied by such.
 _NO_RECORDS = (
-    ".pdf",
-    ".png",
-    ".jpg",
-    ".jpeg",
-    ".docx",
-    ".doc",
-    ".md",
-    ".html",
-    ".xml",
-    ".json",
-    ".zip",
-    ".exe",
-    ".py",
-    ".m",
-)
+    ".pdf", ".png", ".jpg", ".jpeg", ".docx", ".doc", ".md", ".html", ".xml", ".json", ".zip", ".exe", ".py", ".m",
+)  # fmt: skip
 _BLOCK = 1 << 20
 _MAX_MEMBERS = 10_000
 

@@ -18,17 +18,8 @@ from service.readers.limits import Limits
 from service.readers.table import Clock, Column, Reading, Table, only
 
 _NAMES = (
-    "names",
-    "name",
-    "labels",
-    "header",
-    "headers",
-    "colheaders",
-    "channels",
-    "columns",
-    "titles",
-    "variablenames",
-)
+    "names", "name", "labels", "header", "headers", "colheaders", "channels", "columns", "titles", "variablenames",
+)  # fmt: skip
 _DATA = ("data", "values", "value", "y", "samples")
 #: Factors that a file states beside raw counts; whether they were applied already only its program knows.
 _GAINS, _OFFSETS = ("gain", "scale", "factor", "slope", "multiplier", "sensitivity", "calibration"), ("offset", "zero")
@@ -76,7 +67,7 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
             else ""
         )
         message = f"the file holds no array of numbers that could be a channel{hint}"
-        raise InvalidError(message, errors=[FieldError(pointer="", code="no_arrays", message=message)])
+        raise InvalidError.of(FieldError(pointer="", code="no_arrays", message=message))
     if len(sources) > limits.most_columns:
         raise InvalidError(f"a file must not have more than {limits.most_columns} arrays, got {len(sources)}")
     if len({source.column.group for source in sources}) == 1:
@@ -240,7 +231,7 @@ def _values(source: _Source) -> NDArray[Any]:
             message = (
                 f"{shown}: save its physical values, or name the factor scale_factor where it is still to be applied"
             )
-            raise InvalidError(message, errors=[FieldError(pointer="", code="raw_counts", message=message)])
+            raise InvalidError.of(FieldError(pointer="", code="raw_counts", message=message))
     factor, offset = (stated.get(name, default) for name, default in (("scale_factor", 1.0), ("add_offset", 0.0)))
     none = [value for name in ("_fillvalue", "missing_value") if (value := stated.get(name)) is not None]
     invalid = np.isin(values, none) if none and values.dtype.kind in "iuf" else None

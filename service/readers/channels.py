@@ -117,7 +117,7 @@ def _clocks(
         if following is None or not _agree(values[unused], values[following]):
             shown = " and ".join(columns[index].title or columns[index].shown() for index in times[:_MAX_NAMED])
             message = f"time_s must be one column, got {shown}; time=NAME chooses one"
-            raise InvalidError(message, errors=[FieldError(pointer="/time", code="ambiguous", message=message)])
+            raise InvalidError.of(FieldError(pointer="/time", code="ambiguous", message=message))
         if np.unique(values[unused]).size > np.unique(values[following]).size:
             clocks = {index: unused if clock == following else clock for index, clock in clocks.items()}
     return clocks
@@ -232,10 +232,7 @@ def _numbers(column: Taken, values: NDArray[Any]) -> tuple[FloatArray, NDArray[n
     if values.dtype.kind not in "iuf" or values.ndim != 1:
         shown = f"values of type {values.dtype}" if values.ndim == 1 else f"{values.ndim} dimensions"
         message = f"{column.channel} must be numbers, got {shown}"
-        raise InvalidError(
-            message,
-            errors=[FieldError(pointer=f"/channels/{column.channel}", code="not_a_number", message=message)],
-        )
+        raise InvalidError.of(FieldError(pointer=f"/channels/{column.channel}", code="not_a_number", message=message))
     numbers = np.array(values, dtype=np.float64) if values.dtype != np.float64 or not values.flags.writeable else values
     column.conversion.apply(numbers)
     return numbers, valid
@@ -251,7 +248,7 @@ def _refuse_serials(column: Column, times: FloatArray) -> None:
             f"{column.shown()} may be days, as spreadsheets and MATLAB count dates, or seconds, got {times[0]:.9g} and "
             f"steps of {np.median(steps):.3g}: map=time_s:{name} [d], or [s], says which"
         )
-        raise InvalidError(message, errors=[FieldError(pointer="/map", code="missing_unit", message=message)])
+        raise InvalidError.of(FieldError(pointer="/map", code="missing_unit", message=message))
 
 
 def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Reading) -> list[Notice]:
@@ -288,9 +285,7 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
     for name, own in series.items():
         if own.times is not None and own.times.size != own.values.size:
             message = f"{name} has {own.values.size} rows and its times {own.times.size}"
-            raise InvalidError(
-                message, errors=[FieldError(pointer=f"/channels/{name}", code="ragged", message=message)]
-            )
+            raise InvalidError.of(FieldError(pointer=f"/channels/{name}", code="ragged", message=message))
     columns: dict[str, FloatArray] = {} if lead.times is None else {"time_s": lead.times}
     kept = np.ones(lead.values.size, dtype=np.bool_)
     invalid: dict[str, int] = {}
@@ -314,7 +309,7 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
         return columns
     if not kept.any():
         message = "no sample is left: the channels have no time in common at which all are valid"
-        raise InvalidError(message, errors=[FieldError(pointer="/channels", code="empty", message=message)])
+        raise InvalidError.of(FieldError(pointer="/channels", code="empty", message=message))
     return {name: column[kept] for name, column in columns.items()}
 
 
@@ -334,7 +329,7 @@ def _refuse_lengths(series: Mapping[str, _Series], lengths: Mapping[str, int]) -
         message = (
             f"all channels must be sampled by one clock, or each have its own; without a time: {', '.join(timeless)}"
         )
-    raise InvalidError(message, errors=[FieldError(pointer="", code="ragged", message=message)])
+    raise InvalidError.of(FieldError(pointer="", code="ragged", message=message))
 
 
 def _resampled(
@@ -345,9 +340,7 @@ def _resampled(
     assert lead.times is not None  # noqa: S101
     if own.times.size == 0 or not (np.diff(own.times) > 0).all():
         message = f"{name} is sampled by a clock of its own, whose times must increase"
-        raise InvalidError(
-            message, errors=[FieldError(pointer=f"/channels/{name}", code="time_backwards", message=message)]
-        )
+        raise InvalidError.of(FieldError(pointer=f"/channels/{name}", code="time_backwards", message=message))
     after = np.clip(np.searchsorted(own.times, lead.times), 1, max(own.times.size - 1, 1))
     valid = None
     if own.valid is not None and own.times.size > 1:

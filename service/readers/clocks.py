@@ -88,4 +88,4 @@ def _in_hertz(number: float, unit: str, key: str) -> float:
 
 def _unknown(unit: str, key: str) -> InvalidError:
     message = f"the unit of {key[:MAX_QUOTED]} must be known, got {unit[:MAX_QUOTED]!r}"
-    return InvalidError(message, errors=[FieldError(pointer="", code="unknown_unit", message=message)])
+    return InvalidError.of(FieldError(pointer="", code="unknown_unit", message=message))

@@ -153,7 +153,7 @@ def _of_archive(path: Path) -> Format:
 def too_slow(kind: Format, limits: Limits) -> InvalidError:
     """The error of a file that takes more of a processor's time than it may."""
     message = f"the {kind} file cannot be read: it took longer than {limits.seconds} s of a processor"
-    return InvalidError(message, errors=[FieldError(pointer="", code="too_slow", message=message)])
+    return InvalidError.of(FieldError(pointer="", code="too_slow", message=message))
 
 
 def overdue(kind: Format, limits: Limits) -> BusyError:

@@ -282,4 +282,4 @@ def no_table(
         place, rule = filled[0], "a header with the channels' names, above rows of numbers"
     shown = " ".join(map(_text, rows[place] if rows else ())).strip()[:MAX_QUOTED]
     message = f"line {line_of(place)} must be {rule}, got {shown!r}"
-    return InvalidError(message, errors=[FieldError(pointer="", code="no_header", message=message, value=shown)])
+    return InvalidError.of(FieldError(pointer="", code="no_header", message=message, value=shown))

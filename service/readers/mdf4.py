@@ -88,7 +88,7 @@ def _times(file: Any, group: int) -> FloatArray:
     converted = conversion("time_s", unit)
     if converted is None:
         message = f"the unit of the time of {_name(file, group)!r} must be known, got {unit[:MAX_QUOTED]!r}"
-        raise InvalidError(message, errors=[FieldError(pointer="", code="unknown_unit", message=message)])
+        raise InvalidError.of(FieldError(pointer="", code="unknown_unit", message=message))
     times = np.array(file.get_master(group), dtype=np.float64)
     converted.apply(times)
     return times
@@ -118,7 +118,7 @@ def _refuse_formula(file: Any, group: int, index: int) -> None:
             f"{channel.name[:MAX_QUOTED]} is converted by a formula (MDF4 algebraic conversion), which is not computed "
             "here: record it with a linear, rational or tabular conversion, or export its physical values"
         )
-        raise InvalidError(message, errors=[FieldError(pointer="", code="algebraic_conversion", message=message)])
+        raise InvalidError.of(FieldError(pointer="", code="algebraic_conversion", message=message))
 
 
 def _has_formula(conversion: Any, depth: int = 0) -> bool:

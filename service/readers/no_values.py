@@ -35,6 +35,8 @@ _ENDS = {2**bits - end for bits in (15, 16, 31, 32) for end in (0, 1)}
 _MAX_KINDS, _MAX_TOTALS, _LONGEST = 3, 6, 100_000
 #: Rows by which the decimals of a column are counted. Chosen: of so many, not all end in zeros by chance.
 _MAX_LOOKED_AT = 50
+#: Values by which the usual size of a column is found. Chosen: their median is known to some percent; ten times is asked.
+_MAX_SAMPLED = 1000
 #: Probability that measured rows are by chance the means, sums, maxima ... of those above, below which they are left out;
 #: for columns' own values, the maxima, minima and medians, where together they stand in no row above. Chosen: a row of five
 #: plateaus' means has 1e-5, one of their maxima 0.04; of 4,800 pieces of real records one was left out wrongly.
@@ -82,13 +84,21 @@ def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, re
         f"{column.size} rows; half of the others lie between {np.quantile(measured, 0.25):.6g} and "
         f"{np.quantile(measured, 0.75):.6g}: missing={missing} leaves it out, missing={NO_MISSING} takes it as measured"
     )
-    error = FieldError(pointer=f"/channels/{name}/{row}", row=row + 1, value=shown, code="no_value", message=message)
-    raise InvalidError(message, errors=[error])
+    raise InvalidError.of(
+        FieldError(pointer=f"/channels/{name}/{row}", row=row + 1, value=shown, code="no_value", message=message)
+    )
 
 
 def _stand_in(column: FloatArray, *, steady: bool) -> float | None:
     """A value of a column [n] that stands for none; `steady`: values may go on for as long as they like, as times do."""
-    held = column[np.isfinite(column)]
+    finite = np.isfinite(column)
+    held = column if finite.all() else column[finite]
+    if held.size < 2:
+        return None
+    outermost = float(held.min()), float(held.max())
+    usual = float(np.median(np.abs(held[:: max(1, held.size // _MAX_SAMPLED)])))
+    if not any(map(_nines, outermost)) and max(map(abs, outermost)) < _FAR_NINES * usual:
+        return None if steady else _jumped_to(held, *outermost)  # no value is far off by any rule
     ends = sorted(_ends(held, np.min) | _ends(held, np.max), key=abs, reverse=True)
     others = held[~np.isin(held, [end for end in ends if _nines(end)])]
     for end in ends:
@@ -104,7 +114,7 @@ def _stand_in(column: FloatArray, *, steady: bool) -> float | None:
         far = min(far, _FAR_NINES) if below and not common else far
         if 0 < far * scale <= max(low - end, end - high):
             return end
-    return None if steady else _jumped_to(held)
+    return None if steady else _jumped_to(held, *outermost)
 
 
 def _ends(held: FloatArray, end_of: Callable[[FloatArray], Any]) -> set[float]:
@@ -123,9 +133,11 @@ def _nines(value: float) -> int:
     return 5 if digits.isdecimal() and int(digits) in _ENDS else nines if nines >= 3 and "e" not in digits else 0
 
 
-def _jumped_to(held: FloatArray) -> float | None:
+def _jumped_to(held: FloatArray, low: float, high: float) -> float | None:
     """A value of nines to which samples [n] jump, and from which they come back to where they were."""
     for value in (999.0, -999.0, 9999.0, -9999.0):
+        if not low <= value <= high:
+            continue
         rows = np.flatnonzero(held == value)
         rows = rows[(rows > 0) & (rows < held.size - 1)]
         if rows.size == 0:

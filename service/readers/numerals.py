@@ -219,8 +219,9 @@ def _doubtful(name: str, row: int, cell: str, line_of: Callable[[int], int] | No
         f"{place(name, row, line_of)} may be {as_decimal} or {as_thousands}, got {cell!r}: every {sign!r} of the file "
         f"stands before exactly three digits; decimal={sign} reads {as_decimal}, decimal={other} reads {as_thousands}"
     )
-    error = FieldError(pointer="/decimal", row=row + 1, value=cell, code="ambiguous_number", message=message)
-    return InvalidError(message, errors=[error])
+    return InvalidError.of(
+        FieldError(pointer="/decimal", row=row + 1, value=cell, code="ambiguous_number", message=message)
+    )
 
 
 # --- points in time ---
@@ -333,8 +334,7 @@ class Stamps:
             message = (
                 f"the dates of the time column may be day/month or month/day, got {shown!r}: write them as 2026-11-02"
             )
-            error = FieldError(pointer="/channels/time_s", code="ambiguous_date", message=message)
-            raise InvalidError(message, errors=[error])
+            raise InvalidError.of(FieldError(pointer="/channels/time_s", code="ambiguous_date", message=message))
 
     def _day(self, written: str) -> int | None:
         """The day's number; None where it is no date."""

@@ -55,15 +55,7 @@ _CRASHES = (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.
 #: Files that the reading process has open at once. Chosen: importing the libraries takes a dozen.
 _MAX_OPEN_FILES = 64
 #: Environment variables that the reading process gets; no others, so no keys.
-_ENVIRONMENT = (
-    "PATH",
-    "PYTHONPATH",
-    "LANG",
-    "LC_ALL",
-    "LD_LIBRARY_PATH",
-    "XDG_CACHE_HOME",
-    "MPLCONFIGDIR",
-)
+_ENVIRONMENT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "XDG_CACHE_HOME", "MPLCONFIGDIR")
 
 
 def read_isolated(kind: Format, path: Path, *, reading: Reading, limits: Limits) -> Channels:
@@ -158,7 +150,7 @@ def _run(kind: Format, path: Path, answer: str, reading: Reading, limits: Limits
 
 def _unreadable(kind: Format, why: str, code: str = "unreadable") -> InvalidError:
     message = f"the {kind} file cannot be read: {why}"
-    return InvalidError(message, errors=[FieldError(pointer="", code=code, message=message)])
+    return InvalidError.of(FieldError(pointer="", code=code, message=message))
 
 
 def _ending(code: int) -> str:

@@ -147,10 +147,10 @@ def only(names: Sequence[str], wanted: str, kind: str) -> int:
     shown = ", ".join(repr(name[:MAX_QUOTED]) for name in names[:10]) + (" ..." if len(names) > 10 else "")
     missing = f"has no {kind} {wanted[:MAX_QUOTED]!r}" if wanted else f"holds {len(names)} {kind}s with channels"
     message = f"the file {missing}: table=NAME chooses one of {shown}"
-    raise InvalidError(message, errors=[FieldError(pointer="/table", code="which_table", message=message)])
+    raise InvalidError.of(FieldError(pointer="/table", code="which_table", message=message))
 
 
 def cut_short(defect: str) -> InvalidError:
     """The error of a file whose end is missing."""
     message = f"the file is cut off: {defect}"
-    return InvalidError(message, errors=[FieldError(pointer="", code="truncated", message=message)])
+    return InvalidError.of(FieldError(pointer="", code="truncated", message=message))

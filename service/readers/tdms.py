@@ -88,7 +88,7 @@ def _clock(channel: Any, start: Any, earliest: Any) -> Clock | None:
         if str(properties.get("wf_xname") or "").strip().lower() in ("", "time"):
             name, shown = channel.name[:MAX_QUOTED], unit[:MAX_QUOTED]
             message = f"{name}: the unit of the waveform's time must be known, got {shown!r}"
-            raise InvalidError(message, errors=[FieldError(pointer="", code="unknown_unit", message=message)])
+            raise InvalidError.of(FieldError(pointer="", code="unknown_unit", message=message))
         return None
     shift = 0.0 if start is None else float((np.datetime64(start) - np.datetime64(earliest)) / _SECOND)
     rows, factor = len(channel), converted.factor

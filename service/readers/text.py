@@ -286,7 +286,7 @@ def wrong_line(line: int, rule: str, code: str, got: str = "") -> InvalidError:
     """The error of a line that cannot be part of a table; `line` counts from 1."""
     shown = got[:MAX_QUOTED]
     message = f"line {line} {rule}" + (f", got {shown!r}" if got else "")
-    return InvalidError(message, errors=[FieldError(pointer="", code=code, message=message, value=shown)])
+    return InvalidError.of(FieldError(pointer="", code=code, message=message, value=shown))
 
 
 # --- the rows of data ---

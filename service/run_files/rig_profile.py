@@ -42,10 +42,9 @@ def require_usable(profile: RigProfile) -> None:
             message = (
                 f"columns.{number}.unit: {column.channel} is in one of {spellings(column.channel)}, got {column.unit!r}"
             )
-            error = FieldError(
-                pointer=f"/columns/{number}/unit", code="unknown_unit", message=message, value=column.unit
+            raise InvalidError.of(
+                FieldError(pointer=f"/columns/{number}/unit", code="unknown_unit", message=message, value=column.unit)
             )
-            raise InvalidError(message, errors=[error])
     pattern = profile.file_name
     if pattern is None:
         return
@@ -59,9 +58,7 @@ def require_usable(profile: RigProfile) -> None:
         rule = "with {kind} needs kinds, the words that stand for each kind"
     if rule is not None:
         message = f"file_name {rule}, got {pattern!r}"
-        raise InvalidError(
-            message, errors=[FieldError(pointer="/file_name", code="pattern", message=message, value=pattern)]
-        )
+        raise InvalidError.of(FieldError(pointer="/file_name", code="pattern", message=message, value=pattern))
 
 
 def named(profile: RigProfile, filename: str, cells: Mapping[str, str]) -> Named:
