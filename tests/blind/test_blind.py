@@ -11,6 +11,11 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from models.diagnosis.design.design import build_design
+from models.diagnosis.explanations.posterior import posterior_of
+from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
+from tests.blind.rig.hide import hide
+from tests.blind.rig.sent import campaign
 from tests.blind.trials import Outcome, Trial, judge
 
 pytestmark = pytest.mark.slow
@@ -114,3 +119,10 @@ def test_what_no_catalogue_has_is_called_unexplained(uncatalogued: list[Outcome]
     assert len(open_) >= least(len(uncatalogued), 0.80, against=0.2)
     seen = sum(one.where[:1] != () and one.where[0] in one.axes for one in open_)
     assert seen >= least(len(uncatalogued), 0.64, against=1 / 8)
+
+
+def test_a_pressure_offset_that_grows_is_not_named_a_shifted_zero() -> None:
+    """The screen about nothing promised it less than nothing, so it was never fitted."""
+    hidden = hide((1, 3990795945, 2300310336, 7), ("pressure_offset",), 300.0, loops=False, states=8)
+    found = posterior_of(fit_baseline(build_design(campaign(hidden))), ()).probabilities
+    assert next(iter(found)).causes == ("pressure_offset",)

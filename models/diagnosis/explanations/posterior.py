@@ -8,8 +8,9 @@ Their probabilities sum to one, and a verdict is read off them alone.
 
 The search goes up, best first: what the linear screen about a refitted alternative promises of one thing more is refitted,
 while it could hold more than NEGLIGIBLE of the posterior; the promise errs by a share SLACK of the leader's lead. Then
-down: the leader without each of its parts, from where it has the rest. Structure is refitted as an effect is, its likeliest
-form taken off: judged linearly it looked 7.5 nats strong where it was a false lead. It draws no random numbers.
+down: what changes torque much as the leader does, and the leader without each of its parts, from where it has the rest.
+Structure is refitted as an effect is, its likeliest form taken off: judged linearly it looked 7.5 nats strong where it was a
+false lead. It draws no random numbers.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,6 +23,7 @@ from models.diagnosis.criteria import (
     ANYTHING_WRONG,
     MOST_REFITS,
     NEGLIGIBLE,
+    RELATIVE,
     SECOND,
     SLACK,
     UNCATALOGUED_SHARE,
@@ -31,7 +33,7 @@ from models.diagnosis.effects.catalogue import BY_SLUG, effects_for
 from models.diagnosis.effects.catalogued import oil_temperature
 from models.diagnosis.effects.effect import Kind, Shape
 from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
-from models.diagnosis.effects.fitted_effect import FittedEffect
+from models.diagnosis.effects.fitted_effect import FittedEffect, effect_rows
 from models.diagnosis.effects.grid import Column, columns_at_rows, columns_of
 from models.diagnosis.explanations.alternative import LINE, LINES, NOTHING, OUTLIER, Alternative, is_axis
 from models.diagnosis.explanations.evidence import Evidence, evidence_of
@@ -165,6 +167,7 @@ class Search:
             if leader in fallen:
                 return
             fallen.add(leader)
+            self._relatives(leader)
             self._down(leader)
 
     def weights(self) -> dict[Alternative, float]:
@@ -222,6 +225,27 @@ class Search:
         short = [n.log_evidence + self.prior(alternative) - n.promise for n in self.nodes.get(alternative, [])]
         beside = set(leader.causes) <= set(alternative.causes) and leader.unknown in {"", alternative.unknown}
         return self._promises[key][0] + min(short, default=0.0) + (0.0 if beside else slack)
+
+    def _relatives(self, leader: Alternative) -> None:
+        """Effects that change torque much as a single leader does, from its laws, whatever they were promised to be: the
+        baseline about which they were screened has absorbed another part of each."""
+        node, design = self.nodes[leader][0], self.problem.design
+        if len(node.fit.effects) != 1 or leader.unknown:
+            return
+        white = 1.0 / self.problem.noise.deviation
+        change = effect_rows(design, node.fit.prediction, node.fit.effects[0]) * white
+        units = columns_at_rows(design, node.fit.prediction, self._columns) * white[:, None]
+        along = change @ units / np.maximum(np.linalg.norm(units, axis=0), 1e-300)
+        alike: dict[str, int] = {}
+        for place in np.argsort(-np.abs(along)).tolist():
+            if np.abs(along[place]) > RELATIVE * np.linalg.norm(change):
+                alike.setdefault(self._columns[place].effect.slug, place)
+        for slug, place in alike.items():
+            column, relative = self._columns[place], Alternative((slug,))
+            if column.effect.named and relative not in self.nodes and relative not in self._failed:
+                amplitude = float(along[place] / np.linalg.norm(units[:, place]))
+                start = FittedEffect(effect=column.effect, amplitude=amplitude, shape=column.shape)
+                self._add(relative, node.fit, (start,), (column.log_weight_around,), -np.inf)
 
     def _down(self, leader: Alternative) -> None:
         """The leader with one thing less, from where it has the rest."""
