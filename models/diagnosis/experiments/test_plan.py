@@ -191,7 +191,9 @@ def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[Fit]) -
         return []
     added = replace(added, facts=replace(added.facts, reference_temperature=REFERENCE_TEMPERATURE))
     effect = oil_temperature.EFFECT
-    usual = replace(fits[0], effects=(FittedEffect(effect=effect, amplitude=effect.prior_sd, shape=(0.0,)),))
+    usual = replace(
+        fits[0], effects=(FittedEffect(effect=effect, amplitude=effect.prior_sd, shape=(0.0, oil_temperature.AT_ONCE)),)
+    )
     distances = CandidateDistances(problem, (usual, bare(fits[0])))
     nats = float(distances.distances([distances.ahead(added)])[0, 1])
     test = f"{TRIALS[_WARM].text}, and oil temperature recorded from now on"
