@@ -53,8 +53,8 @@ def unseen_of(posterior: Posterior, visible: Sequence[Visible], raw: Sequence[Ra
     competes without a shape."""
     shaped = {column.effect.slug for column in posterior.columns}
     shapeless = {slug for alternative in posterior.weights for slug in alternative.causes} - shaped
-    known = shapeless | {each.effect for each in visible} | {record.effect for record in raw}
-    return tuple(effect.slug for effect in CATALOGUE if effect.slug not in known)
+    shown = shapeless | {effect.effect for effect in visible} | {record.effect for record in raw}
+    return tuple(effect.slug for effect in CATALOGUE if effect.slug not in shown)
 
 
 def amplitudes_of(posterior: Posterior) -> FloatArray:
