@@ -40,7 +40,10 @@ def most_unpacked(path: Path, limits: Limits) -> int:
 
 def members(path: Path, limits: Limits) -> list[str]:
     """The names of the files in an archive that may be records."""
-    names = [info.filename for info in check_archive(path, limits) if not info.is_dir() and info.file_size]
+    listed = [
+        info for info in check_archive(path, limits) if info.filename
+    ]  # zipfile takes no empty name for a folder's
+    names = [info.filename for info in listed if not info.is_dir() and info.file_size]
     return [
         name
         for name in names

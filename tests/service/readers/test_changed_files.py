@@ -86,6 +86,8 @@ def changed(content: bytes, rng: np.random.Generator) -> bytes:
     """A file with one to four changes: bits flipped, extreme numbers, blocks cut out, doubled or moved, the end cut off."""
     data = bytearray(content)
     for _ in range(int(rng.integers(1, 5))):
+        if not data:
+            break
         at = int(rng.integers(len(data)))
         length = int(rng.integers(1, 64))
         match int(rng.integers(7)):

@@ -672,6 +672,14 @@ def test_bombs_in_xml_are_refused(tmp_path: Path, name: str) -> None:
         read_file(path, filename=name)
 
 
+def test_an_archive_with_a_file_without_a_name_is_read(tmp_path: Path) -> None:
+    zipped(tmp_path / "a.zip")
+    content = bytearray((tmp_path / "a.zip").read_bytes())
+    content[content.rindex(b"run/plot.png")] = 0
+    (tmp_path / "a.zip").write_bytes(content)
+    require_record(tmp_path / "a.zip")
+
+
 @pytest.mark.parametrize("inner", ["xl/worksheets/sheet1.xml", "run.csv"])
 def test_bombs_are_refused_by_what_they_state(tmp_path: Path, inner: str) -> None:
     with zipfile.ZipFile(tmp_path / "a.xlsx", "w", zipfile.ZIP_DEFLATED) as archive:
