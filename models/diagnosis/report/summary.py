@@ -133,8 +133,8 @@ def _unseen(findings: Findings) -> list[Sentence]:
     sentences = [Sentence(f"These data would miss {conjunction(missed)}.")] if missed else []
     if reach := [v for v in findings.visible if v not in short]:
         reach.sort(key=lambda v: v.amplitude / v.usual)
-        seen = [f"{effect_name(v.effect)} from {_amount(v.amplitude, v.unit)}" for v in reach[:VISIBLE_MENTIONED]]
-        sentences.append(Sentence(f"Nine times in ten they would have shown {conjunction(seen)}.", SHOULD))
+        sizes = [f"{effect_name(v.effect)} from {_amount(v.amplitude, v.unit)}" for v in reach[:VISIBLE_MENTIONED]]
+        sentences.append(Sentence(f"Nine times in ten they would have shown {conjunction(sizes)}.", SHOULD))
     if findings.unseen:
         names = conjunction([effect_name(slug) for slug in findings.unseen])
         sentences.append(Sentence(f"Nothing of these would show at any size: {names}.", SHOULD))
