@@ -27,3 +27,12 @@ def test_coefficients_alone_are_those_of_one_column_each() -> None:
     alone = [log_gain(info[k : k + 1, k : k + 1], score[k : k + 1], sd[k]) for k in range(3)]
     np.testing.assert_allclose(log_gain_alone(np.diag(info), score, sd), alone)
     assert log_gain(np.zeros((0, 0)), np.zeros(0), 1.0) == 0.0
+
+
+def test_what_rounding_leaves_below_zero_counts_as_nothing() -> None:
+    columns, data, sd = drawn(5)
+    info, score = columns.T @ columns, columns.T @ data
+    with_nothing = np.pad(info, (0, 1)), np.append(score, 0.0), np.append(sd, 1e4)
+    assert log_gain(*with_nothing) == pytest.approx(log_gain(info, score, sd))
+    with_nothing[0][-1, -1] = -1e-7  # 1 + sd² info is negative
+    assert log_gain(*with_nothing) == pytest.approx(log_gain(info, score, sd))

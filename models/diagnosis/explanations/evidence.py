@@ -28,7 +28,7 @@ from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.gram import Gram, gram_of
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import GAINS, Projected, project
-from models.gaussian_evidence import log_gain, log_gain_alone, log_mean, log_sum
+from models.gaussian_evidence import independent, log_gain, log_gain_alone, log_mean, log_sum
 
 #: Orders of the cosines over speed, pressure, life and clock, and harmonics of a loop, by which any template may be off.
 _SPEED, _PRESSURE, _LIFE, _CLOCK, _HARMONICS = 4, 2, 3, 3, 2
@@ -129,18 +129,19 @@ def _averaged(projected: Projected, wrong: slice, own: FloatArray, sizes: Sequen
 
 def _structure(info: FloatArray, score: FloatArray) -> float:
     """What smooth structure adds [nats], averaged over its size, all contrasts together or one of them alone."""
-    values, vectors = np.linalg.eigh(info)
+    values, vectors = independent(info)
     sizes = np.array(CONTRAST_SIZES)[:, None]
-    together = log_gain_alone(np.maximum(values, 0.0), vectors.T @ score, sizes).sum(axis=1)
+    together = log_gain_alone(values, vectors.T @ score, sizes).sum(axis=1)
     alone = [log_mean(gains) for gains in log_gain_alone(np.maximum(np.diag(info), 0.0), score, sizes)]
     return log_mean([*together.tolist(), *alone])
 
 
 def _likeliest(projected: Projected, mine: FloatArray) -> FloatArray:
     """The likeliest coefficients of smooth structure, at the size that suits it best."""
-    info, score = projected.info[np.ix_(mine, mine)], projected.score[mine]
-    size = max(CONTRAST_SIZES, key=lambda size: log_gain(info, score, size))
-    return np.asarray(np.linalg.solve(info + np.eye(score.size) / size**2, score))
+    values, vectors = independent(projected.info[np.ix_(mine, mine)])
+    score = vectors.T @ projected.score[mine]
+    size = max(CONTRAST_SIZES, key=lambda size: float(log_gain_alone(values, score, size).sum()))
+    return np.asarray(vectors @ (score / (values + size**-2.0)))
 
 
 def _log_prior(fitted: Fit) -> float:
