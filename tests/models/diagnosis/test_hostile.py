@@ -72,6 +72,11 @@ BEYOND_ROUNDING = Recipe(
     events=(EventKind.REST,),
 )
 
+#: What is left is to measure the oil's temperature.
+WITHOUT_THERMOMETER = Recipe(
+    seed=341, scale=1.0, shape="noise", rows=(9, 26, 1, 1), loops=(), temperature=False, blocks=0, events=()
+)
+
 
 def _torque(rng: np.random.Generator, speed: np.ndarray, scale: float, shape: str) -> np.ndarray:
     base = {
@@ -136,6 +141,7 @@ def _finite(report: Report) -> bool:
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(recipe=RECIPES)
 @example(recipe=BEYOND_ROUNDING)
+@example(recipe=WITHOUT_THERMOMETER)
 def test_a_diagnosis_is_a_report(recipe: Recipe) -> None:
     report = diagnose(recipe.campaign(), rng=np.random.default_rng(0))
     assert isinstance(report, Report)
