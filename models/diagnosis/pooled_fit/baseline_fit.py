@@ -86,7 +86,7 @@ def _require_weights(problem: FitProblem, fitted: Fit) -> None:
     known = fitted.status is not FitStatus.NOT_FINITE
     if known:  # else the rounding of a parameter changes torque by more than its usual size
         steepest = float(np.abs(fitted.prediction.jacobian(design)[:, problem.priors.free]).max())
-        known = steepest * np.finfo(np.float64).eps < design.usual_torque
+        known = bool(steepest * np.finfo(np.float64).eps < design.usual_torque)
     if not known:
         raise IndeterminateError("no finite torque can be fitted to these numbers.")
     parts = [deviation[: design.plateaus], deviation[design.plateaus :]]
