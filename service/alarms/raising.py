@@ -192,8 +192,8 @@ def _reopened(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts
         ended = event.content.get(_ENDED_LIFE)
         if ended is not None and ended == facts.summary.get("life", "") and _is_of(event, rule, finding):
             alarms.reopen(connection, event.event_id)
-            told = [row for row in receivers_of(connection, facts.clutch_id) if row.content["cleared"]]
-            _tell(connection, RAISED, event.event_id, told)
+            informed = [row for row in receivers_of(connection, facts.clutch_id) if row.content["cleared"]]
+            _tell(connection, RAISED, event.event_id, informed)
             return True
     return False
 

@@ -66,13 +66,15 @@ def missed(back_cast: BackCast) -> list[Notice]:
 
 def filters_disagree(answers: Mapping[str, Mapping[str, Any]]) -> list[Notice]:
     """The warning where a filter's median lies outside another's 90 % interval, of predictions by their method."""
-    known = {m: a["remaining_cycles"] for m, a in answers.items() if a["status"] not in (INSUFFICIENT, ENDED)}
-    ends = [[math.inf if given[q] is None else given[q] for q in ("0.05", "0.5", "0.95")] for given in known.values()]
+    predictions = {m: a["remaining_cycles"] for m, a in answers.items() if a["status"] not in (INSUFFICIENT, ENDED)}
+    ends = [
+        [math.inf if given[q] is None else given[q] for q in ("0.05", "0.5", "0.95")] for given in predictions.values()
+    ]
     if all(low <= median <= high for low, _, high in ends for _, median, _ in ends):
         return []
-    said = "; ".join(f"{interval_in_words(given)} by {method}" for method, given in known.items())
+    intervals = "; ".join(f"{interval_in_words(given)} by {method}" for method, given in predictions.items())
     message = (
-        f"two filters disagree about the cycles that remain: {said}. Plan with the lowest of them, and test again soon"
+        f"two filters disagree about the cycles that remain: {intervals}. Plan with the lowest, and test again soon"
     )
     return [Notice(code=FILTERS_DISAGREE, message=message)]
 

@@ -72,8 +72,8 @@ def diagnosed(task: Task, say: Callable[[Json], None] = _nothing) -> dict[str, A
     with closing(open_database(task.database)) as database:
         diagnosed_life = read_life(database, task.clutch_id, last_run_key=task.last_run_key, say=say)
         say({"step": "diagnoses"})
-        asked = {"isolability": True} if task.isolability else {}
-        report = diagnose(diagnosed_life.campaign, rng=np.random.default_rng(_SEED), **asked)
+        extra = {"isolability": True} if task.isolability else {}
+        report = diagnose(diagnosed_life.campaign, rng=np.random.default_rng(_SEED), **extra)
         say({"step": "predicts"})
         before, after = before_and_after(database, task.clutch_id, diagnosed_life, report.extension)
     origin = 0.0 if diagnosed_life.life is None else diagnosed_life.life.origin

@@ -100,18 +100,18 @@ def refresh(
     """
     executor = InProcess() if executor is None else executor
     fresh: set[str] = set()
-    said = advance
+    progress = advance
     while True:
         with database.reading() as connection:
             names = clutches.all_ids(connection)
         endings = {
             kind: _stored_again(database, fleet, now, at_once, executor)
-            for kind, fleet in _fleets(database, executor, names, said).items()
+            for kind, fleet in _fleets(database, executor, names, progress).items()
         }
         fresh.update(kind for kind, ending in endings.items() if ending is Ending.STORED)
         if Ending.LEFT not in endings.values():  # else another refresh was quicker, perhaps with less than is known now
             break
-        said = _silent
+        progress = _silent
     ended = []
     for clutch in _brought_up(database, names, at_once, executor):
         if clutch.error is not None:

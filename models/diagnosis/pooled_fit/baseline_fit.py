@@ -83,11 +83,11 @@ def _with_its_noise(problem: FitProblem, fitted: Fit) -> Baseline:
 def _require_weights(problem: FitProblem, fitted: Fit) -> None:
     """Raise IndeterminateError where there is nothing that models could be weighed by."""
     design, deviation = problem.design, problem.noise.deviation
-    known = fitted.status is not FitStatus.NOT_FINITE
-    if known:  # else the rounding of a parameter changes torque by more than its usual size
+    finite = fitted.status is not FitStatus.NOT_FINITE
+    if finite:  # else the rounding of a parameter changes torque by more than its usual size
         steepest = float(np.abs(fitted.prediction.jacobian(design)[:, problem.priors.free]).max())
-        known = bool(steepest * np.finfo(np.float64).eps < design.usual_torque)
-    if not known:
+        finite = bool(steepest * np.finfo(np.float64).eps < design.usual_torque)
+    if not finite:
         raise IndeterminateError("no finite torque can be fitted to these numbers.")
     parts = [deviation[: design.plateaus], deviation[design.plateaus :]]
     noise = min(float(np.median(part)) for part in parts if part.size)

@@ -44,23 +44,23 @@ def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
         )
         if slug in slugs
     }
-    seen = {slug: shapes for slug, shapes in grouped.items() if any(np.isfinite(size) for _, size in shapes)}
+    visible = {slug: shapes for slug, shapes in grouped.items() if any(np.isfinite(size) for _, size in shapes)}
     null = posterior.null.fit
     info = posterior.null.evidence.screened[0].info
     place_of = {id(column): place for place, column in enumerate(posterior.columns)}
-    own = {slug: _likeliest(shapes) for slug, shapes in seen.items()}
+    own = {slug: _likeliest(shapes) for slug, shapes in visible.items()}
     pairs = []
-    for first, second in combinations(seen, 2):
+    for first, second in combinations(visible, 2):
         ways = []
         for true, rival in ((first, second), (second, first)):
             column, size = own[true]
-            imitation = _best_imitation(info, place_of[id(column)], [place_of[id(c)] for c, _ in seen[rival]], size)
+            imitation = _best_imitation(info, place_of[id(column)], [place_of[id(c)] for c, _ in visible[rival]], size)
             other = posterior.columns[imitation[0]]
             ways.append((_with(null, column, size), _with(null, other, imitation[1])))
         pairs.append(_pair(campaign, posterior, (first, second), ways))
     return Isolability(
         pairs=tuple(sorted(pairs, key=lambda pair: pair.probability)),
-        unseen=tuple(slug for slug in slugs if slug not in seen),
+        unseen=tuple(slug for slug in slugs if slug not in visible),
     )
 
 

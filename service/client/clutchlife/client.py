@@ -126,7 +126,7 @@ class Client:
 
     def stribeck(self, clutch_id: str, **arguments: Any) -> Any:
         """The fitted curves of all stationary tests as a table; in a frame a row a curve, by test and pressure."""
-        return self._table(f"{_clutch(clutch_id)}/stribeck", each="fits", **arguments)
+        return self._table(f"{_clutch(clutch_id)}/stribeck", row_of="fits", **arguments)
 
     def loops(self, clutch_id: str, **arguments: Any) -> Any:
         """The friction loops of all dynamic tests as a table."""
@@ -174,8 +174,8 @@ class Client:
         """Say that somebody has seen an alarm."""
         return self.service.post(f"/v1/alarms/events/{quote(event_id, safe='')}/acknowledge", _body({"note": note}))
 
-    def _table(self, address: str, *, each: str | None = None, without: Sequence[str] = (), **arguments: Any) -> Any:
-        return table(self.service.pages(address, **arguments), self.frames, each=each, without=without)
+    def _table(self, address: str, *, row_of: str | None = None, without: Sequence[str] = (), **arguments: Any) -> Any:
+        return table(self.service.pages(address, **arguments), self.frames, row_of=row_of, without=without)
 
 
 def diagnosed(

@@ -12,22 +12,26 @@ _NOTICES = ("warnings", "doubts")
 
 
 def table(
-    items: Iterable[Mapping[str, Any]], frames: Frames = "auto", *, each: str | None = None, without: Sequence[str] = ()
+    items: Iterable[Mapping[str, Any]],
+    frames: Frames = "auto",
+    *,
+    row_of: str | None = None,
+    without: Sequence[str] = (),
 ) -> Any:
     """The items as rows; in frames an object within an item is columns of its own, `state.name`, and lists are cells.
 
-    In frames an item with a list named `each` is a row for every member of it, an item without one a row, and the fields
+    In frames an item with a list named `row_of` is a row for every member of it, an item without one a row, and the fields
     `without` are left out: methods of the client have them as tables of their own. Of warnings and doubts the codes stand
     in a cell. Raises ImportError where the library that is asked for is not installed.
     """
     library = _chosen(frames)
     if library == "list":
         return [dict(item) for item in items]
-    left_out = {each, *without}
+    left_out = {row_of, *without}
     rows: list[dict[str, Any]] = []
     for item in items:
         shared = {name: value for name, value in item.items() if name not in left_out}
-        parts: Sequence[Mapping[str, Any]] = (item.get(each) if each else None) or ({},)
+        parts: Sequence[Mapping[str, Any]] = (item.get(row_of) if row_of else None) or ({},)
         rows += [dict(_cells(shared | dict(part))) for part in parts]
     if library == "pandas":
         return importlib.import_module("pandas").DataFrame(rows)

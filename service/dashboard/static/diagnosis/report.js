@@ -202,11 +202,11 @@ function advice({ advice: tests = [], clutch_id: clutch, diagnosis_id: name }) {
       : `distinguishes ${cause} from ${other === "baseline" ? "no effect at all" : other}`;
     return h("li", {}, h("b", {}, test), h("span", { class: "quiet" }, `: ${use}`));
   });
-  const one = tests.length > 1 ? h("p", {}, "One of these is enough; the best comes first.") : null;
+  const choice = tests.length > 1 ? h("p", {}, "One of these is enough; the best comes first.") : null;
   const plan = files(`${clutch}-plan`, `${clutchPath(clutch)}/diagnoses/${name}/plan.csv`);
   return part(
     "What to test next",
-    one,
+    choice,
     h("ol", {}, items),
     h("p", { class: "quiet" }, "As a protocol for the rig: ", plan),
   );

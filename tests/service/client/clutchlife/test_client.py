@@ -123,12 +123,12 @@ def test_a_frame_has_a_row_for_each_measurement() -> None:
         },
         {"run_id": "b", "fits": [], "doubts": [{"code": "unit", "message": "?"}, {"code": "dead", "message": "?"}]},
     ]
-    rows = table(items, "pandas", each="fits")
+    rows = table(items, "pandas", row_of="fits")
     assert rows["run_id"].tolist() == ["a", "a", "b"]
     assert rows["pressure_bar"].tolist()[:2] == [4, 5]
     assert rows["doubts"].tolist() == ["", "", "unit, dead"]
     assert table(items, "pandas", without=["fits"]).columns.tolist() == ["run_id", "doubts"]
-    assert table(items, "list", each="fits") == items
+    assert table(items, "list", row_of="fits") == items
 
 
 def test_channels_of_any_kind_are_lists() -> None:
