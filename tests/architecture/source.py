@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+#: The built site, with scripts to download.
+SITE = ROOT / "service" / "dashboard" / "help"
 PACKAGES = ("models", "storage", "service")
 
 #: The chapters of the diagnosis in reading order: none imports a later one. import-linter holds the same order.
@@ -90,7 +92,7 @@ class Import:
 @cache
 def modules() -> tuple[Module, ...]:
     """All modules of the product, by path."""
-    paths = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+    paths = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py") if SITE not in path.parents)
     return tuple(Module(_dotted(path), path) for path in paths)
 
 

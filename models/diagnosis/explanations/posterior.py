@@ -228,7 +228,8 @@ class Search:
 
     def _relatives(self, leader: Alternative) -> None:
         """Effects that change torque much as a single leader does, from its laws, whatever they were promised to be: the
-        baseline about which they were screened has absorbed another part of each."""
+        baseline about which they were screened has absorbed another part of each. What may stand beside one of them is
+        screened where it leads: a promise that nobody refits would count."""
         node, design = self.nodes[leader][0], self.problem.design
         if len(node.fit.effects) != 1 or leader.unknown:
             return
@@ -245,7 +246,11 @@ class Search:
             if column.effect.named and relative not in self.nodes and relative not in self._failed:
                 amplitude = float(along[place] / np.linalg.norm(units[:, place]))
                 start = FittedEffect(effect=column.effect, amplitude=amplitude, shape=column.shape)
-                self._add(relative, node.fit, (start,), (column.log_weight_around,), -np.inf)
+                self._add(relative, node.fit, (start,), (column.log_weight_around,), -np.inf, screened=False)
+        weights = self.weights()
+        best = max(self.nodes, key=lambda alternative: weights[alternative])
+        if best != leader:
+            self._promise(best, self.nodes[best][0])
 
     def _down(self, leader: Alternative) -> None:
         """The leader with one thing less, from where it has the rest."""
@@ -265,8 +270,11 @@ class Search:
         effects: tuple[FittedEffect, ...],
         shape_evidence: tuple[float, ...],
         promise: float,
+        *,
+        screened: bool = True,
     ) -> None:
-        """One refit more of an alternative; the better one of each kind of shapes is kept."""
+        """One refit more of an alternative; the better one of each kind of shapes is kept. `screened`: a first single effect
+        promises what may stand beside it."""
         fitted = refit(self.problem, start.laws, effects)
         node = None if fitted is None else self._node(fitted, alternative.causes, shape_evidence)
         if node is None:
@@ -278,7 +286,7 @@ class Search:
         if same is None or node.log_evidence > same.log_evidence:
             kept = [node, *(other for other in before if other is not same)]
             self.nodes[alternative] = sorted(kept, key=lambda node: -node.log_evidence)
-        if first and len(effects) == 1 and alternative.causes:
+        if screened and first and len(effects) == 1 and alternative.causes:
             self._promise(alternative, node)
 
     def _add_structure(self, alternative: Alternative, parent: Node, promise: float) -> None:

@@ -168,8 +168,8 @@ def test_slopes_stand_in_the_rows_for_dashboards_at_the_speeds_of_the_criteria_t
     edit = {"end_of_life": {"criteria": [SHUDDER | {"speed_rpm": 200}]}, "reason": "it creeps faster now"}
     assert tested.patch("/v1/clutches/s", json=edit).status_code == 200
     table = tested.get("/v1/clutches/s/series.csv", params={"quantity": "slope"}).text.splitlines()
-    assert table[0].endswith(",frequency_hz,speed_rpm")
-    assert {float(line.rpartition(",")[2]) for line in table[1:]} == {50, 100, 200, 500}
+    assert table[0].endswith(",frequency_hz,speed_rpm,source")
+    assert {float(line.split(",")[-2]) for line in table[1:]} == {50, 100, 200, 500}
 
 
 def test_a_slope_in_the_rows_is_the_difference_of_the_curve_that_the_receipt_shows(tested: TestClient) -> None:
