@@ -76,7 +76,10 @@ def test_a_report_is_answered_stored_and_listed(client: TestClient) -> None:
     assert (again.status_code, again.content) == (304, b"")
     listed = client.get(f"{BASE}/diagnoses").json()
     DiagnosisListed.model_validate(listed["items"][0])
-    assert listed == {"items": [{k: v for k, v in report.items() if k not in ("maps", "loops", "isolability")}], "next": None}
+    assert listed == {
+        "items": [{k: v for k, v in report.items() if k not in ("maps", "loops", "isolability")}],
+        "next": None,
+    }
     post_tests(client, 4000)
     assert client.get(answer.headers["Location"]).json() == report | {"stale": True}
 

@@ -63,7 +63,7 @@ def test_commands_that_read_leave_an_older_file_as_it_is(tmp_path: Path, monkeyp
     assert revision(tmp_path / "copy.db") == OLD
     clutchlife("replay", *url)  # it writes, so it migrates, and keeps a copy
     kept = [each.name for each in tmp_path.glob("old.db-before-*")]
-    assert (revision(path), kept) == ("s0002_later", ["old.db-before-s0002_later"])
+    assert (revision(path), kept) == ("s9000_later", ["old.db-before-s9000_later"])
 
 
 def test_verify_is_clean_on_what_a_service_stored(path: Path) -> None:

@@ -285,7 +285,9 @@ def test_a_rigs_files_are_sent_with_its_name_and_what_else_is_given(terminal: Te
 
 def test_without_a_rig_a_record_needs_its_kind_and_cycles(terminal: Terminal) -> None:
     record = written(terminal.folder / "a.csv", b"1,2")
-    assert "give --rig, or --kind and --cycles" in terminal("push", record, "--clutch", "c1", "--url", URL, code=64)
+    assert "Push a file with --kind and --cycles, or with --rig" in terminal(
+        "push", record, "--clutch", "c1", "--url", URL, code=64
+    )
 
 
 def test_a_file_whose_reader_cannot_start_waits_in_the_spool(terminal: Terminal) -> None:
