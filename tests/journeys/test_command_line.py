@@ -66,6 +66,7 @@ def test_the_command_starts_without_database_and_numerics() -> None:
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_push_waits_in_the_spool_while_the_service_is_away(tmp_path: Path) -> None:
     run, spool = tmp_path / "run.json", tmp_path / "spool"
     run.write_text(json.dumps(stationary(0, run_id="r0")))
@@ -105,6 +106,7 @@ def test_a_recorders_file_is_pushed_as_it_is(server: Server, tmp_path: Path) -> 
     assert len(receipt["fits"]) == 7
 
 
+@pytest.mark.slow
 def test_replay_gives_the_same_again_and_backup_a_copy(campaign: Path, tmp_path: Path) -> None:
     database = tmp_path / "clutchlife.db"
     url = f"sqlite:///{database}"

@@ -2,12 +2,15 @@
 
 from pathlib import Path
 
+import pytest
+
 from tests.journeys.test_postgresql import ENVIRONMENT, asked, fill
 from tests.storage.engine.postgresql.server import PostgresServer
 from tests.storage.transfer.test_transfer import digests
 from tests.support import clutchlife, serving
 
 
+@pytest.mark.slow
 def test_there_and_back_answers_and_tables_are_the_same(tmp_path: Path, postgresql: PostgresServer) -> None:
     on_server = postgresql.empty()
     in_file, back = (f"sqlite:///{tmp_path}/{name}.db" for name in ("first", "back"))

@@ -182,6 +182,7 @@ def test_commands_run_beside_a_service(postgresql: PostgresServer) -> None:
         assert ONCE.get(f"{server.url}/readyz").json()["journal_mode"] is None
 
 
+@pytest.mark.slow
 def test_every_answer_is_that_of_a_service_on_a_file(both: tuple[Server, Server], tmp_path: Path) -> None:
     on_file, on_server = (asked(server) for server in both)
     assert on_file.keys() == on_server.keys()

@@ -21,6 +21,7 @@ def test_an_offset_that_raises_no_alarm_is_not_called_visible() -> None:
     assert "pressure offset" not in stated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slug", ["oil_temperature", "viscous_exponent"])
 def test_twice_what_is_visible_raises_an_alarm(slug: str) -> None:
     found = shown((20261, 3), slug)

@@ -63,6 +63,7 @@ def watched(browser: Browser, server: Server) -> Iterator[Watched]:
     found.close()
 
 
+@pytest.mark.slow
 def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server, references: dict[str, Any]) -> None:
     page = opened(watched)
     assert answers(server.url) == references["before"]
@@ -134,6 +135,7 @@ def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server, r
     assert answers(server.url) == references["after"]
 
 
+@pytest.mark.slow
 def test_a_doubt_is_answered_with_one_click(watched: Watched, server: Server, references: dict[str, Any]) -> None:
     page = opened(watched)
     post_typed(server)
@@ -212,6 +214,7 @@ def test_a_held_run_is_confirmed_and_withdrawn_and_restored(
     assert answers(server.url) == references["after"]
 
 
+@pytest.mark.slow
 def test_a_reason_is_asked_for_and_a_refusal_is_shown(watched: Watched, server: Server) -> None:
     # before the page is loaded: a request that follows at once may pass by what is put before it later
     watched.page.route(
@@ -232,6 +235,7 @@ def test_a_reason_is_asked_for_and_a_refusal_is_shown(watched: Watched, server: 
     watched.said.clear()
 
 
+@pytest.mark.slow
 def test_a_clutch_is_archived_and_brought_back(watched: Watched) -> None:
     page = opened(watched)
     page.get_by_text("More", exact=True).click()
@@ -264,6 +268,7 @@ def test_a_clutch_is_archived_and_brought_back(watched: Watched) -> None:
     watched.said.clear()
 
 
+@pytest.mark.slow
 def test_warnings_of_a_life_stand_on_its_page(watched: Watched, server: Server) -> None:
     page = turned(opened(watched), "overview")
     page.locator("#chart-fan[data-sketched]").wait_for()
@@ -282,6 +287,7 @@ def test_warnings_of_a_life_stand_on_its_page(watched: Watched, server: Server) 
     expect(opened_run.locator("summary").first).to_be_focused()
 
 
+@pytest.mark.slow
 def test_runs_are_listed_page_by_page_the_latest_first(watched: Watched, server: Server) -> None:
     with httpx2.Client(base_url=server.url, timeout=60) as http:
         for cycles in range(6010, 6330, 10):

@@ -159,6 +159,7 @@ def test_a_run_opens_to_its_curve_what_the_fit_leaves_and_its_record(watched: Wa
     details.get_by_label("Channel").select_option("Speed, rpm")
 
 
+@pytest.mark.slow
 def test_units_are_chosen_and_kept(browser: Browser, life: Server) -> None:
     watched = Watched(browser, life.url)
     page = watched.open("/clutches/sim-1#/curves")
@@ -234,6 +235,7 @@ def test_what_the_page_says_is_what_the_service_says(watched: Watched) -> None:
     tested.locator("table").first.wait_for()
 
 
+@pytest.mark.slow
 def test_every_chart_has_a_table_a_png_and_a_csv(watched: Watched) -> None:
     page = opened(watched)
     for name in ("fan", "landscape"):

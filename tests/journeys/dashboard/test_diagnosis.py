@@ -113,6 +113,7 @@ def test_a_rebuild_ends_what_a_diagnosis_said(browser: Browser, url: str) -> Non
     watched.close()
 
 
+@pytest.mark.slow
 def test_a_failed_diagnosis_says_why(browser: Browser, url: str) -> None:
     watched = Watched(browser, url)
     page = watched.page

@@ -204,6 +204,7 @@ def test_a_hidden_tab_asks_nothing(watched: Watched) -> None:
     assert before < len(watched.asked) <= before + 2
 
 
+@pytest.mark.slow
 def test_a_service_that_goes_away_and_comes_back(browser: Browser, tmp_path: Path) -> None:
     with serving(tmp_path / "clutchlife.db", loaded=True) as server:
         ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "kept"})

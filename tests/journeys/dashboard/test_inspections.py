@@ -47,6 +47,7 @@ def opened(browser: Browser, server: Server, clutch_id: str, **context: object) 
     return watched, page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scheme", "viewport"), [("light", SMALL), ("dark", {"width": 1360, "height": 900})], ids=["phone", "dark"]
 )
@@ -102,6 +103,7 @@ def polled(page: Page, times: int) -> None:
         page.wait_for_event("requestfinished", lambda request: "/inspections?" in request.url)
 
 
+@pytest.mark.slow
 def test_photographs_are_kept_small_and_drawn_again_only_where_they_changed(browser: Browser, bench: Server) -> None:
     with httpx2.Client(base_url=bench.url, timeout=60) as http:
         http.post("/v1/clutches", json={"clutch_id": "large"}).raise_for_status()

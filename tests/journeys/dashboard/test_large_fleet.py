@@ -89,6 +89,7 @@ def goes_to(page: Page, key: str, clutch: str) -> None:
     expect(link).to_be_in_viewport()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("viewport", [WIDE, PHONE], ids=["wide", "phone"])
 def test_scrolling_shows_every_row_and_the_page_holds_few(
     browser: Browser, fleet: Server, viewport: dict[str, int]

@@ -45,6 +45,7 @@ def asked(watched: Watched, text: str) -> int:
     return sum(text in url for url in watched.asked)
 
 
+@pytest.mark.slow
 def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_the_clutch_changes(
     browser: Browser, life: Server
 ) -> None:

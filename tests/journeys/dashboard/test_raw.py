@@ -106,6 +106,7 @@ def runs_read(page: Page, wire: Wire, count: int) -> None:
     raise AssertionError(sorted(wire.loaded))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tab", ["overview", "curves", "loops", "runs", "history"])
 def test_a_tab_of_a_clutch_of_raw_runs_is_light(browser: Browser, life: Server, tab: str) -> None:
     watched = Watched(browser, life.url)

@@ -19,6 +19,7 @@ def without_revision(http: httpx2.Client, **params: str | float) -> dict[str, ob
     return prediction | {"revision": 0}
 
 
+@pytest.mark.slow
 def test_the_order_of_arrival_does_not_matter(tmp_path: Path) -> None:
     # the first test's speeds and pressures set what all means are over; the others' differ, and one lacks a pressure
     ranges = {0: SPEEDS_RPM, 500: SPEEDS_RPM[:30], 1000: SPEEDS_RPM[5:], 2000: SPEEDS_RPM, 3000: SPEEDS_RPM[:20]}

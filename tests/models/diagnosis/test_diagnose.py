@@ -119,6 +119,7 @@ def test_one_state_is_enough_for_what_happens_within_a_test() -> None:
     assert "inertia_torque" in report.causes
 
 
+@pytest.mark.slow
 def test_the_same_generator_the_same_answer() -> None:
     given = campaign(7, PLANTED["inertia_torque"], cycles=(0.0, 3000.0))
     first, second = look(given), look(given)

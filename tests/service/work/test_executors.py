@@ -195,6 +195,7 @@ def test_a_scheduler_that_ends_is_named() -> None:
             list(outcomes)
 
 
+@pytest.mark.slow
 def test_a_cluster_whose_last_worker_ends_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     with local_cluster(1) as running, executor_of(running.address) as made:
         monkeypatch.setattr(cluster, "WORKER_SECONDS", 1.0)

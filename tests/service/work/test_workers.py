@@ -173,6 +173,7 @@ def test_an_idle_process_that_stops_is_told_and_replaced(processes: Workers, mon
     assert processes.submit(Lane.RUNS, calls.pid).result(IN_TIME) != stopped
 
 
+@pytest.mark.slow
 def test_what_starts_processes_is_replaced_where_it_stops(processes: Workers, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_SILENCE", 3.0)
     stopped = processes.submit(Lane.RUNS, calls.pid).result(IN_TIME)
