@@ -62,7 +62,6 @@ _same = (
         diagnosis.c.revision >= bindparam("since"),
     )
     .order_by(diagnosis.c.diagnosis_key)
-    .limit(1)
 )
 _end = (
     update(diagnosis)
@@ -95,11 +94,11 @@ def page(connection: Connection, clutch_id: str, *, limit: int, before: float | 
     return [_row(row) for row in connection.execute(_newest, values)]
 
 
-def running(connection: Connection, clutch_id: str, last_run_key: int, *, since: int = 0) -> str | None:
-    """The id of the diagnosis of the same runs that is running, or None; `since` is the revision of their last change."""
+def running(connection: Connection, clutch_id: str, last_run_key: int, *, since: int = 0) -> list[str]:
+    """The ids of the diagnoses of the same runs that are running, oldest first; `since` is the revision of their last
+    change."""
     values = {"of_clutch": clutch_id, "up_to": last_run_key, "since": since}
-    diagnosis_id: str | None = connection.execute(_same, values).scalar()
-    return diagnosis_id
+    return list(connection.execute(_same, values).scalars())
 
 
 def finish(connection: Connection, diagnosis_id: str, at: str, report: Json, extension: Json | None) -> bool:

@@ -48,7 +48,7 @@ def diagnosis_work(job: JobRow, settings: Settings) -> Work:
     task = {
         "clutch_id": job.clutch_id,
         "last_run_key": job.arguments["last_run_key"],
-        "isolability": job.arguments["isolability"],
+        "isolability": job.arguments.get("isolability", False),  # jobs of 1.0.0 have none
         "engine": settings.engine,
         "bytes": settings.diagnosis_bytes,
         "processor_seconds": settings.diagnosis_seconds,

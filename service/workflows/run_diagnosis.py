@@ -35,10 +35,12 @@ def ask(
         clutch = records.clutch(connection, clutch_id)
         last_run_key = diagnoses.last_run_key(connection, clutch_id)
         changed = changes.last_of_history(connection, clutch_id)
-        diagnosis_id = diagnoses.running(connection, clutch_id, last_run_key, since=changed)
-        job = None if diagnosis_id is None else jobs.get(connection, diagnosis_id)
-        same = job is not None and job.arguments["isolability"] >= isolability
-        if job is not None and same and job.state in jobs.OPEN:  # else its end could not be stored
+        for diagnosis_id in diagnoses.running(connection, clutch_id, last_run_key, since=changed):
+            job = jobs.get(connection, diagnosis_id)
+            if job is None or job.state not in jobs.OPEN:  # its end could not be stored
+                continue
+            if isolability and not job.arguments.get("isolability"):
+                continue
             if adopt and job.arguments["adopt_by"] is None:
                 jobs.set_arguments(connection, job.job_id, job.arguments | {"adopt_by": by})
             return job.job_id, False

@@ -40,9 +40,9 @@ def test_pages_and_the_one_that_runs(stocked: Database) -> None:
         first = diagnoses.page(connection, CLUTCH, limit=2)
         rest = diagnoses.page(connection, CLUTCH, limit=2, before=first[-1].diagnosis_key)
         assert [row.diagnosis_id for row in (*first, *rest)] == ["d2", "d1", "d0"]
-        assert diagnoses.running(connection, CLUTCH, 1) == "d0"
-        assert diagnoses.running(connection, CLUTCH, 2) is None
-        assert diagnoses.running(connection, "another", 1) is None
+        assert diagnoses.running(connection, CLUTCH, 1) == ["d0", "d1", "d2"]
+        assert diagnoses.running(connection, CLUTCH, 2) == []
+        assert diagnoses.running(connection, "another", 1) == []
         assert diagnoses.last_run_key(connection, CLUTCH) == 1
         assert diagnoses.last_run_key(connection, "another") == 0
         assert diagnoses.get(connection, "another", "d0") is None

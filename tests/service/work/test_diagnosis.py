@@ -8,6 +8,7 @@ from models.diagnosis.extension import Extension
 from service.queries.cache import to_json
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
+from service.schemas.diagnosis import IsolabilityOut
 from service.work.diagnosis import Task, diagnosed
 from service.workflows.ingest_run import ingest
 from service.workflows.register_clutch import register
@@ -45,3 +46,15 @@ def test_the_same_runs_under_another_name_get_the_same_report(tmp_path: Path, mo
     ]
     assert found[0]["extension"]["content"]["drawn"] == found[1]["extension"]["content"]["drawn"]
     assert found[0]["report"]["summary"] == found[1]["report"]["summary"]
+    task = Task(
+        database=url,
+        clutch_id="a",
+        last_run_key=10**9,
+        engine=f"{stand_in_engine.__name__}:separating",
+        bytes=0,
+        processor_seconds=0,
+        isolability=True,
+    )
+    said = IsolabilityOut.model_validate(diagnosed(task)["report"]["isolability"])
+    assert (said.unseen, said.pairs[0].key, said.pairs[0].with_test) == (["channel_delay"], "open_sweep", 0.98)
+    assert found[0]["report"]["isolability"] is None

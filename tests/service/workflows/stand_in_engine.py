@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import Explanation, Verdict, Where
 from models.diagnosis.extension import Extension
 from models.diagnosis.report.lack_of_fit import Misfit
-from models.diagnosis.report.report import Candidate, LoopTrace, Maps, Report, Visible
+from models.diagnosis.report.report import Candidate, Isolability, LoopTrace, Maps, Pair, Report, Visible
 from models.diagnosis.validation.held_out import Gain
 
 #: Nm that the stand-in takes off every plateau from a cycle on, and that its course loses by 1,000 cycles.
@@ -148,6 +149,20 @@ def diagnose(campaign: Campaign, *, rng: np.random.Generator) -> Report:
         return _report(campaign, None)
     content = {"shift_nm": SHIFT_NM, "course_nm": COURSE_NM, "drawn": float(rng.standard_normal())}
     return _report(campaign, Extension(effects=("torque_zero_shift", "running_in"), content=content))
+
+
+def separating(campaign: Campaign, *, rng: np.random.Generator, isolability: bool) -> Report:
+    """The same, and two effects that an open clutch parts, where that is asked for."""
+    pair = Pair(
+        effects=("hydrodynamic_drag", "torque_zero_shift"),
+        probability=0.78,
+        apart=False,
+        trial="open_sweep",
+        test="stationary test with the clutch open",
+        with_trial=0.98,
+    )
+    apart = Isolability(pairs=(pair,), unseen=("channel_delay",)) if isolability else None
+    return replace(diagnose(campaign, rng=rng), isolability=apart)
 
 
 def overflowing(campaign: Campaign, *, rng: np.random.Generator) -> Report:

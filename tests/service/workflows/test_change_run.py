@@ -257,8 +257,17 @@ def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(benc
     for cycles in (0.0, 1000.0, 70_000.0):
         bench.send(body("test", f"a{cycles:g}", cycles))
 
-    def ask() -> tuple[str, bool]:
-        return run_diagnosis.ask(bench.database, CLUTCH, by="local", adopt=False, request="", most=9, created_at=AT)
+    def ask(*, isolability: bool = False) -> tuple[str, bool]:
+        return run_diagnosis.ask(
+            bench.database,
+            CLUTCH,
+            by="local",
+            adopt=False,
+            isolability=isolability,
+            request="",
+            most=9,
+            created_at=AT,
+        )
 
     asked_for, _ = ask()
     with bench.database.writing() as connection:
@@ -266,6 +275,9 @@ def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(benc
     assert job is not None
     bench.send(body("test", "odd", 1500.0, odd=True))  # held: the runs are the same
     assert ask() == (asked_for, False)
+    apart, new = ask(isolability=True)  # the one that runs does not say it
+    assert new
+    assert ask(isolability=True) == (apart, False)
     bench.correct("a70000", 7000.0)
     fresh, new = ask()
     assert new

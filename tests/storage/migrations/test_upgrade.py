@@ -93,7 +93,7 @@ def test_an_older_file_is_brought_up_and_keeps_what_it_holds(tmp_path: Path, mon
         (row,) = connection.exec_driver_sql("SELECT clutch_id, later FROM clutch").fetchall()
         assert tuple(row) == (CLUTCH, None)
         diagnoses.insert(connection, new_diagnosis(0))
-        assert diagnoses.running(connection, CLUTCH, 1) == "d0"
+        assert diagnoses.running(connection, CLUTCH, 1) == ["d0"]
     assert integrity(path) == ["ok"]
 
 
