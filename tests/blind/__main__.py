@@ -4,6 +4,9 @@ SEED=  another seed, other campaigns          SIZE=   small, full, or a share of
 ONLY=  rows whose names begin with these (lives: remaining life)    PROCESSES= how many at once (2)
 ARGS="--scheduler WHERE": local, processes[:N], or tcp://host:port of a Dask scheduler whose workers can import these tests
 ARGS=--write puts the table into docs/appendix/diagnosis.md, ARGS=--failures lists what went wrong with its command
+
+Outcomes are stored in .blind/table, a file each: the next run goes on where this one ended. After a change of code
+remove them.
 """
 
 import os
@@ -19,7 +22,7 @@ from service.work.executor import Executor
 from service.work.progress import progress
 from tests.blind import lives, table
 from tests.blind.rows import trials
-from tests.blind.trials import Outcome, judge
+from tests.blind.trials import Outcome, stored
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -81,7 +84,7 @@ def main() -> None:
     chosen = [trial for trial in trials(seed, size) if trial.row.startswith(only)]
     processes = os.environ.get("PROCESSES") or "2"
     with executor_of(scheduler(sys.argv) or f"processes:{processes}") as executor:
-        outcomes = run(judge, chosen, executor)
+        outcomes = run(stored, chosen, executor)
         lived = run(lives.lived, lives.jobs(seed, size) if "lives".startswith(only) else [], executor)
     lines = document(outcomes, lived, f"make blind SEED={seed} SIZE={chosen_size}")
     print("\n".join(lines))
