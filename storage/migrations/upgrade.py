@@ -1,4 +1,6 @@
-"""Bring a database to the code's revision. A step is named, and applied and recorded in the caller's transaction.
+"""Bring a database to the code's revision: an empty one gets the tables as they are, an older one the steps that it lacks.
+
+A step is named, and applied and recorded in the caller's transaction.
 
 A new step is a file in `versions/` whose `revision` is its own name and whose `down_revision` is the step before.
 Steps only go forward: going back is restoring a backup.
@@ -13,6 +15,8 @@ from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection
+
+from storage.tables import metadata
 
 # Alembic keeps the step that it runs in module globals: one at a time in a process.
 _one_at_a_time = threading.Lock()
@@ -47,11 +51,15 @@ def current(connection: Connection) -> str | None:
 
 
 def upgrade(connection: Connection) -> None:
-    """Run the missing steps, without committing, on a database that is empty or at one of `revisions()`.
+    """Make all tables, or run the missing steps, without committing, in a database that is empty or at one of `revisions()`.
 
     The transaction must have been begun as a writing one.
     """
     with _one_at_a_time:
         config = _config()
         config.attributes["connection"] = connection
-        command.upgrade(config, "head")
+        if current(connection) is None:
+            metadata.create_all(connection, checkfirst=False)
+            command.stamp(config, "head")
+        else:
+            command.upgrade(config, "head")

@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-import pytest
-from alembic import command
 from alembic.config import Config
 from numpy.typing import NDArray
 from sqlalchemy import Connection, text
@@ -20,7 +18,6 @@ from storage import channels, clutches, diagnoses, runs
 from storage.clutches import ClutchRow
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
-from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.results import FitRow
 from storage.runs import NewRun
@@ -161,15 +158,12 @@ def later_step() -> Iterator[None]:
             known.cache_clear()
 
 
-def old_database(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def old_database(folder: Path) -> Path:
     """A file that the first release has left, at revision OLD, with a clutch; one file without a log."""
     path = folder / "old.db"
-    whole = command.upgrade
-    with monkeypatch.context() as earlier:
-        earlier.setattr(command, "upgrade", lambda config, _: whole(config, OLD))
-        open_database(f"sqlite:///{path}").close()
     with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute("PRAGMA journal_mode=DELETE")
+        connection.executescript(Path(__file__).with_name("first_release.sql").read_text(encoding="utf-8"))
+        connection.execute("INSERT INTO alembic_version VALUES (?)", (OLD,))
         connection.execute(
             "INSERT INTO clutch (clutch_id, record, content_sha256, created_at, revision, rank, summary) "
             "VALUES ('bench3-017', '{\"clutch_id\": \"bench3-017\"}', '', '', 0, 0, '{}')"
@@ -192,6 +186,6 @@ def integrity(path: Path) -> list[str]:
 
 
 def take_back(connection: Connection) -> None:
-    """Bring a database that has the later step to OLD, keeping what it holds."""
-    connection.exec_driver_sql("ALTER TABLE clutch DROP COLUMN later")
+    """Bring a server's database to OLD, keeping what it holds."""
+    connection.exec_driver_sql("ALTER TABLE clutch DROP COLUMN IF EXISTS later")
     connection.execute(text("UPDATE alembic_version SET version_num = :before"), {"before": OLD})

@@ -132,10 +132,8 @@ def post_until_killed(url: str, clutch: str, acknowledged: dict[tuple[str, str],
 
 @pytest.mark.usefixtures("later_step")
 @kills(5, 50)
-def test_a_migration_that_is_killed_is_whole_or_not_begun(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
-) -> None:
-    source = old_database(tmp_path, monkeypatch)
+def test_a_migration_that_is_killed_is_whole_or_not_begun(tmp_path: Path, number: int) -> None:
+    source = old_database(tmp_path)
     path = tmp_path / "a.db"
     url = f"sqlite:///{path}"
     shutil.copyfile(source, path)

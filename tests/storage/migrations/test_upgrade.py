@@ -84,8 +84,8 @@ def test_a_second_start_changes_nothing(database: Database) -> None:
 
 
 @pytest.mark.usefixtures("later_step")
-def test_an_older_file_is_brought_up_and_keeps_what_it_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = old_database(tmp_path, monkeypatch)
+def test_an_older_file_is_brought_up_and_keeps_what_it_holds(tmp_path: Path) -> None:
+    path = old_database(tmp_path)
     with closing(sqlite3.connect(path)) as connection:
         assert "later" not in {row[1] for row in connection.execute("PRAGMA table_info(clutch)")}
     with closing(open_database(f"sqlite:///{path}")) as new, new.writing() as connection:
@@ -97,10 +97,8 @@ def test_an_older_file_is_brought_up_and_keeps_what_it_holds(tmp_path: Path, mon
     assert integrity(path) == ["ok"]
 
 
-def test_ended_lives_that_were_stored_before_they_had_a_law_can_be_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = old_database(tmp_path, monkeypatch)
+def test_ended_lives_that_were_stored_before_they_had_a_law_can_be_read(tmp_path: Path) -> None:
+    path = old_database(tmp_path)
     ended = {"end": 9e3, "fraction": 0.5, "progress": [0.0, 4e3], "damage": [0.0, 0.3], "energy": None}
     ended |= {"deviation": 0.0, "censored": False}
     content = to_text({"clutches": 3, "ended": [ended], "censored": [ended | {"censored": True}]})
@@ -167,8 +165,8 @@ def test_processes_that_start_at_once_all_succeed(tmp_path: Path, journal_mode: 
 
 
 @pytest.mark.usefixtures("later_step")
-def test_a_migration_keeps_a_copy_of_the_file_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = old_database(tmp_path, monkeypatch)
+def test_a_migration_keeps_a_copy_of_the_file_as_it_was(tmp_path: Path) -> None:
+    path = old_database(tmp_path)
     kept = path.with_name(f"old.db-before-{migrations.head()}")
     open_database(f"sqlite:///{path}").close()
     assert (revision(path), revision(kept), integrity(kept)) == (migrations.head(), OLD, ["ok"])
@@ -181,7 +179,7 @@ def test_a_migration_keeps_a_copy_of_the_file_as_it_was(tmp_path: Path, monkeypa
 @pytest.mark.usefixtures("later_step")
 def test_a_migration_that_is_tried_again_replaces_no_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same content is kept once; a file that was worked on in between is kept beside it."""
-    path = old_database(tmp_path, monkeypatch)
+    path = old_database(tmp_path)
     with monkeypatch.context() as failing:
         failing.setattr("storage.engine.sqlite.database.upgrade", lambda _: 1 / 0)
         for _ in range(2):

@@ -51,8 +51,8 @@ def execute(path: Path, statement: str) -> None:
 
 
 @pytest.mark.usefixtures("later_step")
-def test_commands_that_read_leave_an_older_file_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = old_database(tmp_path, monkeypatch)
+def test_commands_that_read_leave_an_older_file_as_it_is(tmp_path: Path) -> None:
+    path = old_database(tmp_path)
     before, url = path.read_bytes(), ("--database", f"sqlite:///{path}")
     names = sorted(each.name for each in tmp_path.iterdir())
     clutchlife("backup", tmp_path / "copy.db", *url)

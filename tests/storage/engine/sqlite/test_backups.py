@@ -95,8 +95,8 @@ def test_a_copy_that_fails_leaves_nothing(busy: Database, tmp_path: Path) -> Non
         back_up(f"sqlite:///{busy.path}", tmp_path / "no such folder" / "copy.db")
 
 
-def test_a_backup_of_an_older_file_is_made_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = old_database(tmp_path, monkeypatch)
+def test_a_backup_of_an_older_file_is_made_as_it_is(tmp_path: Path) -> None:
+    path = old_database(tmp_path)
     before = path.read_bytes()
     back_up(f"sqlite:///{path}", tmp_path / "copy.db")
     assert path.read_bytes() == before

@@ -83,10 +83,8 @@ def test_a_closed_database_says_so(database: Database) -> None:
 
 
 @pytest.mark.usefixtures("later_step")
-def test_a_found_database_is_read_at_its_own_revision_and_never_changed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = old_database(tmp_path, monkeypatch)
+def test_a_found_database_is_read_at_its_own_revision_and_never_changed(tmp_path: Path) -> None:
+    path = old_database(tmp_path)
     before = path.read_bytes()
     with closing(find_database(f"sqlite:///{path}")) as found:
         with found.reading() as connection:

@@ -75,8 +75,8 @@ def test_a_damaged_database_is_replaced_and_kept_as_it_is(url: str, tmp_path: Pa
     assert count(tmp_path / "a.db") == 1
 
 
-def test_an_older_backup_is_restored_at_its_revision(url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    restore(url, old_database(tmp_path, monkeypatch))
+def test_an_older_backup_is_restored_at_its_revision(url: str, tmp_path: Path) -> None:
+    restore(url, old_database(tmp_path))
     assert revision(tmp_path / "a.db") == OLD
 
 

@@ -44,8 +44,8 @@ def test_where_no_lock_can_be_made_no_service_starts(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("later_step")
-def test_a_file_is_not_migrated_under_a_running_service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = old_database(tmp_path, monkeypatch)
+def test_a_file_is_not_migrated_under_a_running_service(tmp_path: Path) -> None:
+    path = old_database(tmp_path)
     with service_lock(path):
         with pytest.raises(ServiceRuns):
             open_database(f"sqlite:///{path}")
