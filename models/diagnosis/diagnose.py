@@ -9,8 +9,7 @@ import numpy as np
 
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.design import build_design
-from models.diagnosis.experiments.rivals import rivals_of
-from models.diagnosis.experiments.test_plan import advise
+from models.diagnosis.experiments.test_plan import advise, rivals_of
 from models.diagnosis.explanations.decide import judge, revise
 from models.diagnosis.explanations.posterior import posterior_of
 from models.diagnosis.explanations.sizes import sizes_of

@@ -5,7 +5,7 @@ torque is taken off every plateau before a curve is fitted. A *course* (running-
 the clutch and not in eq. 6: its mean torque is taken off the measured course before eq. 6 is tracked, and put back when
 the threshold's first passage is looked for.
 
-What the diagnosis does not know is a weighted set of draws (`effects.draw`), each one coherent correction of all runs of a
+What the diagnosis does not know is a weighted set of draws (`effects.fitted_effect`), each one coherent correction of all runs of a
 life: a life is tracked under each, and the prognosis is their mixture.
 """
 
@@ -20,13 +20,11 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.baseline.laws import Frame, Laws, scene_of
 from models.diagnosis.campaign import Campaign, Oil, StationaryRun
-from models.diagnosis.design.design import build_design
+from models.diagnosis.design.design import Points, build_design
 from models.diagnosis.design.facts import Facts, facts_of
-from models.diagnosis.design.points import Points
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.draw import Draw, DrawnEffect
 from models.diagnosis.effects.effect import Discrepancy, Kind
-from models.diagnosis.effects.template_discrepancy import Ranges
+from models.diagnosis.effects.fitted_effect import Draw, DrawnEffect, Ranges
 
 #: Plateaus are handed on in parts of this many: a design takes no more of one run.
 _PART = 2000

@@ -13,12 +13,12 @@ import numpy as np
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.criteria import LIKELY
 from models.diagnosis.design.design import build_design
-from models.diagnosis.effects.catalogued.interface_heating import REFERENCE_FLUX
-from models.diagnosis.explanations.alternative import NOTHING
+from models.diagnosis.effects.thermal import REFERENCE_FLUX
 from models.diagnosis.explanations.posterior import Posterior, posterior_of
+from models.diagnosis.explanations.verdict import NOTHING
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
+from models.diagnosis.report.isolability import visible_of
 from models.diagnosis.report.report import Visible
-from models.diagnosis.report.visible import visible_of
 from tests.blind.rig.clutch import Law
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.makers import CATALOGUED

@@ -24,9 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.baseline.criteria import BELOW, CURVATURE_BOUNDS, EARLY
+from models.diagnosis.criteria import BELOW, CURVATURE_BOUNDS, EARLY
+from models.diagnosis.design.design import IntArray, Points
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.design.points import IntArray, Points
 from models.friction.stribeck import GAMMA
 
 #: The laws of eq. 6 over pressure, in the order of `models.friction.stribeck.PARAMETER_NAMES`; each has six places in θ.

@@ -1,4 +1,12 @@
-"""The pooled baseline: every run of a campaign predicted by one parameter vector.
+"""The GMS attractor law in its periodic state, linear in each loop.
+
+    dM/dt = C (1 - M/S) = (S - M)/τ,   τ = S/C                               (models.loops.attractor)
+
+Given τ at evenly spaced phases, M is the periodic solution R[S] of a linear relaxation (exact where S is linear in the
+relaxation's own time between phases), and so are its sensitivities: a change δS of the stationary curve gives
+δM = R[(M/S) δS], and a change of log C a relaxation of its own.
+
+The pooled baseline: every run of a campaign predicted by one parameter vector.
 
     prediction = S(v; p, ζ) at plateaus,   the GMS attractor's periodic torque behind S in loops,
                  the open clutch's drag where there is no pressure
@@ -11,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.baseline.attractor import Lag, lag_of
 from models.diagnosis.baseline.laws import (
     BLOCK,
     DRIFT,
@@ -27,6 +34,68 @@ from models.diagnosis.baseline.laws import (
 )
 from models.diagnosis.design.design import Design
 from models.diagnosis.design.loop_bins import PHASES
+
+#: A curve below this share of its loop's largest value is lifted to it: C/S must stay finite.
+_LEAST_SHARE = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lag:
+    """keep e^-x and mean_keep (1 - e^-x)/x of each step [l, k]; torque M [l, k] Nm; ratio M/S [l, k]; by_log_attractor
+    ∂M/∂log C [l, k]."""
+
+    keep: FloatArray
+    mean_keep: FloatArray
+    torque: FloatArray
+    ratio: FloatArray
+    by_log_attractor: FloatArray
+
+    def follow(self, change: FloatArray) -> FloatArray:
+        """R[(M/S) δS]: the change of the loops' torque [l, k, m] Nm by a change of the stationary curve [l, k, m] Nm."""
+        return _relaxed(self.keep, self.mean_keep, self.ratio[:, :, None] * change)
+
+
+def lag_of(curve: FloatArray, attractor: FloatArray, angular_frequency: FloatArray) -> Lag:
+    """For curves S [l, k] Nm at evenly spaced phases, attractors C [l, k] or [l, 1] Nm/s > 0, frequencies [l] rad/s."""
+    strength = np.maximum(np.abs(curve), _LEAST_SHARE * np.abs(curve).max(axis=1, keepdims=True) + 1e-12)
+    rate = np.clip(attractor / strength, 1e-9, 1e9)
+    step = 2 * np.pi / (curve.shape[1] * angular_frequency[:, None])
+    x = 0.5 * step * (rate + np.roll(rate, 1, axis=1))
+    keep = np.exp(-x)
+    tiny = x < 1e-4
+    mean_keep = np.where(tiny, 1 - x / 2 + x * x / 6, -np.expm1(-x) / np.where(tiny, 1.0, x))
+    torque = _relaxed(keep, mean_keep, curve[:, :, None])[:, :, 0]
+    by_mean = keep - mean_keep  # x dm/dx of M_i = e^-x M_{i-1} + (1 - m) S_i + (m - e^-x) S_{i-1}
+    gain = -x * keep * np.roll(torque, 1, axis=1) - by_mean * curve + (by_mean + x * keep) * np.roll(curve, 1, axis=1)
+    behind = _periodic(keep, gain.T[:, :, None].copy())[:, :, 0]
+    return Lag(
+        keep=keep,
+        mean_keep=mean_keep,
+        torque=torque,
+        ratio=torque / np.copysign(strength, curve),
+        by_log_attractor=behind,
+    )
+
+
+def _relaxed(keep: FloatArray, mean_keep: FloatArray, target: FloatArray) -> FloatArray:
+    """R[target] for targets [l, k, m]."""
+    by_phase = np.ascontiguousarray(target.transpose(1, 0, 2))
+    here, before = 1 - mean_keep.T[:, :, None], (mean_keep - keep).T[:, :, None]
+    gain = here * by_phase
+    gain[1:] += before[1:] * by_phase[:-1]
+    gain[0] += before[0] * by_phase[-1]
+    return _periodic(keep, gain)
+
+
+def _periodic(keep: FloatArray, gain: FloatArray) -> FloatArray:
+    """The periodic y [l, k, m] of y_i = keep_i y_{i-1} + gain_i, keep [l, k], gain [k, l, m] (overwritten): once around from
+    y = 0, then the share of its end that was missing at its start is added."""
+    steps = keep.T[:, :, None]
+    for i in range(1, gain.shape[0]):
+        gain[i] += steps[i] * gain[i - 1]
+    left = np.cumprod(steps, axis=0)
+    gain += left * (gain[-1] / (1 - left[-1]))
+    return gain.transpose(1, 0, 2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,13 +1,27 @@
 """Autocorrelation of neighbouring rows: a process of the first order with white noise beside it.
 
 correlation with the k-th neighbour = w ρ^k,     the same as of the ARMA(1, 1) x_i = ρ x_{i-1} + s (e_i + θ e_{i-1})
+
+Autocorrelation of the samples of a dynamic record, and the correlation of the means in phase bins that follows from it.
+
+The residual of a loop's samples about its low harmonics has the autocorrelations r_1 and r_2; noise that is partly white and
+partly autocorrelated has r_k = w ρ^k. The means of n samples in a row, a bin each, then have
+
+    variance ∝ n + 2 Σ_{d<n} (n - d) w ρ^d,    covariance k bins on ∝ w ρ^{(k-1) n + 1} ((1 - ρⁿ)/(1 - ρ))²
+
+There are many more samples than bins, so they estimate it better. Samples next to standstill are left out: a loop turns
+sharply there, which is no noise. Noise as slow as a bin is estimated a little too fast, for the harmonics absorb part of it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from models.diagnosis.design.criteria import LEAST_CORRELATION
+from models.arrays import FloatArray
+from models.diagnosis.design.criteria import ALIKE_SAMPLING, FEWEST_PER_BIN, LEAST_CORRELATION, SIGNAL_HARMONICS
+from models.records.periods import harmonics
 
 #: Bounds that keep the process stationary and its covariance positive definite.
 _LEAST_DECAY, _MOST_DECAY, _HALF = 1e-3, 0.99, 0.49
@@ -49,3 +63,62 @@ def arma(correlation: Correlation) -> tuple[float, float]:
     half = at_0 / (2 * at_1)
     inverse = half + np.copysign(np.sqrt(max(half * half - 1, 0.0)), half)  # the root beyond 1, which does not cancel
     return float(1 / inverse), float(np.sqrt(max(at_1 * inverse, 1e-12)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampleAutocorrelation:
+    """Autocorrelations one and two samples on [-], and how many samples in a row fall into one bin."""
+
+    first: float
+    second: float
+    per_bin: float
+
+    def of_bins(self) -> tuple[float, float]:
+        """Correlations [-] of the means in neighbouring bins and in those next but one."""
+        if self.first <= 0.0 or self.second <= 0.0:
+            return 0.0, 0.0
+        samples, n = Correlation.of_neighbours(self.first, self.second), self.per_bin
+        decay, over_bin = samples.decay, samples.decay**n
+        inside = decay * (n - 1 - n * decay + over_bin) / (1 - decay) ** 2
+        neighbour = samples.share * decay * ((1 - over_bin) / (1 - decay)) ** 2 / (n + 2 * samples.share * inside)
+        return neighbour, neighbour * over_bin
+
+
+def sample_autocorrelation(
+    torque: FloatArray, phase: FloatArray, used: NDArray[np.bool_], per_bin: float
+) -> SampleAutocorrelation | None:
+    """Of torque [n] Nm at phase [n] rad, where samples are `used` [n]; None where they are too few or all alike."""
+    if per_bin < FEWEST_PER_BIN or np.count_nonzero(used) < 8 * (2 * SIGNAL_HARMONICS + 1):
+        return None
+    basis = np.column_stack([np.ones(int(used.sum())), harmonics(phase[used], SIGNAL_HARMONICS)])
+    ridge = 1e-9 * used.sum() * np.eye(basis.shape[1])
+    coefficients = np.linalg.solve(basis.T @ basis + ridge, basis.T @ torque[used])
+    residual = np.zeros(torque.size)
+    residual[used] = torque[used] - basis @ coefficients
+    counted = used.astype(np.float64)
+    sums = [float(residual[k:] @ residual[: residual.size - k]) for k in range(3)]
+    counts = [float(counted[k:] @ counted[: counted.size - k]) for k in range(3)]
+    if not sums[0] > 0.0 or min(counts) <= 0.0:
+        return None
+    first, second = (sums[k] / counts[k] * counts[0] / sums[0] for k in (1, 2))
+    return SampleAutocorrelation(first=first, second=second, per_bin=per_bin)
+
+
+def bin_autocorrelation(loops: Sequence[SampleAutocorrelation | None]) -> tuple[float, float] | None:
+    """Correlations [-] of neighbouring bins, and of those next but one, averaged over loops; None where it was not estimated
+    for most of the loops. Loops that were sampled alike share their autocorrelations."""
+    estimated = [loop for loop in loops if loop is not None]
+    if 2 * len(estimated) <= len(loops) or not estimated:
+        return None
+    groups: dict[int, list[SampleAutocorrelation]] = {}
+    for loop in estimated:
+        groups.setdefault(round(np.log(loop.per_bin) / np.log(ALIKE_SAMPLING)), []).append(loop)
+    correlations = []
+    for alike in groups.values():
+        first, second, per_bin = (
+            float(np.mean([getattr(loop, name) for loop in alike])) for name in SampleAutocorrelation.__slots__
+        )
+        pooled = SampleAutocorrelation(first=first, second=second, per_bin=per_bin)
+        correlations += [pooled.of_bins()] * len(alike)
+    neighbour, next_but_one = np.mean(correlations, axis=0).tolist()
+    return neighbour, next_but_one

@@ -1,7 +1,12 @@
 """Numbers that decide what becomes a row, what counts as a rest and what is taken for noise of samples.
 
 Each has its meaning, its unit and its origin; "chosen; no table" means that no command prints the alternatives.
+
+Limits of a design's size: where a campaign is larger, plateaus, states or samples are taken evenly.
+
+All are chosen for time and memory; no table.
 """
+
 
 # ---- physical defaults, where a campaign does not say
 
@@ -74,3 +79,17 @@ LEAST_CORRELATION = 0.02
 #: [K m²/W] A plate that warms by less with the heat flux counts as warming by so much: 1 K at 0.32 W/mm². Chosen, above what
 #: thermometers drift with speed (some tenths of a kelvin); no table. Friction that heats an interface does so by tens of K.
 LEAST_PLATE_RISE = 1.0 / 0.32e6
+
+
+#: Plateaus taken from one stationary run, at most.
+MOST_PLATEAUS = 2000
+#: Rows of a whole campaign, about; beyond, states are taken evenly.
+MOST_ROWS = 40_000
+#: States whose loops are used, at most, the first and the last among them: further ones add no evidence in practice.
+MOST_LOOP_STATES = 12
+#: Change points tried along a life, at most: further ones between them would look the same.
+MOST_ONSETS = 20
+#: Samples of a stretch at one pressure that are binned, at most.
+MOST_SAMPLES = 4000
+#: Samples of a stretch from which its speed cycle is fitted, at most (all where the cycle has corners).
+CYCLE_SAMPLES = 400

@@ -1,4 +1,10 @@
-"""The rows of a campaign that the baseline and the effects are fitted to.
+"""Names of the axes on which structure may live: public channel names, or a name of our own where no channel is it.
+
+Where torque is predicted: plateaus of stationary tests, and evenly spaced phases of loops.
+
+A campaign made small enough to be fitted at once: states are left out evenly, the first and the last are kept.
+
+The rows of a campaign that the baseline and the effects are fitted to.
 
 A *point* is where torque is predicted: a plateau of a stationary test, or one of PHASES evenly spaced phases of a loop. A
 *row* is what is compared with data: a plateau again, or one of BINS phase bins of a loop, the mean over the points (and
@@ -8,22 +14,132 @@ Everything is folded to v >= 0 (the model is odd): `sign` says which way the clu
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, StationaryRun
-from models.diagnosis.design.criteria import PLATEAU_DURATION
+from models.diagnosis.design.autocorrelation import bin_autocorrelation
+from models.diagnosis.design.criteria import MOST_LOOP_STATES, MOST_PLATEAUS, MOST_ROWS, PLATEAU_DURATION
 from models.diagnosis.design.facts import Facts, facts_of
-from models.diagnosis.design.limits import MOST_PLATEAUS
 from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
-from models.diagnosis.design.points import IntArray, Points, concatenate, mark_open
-from models.diagnosis.design.sample_autocorrelation import bin_autocorrelation
-from models.diagnosis.design.thinning import thinned
+from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import plate_rise
+
+SPEED, PRESSURE, TORQUE, TEMPERATURE = "speed_rpm", "pressure_bar", "torque_nm", "oil_temperature_c"
+CYCLES, CLOCK, PHASE, FREQUENCY = "cycles", "test_clock_s", "loop_phase", "frequency_hz"
+
+
+IntArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """Columns [n].
+
+    run                index into Design.runs
+    cycles
+    pressure           [Pa]; where the clutch is open the campaign's lowest closed pressure, for the laws hold for no other
+                       (no friction acts there, see `engaged`)
+    engaged            1, or 0 where the clutch is open
+    velocity           [m/s] >= 0, folded; sign ±1 says which way the clutch turned
+    acceleration       [m/s²] of the folded velocity
+    temperature        of the oil [K], NaN where not measured
+    plate_rise         of the plate above the oil [K], NaN where not measured
+    clock              [s] since the test began
+    moment             [s] since 1970, NaN where unknown
+    angular_frequency  [rad/s], 0 at plateaus
+    phase              [rad]
+    loop               index, -1 at plateaus
+    previous           index of the plateau before it in the same run, -1 where there is none
+    """
+
+    run: IntArray
+    cycles: FloatArray
+    pressure: FloatArray
+    engaged: FloatArray
+    velocity: FloatArray
+    sign: FloatArray
+    acceleration: FloatArray
+    temperature: FloatArray
+    plate_rise: FloatArray
+    clock: FloatArray
+    moment: FloatArray
+    angular_frequency: FloatArray
+    phase: FloatArray
+    loop: IntArray
+    previous: IntArray
+
+    @property
+    def steady(self) -> NDArray[np.bool_]:
+        """[n] whether it is a plateau."""
+        return self.loop < 0
+
+    def take(self, index: IntArray | NDArray[np.bool_]) -> "Points":
+        """The points at `index`; `previous` is set to -1, for the plateau that it means may be gone."""
+        columns = {field.name: getattr(self, field.name)[index] for field in fields(self)}
+        return Points(**{**columns, "previous": np.full(columns["run"].size, -1, dtype=np.intp)})
+
+
+def mark_open(points: Points) -> Points:
+    """With what was measured below UNLOADED marked as an open clutch."""
+    closed = points.pressure >= UNLOADED
+    lowest = float(points.pressure[closed].min()) if closed.any() else 1.0
+    return replace(points, engaged=closed.astype(np.float64), pressure=np.where(closed, points.pressure, lowest))
+
+
+def concatenate(blocks: list[Points]) -> Points:
+    """All blocks one after the other; no blocks give no points."""
+
+    def column(name: str) -> list[FloatArray]:
+        return [getattr(block, name) for block in blocks] or [np.zeros(0)]
+
+    integers = {name: np.concatenate(column(name)).astype(np.intp) for name in ("run", "loop", "previous")}
+    floats = {
+        field.name: np.concatenate(column(field.name)).astype(np.float64)
+        for field in fields(Points)
+        if field.name not in integers
+    }
+    return Points(**integers, **floats)  # type: ignore[arg-type] # names are the fields' own
+
+
+#: Pressures that a dynamic test is taken to have when its rows are counted beforehand.
+_LOOPS_PER_TEST = 8
+
+
+def thinned(campaign: Campaign, notes: list[str]) -> Campaign:
+    """The campaign with states left out evenly where it is too large; `notes` gets a sentence on what was left out."""
+    campaign = _with_fewer_loops(campaign, notes)
+    states = np.unique([*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)])
+    size = sum(min(run.plateaus.torque.size, MOST_PLATEAUS) for run in campaign.stationary)
+    size += sum(_LOOPS_PER_TEST * BINS for _ in campaign.dynamic)
+    if size <= MOST_ROWS or states.size < 3:
+        return campaign
+    kept = _evenly(states, max(2, int(states.size * MOST_ROWS / size)))
+    notes.append(
+        f"{states.size - len(kept)} of {states.size} states were left out, evenly: the campaign is very large."
+    )
+    return replace(
+        campaign,
+        stationary=tuple(run for run in campaign.stationary if run.cycles in kept),
+        dynamic=tuple(run for run in campaign.dynamic if run.cycles in kept),
+    )
+
+
+def _with_fewer_loops(campaign: Campaign, notes: list[str]) -> Campaign:
+    states = np.unique([run.cycles for run in campaign.dynamic])
+    if states.size <= MOST_LOOP_STATES:
+        return campaign
+    kept = _evenly(states, MOST_LOOP_STATES)
+    notes.append(f"Dynamic tests of {len(kept)} of {states.size} states were taken, evenly: there are very many.")
+    return replace(campaign, dynamic=tuple(run for run in campaign.dynamic if run.cycles in kept))
+
+
+def _evenly(states: FloatArray, count: int) -> set[float]:
+    return set(states[np.linspace(0, states.size - 1, count).round().astype(int)].tolist())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +165,7 @@ class Design:
     bins [N - plateaus]     which bin of the flat (loop, bin) order each loop row is
     bin_offset [N - plateaus]  how far past that bin's middle (in bins) its samples lie
     period_differences      rows [n] of a loop, and what a further period of it differs by there [n] Nm, as if each were one
-                            sample (`design.period_differences`)
+                            sample (`design.loop_bins`)
     chains [b, n]           rows that follow each other in a run or loop, those of one length together
     plateaus, loops         how many
     bin_autocorrelation     of neighbouring bins, and of those next but one, estimated from the loops' samples; None where

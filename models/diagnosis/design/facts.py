@@ -15,13 +15,13 @@ from models.diagnosis.design.criteria import (
     LEAST_PAUSE,
     LEAST_PLATE_RISE,
     LONGEST_ENGAGEMENT,
+    MOST_ONSETS,
     PACE_QUANTILE,
     PAUSE_RATIO,
     REFERENCE_TEMPERATURE,
     USUAL_PRESSURE,
     USUAL_TORQUE,
 )
-from models.diagnosis.design.limits import MOST_ONSETS
 from models.records.criteria import UNLOADED
 from models.records.runs import Plateaus, Record, plate_rise
 

@@ -1,4 +1,15 @@
-"""A dynamic record compressed: for each loop the mean torque in phase bins, and the speed cycle at evenly spaced phases."""
+"""Differences between the periods of a loop. What is locked to the speed cycle is the same in every period, so what differs
+is noise, however slow. (A drift over the test's clock differs too, by what it does within some periods.)
+
+The residual about the harmonics of a single period says little about slow noise, for the harmonics absorb it. With ȳ_b the
+mean of n_b samples in a bin of this period and m̄_b that of the N_b samples of the bin in all periods before,
+
+    d_b = (ȳ_b - m̄_b)/(1/n_b + 1/N_b)^{1/2}
+
+has the variance of a single sample and the correlation of neighbouring bins.
+
+A dynamic record compressed: for each loop the mean torque in phase bins, and the speed cycle at evenly spaced phases.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -8,25 +19,43 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.diagnosis.design.autocorrelation import SampleAutocorrelation, sample_autocorrelation
 from models.diagnosis.design.criteria import (
+    CYCLE_SAMPLES,
     FEWEST_BINS,
+    FULL_BIN,
     LEAST_NOISE_SPEED,
     LEAST_SPEED,
     LEAST_SPEED_WITH_CORNERS,
+    MOST_SAMPLES,
     REVERSES,
     SAME_CYCLE_RESIDUAL,
     SETTLING_SHARE,
     SETTLING_TIME,
 )
-from models.diagnosis.design.limits import CYCLE_SAMPLES, MOST_SAMPLES
-from models.diagnosis.design.period_differences import period_differences
-from models.diagnosis.design.sample_autocorrelation import SampleAutocorrelation, sample_autocorrelation
 from models.friction.stribeck import GAMMA
 from models.records.criteria import SPEED_HARMONICS
 from models.records.outliers import beside, inliers
 from models.records.periods import Cycle, fit_cycle, harmonics
 from models.records.pressure_stretches import pressure_stretches
 from models.records.runs import Record, plate_rise
+
+
+def period_differences(torque: FloatArray, bins: NDArray[np.intp], turns: FloatArray, count: int) -> FloatArray:
+    """d [p - 1, count] Nm of torque [n] Nm in its bins [n] (0 ... count - 1) and turns since its start [n]; p is how many
+    turns were begun. NaN where no earlier period holds samples in the bin, or this period too few (FULL_BIN)."""
+    turn = np.floor(turns).astype(np.intp)
+    periods = int(turn.max(initial=0)) + 1
+    cell = turn * count + bins
+    samples = np.bincount(cell, minlength=periods * count).reshape(periods, count).astype(np.float64)
+    sums = np.bincount(cell, weights=torque, minlength=periods * count).reshape(periods, count)
+    full = samples >= FULL_BIN * samples.max(axis=0)
+    samples, sums = np.where(full, samples, 0.0), np.where(full, sums, 0.0)
+    before, sum_before = np.cumsum(samples, axis=0)[:-1], np.cumsum(sums, axis=0)[:-1]
+    here, sum_here = samples[1:], sums[1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray((sum_here / here - sum_before / before) / np.sqrt(1 / here + 1 / before), dtype=np.float64)
+
 
 #: Phases at which a loop is computed, and bins in which it is compared; a bin holds a whole number of phases. With two a bin
 #: the torque next to rest is off by up to 0.013 % of the clutch's, which passed for a delay of 2 ms on a rig of 0.1 % noise;
@@ -46,7 +75,7 @@ class BinnedLoop:
     where not measured.
     In BINS bins: torque [Nm] (folded); samples, how many it is the mean of, 0 where the bin is not used; bin_offset, how far
     past the bin's middle [of a bin] they lie on average (with a rate that is a multiple of the speed's, always as far).
-    period_differences [p, BINS] Nm (`design.period_differences`).
+    period_differences [p, BINS] Nm (`design.loop_bins`).
     temperature [K], NaN where not measured; angular_frequency [rad/s]; sign ±1; autocorrelation of its samples, or None."""
 
     pressure: float

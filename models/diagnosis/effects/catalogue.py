@@ -1,45 +1,43 @@
-"""The catalogue: every effect that the diagnosis can name, in the contract's order."""
+"""The catalogue: every effect that the diagnosis can name, in the contract's order.
 
+The shape grid of all effects as columns: the change of torque of a small amplitude, for every shape that is tried.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from scipy.special import logsumexp
+
+from models.arrays import FloatArray
+from models.diagnosis.baseline.prediction import Prediction
+from models.diagnosis.design.design import Design
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.catalogued import (
-    accelerated_wear,
-    channel_delay,
-    hydrodynamic_drag,
-    inertia_torque,
-    interface_heating,
-    load_severity,
-    oil_change,
-    oil_temperature,
-    pressure_offset,
-    rest_recovery,
-    running_in,
-    shaft_ripple,
-    squeeze_film,
-    stick_slip,
-    torque_zero_shift,
-    unsettled_dwell,
-    viscous_exponent,
-)
-from models.diagnosis.effects.effect import Effect, sized
+from models.diagnosis.effects.effect import Effect, Shape, sized, unit_changes
+from models.diagnosis.effects.history import ACCELERATED_WEAR, LOAD_SEVERITY, OIL_CHANGE, REST_RECOVERY, RUNNING_IN
+from models.diagnosis.effects.moving import INERTIA_TORQUE, SHAFT_RIPPLE, SQUEEZE_FILM, STICK_SLIP
+from models.diagnosis.effects.readings import CHANNEL_DELAY, PRESSURE_OFFSET, TORQUE_ZERO_SHIFT, UNSETTLED_DWELL
+from models.diagnosis.effects.thermal import HYDRODYNAMIC_DRAG, INTERFACE_HEATING, OIL_TEMPERATURE, VISCOUS_EXPONENT
 
 CATALOGUE: tuple[Effect, ...] = (
-    oil_temperature.EFFECT,
-    interface_heating.EFFECT,
-    viscous_exponent.EFFECT,
-    hydrodynamic_drag.EFFECT,
-    torque_zero_shift.EFFECT,
-    pressure_offset.EFFECT,
-    unsettled_dwell.EFFECT,
-    channel_delay.EFFECT,
-    inertia_torque.EFFECT,
-    squeeze_film.EFFECT,
-    shaft_ripple.EFFECT,
-    stick_slip.EFFECT,
-    running_in.EFFECT,
-    oil_change.EFFECT,
-    accelerated_wear.EFFECT,
-    load_severity.EFFECT,
-    rest_recovery.EFFECT,
+    OIL_TEMPERATURE,
+    INTERFACE_HEATING,
+    VISCOUS_EXPONENT,
+    HYDRODYNAMIC_DRAG,
+    TORQUE_ZERO_SHIFT,
+    PRESSURE_OFFSET,
+    UNSETTLED_DWELL,
+    CHANNEL_DELAY,
+    INERTIA_TORQUE,
+    SQUEEZE_FILM,
+    SHAFT_RIPPLE,
+    STICK_SLIP,
+    RUNNING_IN,
+    OIL_CHANGE,
+    ACCELERATED_WEAR,
+    LOAD_SEVERITY,
+    REST_RECOVERY,
 )
 
 BY_SLUG = {effect.slug: effect for effect in CATALOGUE}
@@ -48,3 +46,63 @@ BY_SLUG = {effect.slug: effect for effect in CATALOGUE}
 def effects_for(facts: Facts, without: frozenset[str] = frozenset()) -> list[Effect]:
     """The effects with the priors that fit this campaign's clutch; those whose slugs are in `without` are left out."""
     return [sized(effect, facts) for effect in CATALOGUE if effect.slug not in without]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One point of an effect's grid: the effect, its shape, its log prior weight (normalised over the effect's grid), and
+    that of all points that differ from it in smooth shapes only."""
+
+    effect: Effect
+    shape: Shape
+    log_weight: float
+    log_weight_around: float
+
+
+def columns_of(effects: Sequence[Effect], facts: Facts) -> list[Column]:
+    """The grids of all effects, one after the other."""
+    columns = []
+    for effect in effects:
+        grid = effect.grid(facts)
+        if grid:
+            total = float(logsumexp([tried.log_weight for tried in grid]))
+            kinds: dict[Shape, list[float]] = {}
+            for tried in grid:
+                kinds.setdefault(_stiff(effect, tried.shape), []).append(tried.log_weight - total)
+            around = {kind: float(logsumexp(logs)) for kind, logs in kinds.items()}
+            columns += [
+                Column(
+                    effect=effect,
+                    shape=tried.shape,
+                    log_weight=tried.log_weight - total,
+                    log_weight_around=around[_stiff(effect, tried.shape)],
+                )
+                for tried in grid
+            ]
+    return columns
+
+
+def _stiff(effect: Effect, shape: Shape) -> Shape:
+    """The shapes that a refit does not move."""
+    return tuple(value for value, parameter in zip(shape, effect.shapes, strict=True) if not parameter.smooth)
+
+
+def columns_at_rows(design: Design, prediction: Prediction, columns: Sequence[Column]) -> FloatArray:
+    """The changes [N, m] of small amplitudes, per unit, at the rows."""
+    changes = list[tuple[FloatArray, bool]]()
+    for _, alike in groupby(columns, key=lambda column: column.effect.slug):
+        group = list(alike)
+        unit = unit_changes(group[0].effect, prediction.scene, [column.shape for column in group])
+        changes += [(unit[:, i], column.effect.lags(column.shape)) for i, column in enumerate(group)]
+    return change_columns(design, prediction, changes)
+
+
+def change_columns(design: Design, prediction: Prediction, changes: list[tuple[FloatArray, bool]]) -> FloatArray:
+    """Changes at the points, each with whether it comes before the lag -> [N, m] at the rows."""
+    out = np.zeros((design.torque.size, len(changes)))
+    for before in (True, False):
+        chosen = [i for i, (_, flag) in enumerate(changes) if flag is before]
+        if chosen:
+            stacked = np.stack([changes[i][0] for i in chosen], axis=1)
+            out[:, chosen] = prediction.change_at_rows(design, stacked, before_lag=before)
+    return out

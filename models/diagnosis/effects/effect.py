@@ -4,18 +4,30 @@ An effect changes the torque at every point of a scene (`baseline.laws.Scene`: t
 says there) by an amount that is scaled by one *amplitude*, in engineering units, and formed by *shapes* (a change point, a
 time constant, an exponent). Amplitude 0 is no effect. Adding an effect is adding one file in `effects/catalogued/` and its
 name in `catalogue.py`; what other chapters need to know of it are fields of the effect, so its slug stands nowhere else.
+
+The prior of an effect's amplitude: most are small, a few are large.
+
+    p(a) ∝ (1 + a²/(ν s²))^{-(ν + 1)/2}
+
+with s the effect's prior deviation and ν its tails (Student's t; normal where ν is infinite). A normal prior would cost an
+effect of six deviations 18 nats, and an effect that imitates it with a small amplitude would be named instead.
+
+First-order lags along plateaus, and the periods of loops, as several effects need them.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
+from scipy.linalg import solve_banded
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.criteria import USUAL_PRESSURE, USUAL_TORQUE
+from models.diagnosis.design.design import Points
 from models.diagnosis.design.facts import Facts
 
 #: Values of an effect's shape parameters, in the order of `Effect.shapes`.
@@ -53,7 +65,7 @@ class Measure(StrEnum):
 
 
 class Discrepancy(StrEnum):
-    """Along what a template's form is uncertain (`effects.template_discrepancy`); MOTION: in loops against plateaus. How an
+    """Along what a template's form is uncertain (`effects.fitted_effect`); MOTION: in loops against plateaus. How an
     effect depends on pressure is what distinguishes it from others, so no discrepancy over pressure is allowed."""
 
     SPEED = "speed"
@@ -97,13 +109,13 @@ class Effect:
     change(scene, amplitude, shape) -> [P] Nm at the scene's points. before_lag: whether it changes the stationary curve,
     which friction in loops then lags behind, or the measured torque itself; None where that is unknown and the last shape
     says (1 or 0).
-    discrepancies: along what its form is uncertain (`effects.template_discrepancy`); an exact law has none.
+    discrepancies: along what its form is uncertain (`effects.fitted_effect`); an exact law has none.
     courses(facts) gives the shapes between which a size is averaged; None: as it was fitted.
     several(scene, settings) -> [P, m] Nm is the same for many (amplitude, shape) at once, where that is cheaper.
-    tails: degrees of freedom of the amplitude's prior (`effects.amplitude_prior`), infinite for a normal one.
+    tails: degrees of freedom of the amplitude's prior (`effects.effect`), infinite for a normal one.
     counts_in_severity: its amplitude is the exponent by which ζ counts engagements (no torque is added along a life).
     named: whether it may be named as a cause; where not, what it explains is uncatalogued and lies on `axis`
-    (`design.axes`).
+    (`design.design`).
     opposite_physics: a sentence for a negative amplitude, where `physics` holds for a positive one only.
     """
 
@@ -170,3 +182,56 @@ def untried(_facts: Facts) -> tuple[Tried, ...]:
 def unchanged(scene: Scene, _amplitude: float, _shape: Shape) -> FloatArray:
     """No change [P] Nm of what is averaged over a plateau or a loop's bin."""
     return np.zeros_like(scene.curve)
+
+
+#: Deviations of the two normal distributions that approximate p where everything is linear, in s; each has half the weight
+#: (chosen; no table).
+SCALES = (1.0, 6.0)
+
+
+def amplitude_cost(effect: Effect, amplitude: float) -> float:
+    """-ln p(a)/p(0) [nats]."""
+    squared = (amplitude / effect.prior_sd) ** 2
+    if math.isinf(effect.tails):
+        return 0.5 * squared
+    return 0.5 * (effect.tails + 1.0) * math.log1p(squared / effect.tails)
+
+
+def amplitude_precision(effect: Effect, amplitude: float) -> float:
+    """(d cost/da)/a, in 1/unit²: what a normal prior with the same slope at a would have."""
+    if math.isinf(effect.tails):
+        return float(effect.prior_sd**-2.0)
+    return float((effect.tails + 1.0) / (effect.tails * effect.prior_sd**2 + amplitude**2))
+
+
+def log_amplitude_peak(effect: Effect) -> float:
+    """ln(p(0) √(2π)) [nats], with a in its unit."""
+    peak = -math.log(effect.prior_sd)
+    if math.isinf(effect.tails):
+        return peak
+    half = 0.5 * effect.tails
+    return peak + math.lgamma(half + 0.5) - math.lgamma(half) - 0.5 * math.log(half)
+
+
+def ends_of(target: FloatArray, keep: FloatArray) -> FloatArray:
+    """What each plateau ends with [P], x_i = (1 - k_i) target_i + k_i x_{i-1}: plateaus follow each other."""
+    bands = np.stack([np.ones(keep.size), np.append(-keep[1:], 0.0)])
+    return np.asarray(solve_banded((1, 0), bands, (1.0 - keep) * target), dtype=np.float64)
+
+
+def followed(target: FloatArray, points: Points, settling: float) -> FloatArray:
+    """The mean over each plateau [P] of what approaches its target [P] in `settling` s, from what the one before left; loops
+    stay as they are."""
+    follows = np.flatnonzero(points.previous >= 0)  # each follows the point just before it
+    before = points.previous[follows]
+    ratio = np.maximum(points.clock[follows] - points.clock[before], 1e-6) / settling
+    keep = np.zeros(points.previous.size)
+    keep[follows] = np.exp(-ratio)
+    out = target.copy()
+    out[follows] += (ends_of(target, keep)[before] - target[follows]) * (1.0 - keep[follows]) / ratio
+    return out
+
+
+def phases_of(points: Points, looping: np.ndarray[Any, np.dtype[np.intp]]) -> int:
+    """How many points a loop has; `looping` [n] are the indices of loops' points, loop after loop."""
+    return int(np.flatnonzero(np.diff(points.loop[looping], append=-2))[0]) + 1

@@ -12,9 +12,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
-from models.diagnosis.design.axes import CLOCK, CYCLES, PRESSURE, SPEED
+from models.diagnosis.design.design import CLOCK, CYCLES, PRESSURE, SPEED, IntArray
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.design.points import IntArray
 from models.diagnosis.effects.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.friction.stribeck import PARAMETER_NAMES
 

@@ -3,18 +3,43 @@
     torque = baseline + Σ_effects change(amplitude, shape)
 
 The derivatives in the amplitude and in the smooth shapes are central differences: an effect only has to give its change.
+
+Model discrepancy of a template: each effect may differ from its formula by a smooth factor.
+
+    change · (1 + Σ_k b_k φ_k),     b_k ~ N(0, DISCREPANCY_SD²)
+
+with φ_k cosines over the ranges of speed, life or the test's clock, or a contrast of plateaus against loops: those along
+which the effect's form is uncertain (`Effect.discrepancies`). The b_k are integrated out wherever evidence is computed or
+a case is checked. So a template is held to its formula up to a tolerance, and none wins because its form happens to be
+the more flexible one (after Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425).
+
+One way in which a case may be: the effects at work with their sizes, shapes and model discrepancies, and the laws beside.
+
+What adoption takes off measurements and adds to a life is a weighted set of such draws (`diagnosis.extension`), whatever
+made them. Within a draw the correction of all runs of a life is one function: runs are not off independently of each other.
+
+The estimated size of an effect.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import erf, sqrt
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.diagnosis.baseline.laws import Laws, Scene
 from models.diagnosis.baseline.prediction import Prediction
-from models.diagnosis.design.design import Design
-from models.diagnosis.effects import amplitude_prior
-from models.diagnosis.effects.effect import Effect, Shape
+from models.diagnosis.design.design import Design, Points
+from models.diagnosis.effects.effect import (
+    Discrepancy,
+    Effect,
+    Kind,
+    Shape,
+    amplitude_precision,
+)
 
 #: Steps of the differences: shares of the prior deviation and of a shape's range.
 _STEP = 1e-3
@@ -62,7 +87,7 @@ def effect_columns(design: Design, prediction: Prediction, fitted: FittedEffect)
 def effect_precisions(fitted: FittedEffect) -> FloatArray:
     """1/sd² of the priors on (amplitude, smooth shapes) [1 + s]; that of the amplitude where it is."""
     smooth = [0.5 * (shape.highest - shape.lowest) for shape in fitted.effect.shapes if shape.smooth]
-    return np.array([amplitude_prior.precision(fitted.effect, fitted.amplitude), *(width**-2.0 for width in smooth)])
+    return np.array([amplitude_precision(fitted.effect, fitted.amplitude), *(width**-2.0 for width in smooth)])
 
 
 def smooth_places(effect: Effect) -> list[int]:
@@ -77,3 +102,103 @@ def free_shapes(fitted: FittedEffect) -> NDArray[np.bool_]:
         min(value - shape.lowest, shape.highest - value) / (shape.highest - shape.lowest) for value, shape in smooth
     ]
     return np.array([True, *(margin > _AT_BOUND for margin in margins)])
+
+
+#: Along what φ is uncertain: the lowest value and the range in a campaign.
+Ranges: TypeAlias = Mapping[Discrepancy, tuple[float, float]]
+_ORDERS = {Discrepancy.SPEED: (1, 2), Discrepancy.LIFE: (1,), Discrepancy.CLOCK: (1,), Discrepancy.MOTION: (1,)}
+
+
+def ranges_of(rows: Points) -> Ranges:
+    """The ranges over which a campaign's rows vary."""
+    return {along: (float(values.min()), float(np.ptp(values))) for along, values in _along(rows).items()}
+
+
+def factors_at(points: Points, effect: Effect, ranges: Ranges) -> FloatArray:
+    """φ [P, m] at points, each within ±1, along what the effect's form is uncertain in and a campaign varied; beyond its
+    range that at its end."""
+    values, factors = _along(points), list[FloatArray]()
+    for discrepancy in effect.discrepancies:
+        low, width = ranges[discrepancy]
+        if width > 0:
+            unit = np.clip((values[discrepancy] - low) / width, 0.0, 1.0)
+            factors += [np.cos(order * np.pi * unit) for order in _ORDERS[discrepancy]]
+    return np.stack(factors, axis=1) if factors else np.zeros((points.run.size, 0))
+
+
+def _along(points: Points) -> dict[Discrepancy, FloatArray]:
+    return {
+        Discrepancy.SPEED: points.velocity,
+        Discrepancy.LIFE: points.cycles,
+        Discrepancy.CLOCK: points.clock,
+        Discrepancy.MOTION: np.where(points.steady, 1.0, 0.0),
+    }
+
+
+def discrepancy_factors(design: Design, effect: Effect) -> FloatArray:
+    """φ [N, m] at the rows of a campaign."""
+    return factors_at(design.rows, effect, ranges_of(design.rows))
+
+
+def discrepancy_columns(design: Design, prediction: Prediction, fitted: FittedEffect) -> FloatArray:
+    """∂torque/∂b [N, m] Nm of an effect as it is fitted."""
+    return effect_rows(design, prediction, fitted)[:, None] * discrepancy_factors(design, fitted.effect)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnEffect:
+    """An effect at an amplitude and a shape, its change multiplied by 1 + Σ_k b_k φ_k; `factors` are b [m]."""
+
+    effect: Effect
+    amplitude: float
+    shape: Shape
+    factors: tuple[float, ...] = ()
+
+    def change(self, scene: Scene, ranges: Ranges) -> FloatArray:
+        """Change of torque [P] Nm. A course that is followed far enough ends friction; it does not reverse it."""
+        change = self.effect.change(scene, self.amplitude, self.shape)
+        if any(self.factors):
+            change = change * (1.0 + factors_at(scene.points, self.effect, ranges) @ np.array(self.factors))
+        return np.maximum(change, -scene.curve) if self.effect.kind is Kind.COURSE else change
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Draw:
+    """The effects at work (none: nothing is), beside these laws, and the draw's weight > 0."""
+
+    weight: float
+    laws: Laws
+    effects: tuple[DrawnEffect, ...] = ()
+
+
+#: Half the width of a normal's 90 % interval, in deviations.
+HALF_WIDTH = 1.6448536269514722
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """The amplitude of an effect in engineering units: its name, value, standard deviation and unit; `one_sided` where it
+    cannot be negative; its 90 % interval and the probability of its sign where those are not the normal ones."""
+
+    name: str
+    value: float
+    sd: float
+    unit: str
+    one_sided: bool = False
+    stated_interval: tuple[float, float] | None = None
+    stated_sign: float | None = None
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 90 % interval."""
+        half = HALF_WIDTH * self.sd
+        return self.stated_interval or (self.value - half, self.value + half)
+
+    @property
+    def sign_probability(self) -> float | None:
+        """The probability that the sign is that of the value; None where nothing was estimated."""
+        if self.value == 0.0 or not self.sd > 0.0:
+            return None
+        if self.stated_sign is not None:
+            return self.stated_sign
+        return 1.0 if self.one_sided else 0.5 * (1.0 + erf(abs(self.value) / self.sd / sqrt(2.0)))

@@ -25,13 +25,13 @@ from models.diagnosis.effects.fitted_effect import (
     effect_columns,
     effect_precisions,
     effect_rows,
+    factors_at,
     free_shapes,
+    ranges_of,
 )
-from models.diagnosis.effects.template_discrepancy import factors_at, ranges_of
 from models.diagnosis.pooled_fit.gauss_newton import Fit
-from models.diagnosis.pooled_fit.gram import Gram, gram_of
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import project
+from models.diagnosis.pooled_fit.projection import Gram, gram_of, project
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

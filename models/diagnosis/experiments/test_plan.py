@@ -1,4 +1,6 @@
-"""Which test would decide: the trial after which one candidate is most likely left is recommended.
+"""The rivals that a test should decide between: the causes that stand, and those that may come back.
+
+Which test would decide: the trial after which one candidate is most likely left is recommended.
 
 With Δ_ab what a trial adds to λ_ab (`experiments.information`), evidence for a against b would, if a is true, be about
 normal afterwards: its mean what it is now, and Δ, and the change of what the freedom of both is worth; its variance
@@ -22,21 +24,36 @@ from models.diagnosis.criteria import (
     MOST_ADVISED,
     MOST_RIVALS,
     PREDICTION_ERROR,
+    RIVAL_MARGIN,
     SURE,
     WORTHWHILE,
 )
 from models.diagnosis.design.criteria import REFERENCE_TEMPERATURE
 from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.design.facts import facts_of
-from models.diagnosis.effects.catalogued import oil_temperature, torque_zero_shift
 from models.diagnosis.effects.fitted_effect import FittedEffect
-from models.diagnosis.experiments.candidates import TRIALS, runs_of, with_trial
+from models.diagnosis.effects.readings import TORQUE_ZERO_SHIFT
+from models.diagnosis.effects.thermal import AT_ONCE, OIL_TEMPERATURE
+from models.diagnosis.experiments.candidates import TRIALS, Step, runs_of, steps_of, with_trial
 from models.diagnosis.experiments.information import CandidateDistances
-from models.diagnosis.experiments.protocol import Step, steps_of
-from models.diagnosis.explanations.verdict import Fitted
+from models.diagnosis.explanations.verdict import Fitted, Judgement
 from models.diagnosis.pooled_fit.gauss_newton import Fit
-from models.diagnosis.pooled_fit.gram import Gram
 from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.projection import Gram
+
+
+def rivals_of(judgement: Judgement) -> tuple[tuple[Fitted, ...], tuple[Fitted, ...]]:
+    """Those that stand, and those of as many effects that are not far behind, best first."""
+    if not judgement.stand:
+        return (), ()
+    best = judgement.stand[0]
+    nearby = [
+        other
+        for other in judgement.others
+        if len(other.slugs) == len(best.slugs) and other.evidence > best.evidence - RIVAL_MARGIN
+    ]
+    return judgement.stand, tuple(nearby)
+
 
 #: What a cause is compared with where it has no rival.
 BASELINE = "baseline"
@@ -184,16 +201,14 @@ def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[Fit]) -
 
     What that brings is λ of a temperature effect of the usual size, which a shifted zero does not have.
     """
-    shift = torque_zero_shift.EFFECT.slug
+    shift = TORQUE_ZERO_SHIFT.slug
     added = _added(campaign, problem.design, _WARM)
     mistaken = any(effect.effect.slug == shift for fit in fits for effect in fit.effects)
     if problem.design.facts.temperature_measured or not mistaken or added is None:
         return []
     added = replace(added, facts=replace(added.facts, reference_temperature=REFERENCE_TEMPERATURE))
-    effect = oil_temperature.EFFECT
-    usual = replace(
-        fits[0], effects=(FittedEffect(effect=effect, amplitude=effect.prior_sd, shape=(0.0, oil_temperature.AT_ONCE)),)
-    )
+    effect = OIL_TEMPERATURE
+    usual = replace(fits[0], effects=(FittedEffect(effect=effect, amplitude=effect.prior_sd, shape=(0.0, AT_ONCE)),))
     distances = CandidateDistances(problem, (usual, bare(fits[0])))
     nats = float(distances.distances([distances.ahead(added)])[0, 1])
     test = f"{TRIALS[_WARM].text}, and oil temperature recorded from now on"

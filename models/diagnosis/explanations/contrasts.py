@@ -2,7 +2,7 @@
 
 They are relative to the predicted torque (structure in friction scales with it) and are products of cosines over the
 ranges of pressure, speed, clock and torque and over the rank of life, bumps and kinks in speed, waves over a loop's
-phase, and single states; waves over speed go through the loops' lag, as friction does. Axes: `design.axes`.
+phase, and single states; waves over speed go through the loops' lag, as friction does. Axes: `design.design`.
 """
 
 from collections.abc import Callable
@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.prediction import Prediction
-from models.diagnosis.design.axes import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE
-from models.diagnosis.design.design import Design
+from models.diagnosis.design.design import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE, Design
 
 #: Takes the axis and a column [N] relative to the torque.
 Add: TypeAlias = Callable[[str, FloatArray], None]

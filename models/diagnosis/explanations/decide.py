@@ -15,10 +15,11 @@ from itertools import product
 
 from models.diagnosis.criteria import LIKELY, MOST_WORSE, SURE
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
-from models.diagnosis.explanations.alternative import NOTHING, Alternative, axis_of
 from models.diagnosis.explanations.posterior import Posterior
 from models.diagnosis.explanations.verdict import (
+    NOTHING,
     UNCATALOGUED,
+    Alternative,
     Explanation,
     Fitted,
     HeldOut,
@@ -26,6 +27,7 @@ from models.diagnosis.explanations.verdict import (
     Proposal,
     Verdict,
     Where,
+    axis_of,
     probabilities_by_slug,
 )
 

@@ -18,16 +18,14 @@ from scipy.special import erfcx
 from models.arrays import FloatArray
 from models.diagnosis.criteria import CONTRAST_SIZES, TEMPLATE_ERRORS
 from models.diagnosis.design.design import Design
-from models.diagnosis.effects.amplitude_prior import log_peak
-from models.diagnosis.effects.fitted_effect import effect_precisions, effect_rows, free_shapes
-from models.diagnosis.effects.grid import Column, columns_at_rows
-from models.diagnosis.effects.template_discrepancy import discrepancy_factors
+from models.diagnosis.effects.catalogue import Column, columns_at_rows
+from models.diagnosis.effects.effect import log_amplitude_peak
+from models.diagnosis.effects.fitted_effect import discrepancy_factors, effect_precisions, effect_rows, free_shapes
 from models.diagnosis.explanations.contrasts import contrasts_of, no_contrasts
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.pooled_fit.gauss_newton import Fit
-from models.diagnosis.pooled_fit.gram import Gram, gram_of
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import GAINS, Projected, project
+from models.diagnosis.pooled_fit.projection import GAINS, Gram, Projected, gram_of, project
 from models.gaussian_evidence import independent, log_gain, log_gain_alone, log_mean, log_sum
 
 #: Orders of the cosines over speed, pressure, life and clock, and harmonics of a loop, by which any template may be off.
@@ -146,7 +144,7 @@ def _likeliest(projected: Projected, mine: FloatArray) -> FloatArray:
 
 def _log_prior(fitted: Fit) -> float:
     """The normalisation of the priors of the effects' amplitudes and smooth shapes [nats]."""
-    logs = [log_peak(e.effect) + 0.5 * float(np.log(effect_precisions(e)[1:]).sum()) for e in fitted.effects]
+    logs = [log_amplitude_peak(e.effect) + 0.5 * float(np.log(effect_precisions(e)[1:]).sum()) for e in fitted.effects]
     return sum(logs) + float(np.log(2.0)) * sum(e.effect.positive for e in fitted.effects)
 
 

@@ -1,4 +1,11 @@
-"""The posterior over what may be behind a campaign: an exclusive list, each with a log prior and a log evidence.
+"""The linear screen: what every effect promises beside a fit, without refitting anything.
+
+    promise = ln Σ_g Σ_s p(g) p(shape) ∫ p(data | a; g) p(a) da - the same without the effect        [nats]
+
+with the heavy-tailed prior of amplitudes as two normal ones (`amplitude_prior.SCALES`). The shapes that a refit moves are
+summed over; those that it does not (a change point, which torque is meant) are kinds, and each kind is a start of its own.
+
+The posterior over what may be behind a campaign: an exclusive list, each with a log prior and a log evidence.
 
     nothing | e | e + f | u | S_k | e + S_k | e + u | T | a line | an outlying run
 
@@ -15,9 +22,10 @@ false lead. It draws no random numbers.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-from scipy.special import expit
+from scipy.special import expit, log_ndtr
 
 from models.diagnosis.criteria import (
     ANYTHING_WRONG,
@@ -29,24 +37,71 @@ from models.diagnosis.criteria import (
     UNCATALOGUED_SHARE,
     VIBRATION_TRACE,
 )
-from models.diagnosis.effects.catalogue import BY_SLUG, effects_for
-from models.diagnosis.effects.catalogued import oil_temperature
-from models.diagnosis.effects.effect import Kind, Shape
+from models.diagnosis.effects.catalogue import BY_SLUG, Column, columns_at_rows, columns_of, effects_for
+from models.diagnosis.effects.effect import SCALES, Kind, Shape
 from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
 from models.diagnosis.effects.fitted_effect import FittedEffect, effect_rows
-from models.diagnosis.effects.grid import Column, columns_at_rows, columns_of
-from models.diagnosis.explanations.alternative import LINE, LINES, NOTHING, OUTLIER, Alternative, is_axis
+from models.diagnosis.effects.thermal import OIL_TEMPERATURE
 from models.diagnosis.explanations.evidence import Evidence, evidence_of
-from models.diagnosis.explanations.lines import lines
-from models.diagnosis.explanations.outlying_run import outlier_evidence
-from models.diagnosis.explanations.refit import refit, refit_beside
-from models.diagnosis.explanations.screen import Start, starts, stiff
-from models.diagnosis.explanations.unmeasured_temperature import temperature_evidence
+from models.diagnosis.explanations.shapeless import lines, outlier_evidence, temperature_evidence
+from models.diagnosis.explanations.verdict import LINE, LINES, NOTHING, OUTLIER, Alternative, is_axis
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
-from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, refit, refit_beside
 from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.projection import Projected
 from models.diagnosis.raw_records.evidence import RawEvidence
 from models.gaussian_evidence import log_sum
+
+
+class Start(NamedTuple):
+    """A kind of an effect's shapes: what it promises [nats, its prior included], its best column, the place of the scatter
+    of the gains that suits that, and the linear fit of it."""
+
+    promise: float
+    column: Column
+    gain: int
+    fitted: FittedEffect
+
+
+def stiff(shape: Shape, column: Column) -> Shape:
+    """The shapes that a refit does not move."""
+    return tuple(x for x, parameter in zip(shape, column.effect.shapes, strict=True) if not parameter.smooth)
+
+
+def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str, list[Start]]:
+    """By effect its kinds of shapes, best first."""
+    if not columns:
+        return {}
+    sd = np.array([column.effect.prior_sd for column in columns])
+    positive = np.array([column.effect.positive for column in columns], dtype=np.bool_)
+    weight = np.array([column.log_weight for column in columns])
+    null = log_sum([projected.evidence for projected in screened])
+    by_gain = []
+    for projected in screened:
+        info, score = np.maximum(np.diag(projected.info), 0.0), projected.score
+        wide = np.outer(SCALES, sd)
+        precision = info + wide**-2
+        mean = score / precision
+        gain = 0.5 * score * mean - 0.5 * np.log(precision * wide**2)
+        gain = gain + np.where(positive, np.log(2.0) + log_ndtr(mean * np.sqrt(precision)), 0.0)
+        by_gain.append(projected.evidence + np.logaddexp.reduce(gain, axis=0) - np.log(len(SCALES)) + weight)
+    table = np.stack(by_gain)
+    total = np.logaddexp.reduce(table, axis=0)
+    kinds: dict[tuple[str, Shape], list[int]] = {}
+    for place, column in enumerate(columns):
+        kinds.setdefault((column.effect.slug, stiff(column.shape, column)), []).append(place)
+    by_effect: dict[str, list[Start]] = {}
+    for (slug, _), mine in kinds.items():
+        best = mine[int(np.argmax(total[mine]))]
+        gain = int(np.argmax(table[:, best]))
+        precision = screened[gain].info[best, best] + (SCALES[-1] * sd[best]) ** -2.0
+        amplitude = float(screened[gain].score[best] / precision)
+        column = columns[best]
+        fitted = FittedEffect(effect=column.effect, amplitude=amplitude, shape=column.shape)
+        promise = log_sum(total[mine]) - null
+        by_effect.setdefault(slug, []).append(Start(promise, column, gain, fitted))
+    return {slug: sorted(by_kind, key=lambda start: -start.promise) for slug, by_kind in by_effect.items()}
+
 
 #: What kinds of shapes that were not refitted may add to those that were at most [nats] (numerical: a bound on an estimate).
 _MOST_OTHER_KINDS = 2.0
@@ -349,8 +404,8 @@ class Search:
         outlier = Alternative((), OUTLIER)
         weights[outlier] = outlier_evidence(self.problem, null.fit) + self.prior(outlier)
         facts = self.problem.design.facts
-        if not facts.temperature_measured and oil_temperature.EFFECT.slug not in without:
-            warm = Alternative((oil_temperature.EFFECT.slug,))
+        if not facts.temperature_measured and OIL_TEMPERATURE.slug not in without:
+            warm = Alternative((OIL_TEMPERATURE.slug,))
             weights[warm] = null.log_evidence + temperature_evidence(self.problem, null.fit) + self.prior(warm)
         single = self.prior(Alternative(("",)))
         swings = {record.effect: record.log_evidence for record in raw if is_vibration(record)}

@@ -19,16 +19,21 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.criteria import COURSE_NEGLIGIBLE, COURSE_STEPS, DRAWS, SIZE_TAILS, SIZES_SAMPLED
-from models.diagnosis.effects.draw import Draw, DrawnEffect
 from models.diagnosis.effects.effect import Effect, Tried
-from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns, effect_rows, smooth_places
-from models.diagnosis.effects.template_discrepancy import discrepancy_factors
+from models.diagnosis.effects.fitted_effect import (
+    Draw,
+    DrawnEffect,
+    FittedEffect,
+    discrepancy_factors,
+    effect_columns,
+    effect_rows,
+    smooth_places,
+)
 from models.diagnosis.explanations.evidence import evidence_of
 from models.diagnosis.explanations.verdict import Judgement
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
-from models.diagnosis.pooled_fit.gram import gram_of
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import projections_of
+from models.diagnosis.pooled_fit.projection import gram_of, projections_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

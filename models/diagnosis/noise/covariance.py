@@ -14,8 +14,7 @@ from scipy.sparse import csr_array
 
 from models.arrays import FloatArray
 from models.diagnosis.design.autocorrelation import Correlation, arma
-from models.diagnosis.design.design import Design
-from models.diagnosis.design.points import IntArray
+from models.diagnosis.design.design import Design, IntArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

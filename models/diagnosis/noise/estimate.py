@@ -1,4 +1,14 @@
-"""Sensor noise estimated within the data, from the residual once everything smooth along a curve is taken off.
+"""Curves and loops freed of everything smooth: contrasts of their rows that low polynomials (low harmonics) do not reach.
+
+What the model gets wrong is smooth along a curve; the contrasts do not see it, so it is not mistaken for noise.
+
+Autocorrelation of neighbouring rows by restricted maximum likelihood, averaged over a grid of w ρ^{|i - j|}.
+
+With A the contrasts of a piece (free of anything smooth) and R(w, ρ) the correlation of its rows,
+
+    log L(w, ρ) = -½ (m ln s² + Σ_pieces ln |Aᵀ R A|),     s² = Σ xᵀ (Aᵀ R A)⁻¹ x/m,    x = Aᵀ residual,   m values in all
+
+Sensor noise estimated within the data, from the residual once everything smooth along a curve is taken off.
 
 The remainder of a curve (a loop) beyond low polynomials (low harmonics) gives, by restricted maximum likelihood, a variance
 
@@ -9,19 +19,157 @@ and the data show it as well. How far repeated runs scatter is estimated with th
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from models.arrays import FloatArray
+from models.diagnosis.criteria import (
+    ASSUMED,
+    CORRELATION_PRICE,
+    CORRELATION_PRICE_FROM_SAMPLES,
+    FEWEST,
+    FIRST_GAIN,
+    INFLATION_PRICE,
+    LEAST_COMPARED_BINS,
+    MOST_KINDS,
+    MOST_SPIKES,
+    SMOOTH_DEGREE,
+    SMOOTH_HARMONICS,
+    SPIKE,
+)
 from models.diagnosis.design.autocorrelation import Correlation
-from models.diagnosis.design.design import Design
+from models.diagnosis.design.design import Design, IntArray
 from models.diagnosis.noise.covariance import Noise
-from models.diagnosis.noise.criteria import ASSUMED, FEWEST, LEAST_COMPARED_BINS, MOST_SPIKES, SPIKE, USUAL_GAIN
-from models.diagnosis.noise.row_correlation import estimate_correlation
-from models.diagnosis.noise.smooth_free import Piece, owners, pieces_of
+
+#: Longer curves are cut, for the basis of a piece costs its length cubed.
+_LONGEST = 120
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Piece:
+    """Rows [n] of one curve or loop, and the contrasts [n, k], orthonormal, that are free of anything smooth. Pieces of one
+    length (loops: of the same phases) share one array of contrasts."""
+
+    rows: IntArray
+    contrasts: FloatArray
+
+    def remainder(self, residual: FloatArray) -> FloatArray:
+        """What is left [n] Nm of residual [N] Nm on the piece's rows without its smooth part."""
+        return np.asarray(self.contrasts @ (self.contrasts.T @ residual[self.rows]), dtype=np.float64)
+
+
+def owners(design: Design) -> IntArray:
+    """The number [N] of each row's curve or loop."""
+    loops = design.curve.max(initial=0) + 1 + design.rows.loop
+    return np.asarray(np.where(design.rows.steady, design.curve, loops), dtype=np.intp)
+
+
+def pieces_of(design: Design, part: NDArray[np.bool_]) -> list[Piece]:
+    """Curves and loops among the rows of `part` [N] that have rows enough, long ones cut."""
+    owner = owners(design)
+    pieces = []
+    indices = np.flatnonzero(part)
+    order = indices[np.argsort(owner[indices], kind="stable")]
+    edges = np.flatnonzero(np.diff(owner[order])) + 1
+    cache: dict[bytes, FloatArray] = {}
+    for rows in np.split(order, edges) if order.size else []:
+        for piece in np.array_split(rows, max(1, -(-rows.size // _LONGEST))):
+            looping = bool(piece[0] >= design.plateaus)
+            smooth_terms = 2 * SMOOTH_HARMONICS + 1 if looping else SMOOTH_DEGREE + 1
+            if piece.size < smooth_terms + 3:
+                continue
+            phase = design.rows.phase[piece]
+            key = phase.tobytes()  # all zeros for plateaus: their number alone counts
+            if key not in cache:
+                cache[key] = _contrasts(_harmonics(phase) if looping else _polynomials(piece.size))
+            pieces.append(Piece(rows=piece, contrasts=cache[key]))
+    return pieces
+
+
+def _polynomials(count: int) -> FloatArray:
+    return np.asarray(legvander(np.linspace(-1.0, 1.0, count), SMOOTH_DEGREE), dtype=np.float64)
+
+
+def _harmonics(phase: FloatArray) -> FloatArray:
+    angles = np.arange(1, SMOOTH_HARMONICS + 1) * phase[:, None]
+    return np.column_stack([np.ones_like(phase), np.cos(angles), np.sin(angles)])
+
+
+def _contrasts(smooth: FloatArray) -> FloatArray:
+    """An orthonormal basis [n, n - k] of what is orthogonal to smooth [n, k]."""
+    return np.linalg.qr(smooth, mode="complete")[0][:, smooth.shape[1] :]
+
+
+#: The grid of ρ and of w.
+_DECAYS = (0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
+_SHARES = (0.15, 0.3, 0.5, 0.75, 1.0)
+
+
+def estimate_correlation(
+    pieces: Sequence[Piece],
+    residual: FloatArray,
+    deviation: FloatArray,
+    from_samples: tuple[float, float] | None,
+    period_differences: Sequence[FloatArray],
+) -> tuple[Correlation, float]:
+    """(w, ρ) of residual [N] Nm with deviation [N] Nm, and the factor by which the deviations are off.
+
+    w ρ and w ρ², the correlations of the first and second neighbour, are averaged over the grid: a likelihood that is flat
+    along a ridge must not choose its end. Where samples show both (`from_samples`), these are used unless bins contradict.
+    `period_differences` [n] each are further series of neighbouring bins, in deviations, free of the loop as they are.
+    """
+    groups: dict[int, tuple[FloatArray, list[FloatArray]]] = {}
+    for piece in pieces:
+        relative = piece.remainder(residual) / deviation[piece.rows]
+        groups.setdefault(id(piece.contrasts), (piece.contrasts, []))[1].append(np.clip(relative, -SPIKE, SPIKE))
+    grid = [Correlation(), *(Correlation(share=share, decay=decay) for share in _SHARES for decay in _DECAYS)]
+    expected, price = Correlation(), CORRELATION_PRICE
+    if from_samples is not None:
+        expected, price = Correlation.of_neighbours(*from_samples), CORRELATION_PRICE_FROM_SAMPLES
+        grid = [expected, *grid]
+    if (
+        len(groups) > MOST_KINDS
+    ):  # loops whose bins all differ: each would have a likelihood of its own to be factorised
+        grid = grid[:1]
+    unit = {size: np.eye(size) for size in {series.size for series in period_differences}}
+    for series in period_differences:
+        contrasts = unit[series.size]
+        groups.setdefault(id(contrasts), (contrasts, []))[1].append(np.clip(series, -SPIKE, SPIKE))
+    logs, variances = [], []
+    for number, correlation in enumerate(grid):
+        likelihood, variance = _restricted_likelihood(correlation, groups)
+        off = abs(float(np.log(correlation.variance_inflation / expected.variance_inflation)))
+        logs.append(likelihood - (0.0 if number == 0 else price) - INFLATION_PRICE * off)
+        variances.append(variance)
+    weights = np.exp(np.array(logs) - max(logs))
+    weights /= weights.sum()
+    decays = np.array([correlation.decay for correlation in grid])
+    neighbours = np.array([correlation.share for correlation in grid]) * decays
+    scale = float(np.sqrt(weights @ np.array(variances)))
+    return Correlation.of_neighbours(float(weights @ neighbours), float(weights @ (neighbours * decays))), scale
+
+
+def _restricted_likelihood(
+    correlation: Correlation, groups: dict[int, tuple[FloatArray, list[FloatArray]]]
+) -> tuple[float, float]:
+    """log L [nats] of a correlation at the variance s² that suits it best, and that variance."""
+    squares, logdet, free = 0.0, 0.0, 0
+    for contrasts, series in groups.values():
+        distance = np.abs(np.subtract.outer(np.arange(contrasts.shape[0]), np.arange(contrasts.shape[0])))
+        matrix = correlation.share * correlation.decay**distance
+        np.fill_diagonal(matrix, 1.0)
+        factor = np.linalg.cholesky(contrasts.T @ matrix @ contrasts)
+        white = np.linalg.solve(factor, contrasts.T @ np.stack(series, axis=1))
+        squares += float((white**2).sum())
+        logdet += len(series) * 2 * float(np.log(np.diag(factor)).sum())
+        free += white.size
+    variance = squares / free
+    return -0.5 * (free * np.log(variance) + logdet), variance
+
 
 #: The median of a squared standard normal variable.
 _MEDIAN_SQUARE = 0.455
@@ -36,7 +184,7 @@ def first_noise(design: Design) -> Noise:
         np.minimum(design.samples, 30)
     )
     white = Correlation()
-    return Noise(deviation=deviation, plateaus=white, loops=white, run_gain=USUAL_GAIN, curve_gain=0.0)
+    return Noise(deviation=deviation, plateaus=white, loops=white, run_gain=FIRST_GAIN, curve_gain=0.0)
 
 
 def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, before: Noise) -> tuple[Noise, bool]:

@@ -1,36 +1,126 @@
-"""What is visible of a change of torque once the baseline, the noise and the gains have absorbed their part.
+"""The Gram matrix of a fit: the baseline's sensitivities J, changes of torque g and the residual r, whitened, in one matrix.
 
-All columns (the baseline's sensitivities J, the changes g, the residual r) are in one Gram matrix (`pooled_fit.gram`). For
+For any scatter of the gains, σ_g of the runs and σ_c of the curves, the matrix follows by small corrections (Woodbury), so
+the rows are whitened once.
+
+What is visible of a change of torque once the baseline, the noise and the gains have absorbed their part.
+
+All columns (the baseline's sensitivities J, the changes g, the residual r) are in one Gram matrix (`pooled_fit.projection`). For
 any scatter of the gains, projecting J off is one solve:
 
     info = Gᵀ V⁻¹ (1 - P) G,     score = Gᵀ V⁻¹ (1 - P) r
 
 z = score/√info is standard normal where there is no effect; ½ info a² is λ, the expected log-likelihood ratio [nats] of
 an effect of amplitude a.
+
+The scatter of gains from run to run, estimated from all that a fit leaves, with its uncertainty.
+
+    p(ln σ_g) ∝ p(residual | σ_g) p_0(ln σ_g)
+
+The marginal likelihood is that of `pooled_fit.projection` (what is fitted is integrated out, so gains that the laws over
+life absorb are no evidence of a small scatter), summed over the curves' scatter; p_0 is the prior of `criteria`. What the
+data say beyond it is measured in nats,
+
+    I = Σ p ln(p/p_0),
+
+and where that is less than LEAST_SCATTER_INFORMATION the estimate is the prior, and said to be.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.special import logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis.criteria import (
     CURVE_GAINS,
+    DISCREPANCY_SD,
     GAIN_SD_ABOVE,
     GAIN_SD_BELOW,
     LEAST_CURVE_GAIN_EVIDENCE,
     LEAST_GAIN,
+    LEAST_SCATTER_INFORMATION,
     MORE_CURVE_GAIN,
     MOST_GAIN,
     SMALL_CURVE_GAIN,
     USUAL_GAIN,
 )
-from models.diagnosis.effects.template_discrepancy import discrepancy_factors
-from models.diagnosis.noise.covariance import Noise
+from models.diagnosis.design.design import IntArray
+from models.diagnosis.effects.effect import amplitude_cost
+from models.diagnosis.effects.fitted_effect import (
+    discrepancy_columns,
+    discrepancy_factors,
+    effect_columns,
+    effect_precisions,
+)
+from models.diagnosis.noise.covariance import Noise, by_curve, gains_of, whitened
 from models.diagnosis.pooled_fit.gauss_newton import Fit
-from models.diagnosis.pooled_fit.gram import Gram, gram_of
 from models.diagnosis.pooled_fit.problem import FitProblem
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gram:
+    """matrix [m, m] without gains, directions q [c, m] of the curves, squares [c], run_of_curve [c]; the first `base`
+    columns are the baseline's, the last is the residual."""
+
+    matrix: FloatArray
+    along: FloatArray
+    squares: FloatArray
+    run_of_curve: IntArray
+    base: int
+
+    def with_gains(self, run_gain: float, curve_gain: float) -> tuple[FloatArray, float]:
+        """The matrix with gains that scatter so, and the log determinant of what they add [nats, twice]."""
+        freed = 1 / (1 + curve_gain**2 * self.squares)  # of each curve's direction, what its own gain leaves
+        member = np.zeros((int(self.run_of_curve.max()) + 1, self.run_of_curve.size))
+        member[self.run_of_curve, np.arange(self.run_of_curve.size)] = freed
+        along, squares = member @ self.along, member @ self.squares
+        weight = run_gain**2 / (1 + run_gain**2 * squares)
+        matrix = self.matrix - along.T @ (weight[:, None] * along)
+        if curve_gain > 0.0:
+            matrix -= self.along.T @ ((curve_gain**2 * freed)[:, None] * self.along)
+        return matrix, float(np.log1p(run_gain**2 * squares).sum() - np.log(freed).sum())
+
+
+def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None, *, held: bool = True) -> Gram:
+    """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows, none if None.
+
+    `held`: whether the priors of the effects' amplitudes are included; they are not where the residual is examined, for a
+    residual must not contain what only a prior prevented from being fitted.
+    """
+    design, noise, priors = problem.design, problem.noise, problem.priors
+    changes = np.zeros((design.torque.size, 0)) if changes is None else changes
+    own = [effect_columns(design, fit.prediction, effect) for effect in fit.effects]
+    discrepancy = [discrepancy_columns(design, fit.prediction, effect) for effect in fit.effects]
+    jacobian = np.concatenate([fit.prediction.jacobian(design)[:, priors.free], *own, *discrepancy], axis=1)
+    white = whitened(np.column_stack([jacobian, changes, fit.residual]), design, noise)
+    gains = gains_of(design, fit.torque, noise)
+    matrix = white.T @ white
+    free, base = int(priors.free.sum()), jacobian.shape[1]
+    rows = priors.rows[:, priors.free]
+    off = priors.means - priors.rows @ fit.laws.theta
+    matrix[:free, :free] += rows.T @ rows
+    matrix[:free, -1] += rows.T @ off
+    matrix[-1, :free] += rows.T @ off
+    matrix[-1, -1] += float(off @ off)
+    at = free
+    for effect, columns in zip(fit.effects, own, strict=True):
+        precisions = effect_precisions(effect)
+        precisions[0] *= float(held)
+        diagonal = np.arange(at, at + columns.shape[1])
+        matrix[diagonal, diagonal] += precisions
+        matrix[at, -1] -= precisions[0] * effect.amplitude
+        matrix[-1, at] -= precisions[0] * effect.amplitude
+        matrix[-1, -1] += 2.0 * float(held) * amplitude_cost(effect.effect, effect.amplitude)
+        at += columns.shape[1]
+    diagonal = np.arange(at, base)
+    matrix[diagonal, diagonal] += DISCREPANCY_SD**-2.0
+    return Gram(
+        matrix=matrix, along=by_curve(white, gains), squares=gains.squares, run_of_curve=gains.run_of_curve, base=base
+    )
+
 
 #: Scatters of the runs' gains [g] that are considered [-].
 GAINS: FloatArray = np.geomspace(LEAST_GAIN, MOST_GAIN, 13)
@@ -122,3 +212,56 @@ def amplitude_deviations(problem: FitProblem, fitted: Fit) -> list[float]:
     discrepancies = sum(discrepancy_factors(problem.design, effect.effect).shape[1] for effect in fitted.effects)
     places = gram.base - discrepancies - sum(sizes) + np.concatenate([[0], np.cumsum(sizes)])[: len(sizes)].astype(int)
     return [float(np.sqrt(max(inverse[place, place], 0.0))) for place in places]
+
+
+#: Points of the grid over ln σ_g (numerical: the spline is smooth between the gains that were projected).
+_POINTS = 601
+_LEVELS = (0.05, 0.5, 0.95)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunScatter:
+    """Relative scatter of the runs' gains [-]: median, 90 % interval, and what data say of it beyond the prior [nats]."""
+
+    median: float
+    lower: float
+    upper: float
+    information: float
+
+    @property
+    def assumed(self) -> bool:
+        """Whether it is the prior, for the data hardly say more."""
+        return self.information < LEAST_SCATTER_INFORMATION
+
+
+def run_scatter(projections: Sequence[Projected]) -> RunScatter:
+    """The estimate from projections at every scatter that is considered (`projections_of`)."""
+    gains = np.unique([projected.run_gain for projected in projections])
+    by_gain = [
+        float(logsumexp([projected.evidence for projected in projections if projected.run_gain == gain]))
+        for gain in gains
+    ]
+    logs = np.linspace(np.log(gains[0]), np.log(gains[-1]), _POINTS)
+    posterior = _normalised(CubicSpline(np.log(gains), by_gain)(logs))
+    prior = _normalised(np.array([log_gain_prior(gain) for gain in np.exp(logs).tolist()]))
+    lower, median, upper = np.exp(np.interp(_LEVELS, np.cumsum(np.exp(posterior)), logs)).tolist()
+    information = float(np.exp(posterior) @ (posterior - prior))
+    return RunScatter(median=median, lower=lower, upper=upper, information=information)
+
+
+def _normalised(logs: FloatArray) -> FloatArray:
+    return np.asarray(logs - logsumexp(logs), dtype=np.float64)
+
+
+def without_likely_gains(problem: FitProblem, fitted: Fit) -> FloatArray:
+    """The residual [N] Nm less what the likeliest gains of runs and curves make of it: r - M ĝ with the best linear
+    prediction ĝ = σ_g² Mᵀ V⁻¹ r / (1 + σ_g² Mᵀ V⁻¹ M)."""
+    design, noise = problem.design, problem.noise
+    gains = gains_of(design, fitted.torque, noise)
+    white = whitened(fitted.residual[:, None], design, noise)
+    along = by_curve(white, gains)[:, 0]
+    freed = 1 / (1 + noise.curve_gain**2 * gains.squares)
+    squares, sums = gains.by_run(freed * gains.squares), gains.by_run(freed * along)
+    of_run = (noise.run_gain**2 * sums / (1 + noise.run_gain**2 * squares))[gains.run_of_curve]
+    of_curve = noise.curve_gain**2 * freed * (along - gains.squares * of_run)
+    return np.asarray(fitted.residual - fitted.torque * (of_run + of_curve)[gains.curve], dtype=np.float64)

@@ -1,4 +1,7 @@
-"""Numbers that decide what raw records show. All are chosen, and no command prints the alternatives: no table."""
+"""Numbers that decide what raw records show. All are chosen, and no command prints the alternatives: no table.
+
+Limits of what is analysed of raw records. Chosen for time; no table.
+"""
 
 import numpy as np
 
@@ -145,3 +148,10 @@ SPEED_SHARE = 0.01
 SPEED_DISTANCE = 0.2
 #: Samples that a dwell needs.
 FEWEST_DWELL_SAMPLES = 20
+
+
+#: Records analysed, taken evenly over life: at least so many, more where they hold fewer than so many samples in all.
+FEW_RECORDS = 8
+MANY_SAMPLES = 300_000
+#: Windows in which a fixed frequency is looked for, at most, taken evenly.
+MOST_WINDOWS = 400

@@ -19,18 +19,20 @@ from typing import TypeVar
 import numpy as np
 
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
-from models.diagnosis.effects.catalogued import shaft_ripple, stick_slip, unsettled_dwell
-from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.effects.moving import SHAFT_RIPPLE, STICK_SLIP
+from models.diagnosis.effects.readings import UNSETTLED_DWELL
 from models.diagnosis.raw_records.criteria import (
     FASTER_SHAFT,
+    FEW_RECORDS,
     LEAST_EVIDENCE,
+    MANY_SAMPLES,
     SAME_LINE,
 )
 from models.diagnosis.raw_records.fixed_frequency import best_line, best_slow_line
-from models.diagnosis.raw_records.limits import FEW_RECORDS, MANY_SAMPLES
-from models.diagnosis.raw_records.line import Line
 from models.diagnosis.raw_records.settling_transient import settling_evidence
 from models.diagnosis.raw_records.shaft_orders import best_order
+from models.diagnosis.raw_records.swing import Line
 from models.diagnosis.raw_records.whitened_torque import WhitenedRecord, whitened_record
 from models.records.cleaning import UnusableRecordError
 from models.records.plateaus import PlateauCut, cut_plateaus
@@ -90,11 +92,11 @@ def _lines(records: list[WhitenedRecord]) -> list[RawEvidence]:
     lines = []
     if order.evidence > LEAST_EVIDENCE and order.amplitude > 0:
         note = f"torque swings {order.position:g} times a revolution at every speed"
-        lines.append(_line_evidence(shaft_ripple.EFFECT.slug, order, "ripple amplitude", note))
+        lines.append(_line_evidence(SHAFT_RIPPLE.slug, order, "ripple amplitude", note))
     if line.evidence > LEAST_EVIDENCE and line.amplitude > 0:
         low = f"below {100 * line.speed_share:.0f} % of the highest speed and not above"
         note = f"torque swings at {line.position:.3g} Hz {low if slow else 'at all speeds alike'}"
-        lines.append(_line_evidence(stick_slip.EFFECT.slug if slow else FIXED_LINE, line, "line amplitude", note))
+        lines.append(_line_evidence(STICK_SLIP.slug if slow else FIXED_LINE, line, "line amplitude", note))
     return lines
 
 
@@ -125,6 +127,4 @@ def _unsettled(dwells: list[tuple[Record, PlateauCut]]) -> list[RawEvidence]:
     seconds = f"{settling.time_constant:.2g} s"
     note = f"after each step torque settles from the side of the last level, with a time constant of {seconds}"
     estimate = Estimate(name="settling time constant", value=settling.time_constant, sd=settling.deviation, unit="s")
-    return [
-        RawEvidence(effect=unsettled_dwell.EFFECT.slug, log_evidence=settling.evidence, estimate=estimate, note=note)
-    ]
+    return [RawEvidence(effect=UNSETTLED_DWELL.slug, log_evidence=settling.evidence, estimate=estimate, note=note)]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from models.arrays import FloatArray
-from models.diagnosis.design.points import IntArray
+from models.diagnosis.design.design import IntArray
 from models.diagnosis.raw_records.criteria import (
     ABOVE_ORDER,
     AMPLITUDE_WEIGHTS,
@@ -27,13 +27,13 @@ from models.diagnosis.raw_records.criteria import (
     PAIRED_PROBABILITY,
     STRETCH,
 )
-from models.diagnosis.raw_records.incoherent import (
+from models.diagnosis.raw_records.swing import (
+    Line,
     amplitude,
     log_likelihood_ratios,
     noise_level,
     trial_amplitudes,
 )
-from models.diagnosis.raw_records.line import Line
 from models.diagnosis.raw_records.whitened_torque import WhitenedRecord
 
 #: Laws of the size: with the load (the torque's root, between independent of it and proportional), or with the speed.

@@ -1,30 +1,164 @@
-"""The report of a campaign, put together from what its chapters found."""
+"""The candidates of a report: each effect that competed, with its probability, evidence and estimated amplitude.
 
-from collections.abc import Sequence
+The extension that a judgement proposes for adoption, and why none is.
 
-from models.diagnosis.criteria import NEGLIGIBLE
+Numbers of the computation in a report, by public name.
+
+The report of a campaign, put together from what its chapters found.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from models.diagnosis.criteria import LEAST_LISTED, NEGLIGIBLE, SIGN_UNDETERMINED
 from models.diagnosis.design.design import Design
+from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.effect import sized
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
+from models.diagnosis.effects.fitted_effect import Estimate, ranges_of
 from models.diagnosis.experiments.test_plan import Advice
-from models.diagnosis.explanations.alternative import NOTHING
-from models.diagnosis.explanations.outlying_run import outlying_run
 from models.diagnosis.explanations.posterior import Posterior
-from models.diagnosis.explanations.sizes import Sizes
-from models.diagnosis.explanations.verdict import Judgement, Verdict
+from models.diagnosis.explanations.shapeless import outlying_run
+from models.diagnosis.explanations.sizes import Size, Sizes
+from models.diagnosis.explanations.verdict import NOTHING, Explanation, Judgement, Proposal, Verdict
+from models.diagnosis.extension import Extension, build_extension
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
 from models.diagnosis.pooled_fit.gauss_newton import FitStatus
-from models.diagnosis.pooled_fit.run_scatter import run_scatter
+from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.projection import RunScatter, amplitude_deviations, run_scatter
 from models.diagnosis.raw_records.evidence import RawEvidence
-from models.diagnosis.report.candidates import candidates_of, with_signs
-from models.diagnosis.report.lack_of_fit import misfit_of
+from models.diagnosis.report.isolability import unseen_of, visible_of
 from models.diagnosis.report.maps import loop_traces, residual_maps
-from models.diagnosis.report.proposed_extension import proposed_extension, reason_against
-from models.diagnosis.report.report import Report
-from models.diagnosis.report.statistics import statistics_of
-from models.diagnosis.report.summary import Findings, summarise
-from models.diagnosis.report.visible import unseen_of, visible_of
-from models.diagnosis.report.wording import effect_name
+from models.diagnosis.report.report import Candidate, Report, misfit_of
+from models.diagnosis.report.summary import Findings, effect_name, number, summarise
 from models.diagnosis.validation.extended_model import Validation
+from models.diagnosis.validation.held_out import Gain
+
+
+def candidates_of(
+    problem: FitProblem, judgement: Judgement, raw: Sequence[RawEvidence], sizes: Mapping[str, Size]
+) -> tuple[Candidate, ...]:
+    """Each effect as the verdict has it, else alone, else beside the one that it goes with best."""
+    records = {record.effect: record for record in raw}
+    alone = [fitted for fitted in judgement.others if len(fitted.slugs) == 1]
+    candidates = []
+    for slug, probability in judgement.probabilities.items():
+        if probability < LEAST_LISTED and slug not in judgement.causes:
+            continue
+        fitted = next((f for f in (*judgement.stand, *alone, *judgement.others) if slug in f.slugs), None)
+        evidence = judgement.evidence.get(slug, 0.0)
+        if fitted is not None:
+            place = fitted.slugs.index(slug)
+            estimate = _estimate(
+                slug, fitted.fit.effects[place].amplitude, amplitude_deviations(problem, fitted.fit)[place]
+            )
+            if slug in sizes:
+                estimate = _sized(slug, sizes[slug])
+            evidence = fitted.evidence
+        elif slug in records:
+            estimate, evidence = _finite_estimate(records[slug].estimate), records[slug].log_evidence
+        else:  # screened only, or an oil temperature that was not measured
+            estimate = _estimate(slug, 0.0, sized(BY_SLUG[slug], problem.design.facts).prior_sd)
+        candidates.append(
+            Candidate(
+                effect=slug,
+                title=BY_SLUG[slug].title,
+                probability=probability,
+                log_evidence_gain=_finite(evidence),
+                estimate=estimate,
+                beside=() if fitted is None else tuple(other for other in fitted.slugs if other != slug),
+                fit=None if fitted is None else fitted.fit.status,
+            )
+        )
+    return tuple(candidates)
+
+
+def _estimate(slug: str, amplitude: float, deviation: float) -> Estimate:
+    effect = BY_SLUG[slug]
+    return Estimate(
+        name=effect.amplitude,
+        value=_finite(amplitude * effect.scale),
+        sd=_finite(deviation * effect.scale),
+        unit=effect.unit,
+        one_sided=effect.positive,
+    )
+
+
+def _sized(slug: str, size: Size) -> Estimate:
+    scale = BY_SLUG[slug].scale
+    low, high = (_finite(scale * end) for end in size.interval)
+    return replace(_estimate(slug, size.value, size.sd), stated_interval=(low, high), stated_sign=1.0 - size.other_sign)
+
+
+def _finite_estimate(estimate: Estimate) -> Estimate:
+    return Estimate(name=estimate.name, value=_finite(estimate.value), sd=_finite(estimate.sd), unit=estimate.unit)
+
+
+def with_signs(explanations: Iterable[Explanation], candidates: Iterable[Candidate]) -> tuple[Explanation, ...]:
+    """Explanations with the probability that the least certain of their effects' signs is right."""
+    signs = {candidate.effect: candidate.estimate.sign_probability for candidate in candidates}
+    return tuple(
+        replace(
+            explanation,
+            sign_probability=min(
+                (sign for slug in explanation.effects if (sign := signs.get(slug)) is not None), default=None
+            ),
+        )
+        for explanation in explanations
+    )
+
+
+def _finite(value: float) -> float:
+    return float(np.clip(value, -1e300, 1e300))
+
+
+def proposed_extension(problem: FitProblem, judgement: Judgement, sizes: Sizes, reason: str) -> Extension | None:
+    """The draws of the causes; None where nothing was fitted, or there is a reason against it."""
+    if reason or judgement.proposal is not Proposal.PROPOSED or not any(draw.effects for draw in sizes.draws):
+        return None
+    design = problem.design
+    return build_extension(sizes.draws, design.facts, ranges_of(design.rows), courses=judgement.follow_courses)
+
+
+def reason_against(proposal: Proposal, gain: Gain | None, sizes: Sizes) -> str:
+    """Why an extension is not proposed, or nothing where one is or none was fitted."""
+    if proposal is Proposal.WITHHELD_ERROR:
+        return "The extension is not proposed: its error on held-out runs is larger than the baseline's."
+    if proposal is Proposal.WITHHELD_LOG_SCORE and gain is not None:
+        return "The extension is not proposed: held-out runs are less likely with it than without."
+    unsure = [_unsure(slug, size) for slug, size in sizes.by_slug.items() if size.other_sign > SIGN_UNDETERMINED]
+    return " ".join(unsure) if proposal is Proposal.PROPOSED else ""
+
+
+def _unsure(slug: str, size: Size) -> str:
+    effect = BY_SLUG[slug]
+    low, high = (number(effect.scale * end) for end in size.interval)
+    why = "it depends on the course over life that is assumed, even in sign" if size.courses else "not even its sign"
+    return (
+        f"The extension is not proposed: these data do not determine the size of {effect_name(slug)} "
+        f"({low} to {high} {effect.unit}): {why}."
+    )
+
+
+def statistics_of(posterior: Posterior, judgement: Judgement, scatter: RunScatter) -> dict[str, float]:
+    """All finite numbers: the scatter from run to run, the log evidence [nats] of what is likeliest over nothing and the
+    same with its prior, the evidence of the strongest axis, refits."""
+    probabilities = posterior.probabilities
+    best = next(iter(probabilities))
+    numbers = {
+        "run_scatter": scatter.median,
+        "run_scatter_lower": scatter.lower,
+        "run_scatter_upper": scatter.upper,
+        "run_scatter_information": scatter.information,
+        "probability_nothing": probabilities[NOTHING],
+        "log_evidence": posterior.weights[best] - posterior.prior(best),
+        "log_posterior_odds": posterior.weights[best],
+        "structure": judgement.where[0].strength if judgement.where else 0.0,
+        "refits": float(posterior.refits),
+    }
+    return {name: value for name, value in numbers.items() if np.isfinite(value)}
 
 
 def report_of(

@@ -1,14 +1,13 @@
 """Maps of a model's error: whitened residuals over speed and pressure and over cycles, and loops beside what models
-predict. As in the models' RMSE (`report.lack_of_fit`), the likeliest gains of runs and curves are no error."""
+predict. As in the models' RMSE (`report.report`), the likeliest gains of runs and curves are no error."""
 
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.design.design import Design
-from models.diagnosis.design.points import IntArray
+from models.diagnosis.design.design import Design, IntArray
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.run_scatter import without_likely_gains
+from models.diagnosis.pooled_fit.projection import without_likely_gains
 from models.diagnosis.report.report import LoopTrace, Maps
 
 #: Speeds are gathered into at most this many bins, states into as many (resolution of a map).

@@ -1,17 +1,53 @@
-"""What a diagnosis reports: the verdict, its causes, the misfit and where it lives, what the extension gains, which test
-decides."""
+"""How well a fit does: its error against the noise alone.
 
-from collections.abc import Mapping
+The scatter of gains is no misfit: each run's gain, and in the same way each curve's, is taken out of its residual at its
+best linear prediction,
+
+    r - M ĝ,     ĝ = σ_g² Mᵀ V⁻¹ r / (1 + σ_g² Mᵀ V⁻¹ M)
+
+and rows weigh by their precision, so that a loop's bin of a hundred samples weighs more than one plateau's reading.
+
+What a diagnosis reports: the verdict, its causes, the misfit and where it lives, what the extension gains, which test
+decides.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from models.arrays import FloatArray
-from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.experiments.test_plan import Advice
-from models.diagnosis.explanations.verdict import Explanation, Verdict
+from models.diagnosis.explanations.verdict import Explanation, Verdict, Where
 from models.diagnosis.extension import Extension
-from models.diagnosis.pooled_fit.gauss_newton import FitStatus
-from models.diagnosis.report.lack_of_fit import Misfit
+from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
+from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.projection import without_likely_gains
 from models.diagnosis.validation.held_out import Gain
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Misfit:
+    """How well a model fits: rmse and noise [Nm], the share of the variance beyond noise, and the axes of the structure."""
+
+    rmse: float
+    noise: float
+    unexplained_share: float
+    where: tuple[Where, ...] = ()
+
+
+def misfit_of(problem: FitProblem, fitted: Fit, where: Sequence[Where] = ()) -> Misfit:
+    """The misfit of a fit: rmse and noise [Nm], the gains taken out."""
+    left = without_likely_gains(problem, fitted) / problem.noise.deviation
+    actual = float((left**2).mean())
+    unit = float(np.sqrt((problem.noise.deviation**-2.0).mean()))
+    return Misfit(
+        rmse=float(np.sqrt(actual)) / unit,
+        noise=1.0 / unit,
+        unexplained_share=max(0.0, 1 - 1 / actual) if actual > 0 else 0.0,
+        where=tuple(where),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,6 @@
-"""The paragraph that an engineer would sign: what was found, how sure, how large, what it does to predictions, what next.
+"""Numbers, names and lists as the paragraph writes them.
+
+The paragraph that an engineer would sign: what was found, how sure, how large, what it does to predictions, what next.
 
 Sentences in the order in which one would ask, of MAX_WORDS words at most: where they are more, those that matter least are
 left out. The numbers behind them are the report's fields.
@@ -19,26 +21,93 @@ from models.diagnosis.criteria import (
     WEAK_EVIDENCE,
     WORTHWHILE,
 )
-from models.diagnosis.design.axes import PRESSURE
+from models.diagnosis.design.design import CLOCK, CYCLES, FREQUENCY, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE
 from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.experiments.test_plan import BASELINE, Advice
 from models.diagnosis.explanations.decide import smallest
-from models.diagnosis.explanations.outlying_run import ADVICE
+from models.diagnosis.explanations.shapeless import ADVICE
 from models.diagnosis.explanations.verdict import UNCATALOGUED, Explanation, Verdict
-from models.diagnosis.pooled_fit.run_scatter import RunScatter
-from models.diagnosis.report.lack_of_fit import Misfit
-from models.diagnosis.report.report import Candidate, Visible
-from models.diagnosis.report.wording import (
-    axis_name,
-    conjunction,
-    count_of,
-    effect_name,
-    number,
-    probability,
-    signed,
-    with_unit,
-)
+from models.diagnosis.pooled_fit.projection import RunScatter
+from models.diagnosis.report.report import Candidate, Misfit, Visible
 from models.diagnosis.validation.held_out import Gain
+
+#: Digits after the point at most.
+_DIGITS = 5
+
+_AXES = {
+    PRESSURE: "pressure",
+    TORQUE: "the torque itself",
+    SPEED: "speed",
+    CYCLES: "cycles",
+    CLOCK: "the time since the test began",
+    TEMPERATURE: "oil temperature",
+    PHASE: "the phase of the loops",
+    FREQUENCY: "frequency, in the raw records",
+}
+
+
+def axis_name(axis: str) -> str:
+    """An axis in words."""
+    return _AXES.get(axis, axis)
+
+
+def effect_name(slug: str) -> str:
+    """A slug in words."""
+    return slug.replace("_", " ")
+
+
+def conjunction(parts: Sequence[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def count_of(number: int, noun: str) -> str:
+    """`1 test`, `2 tests`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def probability(value: float) -> str:
+    """Two digits; no certainty."""
+    return "above 0.99" if value > 0.99 else "below 0.01" if value < 0.01 else f"{value:.2f}"
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A number with its unit, if it has one."""
+    return text if unit in {"-", ""} else f"{text} {unit}"
+
+
+def estimated(estimate: Estimate) -> str:
+    """Value and deviation to the deviation's second digit."""
+    if not estimate.sd > 0:
+        return with_unit(f"{estimate.name} {number(estimate.value)}", estimate.unit)
+    digits = max(0, 1 - math.floor(math.log10(estimate.sd)))
+    if digits > _DIGITS:
+        return with_unit(f"{estimate.name} {number(estimate.value)} ± {number(estimate.sd)}", estimate.unit)
+    value = _signed(f"{estimate.value:.{digits}f}")
+    return with_unit(f"{estimate.name} {value} ± {estimate.sd:.{digits}f}", estimate.unit)
+
+
+def signed(estimate: Estimate) -> str:
+    """Value and deviation, and where the sign is open its probability."""
+    sign = None if estimate.one_sided else estimate.sign_probability
+    if sign is None:
+        return estimated(estimate)
+    way = "negative" if estimate.value < 0 else "positive"
+    return f"{estimated(estimate)}, {way} with probability {probability(sign)}"
+
+
+def number(value: float) -> str:
+    """Three digits, without an exponent where that is readable."""
+    if 100 <= abs(value) < 1e6:
+        return _signed(f"{value:,.0f}")
+    return _signed(f"{value:.3g}") if value == 0 or 1e-3 <= abs(value) < 100 else f"{value:.2e}"
+
+
+def _signed(text: str) -> str:
+    """With a minus that is no hyphen."""
+    return text.replace("-", "−")
+
 
 #: A share [%] below which its size is not given, and axes of structure that are mentioned at most.
 _LEAST_PERCENT, _AXES_MENTIONED = 0.1, 2

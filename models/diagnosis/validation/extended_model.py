@@ -1,14 +1,138 @@
-"""The extended model of a judgement: the effects that it names, fitted together; its gain is that of `held_out`."""
+"""Structure without a name: a smooth correction on the axes on which it lives.
 
-from dataclasses import dataclass
+    δ(x) = S(v; p, ζ) Σ_k a_k φ_k(x),     a_k ~ N(0, (τ/(1 + k/3))²),     φ_k cosines over the range of each axis
+
+τ is that of the largest marginal likelihood. The correction interpolates inside the data's range; beyond it the last
+value is kept, and nothing of it is followed into the future of a life.
+
+The extended model of a judgement: the effects that it names, fitted together; its gain is that of `held_out`.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from models.arrays import FloatArray
+from models.diagnosis.baseline.laws import Scene
+from models.diagnosis.baseline.prediction import Prediction
+from models.diagnosis.criteria import CORRECTION_COSINES, CORRECTION_HARMONICS, CORRECTION_SIZES, MOST_CORRECTION_AXES
+from models.diagnosis.design.design import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE, Design, Points
+from models.diagnosis.effects.catalogue import change_columns
+from models.diagnosis.effects.effect import Effect, Family, Kind, Shape
+from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.explanations.verdict import HeldOut, Judgement, Verdict
-from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.projection import gram_of, project
 from models.diagnosis.validation.held_out import Gain, measure_gain
-from models.diagnosis.validation.smooth_correction import AXES, smooth_fit
+
+#: The slug of a smooth correction, which is no effect of the catalogue.
+SLUG = "unexplained_structure"
+
+#: Gauss-Newton steps: the correction is linear but for the lag of loops.
+_STEPS = 6
+
+_OF_POINTS: dict[str, Callable[[Points], FloatArray]] = {
+    SPEED: lambda points: points.velocity,
+    PRESSURE: lambda points: points.pressure,
+    CYCLES: lambda points: np.sqrt(points.cycles),
+    CLOCK: lambda points: np.where(points.steady, points.clock, 0.0),
+    TEMPERATURE: lambda points: points.temperature,
+}
+
+#: Axes that can carry a smooth correction.
+AXES = frozenset({*_OF_POINTS, PHASE})
+
+
+def smooth_fit(problem: FitProblem, baseline: Fit, axes: Sequence[str]) -> Fit | None:
+    """The baseline refitted with a smooth correction on the axes; None where no axis can carry one."""
+    effects = [effect for axis in axes[:MOST_CORRECTION_AXES] for effect in _along(problem.design, axis)]
+    if not effects:
+        return None
+    size = _size(problem, baseline, effects)
+    scaled = [replace(effect, prior_sd=size * effect.prior_sd) for effect in effects]
+    start = [FittedEffect(effect=effect, amplitude=0.0, shape=()) for effect in scaled]
+    return fit(problem, baseline.laws, start, steps=_STEPS)
+
+
+def _along(design: Design, axis: str) -> list[Effect]:
+    """One effect a function: cosines over the axis's range, or a loop's harmonics."""
+    if axis == PHASE:
+        waves = (
+            [(k, wave) for k in range(1, CORRECTION_HARMONICS + 1) for wave in (np.cos, np.sin)] if design.loops else []
+        )
+        return [_effect(k, _harmonic(k, wave), before_lag=False) for k, wave in waves]
+    if axis not in _OF_POINTS:
+        return []
+    place = _OF_POINTS[axis]
+    values = place(design.points)
+    measured = values[np.isfinite(values)]
+    if measured.size == 0 or not np.ptp(measured) > 0:
+        return []
+    low, high = float(measured.min()), float(measured.max())
+    count = min(CORRECTION_COSINES, np.unique(measured).size - 1)
+    return [_effect(k, _cosine(place, low, high, k), before_lag=axis != CLOCK) for k in range(1, count + 1)]
+
+
+def _cosine(place: Callable[[Points], FloatArray], low: float, high: float, k: int) -> Callable[[Points], FloatArray]:
+    def column(points: Points) -> FloatArray:
+        values = place(points)
+        unit = np.clip((np.where(np.isfinite(values), values, low) - low) / (high - low), 0.0, 1.0)
+        return np.where(np.isfinite(values), np.cos(np.pi * k * unit), 0.0)
+
+    return column
+
+
+def _harmonic(k: int, wave: Callable[[FloatArray], FloatArray]) -> Callable[[Points], FloatArray]:
+    return lambda points: np.where(points.steady, 0.0, wave(k * points.phase))
+
+
+def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool) -> Effect:
+    def change(scene: Scene, amplitude: float, _: Shape) -> FloatArray:
+        return amplitude * scene.curve * column(scene.points)
+
+    return Effect(
+        slug=SLUG,
+        title="Structure without a name",
+        physics="",
+        formula="S(v; p, ζ) a cos(π k x)",
+        source="this module",
+        family=Family.SENSOR,
+        kind=Kind.LAG,  # neither taken off measurements nor followed along a life
+        channels=(),
+        amplitude="share of the torque",
+        unit="-",
+        prior_sd=1.0 / (1.0 + k / 3.0),
+        positive=False,
+        scale=1.0,
+        shapes=(),
+        grid=lambda _: (),
+        change=change,
+        before_lag=before_lag,
+        discrepancies=(),
+        tails=float("inf"),
+    )
+
+
+def _size(problem: FitProblem, baseline: Fit, effects: Sequence[Effect]) -> float:
+    """τ of the largest marginal likelihood: ½ uᵀ (1 + I)⁻¹ u - ½ ln|1 + I|, in units of the prior's deviations."""
+    prediction: Prediction = baseline.prediction
+    changes = change_columns(
+        problem.design,
+        prediction,
+        [(effect.change(prediction.scene, 1.0, ()), effect.lags(())) for effect in effects],
+    )
+    gram = gram_of(problem, baseline, changes)
+    projected = project(gram, problem.noise.run_gain, problem.noise.curve_gain)
+    unit = np.array([effect.prior_sd for effect in effects])
+    logs = []
+    for size in CORRECTION_SIZES:
+        scale = size * unit
+        inner = np.eye(unit.size) + projected.info * scale[:, None] * scale
+        along = projected.score * scale
+        logs.append(0.5 * float(along @ np.linalg.solve(inner, along)) - 0.5 * float(np.linalg.slogdet(inner)[1]))
+    return CORRECTION_SIZES[int(np.argmax(logs))]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

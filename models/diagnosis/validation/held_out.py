@@ -25,8 +25,7 @@ from models.diagnosis.criteria import (
     PRESSURE_FOLDS,
     STATE_FOLDS,
 )
-from models.diagnosis.design.axes import CYCLES, PRESSURE
-from models.diagnosis.design.design import Design
+from models.diagnosis.design.design import CYCLES, PRESSURE, Design
 from models.diagnosis.effects.fitted_effect import effect_columns, effect_precisions
 from models.diagnosis.noise.covariance import Noise, gains_of, whitened, without_gains
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit

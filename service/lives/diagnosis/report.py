@@ -12,9 +12,8 @@ from models.arrays import FloatArray
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS, bar
 
 if TYPE_CHECKING:  # start-up time: they load the whole diagnosis
-    from models.diagnosis.experiments.protocol import Step
-    from models.diagnosis.report.lack_of_fit import Misfit
-    from models.diagnosis.report.report import Isolability, LoopTrace, Maps, Report
+    from models.diagnosis.experiments.candidates import Step
+    from models.diagnosis.report.report import Isolability, LoopTrace, Maps, Misfit, Report
     from models.diagnosis.validation.held_out import Gain
 
 #: Maps and traces are looked at: more digits than these only weigh.

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
-from models.diagnosis.design.limits import MOST_PLATEAUS
+from models.diagnosis.design.criteria import MOST_PLATEAUS
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.catalogued.torque_zero_shift import DAYS, STRAIGHT
-from models.diagnosis.effects.draw import Draw, DrawnEffect
-from models.diagnosis.effects.template_discrepancy import ranges_of
-from models.diagnosis.effects.viscosity import log_viscosity_ratio
+from models.diagnosis.effects.fitted_effect import Draw, DrawnEffect, ranges_of
+from models.diagnosis.effects.readings import DAYS, STRAIGHT
+from models.diagnosis.effects.thermal import log_viscosity_ratio
 from models.diagnosis.extension import Extension, NotFiniteError, build_extension, facts_from, facts_to
 from models.records.runs import Plateaus
 from tests.models.diagnosis.campaigns import campaign

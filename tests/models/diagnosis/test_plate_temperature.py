@@ -12,8 +12,8 @@ from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.design import build_design
 from models.diagnosis.design.facts import facts_of
-from models.diagnosis.effects.catalogued import interface_heating
-from models.diagnosis.pooled_fit.starts import starting_laws
+from models.diagnosis.effects.thermal import INTERFACE_HEATING, REFERENCE_FLUX, WHOLE, _computed, _measured
+from models.diagnosis.pooled_fit.baseline_fit import starting_laws
 from models.friction.stribeck import torque
 from models.records.runs import Plateaus, Record
 from tests.models.diagnosis.campaigns import Where, campaign
@@ -22,7 +22,7 @@ from tests.models.diagnosis.test_diagnose import PLANTED, look
 GEOMETRY = Geometry()
 #: Loss of torque at the reference's heat flux, and what the plate then rises by [K], both at the usual flow of oil.
 LOSS, RISE = 0.12, 25.0
-SLUG = interface_heating.EFFECT.slug
+SLUG = INTERFACE_HEATING.slug
 
 
 def warmth(friction: FloatArray, velocity: FloatArray, cycles: float, clock: FloatArray) -> FloatArray:
@@ -78,7 +78,7 @@ def test_hidden_heating_is_named_by_the_plate_and_not_without_it() -> None:
     estimate = report.candidates[0].estimate
     warming = facts_of(given).plate_warming
     assert warming is not None
-    expected = 100 * LOSS * warming[1] * interface_heating.REFERENCE_FLUX / RISE  # at the flow that was usual
+    expected = 100 * LOSS * warming[1] * REFERENCE_FLUX / RISE  # at the flow that was usual
     assert abs(estimate.value - expected) < 4 * estimate.sd
     assert SLUG not in look(campaign(7, heated)).causes
 
@@ -95,17 +95,17 @@ def test_without_the_channel_the_effect_is_what_it_was() -> None:
     scene = scene_of(campaign(1))
     assert scene.facts.plate_warming is None
     assert np.isnan(scene.points.plate_rise).all()
-    tried = interface_heating.EFFECT.grid(scene.facts)
+    tried = INTERFACE_HEATING.grid(scene.facts)
     assert len(tried) == 20
-    computed = interface_heating._computed(scene, 1.5, 1.5)
-    assert interface_heating._measured(scene, computed) is computed
+    computed = _computed(scene, 1.5, 1.5)
+    assert _measured(scene, computed) is computed
 
 
 def test_with_the_channel_it_goes_with_the_plate_and_a_thermometers_offset_is_nothing() -> None:
     for offset in (0.0, -4.0):
         scene = scene_of(with_plate(campaign(1), RISE, offset))
-        assert len(interface_heating.EFFECT.grid(scene.facts)) == 2
-        change = interface_heating.EFFECT.change(scene, 0.1, (0.0, interface_heating.WHOLE, 0.0))
+        assert len(INTERFACE_HEATING.grid(scene.facts)) == 2
+        change = INTERFACE_HEATING.change(scene, 0.1, (0.0, WHOLE, 0.0))
         lost = -np.log1p(change / scene.curve) / 0.1
         area = GEOMETRY.friction_faces * GEOMETRY.lining_area
         assert scene.facts.plate_warming is not None
@@ -122,9 +122,9 @@ def test_where_some_tests_have_it_the_others_are_computed() -> None:
     given = with_plate(campaign(1), RISE)
     bare = tuple(replace(run, record=replace(run.record, plate_temperature=None)) for run in given.dynamic)
     scene = scene_of(replace(given, dynamic=bare))
-    assert len(interface_heating.EFFECT.grid(scene.facts)) == 20
-    computed = interface_heating._computed(scene, 1.5, 0.0)
-    used, steady = interface_heating._measured(scene, computed), scene.points.steady
+    assert len(INTERFACE_HEATING.grid(scene.facts)) == 20
+    computed = _computed(scene, 1.5, 0.0)
+    used, steady = _measured(scene, computed), scene.points.steady
     np.testing.assert_array_equal(used[~steady], computed[~steady])
     assert np.abs(used - computed)[steady].min() > 0
 

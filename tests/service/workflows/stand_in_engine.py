@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 
 from models.diagnosis.campaign import Campaign, StationaryRun
-from models.diagnosis.effects.estimate import Estimate
-from models.diagnosis.experiments.protocol import Step
+from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.experiments.candidates import Step
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import Explanation, Verdict, Where
 from models.diagnosis.extension import Extension
-from models.diagnosis.report.lack_of_fit import Misfit
-from models.diagnosis.report.report import Candidate, Isolability, LoopTrace, Maps, Pair, Report, Visible
+from models.diagnosis.report.report import Candidate, Isolability, LoopTrace, Maps, Misfit, Pair, Report, Visible
 from models.diagnosis.validation.held_out import Gain
 
 #: Nm that the stand-in takes off every plateau from a cycle on, and that its course loses by 1,000 cycles.

@@ -20,7 +20,7 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     return np.asarray(amplitude / (1.0 + ((scene.points.velocity - critical) / _WIDTH) ** 2), dtype=np.float64)
 
 
-EFFECT = Effect(
+CRITICAL_SPEED = Effect(
     slug="critical_speed",
     title="The shaft passes a critical speed",
     physics="Unbalance loads the bearings most at the critical speed: a torque that peaks there, whatever the pressure.",

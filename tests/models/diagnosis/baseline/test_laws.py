@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import brentq
 
 from models.degradation.general_order import progress_fraction
-from models.diagnosis.baseline.criteria import CURVATURE_BOUNDS, EXPONENTIAL, USUAL_CURVATURE
 from models.diagnosis.baseline.laws import (
     ATTRACTOR,
     BLOCK,
@@ -22,12 +21,12 @@ from models.diagnosis.baseline.laws import (
     falling_weight,
 )
 from models.diagnosis.baseline.prediction import frame_of, predict
+from models.diagnosis.criteria import CURVATURE_BOUNDS, EXPONENTIAL, USUAL_CURVATURE
 from models.diagnosis.design.design import build_design
 from models.diagnosis.noise.estimate import first_noise
+from models.diagnosis.pooled_fit.baseline_fit import starting_laws
 from models.diagnosis.pooled_fit.gauss_newton import fit
-from models.diagnosis.pooled_fit.priors import priors_of
-from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.starts import starting_laws
+from models.diagnosis.pooled_fit.problem import FitProblem, priors_of
 from models.friction.stribeck import StribeckParameters, torque
 from models.loops.attractor import attractor_torque
 from tests.models.diagnosis.campaigns import campaign

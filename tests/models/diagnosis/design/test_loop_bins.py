@@ -7,12 +7,11 @@ import pytest
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.diagnosis.baseline.attractor import lag_of
+from models.diagnosis.baseline.prediction import lag_of
 from models.diagnosis.campaign import Campaign, DynamicRun
 from models.diagnosis.design import loop_bins
-from models.diagnosis.design.design import Design, build_design
+from models.diagnosis.design.design import Design, Points, build_design
 from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
-from models.diagnosis.design.points import Points
 from models.friction.stribeck import GAMMA, StribeckParameters, torque
 from models.loops.attractor import attractor_torque
 from models.records.runs import Record

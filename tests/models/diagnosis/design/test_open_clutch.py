@@ -18,8 +18,7 @@ from models.diagnosis.experiments.test_plan import advise
 from models.diagnosis.explanations.contrasts import contrasts_of
 from models.diagnosis.explanations.evidence import evidence_of
 from models.diagnosis.explanations.verdict import Fitted, Verdict
-from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, missing_for_baseline
-from models.diagnosis.pooled_fit.starts import starting_laws
+from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, missing_for_baseline, starting_laws
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.validation.held_out import measure_gain
 from tests.models.diagnosis.campaigns import CYCLES, SPEEDS, Where, campaign

@@ -9,8 +9,7 @@ from scipy.signal import lfilter
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DynamicRun
 from models.diagnosis.design.design import Design, build_design
-from models.diagnosis.design.loop_bins import BINS
-from models.diagnosis.design.period_differences import period_differences
+from models.diagnosis.design.loop_bins import BINS, period_differences
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.records.runs import Record
 

@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from models.diagnosis.design.points import Points, concatenate, mark_open
+from models.diagnosis.design.design import Points, concatenate, mark_open
 from models.records.criteria import UNLOADED
 
 _INTEGERS = {"run", "loop", "previous"}

@@ -7,12 +7,12 @@ import pytest
 from scipy.signal import lfilter
 
 from models.arrays import FloatArray
-from models.diagnosis.design.design import Design, build_design
-from models.diagnosis.design.sample_autocorrelation import (
+from models.diagnosis.design.autocorrelation import (
     SampleAutocorrelation,
     bin_autocorrelation,
     sample_autocorrelation,
 )
+from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from tests.models.diagnosis.campaigns import campaign
 

@@ -10,11 +10,10 @@ from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.campaign import Oil
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
-from models.diagnosis.effects.catalogued.oil_temperature import HERSEY
-from models.diagnosis.effects.catalogued.torque_zero_shift import DAYS, STRAIGHT
 from models.diagnosis.effects.effect import Effect, Kind, unit_changes
-from models.diagnosis.effects.viscosity import log_viscosity_ratio, viscosity
-from models.diagnosis.pooled_fit.starts import starting_laws
+from models.diagnosis.effects.readings import DAYS, STRAIGHT
+from models.diagnosis.effects.thermal import HERSEY, log_viscosity_ratio, viscosity
+from models.diagnosis.pooled_fit.baseline_fit import starting_laws
 from models.friction.stribeck import GAMMA
 from tests.models.diagnosis.campaigns import campaign
 

@@ -14,7 +14,7 @@ from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import Effect
 from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
 from models.diagnosis.explanations.verdict import Verdict
-from models.diagnosis.pooled_fit.starts import starting_laws
+from models.diagnosis.pooled_fit.baseline_fit import starting_laws
 from models.friction.stribeck import torque
 from tests.models.diagnosis.campaigns import Planted, Where, campaign
 

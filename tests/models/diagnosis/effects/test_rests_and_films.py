@@ -14,8 +14,8 @@ from models.diagnosis.campaign import Campaign, DutyRun, EventKind, MaintenanceE
 from models.diagnosis.design.design import build_design
 from models.diagnosis.design.facts import facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.catalogued.rest_recovery import STATIC, WHOLE
-from models.diagnosis.effects.catalogued.squeeze_film import (
+from models.diagnosis.effects.history import STATIC, WHOLE
+from models.diagnosis.effects.moving import (
     FILM,
     FIRST_ORDER,
     LEAST_TIME,
@@ -23,7 +23,7 @@ from models.diagnosis.effects.catalogued.squeeze_film import (
     THICKNESS,
     usual_slope,
 )
-from models.diagnosis.pooled_fit.starts import starting_laws
+from models.diagnosis.pooled_fit.baseline_fit import starting_laws
 from tests.models.diagnosis.campaigns import campaign
 
 HOUR, DAY = 3600.0, 86400.0

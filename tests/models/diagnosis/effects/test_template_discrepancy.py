@@ -9,13 +9,11 @@ from models.diagnosis.criteria import DISCREPANCY_SD
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.effects.effect import Discrepancy
-from models.diagnosis.effects.fitted_effect import FittedEffect, effect_rows
-from models.diagnosis.effects.template_discrepancy import discrepancy_columns, discrepancy_factors
+from models.diagnosis.effects.fitted_effect import FittedEffect, discrepancy_columns, discrepancy_factors, effect_rows
 from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
-from models.diagnosis.pooled_fit.gram import gram_of
-from models.diagnosis.pooled_fit.projection import project
+from models.diagnosis.pooled_fit.projection import gram_of, project
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import study
 

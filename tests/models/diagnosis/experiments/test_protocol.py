@@ -2,8 +2,7 @@
 
 import pytest
 
-from models.diagnosis.experiments.candidates import PASSES, TRIALS
-from models.diagnosis.experiments.protocol import OIL_SETTLING, steps_of
+from models.diagnosis.experiments.candidates import OIL_SETTLING, PASSES, TRIALS, steps_of
 from tests.models.diagnosis.campaigns import campaign
 
 GIVEN = campaign(24, cycles=(0.0, 3000.0))

@@ -10,9 +10,9 @@ from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun
 from models.diagnosis.criteria import WORTHWHILE
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.catalogued.oil_temperature import AT_ONCE
-from models.diagnosis.effects.catalogued.torque_zero_shift import STRAIGHT
 from models.diagnosis.effects.fitted_effect import FittedEffect, effect_rows
+from models.diagnosis.effects.readings import STRAIGHT
+from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.experiments import candidates
 from models.diagnosis.experiments.candidates import TRIALS, with_trial
 from models.diagnosis.experiments.information import CandidateDistances

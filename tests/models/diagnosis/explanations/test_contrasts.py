@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from models.arrays import FloatArray
-from models.diagnosis.design.points import Points
+from models.diagnosis.design.design import Points
 from models.diagnosis.explanations.contrasts import contrasts_of
-from models.diagnosis.pooled_fit.gram import gram_of
-from models.diagnosis.pooled_fit.projection import project
+from models.diagnosis.pooled_fit.projection import gram_of, project
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study
 

@@ -8,15 +8,13 @@ import pytest
 
 from models.arrays import FloatArray
 from models.diagnosis.design.autocorrelation import Correlation
-from models.diagnosis.design.axes import TORQUE
-from models.diagnosis.design.design import Design, build_design
+from models.diagnosis.design.design import TORQUE, Design, build_design
 from models.diagnosis.explanations import contrasts
 from models.diagnosis.explanations.evidence import evidence_of
-from models.diagnosis.explanations.lines import HighestLine, lines
+from models.diagnosis.explanations.shapeless import HighestLine, lines
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.noise.estimate import first_noise
-from models.diagnosis.pooled_fit.priors import Priors
-from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.problem import FitProblem, Priors
 from models.friction.stribeck import torque
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import study

@@ -8,7 +8,7 @@ import pytest
 from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.design.design import build_design
 from models.diagnosis.diagnose import diagnose
-from models.diagnosis.explanations.outlying_run import outlying_run
+from models.diagnosis.explanations.shapeless import outlying_run
 from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from tests.models.diagnosis.campaigns import campaign

@@ -8,11 +8,10 @@ import pytest
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.criteria import ANYTHING_WRONG
 from models.diagnosis.design.design import build_design
-from models.diagnosis.effects.estimate import Estimate
-from models.diagnosis.explanations.alternative import LINE, NOTHING, Alternative, axis_of, is_axis
+from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.explanations.decide import decide, explanations_of
 from models.diagnosis.explanations.posterior import Posterior, Prior, posterior_of
-from models.diagnosis.explanations.verdict import UNCATALOGUED, Verdict
+from models.diagnosis.explanations.verdict import LINE, NOTHING, UNCATALOGUED, Alternative, Verdict, axis_of, is_axis
 from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline
 from models.diagnosis.raw_records.evidence import FIXED_LINE, RawEvidence
 from tests.models.diagnosis.campaigns import Where, campaign

@@ -6,7 +6,7 @@ import numpy as np
 
 from models.diagnosis.campaign import Campaign, EventKind, MaintenanceEvent
 from models.diagnosis.diagnose import diagnose
-from models.diagnosis.explanations.unmeasured_temperature import temperature_evidence
+from models.diagnosis.explanations.shapeless import temperature_evidence
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import study, warmth
 

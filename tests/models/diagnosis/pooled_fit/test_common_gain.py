@@ -7,11 +7,10 @@ import numpy as np
 from models.diagnosis.baseline.prediction import frame_of
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.catalogued.oil_temperature import AT_ONCE
 from models.diagnosis.effects.fitted_effect import FittedEffect
-from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
+from models.diagnosis.effects.thermal import AT_ONCE
+from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, starting_laws
 from models.diagnosis.pooled_fit.gauss_newton import fit
-from models.diagnosis.pooled_fit.starts import starting_laws
 from tests.models.diagnosis.rehearsals import rehearsal
 
 

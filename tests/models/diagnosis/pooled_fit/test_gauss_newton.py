@@ -7,8 +7,8 @@ import pytest
 
 from models.diagnosis.baseline.laws import Laws
 from models.diagnosis.baseline.prediction import frame_of
+from models.diagnosis.pooled_fit.baseline_fit import starting_laws
 from models.diagnosis.pooled_fit.gauss_newton import FitStatus, fit
-from models.diagnosis.pooled_fit.starts import starting_laws
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study
 

@@ -1,8 +1,6 @@
 """The scatter from run to run is estimated where there are runs to tell it, and said to be assumed where there are not."""
 
-from models.diagnosis.pooled_fit.gram import gram_of
-from models.diagnosis.pooled_fit.projection import projections_of
-from models.diagnosis.pooled_fit.run_scatter import RunScatter, run_scatter
+from models.diagnosis.pooled_fit.projection import RunScatter, gram_of, projections_of, run_scatter
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import i0e
 
-from models.diagnosis.raw_records.incoherent import amplitude, rice
+from models.diagnosis.raw_records.swing import amplitude, rice
 from models.diagnosis.raw_records.whitened_torque import WhitenedRecord, whitened_record
 from models.records.runs import Record
 from tests.models.diagnosis.raw_campaigns import loops, reversing, stepped, with_ripple

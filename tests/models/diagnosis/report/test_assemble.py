@@ -10,8 +10,7 @@ from models.diagnosis.explanations.posterior import Posterior, posterior_of
 from models.diagnosis.explanations.sizes import Size, Sizes, sizes_of
 from models.diagnosis.explanations.verdict import Judgement, Proposal, Verdict
 from models.diagnosis.pooled_fit.gauss_newton import FitStatus
-from models.diagnosis.report.assemble import report_of
-from models.diagnosis.report.proposed_extension import reason_against
+from models.diagnosis.report.assemble import reason_against, report_of
 from models.diagnosis.validation.extended_model import Validation
 from models.diagnosis.validation.held_out import Gain
 from tests.models.diagnosis.campaigns import campaign

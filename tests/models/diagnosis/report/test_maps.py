@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.pooled_fit.run_scatter import without_likely_gains
-from models.diagnosis.report.lack_of_fit import misfit_of
+from models.diagnosis.pooled_fit.projection import without_likely_gains
 from models.diagnosis.report.maps import MOST_BINS, SHOWN, loop_traces, residual_maps
+from models.diagnosis.report.report import misfit_of
 from tests.models.diagnosis.campaigns import CYCLES, PRESSURES, SPEEDS, campaign
 from tests.models.diagnosis.fitted import Study, bump, study
 

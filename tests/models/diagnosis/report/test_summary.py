@@ -8,12 +8,11 @@ import pytest
 
 from models.diagnosis.criteria import MAX_WORDS
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
-from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import UNCATALOGUED, Explanation, Verdict, Where
-from models.diagnosis.pooled_fit.run_scatter import RunScatter
-from models.diagnosis.report.lack_of_fit import Misfit
-from models.diagnosis.report.report import Candidate, Visible
+from models.diagnosis.pooled_fit.projection import RunScatter
+from models.diagnosis.report.report import Candidate, Misfit, Visible
 from models.diagnosis.report.summary import Findings, summarise
 from models.diagnosis.validation.held_out import Gain, Hardest
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.report.summary import summarise
 from tests.models.diagnosis.report.test_summary import findings

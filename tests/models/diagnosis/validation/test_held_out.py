@@ -8,10 +8,10 @@ from scipy.stats import multivariate_normal
 
 from models.diagnosis.baseline.laws import ATTRACTOR, Scene
 from models.diagnosis.design.autocorrelation import Correlation
-from models.diagnosis.effects import amplitude_prior
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.catalogued.oil_temperature import AT_ONCE
+from models.diagnosis.effects.effect import amplitude_precision
 from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns
+from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.validation.held_out import (
     _STEPS,
@@ -129,7 +129,7 @@ def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
         if own:
             (each,) = found.effects  # half the width of a shape's bounds is its prior's deviation
             widths = [0.5 * (shape.highest - shape.lowest) for shape in each.effect.shapes]
-            weak = [amplitude_prior.precision(each.effect, each.amplitude), *(width**-2.0 for width in widths)]
+            weak = [amplitude_precision(each.effect, each.amplitude), *(width**-2.0 for width in widths)]
             precision[[-3, -2, -1], [-3, -2, -1]] += weak
         scale = 1 / np.sqrt(np.diag(precision))
         spread = np.linalg.inv(precision * scale[:, None] * scale) * scale[:, None] * scale

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from models.diagnosis.design.axes import CYCLES, PHASE, PRESSURE, SPEED
+from models.diagnosis.design.design import CYCLES, PHASE, PRESSURE, SPEED
+from models.diagnosis.validation.extended_model import SLUG, smooth_fit
 from models.diagnosis.validation.held_out import measure_gain
-from models.diagnosis.validation.smooth_correction import SLUG, smooth_fit
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, bump, study
 

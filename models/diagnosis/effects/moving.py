@@ -1,4 +1,11 @@
-"""The oil film needs time to be squeezed out and drawn in: more torque while accelerating, less while decelerating."""
+"""Rotating mass between clutch and torque sensor.
+
+The oil film needs time to be squeezed out and drawn in: more torque while accelerating, less while decelerating.
+
+Torque that swings with the shaft's angle; it is in raw records and averages out of plateaus.
+
+Self-excited vibration of the driveline at low speed; it is in raw records.
+"""
 
 from collections.abc import Sequence
 
@@ -8,9 +15,53 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Laws, Scene, gradient_of
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
-from models.diagnosis.effects.first_order_lag import phases_of
+from models.diagnosis.effects.effect import (
+    Discrepancy,
+    Effect,
+    Family,
+    Kind,
+    Measure,
+    Shape,
+    ShapeParameter,
+    Tried,
+    phases_of,
+    unchanged,
+    untried,
+)
 from models.friction.stribeck import GAMMA
+
+
+def _inertia_torque_grid(_facts: Facts) -> tuple[Tried, ...]:
+    return (Tried(shape=()),)
+
+
+def _inertia_torque_change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
+    return np.asarray(amplitude * scene.points.acceleration / scene.facts.geometry.mean_radius, dtype=np.float64)
+
+
+INERTIA_TORQUE = Effect(
+    slug="inertia_torque",
+    title="Inertia is in the measured torque",
+    physics="A mass between clutch and sensor turns with the shaft: the sensor also measures the torque that "
+    "accelerates it.",
+    formula="J dω/dt",
+    source="Newton; on the reference's rig the sensor stands on the grounded side, on others it does not",
+    family=Family.DYNAMIC,
+    kind=Kind.LAG,
+    channels=("time_s",),
+    amplitude="moment of inertia",
+    unit="kg m²",
+    prior_sd=0.004,
+    positive=True,
+    scale=1.0,
+    shapes=(),
+    grid=_inertia_torque_grid,
+    change=_inertia_torque_change,
+    grows_with=Measure.TORQUE,
+    before_lag=False,
+    discrepancies=(),
+)
+
 
 #: Pressure to which the amplitude refers [Pa].
 REFERENCE_PRESSURE = 5e5
@@ -30,7 +81,7 @@ _BEFORE = 1 / 3
 _SWING = 24
 
 
-def _grid(_facts: Facts) -> tuple[Tried, ...]:
+def _squeeze_film_grid(_facts: Facts) -> tuple[Tried, ...]:
     powers = [(x, y, f, 0.5, FIRST_ORDER, 0.0) for x in (0.0, 0.6) for y in (0.5, 1.0, 1.5) for f in (0.02, 0.06, 0.15)]
     films = [
         (0.4, y, f, sheared, FILM, lags)
@@ -47,11 +98,11 @@ def _grid(_facts: Facts) -> tuple[Tried, ...]:
     )
 
 
-def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    return _changes(scene, [(amplitude, shape)])[:, 0]
+def _squeeze_film_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    return _squeeze_film_changes(scene, [(amplitude, shape)])[:, 0]
 
 
-def _changes(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
+def _squeeze_film_changes(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
     points = scene.points
     speed = points.velocity / scene.laws.frame.reference_velocity
     out = np.zeros((speed.size, len(settings)))
@@ -134,7 +185,7 @@ def usual_slope(laws: Laws, sheared: FloatArray) -> FloatArray:
     return np.asarray(np.median(sheared[:, None] * carried - dry, axis=1), dtype=np.float64)
 
 
-EFFECT = Effect(
+SQUEEZE_FILM = Effect(
     slug="squeeze_film",
     title="A squeezed film lags behind the speed",
     physics="While speed rises the film is still thin from before and more asperities carry: torque is higher than "
@@ -159,10 +210,55 @@ EFFECT = Effect(
         ShapeParameter(name="how the film is followed", unit="-", lowest=0.0, highest=2.0),
         ShapeParameter(name="whether friction lags behind it", unit="-", lowest=0.0, highest=1.0),
     ),
-    grid=_grid,
-    change=_change,
-    several=_changes,
+    grid=_squeeze_film_grid,
+    change=_squeeze_film_change,
+    several=_squeeze_film_changes,
     grows_with=Measure.TORQUE,
     before_lag=None,
     discrepancies=(Discrepancy.SPEED,),
+)
+
+
+SHAFT_RIPPLE = Effect(
+    slug="shaft_ripple",
+    title="Torque swings with the shaft's turns",
+    physics="Misalignment, run-out or a coupling: torque swings once or a few times a turn, at a frequency that follows "
+    "the speed.",
+    formula="a cos(k ∫ω dt + φ), k = 1, 2, ...",
+    source="order analysis of rotating machinery",
+    family=Family.VIBRATION,
+    kind=Kind.VIBRATION,
+    channels=("time_s",),
+    amplitude="amplitude of the ripple",
+    unit="Nm",
+    prior_sd=0.5,
+    positive=True,
+    scale=1.0,
+    shapes=(),
+    grid=untried,
+    change=unchanged,
+    before_lag=False,
+    discrepancies=(),
+)
+
+
+STICK_SLIP = Effect(
+    slug="stick_slip",
+    title="Stick-slip or shudder",
+    physics="Where friction falls with speed the driveline vibrates by itself, at its own frequency and at low speed.",
+    formula="a cos(2π f t + φ) with f that does not follow the speed",
+    source="Ompusunggu et al. 2013, section 3.1.1: positive slope is anti-shudder",
+    family=Family.VIBRATION,
+    kind=Kind.VIBRATION,
+    channels=("time_s",),
+    amplitude="amplitude of the vibration",
+    unit="Nm",
+    prior_sd=0.5,
+    positive=True,
+    scale=1.0,
+    shapes=(),
+    grid=untried,
+    change=unchanged,
+    before_lag=False,
+    discrepancies=(),
 )

@@ -1,4 +1,6 @@
-"""Incoherent evidence of a swing: its phase is unknown in every stretch, its size follows one law in all.
+"""A swing that stands out of the noise, at an order of the shaft or at a fixed frequency.
+
+Incoherent evidence of a swing: its phase is unknown in every stretch, its size follows one law in all.
 
 With u = |D|²/N of a stretch (`whitened_torque`), exponential of mean 1 where nothing swings, and λ = a² N/4,
 
@@ -8,11 +10,27 @@ averaged over a with the prior AMPLITUDE_WEIGHTS. Where nothing swings, the mean
 frequency in question.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.special import i0e
 
 from models.arrays import FloatArray
 from models.diagnosis.raw_records.criteria import AMPLITUDES, FAINT, MOST_PER_STRETCH, PRIOR_STRETCHES
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """evidence [nats], averaged over everything tried; position, the order [per revolution] or the frequency [Hz];
+    amplitude [Nm]; speed_share, the share of the highest speed below which it acts; peak, the largest log likelihood
+    ratio [nats]. Without arguments: no line."""
+
+    evidence: float = 0.0
+    position: float = 0.0
+    amplitude: float = 0.0
+    speed_share: float = 1.0
+    peak: float = 0.0
+
 
 _TABLE_STEP, _TABLE_END = 0.02, 60.0
 _GRID = np.arange(0.0, _TABLE_END + 2 * _TABLE_STEP, _TABLE_STEP)

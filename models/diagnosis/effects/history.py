@@ -1,0 +1,270 @@
+"""Early in life asperities are worn off: friction starts away from eq. 6 and settles onto it.
+
+Fresh oil: shear and boundary friction step at a cycle.
+
+Late in life the lining goes faster than eq. 6 says.
+
+Harder engagements age the clutch faster: ζ is energy rather than a count.
+
+After a pause friction is off its course and returns to it with use.
+"""
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.baseline.laws import Scene
+from models.diagnosis.design.facts import Facts
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
+
+STATIC, WHOLE = 0.0, 1.0
+
+
+def _running_in_grid(facts: Facts) -> tuple[Tried, ...]:
+    if facts.states.size < 4:
+        return ()
+    gap = max(float(np.diff(facts.states).min()), 1e-3 * facts.life)
+    lengths = np.geomspace(gap / 3, facts.life / 6, 5)
+    return tuple(Tried(shape=(float(np.log(length)), part)) for length in lengths for part in (STATIC, WHOLE))
+
+
+def _running_in_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    log_length, part = shape
+    carried = scene.curve if part == WHOLE else scene.gradient[:, 0] * scene.parameters[:, 0]
+    return np.asarray(amplitude * carried * np.exp(-scene.points.cycles / np.exp(log_length)), dtype=np.float64)
+
+
+RUNNING_IN = Effect(
+    slug="running_in",
+    title="Running-in was not finished",
+    physics="The first cycles polish the lining; friction starts away from the course that eq. 6 follows later.",
+    formula="a M_s ∂S/∂M_s e^{-ζ/ζ_r}, or a S e^{-ζ/ζ_r}",
+    source="Ompusunggu et al. 2013, section 2.3.1: 200 cycles of running-in before cycle 0",
+    family=Family.HISTORY,
+    kind=Kind.COURSE,
+    channels=(),
+    amplitude="share when new",
+    unit="%",
+    prior_sd=0.08,
+    positive=False,
+    scale=100.0,
+    shapes=(
+        ShapeParameter(name="log of the length ζ_r", unit="ln cycles", lowest=3.0, highest=8.6, smooth=True),
+        ShapeParameter(name="what is changed", unit="-", lowest=0.0, highest=1.0),
+    ),
+    grid=_running_in_grid,
+    change=_running_in_change,
+    before_lag=True,
+    discrepancies=(Discrepancy.SPEED, Discrepancy.LIFE),
+)
+
+
+#: Log prior odds [nats] of an unlogged change against a logged one (chosen; no table).
+_UNLOGGED = -2.0
+
+
+def _oil_change_grid(facts: Facts) -> tuple[Tried, ...]:
+    tried = []
+    for low, onset, high in facts.onsets:
+        logged = any(low <= cycles <= high for cycles in facts.oil_changes)
+        weight = 0.0 if logged else (_UNLOGGED if facts.oil_changes else 0.0) - float(np.log(len(facts.onsets)))
+        tried += [Tried(shape=(onset, share, lost), log_weight=weight) for share in (-0.1, 0.1) for lost in (0.0, 0.5)]
+    return tuple(tried)
+
+
+def _oil_change_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    onset, share, lost = shape
+    since = scene.points.cycles - onset
+    ageing = 1.0 - lost * -np.expm1(-np.maximum(since, 0.0) / (0.5 * scene.facts.life))
+    boundary = scene.gradient[:, 1] * scene.parameters[:, 1]
+    step = (scene.viscous + share * boundary) * ageing
+    return np.asarray(amplitude * np.where(since > 0, step, 0.0), dtype=np.float64)
+
+
+OIL_CHANGE = Effect(
+    slug="oil_change",
+    title="The oil was changed",
+    physics="Fresh oil has another viscosity and fresh friction modifiers: the viscous term steps, the boundary friction a "
+    "little.",
+    formula="a (C_v |v|^γ + k M̄_c ∂S/∂M̄_c) (1 - l (1 - e^{-2(ζ - ζ_k)/ζ_last})) after ζ_k",
+    source="maintenance practice; friction modifiers deplete with use",
+    family=Family.HISTORY,
+    kind=Kind.COURSE,
+    channels=(),
+    amplitude="step of C_v",
+    unit="%",
+    prior_sd=0.15,
+    positive=False,
+    scale=100.0,
+    shapes=(
+        ShapeParameter(name="cycle ζ_k", unit="cycles", lowest=0.0, highest=float("inf")),
+        ShapeParameter(name="share of M̄_c k", unit="-", lowest=-0.5, highest=0.5, smooth=True),
+        ShapeParameter(name="share lost again as the oil ages", unit="-", lowest=0.0, highest=1.0, smooth=True),
+    ),
+    grid=_oil_change_grid,
+    change=_oil_change_change,
+    before_lag=True,
+    discrepancies=(Discrepancy.SPEED, Discrepancy.LIFE),
+)
+
+
+def _accelerated_wear_grid(facts: Facts) -> tuple[Tried, ...]:
+    if facts.states.size < 4:
+        return ()
+    onsets = sorted({cycles for low, onset, _ in facts.onsets[1:] for cycles in (low, onset)})
+    weight = -float(np.log(len(onsets)))
+    return tuple(Tried(shape=(onset, power), log_weight=weight) for onset in onsets for power in (1.0, 2.0))
+
+
+def _accelerated_wear_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    onset, power = shape
+    late = np.maximum(scene.points.cycles - onset, 0.0) / max(float(scene.facts.states[-1]) - onset, 1.0)
+    return np.asarray(
+        -amplitude * scene.gradient[:, 0] * scene.parameters[:, 0] * np.minimum(late, 10.0) ** power, dtype=np.float64
+    )
+
+
+ACCELERATED_WEAR = Effect(
+    slug="accelerated_wear",
+    title="Wear accelerates late in life",
+    physics="Glazing, lost porosity or torn fibres: from a cycle on the static torque falls faster than eq. 6.",
+    formula="-a M_s ∂S/∂M_s ((ζ - ζ_k)₊/(ζ_last - ζ_k))^q",
+    source="Ompusunggu et al. 2013, figs. 4 and 5: glazing and lost porosity",
+    family=Family.HISTORY,
+    kind=Kind.COURSE,
+    channels=(),
+    amplitude="further loss of static torque by the last state",
+    unit="%",
+    prior_sd=0.1,
+    positive=True,
+    scale=100.0,
+    shapes=(
+        ShapeParameter(name="onset ζ_k", unit="cycles", lowest=0.0, highest=float("inf")),
+        ShapeParameter(name="power q", unit="-", lowest=0.5, highest=3.0),
+    ),
+    grid=_accelerated_wear_grid,
+    change=_accelerated_wear_change,
+    before_lag=True,
+    discrepancies=(Discrepancy.SPEED, Discrepancy.LIFE),
+)
+
+
+#: Blocks whose log energies differ by less than this cannot show a severity (chosen; no table).
+_LEAST_SPREAD = 0.03
+
+
+def _load_severity_grid(facts: Facts) -> tuple[Tried, ...]:
+    if facts.duty_energies.size > 1 and np.ptp(np.log(facts.duty_energies)) > _LEAST_SPREAD:
+        return (Tried(shape=()),)
+    return ()
+
+
+def effective_cycles(cycles: FloatArray, facts: Facts, exponent: float) -> FloatArray:
+    """ζ [n] as it counts for ageing: each engagement by (energy/usual energy)^exponent, usual where no energy was sent."""
+    ends = np.concatenate([[0.0], facts.duty_ends])
+    lengths = np.maximum(np.diff(ends), 0.0)
+    usual = float(np.median(facts.duty_energies))
+    weights = np.exp(np.clip(exponent * np.log(facts.duty_energies / usual), -3.0, 3.0))
+    grown = np.concatenate([[0.0], np.cumsum(lengths * weights)])
+    beyond = np.maximum(cycles - ends[-1], 0.0)
+    return np.asarray(np.interp(cycles, ends, grown) + beyond, dtype=np.float64)
+
+
+def _load_severity_change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
+    counted = effective_cycles(scene.points.cycles, scene.facts, amplitude)
+    return scene.curve_at(cycles=counted) - scene.curve
+
+
+LOAD_SEVERITY = Effect(
+    slug="load_severity",
+    title="Some duty was harder than other",
+    physics="The rate of eq. 6's kinetics grows with the energy of an engagement: harder blocks age the clutch faster.",
+    formula="S(ζ_e) - S(ζ), ζ_e = Σ (E/E_usual)^m over the engagements whose energy was sent",
+    source="models.degradation.general_order: dD/dζ = -k Dⁿ with k by the load's severity",
+    family=Family.HISTORY,
+    kind=Kind.COURSE,
+    channels=("energy_per_cycle_kj",),
+    amplitude="severity exponent m",
+    unit="-",
+    prior_sd=0.7,
+    positive=True,
+    scale=1.0,
+    shapes=(),
+    grid=_load_severity_grid,
+    change=_load_severity_change,
+    before_lag=True,
+    discrepancies=(Discrepancy.LIFE,),
+    counts_in_severity=True,
+)
+
+
+_HOUR, _MINUTE = 3600.0, 60.0
+RECOVERS_WHOLE, RECOVERS_STATIC = 0.0, 1.0
+
+
+def _rest_recovery_grid(facts: Facts) -> tuple[Tried, ...]:
+    if not facts.rests or facts.states.size < 2:
+        return ()
+    gap = float(np.median(np.diff(facts.states)))
+    courses = [(length, 0.0) for length in (0.1 * gap, 0.5 * gap, 1.5 * gap)]
+    if np.isfinite(facts.rest_moments).any():
+        courses += [(0.1 * gap, seconds) for seconds in (150.0, 600.0)]
+    powers = (0.0, 1.0) if np.isfinite(facts.rest_lengths).sum() > 1 else (0.0,)
+    return tuple(
+        Tried(shape=(*course, power, part))
+        for course in courses
+        for power in powers
+        for part in (RECOVERS_WHOLE, RECOVERS_STATIC)
+    )
+
+
+def _rest_recovery_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    length, seconds, power, *part = shape
+    points = scene.points
+    carried = scene.gradient[:, 0] * scene.parameters[:, 0] if part == [RECOVERS_STATIC] else scene.curve
+    share = np.zeros_like(points.cycles)
+    strengths = _strengths(scene.facts) ** power
+    for rest, moment, strength in zip(scene.facts.rests, scene.facts.rest_moments, strengths.tolist(), strict=True):
+        since = points.cycles - rest
+        left = np.where(since >= 0, strength * np.exp(-np.maximum(since, 0.0) / length), 0.0)
+        if seconds > 0 and np.isfinite(moment):
+            waited = np.where(np.isfinite(points.moment), points.moment - moment, points.clock)
+            left = np.where(waited < -_MINUTE, 0.0, left)  # tested at the same cycles, but before the pause
+            left = left * np.exp(-np.clip(waited, 0.0, 50 * seconds) / seconds)
+        share = np.maximum(share, left)
+    return np.asarray(amplitude * carried * share, dtype=np.float64)
+
+
+def _strengths(facts: Facts) -> FloatArray:
+    """[r] What settles grows with the logarithm of the pause; 1 after the longest, and where the length is not known."""
+    grown = np.log1p(np.maximum(np.array(facts.rest_lengths, dtype=np.float64), 60.0) / _HOUR)
+    timed = np.isfinite(grown)
+    return np.where(timed, grown / max(float(grown[timed].max(initial=0.0)), 1e-9), 1.0)
+
+
+REST_RECOVERY = Effect(
+    slug="rest_recovery",
+    title="Friction recovered during a rest",
+    physics="While the clutch rests additives settle on the lining and oil drains: friction starts away from its course "
+    "and returns to it within some cycles or minutes of sliding.",
+    formula="a S (ln(1 + rest/1 h)/ln(1 + longest/1 h))^r e^{-(ζ - ζ_rest)/ζ_c}, S or M_s ∂S/∂M_s; with the clock also "
+    "e^{-(t - t_rest)/τ}",
+    source="boundary films of friction modifiers re-form at rest",
+    family=Family.HISTORY,
+    kind=Kind.COURSE,
+    channels=("started_at",),
+    amplitude="recovery at the end of the longest rest",
+    unit="%",
+    prior_sd=0.04,
+    positive=False,
+    scale=100.0,
+    shapes=(
+        ShapeParameter(name="length ζ_c", unit="cycles", lowest=1.0, highest=float("inf")),
+        ShapeParameter(name="settling time τ", unit="s", lowest=0.0, highest=float("inf")),
+        ShapeParameter(name="power of the rest's length r", unit="-", lowest=0.0, highest=2.0, smooth=True),
+        ShapeParameter(name="what is changed", unit="-", lowest=RECOVERS_WHOLE, highest=RECOVERS_STATIC),
+    ),
+    grid=_rest_recovery_grid,
+    change=_rest_recovery_change,
+    before_lag=True,
+    discrepancies=(Discrepancy.SPEED, Discrepancy.LIFE, Discrepancy.CLOCK),
+)

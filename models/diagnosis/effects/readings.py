@@ -1,0 +1,334 @@
+"""The torque sensor's zero moved: at once, along the test, or along the life.
+
+The pressure gauge is off: the pressure at the clutch is not the recorded one.
+
+Plateaus too short: each reading still contains a share of the plateau before.
+
+The torque channel lags the speed channel.
+"""
+
+import math
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.baseline.laws import Scene
+from models.diagnosis.design.facts import Facts
+from models.diagnosis.effects.effect import (
+    Discrepancy,
+    Effect,
+    Family,
+    Kind,
+    Measure,
+    Shape,
+    ShapeParameter,
+    Tried,
+    ends_of,
+    phases_of,
+)
+
+#: Courses of the zero: one offset from a cycle on, along the test's clock (straight, or settling), along the life by cycles
+#: or by the days that it took.
+STEP, CLOCK, SETTLING, LIFE, DAYS = 0.0, 1.0, 2.0, 3.0, 4.0
+#: Between these too a size is averaged: x^q and x (1 + s)/(x + s) along the life, without knots that may be off, by cycles
+#: or by days; their powers q, and s (chosen, with those of a pressure's offset).
+EVEN, EVEN_DAYS, FLATTENING, FLATTENING_DAYS = 5.0, 6.0, 7.0, 8.0
+POWERS, FLATTENED = (0.5, 0.7, 1.0, 1.4, 2.0), (0.1, 0.3, 1.0)
+_HOUR = 3600.0
+#: Times [s] after which a zero has settled to 1/e, each refined by the factor e^x, x the first of the knots below.
+TIMES = (120.0, 400.0)
+#: Knots over life at which a zero may be off its straight course, in amplitudes; on a straight course it is off by none.
+KNOTS, STRAIGHT = (0.0, 1 / 3, 2 / 3, 1.0), (0.0, 0.0)
+
+
+def _torque_zero_shift_grid(facts: Facts) -> tuple[Tried, ...]:
+    zeroed = facts.sensor_zeros
+    tried = [Tried(shape=(STEP, -1.0, *STRAIGHT), log_weight=-1.0), Tried(shape=(CLOCK, 0.0, *STRAIGHT))]
+    weight = -float(np.log(len(TIMES)))
+    tried += [Tried(shape=(SETTLING, tau, *STRAIGHT), log_weight=weight) for tau in TIMES]
+    for low, onset, high in facts.onsets:
+        logged = any(low <= cycles <= high for cycles in zeroed)
+        weight = 0.0 if logged else -float(np.log(len(facts.onsets)))
+        tried.append(Tried(shape=(STEP, onset, *STRAIGHT), log_weight=weight))
+    if facts.states.size > 2:
+        courses = (LIFE,) if facts.first_moment is None else (LIFE, DAYS)
+        weight = -0.7 - float(np.log(len(courses)))
+        tried += [
+            Tried(shape=(course, power, *STRAIGHT), log_weight=weight)
+            for course in courses
+            for power in (0.5, 1.0, 2.0)
+        ]
+    return tuple(tried)
+
+
+def _torque_zero_shift_courses(facts: Facts) -> tuple[Tried, ...]:
+    tried = list(_torque_zero_shift_grid(facts))
+    if facts.states.size > 2:
+        timed = facts.first_moment is not None
+        weight = -0.7 - float(np.log((len(POWERS) + len(FLATTENED)) * (1 + timed)))
+        for course, values in (
+            (EVEN, POWERS),
+            (FLATTENING, FLATTENED),
+            (EVEN_DAYS, POWERS),
+            (FLATTENING_DAYS, FLATTENED),
+        ):
+            if timed or course in {EVEN, FLATTENING}:
+                tried += [Tried(shape=(course, value, *STRAIGHT), log_weight=weight) for value in values]
+    return tuple(tried)
+
+
+def _torque_zero_shift_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    course, value, *off = shape
+    clock, cycles = scene.points.clock, scene.points.cycles
+    if course == STEP:
+        share = np.where(cycles > value, 1.0, 0.0)
+    elif course == CLOCK:
+        share = clock / _HOUR * 2.0
+    elif course == SETTLING:
+        share = -np.expm1(-np.maximum(clock, 0.0) / (value * np.exp(off[0])))
+    else:
+        days = course in {DAYS, EVEN_DAYS, FLATTENING_DAYS}
+        life = np.maximum(_gone(scene) if days else (cycles - scene.facts.states[0]) / scene.facts.life, 0.0)
+        if course in {LIFE, DAYS}:
+            share = life**value + np.interp(life, KNOTS, [0.0, *off, 0.0])
+        elif course in {EVEN, EVEN_DAYS}:
+            share = life**value
+        else:
+            share = life * (1.0 + value) / (life + value)
+    return np.asarray(amplitude * scene.points.sign * share, dtype=np.float64)
+
+
+def _gone(scene: Scene) -> FloatArray:
+    """The share [P] of the campaign's days that has gone; where a test was not timed, of its cycles."""
+    facts, moment = scene.facts, scene.points.moment
+    by_cycles = np.asarray((scene.points.cycles - facts.states[0]) / facts.life, dtype=np.float64)
+    if facts.first_moment is None or facts.last_moment is None:
+        return by_cycles
+    gone = (moment - facts.first_moment) / (facts.last_moment - facts.first_moment)
+    return np.asarray(np.where(np.isnan(moment), by_cycles, gone), dtype=np.float64)
+
+
+TORQUE_ZERO_SHIFT = Effect(
+    slug="torque_zero_shift",
+    title="The torque sensor's zero has shifted",
+    physics="The sensor's reading without load is not zero: from a cycle on, drifting with the test's clock (it warms), or "
+    "creeping along the life, by cycles or by days. It adds the same torque at every speed and pressure.",
+    formula="a · step(ζ > ζ_k), a · t/30 min, a (1 - e^{-t/τ}), or a · (ζ/ζ_last)^q or the same in days, with the sensor's "
+    "sign",
+    source="strain-gauge transducers: ISO 376, zero drift and creep",
+    family=Family.SENSOR,
+    kind=Kind.ARTEFACT,
+    channels=("oil_temperature_c",),
+    amplitude="zero shift",
+    unit="Nm",
+    prior_sd=0.5,
+    positive=False,
+    scale=1.0,
+    shapes=(
+        ShapeParameter(name="course", unit="-", lowest=0.0, highest=8.0),
+        ShapeParameter(name="onset or settling time", unit="cycles or s", lowest=-1.0, highest=float("inf")),
+        *(
+            ShapeParameter(
+                name=f"off its course at {share:.0%} of life, or log of the settling time's factor",
+                unit="-",
+                lowest=-0.8,
+                highest=0.8,
+                smooth=True,
+            )
+            for share in KNOTS[1:-1]
+        ),
+    ),
+    grid=_torque_zero_shift_grid,
+    courses=_torque_zero_shift_courses,
+    change=_torque_zero_shift_change,
+    grows_with=Measure.TORQUE,
+    before_lag=False,
+    discrepancies=(Discrepancy.LIFE, Discrepancy.CLOCK),
+)
+
+
+#: Courses of the offset over life x = ζ/ζ_last, 1 at its end: constant, x^q, from a cycle on, or x (1 + s)/(x + s).
+OFFSET_CONSTANT, OFFSET_GROWING, OFFSET_STEP, OFFSET_SETTLING = 0.0, 1.0, 2.0, 3.0
+#: Powers q from which a fit starts, those between which a size is averaged, and values of s (chosen: so close that the size
+#: moves by about its own deviation from one to the next).
+OFFSET_STARTS, OFFSET_POWERS, OFFSET_SETTLED = (
+    (0.5, 1.0, 2.0),
+    (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 2.8),
+    (0.1, 0.3, 1.0),
+)
+
+
+def _pressure_offset_grid(facts: Facts) -> tuple[Tried, ...]:
+    tried = [Tried(shape=(OFFSET_CONSTANT, 0.0, 0.0))]
+    if facts.states.size > 2:
+        tried += [Tried(shape=(OFFSET_GROWING, 0.0, math.log(power))) for power in OFFSET_STARTS]
+        tried += _offset_steps(facts)
+    return tuple(tried)
+
+
+def _pressure_offset_courses(facts: Facts) -> tuple[Tried, ...]:
+    tried = [Tried(shape=(OFFSET_CONSTANT, 0.0, 0.0))]
+    if facts.states.size > 2:
+        log_weight = math.log(len(OFFSET_STARTS) / (len(OFFSET_POWERS) + len(OFFSET_SETTLED)))
+        tried += [Tried(shape=(OFFSET_GROWING, 0.0, math.log(power)), log_weight=log_weight) for power in OFFSET_POWERS]
+        tried += [Tried(shape=(OFFSET_SETTLING, share, 0.0), log_weight=log_weight) for share in OFFSET_SETTLED]
+        tried += _offset_steps(facts)
+    return tuple(tried)
+
+
+def _offset_steps(facts: Facts) -> list[Tried]:
+    weight = -math.log(max(len(facts.onsets), 1))
+    return [Tried(shape=(OFFSET_STEP, onset, 0.0), log_weight=weight) for _, onset, _ in facts.onsets]
+
+
+def _pressure_offset_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    course, value, log_power = shape
+    cycles = scene.points.cycles
+    life = np.maximum((cycles - scene.facts.states[0]) / scene.facts.life, 0.0)
+    if course == OFFSET_CONSTANT:
+        share = np.ones_like(cycles)
+    elif course == OFFSET_GROWING:
+        share = life ** math.exp(log_power)
+    elif course == OFFSET_STEP:
+        share = np.where(cycles > value, 1.0, 0.0)
+    else:
+        share = life * (1.0 + value) / (life + value)
+    pressed = np.maximum(scene.points.pressure + amplitude * share, 0.0)  # nothing pulls the plates apart
+    return np.asarray(scene.curve_at(pressure=pressed) - scene.curve, dtype=np.float64)
+
+
+PRESSURE_OFFSET = Effect(
+    slug="pressure_offset",
+    title="The pressure reading is off",
+    physics="The pressure at the clutch differs from the gauge's reading; the torque changes as it does with pressure.",
+    formula="S(p + a) - S(p), a constant, growing as (ζ/ζ_last)^q or towards an end, or from a cycle on",
+    source="Ompusunggu et al. 2013, fig. 1: one gauge in the line, none at the piston",
+    family=Family.SENSOR,
+    kind=Kind.ARTEFACT,
+    channels=(),
+    amplitude="pressure offset",
+    unit="bar",
+    prior_sd=0.15e5,
+    positive=False,
+    scale=1e-5,
+    shapes=(
+        ShapeParameter(name="course", unit="-", lowest=0.0, highest=3.0),
+        ShapeParameter(name="onset or s", unit="cycles or -", lowest=0.0, highest=float("inf")),
+        ShapeParameter(
+            name="log of the power q", unit="-", lowest=math.log(0.3), highest=math.log(3.0), smooth=True, held=True
+        ),
+    ),
+    grid=_pressure_offset_grid,
+    courses=_pressure_offset_courses,
+    change=_pressure_offset_change,
+    grows_with=Measure.PRESSURE,
+    before_lag=True,
+    discrepancies=(Discrepancy.LIFE,),
+)
+
+
+#: What a plateau starts from: the torque before, or the speed before (the film's), at the same pressure or across a change
+#: too.
+TORQUE, TORQUE_WITHIN, SPEED = 0.0, 1.0, 2.0
+#: Of the share that is read, this much is still there at the dwell's end, to be carried on: all where only that is read.
+CARRIED = 0.5
+
+
+def _unsettled_dwell_grid(_facts: Facts) -> tuple[Tried, ...]:
+    return tuple(Tried(shape=(start, CARRIED)) for start in (TORQUE, TORQUE_WITHIN, SPEED))
+
+
+def _unsettled_dwell_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    start, *carried = shape
+    points = scene.points
+    previous = points.previous
+    follows = previous >= 0
+    before = np.where(follows, previous, 0)
+    if start != TORQUE:
+        follows = follows & (np.abs(points.pressure[before] - points.pressure) < 0.02 * points.pressure)
+    follows = follows & (
+        points.engaged * points.engaged[before] > 0
+    )  # an open clutch's drag is not carried over as friction
+    if start == SPEED:
+        difference = scene.by_velocity * (points.velocity[before] - points.velocity)
+        limit = np.abs(scene.curve)
+        difference = np.clip(difference, -limit, limit)
+    else:
+        share = float(np.clip(amplitude * (carried[0] if carried else 0.0), 0.0, 0.95))
+        difference = ends_of(scene.curve, np.where(follows, share, 0.0))[before] - scene.curve
+    return np.asarray(amplitude * np.where(follows, difference, 0.0), dtype=np.float64)
+
+
+UNSETTLED_DWELL = Effect(
+    slug="unsettled_dwell",
+    title="Plateaus were not settled",
+    physics="Friction approaches its steady value exponentially after a step; a reading taken too early still contains a "
+    "share of the plateau before.",
+    formula="a (x_before - S), x = S + k a (x_before - S) what a plateau ends with; a = e^{-dwell/τ} averaged over what was "
+    "read",
+    source="Ompusunggu et al. 2013, section 2.3.3: 5 s a plateau; real transients in tests/real",
+    family=Family.DWELL,
+    kind=Kind.ARTEFACT,
+    channels=(),
+    amplitude="share of the plateau before",
+    unit="%",
+    prior_sd=0.05,
+    positive=True,
+    scale=100.0,
+    shapes=(
+        ShapeParameter(name="what a plateau starts from", unit="-", lowest=0.0, highest=2.0),
+        ShapeParameter(name="of the share, what is carried on, k", unit="-", lowest=0.0, highest=1.0, smooth=True),
+    ),
+    grid=_unsettled_dwell_grid,
+    change=_unsettled_dwell_change,
+    before_lag=False,
+    discrepancies=(Discrepancy.SPEED,),
+)
+
+
+def _channel_delay_grid(_facts: Facts) -> tuple[Tried, ...]:
+    return (Tried(shape=()),)
+
+
+def _channel_delay_change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
+    points = scene.points
+    out = np.zeros_like(scene.curve)
+    looping = np.flatnonzero(points.loop >= 0)
+    if looping.size:
+        phases = phases_of(points, looping)
+        curves = scene.curve[looping].reshape(-1, phases)
+        step = amplitude * points.angular_frequency[looping].reshape(-1, phases)[:, :1] * phases / (2 * np.pi)
+        out[looping] = (_shifted(curves, np.clip(step, -phases, phases)) - curves).ravel()
+    return out
+
+
+def _shifted(curves: FloatArray, steps: FloatArray) -> FloatArray:
+    """Periodic curves [l, k] as they were `steps` [l, 1] phases before, by parabolas through the nearest three."""
+    whole = np.round(steps)
+    x = steps - whole
+    at = (np.arange(curves.shape[1]) - whole.astype(np.intp)) % curves.shape[1]
+    here, after, before = (np.take_along_axis(curves, (at + k) % curves.shape[1], axis=1) for k in (0, 1, -1))
+    return np.asarray(here - 0.5 * x * (after - before) + 0.5 * x * x * (after - 2 * here + before), dtype=np.float64)
+
+
+CHANNEL_DELAY = Effect(
+    slug="channel_delay",
+    title="The torque channel is delayed",
+    physics="A filter or the recorder delays torque against speed: while accelerating, torque belongs to a lower speed.",
+    formula="S(v(t - δ)) - S(v(t)), to first order -δ dS/dt",
+    source="anti-aliasing filters and multiplexed recorders; no friction is in it",
+    family=Family.DYNAMIC,
+    kind=Kind.LAG,
+    channels=("time_s",),
+    amplitude="delay",
+    unit="ms",
+    prior_sd=0.08,
+    positive=False,
+    scale=1000.0,
+    shapes=(),
+    grid=_channel_delay_grid,
+    change=_channel_delay_change,
+    before_lag=True,
+    discrepancies=(),
+    opposite_physics="Torque is ahead of the speed: a filter or the recorder delays the speed channel.",
+)

@@ -1,0 +1,290 @@
+"""Oil viscosity over temperature after Walther and ASTM D341, from two measured points.
+
+    log10 log10(ν + 0.7) = A - B log10 T,    ν in mm²/s (cSt), T in K
+
+Valid from about 2 cSt upwards and from -40 to 150 °C for mineral and similar synthetic oils.
+
+Source: ASTM D341-20, eq. 1; the two points are the clutch record's (40 °C and 100 °C).
+
+Oil warmer or colder than usual is thinner or thicker, and shears and carries accordingly.
+
+Friction heats the interface above the oil's temperature, and torque falls with it.
+
+The interface's warmth is computed from the power density. Where the plate's temperature was measured it is the plate's own
+rise above the oil, over what the campaign's plate rises by at the reference's flux, so that the amplitude keeps its meaning.
+A plate that stays at the oil's temperature leaves nothing of this effect.
+
+The viscous term grows with another power of speed than 0.3.
+
+Oil dragged around between and beside the discs: torque that grows with speed, whatever the pressure.
+"""
+
+import math
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.baseline.laws import Scene
+from models.diagnosis.campaign import Oil
+from models.diagnosis.design.facts import Facts
+from models.diagnosis.effects.effect import (
+    Discrepancy,
+    Effect,
+    Family,
+    Kind,
+    Measure,
+    Shape,
+    ShapeParameter,
+    Tried,
+    followed,
+    phases_of,
+)
+from models.friction.stribeck import GAMMA
+
+_CST = 1e-6
+_LOW, _HIGH = 273.15 + 40.0, 273.15 + 100.0
+
+
+def viscosity(temperature: FloatArray, oil: Oil) -> FloatArray:
+    """ν [n] m²/s at temperature [n] K > 0.
+
+    >>> viscosity(np.array([353.15, 363.15]), Oil()).round(8).tolist()
+    [1.49e-05, 1.163e-05]
+    """
+    at_40, at_100 = (np.log10(np.log10(point / _CST + 0.7)) for point in (oil.viscosity_40, oil.viscosity_100))
+    slope = (at_40 - at_100) / (np.log10(_HIGH) - np.log10(_LOW))
+    double_log = at_40 - slope * (np.log10(np.clip(temperature, 200.0, 600.0)) - np.log10(_LOW))
+    return np.asarray(np.maximum(10.0 ** (10.0**double_log) - 0.7, 1e-3) * _CST, dtype=np.float64)
+
+
+def log_viscosity_ratio(temperature: FloatArray, reference: float, oil: Oil) -> FloatArray:
+    """ln ν(T)/ν(reference) [n]; 0 where the temperature [n] K was not measured (NaN)."""
+    measured = np.where(np.isfinite(temperature), temperature, reference)
+    return np.asarray(np.log(viscosity(measured, oil) / viscosity(np.array([reference]), oil)), dtype=np.float64)
+
+
+#: κ where friction depends on speed times viscosity alone: V_S goes with 1/ν where C_v v^γ goes with ν^γ.
+HERSEY = -1.0 / GAMMA
+#: Log of the settling time [s] of a film that follows the oil's thermometer at once, and those from which a fit starts. With
+#: a film at once, sizes on the blind rig (late by 4 to 30 s) were 0.65 to 1.26 of the truth (median 0.88): 12 of 20
+#: intervals of 90 % held it, 17 with this.
+AT_ONCE, STARTS = math.log(0.3), (math.log(1.0), math.log(15.0))
+
+
+def _oil_temperature_grid(facts: Facts) -> tuple[Tried, ...]:
+    if not facts.temperature_measured:
+        return ()
+    return tuple(Tried(shape=(share, late)) for share in (HERSEY, -1.0, 0.0, 0.5, 1.0) for late in STARTS)
+
+
+def _oil_temperature_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    measured = log_viscosity_ratio(scene.points.temperature, scene.facts.reference_temperature, scene.facts.oil)
+    logs = followed(measured, scene.points, math.exp(shape[1]))
+    exponent = np.clip(amplitude * logs, -5.0, 5.0)
+    m_s, m_c, v_s, _ = scene.parameters.T
+    later = np.exp(-np.minimum(v_s * np.exp(np.clip(shape[0] * exponent, -3.0, 3.0)) / scene.points.velocity, 700.0))
+    film = scene.points.engaged * m_s * (m_c - 1.0) * (later - scene.decay)
+    return np.asarray(scene.viscous * np.expm1(exponent) + film, dtype=np.float64)
+
+
+OIL_TEMPERATURE = Effect(
+    slug="oil_temperature",
+    title="Oil temperature changes the viscosity",
+    physics="Friction was measured at other oil temperatures than the usual one; thinner oil shears more easily and, the "
+    "film being thinner, changes over to asperity contact at a higher speed.",
+    formula="C_v |v|^γ ((ν(T)/ν_ref)^β - 1), and V_S (ν(T)/ν_ref)^{κβ} for V_S, ν by ASTM D341 at a film's "
+    "temperature, which follows the oil's within τ; κ = -1/γ with β = γ is Hersey's similarity",
+    source="ASTM D341-20; M. D. Hersey, J. Wash. Acad. Sci. 4 (1914) 542; Ompusunggu et al. 2013, section 2.3 (80 to 90 °C)",
+    family=Family.THERMAL,
+    kind=Kind.ARTEFACT,
+    channels=("oil_temperature_c",),
+    amplitude="viscosity exponent β",
+    unit="-",
+    prior_sd=0.7,
+    positive=True,
+    scale=1.0,
+    shapes=(
+        ShapeParameter(name="share of V_S κ", unit="-", lowest=-5.0, highest=2.0, smooth=True),
+        ShapeParameter(
+            name="log of the film's settling time τ", unit="ln s", lowest=AT_ONCE, highest=math.log(60.0), smooth=True
+        ),
+    ),
+    grid=_oil_temperature_grid,
+    change=_oil_temperature_change,
+    before_lag=True,
+    discrepancies=(Discrepancy.SPEED, Discrepancy.MOTION),
+)
+
+
+#: The heat flux to which the amplitude refers [W/m²]: the reference's 20 Nm at 1970 rpm and some, on two faces.
+REFERENCE_FLUX = 0.32e6
+#: What weakens: all of the friction, or the oil's shear.
+WHOLE, VISCOUS = 0.0, 1.0
+#: The most that a measured rise counts for, of that at the reference's flux: a faulty thermometer must not overflow.
+_MOST_WARMTH = 30.0
+
+
+def _interface_heating_grid(facts: Facts) -> tuple[Tried, ...]:
+    if facts.plate_in_all_tests:  # settling and saturation are in what was measured
+        return tuple(Tried(shape=(0.0, part, 0.0)) for part in (WHOLE, VISCOUS))
+    return tuple(
+        Tried(shape=(float(np.log(settling)), part, saturation))
+        for settling in (0.03, 0.3, 1.5, 6.0, 30.0)
+        for part in (WHOLE, VISCOUS)
+        for saturation in (0.0, 1.5)
+    )
+
+
+def _interface_heating_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    log_settling, part, saturation = shape
+    warmth = _measured(scene, _computed(scene, float(np.exp(log_settling)), saturation))
+    carried = scene.curve if part == WHOLE else scene.viscous
+    return np.asarray(-carried * -np.expm1(-amplitude * warmth), dtype=np.float64)
+
+
+def _measured(scene: Scene, computed: FloatArray) -> FloatArray:
+    """The interface's warmth [P], by the plate's temperature where it was measured, else as computed."""
+    rise, warming = scene.points.plate_rise, scene.facts.plate_warming
+    if warming is None:
+        return computed
+    at_rest, per_flux = warming
+    warmth = np.clip((rise - at_rest) / (per_flux * REFERENCE_FLUX), -_MOST_WARMTH, _MOST_WARMTH)
+    return np.where(np.isfinite(rise), warmth, computed)
+
+
+def _computed(scene: Scene, settling: float, saturation: float) -> FloatArray:
+    """The interface's warmth [P] by the flux of friction, saturating and settling in `settling` s; 1 at the reference's."""
+    geometry = scene.facts.geometry
+    power = np.abs(scene.curve) * scene.points.velocity / geometry.mean_radius
+    heat = power / (geometry.friction_faces * geometry.lining_area * REFERENCE_FLUX)
+    heat = heat * (1.0 + saturation) / (1.0 + saturation * heat)
+    return _around(followed(heat, scene.points, settling), scene, settling)
+
+
+def _around(heat: FloatArray, scene: Scene, settling: float) -> FloatArray:
+    """Loops: the periodic answer of the same first-order lag, harmonic by harmonic."""
+    points = scene.points
+    looping = np.flatnonzero(points.loop >= 0)
+    if not looping.size:
+        return heat
+    phases = phases_of(points, looping)
+    waves = np.fft.rfft(heat[looping].reshape(-1, phases), axis=1)
+    frequency = points.angular_frequency[looping].reshape(-1, phases)[:, :1]
+    waves /= 1 + 1j * np.arange(waves.shape[1]) * frequency * settling
+    out = heat.copy()
+    out[looping] = np.fft.irfft(waves, phases, axis=1).ravel()
+    return out
+
+
+INTERFACE_HEATING = Effect(
+    slug="interface_heating",
+    title="Frictional heat at the interface lowers the torque",
+    physics="Frictional power heats the interface above the oil's temperature; the boundary film and the oil there lose "
+    "strength.",
+    formula="-S (1 - e^{-a w}), w the heat flux |S| ω/A over 0.32 W/mm², saturating by s and lagging by τ; S or its "
+    "viscous part; where the plate's temperature was measured w is its rise above the oil over that at 0.32 W/mm²",
+    source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
+    family=Family.THERMAL,
+    kind=Kind.ARTEFACT,
+    channels=(),
+    amplitude="loss of torque at 0.32 W/mm²",
+    unit="%",
+    prior_sd=0.1,
+    positive=True,
+    scale=100.0,
+    shapes=(
+        ShapeParameter(name="log of the settling time τ", unit="ln s", lowest=-5.0, highest=6.0, smooth=True),
+        ShapeParameter(name="what weakens", unit="-", lowest=0.0, highest=1.0),
+        ShapeParameter(name="saturation s", unit="-", lowest=0.0, highest=6.0),
+    ),
+    grid=_interface_heating_grid,
+    change=_interface_heating_change,
+    before_lag=True,
+    discrepancies=(Discrepancy.SPEED, Discrepancy.MOTION),
+)
+
+
+def _viscous_exponent_grid(_facts: Facts) -> tuple[Tried, ...]:
+    return (Tried(shape=()),)
+
+
+def _viscous_exponent_change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
+    middle = scene.laws.frame.reference_velocity
+    exponent = np.clip(amplitude, -0.6, 1.5) * np.log(scene.points.velocity / middle)
+    return np.asarray(scene.viscous * np.expm1(exponent), dtype=np.float64)
+
+
+VISCOUS_EXPONENT = Effect(
+    slug="viscous_exponent",
+    title="The viscous term has another exponent than 0.3",
+    physics="How shear grows with speed depends on the film (0.3 is elastohydrodynamic); grooves, porosity or another oil "
+    "give another power.",
+    formula="C_v |v|^γ ((|v|/v_0)^δ - 1), v_0 the middle of the speeds",
+    source="Ompusunggu et al. 2013, section 3.1.2: γ = 0.3 fixed beforehand",
+    family=Family.VISCOUS,
+    kind=Kind.ARTEFACT,
+    channels=(),
+    amplitude="change of exponent δ",
+    unit="-",
+    prior_sd=0.2,
+    positive=False,
+    scale=1.0,
+    shapes=(),
+    grid=_viscous_exponent_grid,
+    change=_viscous_exponent_change,
+    before_lag=True,
+    discrepancies=(Discrepancy.SPEED,),
+)
+
+
+#: Log prior odds [nats] against a film that ruptures or a drag independent of viscosity: Newton's has neither (chosen; no
+#: table).
+_UNUSUAL = 1.5
+
+
+def _hydrodynamic_drag_grid(facts: Facts) -> tuple[Tried, ...]:
+    thinning = (0.0, 1.0) if facts.temperature_measured else (0.0,)
+    courses = ((0.6, 0.0), (1.0, 0.0), (1.5, 0.0), (1.0, 0.5), (1.0, 2.0))
+    return tuple(
+        Tried(shape=(power, rupture, t, lags), log_weight=-_UNUSUAL * ((rupture > 0.0) + (t < max(thinning))))
+        for power, rupture in courses
+        for t in thinning
+        for lags in (0.0, 1.0)
+    )
+
+
+def _hydrodynamic_drag_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    power, rupture, thinning, _ = shape
+    logs = log_viscosity_ratio(scene.points.temperature, scene.facts.reference_temperature, scene.facts.oil)
+    relative = scene.points.velocity / scene.laws.frame.reference_velocity
+    share = relative**power * (1.0 + rupture) / (1.0 + rupture * relative**2)
+    # an open clutch drags through another gap: that is the baseline's (`Scene.open_powers`), and says nothing about this one
+    return np.asarray(amplitude * scene.points.engaged * share * np.exp(thinning * logs), dtype=np.float64)
+
+
+HYDRODYNAMIC_DRAG = Effect(
+    slug="hydrodynamic_drag",
+    title="Hydrodynamic drag beside the friction",
+    physics="Oil is sheared in grooves and gaps: a torque that grows with speed and viscosity, whatever the pressure.",
+    formula="a (v/v_0)^m (1 + r)/(1 + r (v/v_0)²) (ν(T)/ν_ref)^t, v_0 the middle of the speeds",
+    source="Kato et al., drag torque of disengaged wet clutches; Newtonian shear in an annular gap",
+    family=Family.VISCOUS,
+    kind=Kind.ARTEFACT,
+    channels=(),
+    amplitude="drag in mid speed",
+    unit="Nm",
+    prior_sd=0.5,
+    positive=True,
+    scale=1.0,
+    shapes=(
+        ShapeParameter(name="power m", unit="-", lowest=0.5, highest=1.8, smooth=True),
+        ShapeParameter(name="rupture of the film r", unit="-", lowest=0.0, highest=5.0),
+        ShapeParameter(name="viscosity's exponent t", unit="-", lowest=0.0, highest=1.0),
+        ShapeParameter(name="whether friction lags behind it", unit="-", lowest=0.0, highest=1.0),
+    ),
+    grid=_hydrodynamic_drag_grid,
+    change=_hydrodynamic_drag_change,
+    grows_with=Measure.TORQUE,
+    before_lag=None,
+    discrepancies=(Discrepancy.SPEED, Discrepancy.MOTION),
+)

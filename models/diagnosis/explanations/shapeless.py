@@ -1,0 +1,265 @@
+"""Periodogram over the tests' clock: a line is torque that oscillates while a test runs, with its own phase in every run.
+
+    P(ω) = Σ_runs |Σ_i r_i m_i e^{-iωt_i}|² / Σ_i m_i²
+
+with r the whitened residual of a run, its gain taken out, and m = 1/σ for an oscillation in Nm or M/σ for one in shares of
+the torque, at the plateaus' own times: noise in proportion to torque would smear a line in a plain transform. Where there is
+no line, P relative to its neighbourhood is a sum of exponential variables.
+
+An outlying run: another clutch, a unit that was mistyped, a cable the wrong way round.
+
+No effect is in one run alone, and a report that only says "cycles" sends an engineer through all of them. As an alternative,
+one run of R has a curve of its own, Σ c_jk cos(jπv) cos(kπp) beside the baseline's, with normal c of some size,
+
+    evidence = ln Σ_g mean_τ ∫ p(data | θ, c; g) p(θ) N(c; 0, τ²) d(θ, c) - ln R        [nats]
+
+about the baseline that the other runs have.
+
+Evidence of an oil temperature that was not measured: any slow course, a different one in every test.
+
+In a test of duration T the log of the viscosity may follow a_0 + Σ_k a_k cos(2πkt/T) + b_k sin(2πkt/T), k = 1 ... 4, with
+normal coefficients whose deviations fall with k; in loops it is one number a test. The viscous term follows it. That
+is many columns and no single amplitude to estimate, so it is judged by its marginal likelihood alone,
+
+    evidence = ½ sᵀ (I + Λ⁻¹)⁻¹ s - ½ ln det(1 + Λ I)        (s the score, I the information, Λ the prior variances)
+
+averaged over how strongly temperature varies, from test to test and separately within a test, and over the gains'
+scatter, as every other evidence is: what gains explain as well is no evidence of a temperature.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.ndimage import median_filter
+from scipy.special import gammaincc, gammaincinv, logsumexp
+
+from models.arrays import FloatArray
+from models.diagnosis.criteria import (
+    CHANGES_BETWEEN_TESTS,
+    CHANGES_WITHIN_TESTS,
+    OUTLYING_DEVIATIONS,
+    OUTLYING_FEWEST_RUNS,
+    OUTLYING_SHARE,
+    USUAL_VISCOSITY_CHANGE,
+)
+from models.diagnosis.design.design import Design
+from models.diagnosis.explanations.evidence import projections_beside
+from models.diagnosis.noise.covariance import Noise, whitened
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, refit_beside
+from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.projection import Projected, gram_of, projections_of, without_likely_gains
+from models.gaussian_evidence import log_gain, log_mean, log_sum
+
+#: Steps of half a cycle a test: the first (two and a half cycles), slower ones that it must exceed, and the size of a
+#: neighbourhood.
+_FIRST, _SLOWER, _NEIGHBOURS = 5, 3, 61
+#: Fewer plateaus in all, or in the longest run, show no line.
+_FEWEST, _FEWEST_IN_A_RUN = 64, 32
+#: Frequencies at most, and gaps between plateaus, in usual steps, beyond which a pause is shortened to that length.
+_MOST, _LONGEST_GAP = 4000, 5.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HighestLine:
+    """The highest line: its power above the middle of its neighbourhood, its p-value among all that were looked at, and its
+    place (frequency by frequency, in Nm and in shares of the torque)."""
+
+    value: float = 0.0
+    p_value: float = 1.0
+    index: int = -1
+
+    @property
+    def evidence(self) -> float:
+        """What the p-value is worth at most [nats], 1/(-e p ln p) (Sellke, Bayarri and Berger, Am. Stat. 55 (2001) 62)."""
+        rare = -float(np.log(max(self.p_value, 1e-300)))
+        return rare - 1.0 - float(np.log(rare)) if rare > 1.0 else 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """Times [n] s from the run's start, pauses cut short; whitened residual [n] without the gain; weights m [n, 2]."""
+
+    time: FloatArray
+    left: FloatArray
+    weights: FloatArray
+
+    def power(self, first: int, last: int, spacing: float) -> FloatArray:
+        """[last - first, 2] at angular frequencies `spacing` [rad/s] times first ... last - 1."""
+        wave, step = np.exp(-1j * first * spacing * self.time), np.exp(-1j * spacing * self.time)
+        sums, weighed = np.empty((last - first, 2), dtype=np.complex128), self.left[:, None] * self.weights
+        for k in range(last - first):
+            sums[k] = wave @ weighed
+            wave *= step
+        return np.asarray(np.abs(sums) ** 2 / np.maximum((self.weights**2).sum(axis=0), 1e-300), dtype=np.float64)
+
+
+def lines(problem: FitProblem, residual: FloatArray) -> HighestLine:
+    """The highest line, summed over the runs."""
+    runs = _runs(problem.design, problem.noise, residual)
+    longest = max((run.time.size for run in runs), default=0)
+    if sum(run.time.size for run in runs) < _FEWEST or longest < _FEWEST_IN_A_RUN:
+        return HighestLine()
+    kept = [run for run in runs if run.time.size > 0.5 * longest]
+    duration = float(np.median([run.time[-1] * run.time.size / (run.time.size - 1) for run in kept]))
+    step = float(np.median([np.median(np.diff(run.time)) for run in kept]))
+    last = min(int(duration / step), _MOST) if step > 0.0 else 0
+    if last < _FEWEST_IN_A_RUN:
+        return HighestLine()
+    power = np.sum([run.power(_FIRST - _SLOWER, last, np.pi / duration) for run in kept], axis=0)
+    # a line is above its neighbourhood: noise whose autocorrelation was misjudged is not
+    middle = float(gammaincinv(len(kept), 0.5))
+    for column in power.T:
+        column /= np.maximum(median_filter(column, size=_NEIGHBOURS, mode="reflect") / middle, 1.0)
+    # ... and above everything slower: structure that is larger the slower it is has no period
+    slower = np.maximum.accumulate(power, axis=0)[_SLOWER - 1 : -1]
+    power = np.where(power[_SLOWER:] >= slower, power[_SLOWER:], 0.0)
+    index = int(np.argmax(power))
+    highest = float(power.ravel()[index])
+    tests = 1.5 * power.size
+    return HighestLine(
+        value=max(highest - middle, 0.0),
+        p_value=min(1.0, tests * float(gammaincc(len(kept), highest))),
+        index=index,
+    )
+
+
+def _runs(design: Design, noise: Noise, residual: FloatArray) -> list[_Run]:
+    steady = slice(0, design.plateaus)
+    white = whitened(np.column_stack([residual, design.torque]), design, noise)[steady]
+    runs = []
+    for run in np.unique(design.rows.run[steady]):
+        mine = np.flatnonzero(design.rows.run[steady] == run)
+        left, along = white[mine].T
+        deviation = noise.deviation[mine]
+        steps = np.maximum(np.diff(design.rows.clock[mine], prepend=design.rows.clock[mine[0]]), 0.0)
+        usual = float(np.median(steps[1:])) if mine.size > 1 else 0.0
+        runs.append(
+            _Run(
+                time=np.cumsum(np.minimum(steps, _LONGEST_GAP * usual)),
+                left=left - along * float(along @ left) / max(float(along @ along), 1e-300),
+                weights=np.stack([1 / deviation, np.abs(design.torque[mine]) / deviation], axis=1),
+            )
+        )
+    return runs
+
+
+#: What to do about it.
+ADVICE = "Check that run first."
+#: Orders of the cosines over speed and pressure, and deviations τ of their coefficients, shares of the usual torque.
+_SPEED, _PRESSURE, _SIZES = 4, 2, (0.1, 1.0)
+
+
+def outlying_run(problem: FitProblem, fitted: Fit) -> str:
+    """A sentence on the run whose error is far larger than the others', or nothing."""
+    worst, left = _worst(problem, fitted)
+    if worst is None:
+        return ""
+    design = problem.design
+    here = design.rows.run == worst
+    error, usual = (float(np.sqrt((left[rows] ** 2).mean())) for rows in (here, ~here))
+    run = design.runs[worst]
+    return (
+        f"The run {run.run_id} at {run.cycles:,.0f} cycles is an outlier: the baseline's error there is {error:.2g} Nm RMS, "
+        f"elsewhere {usual:.2g} Nm. {ADVICE}"
+    )
+
+
+def outlier_evidence(problem: FitProblem, fitted: Fit) -> float:
+    """The formula above, of the run whose error is far larger than the others'; -inf where there is none."""
+    worst, left = _worst(problem, fitted)
+    if worst is None:
+        return -np.inf
+    design, deviation = problem.design, problem.noise.deviation
+    here = design.rows.run == worst
+    wide = max(float(np.sqrt(((left / deviation)[here] ** 2).mean())), 1.0)
+    others = problem.with_noise(replace(problem.noise, deviation=np.where(here, wide * wide, 1.0) * deviation))
+    columns = _own_curve(design, here)
+    alone = fit(others, fitted.laws)
+    coefficients = np.linalg.lstsq(columns[here], alone.residual[here], rcond=None)[0]
+    beside = refit_beside(problem, alone, columns @ coefficients)
+    if beside is None:
+        return -np.inf
+    gram = gram_of(problem, beside, columns)
+    projections = projections_beside(gram, problem.noise)
+    logs = [p.evidence + log_mean([log_gain(p.info, p.score, size) for size in _SIZES]) for p in projections]
+    return log_sum(logs) - float(np.log(len(design.runs)))
+
+
+def _own_curve(design: Design, here: NDArray[np.bool_]) -> FloatArray:
+    """[N, m] Nm per unit: smooth in speed and pressure, in one run alone."""
+    waves = [np.ones((here.size, 1))]
+    for values, orders in ((design.rows.velocity, _SPEED), (design.rows.pressure, _PRESSURE)):
+        unit = (values - values.min()) / max(float(np.ptp(values)), 1e-300)
+        own = np.cos(np.pi * unit[:, None] * np.arange(orders + 1))
+        waves.append((waves[-1][:, :, None] * own[:, None, :]).reshape(here.size, -1))
+    return np.where(here, design.usual_torque, 0.0)[:, None] * waves[-1]
+
+
+def _worst(problem: FitProblem, fitted: Fit) -> tuple[int | None, FloatArray]:
+    """The run whose error is far larger than the others', if one is, and the error [N] Nm without what gains make of it."""
+    design = problem.design
+    left = without_likely_gains(problem, fitted)
+    squares = (left / problem.noise.deviation) ** 2
+    count = np.bincount(design.rows.run, minlength=len(design.runs))
+    beyond = np.maximum(np.bincount(design.rows.run, weights=squares, minlength=len(design.runs)) - count, 0.0)
+    worst = int(np.argmax(beyond))
+    least = max(OUTLYING_SHARE * beyond.sum(), OUTLYING_DEVIATIONS**2 * count[worst])
+    if np.count_nonzero(count) < OUTLYING_FEWEST_RUNS or beyond[worst] < least:
+        return None, left
+    return worst, left
+
+
+#: Harmonics of a test's duration.
+_WAVES = 4
+
+
+def temperature_evidence(problem: FitProblem, fitted: Fit) -> float:
+    """Evidence [nats] of unmeasured courses of oil temperature over none."""
+    columns, between, within = _courses(problem.design, fitted)
+    gram = gram_of(problem, fitted, columns)
+    evidences = [
+        (projected.evidence, _averaged(projected, between, within)) for projected in projections_of(gram, problem.noise)
+    ]
+    without, gained = np.array(evidences).T
+    return float(logsumexp(without + gained) - logsumexp(without))
+
+
+def _averaged(projected: Projected, between: FloatArray, within: FloatArray) -> float:
+    """Over the strengths."""
+    logs = [
+        _marginal(projected, (USUAL_VISCOSITY_CHANGE * (b * between + w * within)) ** 2)
+        for b in CHANGES_BETWEEN_TESTS
+        for w in CHANGES_WITHIN_TESTS
+    ]
+    return float(logsumexp(logs) - np.log(len(logs)))
+
+
+def _courses(design: Design, fitted: Fit) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Columns [N, m] of torque and their relative deviations [m] from test to test and within a test."""
+    viscous = fitted.prediction.change_at_rows(design, fitted.prediction.scene.viscous, before_lag=True)
+    columns, relative = [], []
+    for run in np.unique(design.rows.run):
+        here = design.rows.run == run
+        own = np.where(here, viscous, 0.0)
+        columns.append(own)
+        relative.append(0.0)
+        if not design.rows.steady[here].all():
+            continue
+        turn = 2 * np.pi * design.rows.clock / max(float(np.ptp(design.rows.clock[here])), 1e-9)
+        for k in range(1, _WAVES + 1):
+            columns += [own * np.cos(k * turn), own * np.sin(k * turn)]
+            relative += [1.0 / k, 1.0 / k]
+    within = np.array(relative)
+    return np.stack(columns, axis=1), np.where(within == 0, 1.0, 0.0), within
+
+
+def _marginal(projected: Projected, variances: FloatArray) -> float:
+    """The formula above."""
+    root = np.sqrt(variances)
+    unit = root[:, None] * projected.info * root
+    score = root * projected.score
+    factor = np.linalg.cholesky(np.eye(root.size) + 0.5 * (unit + unit.T))
+    half = solve_triangular(factor, score, lower=True)
+    return float(0.5 * (half**2).sum() - np.log(np.diag(factor)).sum())
