@@ -5,8 +5,8 @@ torque is taken off every plateau before a curve is fitted. A *course* (running-
 the clutch and not in eq. 6: its mean torque is taken off the measured course before eq. 6 is tracked, and put back when
 the threshold's first passage is looked for.
 
-What the diagnosis does not know is a weighted set of draws (`effects.fitted_effect`), each one coherent correction of all runs of a
-life: a life is tracked under each, and the prognosis is their mixture.
+What the diagnosis does not know is a weighted set of draws (`effects.fitted_effect`), each one coherent correction of all
+runs of a life: a life is tracked under each, and the prognosis is their mixture.
 """
 
 import math

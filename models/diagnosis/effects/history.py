@@ -1,12 +1,8 @@
-"""Early in life asperities are worn off: friction starts away from eq. 6 and settles onto it.
+"""Effects of a clutch's history: what use, oil and rests do to friction beside eq. 6.
 
-Fresh oil: shear and boundary friction step at a cycle.
-
-Late in life the lining goes faster than eq. 6 says.
-
-Harder engagements age the clutch faster: ζ is energy rather than a count.
-
-After a pause friction is off its course and returns to it with use.
+Running-in (early in life asperities are worn off), an oil change (shear and boundary friction step at a cycle), wear that
+accelerates late in life, load severity (ζ is energy rather than a count), recovery in rests (friction is off its course
+after a pause and returns to it with use).
 """
 
 import numpy as np
@@ -16,7 +12,13 @@ from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
 
+#: What is changed: the static torque's part of the curve, or all of it.
 STATIC, WHOLE = 0.0, 1.0
+
+
+def _carried(scene: Scene, part: float) -> FloatArray:
+    """What a share is of [P] Nm: S, or M_s ∂S/∂M_s."""
+    return scene.curve if part == WHOLE else scene.gradient[:, 0] * scene.parameters[:, 0]
 
 
 def _running_in_grid(facts: Facts) -> tuple[Tried, ...]:
@@ -29,8 +31,9 @@ def _running_in_grid(facts: Facts) -> tuple[Tried, ...]:
 
 def _running_in_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     log_length, part = shape
-    carried = scene.curve if part == WHOLE else scene.gradient[:, 0] * scene.parameters[:, 0]
-    return np.asarray(amplitude * carried * np.exp(-scene.points.cycles / np.exp(log_length)), dtype=np.float64)
+    return np.asarray(
+        amplitude * _carried(scene, part) * np.exp(-scene.points.cycles / np.exp(log_length)), dtype=np.float64
+    )
 
 
 RUNNING_IN = Effect(
@@ -198,7 +201,6 @@ LOAD_SEVERITY = Effect(
 
 
 _HOUR, _MINUTE = 3600.0, 60.0
-RECOVERS_WHOLE, RECOVERS_STATIC = 0.0, 1.0
 
 
 def _rest_recovery_grid(facts: Facts) -> tuple[Tried, ...]:
@@ -210,17 +212,13 @@ def _rest_recovery_grid(facts: Facts) -> tuple[Tried, ...]:
         courses += [(0.1 * gap, seconds) for seconds in (150.0, 600.0)]
     powers = (0.0, 1.0) if np.isfinite(facts.rest_lengths).sum() > 1 else (0.0,)
     return tuple(
-        Tried(shape=(*course, power, part))
-        for course in courses
-        for power in powers
-        for part in (RECOVERS_WHOLE, RECOVERS_STATIC)
+        Tried(shape=(*course, power, part)) for course in courses for power in powers for part in (WHOLE, STATIC)
     )
 
 
 def _rest_recovery_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    length, seconds, power, *part = shape
+    length, seconds, power, part = shape
     points = scene.points
-    carried = scene.gradient[:, 0] * scene.parameters[:, 0] if part == [RECOVERS_STATIC] else scene.curve
     share = np.zeros_like(points.cycles)
     strengths = _strengths(scene.facts) ** power
     for rest, moment, strength in zip(scene.facts.rests, scene.facts.rest_moments, strengths.tolist(), strict=True):
@@ -231,7 +229,7 @@ def _rest_recovery_change(scene: Scene, amplitude: float, shape: Shape) -> Float
             left = np.where(waited < -_MINUTE, 0.0, left)  # tested at the same cycles, but before the pause
             left = left * np.exp(-np.clip(waited, 0.0, 50 * seconds) / seconds)
         share = np.maximum(share, left)
-    return np.asarray(amplitude * carried * share, dtype=np.float64)
+    return np.asarray(amplitude * _carried(scene, part) * share, dtype=np.float64)
 
 
 def _strengths(facts: Facts) -> FloatArray:
@@ -261,7 +259,7 @@ REST_RECOVERY = Effect(
         ShapeParameter(name="length ζ_c", unit="cycles", lowest=1.0, highest=float("inf")),
         ShapeParameter(name="settling time τ", unit="s", lowest=0.0, highest=float("inf")),
         ShapeParameter(name="power of the rest's length r", unit="-", lowest=0.0, highest=2.0, smooth=True),
-        ShapeParameter(name="what is changed", unit="-", lowest=RECOVERS_WHOLE, highest=RECOVERS_STATIC),
+        ShapeParameter(name="what is changed", unit="-", lowest=STATIC, highest=WHOLE),
     ),
     grid=_rest_recovery_grid,
     change=_rest_recovery_change,

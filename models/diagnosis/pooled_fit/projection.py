@@ -1,29 +1,19 @@
-"""The Gram matrix of a fit: the baseline's sensitivities J, changes of torque g and the residual r, whitened, in one matrix.
+"""What is visible of a change of torque once the baseline, the noise and the gains have absorbed their part.
 
-For any scatter of the gains, σ_g of the runs and σ_c of the curves, the matrix follows by small corrections (Woodbury), so
-the rows are whitened once.
-
-What is visible of a change of torque once the baseline, the noise and the gains have absorbed their part.
-
-All columns (the baseline's sensitivities J, the changes g, the residual r) are in one Gram matrix (`pooled_fit.projection`). For
-any scatter of the gains, projecting J off is one solve:
+The baseline's sensitivities J, changes of torque g and the residual r are whitened once, in one Gram matrix. For any scatter
+of the gains, σ_g of the runs and σ_c of the curves, it follows by small corrections (Woodbury), and projecting J off is one
+solve:
 
     info = Gᵀ V⁻¹ (1 - P) G,     score = Gᵀ V⁻¹ (1 - P) r
 
 z = score/√info is standard normal where there is no effect; ½ info a² is λ, the expected log-likelihood ratio [nats] of
-an effect of amplitude a.
-
-The scatter of gains from run to run, estimated from all that a fit leaves, with its uncertainty.
+an effect of amplitude a. The marginal likelihood of σ_g (what is fitted is integrated out, so gains that the laws over life
+absorb are no evidence of a small scatter), summed over σ_c, gives the scatter of gains from run to run with its uncertainty,
 
     p(ln σ_g) ∝ p(residual | σ_g) p_0(ln σ_g)
 
-The marginal likelihood is that of `pooled_fit.projection` (what is fitted is integrated out, so gains that the laws over
-life absorb are no evidence of a small scatter), summed over the curves' scatter; p_0 is the prior of `criteria`. What the
-data say beyond it is measured in nats,
-
-    I = Σ p ln(p/p_0),
-
-and where that is less than LEAST_SCATTER_INFORMATION the estimate is the prior, and said to be.
+with p_0 the prior of `criteria`. What data say beyond it is I = Σ p ln(p/p_0) nats; where that is less than
+LEAST_SCATTER_INFORMATION the estimate is the prior, and said to be.
 """
 
 from collections.abc import Iterator, Sequence
