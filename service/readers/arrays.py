@@ -13,13 +13,11 @@ from numpy.typing import NDArray
 
 from service.errors import FieldError, InvalidError, Notice
 from service.readers.clocks import UNITS, stated_clock
-from service.readers.column_names import column_of, known_channel
+from service.readers.column_names import column_of, known_channel, recognised
 from service.readers.limits import Limits
 from service.readers.table import Clock, Column, Reading, Table, only
+from service.readers.unit_table import is_unit
 
-_NAMES = (
-    "names", "name", "labels", "header", "headers", "colheaders", "channels", "columns", "titles", "variablenames",
-)  # fmt: skip
 _DATA = ("data", "values", "value", "y", "samples")
 #: Factors that a file states beside raw counts; whether they were applied already only its program knows.
 _GAINS, _OFFSETS = ("gain", "scale", "factor", "slope", "multiplier", "sensitivity", "calibration"), ("offset", "zero")
@@ -134,9 +132,9 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
         return
     across = 0 if shape[0] < shape[1] else 1
     width = shape[across]
-    lists = {key.lower(): _texts(value) for key, value in {**beside, **leaf.attributes}.items()}
-    names = next((lists[key] for key in _NAMES if len(lists.get(key, ())) == width), [])
-    units = next((lists[key] for key in UNITS if len(lists.get(key, ())) == width), [])
+    lists = [texts for texts in map(_texts, {**beside, **leaf.attributes}.values()) if len(texts) == width]
+    names = max(lists, key=lambda texts: (recognised(texts, ()), not all(map(is_unit, texts))), default=[])
+    units = next((texts for texts in lists if texts is not names and any(map(is_unit, texts))), [])
     for index in range(width):
         title = names[index] if names else f"{name}[{index + 1}]"
         place = (index, slice(None)) if across == 0 else (slice(None), index)

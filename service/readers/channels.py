@@ -16,8 +16,9 @@ from service.columns import LineOf, check_arrays
 from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice, TooLargeError
 from service.readers.column_names import Taken, choose, is_counter, known_channel
 from service.readers.limits import Limits
+from service.readers.long_table import widened
 from service.readers.no_values import refuse_stand_ins, without_stated, without_totals
-from service.readers.numerals import Numerals, empty_cells
+from service.readers.numerals import empty_cells, read_cells
 from service.readers.table import NO_TIME, Clock, Column, Reading, Table, labels, marks, only
 
 #: The code of the notice that lists unused columns.
@@ -61,6 +62,7 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     Raises InvalidError where a unit or a clock is not clear, a value is no number, or nothing is known; TooLargeError on too
     many values.
     """
+    table = widened(table, reading)
     taken = choose(table.columns, reading)
     series, table, taken, counts = _read(table, taken, reading, limits)
     notices = [*table.notices, *_left_out(table.columns, taken, reading)]
@@ -148,11 +150,7 @@ def _read(
     if stated > limits.most_values:
         raise TooLargeError(f"a file must not hold more than {limits.most_values} values, got {stated}")
     channels = {column.index: column.channel for column in taken}
-    read = dict(zip(indices, table.read(channels), strict=True))
-    cells = {index: _cells(column) for index, column in read.items() if column.dtype.kind in "OUS"}
-    named = {index: channels[index] for index in cells}
-    parsed = Numerals(reading).values(named, list(cells.values()), table.line_of)
-    read |= dict(zip(cells, parsed, strict=True))
+    read = read_cells(table, channels, reading)
     read, table = without_totals(read, [column.index for column in taken if column.channel != "time_s"], table)
     for column in taken:
         read[column.index] = without_stated(read[column.index], reading)
@@ -214,10 +212,6 @@ def _without_gaps(name: str, own: _Series, table: Table, leave_out: bool) -> _Se
     return own
 
 
-def _cells(column: NDArray[Any]) -> list[Any]:
-    return [cell.decode("utf-8", "replace") if isinstance(cell, bytes) else cell for cell in column.tolist()]
-
-
 def _numbers(column: Taken, values: NDArray[Any]) -> tuple[FloatArray, NDArray[np.bool_] | None]:
     """Values in the channel's unit and which of them are valid; points in time as seconds since the first.
 
@@ -240,15 +234,33 @@ def _numbers(column: Taken, values: NDArray[Any]) -> tuple[FloatArray, NDArray[n
 
 def _refuse_serials(column: Column, times: FloatArray) -> None:
     """Raise InvalidError where times without a unit may be days as spreadsheets or MATLAB count them: days of our time since
-    1900 or the year 0, less than five of them, and steps that would be shorter than a rig samples."""
-    days, steps = ((times > 20_000) & (times < 80_000)) | ((times > 700_000) & (times < 800_000)), np.diff(times)
-    if times.size > 1 and days.all() and np.ptp(times) < 5 and np.median(steps) < 1e-3:
-        name = column.title or column.name
-        message = (
-            f"{column.shown()} may be days, as spreadsheets and MATLAB count dates, or seconds, got {times[0]:.9g} and "
-            f"steps of {np.median(steps):.3g}: map=time_s:{name} [d], or [s], says which"
-        )
-        raise InvalidError.of(FieldError(pointer="/map", code="missing_unit", message=message))
+    1900 or the year 0, less than five of them, and steps that would be shorter than a rig samples; or a computer's
+    milliseconds, microseconds or nanoseconds since 1970, which as seconds are thousands of years."""
+    if times.size < 2:
+        return
+    days, step = (
+        ((times > 20_000) & (times < 80_000)) | ((times > 700_000) & (times < 800_000)),
+        np.median(np.diff(times)),
+    )
+    unit, meaning = "d", "days, as spreadsheets and MATLAB count dates"
+    if not (days.all() and np.ptp(times) < 5 and step < 1e-3):
+        since = [
+            (name, factor) for name, factor in (("ms", 1e3), ("µs", 1e6), ("ns", 1e9)) if _is_our_time(times / factor)
+        ]
+        if not since:
+            return
+        unit, meaning = since[0][0], f"{since[0][0]} since 1970"
+    name = column.title or column.name
+    message = (
+        f"{column.shown()} may be {meaning}, or seconds, got {times[0]:.9g} and steps of {step:.3g}: "
+        f"map=time_s:{name} [{unit}], or [s], says which"
+    )
+    raise InvalidError.of(FieldError(pointer="/map", code="missing_unit", message=message))
+
+
+def _is_our_time(times: FloatArray) -> bool:
+    """Whether all are seconds since 1970 between 1990 and 2100."""
+    return bool(((times > 6.3e8) & (times < 4.1e9)).all())
 
 
 def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Reading) -> list[Notice]:

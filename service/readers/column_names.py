@@ -95,6 +95,11 @@ def known_channel(name: str) -> str | None:
     return _LETTERS.get(bare) or (_BY_KEY.get(_key(bare)) if 1 < len(bare) <= LONGEST_NAME else None)
 
 
+def is_time(column: Column) -> bool:
+    """Whether a column is a time by its name, or may be one by its unit."""
+    return known_channel(column.name) == "time_s" or _may_be_time(column)
+
+
 def is_counter(column: Column) -> bool:
     """Whether a time column's title is LabVIEW's, which may count samples."""
     return _key(column.name) == "x_value"
@@ -204,9 +209,9 @@ def recognised(titles: Sequence[str], named: Sequence[str]) -> int:
     channels: set[str] = set()
     for title in titles:
         if 0 < len(title) <= LONGEST_TITLE:
-            name = column_of(title).name
-            channel = known_channel(name)
-            keys = {_key(title), _key(name)} & wanted
+            column = column_of(title)
+            channel = known_channel(column.name) or ("time_s" if is_time(column) else None)
+            keys = {_key(title), _key(column.name)} & wanted
             channels |= keys or ({channel} if channel else set())
     return len(channels)
 

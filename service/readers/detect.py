@@ -70,6 +70,13 @@ _FOREIGN = {
     b"BZh": "a bzip2 archive (gzip is accepted)",
     b"\xfd7zXZ": "an xz archive (gzip is accepted)",
     _GZIP: "packed with gzip twice",
+    b"DIAEXT": "the header of a DIAdem file (DIAdem and its libraries save it as TDMS or CSV)",
+    b"|CF,": "an imc FAMOS file (FAMOS exports CSV, XLSX and MATLAB files)",
+    b"IGOR": "an Igor Pro text file (Igor saves waves as delimited text with their names)",
+    b"CPYA": "an Origin project (Origin exports a worksheet as CSV or XLSX)",
+    b"\x93NUMPY": "an array of NumPy, which has no titles (numpy.savetxt with header= writes them)",
+    b"ARROW1": "an Arrow file (pyarrow, polars and pandas write Parquet as well)",
+    b"[{": "JSON: post it to the address of the runs",
     b"{": "JSON: post it to the address of the runs",
 }
 #: Bytes that are read to detect the format; every magic number is shorter.

@@ -153,9 +153,10 @@ def _layout(
     start, labelled = _without_labelled(rows[:-1], comments, start, length)
     above = _text_rows_above(rows, comments, start)
     width = max((index + 1 for index, cell in enumerate(rows[start]) if cell not in (None, "")), default=0)
+    counted = _are_counted([row for row in rows[start : start + length] if not is_blank(row)][:_LONG_RUN])
     best: tuple[tuple[int, int, int], list[str], int] | None = None
     for place, at in enumerate(above):
-        for titles in _titles(rows, above[place:], width):
+        for titles in _titles(rows, above[place:], width, counted=counted):
             filled = sum(map(bool, titles))
             channel_count = recognised(titles, named)
             enough = filled >= width if at in comments else filled >= min(2, width) or channel_count
@@ -169,7 +170,7 @@ def _layout(
     if best is None:
         return None
     rank, titles, at = best
-    units = _units(rows, [row for row in above if row > at], at, start, titles)
+    units = _units(rows, [row for row in above if row > at], at, start, titles, width)
     groups = _filled([_text(cell) for cell in rows[at - 1]], len(titles)) if at - 1 in above else []
     twice = len(set(filter(None, titles))) < sum(map(bool, titles))
     beside = (units[: len(titles)], groups if twice else (), rows[start][: len(titles)])
@@ -194,22 +195,33 @@ def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) 
     return text_rows
 
 
-def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int) -> Iterator[list[str]]:
-    """The titles that a row may give: its own texts, its gaps filled from above, and both rows' texts joined."""
+def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int, *, counted: bool) -> Iterator[list[str]]:
+    """The titles that a row may give: its own texts, those of all columns but the first, its gaps filled from above, and
+    both rows' texts joined."""
     own = [_text(cell) for cell in rows[upwards[0]]]
     while own and not own[-1]:
         own.pop()
     yield own
-    if len(upwards) < 2 or len(own) < 2 or _are_units(own):
+    if _are_units(own):
         return
-    above = [_text(cell) for cell in rows[upwards[1]]]
-    if sum(map(bool, above)) < 2:
-        return
-    size = max(len(own), min(len(above), width))
-    own += [""] * (size - len(own))
-    above += [""] * (size - len(above))
-    yield [name or other for name, other in zip(own, above, strict=False)]
-    yield [f"{other} {name}".strip() for name, other in zip(own, _filled(above, size), strict=False)]
+    if len(own) == width - 1 and counted:
+        yield ["", *own]
+    for row in upwards[1:2] if len(own) > 1 else upwards[1:]:
+        above = [_text(cell) for cell in rows[row]]
+        if sum(map(bool, above)) < 2 or (len(own) < 2 and _are_units(above)):
+            continue
+        size = max(len(own), min(len(above), width))
+        padded = own + [""] * (size - len(own))
+        above += [""] * (size - len(above))
+        yield [name or other for name, other in zip(padded, above, strict=False)]
+        yield [f"{other} {name}".strip() for name, other in zip(padded, _filled(above, size), strict=False)]
+
+
+def _are_counted(rows: Sequence[Row]) -> bool:
+    """Whether rows of data begin with their numbers or with names, which no title stands above: R's row names."""
+    first = [_text(row[0]) if row else "" for row in rows]
+    counts = [[str(k + start) for k in range(len(first))] for start in (0, 1)]
+    return len(first) > 1 and (first in counts or (all(first) and not any(map(is_value, first))))
 
 
 def _filled(texts: Sequence[str], size: int) -> list[str]:
@@ -231,19 +243,38 @@ def _are_units(row: Row) -> bool:
     return bool(stated) and all(map(is_unit, stated))
 
 
-def _units(rows: Sequence[Row], below: Sequence[int], at: int, start: int, titles: Sequence[str]) -> list[str]:
-    """The units beside the titles in row `at`: of the rows under it, one over it and those that are labelled so, the one
-    that holds most units of its titles."""
+def _units(
+    rows: Sequence[Row], below: Sequence[int], at: int, start: int, titles: Sequence[str], width: int
+) -> list[str]:
+    """The units beside the titles in row `at`: of the rows under it, one over it and those that are labelled so, and of the
+    ways in which these may stand to the titles, those that hold most units of them."""
     texts = {index: [_text(cell) for cell in rows[index]] for index in range(max(0, start - MAX_ROWS), start)}
     labelled = [index for index, row in texts.items() if row and _UNIT_LABELS.fullmatch(row[0])]
     over = [at - 1] if at and _are_units(texts[at - 1]) else []
-    fitting = {
-        index: sum(map(_fits, titles, texts[index]))
-        for index in (*below, *over, *labelled)
-        if index != at and texts[index] != texts[at]
-    }
-    best = max(fitting, key=lambda index: fitting[index], default=at)
-    return ["" if _UNIT_LABELS.fullmatch(unit) else unit for unit in texts[best]] if fitting.get(best) else []
+    best: Sequence[str] = []
+    for index in (*below, *over, *labelled):
+        if index != at and texts[index] != texts[at]:
+            best = max(best, *_beside(texts[index], titles, width), key=lambda units: sum(map(_fits, titles, units)))
+    return ["" if _UNIT_LABELS.fullmatch(unit) else unit for unit in best]
+
+
+def _beside(units: Sequence[str], titles: Sequence[str], width: int) -> Iterator[Sequence[str]]:
+    """A row of units as it stands to the titles, each under its own; or, where every one fits then, those of all columns
+    that are known, or known and no time, one after the other, as writers leave out what needs none."""
+    yield units
+    stated = [unit for unit in units if unit and not _UNIT_LABELS.fullmatch(unit)]
+    known = [known_channel(column_of(title).name) if len(title) <= LONGEST_TITLE else None for title in titles]
+    for places in (
+        [place for place, channel in enumerate(known) if channel],
+        [place for place, channel in enumerate(known) if channel not in (None, "time_s")],
+    ):
+        in_order = dict(zip(places, stated, strict=False))
+        if (
+            len(places) == len(stated)
+            and places[-1:] < [width]
+            and all(_fits(titles[place], unit) for place, unit in in_order.items())
+        ):
+            yield [in_order.get(place, "") for place in range(len(titles))]
 
 
 def _fits(title: str, cell: str) -> bool:
@@ -252,9 +283,12 @@ def _fits(title: str, cell: str) -> bool:
     return is_unit(unit) if channel is None else conversion(channel, unit) is not None
 
 
-def turned(rows: Sequence[Row]) -> list[Row]:
-    """The rows of a table that lies on its side: a line a channel."""
-    return list(zip_longest(*rows, fillvalue=""))
+def turned(rows: Sequence[Row], named: Sequence[str]) -> tuple[list[Row], Layout] | None:
+    """The rows of a table that lies on its side, a line a channel, and its layout; None where it does not."""
+    on_its_side: list[Row] = list(zip_longest(*rows, fillvalue=""))
+    layout = find_table(on_its_side[:MAX_ROWS], frozenset(), named) if len(on_its_side) > 2 else None
+    upright = max((recognised(list(map(_text, row)), named) for row in rows[:MAX_ROWS]), default=0)
+    return None if layout is None or layout.score[0] < upright else (on_its_side, layout)
 
 
 def was_turned() -> Notice:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
-from service.readers.table import Reading, marks, place
+from service.readers.table import Reading, Table, marks, place
 
 #: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_arrays` refuses with their row. Digits
 #: are never given back, or a long run of them with a letter behind it would be tried from every digit to every other.
@@ -77,12 +77,12 @@ class Numerals:
         before: int = 0,
     ) -> list[NDArray[Any]]:
         """Columns [n] by their index, each for a channel: numbers as float64, masked where cells are empty; points in time
-        as numpy has them.
+        as numpy has them; for no channel ("") the cells themselves.
 
         `before` rows were read already. Raises InvalidError naming the rows of cells that are neither, or may be read in two
         ways.
         """
-        if self.settle(columns):
+        if self.settle([cells for name, cells in zip(channels.values(), columns, strict=True) if name]):
             for name, cells in zip(channels.values(), columns, strict=True):
                 for row, cell in enumerate(cells):
                     if isinstance(cell, str) and any(_GROUPED[sign].fullmatch(cell.strip()) for sign in _SIGNS):
@@ -92,6 +92,10 @@ class Numerals:
         total = 0
         given = zip(channels.items(), columns, strict=True)
         for (index, name), cells in sorted(given, key=lambda item: item[0][1] == "time_s"):
+            if not name:
+                read[index] = np.empty(len(cells), dtype=object)
+                read[index][:] = cells
+                continue
             # the time last: a block is read again where another column is wrong
             values = self._moments(index, cells) if name == "time_s" and not wrong else None
             values = self._floats(cells) if values is None else values
@@ -175,6 +179,18 @@ class Numerals:
                 )
 
 
+def read_cells(table: Table, channels: Mapping[int, str], reading: Reading) -> dict[int, NDArray[Any]]:
+    """A table's columns [n] by index, cells of any kind as numbers and points in time. Raises as `Numerals.values` does."""
+    read = dict(zip(channels, table.read(channels), strict=True))
+    cells = {index: _cells(column) for index, column in read.items() if column.dtype.kind in "OUS"}
+    named = {index: channels[index] for index in cells}
+    return read | dict(zip(cells, Numerals(reading).values(named, list(cells.values()), table.line_of), strict=True))
+
+
+def _cells(column: NDArray[Any]) -> list[Any]:
+    return [cell.decode("utf-8", "replace") if isinstance(cell, bytes) else cell for cell in column.tolist()]
+
+
 def _shown(cell: Any) -> str:
     return str("" if cell is None else cell).strip()[:MAX_QUOTED]
 
@@ -233,6 +249,13 @@ _STAMP = re.compile(
     r" ?(?P<half>[AaPp][Mm])?(?: ?(?:Z|UTC)| ?(?P<zone>[+-]\d\d:?\d\d))?",
     re.ASCII,
 )
+#: Durations as MATLAB (`0.01 sec`) and ISO 8601 (`PT0.01S`, polars) write them.
+_DURATION = re.compile(
+    r"(?P<sign>[+-]?)(?:P(?:(?P<days>\d{1,6})D)?T(?=\d)(?:(?P<hours>\d{1,6})H)?(?:(?P<minutes>\d{1,6})M)?"
+    r"(?:(?P<seconds>\d{1,9}(?:\.\d{1,12})?)S)?|(?P<number>\d{1,9}(?:\.\d{1,15})?(?:e-?\d\d)?) (?P<unit>sec|min|hr|days?))",
+    re.ASCII,
+)
+_SECONDS = {"seconds": 1, "minutes": 60, "hours": 3600, "days": 86_400, "sec": 1, "min": 60, "hr": 3600, "day": 86_400}
 #: Orders of a date's parts, but for those with slashes.
 _ORDERS = (
     "%Y-%m-%d",
@@ -253,7 +276,9 @@ _DAY = 86_400 * 10**9
 def is_stamp(cell: str) -> bool:
     """Whether a text has the form of a point in time or of a duration with colons."""
     match = _STAMP.fullmatch(cell.strip())
-    return match is not None and bool(match["date"] or match["first"])
+    return (match is not None and bool(match["date"] or match["first"])) or _DURATION.fullmatch(
+        cell.strip()
+    ) is not None
 
 
 class Stamps:
@@ -303,7 +328,7 @@ class Stamps:
     def _nanoseconds(self, cell: str) -> int | None:
         match = _STAMP.fullmatch(cell.strip())
         if match is None or not (match["date"] or match["first"]):
-            return None
+            return _duration(cell.strip())
         first, second, third = (int(match[name] or 0) for name in ("first", "second", "third"))
         if match["first"] and not match["third"]:
             if not match["fraction"]:
@@ -342,6 +367,18 @@ class Stamps:
             days = (_day_by(written, order) for order in (*_ORDERS, *sorted(self._orders)))
             self._dates[written] = next((number for number in days if number is not None), None)
         return self._dates[written]
+
+
+def _duration(cell: str) -> int | None:
+    """The nanoseconds of a duration; None where a text is none."""
+    match = _DURATION.fullmatch(cell)
+    if match is None:
+        return None
+    parts = {name: match[name] for name in ("days", "hours", "minutes", "seconds") if match[name]}
+    parts |= {match["unit"]: match["number"]} if match["unit"] else {}
+    return (-1 if match["sign"] == "-" else 1) * sum(
+        round(float(n) * _SECONDS[name] * 1e9) for name, n in parts.items()
+    )
 
 
 def _day_by(written: str, order: str) -> int | None:

@@ -5,6 +5,7 @@ from typing import Any
 from service.columns import CHANNELS
 from service.errors import MAX_QUOTED, InvalidError
 from service.readers.column_names import choices_of, choose, column_of, known_channel
+from service.readers.long_table import widened
 from service.readers.table import Reading, Table, labels
 from service.readers.unit_table import conversion
 
@@ -20,6 +21,7 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
     `factor` and `offset` to the channel's unit (null: the unit is not known). `problem` says why it cannot be read as it is.
     """
     try:
+        table = widened(table, reading)
         chosen = choose(table.columns, reading)
         taken = {column.index: column for column in chosen if not column.guessed or _differ(table, column.index)}
         problem = None

@@ -102,9 +102,9 @@ def _with_clocks(columns: Sequence[Column], above: Sequence[Sequence[str]], body
         if is_counter(column) and body.first[place : place + 1] == [""]:
             yield Column("", title=column.title)
         else:
-            stated = labels(
-                [(row[0], row[place]) if place and len(row) > place and row[place] else row for row in above]
-            )
+            own = [row for row in above if len(row) > place and row[place]]
+            beside = [(row[0], row[place]) if place and row in own else row for row in above]
+            stated = labels([*beside, *((row[place],) for row in own)])
             yield replace(column, clock=stated_clock(stated, body.rows))
 
 
@@ -209,9 +209,8 @@ def _turned(first: bytes, reading: Reading) -> bytes | None:
     """A whole text whose lines are channels with its lines as columns, by the separator by which it is a table then."""
     text = "".join(_blocks(io.BytesIO(first), _encodings(first)[0])).split("\n")[reading.skip_rows : -1]
     for separator in _separators(text, 0):
-        rows = turned([_cells(line, separator) for line in text if line.strip()])
-        if len(rows) > 2 and find_table(rows[:MAX_ROWS], frozenset(), _named(reading)):
-            return "\n".join("\t".join(row) for row in rows).encode()
+        if on_its_side := turned([_cells(line, separator) for line in text if line.strip()], _named(reading)):
+            return "\n".join("\t".join(row) for row in on_its_side[0]).encode()
     return None
 
 
@@ -271,7 +270,8 @@ def _cells(line: str, separator: str) -> list[str]:
     """The cells of a line, without quotes, without blanks around them."""
     if not separator.strip(" "):
         apart = r"\s{2,}|\t" if len(separator) > 1 else r"(?<!/)[ \t]+(?![\[({/])"
-        return re.split(apart, line.strip(), maxsplit=LIMITS.most_columns)  # one more cell is one too many
+        cells = re.split(apart, line.strip(), maxsplit=LIMITS.most_columns)  # one more cell is one too many
+        return [cell[1:-1] if re.fullmatch(r'"[^"]*"', cell) else cell for cell in cells] if '"' in line else cells
     if '"' in line:
         even = line.replace("\r", " ").split("\n")  # a carriage return within a line is a blank, not a second line
         try:
@@ -389,7 +389,9 @@ class _Body:
                     return
                 if "." in block or ("," in block and (self._separator != "," or '"' in block)):
                     rows = [row for _, _, row in self._parsed(block) if len(row) > max(channels)]
-                    doubtful |= self._numerals.settle([[row[index] for row in rows] for index in channels])
+                    doubtful |= self._numerals.settle(
+                        [[row[index] for row in rows] for index, name in channels.items() if name]
+                    )
         self._numerals.decimal = self._numerals.decimal or ("" if doubtful else ".")
 
     def _plain(self, block: str) -> FloatArray | None:

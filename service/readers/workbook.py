@@ -55,11 +55,8 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
             _trimmed(row) for row in book.get_sheet_by_name(name).to_python(skip_empty_area=False)
         ]
         layout = find_table(rows[reading.skip_rows : reading.skip_rows + MAX_ROWS], frozenset(), named)
-        if layout is None and len(rows) <= MAX_ROWS:
-            on_its_side = [_trimmed(row) for row in turned(rows)]
-            layout = find_table(on_its_side[:MAX_ROWS], frozenset(), named)
-            if layout is not None:
-                rows, on_side = on_its_side, {*on_side, name}
+        if layout is None and len(rows) <= MAX_ROWS and (on_its_side := turned(rows, named)):
+            (rows, layout), on_side = on_its_side, {*on_side, name}
         if layout is None:
             refused.append(no_table(rows[: reading.skip_rows + MAX_ROWS], named))
         elif len(sheets) == 1 or recognised([heading[0] for heading in layout.headings], named):

@@ -82,6 +82,17 @@ def stamps(form: str, first: datetime = datetime(2026, 11, 2, 7)) -> str:
     )
 
 
+def long(titles: str, form: str) -> str:
+    """A row for each value, by time."""
+    shown = {"pressure_bar": ("Pressure", "bar"), "speed_rpm": ("Speed", "rpm"), "torque_nm": ("Torque", "Nm")}
+    lines = [
+        form.format(t=t, ms=1000 * t, channel=channel, name=name, unit=unit, value=RECORD[channel][row])
+        for row, t in enumerate(TIME)
+        for channel, (name, unit) in shown.items()
+    ]
+    return "\n".join([titles, *lines]) + "\n"
+
+
 HEAD = ",".join(RECORD)
 GERMAN = ";".join(NAMES.values())
 MAPPED = "time_s:Zeit,pressure_bar:p1,speed_rpm:n1,torque_nm:Mz"
@@ -206,7 +217,30 @@ TEXTS: dict[str, tuple[str | bytes, str | None]] = {
                              + "".join(f"{t};{p};{t};{n};{t};{m}\n"
                                        for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
     "device-behind-the-name.txt": ("time\tp_ist\\CAN:1\tn_ist\\CAN:1\tm_ist\\CAN:1\ns\tbar\trpm\tNm\n"
-                                   "f8\tf8\tf8\tf8\n" + rows("\t"), None),
+                               "f8\tf8\tf8\tf8\n" + rows("\t"), None),
+    "labview-of-several-times.lvm": (
+        "LabVIEW Measurement\nX_Columns\tMulti\n***End_of_Header***\n\nChannels\t3\nY_Unit_Label\tbar\trpm\tNm\n"
+        "X_Dimension\tTime\tTime\tTime\n***End_of_Header***\nX_Value\tPressure\tX_Value\tSpeed\tX_Value\tTorque\tComment\n"
+        + "".join(f"{t}\t{p}\t{t}\t{n}\t{t}\t{m}\n" for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
+    "catman-step-above-each-column.asc": (
+        "Channels: 3\n\nDruck\tDrehzahl\tDrehmoment\nbar\t1/min\tNm\nT0 = 02.11.2026\tT0 = 02.11.2026\tT0 = 02.11.2026\n"
+        "dt = 10 ms\tdt = 10 ms\tdt = 10 ms\n" + rows("\t", ",", PLATEAUS), None),
+    "catman-names-of-rates.asc": ("Zeit  1 - Standardmessrate [s]\tDruck [bar]\tDrehzahl [1/min]\tDrehmoment [Nm]\n"
+                                  + rows("\t", ","), None),
+    "units-of-all-but-the-counter.csv": (
+        "Nr;Zeit;Druck;Drehzahl;Moment\ns;bar;1/min;Nm\n"
+        + "".join(f"{k};{line}\n" for k, line in enumerate(rows(";").splitlines())), None),
+    "r-write-table.txt": (
+        '"' + '" "'.join(RECORD) + '"\n'
+        + "".join(f'"{k}" {line}\n' for k, line in enumerate(rows(" ").splitlines(), 1)), None),
+    "pandas-names-over-units.csv": (",Pressure,Speed,Torque\n,bar,rpm,Nm\ntime_s,,,\n" + rows(), None),
+    "matlab-durations.csv": (HEAD.replace("time_s", "Time") + "\n" + re.sub("(?m)^(.{6})", r"\1 sec", rows()), None),
+    "polars-durations.csv": (HEAD.replace("time_s", "Time") + "\n" + re.sub("(?m)^(.{6})", r"PT\1S", rows()), None),
+    "long.csv": (long("time_s,variable,value", "{t},{channel},{value}"), None),
+    "long-with-units.csv": (long("Signal;Zeit;Wert;Einheit", "{name};00:00:{t:05.2f};{value};{unit}"), None),
+    "long-units-in-names.csv": (long("TagName\tTime [ms]\tValue\tQuality", "{name} [{unit}]\t{ms}\t{value}\tGood"), None),
+    "long-mapped.csv": (long("t [s],ch,y", "{t},{channel}#1,{value}"),
+                        "pressure_bar:pressure_bar#1,speed_rpm:speed_rpm#1,torque_nm:torque_nm#1"),
 }  # fmt: skip
 
 
@@ -291,6 +325,16 @@ REFUSED = {
         HEAD + "\n0,5,,20\n",
         None,
         "(line 2) must be a number, got '': fill the cell, or take its row out",
+    ),
+    "a-long-table-of-two-values": (
+        long("time_s,channel,a,b", "{t},{channel},{value},1"),
+        None,
+        "one column must hold the values, got a, b; call it 'value'",
+    ),
+    "milliseconds-since-1970": (
+        HEAD.replace("time_s", "timestamp") + "\n1793602800000,5,20,21\n1793602800010,5,20,21\n",
+        "time_s:timestamp",
+        "may be ms since 1970, or seconds, got",
     ),
     "a-word-for-no-value": (HEAD + "\n0,5,n/a,20\n", None, "got 'n/a': missing=n/a leaves such rows out"),
     "not-a-number": (HEAD + "\n0,5,NaN,20\n", None, "got nan: missing=nan leaves such rows out"),
@@ -493,6 +537,13 @@ def hdf5(path: Path, *, rate: bool) -> None:
             group.create_dataset(name, data=RECORD[f"{name}_{unit.lower()}"]).attrs["unit"] = unit
 
 
+def pandas_fixed(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        for name in ("axis0", "block0_items"):
+            file[f"run/{name}"] = np.array(list(RECORD), dtype="S")
+        file["run/axis1"], file["run/block0_values"] = np.arange(ROWS), np.c_[*RECORD.values()]
+
+
 def version_73(path: Path) -> None:
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, values in RECORD.items():
@@ -534,6 +585,9 @@ MADE: dict[str, Callable[[Path], object]] = {
     "dates.parquet": lambda path: (
         frame().drop(columns="time_s").assign(time=pd.Timestamp("2026-11-02") + pd.to_timedelta(TIME, unit="s"))
     ).to_parquet(path),
+    "long.parquet": lambda path: frame().melt("time_s").to_parquet(path),
+    "long.xlsx": lambda path: frame().melt("time_s").to_excel(path),
+    "pandas-fixed.h5": pandas_fixed,
     "narrow.parquet": lambda path: frame().assign(pressure_bar=lambda f: f.pressure_bar.astype("float64")).to_parquet(path),
     "folder.zip": zipped,
 }  # fmt: skip

@@ -1,0 +1,148 @@
+"""A table of one value a row (time, channel's name, value) -> a table with a column for each name.
+
+So write historians, databases and `melt`. That a column holds the channels' names is seen from its cells, where no title is
+a measured channel's.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice
+from service.readers.column_names import choices_of, choose, column_of, is_time, known_channel, recognised
+from service.readers.grid import is_value
+from service.readers.limits import LIMITS
+from service.readers.numerals import read_cells
+from service.readers.table import NO_TIME, Clock, Column, Reading, Table
+from service.readers.unit_table import is_unit
+
+#: Rows of a table without lines by which its columns are judged, as many as others show.
+_MAX_LOOKED_AT = 20
+_VALUES = re.compile(r"val(?!id)|wert|reading|messung|数值|値|^y$", re.IGNORECASE)
+_SECOND = np.timedelta64(1, "s")
+
+
+def widened(table: Table, reading: Reading) -> Table:
+    """The table with a column for each name, every one with its own times; the table itself where it is of another form.
+
+    Raises InvalidError where the column of values or of times is not clear, or a channel has several units.
+    """
+    columns = table.columns
+    named = [choice.column for channel, choice in choices_of(reading).items() if channel != "time_s"]
+    titles = {text for column in columns for text in (column.title, column.name)}
+    if len(columns) < 2 or titles & set(named) or {known_channel(name) for name in titles} - {None, "time_s"}:
+        return table
+    head = _head(table)
+    words = [index for index, cells in head.items() if cells and not any(map(is_value, cells))]
+    best = max(words, key=lambda index: recognised(_distinct(head[index]), named), default=None)
+    if best is None or not recognised(_distinct(head[best]), named):
+        return table
+    unit = next((index for index in words if index != best and all(map(is_unit, head[index]))), None)
+    timed = _time(columns, reading)
+    value = _value(
+        columns, [index for index, cells in head.items() if cells and all(map(is_value, cells))], best, reading
+    )
+    wanted = {index: "" for index in (best, unit) if index is not None} | {value: columns[value].shown()}
+    cells = read_cells(table, wanted | ({} if timed is None else {timed[0]: "time_s"}), reading)
+    names = np.array([str(cell).strip() for cell in cells[best].tolist()], dtype=object)
+    units = np.array(
+        [str(cell).strip() for cell in cells[unit].tolist()] if unit is not None else [""] * names.size, dtype=object
+    )
+    times = None if timed is None else _seconds(cells[timed[0]], timed[1])
+    rows = {name: np.flatnonzero(names == name) for name in dict.fromkeys(names.tolist()) if name}
+    if len(rows) > LIMITS.most_columns:
+        raise InvalidError(f"a file must not have more than {LIMITS.most_columns} channels, got {len(rows)}")
+
+    def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
+        return [cells[value][list(rows.values())[index]] for index in taken]
+
+    message = (
+        f"the table has a row for each value: the {len(rows)} channels in {columns[best].shown()} were read as columns"
+    )
+    return replace(
+        table,
+        columns=tuple(_column(name, set(units[own].tolist()), own, times) for name, own in rows.items()),
+        read=read,
+        head=tuple(zip(*(map(str, cells[value][own[:_MAX_LOOKED_AT]]) for own in rows.values()), strict=False)),
+        line_of=None,
+        breaks=(),
+        notices=[*table.notices, Notice(code="long_table", message=message)],
+    )
+
+
+def _head(table: Table) -> dict[int, list[Any]]:
+    """The first cells that are not empty of each column."""
+    if table.head:
+        width = range(len(table.columns))
+        return {index: [row[index] for row in table.head if len(row) > index and row[index]] for index in width}
+    texts = [index for index, column in enumerate(table.columns) if column.rows]
+    return {index: table.read({index: ""})[0][:_MAX_LOOKED_AT].tolist() for index in texts}
+
+
+def _distinct(cells: Sequence[Any]) -> list[str]:
+    return list(dict.fromkeys(map(str, cells)))
+
+
+def _time(columns: Sequence[Column], reading: Reading) -> tuple[int, Any] | None:
+    """The column of times and its conversion to s."""
+    if reading.time == NO_TIME:
+        return None
+    named = choices_of(reading).get("time_s")
+    places = range(len(columns)) if named else [index for index, column in enumerate(columns) if is_time(column)]
+    if len(places) > 1 and not named:
+        shown = " and ".join(columns[index].shown() for index in places)
+        message = f"time_s must be one column, got {shown}; time=NAME chooses one"
+        raise InvalidError.of(FieldError(pointer="/time", code="ambiguous", message=message))
+    if not places:
+        return None
+    mapping = {} if named is None else {"time_s": named}
+    (taken, *_) = [
+        taken
+        for taken in choose([columns[index] for index in places], Reading(mapping=mapping))
+        if taken.channel == "time_s"
+    ]
+    return places[taken.index], taken.conversion
+
+
+def _value(columns: Sequence[Column], numeric: Sequence[int], names: int, reading: Reading) -> int:
+    """The column of values: the only one of numbers that is no time, or the one that is called so."""
+    timed = choices_of(reading).get("time_s")
+    others = [
+        index
+        for index in numeric
+        if not is_time(columns[index])
+        and (timed is None or timed.column not in (columns[index].title, columns[index].name))
+    ]
+    called = [index for index in others if _VALUES.search(columns[index].name)]
+    for found in (called, others):
+        if len(found) == 1:
+            return found[0]
+    shown = ", ".join(columns[index].shown() for index in called or others) or "none"
+    message = (
+        f"the table has a row for each value, whose channel {columns[names].shown()} names: one column must hold the "
+        f"values, got {shown}; call it 'value', or save the table with a column for each channel"
+    )
+    raise InvalidError.of(FieldError(pointer="", code="long_table", message=message))
+
+
+def _seconds(times: NDArray[Any], conversion: Any) -> NDArray[np.float64]:
+    if times.dtype.kind in "Mm":
+        since = times - times[:1] if times.dtype.kind == "M" else times
+        return np.asarray(since / _SECOND, dtype=np.float64)
+    seconds = np.array(np.ma.filled(times, np.nan), dtype=np.float64)
+    conversion.apply(seconds)
+    return seconds
+
+
+def _column(name: str, units: set[str], rows: NDArray[np.intp], times: NDArray[np.float64] | None) -> Column:
+    if len(units) > 1:
+        both = " and ".join(sorted(units))[:MAX_QUOTED]
+        message = f"channel {name[:MAX_QUOTED]!r} must be in one unit, got {both}"
+        raise InvalidError.of(FieldError(pointer="", code="mixed_units", message=message))
+    clock = None if times is None else Clock(name, partial(times.__getitem__, rows))
+    return replace(column_of(name, next(iter(units))), rows=rows.size, clock=clock)
