@@ -15,7 +15,7 @@ from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.storage.blobs.stores import new_bucket, s3_server, use_endpoint
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
-from tests.storage.samples import later_step
+from tests.storage.samples import later_step, lay_empty
 
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("untimed")
@@ -50,6 +50,7 @@ def _later_step() -> Iterator[None]:
 
 @pytest.fixture
 def in_file(tmp_path: Path) -> Iterator[Database]:
+    lay_empty(tmp_path / "clutches.db")
     with closing(open_database(f"sqlite:///{tmp_path}/clutches.db")) as opened:
         yield opened
 

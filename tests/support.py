@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -17,6 +17,14 @@ from typing import Any
 
 import httpx2
 import numpy as np
+import pytest
+
+
+def one_quick(values: Iterable[Any]) -> list[Any]:
+    """Values of a parameter of which the first is tried in every run, the others by `make slow`."""
+    first, *others = values
+    return [first, *(pytest.param(value, marks=pytest.mark.slow) for value in others)]
+
 
 PRESSURES_BAR = (4.0, 4.5, 5.0, 5.5, 6.0, 6.5, 7.0)
 SPEEDS_RPM = tuple(range(20, 1971, 50))

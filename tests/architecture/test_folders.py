@@ -43,30 +43,6 @@ def test_a_folder_introduces_itself(package: str) -> None:
     none_of(wrong, "things lacking in introductions:")
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_an_introduction_is_all_that_a_folder_says(package: str) -> None:
-    """No re-exports, no code: a name has one place. The client's are public: scripts import them from the package."""
-    folder_modules = [
-        module
-        for module in modules()
-        if module.is_package and module.name.split(".")[0] == package and module.name != "service.client.clutchlife"
-    ]
-    none_of([module.shown for module in folder_modules if len(module.tree.body) > 1], "introductions that hold code:")
-
-
-def test_what_an_introduction_lacks_is_noticed() -> None:
-    files = {"codec", "engine"}
-    whole = "Bytes and arrays.\n\nIn: arrays. Out: bytes. Open `codec.py` first, then the others."
-    assert lacks(whole, files) == []
-    assert lacks("Arrays go in; bytes come out. Open codec.py first: it is short.", files) == []
-    assert lacks("Bytes: `codec` first.\n\nIn go arrays (any); out come bytes.", files) == []
-    assert lacks("Arrays in, bytes out. In reading order: `codec` (bytes), `engine`.", files) == []
-    assert lacks("Bytes and arrays.\n\nIn: arrays. Out: bytes. Open `other.py` first.", files) == [
-        "the file 'other' that it names"
-    ]
-    assert len(lacks("", files)) == 4
-
-
 def test_tests_stand_where_their_subject_stands() -> None:
     """tests/<folder>/test_x.py tests what is in <folder>; the dashboard is tested in a browser, by journeys."""
     tests = [path for package in PACKAGES for path in (ROOT / "tests" / package).rglob("test_*.py")]

@@ -2,7 +2,7 @@
 
 import tomllib
 
-from tests.architecture.source import CHAPTERS, ROOT, Module, by_name, imports, imports_of, none_of
+from tests.architecture.source import CHAPTERS, ROOT, Module, imports, imports_of, none_of
 
 DIAGNOSIS = "models.diagnosis"
 
@@ -22,33 +22,6 @@ def test_an_import_inside_a_function_says_why() -> None:
         }
     )
     none_of(wrong, "imports inside a function without a reason on their line:")
-
-
-def test_every_part_of_the_diagnosis_is_a_chapter() -> None:
-    parts = {chapter_of(name) for name in by_name()} - {None}
-    assert parts <= set(CHAPTERS), (
-        f"{sorted(map(str, parts - set(CHAPTERS)))} are chapters without a place in the order"
-    )
-
-
-def test_a_chapter_imports_no_later_one() -> None:
-    wrong = []
-    for statement in imports():
-        importer, imported = chapter_of(statement.importer), chapter_of(statement.imported)
-        if importer in CHAPTERS and imported in CHAPTERS and CHAPTERS.index(importer) < CHAPTERS.index(imported):
-            wrong.append(f"{statement.shown}:{statement.line}: {importer} imports the later {imported}")
-    none_of(wrong, "imports of a later chapter:")
-
-
-def test_nothing_imports_upwards() -> None:
-    order = ("models", "storage", "service")
-    wrong = [
-        f"{statement.shown}:{statement.line}: {statement.imported}"
-        for statement in imports()
-        if statement.imported.split(".")[0] in order
-        and order.index(statement.importer.split(".")[0]) < order.index(statement.imported.split(".")[0])
-    ]
-    none_of(wrong, "imports upwards:")
 
 
 def test_import_linter_holds_the_same_order() -> None:

@@ -7,7 +7,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser
 
-from tests.browser.driving import chromium
+from tests.browser.driving import FLAT, chromium, launched
 from tests.support import Server, serving
 
 
@@ -25,8 +25,16 @@ def http(server: Server) -> Iterator[httpx2.Client]:
         yield client
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    """A headless Chromium for the pages of a module."""
-    with chromium() as launched:
-        yield launched
+    """A headless Chromium for all pages, which draws nothing in 3D."""
+    with chromium(more=FLAT) as flat:
+        yield flat
+
+
+@pytest.fixture(scope="module")
+def browser_3d(browser: Browser) -> Iterator[Browser]:
+    """One that draws in 3D, for the pages of a module."""
+    found = launched(browser.browser_type)
+    yield found
+    found.close()

@@ -35,6 +35,7 @@ def test_the_python_example_runs(server: Server) -> None:
     assert "422" in done.stdout
 
 
+@pytest.mark.slow
 def test_the_notebook_runs(server: Server) -> None:
     script = ROOT / "docs" / "tutorial" / "first_steps.py"
     environment = SCRIPTS | {"CLUTCHLIFE_URL": server.url}

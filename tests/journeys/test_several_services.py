@@ -94,6 +94,7 @@ def test_the_same_run_sent_to_all_at_once_is_one_run(servers: list[Server]) -> N
     assert [len(ONCE.get(f"{server.url}{CLUTCH}/runs").json()["items"]) for server in servers] == [1] * 2
 
 
+@pytest.mark.slow
 def test_a_job_that_one_has_another_cancels(address: str, tmp_path: Path) -> None:
     environment = {
         "CLUTCHLIFE_ENGINE": f"{stand_in_engine.__name__}:endless",

@@ -8,6 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from tests.service.clients import client_on
+from tests.storage.samples import lay_empty
 
 
 @pytest.fixture(autouse=True)
@@ -26,6 +27,7 @@ def unchanged_loggers() -> Iterator[None]:
 @pytest.fixture
 def database_url(tmp_path: Path) -> str:
     """Where the test's database lies."""
+    lay_empty(tmp_path / "clutchlife.db")
     return f"sqlite:///{tmp_path / 'clutchlife.db'}"
 
 

@@ -6,7 +6,9 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO
 
 import numpy as np
@@ -90,6 +92,20 @@ def fit_row(pressure: float, *, mse_percent: float | None = 1.7) -> FitRow:
         message="the Stribeck velocity lies at its bound",
         code_version="0.1.0",
     )
+
+
+@cache
+def _empty() -> bytes:
+    with TemporaryDirectory() as folder:
+        open_database(f"sqlite:///{folder}/empty.db").close()
+        return Path(folder, "empty.db").read_bytes()
+
+
+def lay_empty(path: Path) -> None:
+    """A file with all tables, where there is none: a copy, for every migration of an empty file takes 0.1 s."""
+    if not path.exists():
+        path.touch(0o600)
+        path.write_bytes(_empty())
 
 
 def store_run(connection: Connection, number: int, *, length: int = 40) -> int:

@@ -28,6 +28,7 @@ def diagnosed(http: httpx2.Client, hidden: Hidden) -> dict[str, Any]:
     return report
 
 
+@pytest.mark.slow
 def test_a_hidden_effect_is_found(http: httpx2.Client) -> None:
     """λ = 100: an oracle sees it beyond any doubt. Whatever else stands in the set, the truth leads it."""
     slug = "squeeze_film"

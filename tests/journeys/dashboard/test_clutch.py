@@ -11,7 +11,7 @@ import openpyxl
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.browser.driving import Watched, launched, pointed_at, turned
+from tests.browser.driving import Watched, pointed_at, turned
 from tests.browser.lives import demo, post
 from tests.browser.pixels import seen
 from tests.support import ONCE, Server, serving, stationary
@@ -73,6 +73,14 @@ def watched(browser: Browser, life: Server) -> Iterator[Watched]:
     found.close()
 
 
+@pytest.fixture(scope="module")
+def watched_3d(browser_3d: Browser, life: Server) -> Iterator[Watched]:
+    """The same in a browser that draws in 3D."""
+    found = Watched(browser_3d, life.url)
+    yield found
+    found.close()
+
+
 def opened(watched: Watched) -> Page:
     if "/clutches/sim-1" in watched.page.url:
         return watched.page
@@ -91,8 +99,8 @@ def drawn(page: Page, name: str) -> Locator:
 
 
 @pytest.mark.slow
-def test_every_chart_is_drawn(browser: Browser, watched: Watched) -> None:
-    page = opened(watched)
+def test_every_chart_is_drawn(browser: Browser, watched_3d: Watched) -> None:
+    page = opened(watched_3d)
     for tab, names in CHARTS.items():
         turned(page, tab)
         expect(page.locator("figure.chart:visible h3")).to_have_text(list(names.values()))
@@ -184,8 +192,8 @@ def test_units_are_chosen_and_kept(browser: Browser, life: Server) -> None:
 
 
 @pytest.mark.slow
-def test_dark_and_light_are_chosen_and_the_charts_follow(browser: Browser, watched: Watched) -> None:
-    page = opened(watched)
+def test_dark_and_light_are_chosen_and_the_charts_follow(browser: Browser, watched_3d: Watched) -> None:
+    page = opened(watched_3d)
     button = page.locator("#theme")
     assert button.inner_text() == "Theme: system"
     for theme, dark in (("light", False), ("dark", True), ("system", False)):
@@ -236,8 +244,8 @@ def test_what_the_page_says_is_what_the_service_says(watched: Watched) -> None:
 
 
 @pytest.mark.slow
-def test_every_chart_has_a_table_a_png_and_a_csv(watched: Watched) -> None:
-    page = opened(watched)
+def test_every_chart_has_a_table_a_png_and_a_csv(watched_3d: Watched) -> None:
+    page = opened(watched_3d)
     for name in ("fan", "landscape"):
         chart = drawn(page, name)
         chart.locator("summary").click()
@@ -255,7 +263,7 @@ def test_every_chart_has_a_table_a_png_and_a_csv(watched: Watched) -> None:
     with page.expect_download() as sheet:
         page.locator("#chart-fan").get_by_role("button", name="CSV").click()
     rows = list(csv.DictReader(io.StringIO(Path(sheet.value.path()).read_bytes().decode())))
-    pooled = ONCE.get(f"{watched.url}/v1/clutches/sim-1/degradation").json()["items"][0]["measured"]
+    pooled = ONCE.get(f"{watched_3d.url}/v1/clutches/sim-1/degradation").json()["items"][0]["measured"]
     measured = [float(row["mean COF"]) for row in rows if row["kind"] == "measured"]
     assert measured == pooled["value"]
 
@@ -279,6 +287,7 @@ def test_pressure_and_view_are_chosen_by_keyboard(watched: Watched) -> None:
     page.locator("#chart-pressure-law table tbody tr").first.wait_for()
 
 
+@pytest.mark.slow
 def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, tmp_path: Path) -> None:
     with (
         serving(tmp_path / "clutchlife.db", loaded=True) as server,
@@ -303,6 +312,7 @@ def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, tmp_path:
         watched.close()
 
 
+@pytest.mark.slow
 def test_the_report_is_one_page_and_light(browser: Browser, life: Server) -> None:
     watched = Watched(browser, life.url, color_scheme="dark")
     page = opened(watched)
@@ -320,8 +330,7 @@ def test_the_report_is_one_page_and_light(browser: Browser, life: Server) -> Non
 
 @pytest.mark.slow
 def test_without_webgl_the_page_says_so_and_keeps_the_numbers(browser: Browser, life: Server) -> None:
-    other = launched(browser.browser_type, more=("--disable-3d-apis",))
-    watched = Watched(other, life.url)
+    watched = Watched(browser, life.url)
     page = watched.open("/clutches/sim-1#/curves")
     surface = page.locator("#chart-surface")
     surface.scroll_into_view_if_needed()
@@ -329,7 +338,6 @@ def test_without_webgl_the_page_says_so_and_keeps_the_numbers(browser: Browser, 
     surface.locator("summary").click()
     surface.locator("table tbody tr").nth(100).wait_for()
     watched.close()
-    other.close()
 
 
 def test_an_unknown_clutch_is_said_to_be_unknown(browser: Browser, life: Server) -> None:

@@ -74,7 +74,9 @@ def text(cycles: int) -> bytes:
     return "\r\n".join([*head, *(";".join(map(cell, row)) for row in rows_of(cycles))]).encode("latin-1")
 
 
-@pytest.mark.parametrize(("ending", "content", "torque"), [("csv", text, "Mz"), ("xlsx", workbook, "Mx")])
+@pytest.mark.parametrize(
+    ("ending", "content", "torque"), [pytest.param("csv", text, "Mz", marks=pytest.mark.slow), ("xlsx", workbook, "Mx")]
+)
 def test_the_second_file_of_a_rig_is_taken_without_a_question(
     watched: Watched, server: Server, ending: str, content: Any, torque: str
 ) -> None:
@@ -125,6 +127,7 @@ def test_the_importer_is_used_by_keyboard_and_passes_axe(watched: Watched) -> No
     assert violations(page) == []
 
 
+@pytest.mark.slow
 def test_a_file_is_read_again_by_the_mended_profile(watched: Watched, server: Server) -> None:
     columns = [{"title": "p", "channel": "pressure_bar"}, {"title": "n", "channel": "speed_rpm"}]
     torque = {"title": "Mz", "channel": "torque_nm", "unit": "Nm"}

@@ -140,6 +140,7 @@ def test_photographs_are_kept_small_and_drawn_again_only_where_they_changed(brow
     watched.close()
 
 
+@pytest.mark.slow
 def test_an_inspection_that_was_withdrawn_and_is_sent_again_is_said_to_stay_so(browser: Browser, bench: Server) -> None:
     with httpx2.Client(base_url=bench.url, timeout=60) as http:
         http.post("/v1/clutches", json={"clutch_id": "again"}).raise_for_status()
@@ -160,6 +161,7 @@ def test_an_inspection_that_was_withdrawn_and_is_sent_again_is_said_to_stay_so(b
     watched.close()
 
 
+@pytest.mark.slow
 def test_a_clutch_that_was_never_inspected_has_a_closed_form_and_no_chart(browser: Browser, bench: Server) -> None:
     watched, page = opened(browser, bench, "waiting")
     section = page.locator("#inspections")
@@ -209,6 +211,7 @@ def test_an_inspection_is_sent_by_the_form_withdrawn_and_restored(browser: Brows
     watched.close()
 
 
+@pytest.mark.slow
 def test_with_keys_photographs_are_shown_and_sent_with_the_readers_key(browser: Browser, tmp_path: Path) -> None:
     with serving(tmp_path / "clutchlife.db", loaded=True) as server:
         with httpx2.Client(base_url=server.url, timeout=60) as http:

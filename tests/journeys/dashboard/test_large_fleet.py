@@ -148,6 +148,7 @@ def test_search_finds_one_far_down_and_chips_count_what_is_found(watched: Watche
     expect(page.get_by_role("link", name=name(0), exact=True)).to_be_visible()
 
 
+@pytest.mark.slow
 def test_the_focus_stays_while_the_rows_about_it_change(watched: Watched) -> None:
     page = opened(watched)
     link = page.get_by_role("link", name=name(60), exact=True)
@@ -162,6 +163,7 @@ def test_the_focus_stays_while_the_rows_about_it_change(watched: Watched) -> Non
     assert page.locator(ROWS).count() <= MAX_ROWS
 
 
+@pytest.mark.slow
 def test_the_send_dialog_offers_what_is_typed(watched: Watched) -> None:
     page = opened(watched)
     drop(page, {"stationary-4000.csv": "pressure_bar,speed_rpm,torque_nm\n5,20,21\n"})
@@ -171,6 +173,7 @@ def test_the_send_dialog_offers_what_is_typed(watched: Watched) -> None:
     assert name(321) in [option.get_attribute("value") for option in dialog.locator("datalist option").all()]
 
 
+@pytest.mark.slow
 def test_a_print_says_which_rows_it_has(watched: Watched) -> None:
     page = opened(watched)
     expect(page.locator("#printed")).to_be_hidden()

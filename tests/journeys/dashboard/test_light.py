@@ -95,8 +95,8 @@ def test_the_library_takes_the_place_of_the_light_drawing(
 
 
 @pytest.mark.slow
-def test_without_the_library_the_light_charts_stay(browser: Browser, life: Server) -> None:
-    watched = Watched(browser, life.url)
+def test_without_the_library_the_light_charts_stay(browser_3d: Browser, life: Server) -> None:
+    watched = Watched(browser_3d, life.url)
     page = watched.page
     page.route(LIBRARY, lambda route: route.abort())
     watched.open("/clutches/bench")
@@ -111,7 +111,7 @@ def test_without_the_library_the_light_charts_stay(browser: Browser, life: Serve
         for name in names:
             page.locator(f"#chart-{name}").scroll_into_view_if_needed()
             page.locator(f"#chart-{name}[data-sketched]").wait_for()
-            assert seen(browser, page.locator(f"#chart-{name} .plot").screenshot()).is_chart, name
+            assert seen(browser_3d, page.locator(f"#chart-{name} .plot").screenshot()).is_chart, name
     page.locator("#chart-surface").scroll_into_view_if_needed()
     page.locator("#chart-surface").get_by_text("The plotting library did not load").wait_for()
     page.get_by_text("Live, as of").wait_for()

@@ -62,6 +62,7 @@ def test_a_plan_is_typed_by_keyboard_and_answered_with_cycles_blocks_and_dates(p
     assert violations(page) == []
 
 
+@pytest.mark.slow
 def test_what_is_wrong_is_said_at_its_field_and_can_be_mended(page: Page) -> None:
     page.get_by_role("button", name="Add a block").click()
     second = page.get_by_role("group", name="Block 2")

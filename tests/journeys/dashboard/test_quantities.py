@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import httpx2
 import pytest
-from playwright.sync_api import Browser, expect, sync_playwright
+from playwright.sync_api import Browser, expect
 
-from tests.browser.driving import Watched, launched, turned
+from tests.browser.driving import Watched, turned
 from tests.browser.lives import loops, post
 from tests.journeys.dashboard.test_axe import violations
 from tests.support import ONCE, Server, serving, stationary
@@ -15,15 +15,6 @@ pytestmark = pytest.mark.browser
 
 PRESSURES = (4.0, 5.0, 6.0)
 CRITERIA = [{"quantity": "mean_cof"}, {"quantity": "slope", "pressure_bar": 5, "speed_rpm": 100}]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """A Chromium without 3D, which is slow to draw and not what is looked at here."""
-    with sync_playwright() as playwright:
-        flat = launched(playwright.chromium, more=("--disable-3d-apis",))
-        yield flat
-        flat.close()
 
 
 @pytest.fixture(scope="module")
@@ -98,6 +89,7 @@ def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_
     watched.close()
 
 
+@pytest.mark.slow
 def test_curves_of_one_state_and_its_pressure_law(browser: Browser, life: Server) -> None:
     watched = Watched(browser, life.url)
     page = watched.open("/clutches/bench#/curves")
@@ -139,6 +131,7 @@ def test_remaining_life_by_any_quantity_and_pressure_is_chosen_on_the_page(brows
     watched.close()
 
 
+@pytest.mark.slow
 def test_a_clutch_that_its_engagements_end_is_shown(browser: Browser, life: Server) -> None:
     criteria = [{"quantity": "stop_time", "above": 1.5}, {"quantity": "static_ratio", "above": 1.3}]
     record = {"clutch_id": "stopping", "end_of_life": {"criteria": criteria}}

@@ -135,6 +135,7 @@ def test_a_tab_of_a_clutch_of_raw_runs_is_light(browser: Browser, life: Server, 
     watched.close()
 
 
+@pytest.mark.slow
 def test_the_library_is_loaded_once_and_kept(browser: Browser, life: Server) -> None:
     watched = Watched(browser, life.url)
     page, wire = watched.page, Wire(watched.page)

@@ -65,6 +65,7 @@ def file_in(dialog: Locator, name: str) -> Locator:
     return dialog.get_by_role("group", name=name, exact=True)
 
 
+@pytest.mark.slow
 def test_no_clutch_is_chosen_for_the_reader(watched: Watched) -> None:
     page = opened(watched)
     drop(page, {"a.csv": csv_text(0)})
@@ -188,6 +189,7 @@ def test_a_clutch_is_registered_by_the_form(watched: Watched, server: Server) ->
     }
 
 
+@pytest.mark.slow
 def test_what_is_wrong_with_a_file_is_said_by_row(watched: Watched, server: Server) -> None:
     page = opened(watched, "/clutches/other")
     drop(page, {"sweep.csv": WRONG})
@@ -203,6 +205,7 @@ def test_what_is_wrong_with_a_file_is_said_by_row(watched: Watched, server: Serv
     dialog.get_by_role("button", name="Close").click()
 
 
+@pytest.mark.slow
 def test_a_busy_service_is_asked_again(watched: Watched, server: Server) -> None:
     busy = ["1", "1"]
 
@@ -222,6 +225,7 @@ def test_a_busy_service_is_asked_again(watched: Watched, server: Server) -> None
     assert [run["cycles"] for run in asked(server, "/other/runs")["items"]] == [100]
 
 
+@pytest.mark.slow
 def test_a_campaign_s_folder_says_itself_what_its_files_are(watched: Watched, server: Server) -> None:
     page = opened(watched)
     listed = [

@@ -129,6 +129,7 @@ def test_a_key_expires_by_the_clock_and_one_that_is_revoked_stays_so(tmp_path: P
 RUNS_PER_KILL = 6
 
 
+@pytest.mark.slow
 @kills(4, 50)
 def test_what_a_client_that_is_killed_sends_to_a_service_that_comes_and_goes_arrives(
     tmp_path: Path, number: int

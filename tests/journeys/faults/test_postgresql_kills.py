@@ -61,6 +61,7 @@ def test_no_acknowledged_run_is_lost_where_the_service_is_killed(postgres: Postg
     require_all(url, acknowledged, on_their_way=number)
 
 
+@pytest.mark.slow
 @kills(3, 50)
 def test_no_acknowledged_run_is_lost_where_postgresql_is_killed(postgres: PostgresServer, number: int) -> None:
     """The service lives on: it refuses what it cannot store, and goes on when the server is back."""
@@ -89,6 +90,7 @@ def test_no_acknowledged_run_is_lost_where_postgresql_is_killed(postgres: Postgr
     require_all(url, acknowledged, on_their_way=0)
 
 
+@pytest.mark.slow
 @kills(1, 20)
 def test_what_a_killed_service_of_several_was_diagnosing_another_makes(postgres: PostgresServer, number: int) -> None:
     """Runs are posted at all services; the one that has a diagnosis is killed, and comes back later."""

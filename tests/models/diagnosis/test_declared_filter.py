@@ -12,6 +12,7 @@ from models.records.runs import Record
 from models.records.torque_filter import filtered_as_torque
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.test_diagnose import look
+from tests.support import one_quick
 
 SLUG = "channel_delay"
 #: Time constant of the hidden filter [s].
@@ -35,7 +36,7 @@ def hidden(seed: int, declared: float) -> Campaign:
     return replace(given, dynamic=tests)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 7])
+@pytest.mark.parametrize("seed", one_quick([1, 2, 7]))
 def test_a_filter_is_named_undeclared_and_not_declared(seed: int) -> None:
     undeclared = look(hidden(seed, 0.0))
     assert undeclared.causes == (SLUG,)
@@ -44,6 +45,7 @@ def test_a_filter_is_named_undeclared_and_not_declared(seed: int) -> None:
     assert look(hidden(seed, FILTER)).verdict is Verdict.MODEL_ADEQUATE
 
 
+@pytest.mark.slow
 def test_what_is_left_beyond_the_declared_filter_is_what_is_found() -> None:
     report = look(hidden(7, 0.5 * FILTER))
     assert report.causes == (SLUG,)

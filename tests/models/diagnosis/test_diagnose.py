@@ -1,6 +1,7 @@
 """The whole diagnosis on small campaigns: calm where nothing is, right where something loud is planted, honest else."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from models.diagnosis.report.report import Report
 from models.friction.stribeck import StribeckParameters, torque
 from models.records.runs import Plateaus
 from tests.models.diagnosis.campaigns import Planted, Where, campaign
+from tests.support import one_quick
 
 SEED = 5
 
@@ -47,12 +49,20 @@ PLANTED: dict[str, Planted] = {
     "oil_change": lambda at: changed(at, viscous_coefficient=1.25 if at.cycles > 4000 else 1.0),
 }
 
+#: Of a sensor, and of loops; the others are of `make slow`.
+QUICK = {"torque_zero_shift", "inertia_torque"}
+
 
 def look(given: Campaign, **options: frozenset[str]) -> Report:
     return diagnose(given, rng=np.random.default_rng(SEED), **options)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@cache
+def of_planted(slug: str) -> Report:
+    return look(campaign(7, PLANTED[slug]))
+
+
+@pytest.mark.parametrize("seed", one_quick([1, 2, 3]))
 def test_where_nothing_is_planted_the_model_is_adequate(seed: int) -> None:
     report = look(campaign(seed, gain=0.001 * seed))
     assert report.verdict is Verdict.MODEL_ADEQUATE
@@ -62,9 +72,11 @@ def test_where_nothing_is_planted_the_model_is_adequate(seed: int) -> None:
     assert report.baseline.rmse == pytest.approx(report.baseline.noise, rel=0.15)
 
 
-@pytest.mark.parametrize("slug", PLANTED)
+@pytest.mark.parametrize(
+    "slug", [slug if slug in QUICK else pytest.param(slug, marks=pytest.mark.slow) for slug in PLANTED]
+)
 def test_what_is_planted_is_found(slug: str) -> None:
-    report = look(campaign(7, PLANTED[slug]))
+    report = of_planted(slug)
     assert report.verdict in {Verdict.CAUSE_NAMED, Verdict.CAUSE_AMBIGUOUS}
     assert slug in report.causes
     assert report.candidates[0].effect == slug
@@ -75,11 +87,12 @@ def test_what_is_planted_is_found(slug: str) -> None:
 
 
 def test_an_amplitude_is_what_was_planted() -> None:
-    estimate = look(campaign(7, PLANTED["torque_zero_shift"])).candidates[0].estimate
+    estimate = of_planted("torque_zero_shift").candidates[0].estimate
     assert estimate.unit == "Nm"
     assert abs(estimate.value - 0.6) < 4 * estimate.sd < 0.4
 
 
+@pytest.mark.slow
 def test_what_is_taken_out_of_the_catalogue_is_not_named() -> None:
     report = look(campaign(7, PLANTED["unsettled_dwell"]), without=frozenset({"unsettled_dwell"}))
     assert report.verdict not in {Verdict.CAUSE_NAMED, Verdict.MODEL_ADEQUATE}

@@ -138,7 +138,7 @@ def _finite(report: Report) -> bool:
     return all(math.isfinite(number) for number in numbers)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(recipe=RECIPES)
 @example(recipe=BEYOND_ROUNDING)
 @example(recipe=WITHOUT_THERMOMETER)

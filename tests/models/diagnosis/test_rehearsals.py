@@ -8,6 +8,7 @@ from models.diagnosis.explanations.verdict import Verdict
 from tests.models.diagnosis.rehearsals import rehearsal
 
 
+@pytest.mark.slow
 def test_a_plain_simulated_campaign_is_adequate() -> None:
     """It was diagnosed `squeeze film`, the simulator's own, and its clutch was out of specification."""
     report = diagnose(rehearsal(7, tests=8), rng=np.random.default_rng(1))

@@ -21,20 +21,6 @@ CHAPTERS = (
     "fleet",
     "compare",
 )
-#: The file of each chapter to open first; it says what the chapter is in three lines.
-FIRST = {
-    "shared": "api.js",
-    "charts": "chart.js",
-    "quantities": "criteria.js",
-    "sending": "sending.js",
-    "alarms": "alarms.js",
-    "diagnosis": "diagnosis.js",
-    "engagements": "engagements.js",
-    "inspections": "inspections.js",
-    "clutch": "clutch.js",
-    "fleet": "fleet.js",
-    "compare": "compare.js",
-}
 TEXTS = {name: asset.body.decode() for name, asset in assets.load(assets.STATIC).by_name.items() if "/" in name}
 MODULES = {name: text for name, text in TEXTS.items() if name.endswith(".js")}
 
@@ -55,21 +41,6 @@ def resolved(name: str, path: str) -> str:
         elif part != ".":
             parts.append(part)
     return "/".join(parts)
-
-
-def test_every_folder_is_a_chapter() -> None:
-    counts = {chapter: sum(name.startswith(f"{chapter}/") for name in MODULES) for chapter in CHAPTERS}
-    assert sum(counts.values()) == len(MODULES)
-    assert min(counts.values()) > 0
-
-
-@pytest.mark.parametrize("chapter", CHAPTERS)
-def test_the_first_file_of_a_chapter_says_what_it_is(chapter: str) -> None:
-    lines = MODULES[f"{chapter}/{FIRST[chapter]}"].splitlines()
-    assert lines[0] == "// @ts-check"
-    head = [line for line in lines[1:4] if line.startswith("// ")]
-    assert len(head) == 3
-    assert lines[4] == ""
 
 
 @pytest.mark.parametrize("name", sorted(MODULES))

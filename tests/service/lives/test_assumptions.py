@@ -67,6 +67,7 @@ def test_energy_as_severity_predicts_the_recent_duty(client: TestClient) -> None
     assert then["remaining_cycles"]["0.5"] > 2.0 * by_energy["remaining_cycles"]["0.5"]
 
 
+@pytest.mark.slow
 def test_by_energy_too_the_order_of_arrival_does_not_matter(tmp_path: Path) -> None:
     """The blocks tell what the tests' ζ is: a block that comes after its test moves it."""
     posts = [(measure, 1000.0 * i, wear(1000.0 * i)) for i in range(5)] + [

@@ -16,6 +16,7 @@ from service.queries.remaining_life import life_by_criteria, remaining_life, row
 from service.schemas.life import ProgrammeIn
 from service.workflows.replay import replay_clutch
 from tests.service.workflows.benches import CLUTCH, Bench, body, stood_in
+from tests.support import one_quick
 
 #: The present, as the answers state it.
 PRESENT = ("mean_cof", "mean_cof_sd", "measured_at_cycles", "fraction_of_initial", "health")
@@ -69,7 +70,9 @@ def test_two_tests_say_at_least_how_many_cycles_are_left(bench: Bench) -> None:
     assert life["statement"] in item(bench)["state"]["why"]
 
 
-@pytest.mark.parametrize("record", [{}, {"end_of_life": {"criteria": [{"quantity": "mean_cof"}, SLOPE]}}], ids=str)
+@pytest.mark.parametrize(
+    "record", one_quick([{"end_of_life": {"criteria": [{"quantity": "mean_cof"}, SLOPE]}}, {}]), ids=str
+)
 def test_no_answer_stands_without_a_word_while_two_runs_are_held(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, record: dict[str, Any]
 ) -> None:

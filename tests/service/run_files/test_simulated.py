@@ -25,6 +25,7 @@ from service.run_files.json_run import read_run
 from service.run_files.record_writer import RecordFormat, write_record
 from service.run_files.simulated import simulated_body, simulated_channels, simulated_head
 from service.run_files.upload import read_file_run
+from tests.support import one_quick
 
 GEOMETRY = Geometry()
 FORMATS = ("csv", "tdms", "mdf4")
@@ -65,7 +66,7 @@ def incoming(file: manifest.RunFile) -> Any:
     return read_file_run(file.path, cycles=float(parameters.pop("cycles")), **parameters)
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", one_quick(FORMATS))
 def test_every_format_holds_the_run_bit_for_bit(campaigns: dict[str, Path], form: str) -> None:
     plain, other = ([incoming(file) for file in runs_in(campaigns[name])] for name in ("json", form))
     assert len(plain) == 3
@@ -73,7 +74,7 @@ def test_every_format_holds_the_run_bit_for_bit(campaigns: dict[str, Path], form
     assert {path.suffix for path in campaigns[form].rglob("*.*")} == {".json", RecordFormat(form).suffix}
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", one_quick(FORMATS))
 def test_every_format_gives_the_same_fits_and_loops(campaigns: dict[str, Path], form: str) -> None:
     stationary, dynamic = measured(Programme(dynamic=DynamicTest()))
     read = {run.kind: run for run in map(incoming, runs_in(campaigns[form]))}

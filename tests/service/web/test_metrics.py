@@ -155,6 +155,7 @@ sys.stdin.read()
 """
 
 
+@pytest.mark.slow
 def test_of_several_processes_at_a_port_all_are_counted(database_url: str, tmp_path: Path) -> None:
     """Calls that wait are those of processes that are there; what one has answered that ended stays counted."""
     folder = tmp_path / "metrics"

@@ -146,6 +146,7 @@ def test_a_lane_whose_processes_end_at_a_call_again_and_again_is_told_until_one_
     assert isinstance(processes.submit(Lane.RUNS, calls.pid).result(IN_TIME), int)
 
 
+@pytest.mark.slow
 def test_a_process_that_stops_is_replaced_and_its_call_made_once_more(
     processes: Workers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -241,6 +242,7 @@ def _serve(path: str, answer: "multiprocessing.connection.Connection") -> None:
     signal.pause()
 
 
+@pytest.mark.slow
 def test_workers_end_with_a_service_that_is_killed(database: Database) -> None:
     ours, theirs = multiprocessing.Pipe()
     service = multiprocessing.get_context("spawn").Process(target=_serve, args=(str(database.path), theirs))

@@ -30,6 +30,7 @@ from tests.service.workflows.benches import (
     body,
     stood_in,
 )
+from tests.support import one_quick
 
 
 @pytest.fixture
@@ -82,6 +83,7 @@ def test_a_late_arrival_is_none_once_the_run_that_made_it_late_is_gone(benches: 
     assert bench.receipts()["slip"]["sent_cycles"] == 70_000
 
 
+@pytest.mark.slow
 def test_a_rebuild_that_was_none_takes_its_adoption_along(benches: tuple[Bench, Bench]) -> None:
     """What was adopted before it is in force again, and again what was adopted after it where it comes back."""
     slipped, right = benches
@@ -108,6 +110,7 @@ def test_a_rebuild_that_was_none_takes_its_adoption_along(benches: tuple[Bench, 
     assert slipped.answers() == whole
 
 
+@pytest.mark.slow
 def test_a_run_of_an_earlier_life_is_corrected(benches: tuple[Bench, Bench]) -> None:
     slipped, right = benches
     for bench, cycles in ((slipped, 100.0), (right, 1000.0)):
@@ -124,7 +127,7 @@ def test_a_run_of_an_earlier_life_is_corrected(benches: tuple[Bench, Bench]) -> 
     assert slipped.answers()["clutch"]["summary"] != right.answers()["clutch"]["summary"]
 
 
-@pytest.mark.parametrize("kind", ["test", "loop", "duty", "oil_change", "rebuild"])
+@pytest.mark.parametrize("kind", one_quick(["test", "loop", "duty", "oil_change", "rebuild"]))
 def test_what_is_held_changes_no_answer_but_is_said_beside_it(benches: tuple[Bench, Bench], kind: str) -> None:
     held, never = benches
     for bench in benches:

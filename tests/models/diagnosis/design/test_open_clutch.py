@@ -145,6 +145,7 @@ def test_the_drag_is_fitted_and_held_fast_where_there_is_none(swung: Study, give
     assert extended.effects[0].amplitude == pytest.approx(INERTIA, rel=0.03)
 
 
+@pytest.mark.slow
 def test_an_open_clutch_parts_inertia_from_a_film(swung: Study, given: Study) -> None:
     shape = (0.4, 0.8, 0.05, 0.7, 1.0, 1.0)
     parted = []

@@ -48,6 +48,7 @@ def test_what_no_catalogue_holds_is_unexplained_and_described_in_the_summary(pla
     assert not {each.effect for each in report.candidates} & FAULT_BY_SLUG.keys()
 
 
+@pytest.mark.slow
 def test_a_zero_that_settles_is_still_a_zero() -> None:
     def settling_zero(at: Where) -> np.ndarray:
         return np.asarray(-0.5 * np.exp(-at.clock / 110.0), dtype=np.float64)

@@ -47,6 +47,7 @@ def look(given: Campaign) -> Report:
     return diagnose(given, rng=np.random.default_rng(3))
 
 
+@pytest.mark.slow
 def test_the_same_clutch_in_other_sizes_is_told_the_same() -> None:
     given = campaign(9, zero, loops=False)
     first = look(given)

@@ -34,7 +34,7 @@ def too_low(run: StationaryRun) -> StationaryRun:
     )
 
 
-@pytest.mark.parametrize(("changed", "place"), [(reversed_torque, 2), (too_low, 4)])
+@pytest.mark.parametrize(("changed", "place"), [(reversed_torque, 2), pytest.param(too_low, 4, marks=pytest.mark.slow)])
 def test_a_run_that_is_not_like_the_others_is_named(changed, place: int) -> None:
     given = campaign(2, loops=False, cycles=(0.0, 1000.0, 3000.0, 6000.0, 10000.0, 15000.0, 21000.0))
     report = diagnose(other(given, place, changed(given.stationary[place])), rng=np.random.default_rng(1))

@@ -20,6 +20,7 @@ def shifted() -> Report:
     return diagnose(rehearsal(5, {"torque_zero_shift": 3.0}, dynamic=False, tests=12), rng=np.random.default_rng(0))
 
 
+@pytest.mark.slow
 def test_an_offset_whose_sign_depends_on_the_course_assumed_is_no_adoption(creeping: Report) -> None:
     """+0.5 bar in the end was named -0.111 ± 0.040 bar, and adopting it moved 4,090 remaining cycles to 6,090 of 1,730."""
     assert "pressure_offset" in creeping.causes

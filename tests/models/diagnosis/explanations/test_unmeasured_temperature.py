@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from models.diagnosis.campaign import Campaign, EventKind, MaintenanceEvent
 from models.diagnosis.diagnose import diagnose
@@ -20,6 +21,7 @@ def logged(given: Campaign) -> Campaign:
     return replace(given, maintenance=(MaintenanceEvent(run_id="oil", cycles=4000.0, event=EventKind.OIL_CHANGE),))
 
 
+@pytest.mark.slow
 def test_a_logged_oil_change_is_likelier_than_a_temperature_that_nobody_measured() -> None:
     """One step at the cycle of the log against a course of its own for every test: each is possible, one is simple."""
     report = diagnose(logged(campaign(5, fresh, temperature=False)), rng=np.random.default_rng(0))

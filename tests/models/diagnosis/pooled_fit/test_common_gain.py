@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from models.diagnosis.baseline.prediction import frame_of
 from models.diagnosis.design.design import build_design
@@ -14,6 +15,7 @@ from models.diagnosis.pooled_fit.gauss_newton import fit
 from tests.models.diagnosis.rehearsals import rehearsal
 
 
+@pytest.mark.slow
 def test_an_extended_model_is_not_off_all_runs_by_one_share() -> None:
     """It was 14 % below all of them, at a scatter of the gains of 2 %: held-out runs were off by 2.4 Nm."""
     baseline = fit_baseline(build_design(rehearsal(3, {"oil_temperature": 1.0}, tests=8, noise=0.01)))

@@ -1,5 +1,7 @@
 """The scatter from run to run is estimated where there are runs to tell it, and said to be assumed where there are not."""
 
+import pytest
+
 from models.diagnosis.pooled_fit.projection import RunScatter, gram_of, projections_of, run_scatter
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study
@@ -10,6 +12,7 @@ def estimated(given: Study) -> RunScatter:
     return run_scatter(list(projections_of(gram_of(problem, given.baseline.fit), problem.noise)))
 
 
+@pytest.mark.slow
 def test_how_much_runs_scatter_is_estimated_with_its_uncertainty() -> None:
     """Gains that scatter by 0.05, 0.6 and 1.2 %: three estimates, each about its truth. All three were reported as 0.2 %."""
     truths = (0.0005, 0.006, 0.012)

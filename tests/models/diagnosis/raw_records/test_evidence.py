@@ -24,13 +24,14 @@ from tests.models.diagnosis.raw_campaigns import (
     with_ripple,
     with_wandering_ripple,
 )
+from tests.support import one_quick
 
 
 def found(of: Campaign) -> dict[str, tuple[float, float]]:
     return {each.effect: (each.estimate.value, each.estimate.sd) for each in raw_evidence(of)}
 
 
-@pytest.mark.parametrize("memory", [0.0, 0.8, 0.95])
+@pytest.mark.parametrize("memory", one_quick([0.8, 0.0, 0.95]))
 def test_autocorrelated_noise_is_no_evidence(memory: float) -> None:
     print("seeds 0 to 3")
     rngs = [np.random.default_rng(seed) for seed in range(4)]
@@ -84,7 +85,7 @@ def test_what_no_loop_shows_all_loops_show_together() -> None:
     assert found(campaign([], wrong)) == {}
 
 
-@pytest.mark.parametrize("rate", [25.0, 100.0, 500.0])
+@pytest.mark.parametrize("rate", one_quick([25.0, 100.0, 500.0]))
 def test_loops_of_noise_are_no_evidence(rate: float) -> None:
     print("seed 9")
     rng = np.random.default_rng(9)

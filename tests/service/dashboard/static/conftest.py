@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from playwright.sync_api import Browser, Page
 
-from tests.browser.driving import chromium
+from tests.browser.driving import FLAT, chromium
 from tests.browser.modules import Module, load, open_page
 from tests.support import Server, serving
 
@@ -20,7 +20,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
     """A headless Chromium."""
-    with chromium() as launched:
+    with chromium(more=FLAT) as launched:
         yield launched
 
 
