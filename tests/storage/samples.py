@@ -20,6 +20,7 @@ from storage import channels, clutches, diagnoses, runs
 from storage.clutches import ClutchRow
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
+from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.results import FitRow
 from storage.runs import NewRun
