@@ -20,16 +20,13 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.plausibility import criteria
 from models.tracking.courses import Course, basis
-from models.tracking.discrepancy import smooth
+from models.tracking.discrepancy import FUTURE, PAST, smooth
 
-_GRID = np.array(
+#: The nodes [g] that are averaged over: the scale, the deviations of the change and of δ, and the scatter of each.
+_NODES = np.array(
     [(scale, *size, scatter) for scale in criteria.SCALES for size in criteria.SIZES for scatter in criteria.SCATTERS]
 )
-#: Variances of the change and of δ, by size.
-_OF_CHANGE, _OF_DISCREPANCY = np.square(np.array(criteria.SIZES)).T
-_SCALES = np.log(np.array(criteria.SCALES))
-#: Columns [scales, k, p] of cycles k: of level and steps, of the change, of δ.
-_Features = tuple[FloatArray, FloatArray, FloatArray]
+_LOG_SCALES = np.log(np.array(criteria.SCALES))
 #: A probability of nothing.
 _NEVER = 1e-300
 
@@ -52,88 +49,91 @@ class Tests:
 
 
 def _own_clock(cycles: FloatArray, latest: float) -> FloatArray:
-    """u of every scale [scales, k]; where no test was made after the start, any further one is at u = 1.
+    """u at cycles [k] by every scale [scales, k]; where no test was made after the start, any further one is at u = 1.
 
     Cycles of which floats cannot hold the inverse are none.
     """
     if latest < 1e-300:
-        return np.tile(np.minimum(cycles, 1.0), (_SCALES.size, 1))
-    log_scale = (_SCALES + math.log(latest))[:, None]
+        return np.tile(np.minimum(cycles, 1.0), (_LOG_SCALES.size, 1))
+    log_scale = (_LOG_SCALES + math.log(latest))[:, None]
     course = np.full(1, Course.LOGARITHM, dtype=np.intp)
-    zero = np.zeros((1, 1))
-    at = basis(cycles[None, :], log_scale, zero, course)
-    return np.asarray(at / basis(np.full((1, 1), latest), log_scale, zero, course))
+    at, whole = (basis(zeta, log_scale, np.zeros((1, 1)), course) for zeta in (cycles[None], np.array([[latest]])))
+    return np.asarray(at / whole)
 
 
 @dataclass(frozen=True)
 class Fit:
     """The tests of a life taken in, and what they say of further ones.
 
-    Arrays by node of the grid [g] first. `log_weight` [g] is the log posterior probability of the nodes.
+    At a node y - level = A w + scatter with w standard normal: A holds level and steps, the change and δ in their prior
+    deviations, d the variance of every test about its course. With M = I + AᵀA/d = LLᵀ and N = L⁻¹Aᵀ/d the inverse of the
+    covariance of y is P = 1/d - NᵀN. Arrays by node [g] first.
     """
 
     tests: Tests
 
-    def _features(self, cycles: FloatArray, epoch: FloatArray) -> FloatArray:
-        """Columns [scales, k, p] whose products sum to the covariance of level and steps."""
+    def _columns(self, cycles: FloatArray, epoch: FloatArray, stretches: int = PAST + FUTURE) -> FloatArray:
+        """A at cycles [k] in epochs [k]; [g, k, p], with so many of δ's stretches last, those after T behind the others."""
         u = _own_clock(cycles, self.latest)
-        head = [np.full(u.shape, self.tests.level_sd)]
-        further = [np.broadcast_to(criteria.LEVEL_SD * (cycles >= at), u.shape) for at in self.tests.levels]
-        steps = [np.broadcast_to(criteria.STEP_SD * (epoch > e), u.shape) for e in np.unique(self.tests.epoch)]
-        return np.stack([*head, *further, *steps], axis=2)
+        levels = [criteria.LEVEL_SD * (cycles >= at) for at in self.tests.levels]
+        steps = [criteria.STEP_SD * (epoch > e) for e in np.unique(self.tests.epoch)]
+        level = np.stack([np.full(cycles.shape, self.tests.level_sd), *levels, *steps], axis=1)
+        shared = np.broadcast_to(level, (*u.shape, level.shape[1]))
+        terms = np.concatenate([shared, u[:, :, None], smooth(u, 1.0, stretches)], axis=2)
+        by_node = np.repeat(terms, len(_NODES) // _LOG_SCALES.size, axis=0)
+        by_node[..., level.shape[1]] *= _NODES[:, 1, None]
+        by_node[..., level.shape[1] + 1 :] *= _NODES[:, 2, None, None]
+        return by_node
 
     @cached_property
     def latest(self) -> float:
         """T."""
         return float(self.tests.cycles.max(initial=0.0))
 
-    def _covariance(self, a: "_Features", b: "_Features") -> FloatArray:
-        """Covariance [g, k, m] of y without scatter between two sets of cycles."""
-        plain, change, bent = (left @ np.swapaxes(right, 1, 2) for left, right in zip(a, b, strict=True))
-        return _by_node(plain, change, bent)
-
-    def _all(self, cycles: FloatArray, epoch: FloatArray) -> "_Features":
-        u = _own_clock(cycles, self.latest)
-        return self._features(cycles, epoch), u[:, :, None], smooth(u, 1.0)
-
-    @cached_property
-    def _own(self) -> "_Features":
-        return self._all(self.tests.cycles, self.tests.epoch)
-
     @cached_property
     def noise(self) -> FloatArray:
-        """Variance of every test about its course [g, n]."""
-        return np.asarray(self.tests.variance + np.square(_GRID[:, -1, None]))
+        """Variance of every test about its course, d [g, n]."""
+        return np.asarray(self.tests.variance + np.square(_NODES[:, 3, None]))
 
     @cached_property
-    def precision(self) -> FloatArray:
-        """The inverse P of the covariance of the tests [g, n, n]."""
-        root = np.linalg.inv(self._root)
-        return np.asarray(np.swapaxes(root, 1, 2) @ root)
+    def _own(self) -> FloatArray:
+        """A of the tests [g, n, p], without the stretches after T."""
+        return self._columns(self.tests.cycles, self.tests.epoch, PAST)
 
     @cached_property
     def _root(self) -> FloatArray:
-        covariance = self._covariance(self._own, self._own)
-        n = self.tests.cycles.size
-        covariance[:, np.arange(n), np.arange(n)] += self.noise
-        return np.asarray(np.linalg.cholesky(covariance))
+        """L⁻¹ [g, p, p]."""
+        weighted = np.swapaxes(self._own, 1, 2) / self.noise[:, None]
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(np.eye(weighted.shape[1]) + weighted @ self._own)))
+
+    @cached_property
+    def _explained(self) -> FloatArray:
+        """N [g, p, n]."""
+        return np.asarray(self._root @ np.swapaxes(self._own, 1, 2) / self.noise[:, None])
+
+    @cached_property
+    def _off(self) -> FloatArray:
+        """y - level [n]."""
+        return np.asarray(self.tests.log_cof - self.tests.level)
 
     @cached_property
     def pull(self) -> FloatArray:
         """P (y - level) [g, n]."""
-        return np.asarray(self.precision @ (self.tests.log_cof - self.tests.level))
+        pulled = (self._explained @ self._off)[:, None] @ self._explained
+        return np.asarray(self._off / self.noise - pulled[:, 0])
 
     @cached_property
     def log_evidence_by_node(self) -> FloatArray:
         """log density of the tests under every node [g]."""
-        y = self.tests.log_cof - self.tests.level
-        log_volume = np.log(np.diagonal(self._root, axis1=1, axis2=2)).sum(axis=1)
-        return np.asarray(-0.5 * (self.pull @ y) - log_volume - 0.5 * y.size * math.log(2.0 * math.pi))
+        log_volume = 0.5 * np.log(self.noise).sum(axis=1) - np.log(np.diagonal(self._root, axis1=1, axis2=2)).sum(
+            axis=1
+        )
+        return np.asarray(-0.5 * (self.pull @ self._off) - log_volume - 0.5 * self._off.size * math.log(2.0 * math.pi))
 
     @property
     def log_evidence(self) -> float:
         """log density of the tests."""
-        return float(np.logaddexp.reduce(self.log_evidence_by_node)) - math.log(len(_GRID))
+        return float(np.logaddexp.reduce(self.log_evidence_by_node)) - math.log(len(_NODES))
 
     @cached_property
     def log_weight(self) -> FloatArray:
@@ -143,17 +143,16 @@ class Fit:
     @cached_property
     def without(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Each test as the others predict it: mean [g, n], variance of the test [g, n], log weight of the nodes [g, n]."""
-        own = np.diagonal(self.precision, axis1=1, axis2=2)
-        variance = 1.0 / own
+        variance = 1.0 / (1.0 / self.noise - np.square(self._explained).sum(axis=1))
         mean = self.tests.log_cof - self.pull * variance
-        log_weight = self.log_weight[:, None] - _log_normal(self.tests.log_cof - mean, variance)
+        log_weight = self.log_weight[:, None] - log_normal(self.tests.log_cof - mean, variance)
         return mean, variance, log_weight - np.logaddexp.reduce(log_weight, axis=0)
 
     def log_step_gains(self) -> FloatArray:
         """By how much the log evidence would grow by a new level from each test on [n]; 0 for the first."""
         order = np.argsort(self.tests.cycles, kind="stable")[::-1]
-        ordered = self.precision[:, order][:, :, order]
-        volume = np.diagonal(ordered.cumsum(axis=1).cumsum(axis=2), axis1=1, axis2=2)
+        explained = np.square(self._explained[:, :, order].cumsum(axis=2)).sum(axis=1)
+        volume = (1.0 / self.noise[:, order]).cumsum(axis=1) - explained
         pulled = self.pull[:, order].cumsum(axis=1)
         scale = 1.0 + criteria.LEVEL_SD**2 * volume
         gain = -0.5 * np.log(scale) + 0.5 * criteria.LEVEL_SD**2 * pulled**2 / scale
@@ -168,18 +167,11 @@ class Fit:
 
     def predict(self, cycles: FloatArray, epoch: FloatArray) -> "Predicted":
         """y at cycles [m] since the life began in epochs [m]."""
-        features = self._all(cycles, epoch)
-        n = self.tests.cycles.size
-        prior = _diagonal(features)
-        if n == 0:
-            mean, variance = np.full((len(_GRID), cycles.size), self.tests.level), prior
-            log_weight = np.full(len(_GRID), -math.log(len(_GRID)))
-        else:
-            cross = self._covariance(self._own, features)
-            mean = self.tests.level + np.einsum("gn,gnm->gm", self.pull, cross)
-            variance = np.maximum(prior - (cross * (self.precision @ cross)).sum(axis=1), 0.0)
-            log_weight = self.log_weight
-        return Predicted(log_weight=log_weight, mean=mean, variance=variance + np.square(_GRID[:, -1, None]))
+        columns = self._columns(cycles, epoch)
+        turned = columns[..., :-FUTURE] @ np.swapaxes(self._root, 1, 2)
+        mean = self.tests.level + (turned @ (self._explained @ self._off)[..., None])[..., 0]
+        variance = np.square(turned).sum(axis=2) + np.square(columns[..., -FUTURE:]).sum(axis=2)
+        return Predicted(log_weight=self.log_weight, mean=mean, variance=variance + np.square(_NODES[:, 3, None]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,7 +191,7 @@ class Predicted:
         probability `new_level` [m] COF has a new level there."""
         off, variance, weight = log_cof - self.mean, self.variance + spread**2, self.log_weight[:, None]
         same = np.log1p(-new_level) + log_outlying(off, variance, weight)
-        stepped = np.logaddexp.reduce(weight + _log_normal(off, variance + criteria.LEVEL_SD**2), axis=0)
+        stepped = np.logaddexp.reduce(weight + log_normal(off, variance + criteria.LEVEL_SD**2), axis=0)
         return np.asarray(np.logaddexp(same, np.log(np.maximum(new_level, _NEVER)) + stepped))
 
     def interval(self, index: int, spread: float) -> tuple[float, float]:
@@ -212,20 +204,9 @@ class Predicted:
 
 def log_outlying(off: FloatArray, variance: FloatArray, log_weight: FloatArray) -> FloatArray:
     """log density [m] of what is `off` its mean [g, m] under nodes of weight [g, m], where a share of tests is outlying."""
-    plain = math.log1p(-criteria.OUTLYING_SHARE) + _log_normal(off, variance)
-    further = math.log(criteria.OUTLYING_SHARE) + _log_normal(off, variance + criteria.OUTLYING_SD**2)
+    plain = math.log1p(-criteria.OUTLYING_SHARE) + log_normal(off, variance)
+    further = math.log(criteria.OUTLYING_SHARE) + log_normal(off, variance + criteria.OUTLYING_SD**2)
     return np.asarray(np.logaddexp.reduce(log_weight + np.logaddexp(plain, further), axis=0))
-
-
-def _diagonal(features: _Features) -> FloatArray:
-    return _by_node(*(np.square(part).sum(axis=2) for part in features))
-
-
-def _by_node(plain: FloatArray, change: FloatArray, bent: FloatArray) -> FloatArray:
-    """The sum [g, ...] of the parts [scales, ...] of a covariance, each with its size at every node."""
-    sizes = (-1, *(1,) * (plain.ndim - 1))
-    both = plain[:, None] + _OF_CHANGE.reshape(sizes) * change[:, None] + _OF_DISCREPANCY.reshape(sizes) * bent[:, None]
-    return np.asarray(np.repeat(both.reshape(-1, *plain.shape[1:]), len(criteria.SCATTERS), axis=0))
 
 
 def log_physics(log_cof: FloatArray) -> FloatArray:
@@ -234,5 +215,6 @@ def log_physics(log_cof: FloatArray) -> FloatArray:
     return np.asarray(-0.5 * np.maximum(beyond, 0.0) ** 2)
 
 
-def _log_normal(off: FloatArray, variance: FloatArray) -> FloatArray:
+def log_normal(off: FloatArray, variance: FloatArray) -> FloatArray:
+    """log density of what is `off` the mean of a normal, any shape."""
     return np.asarray(-0.5 * (np.log(2.0 * math.pi * variance) + off**2 / variance))

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.plausibility import criteria, pace
-from models.plausibility.course import Fit, Predicted, Tests, log_outlying, log_physics
+from models.plausibility.course import Fit, Predicted, Tests, log_normal, log_outlying, log_physics
 from models.plausibility.runs import Reading, Run, Slip
 from models.plausibility.slips import OF_CLUTCH, OTHER_CLUTCH, OTHER_CYCLES, slips_of
 
@@ -458,7 +458,7 @@ class _Weighed:
             off = fit.tests.log_cof - mean
             sign = np.array([-1.0 if i in belief.outlying else 1.0 for i in own])
             now, then = (
-                np.logaddexp.reduce(log_weight + _log_normal(off, variance + more * criteria.OUTLYING_SD**2), axis=0)
+                np.logaddexp.reduce(log_weight + log_normal(off, variance + more * criteria.OUTLYING_SD**2), axis=0)
                 for more in (0.0, sign)
             )
             turned = then - now + sign * to_outlying
@@ -517,7 +517,3 @@ class _Weighed:
 def _epoch(shifts: FloatArray, cycles: FloatArray) -> FloatArray:
     """How many events come before cycles [m]; [m]."""
     return np.asarray((shifts[None, :] <= cycles[:, None]).sum(axis=1), dtype=np.float64)
-
-
-def _log_normal(off: FloatArray, variance: FloatArray) -> FloatArray:
-    return np.asarray(-0.5 * (np.log(2.0 * math.pi * variance) + off**2 / variance))

@@ -38,14 +38,7 @@ def _course(**values: tuple[Any, ...]) -> Patches:
     """The course with other values to choose among."""
     of = {name: values.get(name, getattr(criteria, name)) for name in ("SCALES", "SIZES", "SCATTERS")}
     grid = np.array([(s, *size, r) for s in of["SCALES"] for size in of["SIZES"] for r in of["SCATTERS"]])
-    change, bent = np.square(np.array(of["SIZES"])).T
-    return (
-        *_changed(**of),
-        (course, "_GRID", grid),
-        (course, "_OF_CHANGE", change),
-        (course, "_OF_DISCREPANCY", bent),
-        (course, "_SCALES", np.log(np.array(of["SCALES"]))),
-    )
+    return (*_changed(**of), (course, "_NODES", grid), (course, "_LOG_SCALES", np.log(np.array(of["SCALES"]))))
 
 
 def _each_left_out() -> Iterator[tuple[str, Patches]]:
