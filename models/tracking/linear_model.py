@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.tracking.courses import FORM_COURSE, FORM_PROPORTIONAL, FORM_SIZE, basis, scatter_growth
 from models.tracking.discrepancy import PAST, column_sds, columns
-from models.tracking.elimination import factor, with_gram
 from models.tracking.history import History
 from models.tracking.prior import Prior
 
@@ -275,14 +274,36 @@ def _disturbed(prior: Prior, size: FloatArray, steps: int) -> tuple[NDArray[np.i
 def _eliminated(z: FloatArray, y: FloatArray, r: FloatArray, rb: FloatArray, sd: FloatArray) -> FloatArray:
     """`Terms.rows` from Z [t, p], y [t], r and r b [t, j], and σ [p, j]."""
     terms = z.shape[1]
-    rows = with_gram(z, r, sd, 3)
+    rows = _with_gram(z, r, sd, 3)
     rows[:, terms : terms + 2] = (
         (np.concatenate([z, z * y[:, None]], axis=1).T @ r).reshape(2, terms, -1).swapaxes(0, 1)
     )
     rows[:, terms + 2] = z.T @ rb
     rows[:, terms:] *= sd[:, None]
-    factor(rows)
+    _factor(rows)
     return rows
+
+
+def _with_gram(z: FloatArray, r: FloatArray, sd: FloatArray, beside: int) -> FloatArray:
+    """M = I + σZᵀRZσ in the upper triangles of rows [p, p + beside, j], from Z [t, p], r [t, j] and σ [p, j]."""
+    terms = z.shape[1]
+    rows = np.empty((terms, terms + beside, sd.shape[1]))
+    for k in range(terms):
+        np.matmul((z[:, k:] * z[:, k : k + 1]).T, r, out=rows[k, k:terms])
+        rows[k, k:terms] *= sd[k:]
+        rows[k, k:terms] *= sd[k]
+        rows[k, k] += 1.0
+    return rows
+
+
+def _factor(rows: FloatArray) -> None:
+    """Cholesky's elimination of all points at once, which is quicker than a factorisation of each: M in the upper triangles
+    of rows [p, p + m, j] becomes Lᵀ, and the m columns beside it become L⁻¹ times them."""
+    terms = rows.shape[0]
+    for k in range(terms):
+        rows[k, k:] /= np.sqrt(rows[k, k])
+        for below in range(k + 1, terms):
+            rows[below, below:] -= rows[k, below] * rows[k, below:]
 
 
 def _without(sums: Sums, terms: Terms) -> Sums:

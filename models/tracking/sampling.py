@@ -1,4 +1,5 @@
-"""Draws with less noise than independent ones: systematic resampling and an evenly spread sequence of points.
+"""Draws with less noise than independent ones: systematic resampling and an evenly spread sequence of points; and of all
+that is linear, given points of the rest.
 
 Sources: J. Carpenter et al., "Improved particle filter for nonlinear problems" (1999) for systematic resampling;
 J. H. Halton, "On the efficiency of certain quasi-random sequences of points" (1960) for the sequence.
@@ -11,7 +12,12 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
+from models.tracking.courses import FORM_PROPORTIONAL, coefficients_at, unit_of_change
+from models.tracking.discrepancy import PAST, drawn
+from models.tracking.history import History
+from models.tracking.linear_model import Points, Sums, Terms, conditional, drawn_terms
 from models.tracking.posterior import Posterior
+from models.tracking.prior import Prior
 
 
 def systematic(weight: FloatArray, size: int, offset: float) -> NDArray[np.intp]:
@@ -58,3 +64,36 @@ def correlated_pair(
     lean = covariance / first
     rest = np.sqrt(np.maximum(second_variance - lean**2, 0.0))
     return np.stack([first * normals[:, 0], lean * normals[:, 0] + rest * normals[:, 1]], axis=1)
+
+
+def with_linear_terms(
+    history: History,
+    prior: Prior,
+    points: Points,
+    solved: tuple[Sums, Terms],
+    weight: FloatArray,
+    normals: FloatArray,
+    rng: np.random.Generator,
+    *,
+    forced: bool = False,
+) -> Posterior:
+    """Points of weights [n] that sum to one, with what is linear drawn given each: ξ0 and Δ by standard normals [n, 2], the
+    discrepancy and the steps by `rng`. `solved` is `linear_model.pointwise` of the points."""
+    sums, terms = solved
+    given = conditional(sums, prior)
+    pair = correlated_pair(normals, given.initial_variance, given.change_variance, given.covariance)
+    initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
+    further = rng.standard_normal((weight.size, PAST + history.steps.size))
+    further = drawn_terms(terms, initial - prior.initial_mean, change, further)
+    scale, exponent = coefficients_at(points.log_scale, points.log_exponent, points.course)
+    return Posterior(
+        weight=weight,
+        initial=initial,
+        change=change / unit_of_change(points.course),
+        scale=scale,
+        exponent=exponent,
+        scatter=np.exp(points.log_scatter),
+        proportional=FORM_PROPORTIONAL[points.form],
+        discrepancy=drawn(history, prior, points.size, further, rng),
+        forced=forced,
+    )

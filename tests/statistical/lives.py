@@ -11,16 +11,7 @@ from models.degradation.general_order import Degradation, first_passage, value
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
 from models.prognosis.scoring import crps_of_sample
 from models.tracking import linear_model, sampling
-from models.tracking.courses import (
-    FORM_COURSE,
-    FORM_PROPORTIONAL,
-    FORM_SIZE,
-    SCALE_SIGN,
-    coefficients_at,
-    log_form_weight,
-    unit_of_change,
-)
-from models.tracking.discrepancy import PAST, drawn
+from models.tracking.courses import FORM_COURSE, FORM_SIZE, SCALE_SIGN, log_form_weight
 from models.tracking.filters.particle import ParticleState
 from models.tracking.history import History
 from models.tracking.linear_model import Points
@@ -126,25 +117,8 @@ def sampled(
     )
     history = History.of(measurements, prior)
     rng = np.random.default_rng(1)
-    sums, terms = linear_model.pointwise(history, prior, kept)
-    given = linear_model.conditional(sums, prior)
-    pair = sampling.correlated_pair(
-        rng.standard_normal((count, 2)), given.initial_variance, given.change_variance, given.covariance
-    )
-    initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
-    normals = rng.standard_normal((count, PAST + history.steps.size))
-    further = linear_model.drawn_terms(terms, initial - prior.initial_mean, change, normals)
-    scale, exponent = coefficients_at(kept.log_scale, kept.log_exponent, kept.course)
-    return Posterior(
-        weight=np.full(count, 1.0 / count),
-        initial=initial,
-        change=change / unit_of_change(kept.course),
-        scale=scale,
-        exponent=exponent,
-        scatter=np.exp(kept.log_scatter),
-        proportional=FORM_PROPORTIONAL[kept.form],
-        discrepancy=drawn(history, prior, kept.size, further, rng),
-    )
+    solved, weight = linear_model.pointwise(history, prior, kept), np.full(count, 1.0 / count)
+    return sampling.with_linear_terms(history, prior, kept, solved, weight, rng.standard_normal((count, 2)), rng)
 
 
 def weighted(

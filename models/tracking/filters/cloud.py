@@ -12,7 +12,7 @@ from models.tracking.history import History
 from models.tracking.linear_model import Points, evidence, last_outlying, log_outlying, pointwise
 from models.tracking.prior import Prior
 
-#: The log prior of a course that ended before the last measurement.
+#: The log probability of measurements of a course that had ended before.
 _NEVER = -1e6
 
 
@@ -63,7 +63,7 @@ class Bridge:
         points, table = as_sound.placed(), table_of(self.after, cloud)
         sums, terms = pointwise(self.after, self.prior, points, table)
         turned = last_outlying(self.after, self.prior, points, sums, terms, table[-1])
-        others = _log_prior(self.after, self.prior, cloud)
+        others = _log_prior(self.prior, cloud) + _log_alive(self.after, cloud)
         flag_sound, flag_outlying = log_outlying(self.prior, np.array([[0.0, 1.0]]))
         sound = evidence(sums, self.prior) + others + flag_sound
         outlying = evidence(turned, self.prior) + others + flag_outlying
@@ -88,13 +88,23 @@ def table_of(history: History, cloud: Cloud) -> FloatArray:
 
 def log_target_of(history: History, prior: Prior, cloud: Cloud, table: FloatArray) -> FloatArray:
     """Log posterior density of every particle, up to a constant."""
-    return evidence(pointwise(history, prior, cloud.placed(), table)[0], prior) + _log_prior(history, prior, cloud)
+    return log_likelihood_of(history, prior, cloud, table) + _log_prior(prior, cloud)
 
 
-def _log_prior(history: History, prior: Prior, cloud: Cloud) -> FloatArray:
+def log_likelihood_of(history: History, prior: Prior, cloud: Cloud, table: FloatArray) -> FloatArray:
+    """Log probability of the data given every particle."""
+    return evidence(pointwise(history, prior, cloud.placed(), table)[0], prior) + _log_alive(history, cloud)
+
+
+def _log_prior(prior: Prior, cloud: Cloud) -> FloatArray:
     flat = prior.log_density(*cloud.points.T) + log_form_weight(prior)[cloud.form.astype(np.intp)]
+    return np.asarray(flat + log_outlying(prior, cloud.outlying.T))
+
+
+def _log_alive(history: History, cloud: Cloud) -> FloatArray:
+    """Of every particle whose course ended before the last measurement that it was never taken."""
     ended = (SCALE_SIGN[cloud.course] < 0.0) & (cloud.points[:, 0] <= math.log(history.span))
-    return np.asarray(flat + log_outlying(prior, cloud.outlying.T) + np.where(ended, _NEVER, 0.0))
+    return np.where(ended, _NEVER, 0.0)
 
 
 def merged(old: Cloud, new: Cloud, accepted: NDArray[np.bool_]) -> Cloud:

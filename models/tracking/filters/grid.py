@@ -15,18 +15,17 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.courses import FORM_PROPORTIONAL, coefficients_at, log_scale_at, unit_of_change
-from models.tracking.discrepancy import PAST, drawn
+from models.tracking.courses import log_scale_at
 from models.tracking.filters import lattice
 from models.tracking.filters.kinds import Kinds
 from models.tracking.filters.lattice import Frame
 from models.tracking.filters.outlying_refinement import completed
 from models.tracking.history import History
-from models.tracking.linear_model import Points, conditional, drawn_terms, evidence, pointwise
+from models.tracking.linear_model import Points, evidence, pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
-from models.tracking.sampling import correlated_pair, spread_points, systematic, thinned
+from models.tracking.sampling import spread_points, systematic, thinned, with_linear_terms
 
 #: A row cannot resolve a ridge whose width depends on a scatter still unknown; draws are cheap then, and made up to
 #: this many times over and thinned, while there are fewer than MANY measurements.
@@ -114,26 +113,13 @@ class Grid:
         chance = _blended(laid.mass)
         cell = np.unravel_index(systematic(chance.ravel(), count, float(offset[5])), chance.shape)
         points, volume = _placed(laid, cell, uniform[:, :3], history.span)
-        sums, terms = pointwise(history, prior, points)
-        density = evidence(sums, prior) + prior.log_density(points.log_scale, points.log_exponent, points.log_scatter)
+        solved = pointwise(history, prior, points)
+        density = evidence(solved[0], prior) + prior.log_density(
+            points.log_scale, points.log_exponent, points.log_scatter
+        )
         density += laid.kinds.log_weight[cell[0]]
         weight = np.exp(density - density.max()) * volume / chance[cell]
-        given = conditional(sums, prior)
-        pair = correlated_pair(ndtri(uniform[:, 3:]), given.initial_variance, given.change_variance, given.covariance)
-        initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
-        normals = rng.standard_normal((count, PAST + history.steps.size))
-        further = drawn_terms(terms, initial - prior.initial_mean, change, normals)
-        scale, exponent = coefficients_at(points.log_scale, points.log_exponent, points.course)
-        sample = Posterior(
-            weight=weight / weight.sum(),
-            initial=initial,
-            change=change / unit_of_change(points.course),
-            scale=scale,
-            exponent=exponent,
-            scatter=np.exp(points.log_scatter),
-            proportional=FORM_PROPORTIONAL[points.form],
-            discrepancy=drawn(history, prior, points.size, further, rng),
-        )
+        sample = with_linear_terms(history, prior, points, solved, weight / weight.sum(), ndtri(uniform[:, 3:]), rng)
         return sample if count == size else thinned(sample, size, float(offset[6]))
 
 

@@ -21,25 +21,15 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.courses import (
-    FORM_COURSE,
-    FORM_PROPORTIONAL,
-    Course,
-    coefficients_at,
-    log_form_weight,
-    log_scale_at,
-    place_of,
-    unit_of_change,
-)
+from models.tracking.courses import FORM_COURSE, Course, log_form_weight, log_scale_at, place_of
 from models.tracking.criteria import HEALTHY, KEPT, MOVED, MOVES, STARVED
-from models.tracking.discrepancy import PAST, drawn
 from models.tracking.filters.cloud import Bridge, Cloud, effective, log_target_of, merged, table_of, weights
 from models.tracking.history import History
-from models.tracking.linear_model import conditional, drawn_terms, pointwise
+from models.tracking.linear_model import pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
-from models.tracking.sampling import correlated_pair, spread_normals, spread_points, systematic
+from models.tracking.sampling import spread_normals, spread_points, systematic, with_linear_terms
 
 #: Where a smaller share of steps than the first is accepted, the next are shorter by the second.
 _TIMID, _SHORTER = 0.2, 0.5
@@ -170,28 +160,10 @@ class Particle:
     def posterior(self, state: ParticleState, size: int, rng: np.random.Generator) -> Posterior:
         """`size` draws of equal weight: systematic over the particles, with evenly spread draws of (ξ0, Δ)."""
         cloud, offset = state.cloud, rng.random(3)
-        index = systematic(weights(cloud.log_weight), size, float(offset[2]))
-        points = cloud.taken(index).placed()
-        sums, terms = pointwise(state.history, state.prior, points)
-        given = conditional(sums, state.prior)
-        pair = correlated_pair(
-            spread_normals(size, offset[:2]), given.initial_variance, given.change_variance, given.covariance
-        )
-        initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
-        normals = rng.standard_normal((size, PAST + state.history.steps.size))
-        further = drawn_terms(terms, initial - state.prior.initial_mean, change, normals)
-        scale, exponent = coefficients_at(points.log_scale, points.log_exponent, points.course)
-        return Posterior(
-            weight=np.full(size, 1.0 / size),
-            initial=initial,
-            change=change / unit_of_change(points.course),
-            scale=scale,
-            exponent=exponent,
-            scatter=np.exp(points.log_scatter),
-            proportional=FORM_PROPORTIONAL[points.form],
-            discrepancy=drawn(state.history, state.prior, points.size, further, rng),
-            forced=state.forced,
-        )
+        points = cloud.taken(systematic(weights(cloud.log_weight), size, float(offset[2]))).placed()
+        solved, weight = pointwise(state.history, state.prior, points), np.full(size, 1.0 / size)
+        normals = spread_normals(size, offset[:2])
+        return with_linear_terms(state.history, state.prior, points, solved, weight, normals, rng, forced=state.forced)
 
 
 def _places(cloud: Cloud, span: float) -> FloatArray:

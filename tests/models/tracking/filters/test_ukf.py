@@ -29,6 +29,9 @@ from tests.models.tracking.tracked_series import (
 def test_the_ukf_stays_in_its_domain_and_definite() -> None:
     for measurements in WEIRD.values():
         state = followed(Ukf(), weak(measurements[0], falling=True), measurements)
+        if len(measurements) < Ukf().together:
+            assert state.form.size == 0
+            continue
         assert np.abs(state.mean).max() <= 6.0
         np.testing.assert_array_equal(state.covariance, np.swapaxes(state.covariance, 1, 2))
         assert np.linalg.eigvalsh(state.covariance).min() > 0.0
