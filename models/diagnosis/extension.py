@@ -24,7 +24,7 @@ from models.diagnosis.design.design import Points, build_design
 from models.diagnosis.design.facts import Facts, facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import Discrepancy, Kind
-from models.diagnosis.effects.fitted_effect import Draw, DrawnEffect, Ranges
+from models.diagnosis.effects.fitted_effect import Draw, FittedEffect, Ranges, drawn_change
 
 #: Plateaus are handed on in parts of this many: a design takes no more of one run.
 _PART = 2000
@@ -113,13 +113,13 @@ class Extension:
             for stored in draw["effects"]:
                 effect = BY_SLUG[stored["slug"]]
                 if effect.kind is kind and not effect.counts_in_severity:
-                    drawn = DrawnEffect(
+                    drawn = FittedEffect(
                         effect=effect,
                         amplitude=stored["amplitude"],
                         shape=tuple(stored["shape"]),
                         factors=tuple(stored["factors"]),
                     )
-                    change += drawn.change(scenes[draw["laws"]], ranges)
+                    change += drawn_change(drawn, scenes[draw["laws"]], ranges)
                     if not np.isfinite(change).all():
                         lost = np.count_nonzero(~np.isfinite(change))
                         raise NotFiniteError(

@@ -1,6 +1,5 @@
-"""The catalogue: every effect that the diagnosis can name, in the contract's order.
-
-The shape grid of all effects as columns: the change of torque of a small amplitude, for every shape that is tried.
+"""The catalogue: every effect that the diagnosis can name, in the contract's order, and the shape grids of all effects as
+columns: the change of torque of a small amplitude, for every shape that is tried.
 """
 
 from collections.abc import Sequence
@@ -68,23 +67,18 @@ def columns_of(effects: Sequence[Effect], facts: Facts) -> list[Column]:
             total = float(logsumexp([tried.log_weight for tried in grid]))
             kinds: dict[Shape, list[float]] = {}
             for tried in grid:
-                kinds.setdefault(_stiff(effect, tried.shape), []).append(tried.log_weight - total)
+                kinds.setdefault(effect.stiff(tried.shape), []).append(tried.log_weight - total)
             around = {kind: float(logsumexp(logs)) for kind, logs in kinds.items()}
             columns += [
                 Column(
                     effect=effect,
                     shape=tried.shape,
                     log_weight=tried.log_weight - total,
-                    log_weight_around=around[_stiff(effect, tried.shape)],
+                    log_weight_around=around[effect.stiff(tried.shape)],
                 )
                 for tried in grid
             ]
     return columns
-
-
-def _stiff(effect: Effect, shape: Shape) -> Shape:
-    """The shapes that a refit does not move."""
-    return tuple(value for value, parameter in zip(shape, effect.shapes, strict=True) if not parameter.smooth)
 
 
 def columns_at_rows(design: Design, prediction: Prediction, columns: Sequence[Column]) -> FloatArray:

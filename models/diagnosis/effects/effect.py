@@ -2,24 +2,22 @@
 
 An effect changes the torque at every point of a scene (`baseline.laws.Scene`: the points and what the baseline
 says there) by an amount that is scaled by one *amplitude*, in engineering units, and formed by *shapes* (a change point, a
-time constant, an exponent). Amplitude 0 is no effect. Adding an effect is adding one file in `effects/catalogued/` and its
-name in `catalogue.py`; what other chapters need to know of it are fields of the effect, so its slug stands nowhere else.
+time constant, an exponent). Amplitude 0 is no effect. Adding an effect is adding one value and its name in `catalogue.py`;
+what other chapters need to know of it are fields of the effect, so its slug stands nowhere else.
 
-The prior of an effect's amplitude: most are small, a few are large.
+Of amplitudes most are small and a few large,
 
     p(a) ∝ (1 + a²/(ν s²))^{-(ν + 1)/2}
 
 with s the effect's prior deviation and ν its tails (Student's t; normal where ν is infinite). A normal prior would cost an
 effect of six deviations 18 nats, and an effect that imitates it with a small amplitude would be named instead.
-
-First-order lags along plateaus, and the periods of loops, as several effects need them.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from scipy.linalg import solve_banded
@@ -27,8 +25,9 @@ from scipy.linalg import solve_banded
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.criteria import USUAL_PRESSURE, USUAL_TORQUE
-from models.diagnosis.design.design import Points
+from models.diagnosis.design.design import IntArray, Points
 from models.diagnosis.design.facts import Facts
+from models.diagnosis.design.loop_bins import PHASES
 
 #: Values of an effect's shape parameters, in the order of `Effect.shapes`.
 Shape: TypeAlias = tuple[float, ...]
@@ -105,13 +104,13 @@ class Effect:
     of the amplitude; prior_sd: its prior deviation in that unit (zero mean, either sign unless `positive`), for a clutch of
     the reference's size where it `grows_with` something (`sized`);
     `scale` turns the SI amplitude into `unit`.
-    grid(facts) gives the shapes to be tried, none where the campaign cannot show the effect.
-    change(scene, amplitude, shape) -> [P] Nm at the scene's points. before_lag: whether it changes the stationary curve,
-    which friction in loops then lags behind, or the measured torque itself; None where that is unknown and the last shape
-    says (1 or 0).
+    grid(facts) gives the shapes to be tried (one, without a parameter), none where the campaign cannot show the effect.
+    change(scene, amplitude, shape) -> [P] Nm at the scene's points (0: averages do not show it). before_lag: whether it
+    changes the stationary curve, which friction in loops then lags behind, or the measured torque itself; None where that
+    is unknown and the last shape says (1 or 0).
     discrepancies: along what its form is uncertain (`effects.fitted_effect`); an exact law has none.
     courses(facts) gives the shapes between which a size is averaged; None: as it was fitted.
-    several(scene, settings) -> [P, m] Nm is the same for many (amplitude, shape) at once, where that is cheaper.
+    several(scene, settings) -> [P, m] Nm is its change for many (amplitude, shape) at once, where that is cheaper.
     tails: degrees of freedom of the amplitude's prior (`effects.effect`), infinite for a normal one.
     counts_in_severity: its amplitude is the exponent by which ζ counts engagements (no torque is added along a life).
     named: whether it may be named as a cause; where not, what it explains is uncatalogued and lies on `axis`
@@ -126,17 +125,17 @@ class Effect:
     source: str
     family: Family
     kind: Kind
-    channels: tuple[str, ...]
+    channels: tuple[str, ...] = ()
     amplitude: str
     unit: str
     prior_sd: float
-    positive: bool
-    scale: float
-    shapes: tuple[ShapeParameter, ...]
-    grid: Callable[[Facts], tuple[Tried, ...]]
-    change: Callable[[Scene, float, Shape], FloatArray]
+    positive: bool = False
+    scale: float = 1.0
+    shapes: tuple[ShapeParameter, ...] = ()
+    grid: Callable[[Facts], tuple[Tried, ...]] = lambda _: (Tried(shape=()),)
+    change: Callable[[Scene, float, Shape], FloatArray] = lambda scene, _, __: np.zeros_like(scene.curve)
     before_lag: bool | None
-    discrepancies: tuple[Discrepancy, ...]
+    discrepancies: tuple[Discrepancy, ...] = ()
     tails: float = 2.0
     courses: Callable[[Facts], tuple[Tried, ...]] | None = None
     several: Callable[[Scene, Sequence[tuple[float, Shape]]], FloatArray] | None = None
@@ -151,6 +150,14 @@ class Effect:
         if self.several is not None:
             return self.several(scene, settings)
         return np.stack([self.change(scene, amplitude, shape) for amplitude, shape in settings], axis=1)
+
+    def stiff(self, shape: Shape) -> Shape:
+        """The shapes that a refit does not move."""
+        return tuple(value for value, parameter in zip(shape, self.shapes, strict=True) if not parameter.smooth)
+
+    def smooth(self, shape: Shape) -> list[tuple[float, ShapeParameter]]:
+        """The shapes that a refit moves, each with its parameter."""
+        return [(x, parameter) for x, parameter in zip(shape, self.shapes, strict=True) if parameter.smooth]
 
     def lags(self, shape: Shape) -> bool:
         """Whether friction in loops lags behind what the effect changes."""
@@ -172,16 +179,6 @@ def unit_changes(effect: Effect, scene: Scene, shapes: Sequence[Shape]) -> Float
     """The changes [P, m] Nm of a small amplitude, per unit: the columns that a linear screen works with."""
     step = 1e-3 * effect.prior_sd
     return effect.changes(scene, [(step, shape) for shape in shapes]) / step
-
-
-def untried(_facts: Facts) -> tuple[Tried, ...]:
-    """No shapes: what a smooth model does not show is judged on raw records (`raw_records.evidence`)."""
-    return ()
-
-
-def unchanged(scene: Scene, _amplitude: float, _shape: Shape) -> FloatArray:
-    """No change [P] Nm of what is averaged over a plateau or a loop's bin."""
-    return np.zeros_like(scene.curve)
 
 
 #: Deviations of the two normal distributions that approximate p where everything is linear, in s; each has half the weight
@@ -232,6 +229,26 @@ def followed(target: FloatArray, points: Points, settling: float) -> FloatArray:
     return out
 
 
-def phases_of(points: Points, looping: np.ndarray[Any, np.dtype[np.intp]]) -> int:
-    """How many points a loop has; `looping` [n] are the indices of loops' points, loop after loop."""
-    return int(np.flatnonzero(np.diff(points.loop[looping], append=-2))[0]) + 1
+def by_loop(points: Points, looping: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Velocity [l, PHASES] m/s and angular frequency [l, 1] rad/s of loops by the indices [l · PHASES] of their points."""
+    columns = (values[looping].reshape(-1, PHASES) for values in (points.velocity, points.angular_frequency))
+    velocity, frequency = columns
+    return velocity, frequency[:, :1]
+
+
+def lagging(target: FloatArray, frequency: FloatArray, time: float) -> FloatArray:
+    """The periodic answer [l, PHASES] of a lag of the first order in `time` s to a target [l, PHASES], harmonic by harmonic;
+    frequency [l, 1] rad/s."""
+    waves = np.fft.rfft(target, axis=1)
+    waves = waves / (1 + 1j * np.arange(waves.shape[1]) * frequency * time)
+    return np.asarray(np.fft.irfft(waves, target.shape[1], axis=1), dtype=np.float64)
+
+
+def flattening(life: FloatArray, share: float) -> FloatArray:
+    """A course x (1 + s)/(x + s) over a share x [n] of life, 1 at its end: half done after about s."""
+    return life * (1.0 + share) / (life + share)
+
+
+def life_of(scene: Scene) -> FloatArray:
+    """The share [P] of the measured life that has gone, 0 before its first state."""
+    return np.maximum((scene.points.cycles - scene.facts.states[0]) / scene.facts.life, 0.0)

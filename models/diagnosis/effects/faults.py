@@ -14,7 +14,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.design import CLOCK, CYCLES, PRESSURE, SPEED, IntArray
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried, life_of
 from models.friction.stribeck import PARAMETER_NAMES
 
 #: Usual size of all of them [-]. Chosen; no table.
@@ -50,10 +50,6 @@ def direction_if_both(scene: Scene, values: FloatArray) -> FloatArray:
     return direction if each_way >= max(least, 1.0) else np.zeros_like(direction)
 
 
-def _once(_facts: Facts) -> tuple[Tried, ...]:
-    return (Tried(shape=()),)
-
-
 def _onsets(facts: Facts) -> tuple[Tried, ...]:
     return tuple(Tried(shape=(onset,)) for _, onset, _ in facts.onsets) if facts.states.size > 2 else ()
 
@@ -73,9 +69,7 @@ def _gains_with_clock(_facts: Facts) -> tuple[Tried, ...]:
 
 def _gain_with_life(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     course, value = shape
-    cycles = scene.points.cycles
-    life = np.maximum((cycles - scene.facts.states[0]) / scene.facts.life, 0.0)
-    share = np.where(cycles > value, 1.0, 0.0) if course == _STEP else life**value
+    share = np.where(scene.points.cycles > value, 1.0, 0.0) if course == _STEP else life_of(scene) ** value
     return np.asarray(amplitude * share * scene.curve, dtype=np.float64)
 
 
@@ -129,17 +123,13 @@ def _fault(
         source="faults of rigs",
         family=Family.SENSOR,
         kind=Kind.ARTEFACT,
-        channels=(),
         amplitude="size",
         unit="-",
         prior_sd=USUAL_SIZE,
-        positive=False,
-        scale=1.0,
         shapes=tuple(ShapeParameter(name="course", unit="-", lowest=-np.inf, highest=np.inf) for _ in range(shapes)),
         grid=grid,
         change=change,
         before_lag=False,
-        discrepancies=(),
         named=False,
         axis=axis,
     )
@@ -196,7 +186,7 @@ FAULTS: tuple[Effect, ...] = (
         "a pressure that depends on whether it was last raised or lowered",
         "± a p ∂S/∂p",
         PRESSURE,
-        _once,
+        lambda _: (Tried(shape=()),),
         _gauge_hysteresis,
     ),
     _fault(
@@ -204,7 +194,7 @@ FAULTS: tuple[Effect, ...] = (
         "a torque that depends on whether the speed was last raised or lowered",
         "± a S",
         SPEED,
-        _once,
+        lambda _: (Tried(shape=()),),
         _speed_hysteresis,
     ),
 )

@@ -1,24 +1,15 @@
 """One effect in a model: its amplitude and shape, its torque at the rows, and the derivatives that a fit needs.
 
-    torque = baseline + Σ_effects change(amplitude, shape)
+    torque = baseline + Σ_effects change(amplitude, shape) (1 + Σ_k b_k φ_k),     b_k ~ N(0, DISCREPANCY_SD²)
 
 The derivatives in the amplitude and in the smooth shapes are central differences: an effect only has to give its change.
+φ_k are cosines over the ranges of speed, life or the test's clock, or a contrast of plateaus against loops: those along
+which the effect's form is uncertain (`Effect.discrepancies`). The b_k are integrated out wherever evidence is computed or a
+case is checked; a fit has none. So a template is held to its formula up to a tolerance, and none wins because its form
+happens to be the more flexible one (after Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425).
 
-Model discrepancy of a template: each effect may differ from its formula by a smooth factor.
-
-    change · (1 + Σ_k b_k φ_k),     b_k ~ N(0, DISCREPANCY_SD²)
-
-with φ_k cosines over the ranges of speed, life or the test's clock, or a contrast of plateaus against loops: those along
-which the effect's form is uncertain (`Effect.discrepancies`). The b_k are integrated out wherever evidence is computed or
-a case is checked. So a template is held to its formula up to a tolerance, and none wins because its form happens to be
-the more flexible one (after Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425).
-
-One way in which a case may be: the effects at work with their sizes, shapes and model discrepancies, and the laws beside.
-
-What adoption takes off measurements and adds to a life is a weighted set of such draws (`diagnosis.extension`), whatever
-made them. Within a draw the correction of all runs of a life is one function: runs are not off independently of each other.
-
-The estimated size of an effect.
+What adoption takes off measurements and adds to a life is a weighted set of draws (`diagnosis.extension`). Within a draw
+the correction of all runs of a life is one function: runs are not off independently of each other.
 """
 
 from collections.abc import Mapping
@@ -49,11 +40,12 @@ _AT_BOUND = 0.01
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FittedEffect:
-    """An effect in a model: its amplitude and shape."""
+    """An effect in a model: its amplitude, its shape, and in a draw the factors b [m] of its discrepancy."""
 
     effect: Effect
     amplitude: float
     shape: Shape
+    factors: tuple[float, ...] = ()
 
     @property
     def wrong_sign(self) -> bool:
@@ -86,8 +78,8 @@ def effect_columns(design: Design, prediction: Prediction, fitted: FittedEffect)
 
 def effect_precisions(fitted: FittedEffect) -> FloatArray:
     """1/sd² of the priors on (amplitude, smooth shapes) [1 + s]; that of the amplitude where it is."""
-    smooth = [0.5 * (shape.highest - shape.lowest) for shape in fitted.effect.shapes if shape.smooth]
-    return np.array([amplitude_precision(fitted.effect, fitted.amplitude), *(width**-2.0 for width in smooth)])
+    widths = [0.5 * (shape.highest - shape.lowest) for _, shape in fitted.effect.smooth(fitted.shape)]
+    return np.array([amplitude_precision(fitted.effect, fitted.amplitude), *(width**-2.0 for width in widths)])
 
 
 def smooth_places(effect: Effect) -> list[int]:
@@ -97,9 +89,9 @@ def smooth_places(effect: Effect) -> list[int]:
 
 def free_shapes(fitted: FittedEffect) -> NDArray[np.bool_]:
     """Which of (amplitude, smooth shapes) [1 + s] a refit may move: shapes at a bound stay there."""
-    smooth = [(value, shape) for value, shape in zip(fitted.shape, fitted.effect.shapes, strict=True) if shape.smooth]
     margins = [
-        min(value - shape.lowest, shape.highest - value) / (shape.highest - shape.lowest) for value, shape in smooth
+        min(value - shape.lowest, shape.highest - value) / (shape.highest - shape.lowest)
+        for value, shape in fitted.effect.smooth(fitted.shape)
     ]
     return np.array([True, *(margin > _AT_BOUND for margin in margins)])
 
@@ -107,6 +99,14 @@ def free_shapes(fitted: FittedEffect) -> NDArray[np.bool_]:
 #: Along what φ is uncertain: the lowest value and the range in a campaign.
 Ranges: TypeAlias = Mapping[Discrepancy, tuple[float, float]]
 _ORDERS = {Discrepancy.SPEED: (1, 2), Discrepancy.LIFE: (1,), Discrepancy.CLOCK: (1,), Discrepancy.MOTION: (1,)}
+
+
+def drawn_change(drawn: FittedEffect, scene: Scene, ranges: Ranges) -> FloatArray:
+    """Change of torque [P] Nm. A course that is followed far enough ends friction; it does not reverse it."""
+    change = drawn.effect.change(scene, drawn.amplitude, drawn.shape)
+    if any(drawn.factors):
+        change = change * (1.0 + factors_at(scene.points, drawn.effect, ranges) @ np.array(drawn.factors))
+    return np.maximum(change, -scene.curve) if drawn.effect.kind is Kind.COURSE else change
 
 
 def ranges_of(rows: Points) -> Ranges:
@@ -146,29 +146,12 @@ def discrepancy_columns(design: Design, prediction: Prediction, fitted: FittedEf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DrawnEffect:
-    """An effect at an amplitude and a shape, its change multiplied by 1 + Σ_k b_k φ_k; `factors` are b [m]."""
-
-    effect: Effect
-    amplitude: float
-    shape: Shape
-    factors: tuple[float, ...] = ()
-
-    def change(self, scene: Scene, ranges: Ranges) -> FloatArray:
-        """Change of torque [P] Nm. A course that is followed far enough ends friction; it does not reverse it."""
-        change = self.effect.change(scene, self.amplitude, self.shape)
-        if any(self.factors):
-            change = change * (1.0 + factors_at(scene.points, self.effect, ranges) @ np.array(self.factors))
-        return np.maximum(change, -scene.curve) if self.effect.kind is Kind.COURSE else change
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Draw:
     """The effects at work (none: nothing is), beside these laws, and the draw's weight > 0."""
 
     weight: float
     laws: Laws
-    effects: tuple[DrawnEffect, ...] = ()
+    effects: tuple[FittedEffect, ...] = ()
 
 
 #: Half the width of a normal's 90 % interval, in deviations.

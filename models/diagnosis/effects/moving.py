@@ -1,10 +1,8 @@
-"""Rotating mass between clutch and torque sensor.
+"""What only motion shows: a mass that is accelerated, a film that lags, and two vibrations that only raw records hold.
 
-The oil film needs time to be squeezed out and drawn in: more torque while accelerating, less while decelerating.
-
-Torque that swings with the shaft's angle; it is in raw records and averages out of plateaus.
-
-Self-excited vibration of the driveline at low speed; it is in raw records.
+A rotating mass stands between clutch and torque sensor. The oil film needs time to be squeezed out and drawn in: more
+torque while accelerating, less while decelerating. Torque may swing with the shaft's angle, or the driveline vibrate by
+itself at low speed; both average out of plateaus.
 """
 
 from collections.abc import Sequence
@@ -24,15 +22,10 @@ from models.diagnosis.effects.effect import (
     Shape,
     ShapeParameter,
     Tried,
-    phases_of,
-    unchanged,
-    untried,
+    by_loop,
+    lagging,
 )
 from models.friction.stribeck import GAMMA
-
-
-def _inertia_torque_grid(_facts: Facts) -> tuple[Tried, ...]:
-    return (Tried(shape=()),)
 
 
 def _inertia_torque_change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
@@ -53,13 +46,9 @@ INERTIA_TORQUE = Effect(
     unit="kg m²",
     prior_sd=0.004,
     positive=True,
-    scale=1.0,
-    shapes=(),
-    grid=_inertia_torque_grid,
     change=_inertia_torque_change,
     grows_with=Measure.TORQUE,
     before_lag=False,
-    discrepancies=(),
 )
 
 
@@ -130,13 +119,13 @@ def _over_film(scene: Scene, looping: NDArray[np.intp], amplitude: FloatArray, s
     power, thin, least, sheared = shapes[:4]
     slope = usual_slope(scene.laws, sheared)
     real = slope > 0
-    phases = phases_of(points, looping)
-    v = np.ascontiguousarray(points.velocity[looping].reshape(-1, phases).T)[:, :, None]
-    pressure = points.pressure[looping].reshape(-1, phases)[:, :1]
-    step = 2 * np.pi / (phases * points.angular_frequency[looping].reshape(-1, phases)[:, :1])
-    time = (
-        amplitude / np.where(real, slope, 1.0) * (pressure / REFERENCE_PRESSURE) ** power
-    )  # of the film, mid speed [s]
+    velocity, frequency = by_loop(points, looping)
+    phases = velocity.shape[1]
+    v = np.ascontiguousarray(velocity.T)[:, :, None]
+    pressure = points.pressure[looping].reshape(velocity.shape)[:, :1]
+    step = 2 * np.pi / (phases * frequency)
+    # of the film at mid speed [s]
+    time = amplitude / np.where(real, slope, 1.0) * (pressure / REFERENCE_PRESSURE) ** power
     rate = step / np.maximum(time, 1e-12)
     change = v - np.roll(v, 1, axis=0)
     film = np.empty((phases, *rate.shape))
@@ -161,12 +150,10 @@ def _over_thickness(scene: Scene, looping: NDArray[np.intp], amplitude: float, s
     asperities carry what the film does not, and carry more under pressure."""
     power, thin, least, time = shape[:4]
     points, middle = scene.points, scene.laws.frame.reference_velocity
-    phases = phases_of(points, looping)
+    velocity, frequency = by_loop(points, looping)
     q, tau = MOST_POWER / (1.0 + thin), LEAST_TIME * 10.0**time
-    height = (points.velocity[looping].reshape(-1, phases) / middle + least) ** q
-    waves = np.fft.rfft(height, axis=1)
-    swing = 1j * np.arange(waves.shape[1]) * points.angular_frequency[looping].reshape(-1, phases)[:, :1] * tau
-    missing = np.fft.irfft(waves * swing / (1.0 + swing), phases, axis=1)
+    height = (velocity / middle + least) ** q
+    missing = height - lagging(height, frequency, tau)
     strength = amplitude * middle / (tau * q * (1.0 + least) ** (q - 1.0))
     pressed = (points.pressure[looping] / REFERENCE_PRESSURE) ** (1.0 + 0.5 * power)
     return np.asarray(strength * pressed * missing.ravel(), dtype=np.float64)
@@ -201,7 +188,6 @@ SQUEEZE_FILM = Effect(
     unit="Nm s²/m",
     prior_sd=0.05,
     positive=True,
-    scale=1.0,
     shapes=(
         ShapeParameter(name="power of pressure x", unit="-", lowest=-0.5, highest=1.5, smooth=True),
         ShapeParameter(name="power of speed y", unit="-", lowest=0.4, highest=1.8, smooth=True),
@@ -233,12 +219,8 @@ SHAFT_RIPPLE = Effect(
     unit="Nm",
     prior_sd=0.5,
     positive=True,
-    scale=1.0,
-    shapes=(),
-    grid=untried,
-    change=unchanged,
+    grid=lambda _: (),
     before_lag=False,
-    discrepancies=(),
 )
 
 
@@ -255,10 +237,6 @@ STICK_SLIP = Effect(
     unit="Nm",
     prior_sd=0.5,
     positive=True,
-    scale=1.0,
-    shapes=(),
-    grid=untried,
-    change=unchanged,
+    grid=lambda _: (),
     before_lag=False,
-    discrepancies=(),
 )

@@ -1,10 +1,8 @@
-"""The torque sensor's zero moved: at once, along the test, or along the life.
+"""What the readings are wrong by: the torque's zero, the pressure's gauge, too short plateaus, channels apart in time.
 
-The pressure gauge is off: the pressure at the clutch is not the recorded one.
-
-Plateaus too short: each reading still contains a share of the plateau before.
-
-The torque channel lags the speed channel.
+A zero moved at once, along the test or along the life. A gauge is off: the pressure at the clutch is not the recorded one.
+Plateaus are too short: each reading still contains a share of the plateau before. The torque channel lags the speed
+channel.
 """
 
 import math
@@ -23,15 +21,17 @@ from models.diagnosis.effects.effect import (
     Shape,
     ShapeParameter,
     Tried,
+    by_loop,
     ends_of,
-    phases_of,
+    flattening,
+    life_of,
 )
 
 #: Courses of the zero: one offset from a cycle on, along the test's clock (straight, or settling), along the life by cycles
 #: or by the days that it took.
 STEP, CLOCK, SETTLING, LIFE, DAYS = 0.0, 1.0, 2.0, 3.0, 4.0
 #: Between these too a size is averaged: x^q and x (1 + s)/(x + s) along the life, without knots that may be off, by cycles
-#: or by days; their powers q, and s (chosen, with those of a pressure's offset).
+#: or by days; their powers q, and s (chosen: so close that the size moves by about its own deviation from one to the next).
 EVEN, EVEN_DAYS, FLATTENING, FLATTENING_DAYS = 5.0, 6.0, 7.0, 8.0
 POWERS, FLATTENED = (0.5, 0.7, 1.0, 1.4, 2.0), (0.1, 0.3, 1.0)
 _HOUR = 3600.0
@@ -66,14 +66,9 @@ def _torque_zero_shift_courses(facts: Facts) -> tuple[Tried, ...]:
     if facts.states.size > 2:
         timed = facts.first_moment is not None
         weight = -0.7 - float(np.log((len(POWERS) + len(FLATTENED)) * (1 + timed)))
-        for course, values in (
-            (EVEN, POWERS),
-            (FLATTENING, FLATTENED),
-            (EVEN_DAYS, POWERS),
-            (FLATTENING_DAYS, FLATTENED),
-        ):
-            if timed or course in {EVEN, FLATTENING}:
-                tried += [Tried(shape=(course, value, *STRAIGHT), log_weight=weight) for value in values]
+        courses = [(EVEN, POWERS), (FLATTENING, FLATTENED), (EVEN_DAYS, POWERS), (FLATTENING_DAYS, FLATTENED)]
+        for course, values in courses if timed else courses[:2]:
+            tried += [Tried(shape=(course, value, *STRAIGHT), log_weight=weight) for value in values]
     return tuple(tried)
 
 
@@ -87,25 +82,20 @@ def _torque_zero_shift_change(scene: Scene, amplitude: float, shape: Shape) -> F
     elif course == SETTLING:
         share = -np.expm1(-np.maximum(clock, 0.0) / (value * np.exp(off[0])))
     else:
-        days = course in {DAYS, EVEN_DAYS, FLATTENING_DAYS}
-        life = np.maximum(_gone(scene) if days else (cycles - scene.facts.states[0]) / scene.facts.life, 0.0)
+        life = _days_of(scene) if course in {DAYS, EVEN_DAYS, FLATTENING_DAYS} else life_of(scene)
+        share = flattening(life, value) if course in {FLATTENING, FLATTENING_DAYS} else life**value
         if course in {LIFE, DAYS}:
-            share = life**value + np.interp(life, KNOTS, [0.0, *off, 0.0])
-        elif course in {EVEN, EVEN_DAYS}:
-            share = life**value
-        else:
-            share = life * (1.0 + value) / (life + value)
+            share = share + np.interp(life, KNOTS, [0.0, *off, 0.0])
     return np.asarray(amplitude * scene.points.sign * share, dtype=np.float64)
 
 
-def _gone(scene: Scene) -> FloatArray:
+def _days_of(scene: Scene) -> FloatArray:
     """The share [P] of the campaign's days that has gone; where a test was not timed, of its cycles."""
     facts, moment = scene.facts, scene.points.moment
-    by_cycles = np.asarray((scene.points.cycles - facts.states[0]) / facts.life, dtype=np.float64)
     if facts.first_moment is None or facts.last_moment is None:
-        return by_cycles
-    gone = (moment - facts.first_moment) / (facts.last_moment - facts.first_moment)
-    return np.asarray(np.where(np.isnan(moment), by_cycles, gone), dtype=np.float64)
+        return life_of(scene)
+    gone = np.maximum((moment - facts.first_moment) / (facts.last_moment - facts.first_moment), 0.0)
+    return np.where(np.isnan(moment), life_of(scene), gone)
 
 
 TORQUE_ZERO_SHIFT = Effect(
@@ -122,8 +112,6 @@ TORQUE_ZERO_SHIFT = Effect(
     amplitude="zero shift",
     unit="Nm",
     prior_sd=0.5,
-    positive=False,
-    scale=1.0,
     shapes=(
         ShapeParameter(name="course", unit="-", lowest=0.0, highest=8.0),
         ShapeParameter(name="onset or settling time", unit="cycles or s", lowest=-1.0, highest=float("inf")),
@@ -149,13 +137,8 @@ TORQUE_ZERO_SHIFT = Effect(
 
 #: Courses of the offset over life x = ζ/ζ_last, 1 at its end: constant, x^q, from a cycle on, or x (1 + s)/(x + s).
 OFFSET_CONSTANT, OFFSET_GROWING, OFFSET_STEP, OFFSET_SETTLING = 0.0, 1.0, 2.0, 3.0
-#: Powers q from which a fit starts, those between which a size is averaged, and values of s (chosen: so close that the size
-#: moves by about its own deviation from one to the next).
-OFFSET_STARTS, OFFSET_POWERS, OFFSET_SETTLED = (
-    (0.5, 1.0, 2.0),
-    (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 2.8),
-    (0.1, 0.3, 1.0),
-)
+#: Powers q from which a fit starts, and those between which a size is averaged (chosen as those of a zero).
+OFFSET_STARTS, OFFSET_POWERS = (0.5, 1.0, 2.0), (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 2.8)
 
 
 def _pressure_offset_grid(facts: Facts) -> tuple[Tried, ...]:
@@ -169,9 +152,9 @@ def _pressure_offset_grid(facts: Facts) -> tuple[Tried, ...]:
 def _pressure_offset_courses(facts: Facts) -> tuple[Tried, ...]:
     tried = [Tried(shape=(OFFSET_CONSTANT, 0.0, 0.0))]
     if facts.states.size > 2:
-        log_weight = math.log(len(OFFSET_STARTS) / (len(OFFSET_POWERS) + len(OFFSET_SETTLED)))
+        log_weight = math.log(len(OFFSET_STARTS) / (len(OFFSET_POWERS) + len(FLATTENED)))
         tried += [Tried(shape=(OFFSET_GROWING, 0.0, math.log(power)), log_weight=log_weight) for power in OFFSET_POWERS]
-        tried += [Tried(shape=(OFFSET_SETTLING, share, 0.0), log_weight=log_weight) for share in OFFSET_SETTLED]
+        tried += [Tried(shape=(OFFSET_SETTLING, share, 0.0), log_weight=log_weight) for share in FLATTENED]
         tried += _offset_steps(facts)
     return tuple(tried)
 
@@ -184,15 +167,13 @@ def _offset_steps(facts: Facts) -> list[Tried]:
 def _pressure_offset_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     course, value, log_power = shape
     cycles = scene.points.cycles
-    life = np.maximum((cycles - scene.facts.states[0]) / scene.facts.life, 0.0)
     if course == OFFSET_CONSTANT:
         share = np.ones_like(cycles)
-    elif course == OFFSET_GROWING:
-        share = life ** math.exp(log_power)
     elif course == OFFSET_STEP:
         share = np.where(cycles > value, 1.0, 0.0)
     else:
-        share = life * (1.0 + value) / (life + value)
+        life = life_of(scene)
+        share = life ** math.exp(log_power) if course == OFFSET_GROWING else flattening(life, value)
     pressed = np.maximum(scene.points.pressure + amplitude * share, 0.0)  # nothing pulls the plates apart
     return np.asarray(scene.curve_at(pressure=pressed) - scene.curve, dtype=np.float64)
 
@@ -205,11 +186,9 @@ PRESSURE_OFFSET = Effect(
     source="Ompusunggu et al. 2013, fig. 1: one gauge in the line, none at the piston",
     family=Family.SENSOR,
     kind=Kind.ARTEFACT,
-    channels=(),
     amplitude="pressure offset",
     unit="bar",
     prior_sd=0.15e5,
-    positive=False,
     scale=1e-5,
     shapes=(
         ShapeParameter(name="course", unit="-", lowest=0.0, highest=3.0),
@@ -239,22 +218,21 @@ def _unsettled_dwell_grid(_facts: Facts) -> tuple[Tried, ...]:
 
 
 def _unsettled_dwell_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    start, *carried = shape
+    start, carried = shape
     points = scene.points
     previous = points.previous
     follows = previous >= 0
     before = np.where(follows, previous, 0)
     if start != TORQUE:
         follows = follows & (np.abs(points.pressure[before] - points.pressure) < 0.02 * points.pressure)
-    follows = follows & (
-        points.engaged * points.engaged[before] > 0
-    )  # an open clutch's drag is not carried over as friction
+    # an open clutch's drag is not carried over as friction
+    follows = follows & (points.engaged * points.engaged[before] > 0)
     if start == SPEED:
         difference = scene.by_velocity * (points.velocity[before] - points.velocity)
         limit = np.abs(scene.curve)
         difference = np.clip(difference, -limit, limit)
     else:
-        share = float(np.clip(amplitude * (carried[0] if carried else 0.0), 0.0, 0.95))
+        share = float(np.clip(amplitude * carried, 0.0, 0.95))
         difference = ends_of(scene.curve, np.where(follows, share, 0.0))[before] - scene.curve
     return np.asarray(amplitude * np.where(follows, difference, 0.0), dtype=np.float64)
 
@@ -269,7 +247,6 @@ UNSETTLED_DWELL = Effect(
     source="Ompusunggu et al. 2013, section 2.3.3: 5 s a plateau; real transients in tests/real",
     family=Family.DWELL,
     kind=Kind.ARTEFACT,
-    channels=(),
     amplitude="share of the plateau before",
     unit="%",
     prior_sd=0.05,
@@ -286,18 +263,14 @@ UNSETTLED_DWELL = Effect(
 )
 
 
-def _channel_delay_grid(_facts: Facts) -> tuple[Tried, ...]:
-    return (Tried(shape=()),)
-
-
 def _channel_delay_change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
     points = scene.points
     out = np.zeros_like(scene.curve)
     looping = np.flatnonzero(points.loop >= 0)
     if looping.size:
-        phases = phases_of(points, looping)
-        curves = scene.curve[looping].reshape(-1, phases)
-        step = amplitude * points.angular_frequency[looping].reshape(-1, phases)[:, :1] * phases / (2 * np.pi)
+        velocity, frequency = by_loop(points, looping)
+        curves, phases = scene.curve[looping].reshape(velocity.shape), velocity.shape[1]
+        step = amplitude * frequency * phases / (2 * np.pi)
         out[looping] = (_shifted(curves, np.clip(step, -phases, phases)) - curves).ravel()
     return out
 
@@ -323,12 +296,8 @@ CHANNEL_DELAY = Effect(
     amplitude="delay",
     unit="ms",
     prior_sd=0.08,
-    positive=False,
     scale=1000.0,
-    shapes=(),
-    grid=_channel_delay_grid,
     change=_channel_delay_change,
     before_lag=True,
-    discrepancies=(),
     opposite_physics="Torque is ahead of the speed: a filter or the recorder delays the speed channel.",
 )

@@ -1,22 +1,16 @@
-"""Oil viscosity over temperature after Walther and ASTM D341, from two measured points.
+"""Oil and heat: viscosity over temperature, an interface that friction heats, another power of speed, and drag.
+
+Oil warmer or colder than usual is thinner or thicker, and shears and carries accordingly. Its viscosity is that of Walther
+and ASTM D341 from two measured points,
 
     log10 log10(ν + 0.7) = A - B log10 T,    ν in mm²/s (cSt), T in K
 
-Valid from about 2 cSt upwards and from -40 to 150 °C for mineral and similar synthetic oils.
-
-Source: ASTM D341-20, eq. 1; the two points are the clutch record's (40 °C and 100 °C).
-
-Oil warmer or colder than usual is thinner or thicker, and shears and carries accordingly.
-
-Friction heats the interface above the oil's temperature, and torque falls with it.
-
-The interface's warmth is computed from the power density. Where the plate's temperature was measured it is the plate's own
-rise above the oil, over what the campaign's plate rises by at the reference's flux, so that the amplitude keeps its meaning.
-A plate that stays at the oil's temperature leaves nothing of this effect.
-
-The viscous term grows with another power of speed than 0.3.
-
-Oil dragged around between and beside the discs: torque that grows with speed, whatever the pressure.
+valid from about 2 cSt upwards and from -40 to 150 °C for mineral and similar synthetic oils (ASTM D341-20, eq. 1; the two
+points are the clutch record's, 40 °C and 100 °C). Friction heats the interface above the oil's temperature by the power
+density, and torque falls with it; where the plate's temperature was measured the warmth is the plate's own rise above the
+oil, over what the campaign's plate rises by at the reference's flux, so that the amplitude keeps its meaning. A plate that
+stays at the oil's temperature leaves nothing of this effect. The viscous term may grow with another power of speed than
+0.3, and oil that is dragged around between and beside the discs adds a torque that grows with speed, whatever the pressure.
 """
 
 import math
@@ -36,8 +30,9 @@ from models.diagnosis.effects.effect import (
     Shape,
     ShapeParameter,
     Tried,
+    by_loop,
     followed,
-    phases_of,
+    lagging,
 )
 from models.friction.stribeck import GAMMA
 
@@ -102,7 +97,6 @@ OIL_TEMPERATURE = Effect(
     unit="-",
     prior_sd=0.7,
     positive=True,
-    scale=1.0,
     shapes=(
         ShapeParameter(name="share of V_S κ", unit="-", lowest=-5.0, highest=2.0, smooth=True),
         ShapeParameter(
@@ -158,22 +152,11 @@ def _computed(scene: Scene, settling: float, saturation: float) -> FloatArray:
     power = np.abs(scene.curve) * scene.points.velocity / geometry.mean_radius
     heat = power / (geometry.friction_faces * geometry.lining_area * REFERENCE_FLUX)
     heat = heat * (1.0 + saturation) / (1.0 + saturation * heat)
-    return _around(followed(heat, scene.points, settling), scene, settling)
-
-
-def _around(heat: FloatArray, scene: Scene, settling: float) -> FloatArray:
-    """Loops: the periodic answer of the same first-order lag, harmonic by harmonic."""
-    points = scene.points
-    looping = np.flatnonzero(points.loop >= 0)
-    if not looping.size:
-        return heat
-    phases = phases_of(points, looping)
-    waves = np.fft.rfft(heat[looping].reshape(-1, phases), axis=1)
-    frequency = points.angular_frequency[looping].reshape(-1, phases)[:, :1]
-    waves /= 1 + 1j * np.arange(waves.shape[1]) * frequency * settling
-    out = heat.copy()
-    out[looping] = np.fft.irfft(waves, phases, axis=1).ravel()
-    return out
+    warmth, looping = followed(heat, scene.points, settling), np.flatnonzero(scene.points.loop >= 0)
+    if looping.size:
+        velocity, frequency = by_loop(scene.points, looping)
+        warmth[looping] = lagging(heat[looping].reshape(velocity.shape), frequency, settling).ravel()
+    return warmth
 
 
 INTERFACE_HEATING = Effect(
@@ -186,7 +169,6 @@ INTERFACE_HEATING = Effect(
     source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
     family=Family.THERMAL,
     kind=Kind.ARTEFACT,
-    channels=(),
     amplitude="loss of torque at 0.32 W/mm²",
     unit="%",
     prior_sd=0.1,
@@ -204,10 +186,6 @@ INTERFACE_HEATING = Effect(
 )
 
 
-def _viscous_exponent_grid(_facts: Facts) -> tuple[Tried, ...]:
-    return (Tried(shape=()),)
-
-
 def _viscous_exponent_change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
     middle = scene.laws.frame.reference_velocity
     exponent = np.clip(amplitude, -0.6, 1.5) * np.log(scene.points.velocity / middle)
@@ -223,14 +201,9 @@ VISCOUS_EXPONENT = Effect(
     source="Ompusunggu et al. 2013, section 3.1.2: γ = 0.3 fixed beforehand",
     family=Family.VISCOUS,
     kind=Kind.ARTEFACT,
-    channels=(),
     amplitude="change of exponent δ",
     unit="-",
     prior_sd=0.2,
-    positive=False,
-    scale=1.0,
-    shapes=(),
-    grid=_viscous_exponent_grid,
     change=_viscous_exponent_change,
     before_lag=True,
     discrepancies=(Discrepancy.SPEED,),
@@ -270,12 +243,10 @@ HYDRODYNAMIC_DRAG = Effect(
     source="Kato et al., drag torque of disengaged wet clutches; Newtonian shear in an annular gap",
     family=Family.VISCOUS,
     kind=Kind.ARTEFACT,
-    channels=(),
     amplitude="drag in mid speed",
     unit="Nm",
     prior_sd=0.5,
     positive=True,
-    scale=1.0,
     shapes=(
         ShapeParameter(name="power m", unit="-", lowest=0.5, highest=1.8, smooth=True),
         ShapeParameter(name="rupture of the film r", unit="-", lowest=0.0, highest=5.0),

@@ -153,7 +153,7 @@ def _held_at_bounds(gram: Gram, first: int, fitted: Fit) -> tuple[Gram, FloatArr
     columns begin at `first`."""
     ways: list[float] = []  # 0 for what is free
     for effect in fitted.effects:
-        smooth = [(x, shape) for x, shape in zip(effect.shape, effect.effect.shapes, strict=True) if shape.smooth]
+        smooth = effect.effect.smooth(effect.shape)
         out = np.array([1.0, *(1.0 if 2 * x > shape.lowest + shape.highest else -1.0 for x, shape in smooth)])
         ways += np.where(free_shapes(effect), 0.0, out).tolist()
     outward = np.array(ways)

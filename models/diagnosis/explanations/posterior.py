@@ -63,11 +63,6 @@ class Start(NamedTuple):
     fitted: FittedEffect
 
 
-def stiff(shape: Shape, column: Column) -> Shape:
-    """The shapes that a refit does not move."""
-    return tuple(x for x, parameter in zip(shape, column.effect.shapes, strict=True) if not parameter.smooth)
-
-
 def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str, list[Start]]:
     """By effect its kinds of shapes, best first."""
     if not columns:
@@ -89,7 +84,7 @@ def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str
     total = np.logaddexp.reduce(table, axis=0)
     kinds: dict[tuple[str, Shape], list[int]] = {}
     for place, column in enumerate(columns):
-        kinds.setdefault((column.effect.slug, stiff(column.shape, column)), []).append(place)
+        kinds.setdefault((column.effect.slug, column.effect.stiff(column.shape)), []).append(place)
     by_effect: dict[str, list[Start]] = {}
     for (slug, _), mine in kinds.items():
         best = mine[int(np.argmax(total[mine]))]
@@ -121,8 +116,7 @@ class Node:
     @property
     def kind(self) -> tuple[tuple[str, Shape], ...]:
         """The shapes that a refit does not move."""
-        shapes = [(e.effect.slug, e.shape, e.effect.shapes) for e in self.fit.effects]
-        return tuple(sorted((s, tuple(x for x, p in zip(v, q, strict=True) if not p.smooth)) for s, v, q in shapes))
+        return tuple(sorted((e.effect.slug, e.effect.stiff(e.shape)) for e in self.fit.effects))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -377,7 +371,7 @@ class Search:
                 continue
             for start in kinds:
                 value = node.log_evidence + start.promise + self._by_raw(more.causes, start.promise) + self.prior(more)
-                promises[more, stiff(start.column.shape, start.column)] = (value, node, start)
+                promises[more, start.column.effect.stiff(start.column.shape)] = (value, node, start)
         for axis, gained in node.evidence.structure.items():
             more = Alternative(parent.causes, axis)
             if more not in self.nodes:

@@ -22,7 +22,6 @@ from models.diagnosis.criteria import COURSE_NEGLIGIBLE, COURSE_STEPS, DRAWS, SI
 from models.diagnosis.effects.effect import Effect, Tried
 from models.diagnosis.effects.fitted_effect import (
     Draw,
-    DrawnEffect,
     FittedEffect,
     discrepancy_factors,
     effect_columns,
@@ -73,7 +72,7 @@ class _Component:
         """Samples [n, m] of what the mean is of."""
         return np.asarray(self.mean + normals[:, : self.mean.size] @ self.root.T)
 
-    def effects(self, off: FloatArray) -> tuple[DrawnEffect, ...]:
+    def effects(self, off: FloatArray) -> tuple[FittedEffect, ...]:
         """The effects at one sample [m]."""
         drawn, at, after = [], 0, sum(1 + len(smooth_places(fitted.effect)) for fitted in self.fit.effects)
         for fitted, last in zip(self.fit.effects, self.last, strict=True):
@@ -83,7 +82,7 @@ class _Component:
                 shape[place] = float(np.clip(shape[place] + move, parameter.lowest, parameter.highest))
             amplitude = fitted.amplitude + float(off[at])
             drawn.append(
-                DrawnEffect(
+                FittedEffect(
                     effect=fitted.effect,
                     amplitude=max(amplitude, 0.0) if fitted.effect.positive else amplitude,
                     shape=tuple(shape),
@@ -93,7 +92,7 @@ class _Component:
             at, after = at + 1 + len(smooth_places(fitted.effect)), after + last.size
         return tuple(drawn)
 
-    def sizes(self, drawn: Sequence[DrawnEffect]) -> list[float]:
+    def sizes(self, drawn: Sequence[FittedEffect]) -> list[float]:
         """The size of each effect after the last state."""
         return [
             effect.amplitude * max(1.0 + float(last @ np.array(effect.factors)), 0.0)
@@ -111,7 +110,7 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
     weight = np.array([component.weight for component in components])
     counts = np.diff(np.floor(np.cumsum(weight) * SIZES_SAMPLED + rng.random()), prepend=0.0).astype(int)
     width = max(component.mean.size for component in components)
-    samples: list[tuple[float, int, tuple[DrawnEffect, ...]]] = []
+    samples: list[tuple[float, int, tuple[FittedEffect, ...]]] = []
     sized: dict[str, list[tuple[float, int]]] = {}
     for index, (component, count) in enumerate(zip(components, counts.tolist(), strict=True)):
         offs = component.drawn(rng.standard_normal((count, width)))
