@@ -7,6 +7,7 @@ Source: Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 
 """
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from models.arrays import FloatArray
 
@@ -45,3 +46,8 @@ def log_gain_alone(info: FloatArray, score: FloatArray, sd: FloatArray | float) 
     """The formula for each coefficient by itself; info [m] >= 0, score [m], sd as broadcasts."""
     unit = np.square(sd) * info
     return np.asarray(0.5 * (np.square(sd) * np.square(score) / (1 + unit) - np.log1p(unit)), dtype=np.float64)
+
+
+def log_positive(info: FloatArray, score: FloatArray, sd: FloatArray | float) -> FloatArray:
+    """What `log_gain_alone` is more for coefficients that cannot be negative: ln 2Φ(s/√(I + sd⁻²))."""
+    return np.asarray(np.log(2.0) + log_ndtr(score / np.sqrt(info + np.power(sd, -2.0))), dtype=np.float64)

@@ -10,7 +10,7 @@ import numpy as np
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.design import build_design
 from models.diagnosis.experiments.test_plan import advise, rivals_of
-from models.diagnosis.explanations.decide import judge, revise
+from models.diagnosis.explanations.decide import judge
 from models.diagnosis.explanations.posterior import posterior_of
 from models.diagnosis.explanations.sizes import sizes_of
 from models.diagnosis.pooled_fit.baseline_fit import IndeterminateError, fit_baseline, missing_for_baseline
@@ -49,7 +49,6 @@ def diagnose(
     problem = posterior.problem
     judgement = judge(posterior)
     validation = validate(problem, posterior.null.fit, judgement, of_gain)
-    judgement = revise(judgement, validation.held_out)
     sizes = sizes_of(problem, judgement, of_sizes)
     advice = advise(campaign, problem, *rivals_of(judgement))
     report = report_of(baseline, posterior, judgement, raw, validation, sizes, advice)

@@ -251,4 +251,5 @@ def flattening(life: FloatArray, share: float) -> FloatArray:
 
 def life_of(scene: Scene) -> FloatArray:
     """The share [P] of the measured life that has gone, 0 before its first state."""
-    return np.maximum((scene.points.cycles - scene.facts.states[0]) / scene.facts.life, 0.0)
+    gone = (scene.points.cycles - scene.facts.states[0]) / scene.facts.life
+    return np.asarray(np.maximum(gone, 0.0), dtype=np.float64)

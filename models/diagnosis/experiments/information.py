@@ -92,10 +92,8 @@ class CandidateDistances:
         place = int(self._problem.priors.free.sum())
         gram, noise, deviations = self._measured[0], self._problem.noise, list[float]()
         for joined in (gram, reduce(_joined, [more[0] for more in ahead], gram)):
-            corner = joined.with_gains(noise.run_gain, noise.curve_gain)[0][: joined.base, : joined.base]
-            scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
-            inverse = np.linalg.pinv(corner * scale[:, None] * scale, hermitian=True)
-            deviations.append(float(scale[place] * np.sqrt(max(inverse[place, place], 0.0))))
+            variance = joined.covariance(noise.run_gain, noise.curve_gain)[place, place]
+            deviations.append(float(np.sqrt(max(variance, 0.0))))
         return deviations[1] / max(deviations[0], 1e-300)
 
     def _gram(self, rows: _Rows, rival: int) -> Gram:

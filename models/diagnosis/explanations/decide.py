@@ -10,10 +10,9 @@ otherwise                                                       ambiguous: the s
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import product
 
-from models.diagnosis.criteria import LIKELY, MOST_WORSE, SURE
+from models.diagnosis.criteria import LIKELY, SURE
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
 from models.diagnosis.explanations.posterior import Posterior
 from models.diagnosis.explanations.verdict import (
@@ -22,9 +21,7 @@ from models.diagnosis.explanations.verdict import (
     Alternative,
     Explanation,
     Fitted,
-    HeldOut,
     Judgement,
-    Proposal,
     Verdict,
     Where,
     axis_of,
@@ -134,16 +131,3 @@ def _where(evidence: Mapping[str, float]) -> tuple[Where, ...]:
         if axis := axis_of(unknown):
             axes[axis] = max(axes.get(axis, 0.0), value)
     return tuple(Where(axis=axis, strength=value) for axis, value in sorted(axes.items(), key=lambda item: -item[1]))
-
-
-def revise(judgement: Judgement, held_out: HeldOut | None) -> Judgement:
-    """With what validation says of an extension; `held_out` is how the extended model does, None where nothing could be held
-    out. The verdict stays."""
-    proposal = Proposal.PROPOSED if judgement.stand else Proposal.NONE
-    if judgement.stand and held_out is not None:
-        if held_out.rmse_after > MOST_WORSE * held_out.rmse_before:
-            proposal = Proposal.WITHHELD_ERROR
-        elif held_out.log_score_gain < 0:
-            proposal = Proposal.WITHHELD_LOG_SCORE
-    follow = held_out is not None and held_out.forecast_log_score_gain > 0
-    return replace(judgement, proposal=proposal, follow_courses=follow)

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import expit, log_ndtr
+from scipy.special import expit
 
 from models.diagnosis.criteria import (
     ANYTHING_WRONG,
@@ -50,7 +50,7 @@ from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, refit, refit_besi
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import Projected
 from models.diagnosis.raw_records.evidence import RawEvidence
-from models.gaussian_evidence import log_sum
+from models.gaussian_evidence import log_gain_alone, log_positive, log_sum
 
 
 class Start(NamedTuple):
@@ -75,10 +75,7 @@ def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str
     for projected in screened:
         info, score = np.maximum(np.diag(projected.info), 0.0), projected.score
         wide = np.outer(SCALES, sd)
-        precision = info + wide**-2
-        mean = score / precision
-        gain = 0.5 * score * mean - 0.5 * np.log(precision * wide**2)
-        gain = gain + np.where(positive, np.log(2.0) + log_ndtr(mean * np.sqrt(precision)), 0.0)
+        gain = log_gain_alone(info, score, wide) + np.where(positive, log_positive(info, score, wide), 0.0)
         by_gain.append(projected.evidence + np.logaddexp.reduce(gain, axis=0) - np.log(len(SCALES)) + weight)
     table = np.stack(by_gain)
     total = np.logaddexp.reduce(table, axis=0)
@@ -88,13 +85,13 @@ def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str
     by_effect: dict[str, list[Start]] = {}
     for (slug, _), mine in kinds.items():
         best = mine[int(np.argmax(total[mine]))]
-        gain = int(np.argmax(table[:, best]))
-        precision = screened[gain].info[best, best] + (SCALES[-1] * sd[best]) ** -2.0
-        amplitude = float(screened[gain].score[best] / precision)
+        likely = int(np.argmax(table[:, best]))
+        precision = screened[likely].info[best, best] + (SCALES[-1] * sd[best]) ** -2.0
+        amplitude = float(screened[likely].score[best] / precision)
         column = columns[best]
         fitted = FittedEffect(effect=column.effect, amplitude=amplitude, shape=column.shape)
         promise = log_sum(total[mine]) - null
-        by_effect.setdefault(slug, []).append(Start(promise, column, gain, fitted))
+        by_effect.setdefault(slug, []).append(Start(promise, column, likely, fitted))
     return {slug: sorted(by_kind, key=lambda start: -start.promise) for slug, by_kind in by_effect.items()}
 
 

@@ -28,12 +28,12 @@ scatter, as every other evidence is: what gains explain as well is no evidence o
 """
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 from scipy.ndimage import median_filter
-from scipy.special import gammaincc, gammaincinv, logsumexp
+from scipy.special import gammaincc, gammaincinv
 
 from models.arrays import FloatArray
 from models.diagnosis.criteria import (
@@ -219,21 +219,16 @@ def temperature_evidence(problem: FitProblem, fitted: Fit) -> float:
     """Evidence [nats] of unmeasured courses of oil temperature over none."""
     columns, between, within = _courses(problem.design, fitted)
     gram = gram_of(problem, fitted, columns)
-    evidences = [
-        (projected.evidence, _averaged(projected, between, within)) for projected in projections_of(gram, problem.noise)
-    ]
-    without, gained = np.array(evidences).T
-    return float(logsumexp(without + gained) - logsumexp(without))
+    projections = list(projections_of(gram, problem.noise))
+    gained = [projected.evidence + _averaged(projected, between, within) for projected in projections]
+    return log_sum(gained) - log_sum([projected.evidence for projected in projections])
 
 
 def _averaged(projected: Projected, between: FloatArray, within: FloatArray) -> float:
     """Over the strengths."""
-    logs = [
-        _marginal(projected, (USUAL_VISCOSITY_CHANGE * (b * between + w * within)) ** 2)
-        for b in CHANGES_BETWEEN_TESTS
-        for w in CHANGES_WITHIN_TESTS
-    ]
-    return float(logsumexp(logs) - np.log(len(logs)))
+    strengths = product(CHANGES_BETWEEN_TESTS, CHANGES_WITHIN_TESTS)
+    sds = [USUAL_VISCOSITY_CHANGE * (b * between + w * within) for b, w in strengths]
+    return log_mean([log_gain(projected.info, projected.score, sd) for sd in sds])
 
 
 def _courses(design: Design, fitted: Fit) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -253,13 +248,3 @@ def _courses(design: Design, fitted: Fit) -> tuple[FloatArray, FloatArray, Float
             relative += [1.0 / k, 1.0 / k]
     within = np.array(relative)
     return np.stack(columns, axis=1), np.where(within == 0, 1.0, 0.0), within
-
-
-def _marginal(projected: Projected, variances: FloatArray) -> float:
-    """The formula above."""
-    root = np.sqrt(variances)
-    unit = root[:, None] * projected.info * root
-    score = root * projected.score
-    factor = np.linalg.cholesky(np.eye(root.size) + 0.5 * (unit + unit.T))
-    half = solve_triangular(factor, score, lower=True)
-    return float(0.5 * (half**2).sum() - np.log(np.diag(factor)).sum())

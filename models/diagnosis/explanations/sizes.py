@@ -231,10 +231,8 @@ def _component(problem: FitProblem, fitted: Fit, weight: float) -> _Component:
     design = problem.design
     gram = gram_of(problem, fitted)
     gains = max(projections_of(gram, problem.noise), key=lambda projected: projected.evidence)
-    matrix = gram.with_gains(gains.run_gain, gains.curve_gain)[0]
-    corner = matrix[: gram.base, : gram.base]
-    scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
-    inverse = np.linalg.pinv(corner * scale[:, None] * scale, hermitian=True) * scale[:, None] * scale
+    inverse = gram.covariance(gains.run_gain, gains.curve_gain)
+    slope = gram.with_gains(gains.run_gain, gains.curve_gain)[0][: gram.base, -1]
     own = slice(int(problem.priors.free.sum()), gram.base)
     values, vectors = np.linalg.eigh(inverse[own, own])
     rows = [effect_rows(design, fitted.prediction, effect) for effect in fitted.effects]
@@ -253,7 +251,7 @@ def _component(problem: FitProblem, fitted: Fit, weight: float) -> _Component:
     return _Component(
         weight=weight,
         fit=fitted,
-        mean=(inverse @ matrix[: gram.base, -1])[own],
+        mean=(inverse @ slope)[own],
         root=vectors * np.sqrt(np.maximum(values, 0.0)),
         trend=(
             float(whole[last].mean() - whole[first].mean()),

@@ -119,33 +119,11 @@ class Fitted:
         return self.fit.status is FitStatus.OUT_OF_STEPS
 
 
-class Proposal(StrEnum):
-    """Whether the extended model is proposed for adoption: there is none; it is; it is withheld, for its error on held-out
-    runs is larger than the baseline's, or its log score there is lower."""
-
-    NONE = "none"
-    PROPOSED = "proposed"
-    WITHHELD_ERROR = "withheld_error"
-    WITHHELD_LOG_SCORE = "withheld_log_score"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HeldOut:
-    """How an extended model does on runs that were held out, against the baseline: RMS errors [Nm], gain of log score
-    [nats], and the gain of log score when the last states are predicted from the first ones [nats]."""
-
-    rmse_before: float
-    rmse_after: float
-    log_score_gain: float
-    forecast_log_score_gain: float
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
     """The verdict and its causes, read off the explanations (most probable first); of what was fitted the causes that
     `stand`, best first, and the `others`; the axes on which structure lies, most evidence first; `likest` the slug of the
-    fault that is the likeliest of all that has no name, if one is; evidence [nats] by slug of effects alone; after
-    validation, what is proposed and whether effects of use are followed beyond the data."""
+    fault that is the likeliest of all that has no name, if one is; evidence [nats] by slug of effects alone."""
 
     verdict: Verdict
     causes: tuple[str, ...] = ()
@@ -156,8 +134,6 @@ class Judgement:
     left: tuple[Where, ...] = ()
     likest: str | None = None
     evidence: Mapping[str, float]
-    proposal: Proposal = Proposal.NONE
-    follow_courses: bool = False
 
     @property
     def probabilities(self) -> dict[str, float]:

@@ -7,6 +7,7 @@ predicted torque on the curve's (run's) rows. R is an ARMA(1, 1) process, whiten
 rank-one terms (Woodbury), whitened by shrinking along one direction.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,3 +115,9 @@ def without_gains(columns: FloatArray, gains: Gains, run_gain: float, curve_gain
 def _shrink(variance: FloatArray) -> FloatArray:
     """1 - 1/sqrt(1 + σ²|m|²): how much of the direction m is taken off."""
     return np.asarray(1 - 1 / np.sqrt(1 + variance), dtype=np.float64)
+
+
+def whitening(design: Design, torque: FloatArray, noise: Noise) -> Callable[[FloatArray], FloatArray]:
+    """V^{-1/2} of columns [N, m], gains taken along a torque [N] Nm."""
+    gains = gains_of(design, torque, noise)
+    return lambda columns: without_gains(whitened(columns, design, noise), gains, noise.run_gain, noise.curve_gain)

@@ -20,7 +20,7 @@ from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.criteria import CURVATURE_BOUNDS
 from models.diagnosis.effects.effect import amplitude_cost
 from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns, effect_precisions, effect_rows
-from models.diagnosis.noise.covariance import gains_of, whitened, without_gains
+from models.diagnosis.noise.covariance import whitening
 from models.diagnosis.pooled_fit.problem import FitProblem, Priors
 
 #: Gauss-Newton steps where the caller asks for no other number, and damped trials for each.
@@ -67,7 +67,7 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
 
     Gains are taken along one torque (`FitProblem.gained`), which keeps the metric fixed while a fit moves.
     """
-    white, priors = _whitening(problem), problem.priors
+    white, priors = whitening(problem.design, problem.gained, problem.noise), problem.priors
     state = _evaluated(problem, white, start, tuple(effects))
     damping, growth = 1e-3, 2.0
     status, made = FitStatus.OUT_OF_STEPS, 0
@@ -96,16 +96,6 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
             status = FitStatus.CONVERGED
             break
     return replace(state, status=status if np.isfinite(state.cost) else FitStatus.NOT_FINITE, steps=made)
-
-
-def _whitening(problem: FitProblem) -> Whiten:
-    design, noise = problem.design, problem.noise
-    gains = gains_of(design, problem.gained, noise)
-
-    def white(columns: FloatArray) -> FloatArray:
-        return without_gains(whitened(columns, design, noise), gains, noise.run_gain, noise.curve_gain)
-
-    return white
 
 
 def _inside(state: Fit, priors: Priors, matrix: FloatArray, gradient: FloatArray) -> FloatArray:

@@ -73,6 +73,13 @@ class Gram:
             matrix -= self.along.T @ ((curve_gain**2 * freed)[:, None] * self.along)
         return matrix, float(np.log1p(run_gain**2 * squares).sum() - np.log(freed).sum())
 
+    def covariance(self, run_gain: float, curve_gain: float) -> FloatArray:
+        """[base, base] of all that the baseline has free, with gains that scatter so."""
+        corner = self.with_gains(run_gain, curve_gain)[0][: self.base, : self.base]
+        scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
+        inverse = np.linalg.pinv(corner * scale[:, None] * scale, hermitian=True)
+        return np.asarray(inverse * scale[:, None] * scale, dtype=np.float64)
+
 
 def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None, *, held: bool = True) -> Gram:
     """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows, none if None.
@@ -195,9 +202,7 @@ def _factor(correlation: FloatArray) -> FloatArray:
 def amplitude_deviations(problem: FitProblem, fitted: Fit) -> list[float]:
     """Standard deviations of the amplitudes of the fit's effects, everything else free."""
     gram = gram_of(problem, fitted)
-    corner = gram.with_gains(problem.noise.run_gain, problem.noise.curve_gain)[0][: gram.base, : gram.base]
-    scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
-    inverse = np.linalg.pinv(corner * scale[:, None] * scale, hermitian=True) * scale[:, None] * scale
+    inverse = gram.covariance(problem.noise.run_gain, problem.noise.curve_gain)
     sizes = [1 + sum(shape.smooth for shape in effect.effect.shapes) for effect in fitted.effects]
     discrepancies = sum(discrepancy_factors(problem.design, effect.effect).shape[1] for effect in fitted.effects)
     places = gram.base - discrepancies - sum(sizes) + np.concatenate([[0], np.cumsum(sizes)])[: len(sizes)].astype(int)

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis.raw_records.criteria import (
@@ -25,6 +25,7 @@ from models.diagnosis.raw_records.criteria import (
     SPEED_SHARE,
     USUAL_SHARE,
 )
+from models.gaussian_evidence import log_gain_alone, log_positive
 from models.records.plateaus import PlateauCut
 from models.records.runs import Record
 
@@ -60,9 +61,7 @@ def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> SettlingEv
     by_fast = np.linalg.solve(corner, np.column_stack([gram[:fast, fast:], along[:fast]]))
     info = np.maximum(np.diag(gram[fast:, fast:] - gram[fast:, :fast] @ by_fast[:, :-1]), 0.0)
     score = along[fast:] - gram[fast:, :fast] @ by_fast[:, -1]
-    precision = info + USUAL_SHARE**-2.0
-    logs = 0.5 * score**2 / precision - 0.5 * np.log(precision * USUAL_SHARE**2)
-    logs = logs + np.log(2.0) + log_ndtr(score / np.sqrt(precision))
+    logs = log_gain_alone(info, score, USUAL_SHARE) + log_positive(info, score, USUAL_SHARE)
     weights, log_times = np.exp(logs - logsumexp(logs)), np.log(SLOW_TIMES)
     middle = float(weights @ log_times)
     within = np.ptp(log_times) / (log_times.size - 1) / np.sqrt(12)  # the grid cannot tell τ closer than its spacing

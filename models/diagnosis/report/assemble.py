@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.diagnosis.criteria import LEAST_LISTED, NEGLIGIBLE, SIGN_UNDETERMINED
+from models.diagnosis.criteria import LEAST_LISTED, MOST_WORSE, NEGLIGIBLE, SIGN_UNDETERMINED
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import sized
@@ -22,7 +22,7 @@ from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.posterior import Posterior
 from models.diagnosis.explanations.shapeless import outlying_run
 from models.diagnosis.explanations.sizes import Size, Sizes
-from models.diagnosis.explanations.verdict import NOTHING, Explanation, Judgement, Proposal, Verdict
+from models.diagnosis.explanations.verdict import NOTHING, Explanation, Judgement, Verdict
 from models.diagnosis.extension import Extension, build_extension
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
 from models.diagnosis.pooled_fit.gauss_newton import FitStatus
@@ -32,7 +32,7 @@ from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.isolability import unseen_of, visible_of
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.report import Candidate, Report, misfit_of
-from models.diagnosis.report.summary import Findings, effect_name, number, summarise
+from models.diagnosis.report.summary import effect_name, number, summarise
 from models.diagnosis.validation.extended_model import Validation
 from models.diagnosis.validation.held_out import Gain
 
@@ -114,22 +114,24 @@ def _finite(value: float) -> float:
     return float(np.clip(value, -1e300, 1e300))
 
 
-def proposed_extension(problem: FitProblem, judgement: Judgement, sizes: Sizes, reason: str) -> Extension | None:
-    """The draws of the causes; None where nothing was fitted, or there is a reason against it."""
-    if reason or judgement.proposal is not Proposal.PROPOSED or not any(draw.effects for draw in sizes.draws):
+def proposed_extension(problem: FitProblem, gain: Gain | None, sizes: Sizes, reason: str) -> Extension | None:
+    """The draws of the causes; None where nothing was fitted, or there is a reason against it. Effects of use are followed
+    beyond the data only where they help to predict the last states from the first ones."""
+    if reason or not any(draw.effects for draw in sizes.draws):
         return None
-    design = problem.design
-    return build_extension(sizes.draws, design.facts, ranges_of(design.rows), courses=judgement.follow_courses)
+    design, follow = problem.design, gain is not None and gain.forecast_log_score_gain > 0
+    return build_extension(sizes.draws, design.facts, ranges_of(design.rows), courses=follow)
 
 
-def reason_against(proposal: Proposal, gain: Gain | None, sizes: Sizes) -> str:
-    """Why an extension is not proposed, or nothing where one is or none was fitted."""
-    if proposal is Proposal.WITHHELD_ERROR:
+def reason_against(gain: Gain | None, sizes: Sizes) -> str:
+    """Why an extension is not proposed, or nothing where one is or none was fitted. The verdict stays."""
+    if not sizes.draws:
+        return ""
+    if gain is not None and gain.rmse_after > MOST_WORSE * gain.rmse_before:
         return "The extension is not proposed: its error on held-out runs is larger than the baseline's."
-    if proposal is Proposal.WITHHELD_LOG_SCORE and gain is not None:
+    if gain is not None and gain.log_score_gain < 0:
         return "The extension is not proposed: held-out runs are less likely with it than without."
-    unsure = [_unsure(slug, size) for slug, size in sizes.by_slug.items() if size.other_sign > SIGN_UNDETERMINED]
-    return " ".join(unsure) if proposal is Proposal.PROPOSED else ""
+    return " ".join(_unsure(slug, size) for slug, size in sizes.by_slug.items() if size.other_sign > SIGN_UNDETERMINED)
 
 
 def _unsure(slug: str, size: Size) -> str:
@@ -172,13 +174,13 @@ def report_of(
 ) -> Report:
     """Candidates, misfits, gain, advice, maps, loops, extension, summary."""
     problem, fitted = posterior.problem, posterior.null.fit
-    reason = reason_against(judgement.proposal, validation.gain, sizes)
+    reason = reason_against(validation.gain, sizes)
     notes = tuple(note for note in (*_notes(baseline, posterior, judgement, raw), reason) if note)
     scatter = run_scatter(posterior.null.evidence.screened)
     candidates = candidates_of(problem, judgement, raw, sizes.by_slug)
     extended = validation.extended
     visible = visible_of(posterior)
-    findings = Findings(
+    report = Report(
         verdict=judgement.verdict,
         causes=judgement.causes,
         explanations=with_signs(judgement.explanations, candidates),
@@ -189,53 +191,24 @@ def report_of(
         advice=advice,
         visible=visible,
         unseen=unseen_of(posterior, visible, raw),
+        maps=residual_maps(problem, fitted, extended),
+        loops=loop_traces(problem, fitted, extended),
+        extension=proposed_extension(problem, validation.gain, sizes, reason),
+        not_adoptable=reason,
         notes=notes,
+        statistics=statistics_of(posterior, judgement, scatter),
         tests=len(problem.design.runs),
         states=int(problem.design.facts.states.size),
         resembles="" if judgement.likest is None else FAULT_BY_SLUG[judgement.likest].title,
         scatter=scatter,
-        withheld=reason,
     )
-    return Report(
-        verdict=judgement.verdict,
-        causes=judgement.causes,
-        summary=summarise(findings),
-        explanations=findings.explanations,
-        candidates=findings.candidates,
-        baseline=findings.baseline,
-        extended=findings.extended,
-        gain=validation.gain,
-        advice=advice,
-        visible=visible,
-        maps=residual_maps(problem, fitted, extended),
-        loops=loop_traces(problem, fitted, extended),
-        extension=proposed_extension(problem, judgement, sizes, reason),
-        not_adoptable=reason,
-        notes=notes,
-        statistics=statistics_of(posterior, judgement, scatter),
-    )
+    return replace(report, summary=summarise(report))
 
 
 def insufficient(missing: str, design: Design) -> Report:
     """Nothing can be judged."""
-    return Report(
-        verdict=Verdict.INSUFFICIENT_DATA,
-        causes=(),
-        summary=f"Too little data for a pooled baseline: {missing}",
-        explanations=(),
-        candidates=(),
-        baseline=None,
-        extended=None,
-        gain=None,
-        advice=(),
-        visible=(),
-        maps=None,
-        loops=(),
-        extension=None,
-        not_adoptable="",
-        notes=design.notes,
-        statistics={},
-    )
+    summary = f"Too little data for a pooled baseline: {missing}"
+    return Report(verdict=Verdict.INSUFFICIENT_DATA, summary=summary, notes=design.notes)
 
 
 def _notes(

@@ -12,7 +12,7 @@ decides.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from models.diagnosis.explanations.verdict import Explanation, Verdict, Where
 from models.diagnosis.extension import Extension
 from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import without_likely_gains
+from models.diagnosis.pooled_fit.projection import RunScatter, without_likely_gains
 from models.diagnosis.validation.held_out import Gain
 
 
@@ -133,23 +133,32 @@ class Report:
     be judged. `extension` is what may be adopted, None where there is nothing to adopt."""
 
     verdict: Verdict
-    causes: tuple[str, ...]
-    summary: str
-    explanations: tuple[Explanation, ...]
-    candidates: tuple[Candidate, ...]
-    baseline: Misfit | None
-    extended: Misfit | None
-    gain: Gain | None
-    advice: tuple[Advice, ...]
-    visible: tuple[Visible, ...]
-    maps: Maps | None
-    loops: tuple[LoopTrace, ...]
-    extension: Extension | None
+    causes: tuple[str, ...] = ()
+    summary: str = ""
+    explanations: tuple[Explanation, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    baseline: Misfit | None = None
+    extended: Misfit | None = None
+    gain: Gain | None = None
+    advice: tuple[Advice, ...] = ()
+    visible: tuple[Visible, ...] = ()
+    #: Effects of which these data show nothing at any size.
+    unseen: tuple[str, ...] = ()
+    maps: Maps | None = None
+    loops: tuple[LoopTrace, ...] = ()
+    extension: Extension | None = None
     #: Why a cause that was fitted gives nothing to adopt, in a sentence; empty where it does, or none was fitted.
-    not_adoptable: str
+    not_adoptable: str = ""
     #: Anything an engineer should know about the data: assumed noise floor, missing channels, states left out.
-    notes: tuple[str, ...]
-    #: Numbers of the engine that a test may want: alarm statistic, its threshold, closure p-values.
-    statistics: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+    #: Numbers of the engine that a test may want: scatter of runs, evidence, odds, refits.
+    statistics: Mapping[str, float] = field(default_factory=dict)
+    #: How many tests at how many states of use were examined.
+    tests: int = 0
+    states: int = 0
+    #: The fault that what has no name most resembles, in words.
+    resembles: str = ""
+    #: The scatter of the runs' gains.
+    scatter: RunScatter | None = None
     #: Which causes this design could tell apart, where that was asked for.
     isolability: Isolability | None = None

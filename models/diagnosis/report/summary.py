@@ -8,7 +8,6 @@ left out. The numbers behind them are the report's fields.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from models.diagnosis.criteria import (
@@ -24,12 +23,12 @@ from models.diagnosis.criteria import (
 from models.diagnosis.design.design import CLOCK, CYCLES, FREQUENCY, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.fitted_effect import Estimate
-from models.diagnosis.experiments.test_plan import BASELINE, Advice
+from models.diagnosis.experiments.test_plan import BASELINE
 from models.diagnosis.explanations.decide import smallest
 from models.diagnosis.explanations.shapeless import ADVICE
-from models.diagnosis.explanations.verdict import UNCATALOGUED, Explanation, Verdict
+from models.diagnosis.explanations.verdict import UNCATALOGUED, Verdict
 from models.diagnosis.pooled_fit.projection import RunScatter
-from models.diagnosis.report.report import Candidate, Misfit, Visible
+from models.diagnosis.report.report import Candidate, Misfit, Report, Visible
 from models.diagnosis.validation.held_out import Gain
 
 #: Digits after the point at most.
@@ -124,30 +123,7 @@ class Sentence(NamedTuple):
     matters: int = MUST
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Findings:
-    """What a report says, before its paragraph; `resembles` is the fault that what has no name most resembles, `unseen`
-    effects of which these data show nothing, `scatter` that of the runs' gains, `withheld` why nothing may be adopted."""
-
-    verdict: Verdict
-    causes: tuple[str, ...]
-    explanations: tuple[Explanation, ...]
-    candidates: tuple[Candidate, ...]
-    baseline: Misfit | None
-    extended: Misfit | None
-    gain: Gain | None
-    advice: tuple[Advice, ...]
-    visible: tuple[Visible, ...]
-    notes: tuple[str, ...]
-    tests: int
-    states: int
-    resembles: str = ""
-    unseen: tuple[str, ...] = ()
-    scatter: RunScatter | None = None
-    withheld: str = ""
-
-
-def summarise(findings: Findings) -> str:
+def summarise(report: Report) -> str:
     """The paragraph."""
     say = {
         Verdict.MODEL_ADEQUATE: _adequate,
@@ -155,15 +131,15 @@ def summarise(findings: Findings) -> str:
         Verdict.CAUSE_AMBIGUOUS: _ambiguous,
         Verdict.UNEXPLAINED_STRUCTURE: _unexplained,
         Verdict.INSUFFICIENT_DATA: _insufficient,
-    }[findings.verdict]
-    data = f"{count_of(findings.tests, 'test')} at {count_of(findings.states, 'state')} of use were examined."
-    if findings.tests == 1:
+    }[report.verdict]
+    data = f"{count_of(report.tests, 'test')} at {count_of(report.states, 'state')} of use were examined."
+    if report.tests == 1:
         data = data.replace("were", "was")
-    sentences = [Sentence(data, MAY), *say(findings), *_noted(findings.notes)]
+    sentences = [Sentence(data, MAY), *say(report), *_noted(report.notes)]
     return " ".join(sentence.text for sentence in _short(sentences) if sentence.text)
 
 
-def _insufficient(_: Findings) -> list[Sentence]:
+def _insufficient(_: Report) -> list[Sentence]:
     return [Sentence("That is too little to judge the model by.")]
 
 
@@ -177,35 +153,35 @@ def _short(sentences: Sequence[Sentence]) -> list[Sentence]:
     return kept
 
 
-def _adequate(findings: Findings) -> list[Sentence]:
-    noise = "" if findings.baseline is None else f" of {number(findings.baseline.noise)} Nm"
-    nothing = next((item.probability for item in findings.explanations if not item.effects), 1.0)
+def _adequate(report: Report) -> list[Sentence]:
+    noise = "" if report.baseline is None else f" of {number(report.baseline.noise)} Nm"
+    nothing = next((item.probability for item in report.explanations if not item.effects), 1.0)
     sentences = [
         Sentence(
             f"The model is adequate (probability {probability(nothing)}): nothing exceeds the noise{noise} and the scatter "
-            f"from run to run{_scatter(findings.scatter)}."
+            f"from run to run{_scatter(report.scatter)}."
         )
     ]
-    sentences += _unseen(findings)
-    if findings.states < FEW_STATES:
-        say = "says" if findings.states == 1 else "say"
-        few = f"{count_of(findings.states, 'state')} of use {say} little about a course over life."
+    sentences += _unseen(report)
+    if report.states < FEW_STATES:
+        say = "says" if report.states == 1 else "say"
+        few = f"{count_of(report.states, 'state')} of use {say} little about a course over life."
         sentences.append(Sentence(few, SHOULD))
     return sentences
 
 
-def _unseen(findings: Findings) -> list[Sentence]:
+def _unseen(report: Report) -> list[Sentence]:
     """What these data would miss: the effects that must be largest against what is usual to be seen."""
-    short = [v for v in findings.visible if v.amplitude > LARGE_AMPLITUDE * v.usual]
+    short = [v for v in report.visible if v.amplitude > LARGE_AMPLITUDE * v.usual]
     worst = sorted(short, key=lambda v: (-v.least / v.usual, -v.amplitude / v.usual))
     missed = [_missed(visible) for visible in worst[:VISIBLE_MENTIONED]]
     sentences = [Sentence(f"These data would miss {conjunction(missed)}.")] if missed else []
-    if reach := [v for v in findings.visible if v not in short]:
+    if reach := [v for v in report.visible if v not in short]:
         reach.sort(key=lambda v: v.amplitude / v.usual)
         sizes = [f"{effect_name(v.effect)} from {_amount(v.amplitude, v.unit)}" for v in reach[:VISIBLE_MENTIONED]]
         sentences.append(Sentence(f"Nine times in ten they would have shown {conjunction(sizes)}.", SHOULD))
-    if findings.unseen:
-        names = conjunction([effect_name(slug) for slug in findings.unseen])
+    if report.unseen:
+        names = conjunction([effect_name(slug) for slug in report.unseen])
         sentences.append(Sentence(f"Nothing of these would show at any size: {names}.", SHOULD))
     return sentences
 
@@ -232,39 +208,39 @@ def _scatter(scatter: RunScatter | None) -> str:
     return f" ({median} % of the torque; 90 % interval {lower} to {upper} %)"
 
 
-def _named(findings: Findings) -> list[Sentence]:
-    causes = set(findings.causes)
-    chosen = [candidate for candidate in findings.candidates if candidate.effect in causes]
-    names = " together with ".join(effect_name(slug) for slug in findings.causes)
-    share = sum(item.probability for item in findings.explanations if causes <= set(item.effects))
+def _named(report: Report) -> list[Sentence]:
+    causes = set(report.causes)
+    chosen = [candidate for candidate in report.candidates if candidate.effect in causes]
+    names = " together with ".join(effect_name(slug) for slug in report.causes)
+    share = sum(item.probability for item in report.explanations if causes <= set(item.effects))
     sentences = [
         Sentence(f"The cause{'s are' if len(causes) > 1 else ' is'} {names} (probability {probability(share)}).")
     ]
     for candidate in chosen:
         sentences += [Sentence(_physics(candidate), SHOULD), Sentence(f"Size: {signed(candidate.estimate)}.")]
-    sentences.append(Sentence(_error(findings), MAY))
+    sentences.append(Sentence(_error(report), MAY))
     companions = [
         f"{effect_name(item.effect)} (probability {probability(item.probability)})"
-        for item in findings.candidates
+        for item in report.candidates
         if item.effect not in causes and item.probability >= COMPANION_FROM
     ]
     if companions:
         sentences.append(
             Sentence(f"These data neither confirm nor exclude, beside it: {' or '.join(companions)}.", SHOULD)
         )
-    return [*sentences, *_gained(findings), *_next(findings)]
+    return [*sentences, *_gained(report), *_next(report)]
 
 
-def _ambiguous(findings: Findings) -> list[Sentence]:
+def _ambiguous(report: Report) -> list[Sentence]:
     """The explanations among which the choice is, each with its probability, and each effect's size where it first comes."""
-    sized = {candidate.effect: candidate.estimate for candidate in findings.candidates}
+    sized = {candidate.effect: candidate.estimate for candidate in report.candidates}
     listed = []
-    near = smallest({item.effects: item.probability for item in findings.explanations})
-    for item in (item for item in findings.explanations if item.effects in near):
+    near = smallest({item.effects: item.probability for item in report.explanations})
+    for item in (item for item in report.explanations if item.effects in near):
         names = [effect_name(slug) for slug in item.effects if slug != UNCATALOGUED]
         if UNCATALOGUED in item.effects:
             names.append(
-                f"something that is not in the catalogue{f', such as {findings.resembles}' if findings.resembles else ''}"
+                f"something that is not in the catalogue{f', such as {report.resembles}' if report.resembles else ''}"
             )
         sizes = [
             signed(estimate) if estimate.value != 0.0 else "not measured, so it cannot be excluded"
@@ -279,34 +255,34 @@ def _ambiguous(findings: Findings) -> list[Sentence]:
             for alternative in listed
         ]
         listed = short[:_ALTERNATIVES]
-        names = [effect_name(slug) for slug in findings.causes if slug != UNCATALOGUED]
+        names = [effect_name(slug) for slug in report.causes if slug != UNCATALOGUED]
         listed += [name for name in names if not any(name in alternative for alternative in listed)]
     alternatives = listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])}, or {listed[-1]}"
-    sentences = [Sentence(f"{first} (with its probability): {alternatives}."), Sentence(_error(findings), MAY)]
-    return [*sentences, *_gained(findings), *_next(findings)]
+    sentences = [Sentence(f"{first} (with its probability): {alternatives}."), Sentence(_error(report), MAY)]
+    return [*sentences, *_gained(report), *_next(report)]
 
 
-def _unexplained(findings: Findings) -> list[Sentence]:
-    unknown = sum(item.probability for item in findings.explanations if UNCATALOGUED in item.effects)
-    resembles = f" It most resembles {findings.resembles}." if findings.resembles else ""
+def _unexplained(report: Report) -> list[Sentence]:
+    unknown = sum(item.probability for item in report.explanations if UNCATALOGUED in item.effects)
+    resembles = f" It most resembles {report.resembles}." if report.resembles else ""
     return [
         Sentence(
             f"The model is wrong in a way that no effect of the catalogue explains (probability {probability(unknown)}), so "
             f"no cause is named.{resembles}"
         ),
-        Sentence(_error(findings)),
-        *_gained(findings),
+        Sentence(_error(report)),
+        *_gained(report),
         Sentence(
             "Next: repeat one of these tests at once. What the rig did differently in one run is gone then; what stays "
-            f"depends on {_axes(findings.baseline) or 'the rig'}: look there.",
+            f"depends on {_axes(report.baseline) or 'the rig'}: look there.",
             SHOULD,
         ),
     ]
 
 
-def _error(findings: Findings) -> str:
+def _error(report: Report) -> str:
     """The baseline's error, and what it depends on."""
-    misfit = findings.baseline
+    misfit = report.baseline
     if misfit is None:
         return ""
     error = f"The baseline model's error is {number(misfit.rmse)} Nm RMS"
@@ -323,24 +299,24 @@ def _axes(misfit: Misfit | None) -> str:
     return " and ".join(axis_name(axis.axis) for axis in shown if axis.strength > 0)
 
 
-def _gained(findings: Findings) -> list[Sentence]:
+def _gained(report: Report) -> list[Sentence]:
     """What the extension gains on runs that were held out, whether it improves remaining life, why it may not be adopted."""
-    gain = findings.gain
-    if findings.withheld:
-        return [Sentence(findings.withheld)]
+    gain = report.gain
+    if report.not_adoptable:
+        return [Sentence(report.not_adoptable)]
     if gain is None:
         return []
     way = "less" if gain.reduction_percent >= 0 else "more"
     model = {
         Verdict.CAUSE_AMBIGUOUS: "the model with the most probable of them",
         Verdict.UNEXPLAINED_STRUCTURE: "the model with a smooth correction",
-    }.get(findings.verdict, "the extended model")
+    }.get(report.verdict, "the extended model")
     change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} % {way}"
     sentences = [
         Sentence(f"On runs held out, {model} errs by {change}.", SHOULD),
-        Sentence(_hardest(gain, findings.extended)),
+        Sentence(_hardest(gain, report.extended)),
     ]
-    if findings.verdict is Verdict.UNEXPLAINED_STRUCTURE:
+    if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         return sentences
     ahead = "It also predicts the last states better from the first ones, so remaining life follows it."
     if not gain.forecast_log_score_gain > 0:
@@ -364,11 +340,11 @@ def _hardest(gain: Gain, extended: Misfit | None) -> str:
     )
 
 
-def _next(findings: Findings) -> list[Sentence]:
+def _next(report: Report) -> list[Sentence]:
     """The first test of the plan, and what it is good for."""
-    if not findings.advice:
+    if not report.advice:
         return []
-    best = findings.advice[0]
+    best = report.advice[0]
     if best.nats < WEAK_EVIDENCE:
         return [Sentence("No test that was considered would add evidence.")]
     chance = f"probability {probability(best.probability)}"

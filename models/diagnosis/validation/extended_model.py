@@ -21,11 +21,12 @@ from models.diagnosis.design.design import CLOCK, CYCLES, PHASE, PRESSURE, SPEED
 from models.diagnosis.effects.catalogue import change_columns
 from models.diagnosis.effects.effect import Effect, Family, Kind, Shape
 from models.diagnosis.effects.fitted_effect import FittedEffect
-from models.diagnosis.explanations.verdict import HeldOut, Judgement, Verdict
+from models.diagnosis.explanations.verdict import Judgement, Verdict
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import gram_of, project
 from models.diagnosis.validation.held_out import Gain, measure_gain
+from models.gaussian_evidence import log_gain
 
 #: The slug of a smooth correction, which is no effect of the catalogue.
 SLUG = "unexplained_structure"
@@ -116,7 +117,7 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
 
 
 def _size(problem: FitProblem, baseline: Fit, effects: Sequence[Effect]) -> float:
-    """τ of the largest marginal likelihood: ½ uᵀ (1 + I)⁻¹ u - ½ ln|1 + I|, in units of the prior's deviations."""
+    """τ of the largest marginal likelihood, in units of the prior's deviations."""
     prediction: Prediction = baseline.prediction
     changes = change_columns(
         problem.design,
@@ -126,13 +127,7 @@ def _size(problem: FitProblem, baseline: Fit, effects: Sequence[Effect]) -> floa
     gram = gram_of(problem, baseline, changes)
     projected = project(gram, problem.noise.run_gain, problem.noise.curve_gain)
     unit = np.array([effect.prior_sd for effect in effects])
-    logs = []
-    for size in CORRECTION_SIZES:
-        scale = size * unit
-        inner = np.eye(unit.size) + projected.info * scale[:, None] * scale
-        along = projected.score * scale
-        logs.append(0.5 * float(along @ np.linalg.solve(inner, along)) - 0.5 * float(np.linalg.slogdet(inner)[1]))
-    return CORRECTION_SIZES[int(np.argmax(logs))]
+    return max(CORRECTION_SIZES, key=lambda size: log_gain(projected.info, projected.score, size * unit))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,18 +136,6 @@ class Validation:
 
     extended: Fit | None
     gain: Gain | None
-
-    @property
-    def held_out(self) -> HeldOut | None:
-        """What a judgement is revised by."""
-        if self.gain is None:
-            return None
-        return HeldOut(
-            rmse_before=self.gain.rmse_before,
-            rmse_after=self.gain.rmse_after,
-            log_score_gain=self.gain.log_score_gain,
-            forecast_log_score_gain=self.gain.forecast_log_score_gain,
-        )
 
 
 def validate(problem: FitProblem, baseline: Fit, judgement: Judgement, rng: np.random.Generator) -> Validation:

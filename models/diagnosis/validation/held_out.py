@@ -27,7 +27,7 @@ from models.diagnosis.criteria import (
 )
 from models.diagnosis.design.design import CYCLES, PRESSURE, Design
 from models.diagnosis.effects.fitted_effect import effect_columns, effect_precisions
-from models.diagnosis.noise.covariance import Noise, gains_of, whitened, without_gains
+from models.diagnosis.noise.covariance import Noise, whitening
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 
@@ -156,11 +156,6 @@ def _without(noise: Noise, out: BoolArray) -> Noise:
     return replace(noise, deviation=np.where(out, _LEFT_OUT, 1.0) * noise.deviation)
 
 
-def _white(columns: FloatArray, problem: FitProblem, noise: Noise) -> FloatArray:
-    gains = gains_of(problem.design, problem.gained, noise)
-    return without_gains(whitened(columns, problem.design, noise), gains, noise.run_gain, noise.curve_gain)
-
-
 def _forecast_score(problem: FitProblem, model: Fit, out: BoolArray) -> float:
     """The log score [nats] of rows that are held out, the uncertainty of what was fitted to the others included."""
     design, noise, priors = problem.design, problem.noise, problem.priors
@@ -168,8 +163,8 @@ def _forecast_score(problem: FitProblem, model: Fit, out: BoolArray) -> float:
     refit = fit(problem.with_noise(before), model.laws, model.effects, steps=_STEPS)
     own = [effect_columns(design, refit.prediction, effect) for effect in refit.effects]
     jacobian = np.concatenate([refit.prediction.jacobian(design)[:, priors.free], *own], axis=1)
-    fitted = _white(jacobian, problem, before)
-    held = _white(np.column_stack([jacobian, refit.residual]), problem, _without(noise, ~out))
+    fitted = whitening(design, problem.gained, before)(jacobian)
+    held = whitening(design, problem.gained, _without(noise, ~out))(np.column_stack([jacobian, refit.residual]))
     precision = fitted.T @ fitted
     rows = priors.rows[:, priors.free]
     precision[: rows.shape[1], : rows.shape[1]] += rows.T @ rows
@@ -193,7 +188,8 @@ def _held(problem: FitProblem, baseline: Fit, extended: Fit, out: BoolArray) -> 
         if bridged is not refit.laws:
             refit = fit(masked, bridged, refit.effects, steps=0)
         errors.append(np.where(out, refit.residual, 0.0))
-    squares = np.square(_white(np.stack(errors, axis=1), problem, problem.noise)).sum(axis=0)
+    white = whitening(problem.design, problem.gained, problem.noise)
+    squares = np.square(white(np.stack(errors, axis=1))).sum(axis=0)
     rows = np.flatnonzero(out)
     return _Held(rows=rows, before=errors[0][rows], after=errors[1][rows], score=0.5 * float(squares[0] - squares[1]))
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.diagnosis.explanations.decide import judge, revise
+from models.diagnosis.effects.fitted_effect import Draw
+from models.diagnosis.explanations.decide import judge
 from models.diagnosis.explanations.posterior import Posterior, posterior_of
 from models.diagnosis.explanations.sizes import Size, Sizes, sizes_of
-from models.diagnosis.explanations.verdict import Judgement, Proposal, Verdict
+from models.diagnosis.explanations.verdict import Judgement, Verdict
 from models.diagnosis.pooled_fit.gauss_newton import FitStatus
 from models.diagnosis.report.assemble import reason_against, report_of
 from models.diagnosis.validation.extended_model import Validation
@@ -33,26 +34,21 @@ def posterior(given: Study) -> Posterior:
 
 
 @pytest.mark.parametrize(
-    ("gain", "proposal"),
-    [
-        (GAIN, Proposal.PROPOSED),
-        (None, Proposal.PROPOSED),
-        (WORSE, Proposal.WITHHELD_LOG_SCORE),
-        (LARGER, Proposal.WITHHELD_ERROR),
-    ],
+    ("gain", "why"),
+    [(GAIN, ""), (None, ""), (WORSE, "less likely with it than without"), (LARGER, "error on held-out runs is larger")],
 )
 def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(
-    given: Study, posterior: Posterior, gain: Gain | None, proposal: Proposal
+    given: Study, posterior: Posterior, gain: Gain | None, why: str
 ) -> None:
     judgement = judge(posterior)
     assert (judgement.verdict, judgement.causes) == (Verdict.CAUSE_NAMED, ("unsettled_dwell",))
     validation = Validation(extended=judgement.stand[0].fit, gain=gain)
-    revised = revise(judgement, validation.held_out)
-    assert revised.proposal is proposal
-    sizes = sizes_of(posterior.problem, revised, np.random.default_rng(1))
-    report = report_of(given.baseline, posterior, revised, (), validation, sizes, ())
+    sizes = sizes_of(posterior.problem, judgement, np.random.default_rng(1))
+    report = report_of(given.baseline, posterior, judgement, (), validation, sizes, ())
     assert (report.verdict, report.causes) == (judgement.verdict, judgement.causes)
-    assert (report.extension is None) == (proposal is not Proposal.PROPOSED)
+    assert (report.extension is None) == bool(why)
+    assert why in report.not_adoptable
+    assert "nats" not in report.not_adoptable
     assert report.statistics["log_evidence"] == pytest.approx(report.candidates[0].log_evidence_gain)
     assert sum(each.probability for each in report.explanations) == pytest.approx(1.0)
 
@@ -81,17 +77,10 @@ def test_what_no_reading_shows_is_no_candidate(given: Study, posterior: Posterio
     assert not loops_only & {slug for each in report.explanations for slug in each.effects}
 
 
-def test_why_an_extension_is_not_proposed_is_said() -> None:
-    none = Sizes(by_slug={})
-    assert "error on held-out runs is larger" in reason_against(Proposal.WITHHELD_ERROR, GAIN, none)
-    unlikely = replace(GAIN, log_score_gain=-825.0)
-    said = reason_against(Proposal.WITHHELD_LOG_SCORE, unlikely, none)
-    assert "less likely with it than without" in said
-    assert "nats" not in said
-    assert reason_against(Proposal.PROPOSED, GAIN, none) == ""
-    assert reason_against(Proposal.NONE, None, none) == ""
+def test_why_an_extension_is_not_proposed_is_said(given: Study) -> None:
+    assert reason_against(LARGER, Sizes(by_slug={})) == ""  # nothing was fitted
     either = Size(value=1e4, sd=2e4, interval=(-2e4, 4e4), other_sign=0.3, courses=True)
-    said = reason_against(Proposal.PROPOSED, GAIN, Sizes(by_slug={"pressure_offset": either}))
-    assert "size of pressure offset (−0.2 to 0.4 bar): it depends on the course" in said
+    some = Sizes(draws=(Draw(weight=1.0, laws=given.baseline.fit.laws),), by_slug={"pressure_offset": either})
+    assert "size of pressure offset (−0.2 to 0.4 bar): it depends on the course" in reason_against(GAIN, some)
     sure = replace(either, interval=(1e4, 4e4), other_sign=0.001)
-    assert reason_against(Proposal.PROPOSED, GAIN, Sizes(by_slug={"pressure_offset": sure})) == ""
+    assert reason_against(GAIN, replace(some, by_slug={"pressure_offset": sure})) == ""

@@ -12,8 +12,8 @@ from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import UNCATALOGUED, Explanation, Verdict, Where
 from models.diagnosis.pooled_fit.projection import RunScatter
-from models.diagnosis.report.report import Candidate, Misfit, Visible
-from models.diagnosis.report.summary import Findings, summarise
+from models.diagnosis.report.report import Candidate, Misfit, Report, Visible
+from models.diagnosis.report.summary import summarise
 from models.diagnosis.validation.held_out import Gain, Hardest
 
 MISFIT = Misfit(
@@ -71,7 +71,7 @@ def explanations_of(given: dict[tuple[str, ...], float]) -> tuple[Explanation, .
     return tuple(Explanation(effects=effects, probability=weight / total) for effects, weight in ranked)
 
 
-def findings(verdict: Verdict, *causes: str) -> Findings:
+def findings(verdict: Verdict, *causes: str) -> Report:
     advice = Advice(
         key="repeat",
         test="stationary test with the oil at 60 °C",
@@ -80,7 +80,7 @@ def findings(verdict: Verdict, *causes: str) -> Findings:
         nats=1234.5,
         probability=0.8,
     )
-    return Findings(
+    return Report(
         verdict=verdict,
         causes=causes,
         explanations=explanations_of(weights(verdict, causes)),
@@ -107,7 +107,7 @@ ALL = [
 
 
 @pytest.mark.parametrize("found", ALL, ids=lambda found: "-".join((found.verdict.value, *found.causes)))
-def test_every_verdict_has_a_paragraph_that_is_read_once(found: Findings) -> None:
+def test_every_verdict_has_a_paragraph_that_is_read_once(found: Report) -> None:
     said = summarise(found)
     assert 15 <= len(said.split()) <= MAX_WORDS
     assert said.endswith(".")
@@ -139,7 +139,7 @@ def test_no_gain_is_said_as_none() -> None:
 
 def test_why_nothing_may_be_adopted_stands_in_the_paragraph() -> None:
     why = "The extension is not proposed: its error on held-out runs is larger than the baseline's."
-    said = summarise(replace(findings(Verdict.CAUSE_NAMED, "oil_change"), withheld=why))
+    said = summarise(replace(findings(Verdict.CAUSE_NAMED, "oil_change"), not_adoptable=why))
     assert why in said
     assert "errs by" not in said
 
