@@ -88,24 +88,6 @@ def test_push_waits_in_the_spool_while_the_service_is_away(tmp_path: Path) -> No
     assert "is not there" in clutchlife("push", tmp_path / "nothing", "--clutch", "c1", code=65)
 
 
-def test_a_recorders_file_is_pushed_as_it_is(server: Server, tmp_path: Path) -> None:
-    channels = stationary(0)["channels"]
-    rows = zip(*channels.values(), strict=True)
-    text = "p [bar],n [1/min],Mz [Nm]\n" + "\n".join(",".join(f"{x:.9g}" for x in row) for row in rows)
-    (tmp_path / "test.csv").write_text(text)
-    ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
-    push: tuple[str | Path, ...] = ("push", tmp_path / "test.csv", "--clutch", "c1", "--url", server.url)
-    push = (*push, "--spool", tmp_path / "spool")
-    assert "Push a file with --kind and --cycles, or with --rig" in clutchlife(*push, code=64)
-    push = (*push, "--kind", "stationary_stribeck", "--cycles", "0", "--map", "torque_nm:Mz")
-    assert "1 stored, 0 known already" in clutchlife(*push)
-    assert "0 stored, 1 known already" in clutchlife(*push)
-    left = [path.name for path in (tmp_path / "spool").rglob("*") if path.is_file() and path.suffix != ".lock"]
-    assert left == []
-    receipt = ONCE.get(f"{server.url}/v1/clutches/c1/runs").json()["items"][0]
-    assert len(receipt["fits"]) == 7
-
-
 @pytest.mark.slow
 def test_replay_gives_the_same_again_and_backup_a_copy(campaign: Path, tmp_path: Path) -> None:
     database = tmp_path / "clutchlife.db"

@@ -9,11 +9,10 @@ import pytest
 
 from tests.load.__main__ import Options, run
 from tests.load.beside import Beside, Processor
-from tests.load.bodies import Post, SentLife, asked, life, posted
+from tests.load.bodies import Post, life
 from tests.load.checks import lost_of
-from tests.load.exchange import Answer, Line, LostError, Reading
-from tests.load.field import ROUTES, Acknowledged, Counts, Field
-from tests.load.report import Loaded, demands, growth, markdown, quantile
+from tests.load.field import ROUTES, Acknowledged, Counts
+from tests.load.report import Loaded, demands, markdown
 
 Handler = Callable[[bytes], Awaitable[bytes | None]]
 
@@ -45,12 +44,6 @@ def response(status: str, body: bytes = b"{}", *headers: str) -> bytes:
     return head.encode() + body
 
 
-def field_on(port: int, begin: float, seconds: float, *, lives: tuple[SentLife, ...] = (), rigs: int = 0) -> Field:
-    return Field(
-        ports=(port,), lives=lives, rigs=rigs, clients=0, seed=1, interval=0.0, begin=begin, end=begin + seconds
-    )
-
-
 def run_named(name: str) -> Post:
     return Post(run_id=name, kind="maintenance", content=b"{}")
 
@@ -77,143 +70,10 @@ def test_a_life_is_whole_and_the_same_for_a_seed(tmp_path: Path) -> None:
     assert {Path(str(post.path)).suffix for post in files} == {".gz", ".parquet"}
 
 
-def test_a_request_says_how_long_it_is() -> None:
-    assert posted("/x", b"{}", "text/csv", "Prefer: x").endswith(
-        b"Content-Type: text/csv\r\nPrefer: x\r\nContent-Length: 2\r\n\r\n{}"
-    )
-    assert asked("/x", 'If-None-Match: "a"') == b'GET /x HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: "a"\r\n\r\n'
-
-
 # --- what comes back ---
 
 
-def test_answers_are_read_in_any_pieces() -> None:
-    sent = (
-        response("200 OK", b"abc", 'ETag: "1"')
-        + b'HTTP/1.1 304 Not Modified\r\nETag: "1"\r\n\r\n'
-        + b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n2\r\nde\r\n1\r\nf\r\n0\r\n\r\n"
-    )
-    answers: list[Answer] = []
-    reading = Reading(answers.append)
-    for start in range(0, len(sent), 7):
-        reading.parser.feed_data(sent[start : start + 7])
-    assert [(each.status, each.etag, each.body) for each in answers] == [
-        (200, '"1"', b"abc"),
-        (304, '"1"', b""),
-        (200, None, b"def"),
-    ]
-
-
-def test_a_lost_connection_is_an_error_and_the_next_question_opens_another() -> None:
-    async def main() -> None:
-        sent = iter([None, response("200 OK")])
-
-        async def answer(_head: bytes) -> bytes | None:
-            return next(sent)
-
-        server, port = await stub(answer)
-        line = Line(port)
-        with pytest.raises(LostError):
-            await line.ask(asked("/"))
-        assert (await line.ask(asked("/"))).status == 200
-        line.close()
-        server.close()
-
-    asyncio.run(main())
-
-
-def test_a_service_that_stands_is_charged_for_all_that_was_to_be_asked() -> None:
-    """One slow answer keeps a client's connection: its next question is late by what is left of it."""
-
-    async def main() -> list[float]:
-        loop = asyncio.get_running_loop()
-        begin = loop.time()
-        answered: list[bytes] = []
-
-        async def answer(head: bytes) -> bytes:
-            if not answered:
-                await asyncio.sleep(begin + 1.5 - loop.time())  # it stands until then
-            answered.append(head)
-            return response("200 OK")
-
-        server, port = await stub(answer)
-        field = field_on(port, begin, 2.0)
-        field.rigs, field.on_rigs = 1, ["c"]
-        await field._client(0, 0.0, 0)
-        server.close()
-        return field.counts.gets[ROUTES[0]]
-
-    first, second = asyncio.run(main())
-    assert first >= 1.5 - 1e-6
-    assert second >= 0.5 - 1e-6
-
-
-def test_a_dashboard_names_the_answer_that_it_has_and_a_script_does_not() -> None:
-    async def main(number: int) -> list[bytes]:
-        heads: list[bytes] = []
-
-        async def answer(head: bytes) -> bytes:
-            heads.append(head)
-            return response("200 OK", b"{}", 'ETag: "7"')
-
-        server, port = await stub(answer)
-        field = field_on(port, asyncio.get_running_loop().time() - 2.0, 2.0)  # all of it is due
-        field.rigs, field.on_rigs = 1, ["c"]
-        for part in range(len(ROUTES)):
-            await field._client(number, 0.0, part)
-        server.close()
-        return heads
-
-    dashboard, script = asyncio.run(main(0)), asyncio.run(main(1))
-    assert {head.split()[1] for head in script} == {
-        b"/v1/clutches/c/remaining-useful-life",
-        b"/v1/clutches/c/degradation",
-        b"/v1/clutches",
-        b"/v1/clutches/c/runs",
-    }
-    assert [b'If-None-Match: "7"' in head for head in dashboard] == [False, True] * len(ROUTES)
-    assert not any(b"If-None-Match" in head for head in script)
-
-
-def test_a_refused_run_is_counted_and_sent_again() -> None:
-    async def main() -> Counts:
-        receipt = json.dumps({"run_id": "r", "content_sha256": "abc"}).encode()
-        busy = response("503 Service Unavailable", b'{"detail": "too busy"}', "Retry-After: 0")
-        sent = iter([response("201 Created"), busy, response("201 Created", receipt)])
-        field = field_on(0, asyncio.get_running_loop().time(), 60.0, lives=(SentLife(seed=1, posts=(run_named("r"),)),))
-        field.rigs, field.on_rigs = 1, [None]
-
-        async def answer(_head: bytes) -> bytes | None:
-            found = next(sent, None)
-            if found is None:
-                field.end = 0.0  # the life is over, and the time
-            return found
-
-        server, port = await stub(answer)
-        field.ports = (port,)
-        await field._rig(0, 0.0)
-        server.close()
-        return field.counts
-
-    counts = asyncio.run(main())
-    assert counts.problems.pop("POST plain: 503 too busy") == 1
-    assert [(run.post.run_id, run.sha256) for run in counts.acknowledged["load-0-000"]] == [("r", "abc")]
-    assert len(counts.posts["plain"]) == 2
-
-
 # --- what is made of it ---
-
-
-def test_quantiles_are_values_that_were_seen() -> None:
-    values = [float(number) for number in range(1, 101)]
-    assert [quantile(values, share) for share in (0.5, 0.9, 0.99, 1.0)] == [50.0, 90.0, 99.0, 100.0]
-    assert quantile([3.0], 0.01) == 3.0
-    assert quantile([], 0.5) == float("inf")
-
-
-def test_growth_is_that_of_the_last_third() -> None:
-    assert growth([1, 2, 3, 100, 100, 100, 110, 110, 110]) == pytest.approx(1.1)
-    assert growth([5, 6]) == 1.0
 
 
 def test_what_is_lost_changed_or_added_is_noticed() -> None:

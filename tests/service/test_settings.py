@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -122,14 +121,3 @@ def test_a_start_prints_the_settings_without_the_password() -> None:
     line = json.loads(done.stderr.splitlines()[0])
     assert (line["message"], line["workers"], line["database"]) == ("settings", 1, "postgresql://rig:***@host/db")
     assert "s3cr3t" not in done.stdout + done.stderr
-
-
-def test_the_table_of_the_documentation_is_that_of_the_settings() -> None:
-    rows = re.findall(
-        r"^\| `(CLUTCHLIFE_\w+)` \| (.*) \| (.*) \|$", OPERATIONS.read_text(encoding="utf-8"), re.MULTILINE
-    )
-    fields = Settings.model_fields
-    assert rows == [
-        (f"{PREFIX}{name.upper()}", f"`{json.dumps(field.default).strip(chr(34))}`", field.description)
-        for name, field in fields.items()
-    ]

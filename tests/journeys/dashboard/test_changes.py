@@ -161,60 +161,6 @@ def post_typed(server: Server) -> None:
 
 
 @pytest.mark.slow
-def test_a_held_run_is_confirmed_and_withdrawn_and_restored(
-    watched: Watched, server: Server, references: dict[str, Any]
-) -> None:
-    with httpx2.Client(base_url=server.url, timeout=60) as http:
-        post(http, "bench", right(LAST))
-        post(http, "bench", right(LAST) | {"run_id": "far", "cycles": 90_000})
-    page = opened(watched)
-    settled(page, 1)
-    held = page.locator("#held .held > li")
-    held.get_by_role("button", name="Confirm").click()
-    page.get_by_role("dialog", name="Confirm this run").get_by_role("button", name="Cancel").click()
-    settled(page, 1)
-    ask(held, "Confirm", "")
-    done(page, "is confirmed")
-    settled(page, 0)
-    counted = answers(server.url)
-    assert counted[f"{CLUTCH}/remaining-useful-life?method=grid"]["as_of_cycles"] == 90_000
-    expect(run_in(page, "far")).to_contain_text("It was held because")
-
-    ask(run_in(page, "far"), "Withdraw", "another clutch")
-    done(page, "is withdrawn")
-    struck = page.locator("#runs details[data-run='far'] > summary")
-    expect(struck.locator("s").first).to_have_css("text-decoration-line", "line-through")
-    expect(struck).to_contain_text("Withdrawn")
-    assert answers(server.url) == references["after"]
-    page.locator(".done").get_by_role("button", name="Undo").click()
-    done(page, "is restored")
-    assert answers(server.url) == counted
-
-    ask(run_in(page, "far"), "Withdraw", "another clutch, surely")
-    expect(struck.locator("s")).to_have_count(2)
-    ask(run_in(page, "far"), "Restore", "it was this one")
-    expect(struck.locator("s")).to_have_count(0)
-    assert answers(server.url) == counted
-    ask(run_in(page, "far"), "Withdraw", "no, another clutch")
-    expect(struck.locator("s")).to_have_count(2)
-    assert answers(server.url) == references["after"]
-    turned(page, "history")
-    expect(page.locator("#changes tbody tr")).to_have_count(7)
-    assert [row[0] for row in trail(page)] == [
-        "Withdrawn", "Restored", "Withdrawn", "Restored", "Withdrawn", "Confirmed", "Held on arrival",
-    ]  # fmt: skip
-
-    # sent once more it stays withdrawn, and the receipt says so
-    drop(page, {"far.json": json.dumps(right(LAST) | {"run_id": "far", "cycles": 90_000})})
-    sending = page.get_by_role("dialog", name="Send a run")
-    sending.get_by_role("button", name="Send").click()
-    sending.get_by_text("It was withdrawn since, and stays so.").wait_for()
-    sending.get_by_role("link", name="Restore it in the list of runs").click()
-    expect(sending).to_have_count(0)
-    assert answers(server.url) == references["after"]
-
-
-@pytest.mark.slow
 def test_a_reason_is_asked_for_and_a_refusal_is_shown(watched: Watched, server: Server) -> None:
     # before the page is loaded: a request that follows at once may pass by what is put before it later
     watched.page.route(

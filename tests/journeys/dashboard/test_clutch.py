@@ -338,12 +338,3 @@ def test_without_webgl_the_page_says_so_and_keeps_the_numbers(browser: Browser, 
     surface.locator("summary").click()
     surface.locator("table tbody tr").nth(100).wait_for()
     watched.close()
-
-
-def test_an_unknown_clutch_is_said_to_be_unknown(browser: Browser, life: Server) -> None:
-    watched = Watched(browser, life.url)
-    page = watched.open("/clutches/nobody")
-    page.get_by_role("heading", name="No such clutch").wait_for()
-    assert all("404" in line for line in watched.errors())
-    watched.said.clear()
-    watched.close()

@@ -140,38 +140,6 @@ def test_photographs_are_kept_small_and_drawn_again_only_where_they_changed(brow
     watched.close()
 
 
-@pytest.mark.slow
-def test_an_inspection_that_was_withdrawn_and_is_sent_again_is_said_to_stay_so(browser: Browser, bench: Server) -> None:
-    with httpx2.Client(base_url=bench.url, timeout=60) as http:
-        http.post("/v1/clutches", json={"clutch_id": "again"}).raise_for_status()
-        body = {"cycles": 7000, "roughness_um": 2.5}
-        address = http.post("/v1/clutches/again/inspections", json=body).headers["location"]
-        http.post(f"{address}/withdraw", json={"reason": "another disc"}).raise_for_status()
-        watched, page = opened(browser, bench, "again")
-        section = page.locator("#inspections")
-        section.get_by_text("Add an inspection").click()
-        section.get_by_label("Duty cycles since new").fill("7000")
-        section.get_by_label("Roughness Ra, µm").fill("2.5")
-        section.get_by_role("button", name="Send the inspection").click()
-        said = section.get_by_text("The inspection at 7,000 cycles was stored before and withdrawn since")
-        expect(said).to_contain_text("it stays withdrawn until it is restored in the table")
-        expect(section.get_by_text("is stored.")).to_have_count(0)
-        assert violations(page) == []
-        assert http.get(address).json()["state"] == "withdrawn"
-    watched.close()
-
-
-@pytest.mark.slow
-def test_a_clutch_that_was_never_inspected_has_a_closed_form_and_no_chart(browser: Browser, bench: Server) -> None:
-    watched, page = opened(browser, bench, "waiting")
-    section = page.locator("#inspections")
-    section.get_by_text("No inspection yet.").wait_for()
-    expect(section.locator(".chart").first).to_be_hidden()
-    expect(section.get_by_label("Roughness Ra, µm")).to_be_hidden()
-    assert violations(page) == []
-    watched.close()
-
-
 def test_an_inspection_is_sent_by_the_form_withdrawn_and_restored(browser: Browser, bench: Server) -> None:
     watched, page = opened(browser, bench, "sent")
     section = page.locator("#inspections")

@@ -12,7 +12,6 @@ from playwright.sync_api import Browser, Page, expect
 from storage import clutches
 from storage.engine.opening import open_database
 from tests.browser.driving import Watched
-from tests.browser.dropping import drop
 from tests.scale.copies import life, multiply, name
 from tests.support import ONCE, Server, serving, stationary
 
@@ -161,25 +160,6 @@ def test_the_focus_stays_while_the_rows_about_it_change(watched: Watched) -> Non
         if number % 10 == 0:  # nobody is faster than the rows ahead
             page.get_by_role("link", name=name(number + 11), exact=True).wait_for(state="attached")
     assert page.locator(ROWS).count() <= MAX_ROWS
-
-
-@pytest.mark.slow
-def test_the_send_dialog_offers_what_is_typed(watched: Watched) -> None:
-    page = opened(watched)
-    drop(page, {"stationary-4000.csv": "pressure_bar,speed_rpm,torque_nm\n5,20,21\n"})
-    dialog = page.get_by_role("dialog", name="Send a run")
-    dialog.get_by_label("Clutch", exact=True).fill(name(321)[:-1])
-    expect(dialog.locator("datalist option")).to_have_count(10)
-    assert name(321) in [option.get_attribute("value") for option in dialog.locator("datalist option").all()]
-
-
-@pytest.mark.slow
-def test_a_print_says_which_rows_it_has(watched: Watched) -> None:
-    page = opened(watched)
-    expect(page.locator("#printed")).to_be_hidden()
-    page.emulate_media(media="print")
-    expect(page.locator("#printed")).to_have_text(f"Rows 1 to 80 of {CLUTCHES}")
-    assert page.locator("table.fleet .space").last.evaluate("element => element.getBoundingClientRect().height") == 0
 
 
 def test_a_walk_by_name_skips_nothing_while_ranks_change(fleet: Server) -> None:

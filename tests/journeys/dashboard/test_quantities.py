@@ -129,15 +129,3 @@ def test_remaining_life_by_any_quantity_and_pressure_is_chosen_on_the_page(brows
     expect(part.get_by_role("alert")).to_contain_text("stop_time_s is not measured in this life")
     watched.said = [line for line in watched.said if "404" not in line]  # the browser notes the refusal
     watched.close()
-
-
-@pytest.mark.slow
-def test_a_clutch_that_its_engagements_end_is_shown(browser: Browser, life: Server) -> None:
-    criteria = [{"quantity": "stop_time", "above": 1.5}, {"quantity": "static_ratio", "above": 1.3}]
-    record = {"clutch_id": "stopping", "end_of_life": {"criteria": criteria}}
-    assert ONCE.post(f"{life.url}/v1/clutches", json=record).status_code == 201
-    watched = Watched(browser, life.url)
-    page = watched.open("/clutches/stopping")
-    expect(page.locator("#head")).to_contain_text("Stop time (above 1.50 s)")
-    expect(page.locator("#head")).to_contain_text("Breakaway over midpoint COF (above 1.30)")
-    watched.close()

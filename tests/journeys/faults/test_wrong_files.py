@@ -119,21 +119,6 @@ def test_a_file_cut_off_at_random_places(
         service.refuse(whole[:place], name=name)
 
 
-@pytest.mark.parametrize("suffix", ["csv", "tdms", "mf4", "mdf", "parquet", "csv.gz", "exe", ""])
-def test_a_picture_by_any_name(service: Watched, suffix: str) -> None:
-    assert "PNG picture" in service.refuse(PNG, name=f"run.{suffix}")["detail"]
-    assert "PNG picture" in service.refuse(gzip.compress(PNG), name=f"run.{suffix}.gz")["detail"]
-
-
-def test_two_million_columns(service: Watched) -> None:
-    row = ",".join(["1"] * 2_000_000)
-    service.refuse((",".join(["torque_nm"] * 2_000_000) + "\n" + row + "\n").encode())
-    service.refuse((",".join(f"c{n}" for n in range(2_000_000)) + "\n" + row + "\n").encode())
-    service.refuse((HEADER + row + "\n").encode())
-    narrow = ",".join(f"c{n}" for n in range(2000)) + "\n" + ",".join(["1"] * 2000) + "\n"
-    assert codes(service.refuse(narrow.encode())) == {"too_wide"}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["CSV", "TDMS", "Parquet"])
 def test_a_gzip_bomb(service: Watched, kind: str, tmp_path: Path) -> None:
@@ -152,55 +137,6 @@ def test_a_gzip_bomb(service: Watched, kind: str, tmp_path: Path) -> None:
     assert "must not unpack to more than" in problem["detail"] or "must not have more than" in problem["detail"]
 
 
-def test_units_that_contradict_themselves(service: Watched) -> None:
-    columns = record(100)
-    rows = text(columns).partition(b"\n")[2]
-    names = ",".join(columns).encode()
-    assert codes(service.refuse(names + b"\ns,bar,rpm,kNm,K\n" + rows)) == {"mixed_units"}
-    both = b"t [s],p [bar],n [rpm],M [Nm],oil_temperature_c\ns,bar,rpm,kNm,C\n"
-    assert codes(service.refuse(both + rows)) == {"mixed_units"}
-
-
-@pytest.mark.parametrize("unit", ["furlong", "mPa", "Nm/s", "", "💥", "Nm" * 400])
-def test_units_that_are_not_known(service: Watched, unit: str) -> None:
-    columns = record(100)
-    rows = text(columns).partition(b"\n")[2]
-    head = f"t [s],p [bar],n [rpm],Drehmoment [{unit}],T_oil [°C]\n".encode()
-    assert codes(service.refuse(head + rows)) <= {"unknown_unit", "missing_unit"}
-
-
-def test_a_unit_of_a_thousand_letters(service: Watched) -> None:
-    columns = record(100)
-    head = f"t [s],p [bar],n [rpm],Drehmoment [{'Nm' * 500}],T_oil [°C]\n".encode()
-    assert codes(service.refuse(head + text(columns).partition(b"\n")[2])) == {"title_too_long"}
-
-
-@pytest.mark.parametrize(("write", "name"), [(write_tdms, "a.tdms"), (write_mdf, "a.mf4")], ids=["TDMS", "MDF4"])
-def test_wrong_units_and_names_in_a_recorder_s_file(
-    service: Watched, tmp_path: Path, write: Callable[..., Path], name: str
-) -> None:
-    columns = record(100)
-    wrong = write(tmp_path / f"1-{name}", columns, units=UNITS | {"torque_nm": "furlong"}).read_bytes()
-    assert codes(service.refuse(wrong, name=name)) == {"unknown_unit"}
-    twice = write(tmp_path / f"2-{name}", columns, units=UNITS, more={"torque_nm": columns["torque_nm"]}).read_bytes()
-    assert codes(service.refuse(twice, name=name)) == {"ambiguous"}
-
-
-def test_two_channels_of_one_name(service: Watched) -> None:
-    rows = b"0,5,100,20,20\n0.1,5,101,21,21\n"
-    assert codes(service.refuse(HEADER.strip().encode() + b",torque_nm\n" + rows)) == {"ambiguous"}
-    assert codes(service.refuse(HEADER.strip().encode() + b",M [Nm]\n" + rows)) == {"ambiguous"}
-
-
-@pytest.mark.parametrize("name", ["run.csv", "run.tdms", "run.mf4", "run.parquet"])
-def test_nothing_and_nuls(service: Watched, name: str) -> None:
-    assert "must not be empty" in service.refuse(b"", name=name)["detail"]
-    service.refuse(gzip.compress(b""), name=f"{name}.gz")
-    service.refuse(bytes(1 << 20), name=name)
-    service.refuse(gzip.compress(bytes(1 << 20)), name=f"{name}.gz")
-    service.refuse(b"\x1f\x8b", name=f"{name}.gz")
-
-
 def test_an_archive_and_a_table_of_words(service: Watched) -> None:
     packed = BytesIO()
     with zipfile.ZipFile(packed, "w") as archive:
@@ -212,16 +148,6 @@ def test_an_archive_and_a_table_of_words(service: Watched) -> None:
         assert answer.status_code in (200, 201), answer.text
     service.refuse((HEADER + "a,b,c,d\n" * 100_000).encode())
     assert codes(service.refuse(b'{"kind": "stationary_stribeck"}', name="run.json")) <= {""}
-
-
-def test_the_wrong_suffix(service: Watched, tmp_path: Path) -> None:
-    """A table that is called a TDMS file is refused; a TDMS file that is called a table is what it begins as."""
-    assert "named as TDMS" in service.refuse(text(record(100)), name="run.tdms")["detail"]
-    assert "named as MDF4" in service.refuse(text(record(100)), name="run.mf4")["detail"]
-    service.http.post("/v1/clutches", json={"clutch_id": "control"})
-    whole = write_tdms(tmp_path / "a.tdms", record(400), units=UNITS).read_bytes()
-    parameters = {"kind": "dynamic_stribeck", "cycles": "0", "filename": "run.csv", "run_id": "suffix"}
-    assert service.http.post("/v1/clutches/control/runs/file", params=parameters, content=whole).status_code == 201
 
 
 def test_a_file_larger_than_is_taken(service: Watched) -> None:

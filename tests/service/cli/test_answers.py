@@ -13,8 +13,6 @@ from typer.testing import CliRunner
 
 from service.cli import connection
 from service.cli.main import app
-from tests.models.engagements.closed_forms import constant
-from tests.service.lives.test_over_life import engaged, sent
 from tests.support import stationary
 
 Terminal = Callable[..., str]
@@ -97,22 +95,6 @@ def test_an_end_by_other_criteria_is_shown_with_how_probably_each_is_the_first(
     assert "course" not in alone  # the course and the forecasts that were held are those of mean COF
     answer = json.loads(terminal("life", "c1", "--quantity", "slope", "--pressure", "5", "--life", "1", "--json"))
     assert (answer["course"], answer["back_cast"], answer["life"]["number"]) == (None, None, 1)
-
-
-def test_a_slope_is_a_line_with_its_speed_and_its_band(terminal: Terminal, client: TestClient) -> None:
-    lines = [line for line in terminal("degradation", "c1", "--quantity", "slope").splitlines() if "slope" in line]
-    items = client.get("/v1/clutches/c1/degradation", params={"quantity": "slope"}).json()["items"]
-    assert [line.split()[2] for line in lines] == [f"{item['speed_rpm']:g}" for item in items]
-    assert all(" to " in line for line in lines)
-    assert len(set(lines)) == len(items)
-
-
-def test_measured_engagements_are_listed(terminal: Terminal, client: TestClient) -> None:
-    sent(client, engaged(3500, constant(0.05)))
-    shown = terminal("engagement", "c1").splitlines()
-    row = next(line.split() for line in shown if line.startswith("duty-3500"))
-    (item,) = client.get("/v1/clutches/c1/engagement").json()["measured"]
-    assert float(row[2]) == pytest.approx(item["indicators"]["stop_time_s"]["value"], rel=0.01)
 
 
 def test_what_cannot_be_answered_is_refused_in_a_line(terminal: Terminal) -> None:

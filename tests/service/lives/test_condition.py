@@ -11,12 +11,9 @@ from models.prognosis.criteria import QUANTILES
 from service.lives.condition import STATES, bound_in_words, rank_of, state_of, top_line
 from service.lives.payloads import filters_disagree
 from service.queries import clutch_list, degradation, series
-from service.queries.planned_duty import planned_life
-from service.queries.remaining_life import life_by_criteria, remaining_life, rows
+from service.queries.remaining_life import remaining_life
 from service.schemas.life import ProgrammeIn
-from service.workflows.replay import replay_clutch
 from tests.service.workflows.benches import CLUTCH, Bench, body, stood_in
-from tests.support import one_quick
 
 #: The present, as the answers state it.
 PRESENT = ("mean_cof", "mean_cof_sd", "measured_at_cycles", "fraction_of_initial", "health")
@@ -68,58 +65,6 @@ def test_two_tests_say_at_least_how_many_cycles_are_left(bench: Bench) -> None:
     assert life["at_least"] > 100.0
     assert life["statement"] == f"the tests cannot tell yet: {bound_in_words(life['at_least'])}"
     assert life["statement"] in item(bench)["state"]["why"]
-
-
-@pytest.mark.parametrize(
-    "record", one_quick([{"end_of_life": {"criteria": [{"quantity": "mean_cof"}, SLOPE]}}, {}]), ids=str
-)
-def test_no_answer_stands_without_a_word_while_two_runs_are_held(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, record: dict[str, Any]
-) -> None:
-    with stood_in(monkeypatch):
-        bench = Bench(tmp_path / "a.db", record)
-        for cycles in (0.0, 2000.0, 4000.0, 6000.0):
-            bench.send(body("test", f"n{cycles:g}", cycles, wear=cycles / 40_000))
-        alone = now(bench) if not record else life_by_criteria(bench.database, CLUTCH, "particle")
-        for cycles in (7000.0, 8000.0):
-            bench.send(body("test", f"h{cycles:g}", cycles, wear=0.8, odd=True))
-        answers = [planned_life(bench.database, CLUTCH, "particle", PLAN)]
-        if record:
-            answers += [life_by_criteria(bench.database, CLUTCH, method) for method in ("particle", "grid")]
-            answers += [life_by_criteria(bench.database, CLUTCH, "particle", quantity="mean_cof")]
-        else:
-            answers += [*(now(bench, method) for method in METHODS), now(bench, pressure=4.0)]
-        for answer in answers:
-            assert answer["held_runs"]["count"] == 2
-            assert "held_runs" in [warning["code"] for warning in answer["warnings"]]
-            held = answer["held_runs"]["remaining_cycles"]["0.05"]
-            assert answer["at_least"] == min(held, answer["remaining_cycles"]["0.05"] or held)
-        assert answers[1]["remaining_cycles"] == alone["remaining_cycles"]
-        assert (answers[1]["at_least"], alone["held_runs"]) == (
-            answers[1]["held_runs"]["remaining_cycles"]["0.05"],
-            None,
-        )
-        assert {row["held_runs"] for row in rows(answers[1])} == {2}
-        assert (item(bench)["state"]["name"], item(bench)["held"]) == ("check", 2)
-        assert item(bench)["state"]["why"].startswith("2 runs are held")
-        assert {name: item(bench)["summary"][name] for name in ("at_least", "held_runs")} == {
-            name: answers[1][name] for name in ("at_least", "held_runs")
-        }
-        tracks = degradation.degradation(bench.database, CLUTCH)
-        assert "held_runs" in [warning["code"] for warning in tracks["warnings"]]
-        waiting = [row["value"] for row in series.series(bench.database, CLUTCH, "held_runs")]
-        assert waiting == [2.0]
-        before = item(bench)["summary"]
-        replay_clutch(bench.database, CLUTCH)
-        assert item(bench)["summary"] == before, "a replay states something else"
-        for run_id in ("h7000", "h8000"):
-            bench.confirm(run_id)
-        confirmed = now(bench) if not record else life_by_criteria(bench.database, CLUTCH, "particle")
-        assert confirmed["held_runs"] is None
-        assert confirmed["remaining_cycles"] == answers[1]["held_runs"]["remaining_cycles"], (
-            "not what it would have been"
-        )
-        bench.close()
 
 
 def test_what_is_said_of_held_runs_does_not_depend_on_the_order_of_arrival(

@@ -4,36 +4,12 @@ import re
 from pathlib import Path
 
 import httpx2
-import pytest
 from fastapi.testclient import TestClient
 
 from tests.service.web.routes.routes_of import routes_of
 from tests.support import serving, stationary
 
 RUNS = "/v1/clutches/c1/runs"
-PATHS = (
-    "/livez",
-    "/readyz",
-    "/openapi.json",
-    "/v1/clutches",
-    "/v1/clutches/c1",
-    RUNS,
-    f"{RUNS}/known",
-    "/v1/clutches/c1/remaining-useful-life",
-    "/v1/clutches/c1/series.csv",
-    "/v1/clutches/nobody",
-    "/nowhere",
-)
-
-
-@pytest.mark.parametrize("path", PATHS)
-def test_the_same_headers_and_no_body(client: TestClient, path: str) -> None:
-    client.post(RUNS, json=stationary(0, run_id="known"))
-    there, head = client.get(path), client.head(path)
-    assert (head.status_code, head.content) == (there.status_code, b"")
-    assert there.content
-    for name in ("content-type", "etag", "content-length", "cache-control"):
-        assert head.headers.get(name) == there.headers.get(name), name
 
 
 def test_every_route_that_can_be_read_can_be_headed(client: TestClient) -> None:
@@ -54,11 +30,6 @@ def test_every_route_that_can_be_read_can_be_headed(client: TestClient) -> None:
         if (head.status_code, head.content, headers[1]) != (there.status_code, b"", headers[0]):
             wrong.append((address, there.status_code, head.status_code, headers))
     assert wrong == []
-
-
-def test_what_cannot_be_read_cannot_be_headed(client: TestClient) -> None:
-    assert client.head(f"{RUNS}/file").status_code == client.get(f"{RUNS}/file").status_code == 404
-    assert client.head("/v1/clutches/c1", headers={"If-None-Match": "*"}).content == b""
 
 
 def test_over_a_socket_the_connection_stays_usable(tmp_path: Path) -> None:

@@ -71,17 +71,5 @@ def test_a_list_names_its_next_page_in_a_header_too(client: TestClient, name: st
     assert items == client.get(name).json()["items"]
 
 
-@pytest.mark.parametrize("suffix", ["", ".csv"])
-def test_a_quantity_that_is_none_is_refused_with_those_that_are(client: TestClient, suffix: str) -> None:
-    answer = client.get(f"{BASE}/series{suffix}?quantity=nonsense")
-    assert answer.status_code == 422
-    (error,) = answer.json()["errors"]
-    known = {item["quantity"] for item in client.get(f"{BASE}/series").json()["items"]}
-    assert len(known) == 10
-    assert all(f"'{name}'" in error["message"] for name in known)
-    for name in known:
-        assert client.get(f"{BASE}/series{suffix}?quantity={name}").status_code == 200
-
-
 def test_a_limit_is_refused_where_nothing_is_listed(client: TestClient) -> None:
     assert client.get(f"{BASE}/model?limit=1").status_code == 422

@@ -109,28 +109,6 @@ def test_more_clutches_cost_no_more_unless_each_is_asked_for(database_url: str, 
         assert bool(named) is clutch_metrics
 
 
-def test_the_numbers_of_all_clutches_are_a_row_a_statement(client: TestClient) -> None:
-    """Rows that grow with the clutches would be as slow as series that do."""
-    for number in range(2, 20):
-        client.post("/v1/clutches", json={"clutch_id": f"c{number}"})
-        post_tests(client, f"c{number}") if number < 5 else None
-    rows: list[int] = []
-    database = context_of(client).database
-
-    def noted(*arguments: object) -> None:
-        with database._engine.connect() as connection:
-            raw = connection.connection.driver_connection
-            assert raw is not None
-            query, values = str(arguments[2]), arguments[3]
-            if query.startswith("SELECT") and not query.startswith("SELECT EXISTS"):  # whether there is a job to do
-                rows.append(len(raw.execute(query, values).fetchall()))
-
-    event.listen(database._engine, "before_cursor_execute", noted)
-    client.get("/metrics")
-    event.remove(database._engine, "before_cursor_execute", noted)
-    assert rows == [1] * 6
-
-
 def test_series_of_every_clutch_are_there_where_they_are_asked_for(database_url: str) -> None:
     with service(database_url, clutch_metrics=True) as client:
         post_tests(client)

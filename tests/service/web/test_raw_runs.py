@@ -1,7 +1,6 @@
 """A run over HTTP: negotiated, packed, not sent again where it is known, sent piece by piece; lists hold no channels."""
 
 import json
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -68,29 +67,6 @@ def test_accept_chooses_the_format(client: TestClient, raw: dict[str, Any], acce
     found = client.get(f"{RUNS}/raw?points=100", headers={"Accept": accepted})
     assert (found.status_code, found.headers["content-type"]) == (200, given)
     assert set(found.headers["vary"].split(", ")) == {"Accept", "Accept-Encoding"}
-
-
-def test_parquet_is_all_samples_and_comes_in_again(client: TestClient, raw: dict[str, Any]) -> None:
-    body = client.get(f"{RUNS}/raw?points=100", headers={"Accept": PARQUET}).content
-    asked = {"kind": "dynamic_stribeck", "cycles": "0", "run_id": "raw"}
-    again = client.post(f"{RUNS}/file", params=asked, content=body)
-    assert (again.status_code, again.json()["duplicate"]) == (200, True), again.text
-    assert raw
-
-
-def test_without_the_extra_parquet_is_406(
-    client: TestClient, raw: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert raw
-
-    def missing(name: str) -> str:
-        raise metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr("service.queries.raw_run.version", missing)
-    problem = client.get(f"{RUNS}/raw", headers={"Accept": PARQUET})
-    assert (problem.status_code, problem.headers["content-type"]) == (406, "application/problem+json")
-    assert "pip install -e '.[parquet]'" in problem.json()["detail"]
-    assert client.get(f"{RUNS}/raw", headers={"Accept": f"{PARQUET};q=0.5, application/json"}).status_code == 200
 
 
 @pytest.mark.parametrize("question", ["", "?points=100"])

@@ -11,7 +11,6 @@ from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import UNCATALOGUED, Explanation, Verdict, Where
-from models.diagnosis.pooled_fit.projection import RunScatter
 from models.diagnosis.report.report import Candidate, Misfit, Report, Visible
 from models.diagnosis.report.summary import summarise
 from models.diagnosis.validation.held_out import Gain, Hardest
@@ -130,37 +129,11 @@ def test_what_is_named_is_explained_with_its_size_its_gain_and_the_next_test() -
     assert "It tells oil change from running in (probability 0.80)." in said
 
 
-def test_no_gain_is_said_as_none() -> None:
-    worse = replace(GAIN, reduction_percent=-2.0, forecast_log_score_gain=-1.0)
-    said = summarise(replace(findings(Verdict.CAUSE_NAMED, "oil_change"), gain=worse))
-    assert "errs by 2.0 ± 0.9 % more" in said
-    assert "remaining life does not follow its course" in said
-
-
 def test_why_nothing_may_be_adopted_stands_in_the_paragraph() -> None:
     why = "The extension is not proposed: its error on held-out runs is larger than the baseline's."
     said = summarise(replace(findings(Verdict.CAUSE_NAMED, "oil_change"), not_adoptable=why))
     assert why in said
     assert "errs by" not in said
-
-
-def test_a_test_that_decides_little_is_not_oversold() -> None:
-    found = findings(Verdict.CAUSE_AMBIGUOUS, "oil_change", "running_in")
-    assert "Next: stationary test" in summarise(found)
-    weak = replace(found.advice[0], nats=1.6)
-    assert "No single test would decide" in summarise(replace(found, advice=(weak,)))
-    nothing = replace(weak, nats=0.5)
-    assert "No test that was considered would add evidence." in summarise(replace(found, advice=(nothing,)))
-    alone = replace(found.advice[0], other="baseline")
-    assert "Next, to confirm it (probability 0.80): " in summarise(replace(found, advice=(alone,)))
-    assert "Next" not in summarise(replace(found, advice=()))
-
-
-def test_of_a_named_cause_the_next_test_narrows_the_size() -> None:
-    found = findings(Verdict.CAUSE_NAMED, "oil_temperature")
-    narrowing = replace(found.advice[0], other="baseline", narrows=0.42)
-    said = summarise(replace(found, advice=(narrowing,)))
-    assert "Next, to narrow its size: stationary test with the oil at 60 °C (brings the uncertainty to 42 %" in said
 
 
 def test_what_was_not_measured_cannot_be_excluded() -> None:
@@ -185,44 +158,11 @@ def test_what_these_data_would_miss_is_said_the_worst_first() -> None:
     assert "Nothing of these would show at any size: channel delay and stick slip." in said
 
 
-def test_of_a_course_over_life_two_states_say_little() -> None:
-    found = findings(Verdict.MODEL_ADEQUATE)
-    assert "2 states of use say little about a course over life." in summarise(replace(found, states=2))
-    assert "1 test at 1 state of use was examined. " in summarise(replace(found, tests=1, states=1))
-    assert "about a course" not in summarise(found)
-
-
 def test_notes_on_single_runs_stay_in_the_report() -> None:
     notes = ("sweep-003: 1 plateaus at rest left out.", "sweep-004: the same", "Nothing was known of the oil")
     said = summarise(replace(findings(Verdict.UNEXPLAINED_STRUCTURE), notes=notes))
     assert said.endswith("Nothing was known of the oil.")
     assert "sweep" not in said
-
-
-@pytest.mark.parametrize(
-    ("strengths", "depends"),
-    [((31.0, 4.0), ", and depends on oil temperature and cycles."), ((31.0, 0.0), ", and depends on oil temperature.")],
-)
-def test_axes_that_show_nothing_are_not_mentioned(strengths: tuple[float, ...], depends: str) -> None:
-    where = tuple(replace(each, strength=nats) for each, nats in zip(MISFIT.where, strengths, strict=True))
-    found = findings(Verdict.UNEXPLAINED_STRUCTURE)
-    assert f"is no noise{depends}" in summarise(replace(found, baseline=replace(MISFIT, where=where)))
-    silent = tuple(replace(each, strength=0.0) for each in where)
-    assert "is no noise. " in summarise(replace(found, baseline=replace(MISFIT, where=silent)))
-
-
-def test_a_baseline_whose_error_is_no_more_than_noise_is_not_said_to_be_worse() -> None:
-    found = findings(Verdict.UNEXPLAINED_STRUCTURE)
-    said = summarise(replace(found, baseline=replace(MISFIT, rmse=0.0987)))
-    assert "error is 0.0987 Nm RMS, no more than noise, but correlated along oil temperature and cycles." in said
-    assert "is no noise" not in said
-    small = summarise(replace(found, baseline=replace(MISFIT, unexplained_share=1e-5)))
-    assert "less than 0.1 % of its square is no noise" in small
-
-
-def test_what_the_likeliest_unknown_resembles_is_described() -> None:
-    found = replace(findings(Verdict.UNEXPLAINED_STRUCTURE), resembles="a static torque that steps at a cycle")
-    assert "It most resembles a static torque that steps at a cycle." in summarise(found)
 
 
 def test_many_alternatives_are_shortened() -> None:
@@ -238,40 +178,6 @@ def ambiguous(*given: Candidate) -> str:
     listed = explanations_of({(each.effect,): each.probability for each in given})
     found = findings(Verdict.CAUSE_AMBIGUOUS, *(each.effect for each in given))
     return summarise(replace(found, explanations=listed, candidates=given))
-
-
-def test_the_likeliest_comes_first() -> None:
-    said = ambiguous(candidate("oil_change", 0.2), candidate("inertia_torque", 0.8))
-    assert said.index("inertia torque (") < said.index("oil change (")
-
-
-def test_a_size_whose_sign_is_open_says_so() -> None:
-    open_ = Estimate(name="pressure offset", value=-0.111, sd=0.08, unit="bar")
-    said = ambiguous(replace(candidate("pressure_offset", 0.8), estimate=open_), candidate("torque_zero_shift", 0.2))
-    assert "pressure offset −0.111 ± 0.080 bar, negative with probability 0.92" in said
-    found = findings(Verdict.CAUSE_NAMED, "interface_heating")
-    one_sided = replace(candidate("interface_heating", 0.9).estimate, one_sided=True)
-    heat = summarise(replace(found, candidates=(replace(found.candidates[0], estimate=one_sided),)))
-    assert "positive with probability above 0.99" in summarise(found)
-    assert "positive with" not in heat  # it cannot be negative
-
-
-def test_what_was_fitted_beside_a_named_cause_is_mentioned() -> None:
-    found = findings(Verdict.CAUSE_NAMED, "oil_change")
-    film = replace(candidate("squeeze_film", 0.6), beside=("oil_change",))
-    said = "These data neither confirm nor exclude, beside it: squeeze film (probability 0.60)."
-    assert said in summarise(replace(found, candidates=(*found.candidates, film)))
-    faint = replace(film, probability=0.1)
-    assert "beside it" not in summarise(replace(found, candidates=(*found.candidates, faint)))
-
-
-def test_how_much_runs_scatter_is_said_where_the_model_is_adequate() -> None:
-    found = findings(Verdict.MODEL_ADEQUATE)
-    scatter = RunScatter(median=0.021, lower=0.015, upper=0.0304, information=2.0)
-    estimated = summarise(replace(found, scatter=scatter))
-    assert "from run to run (2.1 % of the torque; 90 % interval 1.5 to 3 %)" in estimated
-    silent = summarise(replace(found, scatter=replace(scatter, information=0.1)))
-    assert "from run to run (assumed to be 2.1 % of the torque; these data hardly show it)" in silent
 
 
 @pytest.mark.parametrize(

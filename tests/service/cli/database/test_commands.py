@@ -72,23 +72,6 @@ def test_verify_is_clean_on_what_a_service_stored(path: Path) -> None:
     assert "3 clutches are checked, 1 clutches computed again" in clutchlife("verify", "--sample", "1", *url)
 
 
-@pytest.mark.parametrize(
-    ("tampered", "says"),
-    [
-        ("UPDATE run SET cycles = 1 WHERE clutch_id = 'b'", "b: run s0 is not what was sent"),
-        ("UPDATE fit SET rmse = 2 * rmse WHERE run_key = 3", "c: the fit of run s0"),
-        ("DELETE FROM clutch WHERE clutch_id = 'a'", "refers to a row of clutch that is missing"),
-        ("ALTER TABLE run ADD COLUMN colour TEXT", "the schema differs"),
-    ],
-)
-def test_verify_names_what_is_wrong_and_ends_with_1(path: Path, tampered: str, says: str) -> None:
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute(tampered)
-    output = clutchlife("verify", "--database", f"sqlite:///{path}", code=1)
-    assert says in output
-    assert "findings" in output
-
-
 def test_verify_names_a_damaged_page(path: Path) -> None:
     whole = path.read_bytes()
     page = len(whole) // 2 // 4096 * 4096

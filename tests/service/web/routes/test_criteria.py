@@ -61,14 +61,6 @@ def test_a_clutch_that_shudders_first_is_said_so(tested: TestClient) -> None:
     assert by_cof["end_of_life_cycles"] == cof["end_of_life_cycles"]
 
 
-def test_another_quantity_is_not_said_to_take_the_course_of_mean_cof(tested: TestClient) -> None:
-    whole = asked(tested, "remaining-useful-life")
-    assert whole["course"]["probability"] > 0.0
-    assert whole["back_cast"]["of"] > 0
-    alone = asked(tested, "remaining-useful-life", criterion="slope")
-    assert [alone[name] for name in ("course", "back_cast", "ended_lives", "sample")] == [None, None, 0, None]
-
-
 @pytest.mark.parametrize(
     ("alias", "name"),
     [("static_ratio", "breakaway_cof_ratio"), ("stop_time", "stop_time_s"), ("energy", "engagement_energy_kj")],
@@ -140,36 +132,6 @@ def test_an_earlier_life_stays_reachable(tested: TestClient) -> None:
 def test_what_was_known_then_is_answered_for_then(tested: TestClient) -> None:
     items = asked(tested, "degradation", quantity="static_torque_nm", at_cycles=2_000)["items"]
     assert all(item["measured"]["cycles"] == [0, 500, 1_000, 2_000] for item in items)
-
-
-def test_the_lag_stands_in_the_rows_for_dashboards_with_its_frequency(tested: TestClient) -> None:
-    loops = asked(tested, "loops")["items"]
-    for quantity, name, unit in (("film_time", "film_time_s", "s"), ("loop_area", "loop_area_nm_m_s", "Nm·m/s")):
-        rows = asked(tested, "series", quantity=quantity)["items"]
-        told = [(row["pressure_bar"], row["frequency_hz"], row["value"]) for row in rows]
-        assert told == [(loop["pressure_bar"], 0.1, loop[name]) for loop in loops if loop[name] is not None]
-        assert {row["unit"] for row in rows} == {unit}
-        assert all(row["lower"] < row["value"] < row["upper"] for row in rows)
-    assert all(row["frequency_hz"] is None for row in asked(tested, "series", quantity="mean_cof")["items"])
-
-
-def test_slopes_stand_in_the_rows_for_dashboards_at_the_speeds_of_the_criteria_too(tested: TestClient) -> None:
-    rows = asked(tested, "series", quantity="slope")["items"]
-    assert {(row["quantity"], row["unit"], row["frequency_hz"]) for row in rows} == {("slope", "s/m", None)}
-    assert {row["speed_rpm"] for row in rows} == {50, 100, 500}
-    assert all(row["lower"] < row["value"] < row["upper"] for row in rows)
-    tracked = asked(tested, "degradation", quantity="slope")["items"]
-    for item in tracked:
-        place = (item["pressure_bar"], item["speed_rpm"])
-        of_place = [row for row in rows if (row["pressure_bar"], row["speed_rpm"]) == place]
-        assert [row["cycles"] for row in of_place] == item["measured"]["cycles"]
-        assert [row["value"] for row in of_place] == pytest.approx(item["measured"]["value"], rel=1e-12)
-    assert asked(tested, "series")["items"][0]["speed_rpm"] is None
-    edit = {"end_of_life": {"criteria": [SHUDDER | {"speed_rpm": 200}]}, "reason": "it creeps faster now"}
-    assert tested.patch("/v1/clutches/s", json=edit).status_code == 200
-    table = tested.get("/v1/clutches/s/series.csv", params={"quantity": "slope"}).text.splitlines()
-    assert table[0].endswith(",frequency_hz,speed_rpm,source")
-    assert {float(line.split(",")[-2]) for line in table[1:]} == {50, 100, 200, 500}
 
 
 def test_a_slope_in_the_rows_is_the_difference_of_the_curve_that_the_receipt_shows(tested: TestClient) -> None:

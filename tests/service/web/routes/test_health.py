@@ -24,7 +24,7 @@ from service.web import readiness
 from service.web.readiness import available_memory
 from tests.service.web.routes.granting import context_of
 from tests.service.web.test_stopping import family
-from tests.support import ONCE, one_quick, serving
+from tests.support import ONCE, serving
 
 WHOLE = dict.fromkeys(("database", "disk", "memory", "workers"), "ok")
 _SPAWN = multiprocessing.get_context("spawn")
@@ -62,33 +62,11 @@ def test_too_little_room_is_not_ready_and_says_how_little(
         assert client.get("/livez").status_code == 200
 
 
-def test_a_database_that_is_gone_is_not_ready(client: TestClient) -> None:
-    context_of(client).database.path.rename(context_of(client).database.path.with_suffix(".gone"))
-    answer = client.get("/readyz")
-    assert (answer.status_code, answer.json()["checks"]["database"]) == (503, "the file is not there")
-
-
 def _hold(path: str, begin: str, say: "multiprocessing.connection.Connection") -> None:
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
         connection.execute(begin)
         say.send("held")
         say.recv()
-
-
-@pytest.mark.parametrize("begin", one_quick(["BEGIN EXCLUSIVE", "BEGIN IMMEDIATE"]))
-def test_ready_at_once_while_another_process_writes(client: TestClient, begin: str) -> None:
-    ours, theirs = _SPAWN.Pipe()
-    other = _SPAWN.Process(target=_hold, args=(str(context_of(client).database.path), begin, theirs))
-    other.start()
-    assert ours.poll(60)
-    assert ours.recv() == "held"
-    begun = time.monotonic()
-    answer = client.get("/readyz")
-    seconds = time.monotonic() - begun
-    ours.send("end")
-    other.join(60)
-    assert (answer.status_code, answer.json()["checks"]) == (200, WHOLE)
-    assert seconds < 5.0
 
 
 def test_ready_at_once_while_all_threads_wait_for_the_write_lock(client: TestClient) -> None:

@@ -73,15 +73,6 @@ def test_a_mistake_in_the_program_is_not_disguised(database: Database) -> None:
         connection.execute(text("SELECT * FROM no_such"))
 
 
-def test_a_closed_database_says_so(database: Database) -> None:
-    database.close()
-    database.close()
-    with pytest.raises(StorageUnavailable, match="has been closed"), database.reading():
-        pass
-    with pytest.raises(StorageUnavailable, match="has been closed"), database.writing():
-        pass
-
-
 @pytest.mark.usefixtures("later_step")
 def test_a_found_database_is_read_at_its_own_revision_and_never_changed(tmp_path: Path) -> None:
     path = old_database(tmp_path)

@@ -33,16 +33,6 @@ def settled(frame: Module, *data: dict[str, Any], **layout: Any) -> dict[str, An
     return result
 
 
-def test_the_width_of_a_text_grows_with_its_letters_and_its_size(frame: Module) -> None:
-    one = frame("widthOf", "m", FONT)
-    assert one > 0
-    assert frame("widthOf", "mmmm", FONT) == pytest.approx(4 * one)
-    assert frame("widthOf", "m", FONT | {"size": 24}) == pytest.approx(2 * one, rel=0.02)  # glyphs are hinted
-    assert frame("widthOf", "m<sub></sub>", FONT) == pytest.approx(one)
-    assert frame("widthOf", "M<sub>s</sub>", FONT) == pytest.approx(frame("widthOf", "Ms", FONT))
-    assert frame("widthOf", "", FONT) == 0
-
-
 @pytest.mark.parametrize(
     ("span", "length", "least", "texts"),
     [
@@ -66,21 +56,12 @@ def test_ticks_are_one_two_or_five_times_a_power_of_ten(
         assert span[0] - 1e-9 <= tick["at"] <= span[1] + 1e-9
 
 
-def test_a_range_that_points_backwards_has_no_ticks(frame: Module) -> None:
-    assert frame("ticksOf", [5, 3], 400, 80) == []
-
-
 def test_a_range_leaves_room_about_what_is_drawn(frame: Module) -> None:
     layout = settled(frame, trace([0, 10], [1, 3]))["layout"]
     assert layout["xaxis"]["range"] == pytest.approx([-0.2, 10.2])
     assert layout["yaxis"]["range"] == pytest.approx([0.9, 3.1])
     marked = settled(frame, trace([0, 10], [1, 3], "lines+markers"))["layout"]
     assert marked["xaxis"]["range"] == pytest.approx([-0.5, 10.5])  # points would be cut at the edge
-
-
-def test_a_range_of_the_chart_s_own_stays(frame: Module) -> None:
-    layout = settled(frame, trace([0, 10], [1, 3]), xaxis={"range": [2, 4]}, yaxis={"range": [0, 7]})["layout"]
-    assert (layout["xaxis"]["range"], layout["yaxis"]["range"]) == ([2, 4], [0, 7])
 
 
 @pytest.mark.parametrize(
@@ -109,20 +90,6 @@ def test_error_bars_are_in_the_range(frame: Module) -> None:
     assert layout["yaxis"]["range"] == pytest.approx([9 - 0.65, 22 + 0.65])
 
 
-def test_other_figures_are_left_to_the_library(frame: Module) -> None:
-    plain = trace([0, 1], [0, 1])
-    assert settled(frame, plain) is not None
-    for other in ({"type": "surface"}, {"type": "heatmap"}, plain | {"xaxis": "x2"}, plain | {"yaxis": "y2"}):
-        assert frame("settled", figure(plain, other), SIZE) is None
-    assert frame("settled", figure(plain, scene={}), SIZE) is None
-
-
-def test_a_single_trace_has_no_legend(frame: Module) -> None:
-    alone = settled(frame, trace([0, 1], [0, 1], name="alone"))
-    assert alone["legend"]["entries"] == []
-    assert alone["layout"]["showlegend"] is False
-
-
 def test_a_legend_fits_beside_itself_or_breaks_into_rows(frame: Module) -> None:
     named = [trace([0, 1], [0, 1], name=name) for name in ("a", "bb", "ccc")]
     short = settled(frame, *named, trace([0], [0]), trace([0], [0], name="hidden", showlegend=False))
@@ -139,28 +106,9 @@ def test_a_legend_fits_beside_itself_or_breaks_into_rows(frame: Module) -> None:
     assert long["layout"]["margin"]["b"] > short["layout"]["margin"]["b"]
 
 
-def test_a_legend_of_columns_keeps_them_aligned(frame: Module) -> None:
-    data = [trace([0, 1], [0, 1], name="n" * size) for size in (20, 3, 3, 20, 20, 3)]
-    entries = settled(frame, *data)["legend"]["entries"]
-    columns = {entry["x"] for entry in entries}
-    assert 1 < len(columns) < len(entries)
-    assert len({entry["y"] for entry in entries}) == -(-len(entries) // len(columns))
-
-
 def test_margins_hold_labels_titles_and_legend(frame: Module) -> None:
     small = settled(frame, trace([0, 1], [0, 1]), yaxis={"range": [0, 9]})["layout"]
     assert small["margin"] == {"l": 56, "r": 16, "t": 12, "b": 49}  # b: two lines of 1.3 x 12 px and 18 px between
     big = settled(frame, trace([0, 1], [0, 12_345_678]))
     widest = max(frame("widthOf", tick["text"], FONT) for tick in big["ticks"]["y"])
     assert big["layout"]["margin"]["l"] == round(max(56, widest + 1.3 * 12 + 24)) > 56
-
-
-def test_ticks_are_of_the_settled_ranges(frame: Module) -> None:
-    result = settled(frame, trace([0, 10_000], [0, 1]))
-    margin, layout = result["layout"]["margin"], result["layout"]
-    width = SIZE["width"] - margin["l"] - margin["r"]
-    height = SIZE["height"] - margin["t"] - margin["b"]
-    assert result["ticks"]["x"] == frame("ticksOf", layout["xaxis"]["range"], width, 80)
-    assert result["ticks"]["y"] == frame("ticksOf", layout["yaxis"]["range"], height, 40)
-    assert result["legend"]["top"] == pytest.approx(SIZE["height"] - margin["b"] + 2 * 1.3 * 12 + 18)
-    assert layout["legend"]["y"] == pytest.approx(-(2 * 1.3 * 12 + 18) / height)

@@ -37,17 +37,6 @@ def boxes(html: str, name: str) -> list[tuple[float, float]]:
     return [(float(x), float(x) + float(width)) for x, width in found]
 
 
-def test_both_are_shown_with_their_median_and_interval(bars: Module) -> None:
-    text = show(bars, BEFORE, AFTER)["text"]
-    assert text == "Before2,000 (90 %: 1,000 to 3,000)After4,000 (90 %: 3,000 to 5,000)"
-
-
-def test_they_bear_the_names_that_are_given(bars: Module) -> None:
-    text = show(bars, BEFORE, AFTER, ["Now", "Then"])["text"]
-    assert text.startswith("Now2,000")
-    assert "Then4,000" in text
-
-
 def test_they_share_one_scale(bars: Module) -> None:
     html = show(bars, BEFORE, AFTER)["html"]
     assert medians(html) == pytest.approx([WIDTH * 2000 / SCALE, WIDTH * 4000 / SCALE], abs=0.06)
@@ -56,11 +45,6 @@ def test_they_share_one_scale(bars: Module) -> None:
     assert wide[1] == pytest.approx((WIDTH * 3000 / SCALE, WIDTH * 5000 / SCALE), abs=0.11)
     assert half[1] == pytest.approx((WIDTH * 3500 / SCALE, WIDTH * 4500 / SCALE), abs=0.11)
     assert 'class="beyond"' not in html
-
-
-def test_whole_answers_are_taken_too(bars: Module) -> None:
-    whole = show(bars, {"remaining_cycles": BEFORE, "status": "predicted"}, {"remaining_cycles": AFTER})
-    assert whole == show(bars, BEFORE, AFTER)
 
 
 def test_an_end_that_is_not_in_sight_is_marked(bars: Module) -> None:
@@ -80,13 +64,6 @@ def test_quartiles_that_are_missing_are_taken_from_the_interval(bars: Module) ->
     assert boxes(html, "half")[1] == boxes(html, "wide")[1]
     alone = show(bars, BEFORE, {"0.5": 4000})
     assert "After4,000 (90 %: –)" in alone["text"]
-
-
-def test_a_life_that_has_ended_has_bars_of_some_width(bars: Module) -> None:
-    ended = dict.fromkeys(AFTER, 0)
-    result = show(bars, ended, ended)
-    assert result["text"] == "Before0 (90 %: 0 to 0)After0 (90 %: 0 to 0)"
-    assert all(end - start == pytest.approx(1.5) for start, end in boxes(result["html"], "wide"))
 
 
 @pytest.mark.parametrize("nothing", [None, {}, {"remaining_cycles": {}}, {"status": "insufficient_data"}])
