@@ -22,16 +22,7 @@ from enum import StrEnum
 import numpy as np
 
 from models.arrays import FloatArray
-from models.degradation.criteria import (
-    DECELERATION,
-    HARSHEST,
-    LARGEST_EXPONENT,
-    MILDEST,
-    RECENT_CYCLES,
-    RECENT_SHARE,
-    STANDARD_ANGLE,
-    STANDARD_ENERGY,
-)
+from models.degradation import criteria
 from models.degradation.general_order import Number
 
 
@@ -44,7 +35,10 @@ class SeverityBasis(StrEnum):
 
 
 #: The work of a standard cycle [J] or [rad].
-_STANDARD = {SeverityBasis.DISSIPATED_ENERGY: STANDARD_ENERGY, SeverityBasis.SLIDING_DISTANCE: STANDARD_ANGLE}
+_STANDARD = {
+    SeverityBasis.DISSIPATED_ENERGY: criteria.STANDARD_ENERGY,
+    SeverityBasis.SLIDING_DISTANCE: criteria.STANDARD_ANGLE,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +75,7 @@ class Block:
             return self.energy
         if self.speed is None:
             return None
-        return 0.5 * self.speed * (self.speed / DECELERATION if self.duration is None else self.duration)
+        return 0.5 * self.speed * (self.speed / criteria.DECELERATION if self.duration is None else self.duration)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,8 +86,8 @@ class Severity:
     exponent: float = 1.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.exponent <= LARGEST_EXPONENT:
-            raise ValueError(f"exponent must lie between 0 and {LARGEST_EXPONENT:g}, got {self.exponent}")
+        if not 0.0 <= self.exponent <= criteria.LARGEST_EXPONENT:
+            raise ValueError(f"exponent must lie between 0 and {criteria.LARGEST_EXPONENT:g}, got {self.exponent}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,7 +149,7 @@ def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
 
 def counted(work: Number, reference: float, exponent: float) -> FloatArray:
     """How often a cycle of so much work >= 0 counts beside one of the reference's > 0, any shape."""
-    return np.clip((np.asarray(work, dtype=np.float64) / reference) ** exponent, MILDEST, HARSHEST)
+    return np.clip((np.asarray(work, dtype=np.float64) / reference) ** exponent, criteria.MILDEST, criteria.HARSHEST)
 
 
 def _pieces(ordered: Sequence[Block], works: Sequence[float | None]) -> list[tuple[float, float | None]]:
@@ -175,7 +169,7 @@ def _pieces(ordered: Sequence[Block], works: Sequence[float | None]) -> list[tup
 def _recent(lengths: FloatArray, rates: FloatArray) -> float:
     """The mean rate over the cycles that count as recent."""
     total = float(lengths.sum())
-    window = min(total, max(RECENT_SHARE * total, RECENT_CYCLES))
+    window = min(total, max(criteria.RECENT_SHARE * total, criteria.RECENT_CYCLES))
     ends = np.cumsum(lengths)
     kept = np.clip(ends - (total - window), 0.0, lengths)
     return float(kept @ rates / kept.sum())

@@ -12,7 +12,7 @@ contact, where the discs only touch. What is left between both is model discrepa
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -81,7 +81,7 @@ def discrepancy(engagement: MeasuredEngagement, capacity: Capacity, mean_radius:
     modelled = np.interp(profile.contact + since, trace.time, trace.torque)
     inside = slice(1, -1)  # a bin at an end reaches beyond the slip
     return Discrepancy(
-        trace=_shifted(trace, origin),
+        trace=replace(trace, time=trace.time + origin),
         drive=drive,
         torque_share=_relative(measured[inside] - modelled[inside], measured[inside]),
         simulated_stop_time=stop,
@@ -93,18 +93,6 @@ def discrepancy(engagement: MeasuredEngagement, capacity: Capacity, mean_radius:
 
 def _relative(error: FloatArray, values: FloatArray) -> float:
     return math.sqrt(float(error @ error) / float(values @ values))
-
-
-def _shifted(trace: Engagement, origin: float) -> Engagement:
-    return Engagement(
-        time=trace.time + origin,
-        pressure=trace.pressure,
-        speed=trace.speed,
-        torque=trace.torque,
-        motor_torque=trace.motor_torque,
-        duration=trace.duration,
-        energy=trace.energy,
-    )
 
 
 def _drive_of(slip: Slip, speed: float) -> Drive | None:

@@ -23,24 +23,11 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.engagements import criteria
 from models.engagements.comparison import COURSE_POINTS, SpeedCourse, bin_means
-from models.engagements.criteria import (
-    ENDPOINT,
-    FEWEST_LOCAL,
-    HALF_WIDTH,
-    HIGHEST,
-    INITIAL,
-    KEPT_PRESSURE,
-    MIDPOINT,
-    POWER_HALF_WIDTH,
-    POWER_MOMENTS,
-    TRACE_AFTER,
-    TRACE_BEFORE,
-    TRACE_POINTS,
-)
 from models.engagements.local_fit import Channel, Estimate, channel_of
 from models.engagements.refusal import Refusal
-from models.engagements.slip import Slip, slip_of
+from models.engagements.slip import Slip, crossing, slip_of
 from models.records.criteria import UNLOADED
 from models.records.runs import Record
 
@@ -79,13 +66,14 @@ def measured_engagement(record: Record, geometry: Geometry) -> MeasuredEngagemen
     channels = _Channels(slip, per_pascal)
     speed = channels.initial_speed()
     initial, midpoint, endpoint = (
-        channels.cof(channels.moment(share * speed.value)) for share in (INITIAL, MIDPOINT, ENDPOINT)
+        channels.cof(channels.moment(share * speed.value))
+        for share in (criteria.INITIAL, criteria.MIDPOINT, criteria.ENDPOINT)
     )
     breakaway = _breakaway(slip, channels, per_pascal)
     return MeasuredEngagement(
         slip=slip,
         initial_speed=speed,
-        maximum_pressure=float(np.quantile(channels.pressure.values, HIGHEST)),
+        maximum_pressure=float(np.quantile(channels.pressure.values, criteria.HIGHEST)),
         stop_time=slip.duration,
         energy=_energy(slip, channels),
         peak_power=_peak_power(slip),
@@ -96,7 +84,7 @@ def measured_engagement(record: Record, geometry: Geometry) -> MeasuredEngagemen
         initial_ratio=_ratio(initial, midpoint),
         endpoint_ratio=_ratio(endpoint, midpoint),
         breakaway_ratio=_ratio(breakaway, midpoint),
-        torque_rise=channels.torque_rise(channels.moment(MIDPOINT * speed.value)),
+        torque_rise=channels.torque_rise(channels.moment(criteria.MIDPOINT * speed.value)),
         course=_course(slip, channels),
     )
 
@@ -104,8 +92,10 @@ def measured_engagement(record: Record, geometry: Geometry) -> MeasuredEngagemen
 def trace_times(slip: Slip) -> FloatArray:
     """Equally spaced times [m] s at which a slip's trace is shown: from before contact to after the standstill."""
     duration = slip.end.value - slip.contact
-    first = max(slip.contact - TRACE_BEFORE * duration, float(slip.time[0]))
-    return np.linspace(first, min(slip.end.value + TRACE_AFTER * duration, float(slip.time[-1])), TRACE_POINTS)
+    first = max(slip.contact - criteria.TRACE_BEFORE * duration, float(slip.time[0]))
+    return np.linspace(
+        first, min(slip.end.value + criteria.TRACE_AFTER * duration, float(slip.time[-1])), criteria.TRACE_POINTS
+    )
 
 
 class _Channels:
@@ -115,7 +105,7 @@ class _Channels:
         rows = slip.between(slip.contact, slip.end.value - 2 * slip.end.sd)
         time = slip.time[rows]
         self.slip = slip
-        self.width = HALF_WIDTH * (slip.end.value - slip.contact)
+        self.width = criteria.HALF_WIDTH * (slip.end.value - slip.contact)
         self.torque, self.pressure, self.speed = (
             channel_of(time, column[rows]) for column in (slip.torque, slip.pressure, slip.speed)
         )
@@ -132,11 +122,7 @@ class _Channels:
 
     def moment(self, speed: float) -> float:
         """When the shaft has come down to a speed [rad/s]: the moment that leaves the fewest samples on the wrong side."""
-        fast = self.speed.values > speed
-        wrong = np.concatenate([[0], np.cumsum(~fast)]) + np.concatenate([np.cumsum(fast[::-1])[::-1], [0]])
-        row = int(np.argmin(wrong))
-        time = self.speed.time
-        return float(time[max(row - 1, 0)] + time[min(row, time.size - 1)]) / 2
+        return crossing(self.speed.time, self.speed.values <= speed)
 
     def cof(self, moment: float) -> Estimate | None:
         """μ at a moment of the slip [s]."""
@@ -185,8 +171,8 @@ def _energy(slip: Slip, channels: _Channels) -> Estimate:
 def _peak_power(slip: Slip) -> Estimate | None:
     rows = slip.between(slip.contact, slip.end.value)
     power = channel_of(slip.time[rows], (slip.torque * slip.speed)[rows])
-    width = POWER_HALF_WIDTH * (power.high - power.low)
-    values = [power.at(moment, width) for moment in np.linspace(power.low, power.high, POWER_MOMENTS).tolist()]
+    width = criteria.POWER_HALF_WIDTH * (power.high - power.low)
+    values = [power.at(moment, width) for moment in np.linspace(power.low, power.high, criteria.POWER_MOMENTS).tolist()]
     return max((value for value in values if value is not None), key=lambda value: value.value, default=None)
 
 
@@ -196,8 +182,8 @@ def _breakaway(slip: Slip, channels: _Channels, per_pascal: float) -> Estimate |
         return None
     held = slip.between(slip.end.value, slip.again)
     friction = _friction(slip, per_pascal, held)
-    kept = np.median(slip.pressure[held][-FEWEST_LOCAL:]) if held.any() else 0.0
-    if friction is None or kept < KEPT_PRESSURE * channels.pressure.values[-1]:
+    kept = np.median(slip.pressure[held][-criteria.FEWEST_LOCAL :]) if held.any() else 0.0
+    if friction is None or kept < criteria.KEPT_PRESSURE * channels.pressure.values[-1]:
         return None
     return friction.at(slip.again, channels.width)
 

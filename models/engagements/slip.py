@@ -18,18 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.engagements.criteria import (
-    ABOVE_START,
-    BELOW_START,
-    FEWEST_SAMPLES,
-    FEWEST_SLIPPING,
-    LARGEST_OPEN_TORQUE,
-    LEAST_RISE,
-    LONGEST_GAP,
-    RATE_TOLERANCE,
-    SLOWEST_RATE,
-    START,
-)
+from models.engagements import criteria
 from models.engagements.local_fit import Estimate
 from models.engagements.refusal import Refusal, SlipStatus
 from models.engagements.standstill import standstill_of
@@ -85,12 +74,15 @@ def slip_of(record: Record) -> Slip | Refusal:
         return contact
     slipping = record.time[(record.time >= contact.contact) & (record.time <= stop.end.value)]
     duration = stop.end.value - contact.contact
-    if slipping.size < FEWEST_SLIPPING:
-        rule = f"at least {FEWEST_SLIPPING} samples must lie between contact and standstill, got {slipping.size}"
+    if slipping.size < criteria.FEWEST_SLIPPING:
+        rule = (
+            f"at least {criteria.FEWEST_SLIPPING} samples must lie between contact and standstill, got {slipping.size}"
+        )
         return Refusal(status=SlipStatus.TOO_FEW_SAMPLES, message=rule)
     gap = float(np.diff(slipping).max())
-    if gap > LONGEST_GAP * duration:
-        rule = f"samples are missing for {gap:.3g} s of a slip of {duration:.3g} s, more than {100 * LONGEST_GAP:g} %"
+    if gap > criteria.LONGEST_GAP * duration:
+        most = 100 * criteria.LONGEST_GAP
+        rule = f"samples are missing for {gap:.3g} s of a slip of {duration:.3g} s, more than {most:g} %"
         return Refusal(status=SlipStatus.GAP, message=rule)
     return Slip(
         time=record.time,
@@ -108,8 +100,8 @@ def slip_of(record: Record) -> Slip | Refusal:
 
 def _unusable(record: Record) -> Refusal | None:
     size = record.time.size
-    if size < FEWEST_SAMPLES:
-        rule = f"a record must have at least {FEWEST_SAMPLES} samples, got {size}"
+    if size < criteria.FEWEST_SAMPLES:
+        rule = f"a record must have at least {criteria.FEWEST_SAMPLES} samples, got {size}"
         return Refusal(status=SlipStatus.TOO_FEW_SAMPLES, message=rule)
     steps = np.diff(record.time)
     if (steps <= 0).any():
@@ -119,8 +111,8 @@ def _unusable(record: Record) -> Refusal | None:
         )
         return Refusal(status=SlipStatus.TIME_NOT_INCREASING, message=rule)
     rate = 1.0 / float(np.median(steps))
-    if rate < SLOWEST_RATE * (1 - RATE_TOLERANCE):
-        rule = f"an engagement must be sampled at {SLOWEST_RATE:g} Hz or faster, got {rate:.3g} Hz"
+    if rate < criteria.SLOWEST_RATE * (1 - criteria.RATE_TOLERANCE):
+        rule = f"an engagement must be sampled at {criteria.SLOWEST_RATE:g} Hz or faster, got {rate:.3g} Hz"
         return Refusal(status=SlipStatus.SAMPLED_TOO_SLOWLY, message=rule)
     if float(record.pressure.max()) < UNLOADED:
         highest = float(record.pressure.max()) / 1e5
@@ -156,8 +148,8 @@ def _contact_of(time: FloatArray, torque: FloatArray, slowing: int) -> _Contact 
     highest = float(smooth[highest_row])
     low = float(smooth[: max(highest_row, 1)].min())
     noise = float(np.median(np.abs(np.diff(torque, 2)))) / (_NORMAL_QUARTILE * math.sqrt(6))
-    never_open = abs(low) > LARGEST_OPEN_TORQUE * (highest - low)
-    if highest - low <= LEAST_RISE * noise and not (never_open and highest > LEAST_RISE * noise):
+    never_open = abs(low) > criteria.LARGEST_OPEN_TORQUE * (highest - low)
+    if highest - low <= criteria.LEAST_RISE * noise and not (never_open and highest > criteria.LEAST_RISE * noise):
         rule = f"torque must rise above its noise of {noise:.3g} Nm, it rises by {highest - low:.3g} Nm"
         return Refusal(status=SlipStatus.NO_TORQUE, message=rule)
     rising = slice(0, highest_row + 1)
@@ -176,12 +168,15 @@ def _contact_of(time: FloatArray, torque: FloatArray, slowing: int) -> _Contact 
 
 
 def _crossings(time: FloatArray, torque: FloatArray, highest: float) -> tuple[float, float, float]:
-    below, start, above = (_crossing(time, torque > share * highest) for share in (BELOW_START, START, ABOVE_START))
+    below, start, above = (
+        crossing(time, torque > share * highest)
+        for share in (criteria.BELOW_START, criteria.START, criteria.ABOVE_START)
+    )
     return below, start, above
 
 
-def _crossing(time: FloatArray, above: NDArray[np.bool_]) -> float:
-    """The moment that leaves the fewest samples above a level before it and below it after."""
+def crossing(time: FloatArray, above: NDArray[np.bool_]) -> float:
+    """The moment that leaves the fewest samples [n] above a level before it and below it after."""
     wrong = np.concatenate([[0], np.cumsum(above)]) + np.concatenate([np.cumsum(~above[::-1])[::-1], [0]])
     row = int(np.argmin(wrong))
     return float(time[max(row - 1, 0)] + time[min(row, time.size - 1)]) / 2
@@ -198,7 +193,7 @@ def _start_of(time: FloatArray, torque: FloatArray, highest: float, zero: Estima
         square = float(np.sum((at - middle) ** 2))
         slope = float(np.sum((at - middle) * values)) / square
         if slope > 0:
-            passed = middle + (START * highest - float(values.mean())) / slope
+            passed = middle + (criteria.START * highest - float(values.mean())) / slope
             variance = float(np.sum((values - values.mean() - slope * (at - middle)) ** 2)) / (at.size - 2)
             spread = 1 / at.size + (passed - middle) ** 2 / square
             estimate = Estimate(value=passed, sd=math.sqrt(variance * spread) / slope)

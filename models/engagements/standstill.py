@@ -11,15 +11,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from models.arrays import FloatArray
-from models.engagements.criteria import (
-    CURVED_STOP,
-    FAST,
-    FEWEST_SLIPPING,
-    HIGHEST_POWER,
-    LARGEST_ZERO,
-    LEAST_SPEED,
-    SLOW,
-)
+from models.engagements import criteria
 from models.engagements.local_fit import Estimate
 from models.engagements.refusal import Refusal, SlipStatus
 
@@ -43,32 +35,33 @@ def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
 
     smooth = median_filter(speed, 5, mode="nearest")
     highest = float(smooth.max())
-    if highest < LEAST_SPEED:
-        rule = f"the shaft must slip, the highest speed is {highest:.3g} rad/s, below {LEAST_SPEED:g} rad/s"
+    if highest < criteria.LEAST_SPEED:
+        rule = f"the shaft must slip, the highest speed is {highest:.3g} rad/s, below {criteria.LEAST_SPEED:g} rad/s"
         return Refusal(status=SlipStatus.NO_SLIP, message=rule)
-    fast, slow = smooth >= FAST * highest, smooth <= SLOW * highest
+    fast, slow = smooth >= criteria.FAST * highest, smooth <= criteria.SLOW * highest
     first = int(np.argmax(fast))
     rest = first + int(np.argmax(slow[first:]))
     if not slow[rest]:
         least = 100 * float(smooth[first:].min()) / highest
         return _never_ends(f"the lowest speed is {least:.3g} % of the highest")
     slowing = int(np.flatnonzero(fast[:rest])[-1])
-    turning = np.flatnonzero(smooth[rest:] > 2 * SLOW * highest)
+    turning = np.flatnonzero(smooth[rest:] > 2 * criteria.SLOW * highest)
     leaves = rest + int(turning[0]) if turning.size else time.size
     window = slice(slowing, min(leaves, rest + 2 * (rest - slowing) + 5))
     latest = min(2 * rest - slowing + 2, leaves - 1)
     end, zero = _rest(time[window], speed[window], float(time[slowing]), float(time[latest]))
-    if abs(zero) > LARGEST_ZERO * highest:
+    if abs(zero) > criteria.LARGEST_ZERO * highest:
         return _never_ends(f"speed stays at {100 * zero / highest:.3g} % of the highest")
     again = None
     if turning.size:
-        still = np.flatnonzero(speed[rest:leaves] - zero <= LARGEST_ZERO * highest)
+        still = np.flatnonzero(speed[rest:leaves] - zero <= criteria.LARGEST_ZERO * highest)
         again = float(time[rest + (int(still[-1]) if still.size else 0)])
     return Standstill(fast=first, slowing=slowing, rest=rest, end=end, zero=zero, again=again)
 
 
 def _never_ends(reason: str) -> Refusal:
-    rule = f"slip must end in the record: {reason}; a shaft stands within {100 * LARGEST_ZERO:g} % of its highest speed"
+    stands = 100 * criteria.LARGEST_ZERO
+    rule = f"slip must end in the record: {reason}; a shaft stands within {stands:g} % of its highest speed"
     return Refusal(status=SlipStatus.SLIP_NEVER_ENDS, message=rule)
 
 
@@ -78,11 +71,11 @@ def _rest(time: FloatArray, speed: FloatArray, earliest: float, latest: float) -
     The power of g rises from 2 for as long as that explains more than chance would.
     """
     rest = _rest_of(2, time, speed, earliest, latest)
-    for power in range(3, HIGHEST_POWER + 1):
+    for power in range(3, criteria.HIGHEST_POWER + 1):
         better = _rest_of(power, time, speed, earliest, latest)
         if (
-            better.freedom < FEWEST_SLIPPING
-            or rest.misfit - better.misfit < CURVED_STOP**2 * better.misfit / better.freedom
+            better.freedom < criteria.FEWEST_SLIPPING
+            or rest.misfit - better.misfit < criteria.CURVED_STOP**2 * better.misfit / better.freedom
         ):
             break
         rest = better

@@ -33,16 +33,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, stdtrit
 
 from models.arrays import FloatArray
-from models.friction.criteria import (
-    ASSUMED_NOISE,
-    DISBELIEVED,
-    LEAST_NOISE,
-    PRIOR_LOG_VELOCITY,
-    PRIOR_TERM,
-    STRAY,
-    UNDETERMINED_SHARE,
-    Z90,
-)
+from models.friction import criteria
 from models.friction.variable_projection import Problem, Profile, jacobian
 
 #: An eigenvalue of JᵀJ below this share of the largest is rounding.
@@ -74,12 +65,12 @@ def estimate_noise(residual: FloatArray, freedom: FloatArray, given_sd: FloatArr
     given, estimable = np.isfinite(given_sd), freedom >= 1
     spare = np.maximum(freedom, 1.0)
     given_sd = np.where(given, given_sd, 1.0)
-    inflated = given & estimable & (residual / given_sd**2 > chdtri(spare, DISBELIEVED))
+    inflated = given & estimable & (residual / given_sd**2 > chdtri(spare, criteria.DISBELIEVED))
     estimated = (estimable & ~given) | inflated
-    sd = np.where(estimated, np.sqrt(residual / spare), np.where(given, given_sd, ASSUMED_NOISE * level))
+    sd = np.where(estimated, np.sqrt(residual / spare), np.where(given, given_sd, criteria.ASSUMED_NOISE * level))
     return Noise(
-        sd=np.maximum(sd, LEAST_NOISE * level),
-        widening=np.where(estimated, stdtrit(spare, 0.95) / Z90, 1.0),
+        sd=np.maximum(sd, criteria.LEAST_NOISE * level),
+        widening=np.where(estimated, stdtrit(spare, 0.95) / criteria.Z90, 1.0),
         inflated=inflated,
         assumed=~estimated & ~given,
         shaped=estimated & ~given,
@@ -101,8 +92,8 @@ def uncertainty(problem: Problem, optimum: Profile, scan: Profile, noise: Noise,
     columns = jacobian(problem, optimum)
     points = (problem.weight**2).sum(axis=1)
     size = np.sqrt((columns**2).sum(axis=1) / points[:, None])
-    prior = PRIOR_TERM * level[:, None] / np.where(size > 0, size, 1.0)
-    prior[:, 3] = PRIOR_LOG_VELOCITY
+    prior = criteria.PRIOR_TERM * level[:, None] / np.where(size > 0, size, 1.0)
+    prior[:, 3] = criteria.PRIOR_LOG_VELOCITY
     stray = _stray(optimum, scan, noise)
     transform = _transform(problem, optimum)
     covariance, unbiased = (
@@ -113,8 +104,8 @@ def uncertainty(problem: Problem, optimum: Profile, scan: Profile, noise: Noise,
     ratio = transform[:, 1, 1] * optimum.coefficients[:, 0, 1]
     viscous = np.sqrt((problem.viscous**2).sum(axis=1) / points)
     scale = np.stack([level, np.maximum(ratio, 1.0), transform[:, 2, 3], level / np.maximum(viscous, 1e-100)], axis=1)
-    undetermined = deviation > UNDETERMINED_SHARE * scale
-    undetermined[:, 2] |= stray > STRAY
+    undetermined = deviation > criteria.UNDETERMINED_SHARE * scale
+    undetermined[:, 2] |= stray > criteria.STRAY
     return Uncertainty(covariance=covariance, unbiased_covariance=unbiased, undetermined=undetermined)
 
 
@@ -126,7 +117,7 @@ def _covariance(
     inner = _linearised(columns * prior[:, None, :], shape, sd)
     inner *= prior[:, :, None] * prior[:, None, :]
     variance = inner[:, 3, 3]
-    missing = np.where(stray > STRAY, np.maximum((stray / Z90) ** 2 - variance, 0.0), 0.0)
+    missing = np.where(stray > criteria.STRAY, np.maximum((stray / criteria.Z90) ** 2 - variance, 0.0), 0.0)
     direction = inner[:, :, 3] / variance[:, None]
     inner += missing[:, None, None] * direction[:, :, None] * direction[:, None, :]
     covariance = transform @ inner @ transform.swapaxes(1, 2)
@@ -170,7 +161,7 @@ def _linearised(columns: FloatArray, shape: FloatArray, sd: FloatArray) -> Float
 
 def _stray(optimum: Profile, scan: Profile, noise: Noise) -> FloatArray:
     """How far [P] from the optimum, in log V_S, the profile still lies within the 90 % likelihood interval."""
-    limit = optimum.residual + (Z90 * noise.widening * noise.sd)[:, None] ** 2
+    limit = optimum.residual + (criteria.Z90 * noise.widening * noise.sd)[:, None] ** 2
     distance = np.abs(scan.log_velocity - optimum.log_velocity)
     return np.asarray(np.where(scan.residual <= limit, distance, 0.0).max(axis=1))
 

@@ -42,22 +42,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaincinv, log_ndtr, logsumexp, ndtri
 
 from models.arrays import FloatArray
-from models.prognosis.criteria import (
-    COURSE_DISCREPANCIES,
-    COURSE_SCATTERS,
-    COURSE_SIZE_SD,
-    COURSE_STRETCH_SD,
-    DECLARED_EARLY,
-    DECLARED_UNSEEN,
-    END_WORTH,
-    FEWEST_ENDED,
-    FEWEST_SEVERITIES,
-    FEWEST_TESTS,
-    LAWFUL_WORTH,
-    MOST_ENDED,
-    OTHER_KIND,
-    VAGUE,
-)
+from models.prognosis import criteria
 from models.prognosis.first_passage import Offset, ends_of_life
 from models.tracking.courses import Course
 from models.tracking.criteria import STEP_SIZE
@@ -163,7 +148,7 @@ def ended_life(
     """
     before = np.flatnonzero(progress < end)
     at, where = np.unique(progress[before], return_inverse=True)
-    if at.size < FEWEST_TESTS:
+    if at.size < criteria.FEWEST_TESTS:
         return None
     mean = np.bincount(where, weights=values[before]) / np.bincount(where)
     damage = (1.0 - mean / initial) / (1.0 - fraction)
@@ -199,19 +184,19 @@ def declared_end(
     posterior = _drawn(history)
     ends = ends_of_life(posterior, fraction, offset=offset, horizon=horizon)
     early = np.log(np.clip(ends, at, horizon) / at)
-    weight = posterior.weight * np.exp(-early / DECLARED_EARLY)
-    total = float(weight.sum()) + DECLARED_UNSEEN
-    mean = (float(weight @ early) + DECLARED_UNSEEN * DECLARED_EARLY) / total
-    square = (float(weight @ early**2) + 2.0 * DECLARED_UNSEEN * DECLARED_EARLY**2) / total
+    weight = posterior.weight * np.exp(-early / criteria.DECLARED_EARLY)
+    total = float(weight.sum()) + criteria.DECLARED_UNSEEN
+    mean = (float(weight @ early) + criteria.DECLARED_UNSEEN * criteria.DECLARED_EARLY) / total
+    square = (float(weight @ early**2) + 2.0 * criteria.DECLARED_UNSEEN * criteria.DECLARED_EARLY**2) / total
     return at * math.exp(mean), math.sqrt(max(0.0, square - mean**2))
 
 
 def representative(lives: Sequence[EndedLife]) -> list[EndedLife]:
     """The lives; of more than MOST_ENDED, so many, evenly taken by their ends."""
-    if len(lives) <= MOST_ENDED:
+    if len(lives) <= criteria.MOST_ENDED:
         return list(lives)
     ordered = sorted(lives, key=lambda life: life.end)
-    places = np.round(np.linspace(0, len(ordered) - 1, MOST_ENDED)).astype(int)
+    places = np.round(np.linspace(0, len(ordered) - 1, criteria.MOST_ENDED)).astype(int)
     return [ordered[place] for place in places.tolist()]
 
 
@@ -243,7 +228,7 @@ class Kin:
         agreed, left = float(agreeing.sum()), float(weight[ahead].sum())
         by_law = self.lawful * _ANYWHERE * agreed / left if agreed > 0.0 else 0.0
         by_course = (1.0 - self.lawful) * math.exp(min(self.log_odds, _MOST_LOG_ODDS))
-        odds = (by_law + by_course) * (1.0 - OTHER_KIND) / OTHER_KIND
+        odds = (by_law + by_course) * (1.0 - criteria.OTHER_KIND) / criteria.OTHER_KIND
         of_kind = odds / (1.0 + odds)
         shared = left * of_kind / (by_law + by_course)
         parts = [np.where(ahead, 1.0 - of_kind, 1.0) * weight, shared * by_course * self.weight]
@@ -270,7 +255,10 @@ def _as_its_kind(
     tests: tuple[Measurement, ...], as_of: float, lives: tuple[EndedLife, ...], offset: tuple[float, ...] | None
 ) -> Kin | None:
     exact = np.array([not life.censored for life in lives], dtype=bool)
-    if np.count_nonzero(exact) < FEWEST_ENDED or len({test.progress for test in tests}) < FEWEST_TESTS:
+    if (
+        np.count_nonzero(exact) < criteria.FEWEST_ENDED
+        or len({test.progress for test in tests}) < criteria.FEWEST_TESTS
+    ):
         return None
     decline = _Decline.of(tests, None if offset is None else np.array(offset), lives[0].fraction)
     if decline is None:
@@ -278,7 +266,7 @@ def _as_its_kind(
     log_ends = np.log([life.end for life in lives])
     variance = np.array([life.deviation**2 for life in lives])
     centre = float(np.median(log_ends[exact]))
-    of_ends = _predictive(log_ends - centre, variance, exact, VAGUE, END_WORTH)
+    of_ends = _predictive(log_ends - centre, variance, exact, criteria.VAGUE, criteria.END_WORTH)
     now, earliest = math.log(as_of), math.log(decline.span) - _BEFORE
     latest = max(float(log_ends.max()), now) + _BEYOND
     log_end = np.linspace(earliest, latest, _ENDS)
@@ -286,7 +274,7 @@ def _as_its_kind(
     courses = [life for life, counts in zip(lives, exact, strict=True) if counts]
     kin = decline.nodes(log_end, np.concatenate([[life.course(clock) for life in courses], _plain_courses(clock)]))
     pace = np.array([*(life.final_pace for life in courses), *_PLAIN_PACES])
-    wander = np.repeat(COURSE_STRETCH_SD, COURSE_SCATTERS.size) * math.sqrt(1.0 + 2.0 / len(courses))
+    wander = np.repeat(criteria.COURSE_STRETCH_SD, criteria.COURSE_SCATTERS.size) * math.sqrt(1.0 + 2.0 / len(courses))
     middle, deviation, share = kin.crossings(decline, log_end, pace, as_of, wander)
     places = now + (latest + _BEYOND - now) * np.linspace(0.0, 1.0, _PLACES + 1)[1:] ** 1.5
     density = np.exp(-0.5 * np.square((places[:, None] - middle) / deviation)) @ (share / deviation)
@@ -306,7 +294,8 @@ def _as_its_kind(
         ends=np.exp(places),
         weight=stated / stated.sum(),
         log_odds=float(log_odds),
-        lawful=(LAWFUL_WORTH[0] + sum(life.lawful for life in courses)) / (sum(LAWFUL_WORTH) + len(courses)),
+        lawful=(criteria.LAWFUL_WORTH[0] + sum(life.lawful for life in courses))
+        / (sum(criteria.LAWFUL_WORTH) + len(courses)),
         predictive=of_ends,
         centre=math.exp(centre),
     )
@@ -353,8 +342,8 @@ class _Decline:
 
     def nodes(self, log_end: FloatArray, courses: FloatArray) -> "_Nodes":
         """The evidence of the tests for courses [j, e, n] of ends [e]."""
-        size = np.repeat(COURSE_DISCREPANCIES, COURSE_SCATTERS.size)
-        scatter = np.tile(COURSE_SCATTERS, COURSE_DISCREPANCIES.size)
+        size = np.repeat(criteria.COURSE_DISCREPANCIES, criteria.COURSE_SCATTERS.size)
+        scatter = np.tile(criteria.COURSE_SCATTERS, criteria.COURSE_DISCREPANCIES.size)
         size = size * ((self.span * np.exp(-log_end)) ** 1.5)[:, None]
         weight = 1.0 / (np.square(size)[..., None] * self.walk + np.square(scatter)[:, None])
         b, x, d = np.moveaxis(courses @ self.turn, 0, 2), self.features, self.damage
@@ -365,12 +354,12 @@ class _Decline:
         bb = weight @ np.square(b) - np.einsum("ekjp,ekpq,ekjq->ekj", of_b, inverse, of_b, optimize=True)
         bd = weight @ (b * d[:, None]) - np.einsum("ekjp,ekp->ekj", of_b, solved)
         dd = ((weight * d) @ d - (of_d * solved).sum(axis=2))[..., None]
-        precision = bb + COURSE_SIZE_SD**-2
+        precision = bb + criteria.COURSE_SIZE_SD**-2
         taller = (bd - bb) / precision
         fixed = np.log(weight).sum(axis=2) + np.linalg.slogdet(inverse)[1]
         log_evidence = 0.5 * (fixed[..., None] - dd + 2.0 * bd - bb + taller * (bd - bb) - np.log(precision))
         return _Nodes(
-            log_evidence=log_evidence - math.log(COURSE_SIZE_SD),
+            log_evidence=log_evidence - math.log(criteria.COURSE_SIZE_SD),
             size=size,
             weight=weight,
             taller=taller,
@@ -505,8 +494,8 @@ def severity_exponent(ends: FloatArray, work: FloatArray) -> tuple[float, float]
     """
     x = np.log(work) - np.log(work).mean()
     spread = float(x @ x)
-    if x.size < FEWEST_SEVERITIES or spread == 0.0:
-        raise ValueError(f"lives under different work are needed, {FEWEST_SEVERITIES} or more, got {x.size}")
+    if x.size < criteria.FEWEST_SEVERITIES or spread == 0.0:
+        raise ValueError(f"lives under different work are needed, {criteria.FEWEST_SEVERITIES} or more, got {x.size}")
     y = np.log(ends) - np.log(ends).mean()
     slope = float(x @ y) / spread
     left = y - slope * x

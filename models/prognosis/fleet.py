@@ -27,16 +27,7 @@ from scipy.optimize import brentq
 from scipy.special import gammaln, log_expit, logsumexp
 
 from models.arrays import FloatArray
-from models.prognosis.criteria import (
-    DOUBT,
-    FEWEST_TESTS_TO_LEARN,
-    HYPER_CENTRE,
-    HYPER_CLUTCHES,
-    HYPER_SD,
-    SETTLED,
-    TRUST,
-    WIDER,
-)
+from models.prognosis import criteria
 from models.tracking.courses import WITHOUT_EXPONENT, Course, unit_of_change
 from models.tracking.criteria import REACH
 from models.tracking.filters.grid import Grid
@@ -65,7 +56,7 @@ class FleetPrior:
     @property
     def share(self) -> float:
         """The learned population's share of the mixture with the weak prior."""
-        return TRUST * self.clutches / (self.clutches + DOUBT)
+        return criteria.TRUST * self.clutches / (self.clutches + criteria.DOUBT)
 
     def in_unit(self, cycles: float) -> "FleetPrior":
         """The same population with φ counted in units of so many cycles."""
@@ -75,7 +66,7 @@ class FleetPrior:
         """The normal nearest to the population, WIDER than it, for a filter of a series that begins with `first`."""
         believed = weak(first, falling=True)
         size = believed.size
-        deviation = (WIDER * np.sqrt(np.diag(self.scale) * self.freedom / (self.freedom - 2.0))).tolist()
+        deviation = (criteria.WIDER * np.sqrt(np.diag(self.scale) * self.freedom / (self.freedom - 2.0))).tolist()
         mean = self.mean.tolist()
         return replace(
             believed,
@@ -145,8 +136,10 @@ class Taught:
 
 def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
     """What a clutch's measurements of mean COF say about x. Raises ValueError below FEWEST_TESTS_TO_LEARN of them."""
-    if len(history) < FEWEST_TESTS_TO_LEARN:
-        raise ValueError(f"a clutch needs {FEWEST_TESTS_TO_LEARN} tests to teach a fleet's prior, got {len(history)}")
+    if len(history) < criteria.FEWEST_TESTS_TO_LEARN:
+        raise ValueError(
+            f"a clutch needs {criteria.FEWEST_TESTS_TO_LEARN} tests to teach a fleet's prior, got {len(history)}"
+        )
     prior = replace(weak(history[0], falling=True), eq_6_share=1.0)
     drawn = _GRID.posterior(_GRID.from_history(prior, history), _DRAWS, np.random.default_rng(seed))
     sound = drawn.initial > 0.0
@@ -161,7 +154,7 @@ def learn(histories: Sequence[Sequence[Measurement]]) -> FleetPrior:
 
     Those with fewer than FEWEST_TESTS_TO_LEARN measurements are left out. Raises ValueError where none is left.
     """
-    return population([taught(history) for history in histories if len(history) >= FEWEST_TESTS_TO_LEARN])
+    return population([taught(history) for history in histories if len(history) >= criteria.FEWEST_TESTS_TO_LEARN])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,7 +167,7 @@ class PopulationFit:
     @property
     def converged(self) -> bool:
         """Whether further rounds would hardly change it."""
-        return self.change < SETTLED
+        return self.change < criteria.SETTLED
 
 
 def population(fleet: Sequence[Taught]) -> FleetPrior:
@@ -185,14 +178,14 @@ def population(fleet: Sequence[Taught]) -> FleetPrior:
 def fit_population(fleet: Sequence[Taught], rounds: int = _ROUNDS) -> PopulationFit:
     """`population` after so many rounds, and whether it has converged. Raises ValueError where `fleet` is empty."""
     if not fleet:
-        raise ValueError(f"a fleet needs a clutch with {FEWEST_TESTS_TO_LEARN} tests or more")
+        raise ValueError(f"a fleet needs a clutch with {criteria.FEWEST_TESTS_TO_LEARN} tests or more")
     centre = weak(Measurement(progress=0.0, value=1.0, variance=0.0), falling=True)
     believed = np.array([centre.change_mean, centre.log_scale_mean, centre.log_exponent_mean, centre.log_scatter_mean])
     learned = FleetPrior(
         clutches=len(fleet),
         mean=believed,
         scale=np.diag([centre.change_sd, centre.log_scale_sd, centre.log_exponent_sd, centre.log_scatter_sd]) ** 2,
-        freedom=HYPER_CLUTCHES,
+        freedom=criteria.HYPER_CLUTCHES,
     )
     change = math.inf
     for _ in range(rounds):
@@ -218,14 +211,14 @@ def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArra
         off = clutch.x - means[index]
         spread += (weight * off.T) @ off
     middle = means.mean(axis=0)
-    centre = HYPER_CENTRE + n
+    centre = criteria.HYPER_CENTRE + n
     off, pull = means - middle, middle - believed
-    scatter = np.diag(HYPER_SD**2) * (HYPER_CLUTCHES - d + 1.0) + spread + off.T @ off
-    scatter += HYPER_CENTRE * n / centre * np.outer(pull, pull)
-    freedom = HYPER_CLUTCHES + n - d + 1.0
+    scatter = np.diag(criteria.HYPER_SD**2) * (criteria.HYPER_CLUTCHES - d + 1.0) + spread + off.T @ off
+    scatter += criteria.HYPER_CENTRE * n / centre * np.outer(pull, pull)
+    freedom = criteria.HYPER_CLUTCHES + n - d + 1.0
     return FleetPrior(
         clutches=n,
-        mean=(HYPER_CENTRE * believed + n * middle) / centre,
+        mean=(criteria.HYPER_CENTRE * believed + n * middle) / centre,
         scale=scatter * (centre + 1.0) / (centre * freedom),
         freedom=freedom,
     )

@@ -12,17 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.records.criteria import (
-    FASTEST,
-    FEWEST_SAMPLES,
-    JITTER,
-    LARGEST_SWAP,
-    LARGEST_VALUE,
-    SLOWEST,
-    SPIKE,
-    SPIKE_DURATION,
-    SPIKE_EDGE,
-)
+from models.records import criteria
 from models.records.runs import Record
 
 Note = tuple[str, str]
@@ -73,15 +63,7 @@ def clean(record: Record) -> tuple[Record, float, tuple[Note, ...]]:
     """
     kept = plan_cleaning(record)
     if kept.rows is not None:
-        oil, plate = record.oil_temperature, record.plate_temperature
-        record = Record(
-            time=kept.of(record.time),
-            pressure=kept.of(record.pressure),
-            speed=kept.of(record.speed),
-            torque=kept.of(record.torque),
-            oil_temperature=None if oil is None else kept.of(oil),
-            plate_temperature=None if plate is None else kept.of(plate),
-        )
+        record = record.take(kept.rows)
     return record, kept.period, kept.notes
 
 
@@ -92,13 +74,15 @@ def plan_cleaning(record: Sampled) -> Cleaning:
     back, and samples that lie less than 1 µs or more than 10 s apart.
     """
     size = record.time.size
-    if size < FEWEST_SAMPLES:
-        raise UnusableRecordError(f"time must have at least {FEWEST_SAMPLES} samples, got {size}")
+    if size < criteria.FEWEST_SAMPLES:
+        raise UnusableRecordError(f"time must have at least {criteria.FEWEST_SAMPLES} samples, got {size}")
     _require_measurements("time", record.time)
     order, period, notes = _in_order(record.time)
     ordered = Cleaning(rows=order, period=period, notes=())
-    if not FASTEST <= period <= SLOWEST:
-        raise UnusableRecordError(f"samples must lie {FASTEST:g} to {SLOWEST:g} s apart, got {period:.3g} s")
+    if not criteria.FASTEST <= period <= criteria.SLOWEST:
+        raise UnusableRecordError(
+            f"samples must lie {criteria.FASTEST:g} to {criteria.SLOWEST:g} s apart, got {period:.3g} s"
+        )
     spikes: NDArray[np.bool_] = np.zeros(size, dtype=np.bool_)
     removed = []
     for name in _CHANNELS:
@@ -106,7 +90,7 @@ def plan_cleaning(record: Sampled) -> Cleaning:
         if channel is None:
             continue
         _require_measurements(name, channel)
-        where = _spikes(ordered.of(channel), max(3, min(12, round(SPIKE_DURATION / period))))
+        where = _spikes(ordered.of(channel), max(3, min(12, round(criteria.SPIKE_DURATION / period))))
         if where.size:
             removed.append(f"{where.size} of {name}")
             spikes[where] = True
@@ -119,9 +103,9 @@ def plan_cleaning(record: Sampled) -> Cleaning:
 
 
 def _require_measurements(name: str, channel: FloatArray) -> None:
-    if max(float(channel.max()), -float(channel.min())) > LARGEST_VALUE:
+    if max(float(channel.max()), -float(channel.min())) > criteria.LARGEST_VALUE:
         raise UnusableRecordError(
-            f"{name} must lie within ±{LARGEST_VALUE:g}, got {float(channel[np.abs(channel).argmax()])}"
+            f"{name} must lie within ±{criteria.LARGEST_VALUE:g}, got {float(channel[np.abs(channel).argmax()])}"
         )
 
 
@@ -138,7 +122,7 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
     if swapped:
         fallback = np.maximum.accumulate(time) - time
         worst = int(fallback.argmax())
-        if fallback[worst] > max(LARGEST_SWAP, 10 * period):
+        if fallback[worst] > max(criteria.LARGEST_SWAP, 10 * period):
             raise UnusableRecordError(
                 f"time must run forwards, but time[{worst}] = {time[worst]} s lies {fallback[worst]:.6g} s before an "
                 "earlier sample of the record"
@@ -151,7 +135,7 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
     if regular.any():
         period = float(steps.mean(where=regular))
         scatter = float(steps.std(where=regular, mean=period)) / period
-        if scatter > JITTER or swapped or repeated:
+        if scatter > criteria.JITTER or swapped or repeated:
             sentence = f"Sampling intervals scatter by {scatter:.1%}; {repeated} repeated and {swapped} swapped times."
             notes.append(("clock_jitter", sentence))
     lost = round((time[-1] - time[0]) / period) + 1 - time.size
@@ -171,7 +155,7 @@ def _spikes(channel: FloatArray, longest: int) -> NDArray[np.intp]:
     moved = np.abs(channel[1::stride] - channel[:-1:stride])
     if scale == 0.0 and moved.any():  # a coarse recorder: its count
         scale = float(moved[moved > 0].min())
-    edges = _jumps(channel, SPIKE_EDGE * scale)
+    edges = _jumps(channel, criteria.SPIKE_EDGE * scale)
     if edges.size > channel.size // 20:  # more than spikes: a signal that moves by itself
         edges = _jumps(channel, float(np.quantile(moved, 0.95)))
     if edges.size == 0:
@@ -182,7 +166,7 @@ def _spikes(channel: FloatArray, longest: int) -> NDArray[np.intp]:
     window = channel[around]
     middle = np.median(window, axis=1)
     spread = 1.4826 * np.median(np.abs(window - middle[:, np.newaxis]), axis=1)
-    return suspects[np.abs(channel[suspects] - middle) > SPIKE * np.maximum(spread, scale)]
+    return suspects[np.abs(channel[suspects] - middle) > criteria.SPIKE * np.maximum(spread, scale)]
 
 
 def _jumps(channel: FloatArray, most: float) -> NDArray[np.intp]:

@@ -13,27 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.records import criteria
 from models.records.cleaning import Cleaning, Note, Sampled
-from models.records.criteria import (
-    BLOCK_DURATION,
-    CREST_SHARE,
-    FEWEST_WINDOW_BLOCKS,
-    GAP_BLOCKS,
-    GAP_DURATION,
-    LEAVING_DEVIATIONS,
-    MOST_CRESTS,
-    NO_PRESSURE_SHARE,
-    NO_STEP_SHARE,
-    OVERSHOOT_SHARE,
-    PLAIN_STEP_SHARE,
-    RAMP_PIECES,
-    RAMP_SHARE,
-    SHORTEST_DWELL,
-    STANDSTILL_SHARE,
-    STEP_DEVIATIONS,
-    UNLOADED,
-    WINDOW_DURATION,
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +46,7 @@ class Dwell:
 def average(record: Sampled, cleaning: Cleaning) -> Blocks:
     """Means over blocks of about 10 ms of the kept rows of a record; a remainder at its end is left out."""
     period = cleaning.period
-    size = max(1, round(BLOCK_DURATION / period))
+    size = max(1, round(criteria.BLOCK_DURATION / period))
     time = cleaning.of(record.time)
     count = time.size // size
     share = np.full(size, 1.0 / size)
@@ -80,7 +61,7 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
         off = blocks_of(channel) - mean(channel)[:, np.newaxis]
         return np.asarray(np.einsum("ij,ij->i", off, off) / size, dtype=np.float64)
 
-    late = np.flatnonzero(np.diff(time) > max(GAP_DURATION, GAP_BLOCKS * size * period)) + 1
+    late = np.flatnonzero(np.diff(time) > max(criteria.GAP_DURATION, criteria.GAP_BLOCKS * size * period)) + 1
     gap: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
     gap[np.minimum(late // size, count - 1)] = True
     oil, plate = record.oil_temperature, record.plate_temperature
@@ -100,13 +81,15 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
 
 def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
     """The dwells in motion, and under pressure where there is any, in the order of time, and notes on those left out."""
-    if blocks.time.size < SHORTEST_DWELL:
+    if blocks.time.size < criteria.SHORTEST_DWELL:
         return [], []
-    window = max(FEWEST_WINDOW_BLOCKS, round(WINDOW_DURATION / blocks.duration))
+    window = max(criteria.FEWEST_WINDOW_BLOCKS, round(criteria.WINDOW_DURATION / blocks.duration))
     pressure, speed = _Channel(blocks.pressure, window), _Channel(blocks.speed, window)
-    idle = _highest(blocks.pressure, window) < UNLOADED
-    channels, least = ((speed,), -math.inf) if idle else ((pressure, speed), NO_PRESSURE_SHARE * pressure.highest)
-    active = (np.abs(blocks.pressure) > least) & (np.abs(blocks.speed) > STANDSTILL_SHARE * speed.highest)
+    idle = _highest(blocks.pressure, window) < criteria.UNLOADED
+    channels, least = (
+        ((speed,), -math.inf) if idle else ((pressure, speed), criteria.NO_PRESSURE_SHARE * pressure.highest)
+    )
+    active = (np.abs(blocks.pressure) > least) & (np.abs(blocks.speed) > criteria.STANDSTILL_SHARE * speed.highest)
     steady = ~blocks.gap
     for channel in channels:
         channel.judge(active)
@@ -131,7 +114,7 @@ class _Channel:
         self.values = values
         self.highest = float(np.quantile(np.abs(values), 0.995))
         self.steady: NDArray[np.bool_] = np.ones(values.size, dtype=np.bool_)
-        self.threshold = NO_STEP_SHARE * self.highest
+        self.threshold = criteria.NO_STEP_SHARE * self.highest
         self.window = window
         self._levels: dict[tuple[int, int], tuple[float, float]] = {}
 
@@ -144,14 +127,19 @@ class _Channel:
         apart = (apart / window)[np.clip(np.arange(size) - window, 0, size - 2 * window)]
         # A quarter of a normal variable's absolute values lies below 0.3186 deviations: ramps are above that.
         deviation = float(np.quantile(apart[active] if active.any() else apart, 0.25)) / 0.3186
-        self.threshold = max(self.threshold, min(STEP_DEVIATIONS * deviation, PLAIN_STEP_SHARE * self.highest))
+        self.threshold = max(
+            self.threshold, min(criteria.STEP_DEVIATIONS * deviation, criteria.PLAIN_STEP_SHARE * self.highest)
+        )
         self.steady = apart <= self.threshold
 
     def level(self, core: tuple[int, int]) -> tuple[float, float]:
         """The level of a core and how far a block may lie off it; only after `judge`."""
         if core not in self._levels:
             part = self.values[slice(*core)]
-            self._levels[core] = float(np.median(part)), max(LEAVING_DEVIATIONS * float(part.std()), self.threshold)
+            self._levels[core] = (
+                float(np.median(part)),
+                max(criteria.LEAVING_DEVIATIONS * float(part.std()), self.threshold),
+            )
         return self._levels[core]
 
 
@@ -210,7 +198,9 @@ def _sorted_out(
     for row, dwell in enumerate(dwells):
         where = slice(dwell.start, dwell.stop)
         following = [
-            later for later in dwells[row + 1 : row + 1 + MOST_CRESTS] if not blocks.gap[dwell.stop : later.start].any()
+            later
+            for later in dwells[row + 1 : row + 1 + criteria.MOST_CRESTS]
+            if not blocks.gap[dwell.stop : later.start].any()
         ]
         if settled is not None and _crest(channels, settled, dwell, following):
             left["overshoot"].append(float(blocks.time[dwell.start]))
@@ -218,9 +208,9 @@ def _sorted_out(
         settled = dwell
         if float(blocks.pressure[where].mean()) <= least:
             reason = "no_pressure"
-        elif abs(float(blocks.speed[where].mean())) <= STANDSTILL_SHARE * speed.highest:
+        elif abs(float(blocks.speed[where].mean())) <= criteria.STANDSTILL_SHARE * speed.highest:
             reason = "standstill"
-        elif dwell.stop - dwell.start < SHORTEST_DWELL:
+        elif dwell.stop - dwell.start < criteria.SHORTEST_DWELL:
             reason = "dwell_too_short"
         elif any(_ramps(channel, where) for channel in channels):
             reason = "not_steady"
@@ -236,14 +226,16 @@ def _sorted_out(
 def _crest(channels: tuple[_Channel, ...], before: Dwell, dwell: Dwell, following: list[Dwell]) -> bool:
     """Whether a dwell is only a crest of an overshoot, or the trough after it, between the dwell before and the first long
     dwell that follows: speed or pressure went beyond the latter's level."""
-    long = (later for later in following if dwell.stop - dwell.start < CREST_SHARE * (later.stop - later.start))
+    long = (
+        later for later in following if dwell.stop - dwell.start < criteria.CREST_SHARE * (later.stop - later.start)
+    )
     after = next(long, None)
     if after is None:
         return False
     beyond = False
     for channel in channels:
         first, here, last = (float(channel.values[part.start : part.stop].mean()) for part in (before, dwell, after))
-        if abs(here - last) > OVERSHOOT_SHARE * abs(last - first) + channel.threshold:
+        if abs(here - last) > criteria.OVERSHOOT_SHARE * abs(last - first) + channel.threshold:
             return False
         on_the_way = np.copysign(1.0, last - first) * (channel.values[before.stop : dwell.stop] - last)
         beyond |= abs(last - first) > 2 * channel.threshold and bool(on_the_way.max() > channel.threshold)
@@ -261,10 +253,10 @@ _SENTENCES = {
 
 def _ramps(channel: _Channel, where: slice) -> bool:
     part = channel.values[where]
-    pieces = min(RAMP_PIECES, part.size // 2)
+    pieces = min(criteria.RAMP_PIECES, part.size // 2)
     means = part[: part.size // pieces * pieces].reshape(pieces, -1).mean(axis=1)
-    noise = LEAVING_DEVIATIONS * float(np.diff(part).std()) * np.sqrt(pieces / part.size)
-    return bool(np.ptp(means) > max(2 * channel.threshold, noise, RAMP_SHARE * abs(float(part.mean()))))
+    noise = criteria.LEAVING_DEVIATIONS * float(np.diff(part).std()) * np.sqrt(pieces / part.size)
+    return bool(np.ptp(means) > max(2 * channel.threshold, noise, criteria.RAMP_SHARE * abs(float(part.mean()))))
 
 
 def listed(times: FloatArray) -> str:

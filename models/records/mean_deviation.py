@@ -13,16 +13,7 @@ import numpy as np
 from scipy.special import digamma, polygamma
 
 from models.arrays import FloatArray
-from models.records.criteria import (
-    BATCH_TIMES,
-    BATCHES,
-    FADED,
-    FEWEST_FOR_MODERATION,
-    LEAST_FACTOR,
-    LONGEST_LAG,
-    LOST_SHARE,
-    SOKAL,
-)
+from models.records import criteria
 from models.records.slow_noise import slow_correlation
 
 
@@ -45,13 +36,13 @@ class Correlation:
     def factor(self, count: int) -> float:
         """The variance of a mean over `count` values over that of as many independent ones."""
         lag = np.arange(1, self.lags.size + 1)
-        return max(float(1 + 2 * (np.maximum(1 - lag / count, 0.0) * self.lags).sum()), LEAST_FACTOR)
+        return max(float(1 + 2 * (np.maximum(1 - lag / count, 0.0) * self.lags).sum()), criteria.LEAST_FACTOR)
 
 
 def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correlation:
     """ρ of all residuals together, each of which `removed` coefficients of low frequency were fitted to."""
     length = float(np.median([residual.size for residual in residuals]))
-    longest = max(1, min(LONGEST_LAG, int(LOST_SHARE * length / (2 * removed))))
+    longest = max(1, min(criteria.LONGEST_LAG, int(criteria.LOST_SHARE * length / (2 * removed))))
     total, count = np.zeros(longest + 1), np.zeros(longest + 1)
     for residual in residuals:
         power = float(residual @ residual)
@@ -67,13 +58,13 @@ def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correla
     # What was removed takes `removed` Λ/n off every lag, Λ = γ_0 + 2 Σ γ_k being unknown: solved for each window.
     lag = np.arange(longest + 1)
     raw = covariance[0] + 2 * np.cumsum(np.where(lag > 0, covariance, 0.0))
-    long_run = raw / np.maximum(1 - (1 + 2 * lag) * removed / length, 0.5 * (1 - LOST_SHARE))
+    long_run = raw / np.maximum(1 - (1 + 2 * lag) * removed / length, 0.5 * (1 - criteria.LOST_SHARE))
     lost = removed * long_run / length
     times = np.maximum(long_run / (covariance[0] + lost), 1.0)
-    enough = lag >= SOKAL * times
+    enough = lag >= criteria.SOKAL * times
     window = int(enough.argmax()) if enough.any() else longest
     lags = (covariance[1 : window + 1] + lost[window]) / (covariance[0] + lost[window])
-    if enough.any() or abs(float(lags[-1])) < FADED:
+    if enough.any() or abs(float(lags[-1])) < criteria.FADED:
         return Correlation(lags=lags)
     return Correlation(lags=slow_correlation(residuals), resolved=False)
 
@@ -124,7 +115,7 @@ def _moments(residual: FloatArray, correlation: Correlation) -> tuple[float, flo
     size = residual.size
     factor = correlation.factor(size)
     variance = float(residual @ residual) / max(size - 2 * factor, 0.5 * size)
-    length = max(1, size // BATCHES, int(np.ceil(BATCH_TIMES * factor)))
+    length = max(1, size // criteria.BATCHES, int(np.ceil(criteria.BATCH_TIMES * factor)))
     batches = size // length
     if batches < 4 or variance == 0.0:
         return variance, factor, 1.0, 1.0
@@ -135,7 +126,7 @@ def _moments(residual: FloatArray, correlation: Correlation) -> tuple[float, flo
 
 def _moderated(ratio: FloatArray, freedom: FloatArray) -> FloatArray:
     """Each dwell's own ratio [n], shrunk towards 1 by as much as ratios scatter by chance (G. Smyth 2004)."""
-    if ratio.size < FEWEST_FOR_MODERATION:
+    if ratio.size < criteria.FEWEST_FOR_MODERATION:
         return np.ones_like(ratio)
     log_ratio = np.log(np.maximum(ratio, 1e-6)) - digamma(freedom / 2) + np.log(freedom / 2)
     excess = float(log_ratio.var(ddof=1) - polygamma(1, freedom / 2).mean())

@@ -18,24 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.records.criteria import (
-    CORNERS,
-    FOLLOWED,
-    INSIDE,
-    LINGERS,
-    MOST_SWING_SHARE,
-    NEIGHBOURS,
-    OFF_SWING,
-    OUTLIER,
-    PERIODIC,
-    REST_INSIDE,
-    REST_SHARE,
-    SPEED_HARMONICS,
-    STILL_SHARE,
-    SWING_SHARE,
-    TAKEN,
-    WHOLE,
-)
+from models.records import criteria
 from models.records.outliers import beside, leading, near
 
 #: Cuts of ends that do not swing, and steps of a fit, at most.
@@ -112,7 +95,7 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
     """
     moving = _without_rest(time, value, float(time[-1] - time[0])) if time.size else slice(0)
     t, y = time[moving], value[moving]
-    if t.size < 4 * (2 * SPEED_HARMONICS + 2) or t[-1] <= t[0]:
+    if t.size < 4 * (2 * criteria.SPEED_HARMONICS + 2) or t[-1] <= t[0]:
         return f"The speed moves for {t.size} samples only: too few for a period."
     if not (np.ptp(y) > 0 and np.isfinite(np.ptp(y))):
         return "The speed does not move."
@@ -120,10 +103,10 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
     if not isinstance(fitted, str):
         moving = _without_rest(t, y, min(1 / fitted.frequency, float(t[-1] - t[0])))
         t, y = t[moving], y[moving]
-        fitted = _without_ends(t, y, fitted.frequency, SPEED_HARMONICS)
+        fitted = _without_ends(t, y, fitted.frequency, criteria.SPEED_HARMONICS)
     if isinstance(fitted, str):
         return fitted
-    if not (fitted.noise < PERIODIC * fitted.amplitude and fitted.outliers <= 0.2 * t.size):
+    if not (fitted.noise < criteria.PERIODIC * fitted.amplitude and fitted.outliers <= 0.2 * t.size):
         miss = fitted.noise / max(fitted.amplitude, 1e-3 * fitted.noise, 1e-300)
         return f"The speed does not swing periodically: the error of its best fit is {miss:.0%} of its swing (RMS)."
     return _with_corners(t, y, fitted)
@@ -151,18 +134,18 @@ def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
     t, y = time[inside], value[inside]
     most = t.size / (3 * max((t[-1] - t[0]) * cycle.frequency, 1.0))
     richer = cycle
-    for count in CORNERS:
-        if richer.noise < FOLLOWED * cycle.amplitude or count > most or t.size < 4 * (2 * count + 2):
+    for count in criteria.CORNERS:
+        if richer.noise < criteria.FOLLOWED * cycle.amplitude or count > most or t.size < 4 * (2 * count + 2):
             break
         again = _refine(t, y, richer.frequency, count, _EXACT)
-        if isinstance(again, str) or again.noise > TAKEN * richer.noise:
+        if isinstance(again, str) or again.noise > criteria.TAKEN * richer.noise:
             break
         richer = again
     if richer is cycle:
         return cycle
     # a corner at an end may have been cut off as no part of the swing
     whole = _without_ends(time, value, richer.frequency, richer.cosine.size)
-    return richer if isinstance(whole, str) or whole.noise > richer.noise / TAKEN else whole
+    return richer if isinstance(whole, str) or whole.noise > richer.noise / criteria.TAKEN else whole
 
 
 def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
@@ -171,8 +154,8 @@ def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
 
     residual = value - cycle.value(cycle.phase(time))
     usual = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
-    smooth = median_filter(residual, size=min(NEIGHBOURS, residual.size), mode="nearest")
-    off = np.abs(smooth) > max(OUTLIER * usual, OFF_SWING * cycle.amplitude)
+    smooth = median_filter(residual, size=min(criteria.NEIGHBOURS, residual.size), mode="nearest")
+    off = np.abs(smooth) > max(criteria.OUTLIER * usual, criteria.OFF_SWING * cycle.amplitude)
     before, after = leading(off), leading(off[::-1])
     return slice(before, off.size - after) if before + after < off.size else slice(0, off.size)
 
@@ -183,17 +166,17 @@ def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
 
     smooth = median_filter(value, size=min(3, value.size), mode="nearest")
     swing, noise = float(np.ptp(smooth)), float(np.median(np.abs(value - smooth)))
-    least = min(SWING_SHARE * swing + 4 * noise, MOST_SWING_SHARE * swing)
+    least = min(criteria.SWING_SHARE * swing + 4 * noise, criteria.MOST_SWING_SHARE * swing)
     # the share of a period that a sine spends so near an end of its swing, where the record begins or stops there
-    lingers = LINGERS * math.acos(1 - 2 * least / swing) / (2 * math.pi) if swing > 0 else REST_SHARE
-    lowest, still = float(smooth.min()), max(4 * noise, STILL_SHARE * swing)
+    lingers = criteria.LINGERS * math.acos(1 - 2 * least / swing) / (2 * math.pi) if swing > 0 else criteria.REST_SHARE
+    lowest, still = float(smooth.min()), max(4 * noise, criteria.STILL_SHARE * swing)
 
     def rest(course: FloatArray, passed: FloatArray) -> int:
         """Samples of the course that stand still at its beginning, `passed` [n] s being its clock."""
         off = np.abs(course - course[0])
-        inside = INSIDE[0] * swing < course[0] - lowest < INSIDE[1] * swing
+        inside = criteria.INSIDE[0] * swing < course[0] - lowest < criteria.INSIDE[1] * swing
         moved = np.flatnonzero(off > least)
-        longest = REST_INSIDE * (time[-1] - time[0]) if inside else min(REST_SHARE, lingers) * period
+        longest = criteria.REST_INSIDE * (time[-1] - time[0]) if inside else min(criteria.REST_SHARE, lingers) * period
         if not moved.size or passed[moved[0]] <= longest:
             return 0
         return int(moved[0]) if inside else int(np.flatnonzero(off[: moved[0]] <= still)[-1]) + 1
@@ -282,7 +265,7 @@ def _cycle(
     """The swing with its whole periods counted."""
     interval = sample_interval(time)
     sampled = (float(time[-1] - time[0]) + interval) * frequency
-    periods = math.floor(sampled + 1 - WHOLE)
+    periods = math.floor(sampled + 1 - criteria.WHOLE)
     if periods < 1:
         return f"No whole period: {sampled:.2f} periods of {1 / frequency:.4g} s were recorded."
     count = coefficients.size // 2

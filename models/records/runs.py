@@ -5,6 +5,7 @@ the rows of one pressure level. Measured pressures scatter about their level, so
 """
 
 from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,31 +17,47 @@ from models.records.pressure_levels import levels_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plateaus:
+class _Columns:
+    """Columns of one length, of finite numbers, with one row at least; or ValueError."""
+
+    pressure: FloatArray
+    speed: FloatArray
+    torque: FloatArray
+
+    def __post_init__(self) -> None:
+        rows = self.torque.shape
+        if len(rows) != 1 or rows[0] == 0:
+            raise ValueError(f"torque must be a column with at least one row, got shape {rows}")
+        for name, column in self._measured().items():
+            if column.shape != rows:
+                raise ValueError(f"{name} must have the shape of torque {rows}, got {column.shape}")
+            if not np.isfinite(column).all():
+                raise ValueError(f"{name} must be finite")
+
+    def _measured(self) -> dict[str, FloatArray]:
+        columns = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: column for name, column in columns.items() if column is not None}
+
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Self:
+        """The same at `rows`, at least one."""
+        return replace(self, **{name: column[rows] for name, column in self._measured().items()})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plateaus(_Columns):
     """Steady plateaus, one row each: pressure [n] Pa, speed [n] rad/s, torque [n] Nm.
 
     `torque_sd` [n] Nm is the deviation of each torque where it is known, `oil_temperature` and `plate_temperature` [n] K
     where they are measured. Raises ValueError on unequal lengths, no rows or values that are not finite.
     """
 
-    pressure: FloatArray
-    speed: FloatArray
-    torque: FloatArray
     torque_sd: FloatArray | None = None
     oil_temperature: FloatArray | None = None
     plate_temperature: FloatArray | None = None
 
-    def __post_init__(self) -> None:
-        _require_columns(self, ("pressure", "speed", "torque", "torque_sd", "oil_temperature", "plate_temperature"))
-
-    def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> "Plateaus":
-        """The plateaus at `rows`, at least one."""
-        columns = {field.name: getattr(self, field.name) for field in fields(self)}
-        return replace(self, **{name: column[rows] for name, column in columns.items() if column is not None})
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Record:
+class Record(_Columns):
     """A sampled record: time [n] s, pressure [n] Pa, speed [n] rad/s, torque [n] Nm, perhaps oil_temperature and
     plate_temperature [n] K.
 
@@ -49,14 +66,8 @@ class Record:
     """
 
     time: FloatArray
-    pressure: FloatArray
-    speed: FloatArray
-    torque: FloatArray
     oil_temperature: FloatArray | None = None
     plate_temperature: FloatArray | None = None
-
-    def __post_init__(self) -> None:
-        _require_columns(self, ("time", "pressure", "speed", "torque", "oil_temperature", "plate_temperature"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,20 +82,6 @@ class Curve:
     velocity: FloatArray
     torque: FloatArray
     torque_sd: FloatArray | None = None
-
-
-def _require_columns(columns: Plateaus | Record, names: tuple[str, ...]) -> None:
-    rows = columns.torque.shape
-    if len(rows) != 1 or rows[0] == 0:
-        raise ValueError(f"torque must be a column with at least one row, got shape {rows}")
-    for name in names:
-        column = getattr(columns, name)
-        if column is None:
-            continue
-        if column.shape != rows:
-            raise ValueError(f"{name} must have the shape of torque {rows}, got {column.shape}")
-        if not np.isfinite(column).all():
-            raise ValueError(f"{name} must be finite")
 
 
 def plate_rise(measured: Plateaus | Record) -> FloatArray | None:

@@ -15,21 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.records.criteria import (
-    DRIFT_SHARE,
-    FEWEST_FOR_SPREAD,
-    GAIN_CAP,
-    LATE,
-    LEAST_DROPPED,
-    LEAST_SPREAD,
-    LEFT_IN_MEAN,
-    MOST_DROPPED,
-    MOST_SPREAD,
-    OWN_GAIN,
-    POOLED_GAIN,
-    SLOWEST_TRANSIENT,
-    SLOWEST_TRANSIENT_SHARE,
-)
+from models.records import criteria
 from models.records.mean_deviation import Stretch, pooled_correlation
 
 #: Time constants that are tried.
@@ -62,14 +48,16 @@ def fit_transients(stretches: Sequence[Stretch], shortest: float) -> Transients:
     """The settling transient of every dwell. `shortest` [s] is a block."""
     longest = max(float(stretch.time[-1]) for stretch in stretches)
     taus = np.geomspace(
-        shortest, max(min(SLOWEST_TRANSIENT_SHARE * longest, SLOWEST_TRANSIENT), 4 * shortest), _SCANNED
+        shortest,
+        max(min(criteria.SLOWEST_TRANSIENT_SHARE * longest, criteria.SLOWEST_TRANSIENT), 4 * shortest),
+        _SCANNED,
     )
     basis = _Bases(taus)
     scans = [_scan(stretch, basis.of(stretch.time)) for stretch in stretches]
     correlation = pooled_correlation([scan.residual for scan in scans], removed=3)
     long_run = np.array([[scan.variance * correlation.factor(scan.residual.size)] for scan in scans])
     gain = np.stack([scan.gain for scan in scans]) / long_run
-    drifts = taus < DRIFT_SHARE * np.array([[stretch.time[-1]] for stretch in stretches])
+    drifts = taus < criteria.DRIFT_SHARE * np.array([[stretch.time[-1]] for stretch in stretches])
     worth = np.stack([scan.total for scan in scans]) / long_run - drifts  # a drift is worth 1 by chance
     place = np.log(taus)
     common = _common(worth, gain, place)
@@ -86,7 +74,7 @@ def _decays(time: FloatArray, taus: FloatArray) -> tuple[FloatArray, FloatArray]
     decay -= decay.mean(axis=1, keepdims=True)
     trend = time - time.mean()
     trend /= max(float(np.sqrt(trend @ trend)), 1e-300)
-    drifts = taus < DRIFT_SHARE * time[-1]
+    drifts = taus < criteria.DRIFT_SHARE * time[-1]
     decay -= np.where(drifts, decay @ trend, 0.0)[:, np.newaxis] * trend
     return decay, trend
 
@@ -113,7 +101,7 @@ class _Bases:
             square = np.maximum(np.einsum("jk,jk->j", decay, decay), 1e-12)
             if len(self._cache) == _CACHED_CLOCKS:
                 self._cache.clear()
-            drifts = self._taus < DRIFT_SHARE * time[-1]
+            drifts = self._taus < criteria.DRIFT_SHARE * time[-1]
             self._cache[key] = _Basis(decay=decay, trend=trend, square=square, drifts=drifts)
         return self._cache[key]
 
@@ -141,20 +129,22 @@ class _Common:
 
 def _common(worth: FloatArray, gain: FloatArray, place: FloatArray) -> _Common | None:
     """What explains all dwells [n, J] best, None where no transient does."""
-    share = np.minimum(GAIN_CAP / np.maximum(worth.max(axis=1), GAIN_CAP), 1.0)
+    share = np.minimum(criteria.GAIN_CAP / np.maximum(worth.max(axis=1), criteria.GAIN_CAP), 1.0)
     together = share @ worth
     dwells = worth.shape[0]
-    if share @ gain[:, together.argmax()] - dwells <= POOLED_GAIN * np.sqrt(2.0 * dwells):
+    if share @ gain[:, together.argmax()] - dwells <= criteria.POOLED_GAIN * np.sqrt(2.0 * dwells):
         return None
     own = np.array([_peak(row, place) for row in worth])
-    visible = gain[np.arange(dwells), worth.argmax(axis=1)] > OWN_GAIN
-    determined = own[visible & (own[:, 1] < MOST_SPREAD)]
+    visible = gain[np.arange(dwells), worth.argmax(axis=1)] > criteria.OWN_GAIN
+    determined = own[visible & (own[:, 1] < criteria.MOST_SPREAD)]
     centre = _peak(together, place)[0]
-    if determined.shape[0] < FEWEST_FOR_SPREAD:
-        return _Common(place=centre, spread=MOST_SPREAD)
+    if determined.shape[0] < criteria.FEWEST_FOR_SPREAD:
+        return _Common(place=centre, spread=criteria.MOST_SPREAD)
     # The median of a squared normal variable is 0.455 of its variance.
     beyond = float(np.median((determined[:, 0] - centre) ** 2)) / 0.455 - float(np.median(determined[:, 1] ** 2))
-    return _Common(place=centre, spread=min(max(float(np.sqrt(max(beyond, 0.0))), LEAST_SPREAD), MOST_SPREAD))
+    return _Common(
+        place=centre, spread=min(max(float(np.sqrt(max(beyond, 0.0))), criteria.LEAST_SPREAD), criteria.MOST_SPREAD)
+    )
 
 
 def _peak(worth: FloatArray, place: FloatArray) -> tuple[float, float]:
@@ -173,14 +163,14 @@ def _fit(
     stretch: Stretch, place: FloatArray, worth: FloatArray, gain: FloatArray, long_run: float, common: _Common | None
 ) -> tuple[float, float, float, float]:
     """τ, its upper limit, A and its deviation."""
-    if common is None and gain[worth.argmax()] < OWN_GAIN:
+    if common is None and gain[worth.argmax()] < criteria.OWN_GAIN:
         return np.nan, np.nan, 0.0, 0.0
     held = 0.0 if common is None else ((place - common.place) / common.spread) ** 2
     at, deviation = _peak(worth - held, place)
     tau = float(np.exp(at))
     decay = _decays(stretch.time, np.array([tau]))[0][0]
     square = max(float(decay @ decay), 1e-12)
-    slowest = tau * float(np.exp(LATE * deviation))
+    slowest = tau * float(np.exp(criteria.LATE * deviation))
     return tau, slowest, float(decay @ stretch.torque) / square, float(np.sqrt(long_run / square))
 
 
@@ -189,15 +179,15 @@ def dropped(transients: Transients, duration: FloatArray, deviation: FloatArray)
 
     duration [n] s of the dwells, deviation [n] Nm of a mean over the whole of each. At most three quarters are dropped.
     """
-    share = np.linspace(LEAST_DROPPED, MOST_DROPPED, 71)
-    size, wide = np.abs(transients.amplitude), LATE * transients.amplitude_sd
+    share = np.linspace(criteria.LEAST_DROPPED, criteria.MOST_DROPPED, 71)
+    size, wide = np.abs(transients.amplitude), criteria.LATE * transients.amplitude_sd
     shift = np.zeros((duration.size, share.size))
     for amplitude, tau in ((size + wide, transients.time_constant), (size, transients.slowest)):
         left = mean_decay(tau[:, np.newaxis], share * duration[:, np.newaxis], duration[:, np.newaxis])
         shift = np.maximum(shift, amplitude[:, np.newaxis] * left)
-    small = shift <= LEFT_IN_MEAN * deviation[:, np.newaxis] / np.sqrt(1 - share)
+    small = shift <= criteria.LEFT_IN_MEAN * deviation[:, np.newaxis] / np.sqrt(1 - share)
     small[np.isnan(transients.time_constant)] = True
-    return np.asarray(np.where(small.any(axis=1), share[small.argmax(axis=1)], MOST_DROPPED) * duration)
+    return np.asarray(np.where(small.any(axis=1), share[small.argmax(axis=1)], criteria.MOST_DROPPED) * duration)
 
 
 def mean_decay(tau: FloatArray, start: FloatArray, stop: FloatArray) -> FloatArray:

@@ -12,25 +12,7 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 
 from models.arrays import FloatArray
-from models.tracking.criteria import (
-    EITHER_CHANGE,
-    EQ_6_SHARE,
-    EXPONENT_MEDIAN,
-    FALLING_CHANGE,
-    INITIAL_SD,
-    KNEE_HAZARD,
-    LAW_SHARE,
-    LEAST_RELATIVE,
-    LOG_EXPONENT_SD,
-    LOG_SCALE_SD,
-    LOG_SCATTER_SD,
-    OUTLYING_SHARE,
-    OUTLYING_SIZE,
-    PROPORTIONAL_SHARE,
-    SCALE_MEDIAN,
-    SCATTER_MEDIAN,
-    STEP_SIZE,
-)
+from models.tracking import criteria
 from models.tracking.measurement import Measurement
 
 
@@ -56,10 +38,10 @@ class Prior:
     log_exponent_sd: float
     log_scatter_mean: float
     log_scatter_sd: float
-    outlying_share: float = OUTLYING_SHARE
-    outlying_size: float = OUTLYING_SIZE
-    law_share: float = LAW_SHARE
-    step_size: float = STEP_SIZE
+    outlying_share: float = criteria.OUTLYING_SHARE
+    outlying_size: float = criteria.OUTLYING_SIZE
+    law_share: float = criteria.LAW_SHARE
+    step_size: float = criteria.STEP_SIZE
     eq_6_share: float = 1.0
     proportional_share: float = 0.0
     knee_hazard: float = 0.0
@@ -87,7 +69,7 @@ class Prior:
 
     def relative(self, value: FloatArray | float) -> FloatArray:
         """The square of a value over the size, any shape: what the variance of scatter that is a share of it grows with."""
-        return np.maximum(np.square(np.asarray(value) / self.size), LEAST_RELATIVE)
+        return np.maximum(np.square(np.asarray(value) / self.size), criteria.LEAST_RELATIVE)
 
     def to_array(self) -> FloatArray:
         """The numbers in the order of the fields [17]."""
@@ -122,19 +104,19 @@ def weak(first: Measurement, *, falling: bool) -> Prior:
     a, two deviations covering 0.06 % to 1.5 %.
     """
     size = math.hypot(first.value, math.sqrt(first.variance)) or 1.0
-    change_mean, change_sd = FALLING_CHANGE if falling else EITHER_CHANGE
+    change_mean, change_sd = criteria.FALLING_CHANGE if falling else criteria.EITHER_CHANGE
     return Prior(
         initial_mean=first.value,
-        initial_sd=INITIAL_SD * size,
+        initial_sd=criteria.INITIAL_SD * size,
         change_mean=change_mean * size,
         change_sd=change_sd * size,
-        log_scale_mean=math.log(SCALE_MEDIAN),
-        log_scale_sd=LOG_SCALE_SD,
-        log_exponent_mean=math.log(EXPONENT_MEDIAN),
-        log_exponent_sd=LOG_EXPONENT_SD,
-        log_scatter_mean=math.log(SCATTER_MEDIAN * size),
-        log_scatter_sd=LOG_SCATTER_SD,
-        eq_6_share=EQ_6_SHARE if falling else 1.0,
-        proportional_share=PROPORTIONAL_SHARE if falling else 0.0,
-        knee_hazard=KNEE_HAZARD if falling else 0.0,
+        log_scale_mean=math.log(criteria.SCALE_MEDIAN),
+        log_scale_sd=criteria.LOG_SCALE_SD,
+        log_exponent_mean=math.log(criteria.EXPONENT_MEDIAN),
+        log_exponent_sd=criteria.LOG_EXPONENT_SD,
+        log_scatter_mean=math.log(criteria.SCATTER_MEDIAN * size),
+        log_scatter_sd=criteria.LOG_SCATTER_SD,
+        eq_6_share=criteria.EQ_6_SHARE if falling else 1.0,
+        proportional_share=criteria.PROPORTIONAL_SHARE if falling else 0.0,
+        knee_hazard=criteria.KNEE_HAZARD if falling else 0.0,
     )
