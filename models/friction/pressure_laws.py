@@ -83,12 +83,7 @@ def fit_pressure_laws(fits: Sequence[StribeckFit]) -> PressureLaws | None:
     determined = [_determined(fits, index) for index in range(len(PARAMETER_NAMES))]
     if any(np.unique(pressure).size < FEWEST_PRESSURES for pressure, _, _ in determined):
         return None
-    return PressureLaws(
-        static_torque=fit_linear(*determined[0]),
-        coulomb_ratio=fit_asymptotic(*determined[1]),
-        stribeck_velocity=fit_linear(*determined[2]),
-        viscous_coefficient=fit_linear(*determined[3]),
-    )
+    return _laws(determined)
 
 
 def law_covariances(fits: Sequence[StribeckFit], laws: PressureLaws) -> dict[str, FloatArray]:
@@ -123,13 +118,17 @@ def law_covariance(
 def laws_of(levels: FloatArray, columns: FloatArray) -> PressureLaws:
     """The laws through parameters [l, 4] in the order of PARAMETER_NAMES at FEWEST_PRESSURES or more levels [l] Pa, equally
     weighted."""
-    equal = np.ones_like(levels)
-    m_s, m_c, v_s, c_v = columns.T
+    return _laws([(levels, column, np.ones_like(levels)) for column in columns.T])
+
+
+def _laws(points: Sequence[tuple[FloatArray, FloatArray, FloatArray]]) -> PressureLaws:
+    """The laws through pressures, values and deviations, in the order of PARAMETER_NAMES."""
+    m_s, m_c, v_s, c_v = points
     return PressureLaws(
-        static_torque=fit_linear(levels, m_s, equal),
-        coulomb_ratio=fit_asymptotic(levels, m_c, equal),
-        stribeck_velocity=fit_linear(levels, v_s, equal),
-        viscous_coefficient=fit_linear(levels, c_v, equal),
+        static_torque=fit_linear(*m_s),
+        coulomb_ratio=fit_asymptotic(*m_c),
+        stribeck_velocity=fit_linear(*v_s),
+        viscous_coefficient=fit_linear(*c_v),
     )
 
 

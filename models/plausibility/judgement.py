@@ -27,8 +27,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.plausibility import criteria, pace
 from models.plausibility.course import Fit, Predicted, Tests, log_normal, log_outlying, log_physics
-from models.plausibility.runs import Reading, Run, Slip
-from models.plausibility.slips import OF_CLUTCH, OTHER_CLUTCH, OTHER_CYCLES, slips_of
+from models.plausibility.slips import OF_CLUTCH, OTHER_CLUTCH, OTHER_CYCLES, Reading, Run, Slip, slips_of
 
 #: No slip is proved by a number that underflows.
 _LEAST = math.log(1e-250)

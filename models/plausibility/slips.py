@@ -1,12 +1,12 @@
-"""The slips that a run may suffer on its way in: each the run as it would have been without it, and how often it is made."""
+"""Runs as numbers alone, and the slips that they may suffer on their way in: each the run as it would have been without it,
+and how often it is made."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 
 from models.plausibility import criteria
 from models.plausibility.pace import log_anywhere
-from models.plausibility.runs import Run, Slip
 
 #: Slips that mistake the cycles; `other_cycles` may have been any.
 EXTRA_ZERO, LOST_ZERO, SWAPPED, OTHER_CYCLES = "extra_zero", "lost_zero", "swapped_digits", "other_cycles"
@@ -15,6 +15,56 @@ OF_CYCLES = (EXTRA_ZERO, LOST_ZERO, SWAPPED, OTHER_CYCLES)
 OTHER_CLUTCH, OTHER_TEST = "other_clutch", "other_test"
 #: Slips of which the run without them is not known, so that only what they leave of it has a probability.
 OF_CLUTCH = (OTHER_CLUTCH, OTHER_TEST)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """What a run shows, as sent or without a slip.
+
+    `cycles` since new; `log_cof` the logarithm of mean COF as the stationary tests of its life show it and `spread` its own
+    deviation, None for a run that shows none; `log_protocol` the log density of its pressures, speeds and oil.
+    """
+
+    cycles: float
+    log_cof: float | None = None
+    spread: float = 0.0
+    log_protocol: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slip:
+    """A slip, the log of its prior odds, the unit that it is about, and the run without it."""
+
+    name: str
+    log_prior: float
+    likely: Reading
+    unit: str = ""
+
+
+def none() -> tuple[Slip, ...]:
+    """No slips."""
+    return ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """A run: `sent` as it came in, and the `slips` of its channels that are possible, made when they are asked for.
+
+    `tests` says whether its COF is evidence of the course (a stationary test); `block` [cycles] what a block of duty says it
+    ran; `moment` [s] when it was started, None where it does not say; `shift` an event that may move the level of COF,
+    `rebuild` one that begins a life; `fixed` a run that somebody confirmed: it is not held, and seldom slipped all the same.
+    """
+
+    name: str
+    kind: str
+    sent: Reading
+    slips: Callable[[], Iterable[Slip]] = none
+    tests: bool = False
+    block: float | None = None
+    moment: float | None = None
+    shift: bool = False
+    rebuild: bool = False
+    fixed: bool = False
 
 
 def slips_of(run: Run, expected: float) -> Iterator[Slip]:

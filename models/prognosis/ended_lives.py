@@ -33,7 +33,7 @@ Source: A. Gelman et al., Bayesian Data Analysis (2013) ch. 3, for the predictiv
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -112,30 +112,12 @@ class EndedLife:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON can carry it."""
-        return {
-            "end": self.end,
-            "fraction": self.fraction,
-            "progress": list(self.progress),
-            "damage": list(self.damage),
-            "energy": self.energy,
-            "deviation": self.deviation,
-            "censored": self.censored,
-            "lawful": self.lawful,
-        }
+        return asdict(self) | {"progress": list(self.progress), "damage": list(self.damage)}
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> "EndedLife":
         """The inverse of `to_dict`, exactly."""
-        return cls(
-            end=stored["end"],
-            fraction=stored["fraction"],
-            progress=tuple(stored["progress"]),
-            damage=tuple(stored["damage"]),
-            energy=stored["energy"],
-            deviation=stored["deviation"],
-            censored=stored["censored"],
-            lawful=stored["lawful"],
-        )
+        return cls(**{**stored, "progress": tuple(stored["progress"]), "damage": tuple(stored["damage"])})
 
 
 def ended_life(

@@ -177,8 +177,13 @@ def _places(beside: Discrepancy | None, horizon: float) -> tuple[FloatArray, NDA
     span = 1.0 if beside is None else beside.span
     at = np.zeros(0) if beside is None else beside.at[(beside.at > 0.0) & (beside.at <= horizon)]
     end = min(span, horizon)
-    places = np.unique(np.concatenate([np.linspace(0.0, end, _BEHIND), np.geomspace(end, horizon, _AHEAD), at]))
+    places = np.union1d(path_places(end, horizon, _BEHIND, _AHEAD), at)
     return places, np.searchsorted(places, at)
+
+
+def path_places(now: float, horizon: float, behind: int, ahead: int) -> FloatArray:
+    """ζ [behind + ahead - 1] at which paths are computed: evenly from 0 to `now` > 0, and in equal ratios to `horizon`."""
+    return np.concatenate([np.linspace(0.0, now, behind), np.geomspace(now, horizon, ahead)[1:]])
 
 
 def first_below(paths: FloatArray, progress: FloatArray, level: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ J. Comput. Phys. 22 (1976) 245-268, and M. R. Shirts, J. D. Chodera, J. Chem. Ph
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -106,22 +106,13 @@ class FleetPrior:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON can carry it."""
-        return {
-            "clutches": self.clutches,
-            "mean": self.mean.tolist(),
-            "scale": self.scale.tolist(),
-            "freedom": self.freedom,
-        }
+        return asdict(self) | {"mean": self.mean.tolist(), "scale": self.scale.tolist()}
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> "FleetPrior":
         """The inverse of `to_dict`, exactly."""
-        return cls(
-            clutches=stored["clutches"],
-            mean=np.array(stored["mean"], dtype=np.float64),
-            scale=np.array(stored["scale"], dtype=np.float64),
-            freedom=stored["freedom"],
-        )
+        mean, scale = (np.array(stored[name], dtype=np.float64) for name in ("mean", "scale"))
+        return cls(clutches=stored["clutches"], mean=mean, scale=scale, freedom=stored["freedom"])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Mean COF from the Stribeck parameters' own tracks: a second way to the number that its direct track gives.
+"""Mean COF from the Stribeck parameters' own tracks, a second way to the number that its direct track gives; and dμ/dv.
 
 Each parameter at each reference pressure follows its own eq. 6. At any ζ eq. 3 gives the torque over the protocol's
 velocities, and the mean of that over velocities and pressures, divided by the torque of a unit COF, is mean COF again:
@@ -18,14 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.friction.stribeck import StribeckParameters, torque
+from models.friction.stribeck import StribeckParameters, slope, torque
 from models.prognosis.criteria import BAND, FAR_APART, FEWEST_TESTS, HORIZON
-from models.prognosis.first_passage import first_below, weighted_quantiles
+from models.prognosis.first_passage import first_below, path_places, weighted_quantiles
 from models.prognosis.joint_draws import draw_jointly, paired, shrunk_correlation
 from models.tracking.posterior import Posterior
 
 #: Draws, and places of the paths: evenly up to now, and in equal ratios beyond.
-_DRAWS, _BEHIND, _AHEAD = 200, 24, 48
+_DRAWS, _BEHIND, _AHEAD = 200, 24, 49
 #: Tests before and after, over which a fit's covariance is averaged: each is estimated from the residuals of its own test
 #: and errs as that test does, so that tests that happen to scatter less count for too much. Tried on 100 lives as those of
 #: `make score PARTS=shudder`, held at 40/60/80/120 % of life: none 86/87/83/72 %, one 91/92/89/83, two 93/97/93/87, three
@@ -107,7 +107,8 @@ def mean_cof_paths(
     velocities [v] m/s are the protocol's, `reference_cofs` the reference test's mean COF at every pressure. Levels with
     fewer than FEWEST_TESTS tests at different progress take no part.
     """
-    progress = _places(now, horizon)
+    start = max(now, 1.0)
+    progress = path_places(start, max(horizon, 2.0 * start), _BEHIND, _AHEAD)
     parts, at_levels = [], []
     for level in levels:
         if np.unique(level.progress).size >= FEWEST_TESTS:
@@ -149,13 +150,6 @@ def disagreement(
     )
 
 
-def _places(now: float, horizon: float) -> FloatArray:
-    """ζ at which the paths are computed: evenly up to now, and in equal ratios to the horizon."""
-    start = max(now, 1.0)
-    last = max(horizon, 2.0 * start)
-    return np.concatenate([np.linspace(0.0, now, _BEHIND), np.geomspace(start * 1.02, last, _AHEAD)])
-
-
 def parameter_draws(level: PressureLevel, rng: np.random.Generator) -> list[Posterior]:
     """Joint draws of the four parameters at a pressure, under the fits' covariance and the scatter between tests."""
     values, covariance = level.parameters, _averaged(level.covariance)
@@ -179,9 +173,8 @@ def _averaged(covariance: FloatArray) -> FloatArray:
 
 def _mean_torque(draws: Sequence[Posterior], progress: FloatArray, velocities: FloatArray) -> FloatArray:
     """Mean torque over velocities [m] at ζ [k] of every draw of the four parameters; [k, n]."""
-    values = np.maximum(np.stack([track.values(progress) for track in draws]), 0.0)
-    parameters = StribeckParameters.from_array(values)
-    total: FloatArray = np.zeros(values.shape[1:])
+    parameters = _parameters_at(draws, progress)
+    total: FloatArray = np.zeros(np.shape(parameters.static_torque))
     for velocity in velocities.tolist():
         total += torque(np.array(velocity), parameters)
     return np.asarray(total / velocities.size)
@@ -198,3 +191,21 @@ def _together(levels: Sequence[PressureLevel], at_levels: Sequence[FloatArray], 
     wanted = shrunk_correlation(np.array(whole).reshape(-1, len(levels)))
     index = paired(np.stack([paths[_BEHIND - 1] for paths in at_levels], axis=1), wanted, rng)
     return np.asarray(np.mean([paths[:, index[:, i]] for i, paths in enumerate(at_levels)], axis=0))
+
+
+def slope_paths(level: PressureLevel, velocity: float, progress: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """dμ/dv [s/m] at velocity > 0 [m/s] and progress ζ [k] >= 0 of n equal draws; [k, n].
+
+    The slope's own course is no eq. 6: it rises a little, passes through 0 and falls steeply, so that a track of the fitted
+    slopes alone sees shudder far too late. `level` holds at least FEWEST_TESTS tests at different progress. Raises
+    ValueError where velocity is not positive.
+    """
+    if not velocity > 0.0:
+        raise ValueError(f"velocity must be positive, got {velocity}")
+    parameters = _parameters_at(parameter_draws(level, rng), progress)
+    return np.asarray(slope(np.array(velocity), parameters) / level.torque_per_cof)
+
+
+def _parameters_at(draws: Sequence[Posterior], progress: FloatArray) -> StribeckParameters:
+    """The four parameters of every draw at ζ [k]; [k, n] each."""
+    return StribeckParameters.from_array(np.maximum(np.stack([track.values(progress) for track in draws]), 0.0))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.prognosis.first_passage import first_below
+from models.prognosis.first_passage import first_below, path_places
 from models.tracking.sampling import systematic
 
 #: Places of a path: evenly over what was measured, and then in equal ratios up to the horizon.
@@ -55,9 +55,7 @@ class Limit:
 def places(now: float, horizon: float) -> FloatArray:
     """ζ [k] at which paths are computed: evenly up to `now` >= 0, where a life stands, and in equal ratios to `horizon`."""
     start = max(now, 1.0)
-    return np.concatenate(
-        [np.linspace(0.0, start, _BEHIND), np.geomspace(start, max(horizon, 2.0 * start), _AHEAD)[1:]]
-    )
+    return path_places(start, max(horizon, 2.0 * start), _BEHIND, _AHEAD)
 
 
 def first_reached(

@@ -123,18 +123,11 @@ class Posterior:
 
     def taken(self, index: NDArray[np.intp], weight: FloatArray) -> "Posterior":
         """The draws at `index`, with new weights."""
-        return Posterior(
-            weight=weight,
-            initial=self.initial[index],
-            change=self.change[index],
-            scale=self.scale[index],
-            exponent=self.exponent[index],
-            scatter=self.scatter[index],
-            proportional=None if self.proportional is None else self.proportional[index],
-            discrepancy=None if self.discrepancy is None else self.discrepancy.taken(index),
-            forced=self.forced,
-            branch=None if self.branch is None else self.branch[index],
-        )
+        columns = ("initial", "change", "scale", "exponent", "scatter", "proportional", "branch")
+        rows = {name: getattr(self, name) for name in columns}
+        taken: dict[str, Any] = {name: column[index] for name, column in rows.items() if column is not None}
+        beside = None if self.discrepancy is None else self.discrepancy.taken(index)
+        return replace(self, weight=weight, discrepancy=beside, **taken)
 
     def beside(self, offsets: FloatArray) -> FloatArray:
         """Of what is added to each branch [b, k], or to all of them [1, k], what is added to each draw; [k, n] or [k, 1]."""

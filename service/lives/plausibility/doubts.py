@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 from models.clutch import Geometry
 from models.plausibility import criteria
 from models.plausibility.judgement import Verdict, judge
-from models.plausibility.runs import Reading
-from models.plausibility.slips import OF_CYCLES, OTHER_CYCLES
+from models.plausibility.slips import OF_CYCLES, OTHER_CYCLES, Reading
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 from service.errors import Notice
 from service.lives.history import Event, Shown, beyond_end, order

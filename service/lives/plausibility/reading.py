@@ -15,7 +15,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.plausibility import criteria as odds
-from models.plausibility.runs import Reading, Run, Slip, none
+from models.plausibility.slips import Reading, Run, Slip, none
 from models.records.criteria import UNLOADED
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 from service.errors import Notice

@@ -18,8 +18,7 @@ from models.friction.slope import cof_slope
 from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.back_cast import BackCast
 from models.prognosis.criteria import FEWEST_TESTS
-from models.prognosis.from_parameters import PressureLevel
-from models.prognosis.slope_paths import slope_paths
+from models.prognosis.from_parameters import PressureLevel, slope_paths
 from models.tracking.filters.grid import Grid
 from models.tracking.posterior import Posterior, mixture
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, bar, whole

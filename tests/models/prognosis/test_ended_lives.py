@@ -13,7 +13,7 @@ from models.arrays import FloatArray
 from models.degradation import general_order
 from models.degradation.general_order import Degradation, first_passage
 from models.prognosis import ended_lives
-from models.prognosis.criteria import COURSE_SIZE_SD, OTHER_KIND, VAGUE
+from models.prognosis.criteria import COURSE_DISCREPANCIES, COURSE_SCATTERS, COURSE_SIZE_SD, OTHER_KIND, VAGUE
 from models.prognosis.ended_lives import (
     EndedLife,
     Kin,
@@ -241,7 +241,7 @@ def test_the_evidence_is_that_of_the_normal_written_out() -> None:
     expected = np.empty(found.shape)
     for e, end in enumerate(np.exp(log_end)):
         walk = 0.5 * low**2 * (3.0 * high - low) / end**3
-        pairs = [(q, s) for q in ended_lives.COURSE_DISCREPANCIES for s in ended_lives.COURSE_SCATTERS]
+        pairs = [(q, s) for q in COURSE_DISCREPANCIES for s in COURSE_SCATTERS]
         for k, (q, s) in enumerate(pairs):
             for j in range(2):
                 b = courses[j, e]
