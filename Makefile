@@ -51,7 +51,7 @@ LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --
 	--custom-compile-command "make lock"
 SLIM := $(LOCK) $(foreach name,$(UNUSED),--no-emit-package $(name))
 
-.PHONY: help docs gallery reference adoption demo shell test quick slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
+.PHONY: help docs gallery reference adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -80,11 +80,15 @@ faults: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 CLUTCHLIFE_FUZZ_MINUTES=$(MINUTES) $(BIN)/python -m pytest -m slow tests/journeys/faults tests/journeys/test_openapi.py \
 		tests/service/readers $(ARGS)
 
-check: $(VENV)/.tests $(JAVASCRIPT)/.package-lock.json
+check: check-python check-javascript
+
+check-python: $(VENV)/.tests
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+check-javascript: $(VENV)/.tests $(JAVASCRIPT)/.package-lock.json
 	$(JAVASCRIPT)/.bin/prettier --config tests/javascript/prettier.json --check "service/dashboard/static/**/*.{js,css,ts}" "tests/javascript/*.json"
 	$(BIN)/python -m tests.javascript.types
 	$(JAVASCRIPT)/.bin/tsc --project tests/javascript

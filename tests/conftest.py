@@ -23,16 +23,21 @@ settings.load_profile("untimed")
 
 #: Fixtures, and values of fixtures, that start a server or a browser.
 OUTSIDE = {"postgresql", "s3", "on_server", "in_bucket", "browser", "server"}
+#: Tests of the service that run on a server, too, in every run; the others do so in `make slow`. Tests of storage always do.
+ON_BOTH = {"test_repeated_run.py", "test_compute_then_store.py", "test_raw_run.py"}
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What needs more than its own process is marked `outside`: `make quick` leaves it out."""
+    """What needs more than its own process is marked `outside`: `make quick` leaves it out. So is what says the same of a
+    server again, as slow."""
     for item in items:
         drawn = getattr(getattr(item, "callspec", None), "params", {})
         used = {*getattr(item, "fixturenames", ()), *(value for value in drawn.values() if isinstance(value, str))}
         if used & OUTSIDE or "journeys" in item.path.parts:
             item.add_marker("outside")
+        if "on_server" in drawn.values() and "service" in item.path.parts and item.path.name not in ON_BOTH:
+            item.add_marker("slow")
 
 
 @pytest.fixture(scope="session")

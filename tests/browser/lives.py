@@ -44,7 +44,7 @@ def worn(http: httpx2.Client, clutch_id: str, last: int = 7000) -> None:
     """A made-up clutch: stationary tests every 1,000 cycles, two dynamic ones, an oil change."""
     http.post("/v1/clutches", json={"clutch_id": clutch_id}).raise_for_status()
     for cycles in range(0, last + 1, 1000):
-        post(http, clutch_id, stationary(cycles))
+        post(http, clutch_id, stationary(cycles, pressures=(4.0, 5.0, 6.0)))
     post(http, clutch_id, loops(0))
     post(http, clutch_id, loops(4000))
     post(http, clutch_id, {"kind": "maintenance", "cycles": 4000, "event": "oil_change", "note": "<b>fresh</b> ATF"})

@@ -27,13 +27,14 @@ TIMES = {"revision", "created_at", "received_at"}
 #: What says that runs are held, and what follows from it while they are.
 OF_HELD_RUNS = {"held_runs", "at_least", "at_least_at", "state", "statement", "warnings", "items"}
 LAST = 7000
+PRESSURES = (4.0, 5.0, 6.0)
 #: Of the first test; the others follow as their cycles do, 1,000 an hour.
 FIRST = datetime(2026, 11, 2, 8, tzinfo=UTC)
 
 
 def right(cycles: int) -> dict[str, Any]:
     """A test as it ought to be sent; its name says nothing of its cycles."""
-    return stationary(cycles, run_id=f"test-{cycles // 1000}") | {"started_at": at(cycles)}
+    return stationary(cycles, run_id=f"test-{cycles // 1000}", pressures=PRESSURES) | {"started_at": at(cycles)}
 
 
 def at(cycles: int) -> str:

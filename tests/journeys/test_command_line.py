@@ -21,6 +21,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_campaign_is_simulated_the_same_each_time(campaign: Path, tmp_path: Path) -> None:
     clutchlife("simulate", "--seed", "7", "--no-dynamic", "--out", tmp_path / "again")
     names = sorted(path.relative_to(campaign) for path in campaign.rglob("*.json"))
@@ -104,6 +105,7 @@ def test_replay_gives_the_same_again_and_backup_a_copy(campaign: Path, tmp_path:
     assert "no clutch is known" in clutchlife("replay", "nobody", "--database", url, code=1)
 
 
+@pytest.mark.slow
 def test_wrong_arguments_are_reported_in_a_line(tmp_path: Path) -> None:
     """No traceback, and no new database where the address was mistyped."""
     absent = f"sqlite:///{tmp_path / 'mistyped.db'}"

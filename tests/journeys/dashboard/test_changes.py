@@ -135,6 +135,7 @@ def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server, r
     assert answers(server.url) == references["after"]
 
 
+@pytest.mark.slow
 def test_a_doubt_is_answered_with_one_click(watched: Watched, server: Server, references: dict[str, Any]) -> None:
     page = opened(watched)
     post_typed(server)

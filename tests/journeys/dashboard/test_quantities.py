@@ -108,6 +108,7 @@ def test_curves_of_one_state_and_its_pressure_law(browser: Browser, life: Server
     watched.close()
 
 
+@pytest.mark.slow
 def test_remaining_life_by_any_quantity_and_pressure_is_chosen_on_the_page(browser: Browser, life: Server) -> None:
     watched = Watched(browser, life.url)
     page = watched.open("/clutches/bench")

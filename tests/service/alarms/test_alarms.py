@@ -176,6 +176,7 @@ def test_a_new_verdict_is_an_alarm(life: TestClient) -> None:
     assert report["verdict"].replace("_", " ") in raised["message"]
 
 
+@pytest.mark.slow
 def test_a_silent_rig_is_an_alarm_and_a_state(life: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outbox, "CLOCK_SECONDS", 0.1)
     rule(life, quantity="silent_hours", above=0.5 / 3600)

@@ -15,8 +15,11 @@ from service.readers.read_file import read_file, reading_of
 from tests.service.readers.sample_files import UNITS, record, write_mdf, write_parquet, write_tdms
 
 Writer = Callable[..., Path]
-WRITERS = pytest.mark.parametrize(
-    ("write", "name"), [(write_tdms, "a.tdms"), (write_mdf, "a.mf4"), (write_parquet, "a.parquet")]
+FORMATS: list[tuple[Writer, str]] = [(write_tdms, "a.tdms"), (write_mdf, "a.mf4"), (write_parquet, "a.parquet")]
+WRITERS = pytest.mark.parametrize(("write", "name"), FORMATS)
+#: What comes after a format was taken apart.
+AFTERWARDS = pytest.mark.parametrize(
+    ("write", "name"), [FORMATS[0], *(pytest.param(*form, marks=pytest.mark.slow) for form in FORMATS[1:])]
 )
 GERMAN = {"M": "kNm", "n": "rad/s", "p": "MPa", "Öltemperatur": "K"}
 
@@ -44,7 +47,7 @@ def test_columns_come_back_bit_for_bit(tmp_path: Path, write: Writer, name: str)
         assert got[channel].tobytes() == column.tobytes()
 
 
-@WRITERS
+@AFTERWARDS
 def test_units_are_converted_and_names_understood(tmp_path: Path, write: Writer, name: str) -> None:
     columns = record(200)
     got = read(write(tmp_path / name, german(columns), units=GERMAN))
@@ -81,13 +84,13 @@ def test_damaged_files_raise_nothing_but_contract_errors(tmp_path: Path, write: 
             assert error.status in (413, 422)  # noqa: PT017
 
 
-@WRITERS
+@AFTERWARDS
 def test_a_unit_that_is_not_known_is_refused(tmp_path: Path, write: Writer, name: str) -> None:
     with pytest.raises(InvalidError, match=r"torque_nm .*'M'.*'furlong'"):
         read(write(tmp_path / name, german(record(50)), units=GERMAN | {"M": "furlong"}))
 
 
-@WRITERS
+@AFTERWARDS
 def test_channels_that_are_not_known_are_left_out_and_listed(tmp_path: Path, write: Writer, name: str) -> None:
     columns = record(50)
     columns["Mz"] = columns.pop("torque_nm")
@@ -97,7 +100,7 @@ def test_channels_that_are_not_known_are_left_out_and_listed(tmp_path: Path, wri
     assert read(path, "torque_nm:Mz")["torque_nm"].tobytes() == columns["Mz"].tobytes()
 
 
-@WRITERS
+@AFTERWARDS
 def test_not_finite_values_are_named(tmp_path: Path, write: Writer, name: str) -> None:
     columns = record(50)
     columns["torque_nm"][17] = np.nan
@@ -105,7 +108,7 @@ def test_not_finite_values_are_named(tmp_path: Path, write: Writer, name: str) -
         read(write(tmp_path / name, columns, units=UNITS))
 
 
-@WRITERS
+@AFTERWARDS
 def test_too_many_values_are_too_large(tmp_path: Path, write: Writer, name: str) -> None:
     path = write(tmp_path / name, record(), units=UNITS)
     with pytest.raises(TooLargeError, match="must not hold more than 100 values"):

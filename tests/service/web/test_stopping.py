@@ -67,6 +67,7 @@ def test_a_stop_amid_posts_ends_with_0_and_keeps_every_acknowledged_run(tmp_path
     assert set(acknowledged) <= stored
 
 
+@pytest.mark.slow
 def test_a_stop_before_the_service_listens_ends_with_0(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "service.cli.main", "serve", "--database", f"sqlite:///{tmp_path / 'a.db'}"]
     starting = subprocess.Popen([*command, "--port", "0"], stderr=subprocess.PIPE, text=True)

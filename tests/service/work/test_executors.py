@@ -162,6 +162,7 @@ def test_a_cluster_of_another_release_is_refused(dask_cluster: LocalCluster, mon
         executor_of(dask_cluster.address)
 
 
+@pytest.mark.slow
 def test_a_worker_of_another_release_that_joins_later_is_refused(
     dask_cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -186,6 +187,7 @@ def test_what_is_no_cluster_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         executor_of("tcp://127.0.0.1:1")
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_ends_is_named() -> None:
     with local_cluster(1) as running, executor_of(running.address) as made:
         outcomes = made.map(functions.pid, range(10_000))

@@ -53,6 +53,7 @@ def test_a_replay_stores_what_one_in_process_does(database: Database) -> None:
         assert client.get(asked.headers["Location"]).json() == job
 
 
+@pytest.mark.slow
 def test_a_clutch_that_is_left_is_named_with_the_reason(in_file: Database, caplog: pytest.LogCaptureFixture) -> None:
     stock(in_file, 2)
     with in_file.writing() as connection:

@@ -69,6 +69,7 @@ def test_the_reference_test_is_withdrawn_and_comes_back(benches: tuple[Bench, Be
     assert slipped.answers() == whole
 
 
+@pytest.mark.slow
 def test_a_late_arrival_is_none_once_the_run_that_made_it_late_is_gone(benches: tuple[Bench, Bench]) -> None:
     bench, _ = benches
     bench.send(body("test", "first", 0.0))
@@ -308,6 +309,7 @@ def trail_of(bench: Bench) -> list[dict[str, Any]]:
     return run_query.trail(bench.database, CLUTCH, limit=1000, after=None)[0]
 
 
+@pytest.mark.slow
 def test_a_zero_too_many_is_held_and_corrected_by_the_rules_in_force(
     benches: tuple[Bench, Bench], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -179,6 +179,7 @@ def test_the_order_of_arrival_does_not_matter_under_a_model_and_replay_gives_the
     assert answers[0][0]["model"] == EXTENDED
 
 
+@pytest.mark.slow
 def test_a_rebuild_ends_the_model(client: TestClient) -> None:
     post_tests(client, 0, 1000, 2000)
     report = diagnosed(client, adopt=True)

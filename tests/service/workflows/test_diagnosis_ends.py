@@ -28,11 +28,11 @@ def _stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("engine", "problem"),
     [
-        ("killed", "SIGKILL"),
+        pytest.param("killed", "SIGKILL", marks=pytest.mark.slow),
         ("raising", "status 1"),
-        ("greedy", "memory"),
+        pytest.param("greedy", "memory", marks=pytest.mark.slow),
         ("computing", "longer than 4 s of processor time"),
-        ("endless", "longer than 6 s by the clock"),
+        pytest.param("endless", "longer than 6 s by the clock", marks=pytest.mark.slow),
     ],
 )
 def test_a_diagnosis_that_breaks_is_told(
@@ -52,8 +52,10 @@ def test_a_diagnosis_that_breaks_is_told(
     ("engine", "status", "level", "said"),
     [
         ("raising", "failed", "ERROR", "RuntimeError: it broke"),
-        ("overflowing", "finished", "WARNING", "RuntimeWarning: overflow encountered"),
-        ("diagnose", "finished", "", ""),
+        pytest.param(
+            "overflowing", "finished", "WARNING", "RuntimeWarning: overflow encountered", marks=pytest.mark.slow
+        ),
+        pytest.param("diagnose", "finished", "", "", marks=pytest.mark.slow),
     ],
 )
 def test_what_goes_wrong_in_a_diagnosis_is_in_the_log(
@@ -141,6 +143,7 @@ def test_what_a_dead_service_left_running_is_made_by_the_next(tmp_path: Path) ->
         assert client.get(f"/v1/jobs/{report['diagnosis_id']}").json()["attempts"] == 2
 
 
+@pytest.mark.slow
 def test_what_ends_the_service_again_and_again_is_given_up(tmp_path: Path) -> None:
     with service(tmp_path) as client:
         report = diagnosed(client)
@@ -151,6 +154,7 @@ def test_what_ends_the_service_again_and_again_is_given_up(tmp_path: Path) -> No
         assert client.get(f"/v1/jobs/{report['diagnosis_id']}").json()["state"] == "failed"
 
 
+@pytest.mark.slow
 def test_who_joins_a_diagnosis_that_runs_has_it_adopted(tmp_path: Path) -> None:
     with service(tmp_path, "slow") as client:
         post_tests(client, 0, 1000, 2000)

@@ -131,6 +131,7 @@ def test_a_worn_end_is_the_same_whether_its_reason_is_said(tested: TestClient) -
     assert post(tested, END)["run_id"] == post(tested, END | {"reason": "worn"}, 200)["run_id"]
 
 
+@pytest.mark.slow
 def test_declared_ends_teach_the_fleet_by_themselves(client: TestClient, database_url: str) -> None:
     """Stopped at 95 % of the way to the threshold; four ends and one clutch that was taken out."""
     for number in range(5):

@@ -146,6 +146,7 @@ def test_a_refresh_that_learns_nothing_new_changes_nothing(url: str) -> None:
         assert client.get(LIFE.format("new"), headers={"If-None-Match": said.headers["etag"]}).status_code == 304
 
 
+@pytest.mark.slow
 def test_a_refresh_that_read_before_another_stored_does_not_undo_it(url: str) -> None:
     with client_of(url) as client:
         for number, scale in enumerate((5000.0, 6000.0, 7000.0)):

@@ -66,6 +66,7 @@ def test_the_level_is_that_of_the_option_or_else_of_the_environment_and_a_start_
     assert " WARNING clutchlife.start: no keys are configured" in open_to_all
 
 
+@pytest.mark.slow
 def test_a_busy_port_is_one_line_before_anything_is_made(tmp_path: Path) -> None:
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))

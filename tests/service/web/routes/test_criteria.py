@@ -16,6 +16,7 @@ from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
 from service.run_files.simulated import simulated_body
 from tests.service.clients import client_on
+from tests.support import one_quick
 
 WAIT = {"Prefer": "wait=60"}
 SHUDDER = {"quantity": "slope", "pressure_bar": 5, "speed_rpm": 100}
@@ -83,7 +84,7 @@ def test_mean_cof_alone_is_one_criterion_and_as_it_was(tested: TestClient) -> No
     assert answer["criterion"]["threshold_mean_cof"] == only["limit"]
 
 
-@pytest.mark.parametrize("method", ["particle", "ukf", "grid"])
+@pytest.mark.parametrize("method", one_quick(["particle", "ukf", "grid"]))
 @pytest.mark.parametrize("quantity", ["static_torque_nm", "film_time"])
 def test_every_filter_tracks_parameters_and_lag(tested: TestClient, method: str, quantity: str) -> None:
     answer = asked(tested, "degradation", quantity=quantity, method=method, draws=20)

@@ -160,6 +160,7 @@ def test_who_asks_for_many_answers_holds_up_nobody_else(client: TestClient, tmp_
     assert [of_one for _, of_one in ended].index(True) <= 3
 
 
+@pytest.mark.slow
 def test_sixty_engagements_are_one_computation_where_they_are_the_same(client: TestClient) -> None:
     """Who asks for an answer that is being made waits for that one."""
     for cycles in (0.0, 2000.0, 4000.0):
