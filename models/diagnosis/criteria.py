@@ -1,16 +1,56 @@
-"""Every number on which a diagnosis decides from the effects on: its meaning, its unit, and where it is from.
+"""Every number on which a diagnosis decides beside those of rows (`design`) and raw records, which have their own
+`criteria.py`, and of single effects, whose priors and shapes stand with them: its meaning, its unit, and where it is from.
 
-Design, baseline, noise, uncatalogued effects and raw records have their own `criteria.py`, the templates of single effects
-their priors beside them. "chosen; no table" says that no record was kept of what else was tried;
-What the whole does on hidden effects (`make blind`): docs/appendix/diagnosis.md.
- λ is the expected log-likelihood ratio [nats]
-of an effect (`pooled_fit.projection`), for the best hypothesis estimated by the drop of its cost.
-
-Numbers that decide about the baseline's laws.
-
-Numbers that decide how noise is estimated.
+The numbers that gate a verdict, with what an ablation of each changes, are the table in docs/appendix/diagnosis.md.
+"chosen; no table" says that no record was kept of what else was tried. λ is the expected log-likelihood ratio [nats] of an
+effect (`pooled_fit.projection`), for the best hypothesis estimated by the drop of its cost.
 """
 
+# --- baseline ---------------------------------------------------------------------------------------------------------
+
+#: b of M̄_c's law over pressure [-] where the data do not determine it: between an exponential and a hyperbola.
+#: Chosen; no table.
+USUAL_CURVATURE = 0.25
+#: b [-] of what is as good as an exponential. Derived: the law differs from e^{-p/p_0} by the share b (p/p_0)²/2.
+EXPONENTIAL = 1e-3
+#: Bounds of b [-]. The upper one: chosen; no table.
+CURVATURE_BOUNDS = (EXPONENTIAL, 5.0)
+#: Half of the early drift of log C is done after this share [-] of the life measured. Chosen: as eq. 6 may have it (a drift
+#: quadratic in life passed for structure); no table.
+EARLY = 0.15
+#: Share of the span of pressures below P⁻, and of the way to the law's pole, for which M̄_c's law goes on where the pressure
+#: at the clutch is less than was read. Chosen: an offset of -1.3 bar was fitted as -0.44 ± 0.04 bar with the tangent from P⁻
+#: on, as -1.1 ± 0.1 bar so.
+BELOW = 0.6
+
+# --- noise ------------------------------------------------------------------------------------------------------------
+
+#: Noise [-] as a share of the torque where too little is left to estimate it. Chosen; no table.
+ASSUMED = 0.01
+#: Free squares (residuals beyond the smooth terms) needed to estimate noise. Chosen; no table.
+FEWEST = 12
+#: Run-to-run scatter of the gain [-] until it is estimated. Chosen: some tenths of a percent are usual; no table.
+FIRST_GAIN = 0.002
+#: What is taken for smooth along a curve: polynomials up to this degree; along a loop: so many harmonics. Chosen; no table.
+SMOOTH_DEGREE = 4
+SMOOTH_HARMONICS = 5
+#: Bins that a period must share with the periods before it to be compared with them. Chosen; no table.
+LEAST_COMPARED_BINS = 8
+#: A row is a spike where it is off its fit and off both its neighbours by more than this many deviations [-] ...
+#: Chosen; no table.
+SPIKE = 5.5
+#: ... while fewer than this share [-] of all rows are. Chosen; no table.
+MOST_SPIKES = 0.02
+#: Log likelihood [nats] that an autocorrelation must gain over none. Chosen; no table.
+CORRELATION_PRICE = 2.0
+#: ... over the one that samples show, where they do: they are more than bins are. Chosen; no table.
+CORRELATION_PRICE_FROM_SAMPLES = 5.0
+#: Log likelihood [nats] that an autocorrelation loses per unit of the log of its variance inflation: slow noise was taken
+#: off with everything smooth, so the data say little about it. Chosen; no table.
+INFLATION_PRICE = 2.0
+#: Kinds of curves or loops (by length and phases), at most, with which an autocorrelation is estimated.
+#: Chosen for time; no table.
+MOST_KINDS = 40
 
 # --- effects -------------------------------------------------------------------------------------------------------------
 
@@ -144,47 +184,3 @@ FAR_FROM_FIT = 5.0
 LARGE_AMPLITUDE = 2.0
 #: Fewer states of use say little of a course over life (chosen).
 FEW_STATES = 3
-
-
-#: b of M̄_c's law over pressure [-] where the data do not determine it: between an exponential and a hyperbola.
-#: Chosen; no table.
-USUAL_CURVATURE = 0.25
-#: b [-] of what is as good as an exponential. Derived: the law differs from e^{-p/p_0} by the share b (p/p_0)²/2.
-EXPONENTIAL = 1e-3
-#: Bounds of b [-]. The upper one: chosen; no table.
-CURVATURE_BOUNDS = (EXPONENTIAL, 5.0)
-#: Half of the early drift of log C is done after this share [-] of the life measured. Chosen: as eq. 6 may have it (a drift
-#: quadratic in life passed for structure); no table.
-EARLY = 0.15
-#: Share of the span of pressures below P⁻, and of the way to the law's pole, for which M̄_c's law goes on where the pressure
-#: at the clutch is less than was read. Chosen: an offset of -1.3 bar was fitted as -0.44 ± 0.04 bar with the tangent from P⁻
-#: on, as -1.1 ± 0.1 bar so.
-BELOW = 0.6
-
-
-#: Noise [-] as a share of the torque where too little is left to estimate it. Chosen; no table.
-ASSUMED = 0.01
-#: Free squares (residuals beyond the smooth terms) needed to estimate noise. Chosen; no table.
-FEWEST = 12
-#: Run-to-run scatter of the gain [-] until it is estimated. Chosen: some tenths of a percent are usual; no table.
-FIRST_GAIN = 0.002
-#: What is taken for smooth along a curve: polynomials up to this degree; along a loop: so many harmonics. Chosen; no table.
-SMOOTH_DEGREE = 4
-SMOOTH_HARMONICS = 5
-#: Bins that a period must share with the periods before it to be compared with them. Chosen; no table.
-LEAST_COMPARED_BINS = 8
-#: A row is a spike where it is off its fit and off both its neighbours by more than this many deviations [-] ...
-#: Chosen; no table.
-SPIKE = 5.5
-#: ... while fewer than this share [-] of all rows are. Chosen; no table.
-MOST_SPIKES = 0.02
-#: Log likelihood [nats] that an autocorrelation must gain over none. Chosen; no table.
-CORRELATION_PRICE = 2.0
-#: ... over the one that samples show, where they do: they are more than bins are. Chosen; no table.
-CORRELATION_PRICE_FROM_SAMPLES = 5.0
-#: Log likelihood [nats] that an autocorrelation loses per unit of the log of its variance inflation: slow noise was taken
-#: off with everything smooth, so the data say little about it. Chosen; no table.
-INFLATION_PRICE = 2.0
-#: Kinds of curves or loops (by length and phases), at most, with which an autocorrelation is estimated.
-#: Chosen for time; no table.
-MOST_KINDS = 40

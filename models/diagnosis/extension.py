@@ -20,7 +20,7 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.baseline.laws import Frame, Laws, scene_of
 from models.diagnosis.campaign import Campaign, Oil, StationaryRun
-from models.diagnosis.design.design import Points, build_design
+from models.diagnosis.design.design import Points, build_design, points_of
 from models.diagnosis.design.facts import Facts, facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import Discrepancy, Kind
@@ -86,7 +86,8 @@ class Extension:
         if not self.has_course:
             return np.zeros(shape[:3])
         grid = np.broadcast_arrays(cycles[:, None, None], pressure[:, None], velocity)
-        points = _steady_points(*(np.ravel(axis) for axis in grid))
+        at, under, moving = (np.ravel(axis) for axis in grid)
+        points = points_of(at.size, cycles=at, pressure=under, velocity=moving)  # not measured: no clock, no neighbours
         changes = self._changes(points, facts_from(self.content["facts"]), Kind.COURSE)
         return np.asarray(changes.reshape(shape).mean(axis=3), dtype=np.float64)
 
@@ -220,27 +221,3 @@ def _laws(stored: Mapping[str, Any]) -> Laws:
     frame = stored["frame"]
     at = Frame(**(frame | {"loop_pressures": np.array(frame["loop_pressures"], dtype=np.float64)}))
     return Laws(theta=np.array(stored["theta"], dtype=np.float64), frame=at)
-
-
-def _steady_points(cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> Points:
-    """Plateaus that were not measured: no temperature but the reference's, no clock, no neighbours."""
-    count = cycles.size
-    whole, none, zero = np.zeros(count, dtype=np.intp), np.full(count, -1, dtype=np.intp), np.zeros(count)
-    nan = np.full(count, np.nan)
-    return Points(
-        run=whole,
-        cycles=cycles,
-        pressure=pressure,
-        engaged=np.ones(count),
-        velocity=velocity,
-        sign=np.ones(count),
-        acceleration=zero,
-        temperature=nan,
-        plate_rise=nan,
-        clock=zero,
-        moment=nan,
-        angular_frequency=zero,
-        phase=zero,
-        loop=none,
-        previous=none,
-    )

@@ -1,17 +1,15 @@
-"""The GMS attractor law in its periodic state, linear in each loop.
-
-    dM/dt = C (1 - M/S) = (S - M)/τ,   τ = S/C                               (models.loops.attractor)
-
-Given τ at evenly spaced phases, M is the periodic solution R[S] of a linear relaxation (exact where S is linear in the
-relaxation's own time between phases), and so are its sensitivities: a change δS of the stationary curve gives
-δM = R[(M/S) δS], and a change of log C a relaxation of its own.
-
-The pooled baseline: every run of a campaign predicted by one parameter vector.
+"""The pooled baseline: every run of a campaign predicted by one parameter vector.
 
     prediction = S(v; p, ζ) at plateaus,   the GMS attractor's periodic torque behind S in loops,
                  the open clutch's drag where there is no pressure
 
-with derivatives in closed form. `pooled_fit.gauss_newton` fits it.
+with derivatives in closed form. `pooled_fit.gauss_newton` fits it. The attractor law is linear in each loop,
+
+    dM/dt = C (1 - M/S) = (S - M)/τ,   τ = S/C                               (models.loops.attractor)
+
+Given τ at evenly spaced phases, M is the periodic solution R[S] of a linear relaxation (exact where S is linear in the
+relaxation's own time between phases), and so are its sensitivities: a change δS of the stationary curve gives δM = R[(M/S)
+δS], and a change of log C a relaxation of its own.
 """
 
 from dataclasses import dataclass

@@ -1,16 +1,15 @@
 """Autocorrelation of neighbouring rows: a process of the first order with white noise beside it.
 
-correlation with the k-th neighbour = w ρ^k,     the same as of the ARMA(1, 1) x_i = ρ x_{i-1} + s (e_i + θ e_{i-1})
+    correlation with the k-th neighbour = w ρ^k,     the same as of the ARMA(1, 1) x_i = ρ x_{i-1} + s (e_i + θ e_{i-1})
 
-Autocorrelation of the samples of a dynamic record, and the correlation of the means in phase bins that follows from it.
-
-The residual of a loop's samples about its low harmonics has the autocorrelations r_1 and r_2; noise that is partly white and
-partly autocorrelated has r_k = w ρ^k. The means of n samples in a row, a bin each, then have
+Samples of a dynamic record show it better than its phase bins, for they are many more. The residual of a loop's samples
+about its low harmonics has the autocorrelations r_1 and r_2; noise that is partly white and partly autocorrelated has r_k =
+w ρ^k. The means of n samples in a row, a bin each, then have
 
     variance ∝ n + 2 Σ_{d<n} (n - d) w ρ^d,    covariance k bins on ∝ w ρ^{(k-1) n + 1} ((1 - ρⁿ)/(1 - ρ))²
 
-There are many more samples than bins, so they estimate it better. Samples next to standstill are left out: a loop turns
-sharply there, which is no noise. Noise as slow as a bin is estimated a little too fast, for the harmonics absorb part of it.
+Samples next to standstill are left out: a loop turns sharply there, which is no noise. Noise as slow as a bin is estimated
+a little too fast, for the harmonics absorb part of it.
 """
 
 from collections.abc import Sequence

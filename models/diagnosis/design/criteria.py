@@ -1,10 +1,7 @@
-"""Numbers that decide what becomes a row, what counts as a rest and what is taken for noise of samples.
+"""Numbers that decide what becomes a row, what counts as a rest, what is taken for noise of samples, and how large a design
+may be.
 
 Each has its meaning, its unit and its origin; "chosen; no table" means that no command prints the alternatives.
-
-Limits of a design's size: where a campaign is larger, plateaus, states or samples are taken evenly.
-
-All are chosen for time and memory; no table.
 """
 
 

@@ -1,16 +1,12 @@
-"""Names of the axes on which structure may live: public channel names, or a name of our own where no channel is it.
-
-Where torque is predicted: plateaus of stationary tests, and evenly spaced phases of loops.
-
-A campaign made small enough to be fitted at once: states are left out evenly, the first and the last are kept.
-
-The rows of a campaign that the baseline and the effects are fitted to.
+"""The rows of a campaign that the baseline and the effects are fitted to.
 
 A *point* is where torque is predicted: a plateau of a stationary test, or one of PHASES evenly spaced phases of a loop. A
 *row* is what is compared with data: a plateau again, or one of BINS phase bins of a loop, the mean over the points (and
-over the samples) within. So a loop is a few rows however fast it was sampled, and sixty states stay cheap.
+over the samples) within. So a loop is a few rows however fast it was sampled, and sixty states stay cheap. Where a campaign
+is too large, states are left out evenly, the first and the last are kept.
 
-Everything is folded to v >= 0 (the model is odd): `sign` says which way the clutch turned.
+Everything is folded to v >= 0 (the model is odd): `sign` says which way the clutch turned. Axes on which structure may lie
+have public channel names, or a name of our own where no channel is it.
 """
 
 from collections.abc import Iterator
@@ -20,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.diagnosis.campaign import Campaign, StationaryRun
+from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
 from models.diagnosis.design.autocorrelation import bin_autocorrelation
 from models.diagnosis.design.criteria import MOST_LOOP_STATES, MOST_PLATEAUS, MOST_ROWS, PLATEAU_DURATION
 from models.diagnosis.design.facts import Facts, facts_of
@@ -91,19 +87,27 @@ def mark_open(points: Points) -> Points:
     return replace(points, engaged=closed.astype(np.float64), pressure=np.where(closed, points.pressure, lowest))
 
 
-def concatenate(blocks: list[Points]) -> Points:
-    """All blocks one after the other; no blocks give no points."""
+#: Columns of whole numbers, and what stands where nothing is given (0 in all others).
+_INTEGERS: dict[str, int] = {"run": 0, "loop": -1, "previous": -1}
+_USUAL = {"engaged": 1.0, "sign": 1.0, "temperature": np.nan, "plate_rise": np.nan, "moment": np.nan}
 
-    def column(name: str) -> list[FloatArray]:
-        return [getattr(block, name) for block in blocks] or [np.zeros(0)]
 
-    integers = {name: np.concatenate(column(name)).astype(np.intp) for name in ("run", "loop", "previous")}
+def points_of(count: int, **known: FloatArray | IntArray | float | None) -> Points:
+    """So many points, plateaus of a closed clutch that turns forwards unless given; what was not measured is None."""
+    given = {name: values for name, values in known.items() if values is not None}
+    integers = {name: np.full(count, given.get(name, usual), dtype=np.intp) for name, usual in _INTEGERS.items()}
     floats = {
-        field.name: np.concatenate(column(field.name)).astype(np.float64)
+        field.name: np.full(count, given.get(field.name, _USUAL.get(field.name, 0.0)), dtype=np.float64)
         for field in fields(Points)
         if field.name not in integers
     }
     return Points(**integers, **floats)  # type: ignore[arg-type] # names are the fields' own
+
+
+def concatenate(blocks: list[Points]) -> Points:
+    """All blocks one after the other; no blocks give no points."""
+    columns = {field.name: [getattr(block, field.name) for block in blocks] for field in fields(Points)}
+    return Points(**{name: np.concatenate(parts) for name, parts in columns.items()}) if blocks else points_of(0)
 
 
 #: Pressures that a dynamic test is taken to have when its rows are counted beforehand.
@@ -226,70 +230,48 @@ def build_design(campaign: Campaign) -> Design:
     kept = thinned(campaign, notes)
     runs: list[RunInfo] = []
     blocks: list[Points] = []
-    torques, deviations, samples = [], [], []
-    offset = 0
+    torques, deviations = [np.zeros(0)], [np.zeros(0)]
+    plateaus = 0
     for run in kept.stationary:
-        points, torque, sd = _plateaus(run, kept, len(runs), offset, notes)
+        points, torque, sd = _plateaus(run, kept, len(runs), plateaus, notes)
         if torque.size:
             runs.append(RunInfo(run_id=run.run_id, cycles=run.cycles, dynamic=False))
             blocks.append(points)
             torques.append(torque)
             deviations.append(sd)
-            samples.append(np.ones_like(torque))
-            offset += torque.size
+            plateaus += torque.size
     loops: list[BinnedLoop] = []
-    of_run: list[int] = []
     reasons: list[str] = []  # why a dynamic test gave no loop at all
     for dynamic in kept.dynamic:
         test_loops, sentences = binned_loops(dynamic.record, kept.geometry)
         notes.extend(f"{dynamic.run_id}: {sentence}" for sentence in sentences)
         reasons += sentences[:1] if not test_loops else []
+        for loop in test_loops:
+            blocks.append(_loop_points(loop, dynamic, len(runs), len(loops)))
+            loops.append(loop)
         if test_loops:
-            loops.extend(test_loops)
-            of_run.extend([len(runs)] * len(test_loops))
             runs.append(RunInfo(run_id=dynamic.run_id, cycles=dynamic.cycles, dynamic=True))
     if reasons:
         count = f"{len(reasons)} of {len(kept.dynamic)} ({reasons[0].rstrip('.')})"
         notes.append(f"Dynamic tests that could not be evaluated and were left out: {count}.")
-    moments = {run.run_id: run.moment for run in kept.dynamic}
-    for number, (loop, index) in enumerate(zip(loops, of_run, strict=True)):
-        blocks.append(_loop_points(loop, index, number, runs[index].cycles, moments[runs[index].run_id]))
-    return _assembled(blocks, torques, deviations, samples, loops, runs, offset, kept, tuple(notes))
-
-
-def _assembled(
-    blocks: list[Points],
-    torques: list[FloatArray],
-    deviations: list[FloatArray],
-    samples: list[FloatArray],
-    loops: list[BinnedLoop],
-    runs: list[RunInfo],
-    plateaus: int,
-    campaign: Campaign,
-    notes: tuple[str, ...],
-) -> Design:
     points = mark_open(concatenate(blocks))
-    filled, offsets = (
-        np.concatenate([getattr(loop, name) for loop in loops]) if loops else np.zeros(0)
-        for name in ("samples", "bin_offset")
+    binned, filled, offsets = (
+        np.concatenate([np.zeros(0), *(getattr(loop, name) for loop in loops)])
+        for name in ("torque", "samples", "bin_offset")
     )
     bins = np.flatnonzero(filled > 0)
     per_bin = PHASES // BINS
     middle = plateaus + bins * per_bin + per_bin // 2
     rows = points.take(np.concatenate([np.arange(plateaus), middle]).astype(np.intp))
-    if loops:
-        torques = [*torques, np.concatenate([loop.torque for loop in loops])[bins]]
-        samples = [*samples, filled[bins]]
-        deviations = [*deviations, np.full(bins.size, np.nan)]
     level, closed = np.zeros(rows.run.size), rows.engaged > 0
     level[closed] = levels_of(rows.pressure[closed]) if closed.any() else 0.0
     _, curve = np.unique(np.stack([rows.run, level]), axis=1, return_inverse=True)
     return Design(
         points=points,
         rows=rows,
-        torque=np.concatenate(torques) if torques else np.zeros(0),
-        samples=np.concatenate(samples) if samples else np.zeros(0),
-        torque_sd=np.concatenate(deviations) if deviations else np.zeros(0),
+        torque=np.concatenate([*torques, binned[bins]]),
+        samples=np.concatenate([np.ones(plateaus), filled[bins]]),
+        torque_sd=np.concatenate([*deviations, np.full(bins.size, np.nan)]),
         level=level,
         curve=np.asarray(curve, dtype=np.intp).reshape(-1),
         bins=np.asarray(bins, dtype=np.intp),
@@ -300,8 +282,8 @@ def _assembled(
         loops=len(loops),
         bin_autocorrelation=bin_autocorrelation([loop.autocorrelation for loop in loops]),
         runs=tuple(runs),
-        facts=facts_of(campaign),
-        notes=notes,
+        facts=facts_of(kept),
+        notes=tuple(notes),
     )
 
 
@@ -345,46 +327,40 @@ def _plateaus(
     count = usable.size
     times = PLATEAU_DURATION * (np.arange(table.torque.size) + 0.5) if run.time is None else np.array(run.time)
     clock = np.asarray(times[usable], dtype=np.float64)
-    nan: FloatArray = np.full(count, np.nan, dtype=np.float64)
     rise = plate_rise(table)
-    moment = nan if run.moment is None else np.asarray(run.moment + clock, dtype=np.float64)
     consecutive = np.concatenate([[-1], np.where(np.diff(usable) == 1, offset + np.arange(count - 1), -1)])
-    points = Points(
-        run=np.full(count, index, dtype=np.intp),
-        cycles=np.full(count, float(run.cycles)),
+    points = points_of(
+        count,
+        run=index,
+        cycles=float(run.cycles),
         pressure=table.pressure[usable],
-        engaged=np.ones(count),
         velocity=np.abs(velocity),
         sign=sign,
-        acceleration=np.zeros(count),
-        temperature=nan if table.oil_temperature is None else table.oil_temperature[usable],
-        plate_rise=nan if rise is None else rise[usable],
+        temperature=None if table.oil_temperature is None else table.oil_temperature[usable],
+        plate_rise=None if rise is None else rise[usable],
         clock=clock,
-        moment=moment,
-        angular_frequency=np.zeros(count),
-        phase=np.zeros(count),
-        loop=np.full(count, -1, dtype=np.intp),
-        previous=consecutive[:count].astype(np.intp),
+        moment=None if run.moment is None else run.moment + clock,
+        previous=consecutive[:count],
     )
-    return points, sign * table.torque[usable], nan if table.torque_sd is None else table.torque_sd[usable]
+    stated = np.full(count, np.nan) if table.torque_sd is None else table.torque_sd[usable]
+    return points, sign * table.torque[usable], stated
 
 
-def _loop_points(loop: BinnedLoop, run: int, number: int, cycles: float, moment: float | None) -> Points:
-    count = loop.velocity.size
-    return Points(
-        run=np.full(count, run, dtype=np.intp),
-        cycles=np.full(count, float(cycles)),
-        pressure=np.full(count, loop.pressure),
-        engaged=np.ones(count),
+def _loop_points(loop: BinnedLoop, run: DynamicRun, index: int, number: int) -> Points:
+    """Points of the loop of that number, of a run of that index."""
+    return points_of(
+        loop.velocity.size,
+        run=index,
+        cycles=float(run.cycles),
+        pressure=loop.pressure,
         velocity=loop.velocity,
-        sign=np.full(count, loop.sign),
+        sign=loop.sign,
         acceleration=loop.acceleration,
-        temperature=np.full(count, loop.temperature),
+        temperature=loop.temperature,
         plate_rise=loop.plate_rise,
         clock=loop.clock,
-        moment=np.full(count, np.nan) if moment is None else moment + loop.clock,
-        angular_frequency=np.full(count, loop.angular_frequency),
+        moment=None if run.moment is None else run.moment + loop.clock,
+        angular_frequency=loop.angular_frequency,
         phase=loop.phase,
-        loop=np.full(count, number, dtype=np.intp),
-        previous=np.full(count, -1, dtype=np.intp),
+        loop=number,
     )

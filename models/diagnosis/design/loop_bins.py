@@ -1,14 +1,13 @@
-"""Differences between the periods of a loop. What is locked to the speed cycle is the same in every period, so what differs
-is noise, however slow. (A drift over the test's clock differs too, by what it does within some periods.)
+"""A dynamic record compressed: for each loop the mean torque in phase bins, and the speed cycle at evenly spaced phases.
 
-The residual about the harmonics of a single period says little about slow noise, for the harmonics absorb it. With ȳ_b the
-mean of n_b samples in a bin of this period and m̄_b that of the N_b samples of the bin in all periods before,
+What is locked to the speed cycle is the same in every period, so what differs between periods is noise, however slow (a
+drift over the test's clock differs too, by what it does within some periods). The residual about the harmonics of a single
+period says little about slow noise, for the harmonics absorb it. With ȳ_b the mean of n_b samples in a bin of this period
+and m̄_b that of the N_b samples of the bin in all periods before,
 
     d_b = (ȳ_b - m̄_b)/(1/n_b + 1/N_b)^{1/2}
 
 has the variance of a single sample and the correlation of neighbouring bins.
-
-A dynamic record compressed: for each loop the mean torque in phase bins, and the speed cycle at evenly spaced phases.
 """
 
 import math

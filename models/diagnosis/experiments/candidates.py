@@ -3,7 +3,7 @@
 A trial is made after the last state unless it goes on to later ones. Its torques are not known beforehand and not needed:
 what it would show depends on where it measures.
 
-A trial as a protocol that a rig can run: its steps in order, with what is to be set and how long each takes.
+As a protocol that a rig can run a trial is its steps in order, with what is to be set and how long each takes.
 """
 
 from collections.abc import Sequence
@@ -279,17 +279,17 @@ class Step:
     kind: str
     pressures: tuple[float, ...]
     speeds: tuple[float, ...]
-    frequency: float | None
-    periods: int | None
+    frequency: float | None = None
+    periods: int | None = None
     temperature: float | None
-    repeats: int
+    repeats: int = 1
     cycles: float
-    pause: float
+    pause: float = 0.0
     minutes: float
 
 
 def steps_of(campaign: Campaign, key: str) -> tuple[Step, ...]:
-    """The steps of a trial (`experiments.candidates.TRIALS`); none where the campaign has no pattern for it."""
+    """The steps of a trial; none where the campaign has no pattern for it."""
     trial = TRIALS[key]
     if trial.parts:
         return tuple(step for part in trial.parts for step in steps_of(campaign, part))
@@ -297,51 +297,42 @@ def steps_of(campaign: Campaign, key: str) -> tuple[Step, ...]:
     if then is None:
         return ()
     settling = 0.0 if trial.temperature is None else OIL_SETTLING
-    made: list[Step] = []
+    steps = list[Step]()
     cycles = [*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)]
     before = max(cycles, default=0.0)
     for number, run in enumerate(then.stationary[len(campaign.stationary) :]):
-        pause = trial.rest * float(number % 2 == 0)
-        minutes = PLATEAU_DURATION * run.plateaus.torque.size / 60.0 * trial.times + settling + pause / 60.0
+        table, pause = run.plateaus, trial.rest * float(number % 2 == 0)
+        minutes = PLATEAU_DURATION * table.torque.size / 60.0 * trial.times + settling + pause / 60.0
         minutes += _pace(campaign) * (run.cycles - before) / 60.0
         before = run.cycles
-        made.append(_swept(run, trial.temperature, trial.times, pause, minutes))
-    swings = then.dynamic[len(campaign.dynamic) :]
-    return (*made, *(_swung(run, trial.frequency, trial.temperature, settling) for run in swings))
-
-
-def _swept(run: StationaryRun, temperature: float | None, repeats: int, pause: float, minutes: float) -> Step:
-    table = run.plateaus
-    return Step(
-        kind="stationary_stribeck",
-        pressures=_in_order(levels_of(table.pressure)),
-        speeds=_in_order(np.round(table.speed, 3)),
-        frequency=None,
-        periods=None,
-        temperature=temperature,
-        repeats=repeats,
-        cycles=run.cycles,
-        pause=pause,
-        minutes=minutes,
-    )
-
-
-def _swung(run: DynamicRun, frequency: float, temperature: float | None, settling: float) -> Step:
-    record = run.record
-    pressures = _in_order(record.pressure)
-    seconds = float(record.time[-1] - record.time[0])
-    return Step(
-        kind="dynamic_stribeck",
-        pressures=pressures,
-        speeds=(float(record.speed.min()), float(record.speed.max())),
-        frequency=frequency,
-        periods=round(seconds * frequency / len(pressures)),
-        temperature=temperature,
-        repeats=1,
-        cycles=run.cycles,
-        pause=0.0,
-        minutes=seconds / 60.0 + settling,
-    )
+        steps.append(
+            Step(
+                kind="stationary_stribeck",
+                pressures=_in_order(levels_of(table.pressure)),
+                speeds=_in_order(np.round(table.speed, 3)),
+                temperature=trial.temperature,
+                repeats=trial.times,
+                cycles=run.cycles,
+                pause=pause,
+                minutes=minutes,
+            )
+        )
+    for swing in then.dynamic[len(campaign.dynamic) :]:
+        record, pressures = swing.record, _in_order(swing.record.pressure)
+        seconds = float(record.time[-1] - record.time[0])
+        steps.append(
+            Step(
+                kind="dynamic_stribeck",
+                pressures=pressures,
+                speeds=(float(record.speed.min()), float(record.speed.max())),
+                frequency=trial.frequency,
+                periods=round(seconds * trial.frequency / len(pressures)),
+                temperature=trial.temperature,
+                cycles=swing.cycles,
+                minutes=seconds / 60.0 + settling,
+            )
+        )
+    return tuple(steps)
 
 
 def _in_order(values: FloatArray) -> tuple[float, ...]:

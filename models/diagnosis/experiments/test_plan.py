@@ -1,13 +1,11 @@
-"""The rivals that a test should decide between: the causes that stand, and those that may come back.
-
-Which test would decide: the trial after which one candidate is most likely left is recommended.
+"""Which test would decide: the trial after which one candidate is most likely left is recommended.
 
 With Δ_ab what a trial adds to λ_ab (`experiments.information`), evidence for a against b would, if a is true, be about
-normal afterwards: its mean what it is now, and Δ, and the change of what the freedom of both is worth; its variance
-1 + 2Δ + (PREDICTION_ERROR Δ)². a is left alone where the odds are those of SURE, for every b. Trials are
-ranked by the probability of that, over the candidates by their evidence, less COST_OF_RUN a run; of those that are sure to
-decide (SURE) the shortest comes first. Of a cause without a rival the size is what is left to learn: the trial that
-narrows it most, less the same a run.
+normal afterwards: its mean what it is now, and Δ, and the change of what the freedom of both is worth; its variance 1 + 2Δ
++ (PREDICTION_ERROR Δ)². a is left alone where the odds are those of SURE, for every b. Trials are ranked by the probability
+of that, over the candidates by their evidence, less COST_OF_RUN a run; of those that are sure to decide (SURE) the shortest
+comes first. Of a cause without a rival the size is what is left to learn: the trial that narrows it most, less the same a
+run.
 """
 
 from collections.abc import Sequence

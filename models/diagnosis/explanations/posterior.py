@@ -1,23 +1,23 @@
-"""The linear screen: what every effect promises beside a fit, without refitting anything.
-
-    promise = ln Σ_g Σ_s p(g) p(shape) ∫ p(data | a; g) p(a) da - the same without the effect        [nats]
-
-with the heavy-tailed prior of amplitudes as two normal ones (`amplitude_prior.SCALES`). The shapes that a refit moves are
-summed over; those that it does not (a change point, which torque is meant) are kinds, and each kind is a start of its own.
-
-The posterior over what may be behind a campaign: an exclusive list, each with a log prior and a log evidence.
+"""The posterior over what may be behind a campaign: an exclusive list, each with a log prior and a log evidence.
 
     nothing | e | e + f | u | S_k | e + S_k | e + u | T | a line | an outlying run
 
-e, f are effects of the catalogue, u faults of the same catalogue that may not be named, S_k smooth structure on axis k, T an
-oil temperature that nobody measured, a line is torque that swings with the tests' clock or at one frequency in raw records.
-Their probabilities sum to one, and a verdict is read off them alone.
+e, f are effects of the catalogue, u faults of the same catalogue that may not be named, S_k smooth structure on axis k, T
+an oil temperature that nobody measured, a line is torque that swings with the tests' clock or at one frequency in raw
+records. Their probabilities sum to one, and a verdict is read off them alone.
 
 The search goes up, best first: what the linear screen about a refitted alternative promises of one thing more is refitted,
 while it could hold more than NEGLIGIBLE of the posterior; the promise errs by a share SLACK of the leader's lead. Then
 down: what changes torque much as the leader does, and the leader without each of its parts, from where it has the rest.
-Structure is refitted as an effect is, its likeliest form taken off: judged linearly it looked 7.5 nats strong where it was a
-false lead. It draws no random numbers.
+Structure is refitted as an effect is, its likeliest form taken off: judged linearly it looked 7.5 nats strong where it was
+a false lead. It draws no random numbers.
+
+The linear screen refits nothing,
+
+    promise = ln Σ_g Σ_s p(g) p(shape) ∫ p(data | a; g) p(a) da - the same without the effect        [nats]
+
+with the heavy-tailed prior of amplitudes as two normal ones (`effects.effect.SCALES`). The shapes that a refit moves are
+summed over; those that it does not (a change point, which torque is meant) are kinds, and each kind is a start of its own.
 """
 
 from collections.abc import Mapping, Sequence
@@ -93,10 +93,6 @@ def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str
         promise = log_sum(total[mine]) - null
         by_effect.setdefault(slug, []).append(Start(promise, column, likely, fitted))
     return {slug: sorted(by_kind, key=lambda start: -start.promise) for slug, by_kind in by_effect.items()}
-
-
-#: What kinds of shapes that were not refitted may add to those that were at most [nats] (numerical: a bound on an estimate).
-_MOST_OTHER_KINDS = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -238,7 +234,7 @@ class Search:
         if not left or alternative == NOTHING:
             return value
         done = log_sum([node.promise for node in nodes])
-        return value + min(float(np.logaddexp(done, log_sum(left))) - done, _MOST_OTHER_KINDS)
+        return value + float(np.logaddexp(done, log_sum(left))) - done
 
     def _up(self) -> None:
         while self._promises and self.refits < MOST_REFITS:

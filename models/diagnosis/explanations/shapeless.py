@@ -1,30 +1,28 @@
-"""Periodogram over the tests' clock: a line is torque that oscillates while a test runs, with its own phase in every run.
+"""Alternatives that have no shape to be fitted: a line over the tests' clock, an outlying run, an oil temperature that
+nobody measured.
+
+A line is torque that oscillates while a test runs, with its own phase in every run; its power
 
     P(ω) = Σ_runs |Σ_i r_i m_i e^{-iωt_i}|² / Σ_i m_i²
 
 with r the whitened residual of a run, its gain taken out, and m = 1/σ for an oscillation in Nm or M/σ for one in shares of
-the torque, at the plateaus' own times: noise in proportion to torque would smear a line in a plain transform. Where there is
-no line, P relative to its neighbourhood is a sum of exponential variables.
+the torque, at the plateaus' own times: noise in proportion to torque would smear a line in a plain transform. Where there
+is no line, P relative to its neighbourhood is a sum of exponential variables.
 
-An outlying run: another clutch, a unit that was mistyped, a cable the wrong way round.
-
-No effect is in one run alone, and a report that only says "cycles" sends an engineer through all of them. As an alternative,
-one run of R has a curve of its own, Σ c_jk cos(jπv) cos(kπp) beside the baseline's, with normal c of some size,
+An outlying run is another clutch, a unit that was mistyped, a cable the wrong way round. No effect is in one run alone, and
+a report that only says "cycles" sends an engineer through all of them. As an alternative, one run of R has a curve of its
+own, Σ c_jk cos(jπv) cos(kπp) beside the baseline's, with normal c of some size,
 
     evidence = ln Σ_g mean_τ ∫ p(data | θ, c; g) p(θ) N(c; 0, τ²) d(θ, c) - ln R        [nats]
 
 about the baseline that the other runs have.
 
-Evidence of an oil temperature that was not measured: any slow course, a different one in every test.
-
-In a test of duration T the log of the viscosity may follow a_0 + Σ_k a_k cos(2πkt/T) + b_k sin(2πkt/T), k = 1 ... 4, with
-normal coefficients whose deviations fall with k; in loops it is one number a test. The viscous term follows it. That
-is many columns and no single amplitude to estimate, so it is judged by its marginal likelihood alone,
-
-    evidence = ½ sᵀ (I + Λ⁻¹)⁻¹ s - ½ ln det(1 + Λ I)        (s the score, I the information, Λ the prior variances)
-
-averaged over how strongly temperature varies, from test to test and separately within a test, and over the gains'
-scatter, as every other evidence is: what gains explain as well is no evidence of a temperature.
+An oil temperature that was not measured may follow any slow course, a different one in every test. In a test of duration T
+the log of the viscosity may follow a_0 + Σ_k a_k cos(2πkt/T) + b_k sin(2πkt/T), k = 1 ... 4, with normal coefficients whose
+deviations fall with k; in loops it is one number a test. The viscous term follows it. That is many columns and no single
+amplitude to estimate, so it is judged by its marginal likelihood alone (`models.gaussian_evidence`), averaged over how
+strongly temperature varies, from test to test and separately within a test, and over the gains' scatter, as every other
+evidence is: what gains explain as well is no evidence of a temperature.
 """
 
 from dataclasses import dataclass, replace

@@ -1,6 +1,6 @@
-"""What the list holds: an alternative is a set of catalogued causes, and at most one thing beside them that has no name.
+"""Alternatives, verdict, explanations and judgement, as values; `posterior` weighs the first, `decide` makes the others.
 
-Verdict, explanations and judgement, as values; `decide` makes them.
+An alternative is a set of catalogued causes, and at most one thing beside them that has no name.
 """
 
 from collections.abc import Iterable, Mapping

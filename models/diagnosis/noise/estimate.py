@@ -1,21 +1,17 @@
-"""Curves and loops freed of everything smooth: contrasts of their rows that low polynomials (low harmonics) do not reach.
-
-What the model gets wrong is smooth along a curve; the contrasts do not see it, so it is not mistaken for noise.
-
-Autocorrelation of neighbouring rows by restricted maximum likelihood, averaged over a grid of w ρ^{|i - j|}.
-
-With A the contrasts of a piece (free of anything smooth) and R(w, ρ) the correlation of its rows,
-
-    log L(w, ρ) = -½ (m ln s² + Σ_pieces ln |Aᵀ R A|),     s² = Σ xᵀ (Aᵀ R A)⁻¹ x/m,    x = Aᵀ residual,   m values in all
-
-Sensor noise estimated within the data, from the residual once everything smooth along a curve is taken off.
+"""Sensor noise estimated within the data, from the residual once everything smooth along a curve is taken off.
 
 The remainder of a curve (a loop) beyond low polynomials (low harmonics) gives, by restricted maximum likelihood, a variance
 
     σ_i² = (a² + b² M_i²)/n_i
 
-(n_i samples in a row) and the correlation w ρ^{|i - j|} of neighbours. A deviation sent along is not used: rigs misjudge it,
-and the data show it as well. How far repeated runs scatter is estimated with the baseline (`pooled_fit.projection`).
+(n_i samples in a row) and the correlation w ρ^{|i - j|} of neighbours, averaged over a grid: with A the contrasts of a
+piece that nothing smooth reaches and R(w, ρ) the correlation of its rows,
+
+    log L(w, ρ) = -½ (m ln s² + Σ_pieces ln |Aᵀ R A|),     s² = Σ xᵀ (Aᵀ R A)⁻¹ x/m,    x = Aᵀ residual,   m values in all
+
+What the model gets wrong is smooth along a curve; the contrasts do not see it, so it is not mistaken for noise. A deviation
+sent along is not used: rigs misjudge it, and the data show it as well. How far repeated runs scatter is estimated with the
+baseline (`pooled_fit.projection`).
 """
 
 from collections.abc import Sequence

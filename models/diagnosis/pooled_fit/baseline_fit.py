@@ -1,6 +1,6 @@
-"""Starts of the pooled fit: the curves of a few states fitted one by one, and laws fitted through their parameters.
+"""The baseline of a campaign: the pooled fit without effects, and the noise that its residuals show, in turns.
 
-The baseline of a campaign: the pooled fit without effects, and the noise that its residuals show, in turns.
+It starts from the curves of a few states fitted one by one, and laws fitted through their parameters.
 """
 
 from collections.abc import Sequence

@@ -3,8 +3,7 @@
     min over θ, effects:   ½ |V^{-1/2} (torque - model)|² + ½ |R θ - m|² + Σ_effects -ln p(amplitude)
 
 Effects may be fitted along: each brings its amplitude and its smooth shapes as further parameters. A fit says how it ended.
-
-Refits: a model followed to its end with everything free, with effects or beside a pattern that has no name.
+A refit is a fit that is followed to its end, with effects or beside a pattern that has no name.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,8 +1,8 @@
-"""Priors of the pooled fit: weak, scaled by the data, and rows of the least-squares problem like any other.
+"""What every fit and every projection of a campaign is given: the rows, their noise, the priors of the baseline.
 
-½ |R θ - m|²,     one row for each parameter, and one for each law whose two shares are expected to drift alike
+Priors are weak, scaled by the data, and rows of the least-squares problem like any other,
 
-What every fit and every projection of a campaign is given: the rows, their noise, the priors of the baseline.
+    ½ |R θ - m|²,     one row for each parameter, and one for each law whose two shares are expected to drift alike
 """
 
 from dataclasses import dataclass, replace

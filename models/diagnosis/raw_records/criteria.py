@@ -1,6 +1,5 @@
-"""Numbers that decide what raw records show. All are chosen, and no command prints the alternatives: no table.
-
-Limits of what is analysed of raw records. Chosen for time; no table.
+"""Numbers that decide what raw records show, and how many are analysed. All are chosen, and no command prints the
+alternatives.
 """
 
 import numpy as np

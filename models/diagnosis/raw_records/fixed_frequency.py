@@ -1,11 +1,10 @@
-"""Windows of raw records within a range of speeds, and their matched spectra: where a line of fixed frequency may show.
-
-Torque that swings at one frequency, whatever the speed: at low speed only (stick-slip), or at all speeds.
+"""Torque that swings at one frequency, whatever the speed: at low speed only (stick-slip), or at all speeds. It is looked
+for in windows of raw records within a range of speeds, by their matched spectra.
 """
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -149,14 +148,7 @@ def _averaged(lines: list[Line], tried: int) -> Line:
     if not lines:
         return Line()
     best = max(lines, key=lambda line: line.evidence)
-    evidence = float(logsumexp([line.evidence for line in lines]) - np.log(tried))
-    return Line(
-        evidence=evidence,
-        position=best.position,
-        amplitude=best.amplitude,
-        speed_share=best.speed_share,
-        peak=best.peak,
-    )
+    return replace(best, evidence=float(logsumexp([line.evidence for line in lines]) - np.log(tried)))
 
 
 def _line(windows: Windows, size: FloatArray, order: Line | None, share: float) -> Line:

@@ -5,7 +5,8 @@ averaged over both and over the orders by their prior probabilities.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,14 +39,8 @@ from models.diagnosis.raw_records.whitened_torque import WhitenedRecord
 
 #: Laws of the size: with the load (the torque's root, between independent of it and proportional), or with the speed.
 _LAWS = ("load", "speed")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DemodulatedOrder:
-    """D and N [b] of an order in the stretches of all records."""
-
-    sums: NDArray[np.complex128]
-    weight: FloatArray
+#: D and N [b] of an order in the stretches of all records.
+Demodulated: TypeAlias = tuple[NDArray[np.complex128], FloatArray]
 
 
 def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> Line:
@@ -70,8 +65,7 @@ def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> L
     parts = [np.log(probability / by_order[k].size) + by_order[k].ravel() for k, probability in ORDERS.items()]
     both = by_order[PAIRED_ORDERS[0]] + by_order[PAIRED_ORDERS[1]]
     parts.append(np.log(PAIRED_PROBABILITY / both.size) + both.ravel())
-    evidence = float(logsumexp(np.concatenate(parts)))
-    return Line(evidence=evidence, position=best.position, amplitude=best.amplitude, peak=best.peak)
+    return replace(best, evidence=float(logsumexp(np.concatenate(parts))))
 
 
 def _stretch_count(record: WhitenedRecord, first: int, stop: int) -> int:
@@ -121,7 +115,7 @@ def _relative_sizes(records: Sequence[WhitenedRecord], stretches: list[IntArray]
 
 def _demodulated(
     records: Sequence[WhitenedRecord], stretches: list[IntArray], orders: list[float], line: Line | None
-) -> dict[float, DemodulatedOrder]:
+) -> dict[float, Demodulated]:
     """D and N of every order (multiples of a tenth, ascending)."""
     highest = max(float(np.abs(record.speed).max()) for record in records)
     parts: dict[float, list[tuple[FloatArray, FloatArray]]] = {order: [] for order in orders}
@@ -152,24 +146,19 @@ def _demodulated(
             enough = np.add.reduceat(visible.astype(float), firsts) > LEAST_VISIBLE * counts
             parts[order].append((total * enough, power * enough))
     return {
-        order: DemodulatedOrder(
-            sums=np.concatenate([total for total, _ in of_records]),
-            weight=np.concatenate([power for _, power in of_records]),
-        )
-        for order, of_records in parts.items()
+        k: (np.concatenate([d for d, _ in all_]), np.concatenate([n for _, n in all_])) for k, all_ in parts.items()
     }
 
 
-def _powers(order: DemodulatedOrder, size: FloatArray, firsts: IntArray) -> tuple[FloatArray, FloatArray]:
+def _powers(order: Demodulated, size: FloatArray, firsts: IntArray) -> tuple[FloatArray, FloatArray]:
     """u and N of the groups in which the order is visible."""
-    total = np.add.reduceat(order.sums * size, firsts)
-    weight = np.add.reduceat(order.weight * size**2, firsts)
+    total, weight = np.add.reduceat(order[0] * size, firsts), np.add.reduceat(order[1] * size**2, firsts)
     visible = weight > 0
     return np.abs(total[visible]) ** 2 / weight[visible], weight[visible]
 
 
 def _order_evidence(
-    demodulated: dict[float, DemodulatedOrder], order: float, size: FloatArray, firsts: IntArray
+    demodulated: dict[float, Demodulated], order: float, size: FloatArray, firsts: IntArray
 ) -> tuple[float, float, float]:
     """Evidence of an order, its amplitude, and the largest log likelihood ratio."""
     power, weight = _powers(demodulated[order], size, firsts)

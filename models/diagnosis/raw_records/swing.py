@@ -1,8 +1,7 @@
-"""A swing that stands out of the noise, at an order of the shaft or at a fixed frequency.
+"""A swing that stands out of the noise, at an order of the shaft or at a fixed frequency: evidence without its phase.
 
-Incoherent evidence of a swing: its phase is unknown in every stretch, its size follows one law in all.
-
-With u = |D|²/N of a stretch (`whitened_torque`), exponential of mean 1 where nothing swings, and λ = a² N/4,
+The phase is unknown in every stretch, the size follows one law in all. With u = |D|²/N of a stretch (`whitened_torque`),
+exponential of mean 1 where nothing swings, and λ = a² N/4,
 
     log L(a)/L(0) = Σ_j ln I0(2 √(λ_j u_j)) - λ_j                                          (Rice)
 

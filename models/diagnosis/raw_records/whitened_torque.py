@@ -1,6 +1,4 @@
-"""The pieces of a raw record that are analysed: without gaps, at one pressure, between reversals of the speed.
-
-Raw torque made ready for a search of swings: freed of everything slow, and its noise whitened.
+"""Raw torque made ready for a search of swings: freed of everything slow, and its noise whitened.
 
     torque = smooth spline + x,    A(L) x / σ ~ white noise of deviation 1
 
@@ -10,6 +8,8 @@ A(L) x. A swing s(t) of unknown size and phase is then looked for by its matched
     D = Σ s* A(1/L) [A(L) x / σ²],    N = Σ |A(ω) s|² / σ²,    |D|²/N ~ exponential of mean 1 where there is none.
 
 The spline's knots are so close that no friction curve passed at the record's pace leaves anything above its cut-off.
+
+Pieces of a record are analysed that have no gaps, one pressure and no reversal of the speed.
 """
 
 import itertools

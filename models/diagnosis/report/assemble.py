@@ -1,10 +1,5 @@
-"""The candidates of a report: each effect that competed, with its probability, evidence and estimated amplitude.
-
-The extension that a judgement proposes for adoption, and why none is.
-
-Numbers of the computation in a report, by public name.
-
-The report of a campaign, put together from what its chapters found.
+"""The report of a campaign, put together from what its chapters found: each effect that competed with its probability,
+evidence and amplitude, the extension that is proposed for adoption or why none is, and the numbers of the computation.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

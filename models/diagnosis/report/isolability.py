@@ -1,4 +1,4 @@
-"""The amplitudes that a campaign would have shown, effect by effect.
+"""What a campaign can show: which amplitude of each effect, and which causes it can tell apart.
 
 An effect of amplitude a raises λ = ½ a² info nats where the gains' scatter σ is known. It is not: a larger one may take up
 what the effect does, and costs evidence. So an amplitude counts as visible where no scatter can explain it,
@@ -6,15 +6,14 @@ what the effect does, and costs evidence. So an amplitude counts as visible wher
     a = max over σ of √(2 (λ_90 - L* + L(σ))₊/info(σ)),     λ_90 = ½ (√(2 t) + 1.28)²
 
 with L(σ) the evidence of a scatter and L* the largest. The model is called wrong where the effect's posterior odds against
-nothing are even: where the drop of the cost pays for the prior odds of the effect, for that of its shape and for the freedom
-of its amplitude, of prior deviation s in the narrower or the wider of two (`amplitude_prior.SCALES`),
+nothing are even: where the drop of the cost pays for the prior odds of the effect, for that of its shape and for the
+freedom of its amplitude, of prior deviation s in the narrower or the wider of two (`effects.effect.SCALES`),
 
     t = -ln(prior odds) - ln p(shape) + ln 2 + min over s of ½ ln(1 + s² info).
 
-Which causes a campaign can tell apart, from its design alone: before anything is hidden in it.
-
-Each effect is thought to be at work at twice the amplitude that the data show with 90 % power (`report.isolability`), in its
-most probable shape. What of its change another effect, in whatever of its shapes, cannot imitate beside the baseline is
+Which causes it can tell apart is known from its design alone, before anything is hidden in it. Each effect is thought to be
+at work at twice the amplitude that the data show with 90 % power, in its most probable shape. What of its change another
+effect, in whatever of its shapes, cannot imitate beside the baseline is
 
     λ_ab = min over shapes of b of ½ dᵀ V⁻¹ (1 - P_b) d      [nats]
 
@@ -149,17 +148,13 @@ def _with(null: Fit, column: Column, amplitude: float) -> Fit:
 
 def _pair(campaign: Campaign, posterior: Posterior, effects: tuple[str, str], ways: Sequence[tuple[Fit, Fit]]) -> Pair:
     """Both ways round, with the campaign and with each test beside it."""
-    now, after = 1.0, dict[str, float]()
-    for true, rival in ways:
-        distances = CandidateDistances(posterior.problem, (true, rival))
-        chance = float(distinguished(distances.distances(())[0, 1]))
-        now = min(now, chance)
-    if now < SURE:
-        for true, rival in ways:
-            distances = CandidateDistances(posterior.problem, (true, rival))
-            for key, rows in trials_of(campaign, posterior.problem.design, distances).items():
-                chance = float(distinguished(distances.distances(rows)[0, 1]))
-                after[key] = min(after.get(key, 1.0), chance)
+    after = dict[str, float]()
+    distances = [CandidateDistances(posterior.problem, way) for way in ways]
+    now = min(float(distinguished(distance.distances(())[0, 1])) for distance in distances)
+    for distance in distances if now < SURE else ():
+        for key, rows in trials_of(campaign, posterior.problem.design, distance).items():
+            chance = float(distinguished(distance.distances(rows)[0, 1]))
+            after[key] = min(after.get(key, 1.0), chance)
     trial = _parting(after, now)
     return Pair(
         effects=effects,

@@ -1,14 +1,12 @@
-"""How well a fit does: its error against the noise alone.
+"""What a diagnosis reports: verdict, causes, the misfit and what it depends on, what the extension gains, which test
+decides.
 
-The scatter of gains is no misfit: each run's gain, and in the same way each curve's, is taken out of its residual at its
-best linear prediction,
+How well a fit does is its error against the noise alone. The scatter of gains is no misfit: each run's gain, and in the
+same way each curve's, is taken out of its residual at its best linear prediction,
 
     r - M ĝ,     ĝ = σ_g² Mᵀ V⁻¹ r / (1 + σ_g² Mᵀ V⁻¹ M)
 
 and rows weigh by their precision, so that a loop's bin of a hundred samples weighs more than one plateau's reading.
-
-What a diagnosis reports: the verdict, its causes, the misfit and where it lives, what the extension gains, which test
-decides.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,6 +1,4 @@
-"""Numbers, names and lists as the paragraph writes them.
-
-The paragraph that an engineer would sign: what was found, how sure, how large, what it does to predictions, what next.
+"""The paragraph that an engineer would sign: what was found, how sure, how large, what it does to predictions, what next.
 
 Sentences in the order in which one would ask, of MAX_WORDS words at most: where they are more, those that matter least are
 left out. The numbers behind them are the report's fields.

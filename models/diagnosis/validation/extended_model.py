@@ -1,11 +1,12 @@
-"""Structure without a name: a smooth correction on the axes on which it lives.
+"""The extended model of a judgement: the effects that it names, fitted together, or a smooth correction; `held_out`
+measures its gain.
+
+Structure without a name is corrected on the axes on which it lives,
 
     δ(x) = S(v; p, ζ) Σ_k a_k φ_k(x),     a_k ~ N(0, (τ/(1 + k/3))²),     φ_k cosines over the range of each axis
 
-τ is that of the largest marginal likelihood. The correction interpolates inside the data's range; beyond it the last
-value is kept, and nothing of it is followed into the future of a life.
-
-The extended model of a judgement: the effects that it names, fitted together; its gain is that of `held_out`.
+with the τ of the largest marginal likelihood. The correction interpolates inside the data's range; beyond it the last value
+is kept, and nothing of it is followed into the future of a life.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,12 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.baseline.prediction import Prediction
 from models.diagnosis.criteria import CORRECTION_COSINES, CORRECTION_HARMONICS, CORRECTION_SIZES, MOST_CORRECTION_AXES
 from models.diagnosis.design.design import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE, Design, Points
 from models.diagnosis.effects.catalogue import change_columns
-from models.diagnosis.effects.effect import Effect, Family, Kind, Shape
+from models.diagnosis.effects.effect import Effect, Family, Kind
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.explanations.verdict import Judgement, Verdict
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
@@ -60,10 +60,8 @@ def smooth_fit(problem: FitProblem, baseline: Fit, axes: Sequence[str]) -> Fit |
 def _along(design: Design, axis: str) -> list[Effect]:
     """One effect a function: cosines over the axis's range, or a loop's harmonics."""
     if axis == PHASE:
-        waves = (
-            [(k, wave) for k in range(1, CORRECTION_HARMONICS + 1) for wave in (np.cos, np.sin)] if design.loops else []
-        )
-        return [_effect(k, _harmonic(k, wave), before_lag=False) for k, wave in waves]
+        orders = range(1, CORRECTION_HARMONICS + 1) if design.loops else ()
+        return [_harmonic(k, wave) for k in orders for wave in (np.cos, np.sin)]
     if axis not in _OF_POINTS:
         return []
     place = _OF_POINTS[axis]
@@ -72,27 +70,24 @@ def _along(design: Design, axis: str) -> list[Effect]:
     if measured.size == 0 or not np.ptp(measured) > 0:
         return []
     low, high = float(measured.min()), float(measured.max())
+
+    def unit(points: Points) -> FloatArray:
+        return np.clip((place(points) - low) / (high - low), 0.0, 1.0)  # NaN where it was not measured
+
     count = min(CORRECTION_COSINES, np.unique(measured).size - 1)
-    return [_effect(k, _cosine(place, low, high, k), before_lag=axis != CLOCK) for k in range(1, count + 1)]
+    return [_cosine(k, unit, before_lag=axis != CLOCK) for k in range(1, count + 1)]
 
 
-def _cosine(place: Callable[[Points], FloatArray], low: float, high: float, k: int) -> Callable[[Points], FloatArray]:
-    def column(points: Points) -> FloatArray:
-        values = place(points)
-        unit = np.clip((np.where(np.isfinite(values), values, low) - low) / (high - low), 0.0, 1.0)
-        return np.where(np.isfinite(values), np.cos(np.pi * k * unit), 0.0)
-
-    return column
+def _cosine(k: int, unit: Callable[[Points], FloatArray], *, before_lag: bool) -> Effect:
+    return _effect(k, lambda points: np.nan_to_num(np.cos(np.pi * k * unit(points)), nan=0.0), before_lag=before_lag)
 
 
-def _harmonic(k: int, wave: Callable[[FloatArray], FloatArray]) -> Callable[[Points], FloatArray]:
-    return lambda points: np.where(points.steady, 0.0, wave(k * points.phase))
+def _harmonic(k: int, wave: Callable[[FloatArray], FloatArray]) -> Effect:
+    return _effect(k, lambda points: np.where(points.steady, 0.0, wave(k * points.phase)), before_lag=False)
 
 
 def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool) -> Effect:
-    def change(scene: Scene, amplitude: float, _: Shape) -> FloatArray:
-        return amplitude * scene.curve * column(scene.points)
-
+    """A smooth share of the torque; it is neither taken off measurements nor followed along a life."""
     return Effect(
         slug=SLUG,
         title="Structure without a name",
@@ -100,18 +95,12 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
         formula="S(v; p, ζ) a cos(π k x)",
         source="this module",
         family=Family.SENSOR,
-        kind=Kind.LAG,  # neither taken off measurements nor followed along a life
-        channels=(),
+        kind=Kind.LAG,
         amplitude="share of the torque",
         unit="-",
         prior_sd=1.0 / (1.0 + k / 3.0),
-        positive=False,
-        scale=1.0,
-        shapes=(),
-        grid=lambda _: (),
-        change=change,
+        change=lambda scene, amplitude, _: amplitude * scene.curve * column(scene.points),
         before_lag=before_lag,
-        discrepancies=(),
         tails=float("inf"),
     )
 
