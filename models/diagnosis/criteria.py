@@ -1,22 +1,21 @@
 """Every number on which a diagnosis decides beside those of rows (`design`) and raw records, which have their own
 `criteria.py`, and of single effects, whose priors and shapes stand with them: its meaning, its unit, and where it is from.
 
-The numbers that gate a verdict, with what an ablation of each changes, are the table in docs/appendix/diagnosis.md.
-"chosen; no table" says that no record was kept of what else was tried. λ is the expected log-likelihood ratio [nats] of an
-effect (`pooled_fit.projection`), for the best hypothesis estimated by the drop of its cost.
+The numbers that gate a verdict, with what an ablation of each changes, are the table in docs/appendix/diagnosis.md. A number
+without an origin was chosen, and no record was kept of what else was tried. λ is the expected log-likelihood ratio [nats]
+of an effect (`pooled_fit.projection`), for the best hypothesis estimated by the drop of its cost.
 """
 
 # --- baseline ---------------------------------------------------------------------------------------------------------
 
 #: b of M̄_c's law over pressure [-] where the data do not determine it: between an exponential and a hyperbola.
-#: Chosen; no table.
 USUAL_CURVATURE = 0.25
 #: b [-] of what is as good as an exponential. Derived: the law differs from e^{-p/p_0} by the share b (p/p_0)²/2.
 EXPONENTIAL = 1e-3
-#: Bounds of b [-]. The upper one: chosen; no table.
+#: Bounds of b [-].
 CURVATURE_BOUNDS = (EXPONENTIAL, 5.0)
 #: Half of the early drift of log C is done after this share [-] of the life measured. Chosen: as eq. 6 may have it (a drift
-#: quadratic in life passed for structure); no table.
+#: quadratic in life passed for structure).
 EARLY = 0.15
 #: Share of the span of pressures below P⁻, and of the way to the law's pole, for which M̄_c's law goes on where the pressure
 #: at the clutch is less than was read. Chosen: an offset of -1.3 bar was fitted as -0.44 ± 0.04 bar with the tangent from P⁻
@@ -25,57 +24,55 @@ BELOW = 0.6
 
 # --- noise ------------------------------------------------------------------------------------------------------------
 
-#: Noise [-] as a share of the torque where too little is left to estimate it. Chosen; no table.
+#: Noise [-] as a share of the torque where too little is left to estimate it.
 ASSUMED = 0.01
-#: Free squares (residuals beyond the smooth terms) needed to estimate noise. Chosen; no table.
+#: Free squares (residuals beyond the smooth terms) needed to estimate noise.
 FEWEST = 12
-#: Run-to-run scatter of the gain [-] until it is estimated. Chosen: some tenths of a percent are usual; no table.
+#: Run-to-run scatter of the gain [-] until it is estimated. Chosen: some tenths of a percent are usual.
 FIRST_GAIN = 0.002
-#: What is taken for smooth along a curve: polynomials up to this degree; along a loop: so many harmonics. Chosen; no table.
+#: What is taken for smooth along a curve: polynomials up to this degree; along a loop: so many harmonics.
 SMOOTH_DEGREE = 4
 SMOOTH_HARMONICS = 5
-#: Bins that a period must share with the periods before it to be compared with them. Chosen; no table.
+#: Bins that a period must share with the periods before it to be compared with them.
 LEAST_COMPARED_BINS = 8
 #: A row is a spike where it is off its fit and off both its neighbours by more than this many deviations [-] ...
-#: Chosen; no table.
 SPIKE = 5.5
-#: ... while fewer than this share [-] of all rows are. Chosen; no table.
+#: ... while fewer than this share [-] of all rows are.
 MOST_SPIKES = 0.02
-#: Log likelihood [nats] that an autocorrelation must gain over none. Chosen; no table.
+#: Log likelihood [nats] that an autocorrelation must gain over none.
 CORRELATION_PRICE = 2.0
-#: ... over the one that samples show, where they do: they are more than bins are. Chosen; no table.
+#: ... over the one that samples show, where they do: they are more than bins are.
 CORRELATION_PRICE_FROM_SAMPLES = 5.0
 #: Log likelihood [nats] that an autocorrelation loses per unit of the log of its variance inflation: slow noise was taken
-#: off with everything smooth, so the data say little about it. Chosen; no table.
+#: off with everything smooth, so the data say little about it.
 INFLATION_PRICE = 2.0
 #: Kinds of curves or loops (by length and phases), at most, with which an autocorrelation is estimated.
-#: Chosen for time; no table.
 MOST_KINDS = 40
 
 # --- effects -------------------------------------------------------------------------------------------------------------
 
-#: Deviation of each coefficient of a template's model discrepancy [-] (chosen; no table).
+#: Deviation of each coefficient of a template's model discrepancy [-].
 DISCREPANCY_SD = 0.25
 
 # --- pooled fit ----------------------------------------------------------------------------------------------------------
 
-#: Fewest plateaus of stationary tests under pressure, and fewest distinct speeds among them, for a baseline (chosen; no
-#: table: a Stribeck curve has four parameters and the laws over pressure and life multiply them).
+#: Fewest plateaus of stationary tests under pressure, and fewest distinct speeds among them, for a baseline
+#: (a Stribeck curve has four parameters and the laws over pressure and life multiply them).
 FEWEST_ROWS, FEWEST_SPEEDS = 24, 6
-#: Torques [Nm] outside this range are no clutch's (chosen; no table).
+#: Torques [Nm] outside this range are no clutch's.
 LEAST_TORQUE, MOST_TORQUE = 1e-6, 1e7
 #: Noise of plateaus or of loops [-], a share of the usual torque, below which there is none to weigh anything by. Derived:
 #: with gains of MOST_GAIN over 1,000 rows (2e-2/1e-6)² · 1e3 is 4e11, a ten-thousandth of what 64 bits can tell from 1; a
 #: 16-bit channel rounds at 1.5e-5.
 LEAST_NOISE_SHARE = 1e-6
-#: From so many plateaus on every curve is determined and one start is enough (chosen; no table).
+#: From so many plateaus on every curve is determined and one start is enough.
 MANY_PLATEAUS = 8000
 #: Deviation of the difference of the two shares of one law, which are expected to drift alike [-]; the open clutch's
-#: drag as a share of the usual torque [-] (chosen; no table).
+#: drag as a share of the usual torque [-].
 ALIKE_SD, DRAG_SD = 0.1, 0.3
 #: Scatter of the runs' gains that is considered [-], lowest and highest, and its prior: log-normal about a usual one,
 #: narrower above it, for a rig that repeats that badly would not be used; larger differences from test to test are
-#: structure (chosen).
+#: structure.
 LEAST_GAIN, MOST_GAIN = 2e-4, 2e-2
 USUAL_GAIN, GAIN_SD_BELOW, GAIN_SD_ABOVE = 2.5e-3, 1.0, 0.6
 #: What the data must say of the runs' scatter beyond its prior [nats] for the estimate to be theirs (derived: a deviation of
@@ -87,7 +84,7 @@ CURVE_GAINS, SMALL_CURVE_GAIN = (0.0, 4e-4, 1e-3, 2.5e-3, 6e-3), 1e-3
 #: Curves' gains up to this multiple of the noise's own are considered: its own and the next above (derived: CURVE_GAINS'
 #: steps).
 MORE_CURVE_GAIN = 2.6
-#: Evidence [nats] by which a scatter of the curves' gains must be likelier than none to be taken (chosen; no table).
+#: Evidence [nats] by which a scatter of the curves' gains must be likelier than none to be taken.
 LEAST_CURVE_GAIN_EVIDENCE = 0.5
 
 # --- explanations: the posterior and its verdict -------------------------------------------------------------------------
@@ -114,48 +111,48 @@ VIBRATION_TRACE = 0.1
 #: An extension whose held-out error is more than this times the baseline's is withheld; it changes no verdict.
 MOST_WORSE = 1.02
 #: Deviation of ln ν in a test whose oil temperature varies by some 3 K (derived: about what ASTM D341 gives near 85 °C),
-#: and the factors on it that are averaged over from test to test and within a test (chosen; no table).
+#: and the factors on it that are averaged over from test to test and within a test.
 USUAL_VISCOSITY_CHANGE = 0.06
 CHANGES_BETWEEN_TESTS, CHANGES_WITHIN_TESTS = (0.5, 1.5, 4.0), (0.0, 0.5, 1.5, 4.0)
 
 # --- explanations: sizes -----------------------------------------------------------------------------------------------
 
-#: Gauss-Newton steps of a refit under another course at most, from the fit under its neighbour (chosen; no table: it bounds
+#: Gauss-Newton steps of a refit under another course at most, from the fit under its neighbour (it bounds
 #: the time), and nats behind the best from which a course, and those beyond it, do not count (derived: e^-10).
 COURSE_STEPS, COURSE_NEGLIGIBLE = 12, 10.0
 #: Degrees of freedom of a size's prior once its effect is held to be at work [-]: p ∝ 1/|a| but for the smallest. Chosen:
 #: with the search's 2, eight of eight offsets of 0.7 to 1.5 bar came out small, by 15 % in the mean.
 SIZE_TAILS = 0.1
-#: Samples that sizes are stated by, and draws of them that an extension carries (chosen; no table).
+#: Samples that sizes are stated by, and draws of them that an extension carries.
 SIZES_SAMPLED, DRAWS = 2000, 12
 #: The probability of the less likely sign from which a size is not determined (chosen: `make adoption` wants no wrong sign).
 SIGN_UNDETERMINED = 0.02
 
 # --- validation ----------------------------------------------------------------------------------------------------------
 
-#: Folds of states and of pressures, and the share of the states that is predicted from those before (chosen; no table).
+#: Folds of states and of pressures, and the share of the states that is predicted from those before.
 STATE_FOLDS, PRESSURE_FOLDS, FORWARD_SHARE = 3, 2, 1 / 3
 #: Fewest states and pressures of which some can be left out, and fewest states of which the last can be predicted.
 FEWEST_STATES_HELD_OUT, FEWEST_PRESSURES_HELD_OUT, FEWEST_STATES_AHEAD = 3, 4, 4
-#: A smooth correction: cosines along an axis, harmonics of a loop, axes at most (chosen; no table).
+#: A smooth correction: cosines along an axis, harmonics of a loop, axes at most.
 CORRECTION_COSINES, CORRECTION_HARMONICS, MOST_CORRECTION_AXES = 10, 5, 2
-#: Its deviations τ that are tried, shares of the torque (chosen; no table).
+#: Its deviations τ that are tried, shares of the torque.
 CORRECTION_SIZES = (0.001, 0.003, 0.01, 0.03, 0.1)
 
 # --- experiments ---------------------------------------------------------------------------------------------------------
 
 #: Tests advised at most; λ [nats] that one must bring to be worth its time, and that the best one must bring to be listed
-#: where none is worth it (chosen; no table).
+#: where none is worth it.
 MOST_ADVISED, WORTHWHILE, LEAST_ADVISED = 3, 3.0, 0.1
-#: Rivals that are compared at most, unless the credible set is larger (chosen; no table: it bounds the time).
+#: Rivals that are compared at most, unless the credible set is larger (it bounds the time).
 MOST_RIVALS = 4
-#: Hypotheses so much [nats] behind the best may become rivals again after another test (chosen; no table).
+#: Hypotheses so much [nats] behind the best may become rivals again after another test.
 RIVAL_MARGIN = 8.0
-#: Probability that a run must add for the work that it is (chosen; no table).
+#: Probability that a run must add for the work that it is.
 COST_OF_RUN = 0.005
-#: Relative deviation of a predicted λ (chosen; no table).
+#: Relative deviation of a predicted λ.
 PREDICTION_ERROR = 0.4
-#: Noise at zero torque is at least this share of the usual: data under torque hardly determine it (chosen; no table).
+#: Noise at zero torque is at least this share of the usual: data under torque hardly determine it.
 LEAST_NOISE = 0.2
 
 # --- report --------------------------------------------------------------------------------------------------------------
@@ -164,23 +161,23 @@ LEAST_NOISE = 0.2
 LEAST_VISIBLE_SHARE = 1e-6
 #: Probability with which a stated visible amplitude is seen (chosen; `make visible` counts it at twice that).
 VISIBLE_POWER = 0.9
-#: Candidates below this probability are not listed (chosen).
+#: Candidates below this probability are not listed.
 LEAST_LISTED = 1e-3
 #: A run is outlying that makes this share of all error beyond noise, among at least so many runs, with an RMS error beyond
-#: noise of so many deviations (chosen; no table).
+#: noise of so many deviations.
 OUTLYING_SHARE, OUTLYING_FEWEST_RUNS, OUTLYING_DEVIATIONS = 0.6, 4, 2.0
 #: Evidence [nats] from which a test is said to add any (derived: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773,
 #: natural log of the Bayes factor: "positive" from 1).
 WEAK_EVIDENCE = 1.0
-#: Effects at most whose detectable amplitude the paragraph gives (chosen).
+#: Effects at most whose detectable amplitude the paragraph gives.
 VISIBLE_MENTIONED = 3
-#: Probability from which an effect that was fitted beside a cause and is not named is mentioned (chosen).
+#: Probability from which an effect that was fitted beside a cause and is not named is mentioned.
 COMPANION_FROM = 0.3
 #: Words of the paragraph at most (chosen: with what is said of the remaining life 120, which are read once).
 MAX_WORDS = 105
 #: Held-out errors of so many times the fit's are explained in the paragraph (chosen: less is what gains make).
 FAR_FROM_FIT = 5.0
-#: An amplitude beyond so many prior deviations is larger than expected (chosen).
+#: An amplitude beyond so many prior deviations is larger than expected.
 LARGE_AMPLITUDE = 2.0
-#: Fewer states of use say little of a course over life (chosen).
+#: Fewer states of use say little of a course over life.
 FEW_STATES = 3

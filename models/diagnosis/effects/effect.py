@@ -181,8 +181,7 @@ def unit_changes(effect: Effect, scene: Scene, shapes: Sequence[Shape]) -> Float
     return effect.changes(scene, [(step, shape) for shape in shapes]) / step
 
 
-#: Deviations of the two normal distributions that approximate p where everything is linear, in s; each has half the weight
-#: (chosen; no table).
+#: Deviations of the two normal distributions that approximate p where everything is linear, in s; each has half the weight.
 SCALES = (1.0, 6.0)
 
 

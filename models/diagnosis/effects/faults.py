@@ -17,16 +17,16 @@ from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried, life_of
 from models.friction.stribeck import PARAMETER_NAMES
 
-#: Usual size of all of them [-]. Chosen; no table.
+#: Usual size of all of them [-].
 USUAL_SIZE = 0.02
-#: A pressure or speed that differs from the one before by less than this share [-] was held. Chosen; no table.
+#: A pressure or speed that differs from the one before by less than this share [-] was held.
 HELD_SHARE = 0.01
 #: Least share [-] of the plateaus that must have been reached from above, and from below: with fewer the direction is only
-#: another name for the level. Chosen; no table.
+#: another name for the level.
 LEAST_EACH_WAY = 0.1
-#: Time constants of a gain that settles [s], 0 for one that grows evenly, by its size in DRIFT_TIME [s]. Chosen; no table.
+#: Time constants of a gain that settles [s], 0 for one that grows evenly, by its size in DRIFT_TIME [s].
 SETTLING_TIMES, DRIFT_TIME = (0.0, 60.0, 150.0, 400.0), 1800.0
-#: Powers of the cycles in which a gain creeps [-]. Chosen; no table.
+#: Powers of the cycles in which a gain creeps [-].
 CREEP_POWERS = (0.5, 1.0, 2.0)
 #: The first shape of a gain over life says whether it steps (at the cycle that follows) or creeps (by the power).
 _STEP, _CREEP = 0.0, 1.0

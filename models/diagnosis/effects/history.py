@@ -59,7 +59,7 @@ RUNNING_IN = Effect(
 )
 
 
-#: Log prior odds [nats] of an unlogged change against a logged one (chosen; no table).
+#: Log prior odds [nats] of an unlogged change against a logged one.
 _UNLOGGED = -2.0
 
 
@@ -146,7 +146,7 @@ ACCELERATED_WEAR = Effect(
 )
 
 
-#: Blocks whose log energies differ by less than this cannot show a severity (chosen; no table).
+#: Blocks whose log energies differ by less than this cannot show a severity.
 _LEAST_SPREAD = 0.03
 
 

@@ -59,7 +59,7 @@ REFERENCE_PRESSURE = 5e5
 FIRST_ORDER, FILM, THICKNESS = 0.0, 1.0, 2.0
 #: The least time of such a thickness [s], and the power of speed that it stays below: with more it would be inertia.
 LEAST_TIME, MOST_POWER = 0.15, 0.55
-#: The log of the prior weight of such a thickness [nats]: eq. 7 ties strength and time together (chosen; no table).
+#: The log of the prior weight of such a thickness [nats]: eq. 7 ties strength and time together.
 UNTIED = -1.0
 #: To first order torque falls faster with speed than the film's lag does, for fewer asperities touch: by this power more. A
 #: film of any other kind would be the same at all speeds, as inertia is.

@@ -210,8 +210,7 @@ VISCOUS_EXPONENT = Effect(
 )
 
 
-#: Log prior odds [nats] against a film that ruptures or a drag independent of viscosity: Newton's has neither (chosen; no
-#: table).
+#: Log prior odds [nats] against a film that ruptures or a drag independent of viscosity: Newton's has neither.
 _UNUSUAL = 1.5
 
 
