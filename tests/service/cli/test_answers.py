@@ -3,37 +3,24 @@
 import csv
 import io
 import json
-from collections.abc import Callable
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
-from typer.testing import CliRunner
 
-from service.cli import connection
-from service.cli.main import app
+from tests.service.cli.conftest import Terminal
 from tests.support import stationary
 
-Terminal = Callable[..., str]
 DUTY = {"kind": "duty_cycles", "cycles": 3000, "duty": {"cycles": 3000, "energy_per_cycle_kj": 18}}
 LIFE = "/v1/clutches/c1/remaining-useful-life"
 
 
-@pytest.fixture
-def terminal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> Terminal:
-    """A terminal whose service has seen a clutch for 3,000 cycles."""
-    monkeypatch.setattr(connection, "connect", lambda *_, **__: nullcontext(client))
+@pytest.fixture(autouse=True)
+def aged(client: TestClient) -> None:
+    """The service has seen a clutch for 3,000 cycles."""
     tests = [stationary(cycles, pressures=(5.0, 6.0)) for cycles in (0, 1000, 2000, 3000)]
     for number, run in enumerate([*tests, DUTY]):
         assert client.post("/v1/clutches/c1/runs", json=run | {"run_id": f"r{number}"}).status_code == 201
-
-    def typed(*arguments: str | Path, code: int = 0) -> str:
-        done = CliRunner().invoke(app, list(map(str, arguments)))
-        assert done.exit_code == code, done.output
-        return done.output
-
-    return typed
 
 
 def test_remaining_life_is_a_table_of_quantiles(terminal: Terminal, client: TestClient) -> None:

@@ -1,32 +1,13 @@
 """`clutchlife import`: a rig's first file is asked about once, its second is sent without a question."""
 
-from collections.abc import Callable
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
-from typer.testing import CliRunner
 
-from service.cli import connection
-from service.cli.main import app
 from service.cli.options import EX_DATAERR
+from tests.service.cli.conftest import Terminal
 from tests.service.web.test_import_preview import german
-
-Terminal = Callable[..., str]
-
-
-@pytest.fixture
-def terminal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> Terminal:
-    """A terminal whose service knows a clutch, and what is typed at its questions."""
-    monkeypatch.setattr(connection, "connect", lambda *_, **__: nullcontext(client))
-
-    def typed(*arguments: str | Path, answers: str = "", code: int = 0) -> str:
-        done = CliRunner().invoke(app, list(map(str, arguments)), input=answers, env={"COLUMNS": "200"})
-        assert done.exit_code == code, done.output
-        return done.output
-
-    return typed
 
 
 def test_a_first_file_is_asked_about_and_the_second_is_not(

@@ -1,34 +1,15 @@
 """Inspections in the terminal: sent with their photographs, listed, exported; the service is in this process."""
 
 import json
-from collections.abc import Callable
-from contextlib import nullcontext
 from pathlib import Path
 
-import pytest
 from fastapi.testclient import TestClient
-from typer.testing import CliRunner
 
-from service.cli import connection
-from service.cli.main import app
+from tests.service.cli.conftest import Terminal
 from tests.service.web.routes.surfaces import png, sha256
 from tests.support import stationary
 
-Terminal = Callable[..., str]
 LIST = "/v1/clutches/c1/inspections"
-
-
-@pytest.fixture
-def terminal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> Terminal:
-    """A terminal whose service knows a clutch."""
-    monkeypatch.setattr(connection, "connect", lambda *_, **__: nullcontext(client))
-
-    def typed(*arguments: str | Path, code: int = 0) -> str:
-        done = CliRunner().invoke(app, list(map(str, arguments)))
-        assert done.exit_code == code, done.output
-        return done.output
-
-    return typed
 
 
 def test_an_inspection_is_sent_with_its_photographs_and_repeated_safely(

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from service.app import create_app
-from service.settings import Settings
+from tests.service.clients import client_on
 from tests.service.queries.test_scores import mean_torque
 from tests.service.workflows.test_learn_fleet import SPEEDS, client_of
 from tests.support import stationary
@@ -136,8 +135,7 @@ def test_no_surfaces_before_the_first_test(client: TestClient) -> None:
 
 
 def test_answers_name_model_prior_and_severity(database_url: str) -> None:
-    app = create_app(Settings(workers=0, database=database_url))
-    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
+    with client_on(database_url) as client:
         client.post("/v1/clutches", json={"clutch_id": "c1"})
         found = said(client, "c1")
         assert found["model"] == {"name": "baseline", "effects": []}

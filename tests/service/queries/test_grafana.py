@@ -13,9 +13,8 @@ from fastapi.testclient import TestClient
 from models.rig.campaign import simulate
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
-from service.app import create_app
 from service.run_files.simulated import simulated_body
-from service.settings import Settings
+from tests.service.clients import client_on
 
 FOLDER = Path(__file__).parents[3] / "docker" / "grafana"
 DASHBOARD: dict[str, Any] = json.loads((FOLDER / "dashboards" / "clutchlife.json").read_text(encoding="utf-8"))
@@ -26,8 +25,7 @@ TARGETS = [target for panel in DASHBOARD["panels"] for target in panel["targets"
 def aged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     """A service that knows a clutch with three tests of each kind, and has metrics of every clutch."""
     database = f"sqlite:///{tmp_path_factory.mktemp('aged') / 'clutchlife.db'}"
-    app = create_app(Settings(workers=0, database=database, clutch_metrics=True))
-    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
+    with client_on(database, clutch_metrics=True) as client:
         client.post("/v1/clutches", json={"clutch_id": "bench"})
         for run in simulate(7, most_tests=3, programme=Programme(dynamic=DynamicTest(rate=25.0))):
             assert client.post("/v1/clutches/bench/runs", json=simulated_body(run)).status_code == 201

@@ -7,11 +7,10 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from service.app import create_app
 from service.queries.verification import CheckedResults, CheckedRuns, check_results, check_runs
-from service.settings import Settings
 from storage.engine.opening import find_database
 from storage.engine.sqlite.database import back_up
+from tests.service.clients import client_on
 from tests.support import stationary
 
 BASE = "/v1/clutches/c1"
@@ -21,8 +20,7 @@ BASE = "/v1/clutches/c1"
 def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A clutch with runs of all kinds, one that is held, one corrected, one that came late and one withdrawn."""
     path = tmp_path_factory.mktemp("stored") / "clutchlife.db"
-    app = create_app(Settings(workers=0, database=f"sqlite:///{path}"))
-    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
+    with client_on(f"sqlite:///{path}") as client:
         assert client.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
         fill(client)
     return path

@@ -9,13 +9,12 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from service.app import create_app
 from service.queries import series
-from service.settings import Settings
 from service.web import answers
 from service.workflows.replay import replay_clutch
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import back_up
+from tests.service.clients import client_on
 from tests.support import stationary
 
 BASE = "/v1/clutches/c1"
@@ -43,9 +42,7 @@ def told_by_another(database_url: str) -> dict[str, tuple[str, bytes]]:
 
 
 def told_on(database_url: str) -> dict[str, tuple[str, bytes]]:
-    with TestClient(
-        create_app(Settings(workers=0, database=database_url)), base_url="http://127.0.0.1", client=("127.0.0.1", 50000)
-    ) as client:
+    with client_on(database_url) as client:
         return told(client)
 
 

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import pytest
 from fastapi.testclient import TestClient
 
-from service.app import create_app
-from service.settings import Settings
+from tests.service.clients import client_on
 from tests.support import stationary
 
 BASE = "/v1/clutches/c1"
@@ -17,8 +16,7 @@ BASE = "/v1/clutches/c1"
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     """A clutch with five tests, one of them corrected twice, and a second clutch."""
-    app = create_app(Settings(workers=0, database=f"sqlite:///{tmp_path_factory.mktemp('lists')}/clutchlife.db"))
-    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as found:
+    with client_on(f"sqlite:///{tmp_path_factory.mktemp('lists')}/clutchlife.db") as found:
         for clutch_id in ("c1", "c2"):
             assert found.post("/v1/clutches", json={"clutch_id": clutch_id}).status_code == 201
         for cycles in range(0, 5000, 1000):

@@ -12,17 +12,15 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import event
 
-from service.app import create_app
-from service.settings import Settings
 from storage import clutches
+from tests.service.clients import client_on
 from tests.service.web.routes.granting import context_of
 from tests.support import stationary
 
 
 @contextmanager
 def service(database_url: str, *, clutch_metrics: bool) -> Iterator[TestClient]:
-    app = create_app(Settings(workers=0, database=database_url, clutch_metrics=clutch_metrics))
-    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
+    with client_on(database_url, clutch_metrics=clutch_metrics) as client:
         client.post("/v1/clutches", json={"clutch_id": "c1"})
         yield client
 

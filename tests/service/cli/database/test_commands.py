@@ -12,6 +12,7 @@ from service.app import create_app
 from service.cli.main import app
 from service.settings import Settings
 from storage.engine.sqlite.connect import service_lock
+from tests.service.clients import client_on
 from tests.storage.samples import OLD, integrity, old_database, revision
 from tests.support import stationary
 
@@ -27,11 +28,7 @@ def clutchlife(*arguments: str | Path, code: int = 0) -> str:
 def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A database with the clutches a, b and c, of which b has tests."""
     path = tmp_path_factory.mktemp("stored") / "clutchlife.db"
-    with TestClient(
-        create_app(Settings(workers=0, database=f"sqlite:///{path}")),
-        base_url="http://127.0.0.1",
-        client=("127.0.0.1", 50000),
-    ) as client:
+    with client_on(f"sqlite:///{path}") as client:
         for clutch_id in "abc":
             assert client.post("/v1/clutches", json={"clutch_id": clutch_id}).status_code == 201
             assert client.post(f"/v1/clutches/{clutch_id}/runs", json=stationary(0, run_id="s0")).status_code == 201

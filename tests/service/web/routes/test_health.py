@@ -8,33 +8,23 @@ import signal
 import sqlite3
 import threading
 import time
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
-from service.app import create_app
-from service.settings import Settings
 from service.web import readiness
 from service.web.readiness import available_memory
+from tests.service.clients import client_on
 from tests.service.web.routes.granting import context_of
 from tests.service.web.test_stopping import family
 from tests.support import ONCE, serving
 
 WHOLE = dict.fromkeys(("database", "disk", "memory", "workers"), "ok")
 _SPAWN = multiprocessing.get_context("spawn")
-
-
-@contextmanager
-def service(database_url: str, **settings: Any) -> Iterator[TestClient]:
-    app = create_app(Settings(workers=0, database=database_url, **settings))
-    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
-        yield client
 
 
 def test_a_service_that_can_work_says_so(client: TestClient) -> None:
@@ -50,7 +40,7 @@ def test_a_service_that_can_work_says_so(client: TestClient) -> None:
 def test_too_little_room_is_not_ready_and_says_how_little(
     database_url: str, setting: str, part: str, says: str
 ) -> None:
-    with service(database_url, **{setting: 2**40}) as client:
+    with client_on(database_url, **{setting: 2**40}) as client:
         answer = client.get("/readyz")
         assert (answer.status_code, answer.json()["status"]) == (503, "not ready")
         checks = answer.json()["checks"]

@@ -11,10 +11,9 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from service.app import create_app
 from service.errors import BusyError
-from service.settings import Settings
 from service.work.workers import Lane
+from tests.service.clients import client_on
 from tests.service.web.routes.granting import context_of, granted
 from tests.service.work import calls
 from tests.support import serving, stationary
@@ -23,15 +22,8 @@ CLUTCHES = "/v1/clutches"
 WAIT = {"Prefer": "wait=60"}
 
 
-@contextmanager
-def service(database_url: str, **settings: Any) -> Iterator[TestClient]:
-    app = create_app(Settings(workers=0, database=database_url, **settings))
-    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
-        yield client
-
-
 def test_who_asks_too_often_is_told_when_to_come_back(database_url: str) -> None:
-    with service(database_url, requests_per_second=1) as client:
+    with client_on(database_url, requests_per_second=1) as client:
         answers = [client.get(CLUTCHES) for _ in range(4)]
         assert [answer.status_code for answer in answers] == [200, 200, 429, 429]
         refused = answers[-1]
@@ -43,7 +35,7 @@ def test_who_asks_too_often_is_told_when_to_come_back(database_url: str) -> None
 
 
 def test_a_key_and_its_neighbours_at_one_address_have_a_share_each(database_url: str) -> None:
-    with service(database_url, requests_per_second=1) as client:
+    with client_on(database_url, requests_per_second=1) as client:
         one, other = granted(client), granted(client)
         assert client.get(CLUTCHES, headers=one).status_code == 200
         assert client.get(CLUTCHES, headers=other).status_code == 200
@@ -54,7 +46,7 @@ def test_a_key_and_its_neighbours_at_one_address_have_a_share_each(database_url:
 
 def test_who_tries_keys_has_one_share(database_url: str) -> None:
     """Else every key that is tried would come with a share of its own."""
-    with service(database_url, requests_per_second=1) as client:
+    with client_on(database_url, requests_per_second=1) as client:
         granted(client)
         tried = [client.get(CLUTCHES, headers={"Authorization": f"Bearer {number}"}) for number in range(4)]
         assert [answer.status_code for answer in tried] == [401, 401, 429, 429]
