@@ -10,7 +10,7 @@ ISRN Tribology 2013, 607279, section 2.2 and eq. 1.
 import math
 from dataclasses import dataclass
 
-from models.arrays import FloatArray
+from models.arrays import FloatArray, require_finite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,14 +28,7 @@ class Geometry:
     pressure_factor: float = 1.0
 
     def __post_init__(self) -> None:
-        positive = {
-            "inner_diameter": self.inner_diameter,
-            "pressure_factor": self.pressure_factor,
-            "mean_radius_override": 1.0 if self.mean_radius_override is None else self.mean_radius_override,
-        }
-        for name, value in positive.items():
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be finite and positive, got {value}")
+        require_finite(self, ("inner_diameter", "pressure_factor", "mean_radius_override"), positive=True)
         if not (math.isfinite(self.outer_diameter) and self.outer_diameter > self.inner_diameter):
             raise ValueError(
                 f"outer_diameter must exceed inner_diameter {self.inner_diameter}, got {self.outer_diameter}"

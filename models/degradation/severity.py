@@ -21,7 +21,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from models.arrays import FloatArray
+from models.arrays import FloatArray, require_finite
 from models.degradation import criteria
 from models.degradation.general_order import Number
 
@@ -55,10 +55,7 @@ class Block:
     duration: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("end", "cycles", "energy", "speed", "duration"):
-            number = getattr(self, name)
-            if number is not None and not (math.isfinite(number) and number >= 0.0):
-                raise ValueError(f"{name} must be finite and not negative, got {number}")
+        require_finite(self, ("end", "cycles", "energy", "speed", "duration"))
         if self.cycles == 0.0:
             raise ValueError("cycles must be positive, got 0")
 

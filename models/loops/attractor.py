@@ -15,7 +15,7 @@ Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.4, e
 import numpy as np
 
 from models.arrays import FloatArray
-from models.friction.stribeck import StribeckParameters, slope, torque
+from models.friction.stribeck import StribeckParameters, torque
 from models.relaxation import relax
 
 _LEAST_TORQUE = 1e-9
@@ -43,18 +43,3 @@ def attractor_torque(
     curve = torque(velocity, parameters)
     strength = np.maximum(np.abs(curve), _LEAST_TORQUE)
     return relax(time, np.asarray(attractor) / strength, curve, curve[..., :1] if start is None else start)
-
-
-def attractor_area(
-    velocity: FloatArray, acceleration: FloatArray, period: float, parameters: StribeckParameters, attractor: float
-) -> float:
-    """-(1/C) ∮ S S' v̇² dt [Nm m/s], the attractor law's loop area to first order in 1/C.
-
-    velocity [n] m/s and acceleration [n] m/s² at n evenly spaced times of one period [s], none of them at standstill
-    unless v̇ is 0 there too.
-    """
-    turning = np.square(acceleration)
-    rise = torque(velocity, parameters) * slope(velocity, parameters)
-    return (
-        -float(np.where(turning > 0, np.where(np.isfinite(rise), rise, 0.0) * turning, 0.0).mean()) * period / attractor
-    )

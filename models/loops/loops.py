@@ -51,11 +51,11 @@ class Loop:
 
     pressure: float
     mean_pressure: float
-    frequency: float | None
-    periods: int
-    area: float | None
-    area_sd: float | None
-    direction: Direction
+    frequency: float | None = None
+    periods: int = 0
+    area: float | None = None
+    area_sd: float | None = None
+    direction: Direction = Direction.NONE
     attractor: float | None = None
     attractor_sd: float | None = None
     attractor_interval: tuple[float, float | None] | None = None
@@ -111,11 +111,6 @@ def _loop(
         return Loop(
             pressure=level,
             mean_pressure=mean_pressure,
-            frequency=None,
-            periods=0,
-            area=None,
-            area_sd=None,
-            direction=Direction.NONE,
             status=LoopStatus.NO_PERIOD,
             message=cycle if isinstance(cycle, str) else "Too few samples lie in whole periods.",
         )

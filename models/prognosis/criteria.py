@@ -50,9 +50,6 @@ TRUST, DOUBT = 0.25, 3.0
 #: A filter runs under a normal that is wider than the population by this factor: a clutch at the edge of its fleet must not
 #: lie at the edge of what the filter covers. Chosen; no table.
 WIDER = 1.5
-#: A learned population has converged where its mean changes by less than this in a round, in its deviations. Chosen; no
-#: table: it decides no number.
-SETTLED = 1e-3
 
 # What ended lives say of one that has not (`ended_lives`): what it achieves: docs/appendix/prognosis.md, A fleet's prior
 

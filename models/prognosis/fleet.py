@@ -148,26 +148,8 @@ def learn(histories: Sequence[Sequence[Measurement]]) -> FleetPrior:
     return population([taught(history) for history in histories if len(history) >= criteria.FEWEST_TESTS_TO_LEARN])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PopulationFit:
-    """A learned population, and the largest change of its mean in the last round, in the population's deviations."""
-
-    prior: FleetPrior
-    change: float
-
-    @property
-    def converged(self) -> bool:
-        """Whether further rounds would hardly change it."""
-        return self.change < criteria.SETTLED
-
-
-def population(fleet: Sequence[Taught]) -> FleetPrior:
-    """The population behind the samples of clutches. Raises ValueError where there are none."""
-    return fit_population(fleet).prior
-
-
-def fit_population(fleet: Sequence[Taught], rounds: int = _ROUNDS) -> PopulationFit:
-    """`population` after so many rounds, and whether it has converged. Raises ValueError where `fleet` is empty."""
+def population(fleet: Sequence[Taught], rounds: int = _ROUNDS) -> FleetPrior:
+    """The population behind the samples of clutches, after so many rounds. Raises ValueError where there are none."""
     if not fleet:
         raise ValueError(f"a fleet needs a clutch with {criteria.FEWEST_TESTS_TO_LEARN} tests or more")
     centre = weak(Measurement(progress=0.0, value=1.0, variance=0.0), falling=True)
@@ -178,11 +160,9 @@ def fit_population(fleet: Sequence[Taught], rounds: int = _ROUNDS) -> Population
         scale=np.diag([centre.change_sd, centre.log_scale_sd, centre.log_exponent_sd, centre.log_scatter_sd]) ** 2,
         freedom=criteria.HYPER_CLUTCHES,
     )
-    change = math.inf
     for _ in range(rounds):
-        before, learned = learned, _learnt(learned, fleet, believed)
-        change = float((np.abs(learned.mean - before.mean) / np.sqrt(np.diag(learned.scale))).max())
-    return PopulationFit(prior=learned, change=change)
+        learned = _learnt(learned, fleet, believed)
+    return learned
 
 
 def pooled(first: Posterior, second: Posterior) -> Posterior:

@@ -22,10 +22,9 @@ from models.arrays import FloatArray
 from models.friction.stribeck import GAMMA, StribeckParameters, torque
 from models.records.runs import Plateaus, Record
 from models.rig.hysteresis import ATTRACTOR, NO_LAG
-from models.rig.oil_viscosity import warmed
-from models.rig.plate import REFERENCE_FLUX, heat_flux
 from models.rig.simulated_runs import SimulatedRun
 from models.rig.stationary import PLATEAU_DURATION
+from models.rig.temperatures import REFERENCE_FLUX, heat_flux, warmed
 from models.rig.truth import OPEN, SimulatedClutch
 
 #: Cycles in which drifts come to half of their size, and a new lining's excess to a quarter.
@@ -128,7 +127,7 @@ def _in_the_lag(_: float, rows: Rows) -> FloatArray:
 
 
 def _oil_temperature(size: float, rows: Rows) -> FloatArray:
-    """Hersey's similarity with Vogel's viscosity: `models.rig.oil_viscosity`."""
+    """Hersey's similarity with Vogel's viscosity: `models.rig.temperatures`."""
     measured = Plateaus(
         pressure=rows.held.pressure,
         speed=rows.held.speed,

@@ -15,12 +15,11 @@ Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 7 and sectio
 project's: the reference prints none.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from models.arrays import FloatArray
+from models.arrays import FloatArray, require_finite
 from models.degradation.general_order import progress_fraction
 from models.friction.pressure_laws import LinearLaw
 from models.friction.stribeck import StribeckParameters, torque
@@ -46,12 +45,8 @@ class FrictionLag:
     attractor: float | None = None
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.film_time) and self.film_time >= 0):
-            raise ValueError(f"film_time must be finite and not negative, got {self.film_time}")
-        for name in ("scale", "exponent", "attractor"):
-            setting = getattr(self, name)
-            if setting is not None and not (math.isfinite(setting) and setting > 0):
-                raise ValueError(f"{name} must be finite and positive, got {setting}")
+        require_finite(self, ("film_time",))
+        require_finite(self, ("scale", "exponent", "attractor"), positive=True)
 
     def film_time_at(self, pressure: FloatArray, cycles: float) -> FloatArray:
         """τ_1 [...] s at pressure [...] Pa after cycles >= 0."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from models.arrays import FloatArray
+from models.arrays import FloatArray, require_finite
 from models.friction.speed_protocol import RPM
 from models.records.runs import Record
 from models.rig.stationary import OIL_TEMPERATURE, Sensor, oil_temperature, rounded
@@ -36,10 +36,7 @@ class Recorder:
     spikes_per_minute: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in self.__slots__:
-            setting = getattr(self, name)
-            if not (math.isfinite(setting) and setting >= 0):
-                raise ValueError(f"{name} must be finite and not negative, got {setting}")
+        require_finite(self, self.__slots__)
         if self.lost >= 1:
             raise ValueError(f"lost must be below 1, got {self.lost}")
 

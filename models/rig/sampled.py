@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from models.arrays import FloatArray
+from models.arrays import FloatArray, require_finite
 from models.engagements.simulation import Engagement
 from models.friction.speed_protocol import REFERENCE_SPEEDS, RPM
 from models.records.runs import Record
@@ -42,8 +42,7 @@ class DynamicTest:
     pressures: tuple[float, ...] = PROTOCOL
 
     def __post_init__(self) -> None:
-        for name in ("frequency", "offset", "amplitude", "duration", "step", "rate"):
-            _require_positive(name, getattr(self, name))
+        require_finite(self, ("frequency", "offset", "amplitude", "duration", "step", "rate"), positive=True)
         if self.amplitude > self.offset:
             raise ValueError(f"amplitude must not exceed offset {self.offset}, got {self.amplitude}")
 
@@ -72,8 +71,7 @@ class RawTest:
     pressures: tuple[float, ...] = PROTOCOL
 
     def __post_init__(self) -> None:
-        for name in ("rate", "controller", "dwell"):
-            _require_positive(name, getattr(self, name))
+        require_finite(self, ("rate", "controller", "dwell"), positive=True)
 
     def course(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Time [n] s, pressure [n] Pa and speed [n] rad/s as the controllers bring them about."""
@@ -105,8 +103,3 @@ def sampled_test(
 def engagement_record(trace: Engagement, rng: np.random.Generator, sensor: Sensor) -> Record:
     """What the recorder makes of one engagement."""
     return Recorder().record(trace.time, trace.pressure, trace.speed, trace.torque, rng, sensor)
-
-
-def _require_positive(name: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{name} must be finite and positive, got {value}")

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.arrays import FloatArray
+from models.arrays import FloatArray, require_finite
 from models.friction.speed_protocol import REFERENCE_SPEEDS
 from models.friction.stribeck import torque
 from models.records.runs import Plateaus
@@ -44,10 +44,7 @@ class Sensor:
     temperature_counts: float = 10.0
 
     def __post_init__(self) -> None:
-        for name in ("noise", "floor", "gain_scatter", "torque_counts", "temperature_counts"):
-            setting = getattr(self, name)
-            if not (math.isfinite(setting) and setting >= 0):
-                raise ValueError(f"{name} must be finite and not negative, got {setting}")
+        require_finite(self, self.__slots__)
 
 
 #: A sensor that gives the reference's errors of fit: the percentage MSE (eq. 5) of fresh curves is 1.5 % on average over

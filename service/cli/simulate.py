@@ -76,7 +76,7 @@ def simulate(
 
     Run-in and duty blocks are JSON whatever the format. Tests in another format are listed in runs.json, which push reads.
     """
-    from models.rig import campaign, hidden, plate, stationary, surface  # start-up time
+    from models.rig import campaign, hidden, stationary, surface, temperatures  # start-up time
     from models.rig.simulated_runs import RunKind  # start-up time
     from service.run_files import record_writer, simulated  # start-up time
 
@@ -107,7 +107,7 @@ def simulate(
                 progress.update(task, description=description, completed=run.wear)
                 made = hidden.hidden_in(run, clutch, sizes)
                 if plate_rise is not None:
-                    made = plate.with_plate(made, clutch.geometry, plate_rise)
+                    made = temperatures.with_plate(made, clutch.geometry, plate_rise)
                 listed += _write(out_folder, made, record_format)
                 if run.kind is RunKind.STATIONARY_STRIBECK:
                     _inspect(out_folder, surface.surface(clutch, run.wear), run.cycles)
@@ -135,7 +135,7 @@ def simulate(
 
 def _run_plan(folder: Path, plan: Path, alternative: int) -> None:
     """One test of a plan on the clutch of a campaign that was simulated into the folder, as its `answer.json` has it."""
-    from models.rig import campaign, hidden, plate, stationary  # start-up time
+    from models.rig import campaign, hidden, stationary, temperatures  # start-up time
     from models.rig.programme import Ageing  # start-up time
     from service.run_files import plan_file, simulated  # start-up time
 
@@ -157,7 +157,7 @@ def _run_plan(folder: Path, plan: Path, alternative: int) -> None:
     for run in runs:
         made = hidden.hidden_in(run, clutch, sizes)
         if answer["plate_rise"] is not None:
-            made = plate.with_plate(made, clutch.geometry, answer["plate_rise"])
+            made = temperatures.with_plate(made, clutch.geometry, answer["plate_rise"])
         manifest.write(folder / f"{made.run_id}.json", simulated.simulated_body(made))
         answer |= {"cycles": made.cycles, "wear": made.wear}
         answer["planned_tests"] += made.duty is None

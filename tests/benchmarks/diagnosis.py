@@ -12,9 +12,9 @@ import numpy as np
 
 from models.diagnosis.diagnose import diagnose
 from models.rig import campaign
-from models.rig.oil_viscosity import warmed
 from models.rig.programme import QUICK, WHOLE, Programme
 from models.rig.simulated_runs import SimulatedRun
+from models.rig.temperatures import warmed
 from service.run_files.simulated import simulated_body
 from tests.blind.rig import sent
 from tests.blind.rig.hide import hide

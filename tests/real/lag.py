@@ -15,11 +15,12 @@ from scipy.optimize import least_squares
 
 from models.arrays import FloatArray
 from models.friction.stribeck import StribeckParameters
-from models.loops.attractor import attractor_area, attractor_torque
+from models.loops.attractor import attractor_torque
 from models.loops.loop_area import measured_area
 from models.loops.squeeze_film import film_time_at, squeeze_film_torque
 from models.records.periods import Cycle, fit_cycle
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
+from tests.models.loops.dynamic_records import attractor_area
 from tests.real.loaders import FOLDER, TRACTION_SWEEPS
 
 MICRO_LOOPS = FOLDER / "micro_friction_loops" / "test_data_2.csv"

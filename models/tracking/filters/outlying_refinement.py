@@ -13,8 +13,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.tracking.courses import scatter_growth
 from models.tracking.criteria import LEADING, MOST, WORTH
-from models.tracking.filters.kinds import Kinds
-from models.tracking.filters.lattice import COARSE, Frame, joined, log_density, log_masses, shrunk, tabled
+from models.tracking.filters.lattice import COARSE, Frame, Kinds, joined, log_density, log_masses, shrunk, tabled
 from models.tracking.history import History
 from models.tracking.linear_model import log_outlying
 from models.tracking.outlying_runs import TEMPER, Nodes, gains

@@ -20,12 +20,12 @@ from models.friction.stribeck import torque
 from models.records.runs import Record
 from models.rig import campaign
 from models.rig.hysteresis import FrictionLag
-from models.rig.oil_viscosity import warmed
 from models.rig.recorder import Recorder
 from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor
 from models.rig.surface import Surface, surface
+from models.rig.temperatures import warmed
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 
 #: The demo ends at this share of the mean COF when new. Chosen: a little after the end of life at 0.5.

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.clutch import Geometry
-from models.friction.stribeck import StribeckParameters
+from models.friction.stribeck import StribeckParameters, slope
 from models.records.runs import Record
 
 GEOMETRY = Geometry()
@@ -29,6 +29,12 @@ def curve(v: np.ndarray | float, p: StribeckParameters) -> np.ndarray:
     v = np.maximum(v, 1e-12)
     e = np.exp(-p.stribeck_velocity / v)
     return p.static_torque * (1 + (p.coulomb_ratio - 1) * e) + p.viscous_coefficient * v**0.3
+
+
+def attractor_area(v: np.ndarray, rate: np.ndarray, period: float, p: StribeckParameters, c: float) -> float:
+    """-(1/C) ∮ S S' v̇² dt [Nm m/s], the attractor law's loop area to first order in 1/C, for v > 0 or v̇ = 0."""
+    rise = curve(v, p) * slope(v, p)
+    return -float(np.where(np.isfinite(rise), rise * rate**2, 0.0).mean()) * period / c
 
 
 def velocity(t: np.ndarray | float, frequency: float = 0.1) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.friction.stribeck import StribeckParameters
-from models.loops.attractor import attractor_area, attractor_torque
+from models.loops.attractor import attractor_torque
 from tests.models.loops.dynamic_records import (
     FALLING,
     FINE,
@@ -14,6 +14,7 @@ from tests.models.loops.dynamic_records import (
     RISING,
     SWING,
     attractor,
+    attractor_area,
     curve,
     dense_area,
     velocity,

@@ -10,7 +10,7 @@ import pytest
 from models.degradation.general_order import Degradation, value
 from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
 from models.prognosis.first_passage import ends_of_life
-from models.prognosis.fleet import FleetPrior, fit_population, learn, pooled, population, taught
+from models.prognosis.fleet import FleetPrior, learn, pooled, population, taught
 from models.prognosis.scoring import crps_of_sample
 from models.tracking.courses import Course, basis
 from models.tracking.filters.grid import Grid
@@ -69,16 +69,15 @@ def test_it_survives_json_and_counts_in_other_units() -> None:
     assert math.exp(shifted.log_scale_mean) == pytest.approx(0.5 * math.exp(found.prior_for(first).log_scale_mean))
 
 
-def test_a_population_says_whether_it_has_converged() -> None:
+def test_a_population_has_converged() -> None:
+    """Further rounds leave it where it is, and a single one does not reach it."""
     rng = np.random.default_rng(3)
     samples = [taught(measured(life(rng, 5000.0), 15_000.0, 14, rng)) for _ in range(3)]
-    fit = fit_population(samples)
-    assert fit.converged
-    # further rounds leave it where it is, and a single one does not reach it
-    further = fit_population(samples, rounds=80).prior
-    assert fit.prior.mean == pytest.approx(further.mean, abs=0.01 * float(np.sqrt(np.diag(further.scale)).min()))
-    assert not fit_population(samples, rounds=1).converged
-    assert (population(samples).mean == fit.prior.mean).all()
+    found, further, first = (population(samples, rounds) for rounds in (40, 80, 1))
+    near = 0.01 * float(np.sqrt(np.diag(further.scale)).min())
+    assert found.mean == pytest.approx(further.mean, abs=near)
+    assert first.mean != pytest.approx(further.mean, abs=near)
+    assert (population(samples).mean == found.mean).all()
 
 
 def test_too_few_tests_teach_nothing() -> None:

@@ -11,11 +11,11 @@ from models.diagnosis.effects.catalogue import CATALOGUE
 from models.diagnosis.report.report import Report
 from models.rig.campaign import simulate, simulated_clutch
 from models.rig.hidden import EFFECTS, clutch_for, effect_of, hidden_in
-from models.rig.plate import with_plate
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
 from models.rig.simulated_runs import RunKind, SimulatedRun
 from models.rig.stationary import SHARP
+from models.rig.temperatures import with_plate
 
 LEVELS = (4.0e5, 5.5e5, 7.0e5)
 PROGRAMME = Programme(dynamic=DynamicTest(rate=50.0, pressures=LEVELS), pressures=LEVELS)
