@@ -36,7 +36,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         used = {*getattr(item, "fixturenames", ()), *(value for value in drawn.values() if isinstance(value, str))}
         if used & OUTSIDE or "journeys" in item.path.parts:
             item.add_marker("outside")
-        if "on_server" in drawn.values() and "service" in item.path.parts and item.path.name not in ON_BOTH:
+        if "on_server" in used and "/tests/service/" in item.path.as_posix() and item.path.name not in ON_BOTH:
             item.add_marker("slow")
 
 
