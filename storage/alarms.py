@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Double, Row, Text, bindparam, delete, func, or_, select, update
 
 from storage.dialects import ALL_ROWS, among, upsert
-from storage.encoding.json_text import Json, to_object, to_text
+from storage.encoding import Json, to_object, to_text
 from storage.tables import NOT_CLEARED, alarm, alarm_event, run
 
 RAISED, ACKNOWLEDGED, CLEARED = "raised", "acknowledged", "cleared"

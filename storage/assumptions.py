@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, delete, func, select
 
 from storage.dialects import json_length
-from storage.encoding.json_text import Json, to_list, to_object, to_text
+from storage.encoding import Json, to_list, to_object, to_text
 from storage.tables import adopted_model, corrected_cof, fleet_prior, run
 
 # --- adopted models ---

@@ -6,7 +6,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Double, Row, Text, bindparam, func, or_, select
 
 from storage.dialects import ALL_ROWS
-from storage.encoding.json_text import Json, to_object, to_text
+from storage.encoding import Json, to_object, to_text
 from storage.tables import change
 
 HOLD, CONFIRM, WITHDRAW, RESTORE, CORRECT = "hold", "confirm", "withdraw", "restore", "correct"

@@ -21,7 +21,7 @@ from sqlalchemy import ColumnElement, Connection, Row, and_, bindparam, func, or
 from storage.blobs import raw_stores
 from storage.blobs.raw_stores import RawStore
 from storage.blobs.stores import fetched, name_of, open_store
-from storage.encoding.codec import CODEC, DECIMAL_CODEC, LONG, decode, decode_decimals, encode, encode_decimals
+from storage.encoding import CODEC, DECIMAL_CODEC, LONG, decode, decode_decimals, encode, encode_decimals
 from storage.engine.errors import DamagedData, DatabaseBusy
 from storage.tables import channel, raw_store, run
 

@@ -8,7 +8,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Row, Select, Text, bindparam, case, func, select, tuple_, update
 
 from storage.dialects import among, json_fields
-from storage.encoding.json_text import Json, to_object, to_text
+from storage.encoding import Json, to_object, to_text
 from storage.tables import HELD_ONLY, clutch, run
 
 

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Double, Row, bindparam, select, update
 
 from storage.dialects import json_fields
-from storage.encoding.json_text import Json, to_object, to_text
+from storage.encoding import Json, to_object, to_text
 from storage.runs import ACCEPTED
 from storage.tables import adopted_model, diagnosis, run
 

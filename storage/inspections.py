@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, select, tuple_, update
 
 from storage.dialects import ALL_ROWS, among
-from storage.encoding.json_text import Json, to_object, to_text
+from storage.encoding import Json, to_object, to_text
 from storage.runs import ACCEPTED
 from storage.tables import inspection, inspection_photograph, photograph
 

@@ -12,7 +12,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Double, Row, Text, and_, bindparam, func, or_, select, update
 
 from storage.dialects import among, now_in_seconds
-from storage.encoding.json_text import Json, to_object, to_text
+from storage.encoding import Json, to_object, to_text
 from storage.tables import OPEN_ONLY, job
 
 WAITING, RUNNING, FINISHED, FAILED, CANCELLED = "waiting", "running", "finished", "failed", "cancelled"

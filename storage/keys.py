@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, exists, or_, select, update
 
-from storage.encoding.json_text import to_list, to_text
+from storage.encoding import to_list, to_text
 from storage.tables import access_key
 
 

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, Row, bindparam, delete, select
 
 from storage.dialects import upsert
-from storage.encoding.codec import pack, unpack
-from storage.encoding.json_text import Json, to_list, to_object, to_text
+from storage.encoding import Json, pack, to_list, to_object, to_text, unpack
 from storage.engine.errors import DamagedData
 from storage.tables import filter_state, fit, prediction, run
 

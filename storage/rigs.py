@@ -6,7 +6,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, select
 
 from storage.dialects import ALL_ROWS, upsert
-from storage.encoding.json_text import Json, to_object, to_text
+from storage.encoding import Json, to_object, to_text
 from storage.tables import rig
 
 

@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Row, Select, Text, bindparam, exists, func, or_, select, tuple_, update
 
 from storage.dialects import ALL_ROWS, Pair, json_text, json_value
-from storage.encoding.json_text import Json, to_list, to_object, to_text
+from storage.encoding import Json, to_list, to_object, to_text
 from storage.tables import HELD_ONLY, fit, run
 
 ACCEPTED, HELD, WITHDRAWN = "accepted", "held", "withdrawn"

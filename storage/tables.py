@@ -1,7 +1,7 @@
 """The tables. What a request reads is stored beside what it was computed from; raw channels are kept bit for bit.
 
 Units are SI (pressure in Pa; 0 stands for the mean over the reference pressures), cycles are duty cycles since new,
-times are ISO 8601 text made by the caller. Columns that hold JSON are text, written by `storage.encoding.json_text`.
+times are ISO 8601 text made by the caller. Columns that hold JSON are text, written by `storage.encoding`.
 """
 
 from typing import Any

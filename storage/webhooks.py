@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Double, Row, bindparam, delete, func, select, update
 
 from storage.dialects import now_in_seconds
-from storage.encoding.json_text import Json, to_object, to_text
+from storage.encoding import Json, to_object, to_text
 from storage.tables import WAITING_ONLY, delivery, webhook
 
 WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"

@@ -28,7 +28,7 @@ from service.schemas.clutch import ClutchIn
 from storage import alarms, clutches, diagnoses, results, runs, webhooks
 from storage.alarms import AlarmRow, EventRow, NewEvent
 from storage.clutches import ClutchRow
-from storage.encoding.json_text import Json
+from storage.encoding import Json
 from storage.results import FitRow
 from storage.webhooks import NewDelivery, WebhookRow
 

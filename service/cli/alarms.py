@@ -5,8 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.connection import asking, listed
-from service.cli.options import Json, print_line
+from service.cli.options import Json, asking, listed, print_line
 from service.cli.tables import show_table
 from service.client.clutchlife.transport import Service
 

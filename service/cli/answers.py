@@ -8,8 +8,7 @@ from urllib.parse import urlencode
 
 import typer
 
-from service.cli.connection import asking
-from service.cli.options import EX_USAGE, ClutchId, Json, errors_in_a_line, fail, out, print_line
+from service.cli.options import EX_USAGE, ClutchId, Json, asking, errors_in_a_line, fail, out, print_line
 from service.cli.tables import coefficient, cycles, number, place, show_table, warn, with_deviation
 from service.cli.tables import pressure as pressure_of
 from service.client.clutchlife.transport import Service

@@ -9,8 +9,22 @@ from typing import Annotated, Any
 import httpx2
 import typer
 
-from service.cli.connection import asking, listed
-from service.cli.options import EX_USAGE, URL, ClutchId, Json, Key, Patience, Reason, Url, err, fail, out, print_line
+from service.cli.options import (
+    EX_USAGE,
+    URL,
+    ClutchId,
+    Json,
+    Key,
+    Patience,
+    Reason,
+    Url,
+    asking,
+    err,
+    fail,
+    listed,
+    out,
+    print_line,
+)
 from service.cli.tables import cycles, number, show_table
 from service.client.clutchlife import Client, ClutchlifeError
 from service.client.clutchlife.transport import Service

@@ -1,17 +1,241 @@
-"""`clutchlife diagnose`: what the simulation gets wrong about a clutch, and why."""
+"""`clutchlife diagnose`: a diagnosis asked for, awaited and printed."""
 
 import json
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from rich.columns import Columns
+from rich.console import Group, RenderableType
+from rich.panel import Panel
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
 
-from service.cli.connection import asking
-from service.cli.diagnosis_view import shown
-from service.cli.options import ClutchId, err, fail, out, print_line
+from service.cli.options import ClutchId, asking, err, fail, out, print_line
+from service.cli.tables import cycles, number
 from service.client.clutchlife.client import diagnosed
 from service.client.clutchlife.transport import Service
+
+_Table = list[list[float | None]]
+_VERDICTS = {
+    "model_adequate": ("The model is adequate", "green"),
+    "cause_named": ("The cause is named", "yellow"),
+    "cause_ambiguous": ("The cause cannot be distinguished", "yellow"),
+    "unexplained_structure": ("A pattern that no effect of the catalogue explains", "red"),
+    "insufficient_data": ("Too little data", "cyan"),
+}
+#: An axis is named where chance alone makes such a pattern less often than this.
+_SHOWN_P = 0.01
+#: Candidates that are less probable, or come after this many, are shown by `--json` only. Chosen: a screenful.
+_MIN_PROBABILITY, _MAX_CANDIDATES = 0.005, 6
+#: A gain in log evidence [nats] from which the evidence has this name. Derived: 2 ln B of 6 and 2 in R. E. Kass, A. E.
+#: Raftery, Bayes Factors, JASA 90, 1995, section 3.2.
+_EVIDENCE = ((3.0, "strong"), (1.0, "moderate"), (0.0, "weak"))
+#: Cells of two characters across a map; finer axes are averaged. Chosen: two maps fit 80 characters.
+_MAX_CELLS = 15
+#: A cell is marked from this share of the largest residual on: share, mark, colours for residuals above and below zero.
+#: Chosen: quarters.
+_MARKS = ((0.75, "##", 160, 27), (0.5, "++", 203, 69), (0.25, "+ ", 217, 153))
+
+
+def _spelt(slug: str) -> str:
+    """An effect or an axis in words, without the unit in its name."""
+    return re.sub(r"_(rpm|bar|s|c|nm)$", "", slug).replace("_", " ")
+
+
+def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
+    """The parts of a finished report, each to be printed."""
+    words, colour = _VERDICTS[report["verdict"]]
+    causes = f": {', '.join(map(_spelt, report['causes']))}" if report["causes"] else ""
+    yield Panel(Text(report["summary"]), title=Text(f"{words}{causes}", style=f"bold {colour}"), border_style=colour)
+    if report["candidates"]:
+        likely = [item for item in report["candidates"] if (item["probability"] or 0.0) >= _MIN_PROBABILITY]
+        yield _candidates((likely or report["candidates"])[:_MAX_CANDIDATES])
+    if report["maps"] is not None:
+        yield _maps(report["maps"])
+    axes = [_spelt(item["axis"]) for item in report["baseline"]["where"] if item["p_value"] < _SHOWN_P]
+    if axes:
+        yield Text(f"The model without an effect errs along: {', '.join(axes)}")
+    yield from _gain(report)
+    tests = report["advice"]
+    if len(tests) > 1:
+        yield Text("What to test next. One of these is enough; the best comes first:", style="bold")
+    for advice in tests:
+        yield Text(f"{'- ' if len(tests) > 1 else 'What to test next: '}{advice['test']} ({_use(advice)})")
+    if report["isolability"] is not None:
+        yield from _isolability(report["isolability"])
+    if report["visible"]:
+        yield _visible(report["visible"])
+    for note in report["notes"]:
+        yield Text(f"Note: {note}", style="dim")
+
+
+def _use(advice: Mapping[str, Any]) -> str:
+    """What a test is good for: it narrows the size of a cause that is named, or distinguishes two."""
+    cause, other = map(_spelt, advice["separates"])
+    if advice["narrows"]:
+        return f"leaves {100 * advice['narrows']:.0f} % of the uncertainty about the size of {cause}"
+    against = "no effect at all" if other == "baseline" else other
+    return f"distinguishes {cause} from {against}; expected evidence: {_evidence(advice['nats'])}"
+
+
+def _in_unit(value: str, unit: str) -> str:
+    """A value with its unit, "-" where it has none."""
+    return value if unit == "-" else f"{value} {unit}"
+
+
+def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("candidate")
+    table.add_column("probability", justify="right")
+    table.add_column("estimate")
+    for candidate in candidates:
+        estimate = candidate["estimate"]
+        size = f"{number(estimate['value'])} ± {number(estimate['sd'], 2)}"
+        amount = f"{_in_unit(size, estimate['unit'])} {estimate['name']}"
+        table.add_row(Text(candidate["effect"]), number(candidate["probability"]), Text(amount))
+    return table
+
+
+def _visible(visible: Sequence[Mapping[str, Any]]) -> Table:
+    """From which size on an effect would be seen: in any of its forms, and in the one that shows best."""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("would be seen", "in any form from", "in its best from"):
+        table.add_column(name, justify="left" if name == "would be seen" else "right")
+    for item in visible:
+        sizes = (
+            "at no size" if size is None else _in_unit(number(size), item["unit"])
+            for size in (item["amplitude"], item["least"])
+        )
+        table.add_row(Text(item["effect"]), *sizes)
+    return table
+
+
+def _isolability(isolability: Mapping[str, Any]) -> Iterator[RenderableType]:
+    """The pairs that these tests could not tell apart for sure, hardest first, and what they cannot show."""
+    hard = [pair for pair in isolability["pairs"] if not pair["apart"]]
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("could be mistaken", "told apart", "by this test", "then"):
+        table.add_column(name)
+    for pair in hard:
+        before, then = (f"{100 * pair[name]:.0f} %" for name in ("probability", "with_test"))
+        table.add_row(
+            Text(" and ".join(map(_spelt, pair["effects"]))),
+            before,
+            Text(pair["test"] or "no single test parts them"),
+            then,
+        )
+    if hard:
+        yield table
+    sure = len(isolability["pairs"]) - len(hard)
+    yield Text(f"Of {len(isolability['pairs'])} pairs of causes these tests would tell {sure} apart.")
+    if isolability["unseen"]:
+        yield Text(f"These tests cannot show: {', '.join(map(_spelt, isolability['unseen']))}.")
+
+
+def _evidence(gain: float | None) -> str:
+    """A gain in log evidence [nats] in a word; the number is in `--json`."""
+    if gain is None:
+        return "-"
+    return next((word for least, word in _EVIDENCE if gain >= least), "none")
+
+
+def _maps(maps: Mapping[str, Any]) -> Group:
+    axes, drawn = maps["axes"], []
+    tables = {when: _tables(maps[when]) for when in ("before", "after")}
+    largest = [
+        max((abs(value) for line in tables["before"][place] for value in line if value is not None), default=0.0)
+        for place in (0, 1)
+    ]
+    for when, title in (("before", "Baseline"), ("after", "Extended")):
+        over = zip((("rpm", axes["speed_rpm"]), ("cycles", axes["cycles"])), tables[when], largest, strict=True)
+        grids = [
+            _grid(f"{title}: bar over {name}", axes["pressure_bar"], columns, table, most)
+            for (name, columns), table, most in over
+        ]
+        drawn.append(Group(*grids))
+    legend = Text("Mean residual, share of the baseline's largest ")
+    legend.append(f"({number(largest[0], 2)} and {number(largest[1], 2)} deviations): ")
+    for least, mark, above, below in reversed(_MARKS):
+        legend.append(mark, style=f"black on color({above})")
+        legend.append(_below(mark), style=f"black on color({below})")
+        legend.append(f" {100 * least:.0f} %  ")
+    return Group(Columns(drawn, padding=(0, 3)), legend)
+
+
+def _tables(residuals: Mapping[str, Any]) -> tuple[_Table, _Table]:
+    """Both maps with a row a pressure, thinned to what fits."""
+    by_pressure = [list(line) for line in zip(*residuals["pressure_cycles"], strict=True)]
+    return _thinned(residuals["speed_pressure"]), _thinned(by_pressure)
+
+
+def _thinned(table: _Table) -> _Table:
+    size = max(1, math.ceil(max(map(len, table), default=0) / _MAX_CELLS))
+    return [[_mean(line[start : start + size]) for start in range(0, len(line), size)] for line in table]
+
+
+def _grid(title: str, rows: Sequence[float], columns: Sequence[float], table: _Table, largest: float) -> Text:
+    """Residuals as coloured blocks that can be read without colours too, the highest row first."""
+    text = Text(f"{title}\n", style="bold")
+    for level, line in sorted(zip(rows, table, strict=True), key=lambda pair: -pair[0]):
+        text.append(f"{level:5.3g} ", style="not bold")
+        for value in line:
+            text.append_text(_cell(value, largest))
+        text.append("\n")
+    first, last = (f"{columns[0]:.0f}", f"{columns[-1]:.0f}") if columns else ("", "")
+    width = 2 * max(map(len, table), default=0)
+    text.append(" " * 6 + first + last.rjust(max(len(last) + 1, width - len(first))), style="not bold dim")
+    return text
+
+
+def _cell(value: float | None, largest: float) -> Text:
+    if value is None:
+        return Text("  ")
+    for share, mark, above, below in _MARKS:
+        if value >= share * largest > 0:
+            return Text(mark, style=f"not bold black on color({above})")
+        if -value >= share * largest > 0:
+            return Text(_below(mark), style=f"not bold black on color({below})")
+    return Text("· ", style="not bold dim")
+
+
+def _below(mark: str) -> str:
+    return mark.replace("+", "-").replace("#", "=")
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    measured = [value for value in values if value is not None]
+    return sum(measured) / len(measured) if measured else None
+
+
+def _gain(report: Mapping[str, Any]) -> Iterator[RenderableType]:
+    gain = report["gain"]
+    if gain["rmse_before_nm"] is not None:
+        spread = "" if gain["reduction_percent_sd"] is None else f" ± {number(gain['reduction_percent_sd'], 2)}"
+        yield Text(
+            f"Held out ({len(gain['held_out_runs'])} runs): error {number(gain['rmse_before_nm'])} Nm before, "
+            f"{number(gain['rmse_after_nm'])} Nm after, {number(gain['reduction_percent'])}{spread} % less; "
+            f"evidence for the extended model there: {_evidence(gain['log_score_gain'])}"
+        )
+    life = gain["remaining_useful_life"]
+    for when, title in (("before", "baseline"), ("after", "extended")):
+        if life[when] and (when == "before" or report["adoptable"]):
+            yield Text(f"Remaining life, {title}: {_remaining(life[when])}")
+    if report["adopted"]:
+        yield Text("The extended model is adopted: tracking and remaining life use it from now on.", style="bold")
+
+
+def _remaining(life: Mapping[str, Any]) -> str:
+    if life["status"] == "reached":
+        return "the end of life is reached"
+    if life["status"] == "insufficient_data":
+        return "too few tests for a prediction"
+    low, middle, high = (life["remaining_cycles"][quantile] for quantile in ("0.05", "0.5", "0.95"))
+    return f"{cycles(middle)} cycles (90 %: {cycles(low)} to {cycles(high)})"
 
 
 @asking

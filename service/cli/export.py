@@ -19,8 +19,7 @@ from typing import Annotated, Any, get_args
 import typer
 from rich.progress import Progress
 
-from service.cli.connection import asking
-from service.cli.options import ClutchId, err, print_line
+from service.cli.options import ClutchId, asking, err, print_line
 from service.cli.workbook import write_workbook
 from service.client.clutchlife.transport import Service
 from service.run_files import manifest

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from service.cli.connection import asking
-from service.cli.options import EX_DATAERR, ChannelMap, Decimal, Missing, fail, out, print_line
+from service.cli.options import EX_DATAERR, ChannelMap, Decimal, Missing, asking, fail, out, print_line
 from service.cli.runs import run_line
 from service.client.clutchlife.answers import RefusedError
 from service.client.clutchlife.transport import Service

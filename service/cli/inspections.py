@@ -8,8 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.connection import asking, listed
-from service.cli.options import EX_USAGE, ClutchId, Json, fail, print_line
+from service.cli.options import EX_USAGE, ClutchId, Json, asking, fail, listed, print_line
 from service.cli.tables import number, show_table
 from service.client.clutchlife.transport import Service
 

@@ -11,6 +11,7 @@ from service.cli import (
     alarms,
     answers,
     clutches,
+    database,
     diagnose,
     export,
     fleet,
@@ -20,10 +21,9 @@ from service.cli import (
     runs,
     simulate,
 )
-from service.cli.database import backup, migrate, raw, replay, verify
 from service.cli.demo import demo
 from service.cli.options import EX_USAGE, fail
-from service.cli.sending import push, spool_commands
+from service.cli.sending import push
 from service.cli.serving import serve
 
 
@@ -74,17 +74,17 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
     serve.serve, demo.demo, simulate.simulate, push.push, importing.import_file, clutches.register,
     clutches.list_clutches, clutches.status, clutches.watch, alarms.alarms, answers.life, answers.degradation,
     answers.loops, answers.engagement, inspections.inspect, inspections.inspections, diagnose.diagnose,
-    clutches.model, runs.runs, runs.withdraw, backup.restore, runs.end, runs.confirm, runs.correct, clutches.edit,
-    clutches.archive, runs.changes, export.export, fleet.score, replay.replay, backup.backup, verify.verify,
-    migrate.migrate,
+    clutches.model, runs.runs, runs.withdraw, database.restore, runs.end, runs.confirm, runs.correct, clutches.edit,
+    clutches.archive, runs.changes, export.export, fleet.score, database.replay, database.backup, database.verify,
+    database.migrate,
 )  # fmt: skip
 #: Names that Python or typer has for something else.
 _OTHER_NAMES: dict[Callable[..., None], str] = {importing.import_file: "import", clutches.list_clutches: "list"}
 for _command in _COMMANDS:
     app.command(_OTHER_NAMES.get(_command))(_command)
-app.add_typer(spool_commands.app, name="spool")
+app.add_typer(push.app, name="spool")
 app.add_typer(key.app, name="key")
-app.add_typer(raw.app, name="raw")
+app.add_typer(database.app, name="raw")
 app.add_typer(fleet.app, name="fleet")
 
 

@@ -1,14 +1,19 @@
-"""Options that several commands share, and how a command ends on an error."""
+"""Options that several commands share, a service for one command, and how a command ends on an error."""
 
-from collections.abc import Iterator
+import functools
+import inspect
+import json
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import httpx2
 import typer
 from rich.console import Console
 from rich.markup import escape
 
+from service.client.clutchlife.answers import RefusedError, ServiceAwayError
+from service.client.clutchlife.transport import Service, connect
 from service.defaults import DEFAULT_DATABASE, DEFAULT_URL, SCHEDULERS
 from service.errors import NotFoundError
 from storage.engine.errors import StorageError
@@ -92,8 +97,10 @@ def read_only(url: str) -> Iterator["Opened"]:
 @contextmanager
 def executor(scheduler: str) -> Iterator["Executor"]:
     """The executor of an option, closed at the end; that it cannot be used ends the command with a line."""
-    from service.work.cluster import executor_of  # start-up time: few commands compute
-    from service.work.executor import ExecutorUnavailableError  # start-up time: few commands compute
+    from service.work.executor import (
+        ExecutorUnavailableError,  # start-up time: few commands compute
+        executor_of,  # start-up time: few commands compute
+    )
 
     with errors_in_a_line():
         try:
@@ -129,3 +136,45 @@ def fail(message: str, code: int = 1) -> NoReturn:
     """Print the error on standard error, and end."""
     err.print(f"[bold red]clutchlife:[/] {escape(message)}", soft_wrap=True)
     raise typer.Exit(code)
+
+
+_OPTIONS = {"url": (Url, URL), "key": (Key, None), "patience": (Patience, 10.0)}
+
+
+@contextmanager
+def service_at(url: str, key: str | None, patience: float) -> Iterator[Service]:
+    """The service at `url`; `patience` [s] is how long a request is tried again while the service is away."""
+    with errors_in_a_line(), connect(url, key=key) as http:
+        try:
+            yield Service(http=http, patience=patience)
+        except ServiceAwayError as error:
+            fail(str(error), EX_TEMPFAIL)
+        except RefusedError as error:
+            fail(str(error), EX_DATAERR)
+
+
+def asking(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with --url, --key and --patience in the place of its first parameter, the service that they make."""
+    _, *own = inspect.signature(command, eval_str=True).parameters.values()
+    kind = inspect.Parameter.KEYWORD_ONLY
+    shared = [inspect.Parameter(name, kind, default=usual, annotation=of) for name, (of, usual) in _OPTIONS.items()]
+
+    @functools.wraps(command)
+    def with_service(*, url: str, key: str | None, patience: float, **given: Any) -> None:
+        with service_at(url, key, patience) as service:
+            command(service, **given)
+
+    with_service.__signature__ = inspect.Signature([*own, *shared])  # type: ignore[attr-defined]
+    with_service.__annotations__ = {parameter.name: parameter.annotation for parameter in [*own, *shared]}
+    return with_service
+
+
+def listed(items: Iterable[Any], as_json: bool, show: Callable[[list[Any]], object], nothing: str) -> None:
+    """A list as JSON or as it is shown; without items the line that says so."""
+    items = list(items)
+    if as_json:
+        out.print_json(json.dumps(items))
+    elif items:
+        show(items)
+    else:
+        print_line(nothing)

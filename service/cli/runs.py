@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.connection import asking, listed
-from service.cli.options import EX_USAGE, ClutchId, Json, Reason, fail, print_line
+from service.cli.options import EX_USAGE, ClutchId, Json, Reason, asking, fail, listed, print_line
 from service.client.clutchlife.transport import Service
 
 RunId = Annotated[str, typer.Argument(metavar="RUN")]

@@ -18,7 +18,7 @@ from typing import Any
 from service.lists import LONGEST_CURSOR
 from service.settings import CODE_VERSION
 from storage import clutches
-from storage.encoding.json_text import to_text
+from storage.encoding import to_text
 from storage.engine.database import Database, SharedAnswer
 from storage.engine.errors import StorageError
 

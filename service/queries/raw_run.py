@@ -22,7 +22,7 @@ from service import records, stored_runs
 from service.columns import CHANNELS
 from service.errors import NotAcceptableError, NotFoundError
 from storage import changes, channels
-from storage.encoding.json_text import to_text
+from storage.encoding import to_text
 from storage.engine.database import Database
 
 #: Values that are written at once: as JSON some 150 kB, and a millisecond in which no other thread runs.

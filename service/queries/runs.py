@@ -9,7 +9,7 @@ from service.columns import whole
 from service.lists import Place, page_as_bytes
 from service.lives.history import DYNAMIC
 from storage import changes, runs
-from storage.encoding.json_text import to_text
+from storage.encoding import to_text
 from storage.engine.database import Database
 
 COLUMNS = (

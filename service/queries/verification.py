@@ -24,7 +24,7 @@ from service.settings import CODE_VERSION
 from service.stored_runs import incoming
 from storage import channels, inspections, results, runs
 from storage.channels import Stored
-from storage.encoding.json_text import to_text
+from storage.encoding import to_text
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 from storage.inspections import InspectionRow, PhotographRow

@@ -18,7 +18,7 @@ from service.columns import CHANNELS, check_columns
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
 from service.lives.history import END_OF_LIFE, WORN
 from service.lives.incoming_run import IncomingRun, name_run
-from service.schemas.limits import LONGEST_NOTE, MAX_MARKS
+from service.schemas.base import LONGEST_NOTE, MAX_MARKS
 from service.schemas.run import RUN_IN, DutyRunIn, MaintenanceRunIn
 
 #: Items of a list and characters of a name of a run that are checked by its schema: more than a message quotes.

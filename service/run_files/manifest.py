@@ -26,7 +26,7 @@ MANIFEST = "runs.json"
 INSPECTIONS = "inspections"
 #: What was hidden in a simulated campaign: for who rehearses a diagnosis, and no run.
 ANSWER = "answer.json"
-#: Cycles from which a file is not taken for a run. Chosen: far beyond what the service accepts (`schemas.limits`).
+#: Cycles from which a file is not taken for a run. Chosen: far beyond what the service accepts (`schemas.base`).
 _MAX_CYCLES = 1e15
 _NEEDED, _OPTIONAL = ("file", "kind", "cycles"), ("run_id", "origin", "started_at", "map", "decimal", "missing")
 _RECORDS = (

@@ -11,7 +11,7 @@ from pathlib import PurePath
 
 from service.errors import FieldError, InvalidError
 from service.readers.unit_table import conversion, spellings
-from service.schemas.limits import MAX_CYCLES
+from service.schemas.base import MAX_CYCLES
 from service.schemas.rig import RigProfile
 
 #: Places of a pattern that may match in several ways. Chosen: matching takes time with that power of the name's length.

@@ -5,14 +5,20 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from models.prognosis.criteria import QUANTILES
-from service.schemas.base import Answer, Identifier, NotNegativeNumber, PositiveNumber, Reason, Schema, page_of
-from service.schemas.limits import (
+from service.schemas.base import (
     LARGEST_LIMIT,
     LONGEST_ADDRESS,
     LONGEST_NAME,
     LONGEST_SECRET,
     MAX_SPEED_RPM,
     SHORTEST_SECRET,
+    Answer,
+    Identifier,
+    NotNegativeNumber,
+    PositiveNumber,
+    Reason,
+    Schema,
+    page_of,
 )
 
 WatchedQuantity = Literal[

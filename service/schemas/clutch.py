@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 from models.clutch import Geometry
 from models.degradation.severity import Severity, SeverityBasis
 from service.columns import whole
-from service.schemas import limits
+from service.schemas import base
 from service.schemas.base import (
     Answer,
     ClutchName,
@@ -39,16 +39,16 @@ from service.schemas.life import (
 WholeNumber = Annotated[
     int, Field(strict=True), BeforeValidator(lambda sent: whole(sent) if isinstance(sent, float) else sent)
 ]
-Name = Annotated[str, StringConstraints(min_length=1, max_length=limits.LONGEST_NAME)]
+Name = Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_NAME)]
 TorqueFilter = Annotated[
-    Annotated[NotNegativeNumber, Field(le=limits.MAX_TORQUE_FILTER_MS)] | None,
+    Annotated[NotNegativeNumber, Field(le=base.MAX_TORQUE_FILTER_MS)] | None,
     Field(
         description="Time constant of the torque channel's own first-order low-pass, ms; null: not declared. Sampled tests "
         "are evaluated with pressure and speed behind the same filter"
     ),
 ]
-Length = Annotated[PositiveNumber, Field(ge=limits.MIN_LENGTH_MM, le=limits.MAX_LENGTH_MM)]
-PressureFactor = Annotated[PositiveNumber, Field(ge=limits.MIN_PRESSURE_FACTOR, le=limits.MAX_PRESSURE_FACTOR)]
+Length = Annotated[PositiveNumber, Field(ge=base.MIN_LENGTH_MM, le=base.MAX_LENGTH_MM)]
+PressureFactor = Annotated[PositiveNumber, Field(ge=base.MIN_PRESSURE_FACTOR, le=base.MAX_PRESSURE_FACTOR)]
 
 
 class GeometryIn(Schema):
@@ -56,7 +56,7 @@ class GeometryIn(Schema):
 
     inner_diameter_mm: Length = Field(default=99.0, description="Inner diameter of the lining, mm")
     outer_diameter_mm: Length = Field(default=133.0, description="Outer diameter of the lining, mm")
-    friction_faces: Annotated[WholeNumber, Field(ge=1, le=limits.MAX_FRICTION_FACES)] = Field(
+    friction_faces: Annotated[WholeNumber, Field(ge=1, le=base.MAX_FRICTION_FACES)] = Field(
         default=2, description="Number of friction faces"
     )
     mean_radius_mm: Length | None = Field(
@@ -66,9 +66,9 @@ class GeometryIn(Schema):
 
     @model_validator(mode="after")
     def _has_width(self) -> Self:
-        if self.outer_diameter_mm < self.inner_diameter_mm + limits.MIN_WIDTH_MM:
+        if self.outer_diameter_mm < self.inner_diameter_mm + base.MIN_WIDTH_MM:
             raise ValueError(
-                f"outer_diameter_mm must exceed inner_diameter_mm {self.inner_diameter_mm} by {limits.MIN_WIDTH_MM} or more"
+                f"outer_diameter_mm must exceed inner_diameter_mm {self.inner_diameter_mm} by {base.MIN_WIDTH_MM} or more"
                 f", got {self.outer_diameter_mm}"
             )
         return self
@@ -107,7 +107,7 @@ class EndOfLifeIn(Schema):
         default=0.5, description="The life ends when mean COF has fallen to this fraction of its initial value"
     )
 
-    criteria: Annotated[tuple[CriterionIn, ...], Field(max_length=limits.MAX_CRITERIA)] = Field(
+    criteria: Annotated[tuple[CriterionIn, ...], Field(max_length=base.MAX_CRITERIA)] = Field(
         default=(),
         description="What ends the life in place of `cof_fraction` alone: several limits, the first to be reached counts",
     )
@@ -119,7 +119,7 @@ class SeverityIn(Schema):
     basis: Literal["cycles", "sliding_distance", "dissipated_energy"] = Field(
         default="cycles", description="What eq. 6 counts: duty cycles, or their sliding distance or dissipated energy"
     )
-    exponent: Annotated[NotNegativeNumber, Field(le=limits.MAX_SEVERITY_EXPONENT)] = Field(
+    exponent: Annotated[NotNegativeNumber, Field(le=base.MAX_SEVERITY_EXPONENT)] = Field(
         default=1.0, description="Exponent of a duty cycle's distance or energy"
     )
 

@@ -4,9 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.schemas.base import Answer, ClutchName, Identifier, Revision, Schema, page_of
+from service.schemas.base import LONGEST_DIAGNOSIS_ID, Answer, ClutchName, Identifier, Revision, Schema, page_of
 from service.schemas.life import ModelName
-from service.schemas.limits import LONGEST_DIAGNOSIS_ID
 
 Number = float | None
 Numbers = list[float | None]

@@ -4,8 +4,19 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.schemas.base import Answer, ClutchName, Cycles, Origin, PositiveNumber, Schema, StartedAt, page_of
-from service.schemas.limits import LARGEST_SKEWNESS, LONGEST_NAME, LONGEST_NOTE
+from service.schemas.base import (
+    LARGEST_SKEWNESS,
+    LONGEST_NAME,
+    LONGEST_NOTE,
+    Answer,
+    ClutchName,
+    Cycles,
+    Origin,
+    PositiveNumber,
+    Schema,
+    StartedAt,
+    page_of,
+)
 
 Skewness = Annotated[float, Field(ge=-LARGEST_SKEWNESS, le=LARGEST_SKEWNESS, allow_inf_nan=False, strict=True)]
 MediaType = Literal["image/png", "image/jpeg", "image/webp"]

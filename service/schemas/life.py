@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from service.schemas.base import Answer, ClutchName, NotNegativeNumber, Origin, PositiveNumber, Revision, Schema
-from service.schemas.limits import (
+from service.schemas.base import (
     LARGEST_LIMIT,
     MAX_BLOCKS,
     MAX_CRITERION_PRESSURE_BAR,
@@ -16,6 +15,13 @@ from service.schemas.limits import (
     MAX_SPEED_RPM,
     MIN_BLOCK_CYCLES,
     MIN_PLANNED_KJ,
+    Answer,
+    ClutchName,
+    NotNegativeNumber,
+    Origin,
+    PositiveNumber,
+    Revision,
+    Schema,
 )
 from service.schemas.run import EndReason, Warned
 

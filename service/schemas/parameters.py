@@ -4,10 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from service.schemas.base import StartedAt
-from service.schemas.diagnosis import JobState
-from service.schemas.life import SeriesQuantity
-from service.schemas.limits import (
+from service.schemas.base import (
     IDENTIFIER_PATTERN,
     LONGEST_FILENAME,
     LONGEST_IDENTIFIER,
@@ -19,7 +16,10 @@ from service.schemas.limits import (
     MAX_OFFSET,
     MAX_POINTS,
     MAX_SKIPPED,
+    StartedAt,
 )
+from service.schemas.diagnosis import JobState
+from service.schemas.life import SeriesQuantity
 
 
 def _short(value: object) -> object:

@@ -4,8 +4,18 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.schemas.base import Answer, Identifier, Schema, page_of
-from service.schemas.limits import LARGEST_NUMBER, LONGEST_NAME, LONGEST_TITLE, MAX_COLUMNS, MAX_SKIPPED, MAX_WORDS
+from service.schemas.base import (
+    LARGEST_NUMBER,
+    LONGEST_NAME,
+    LONGEST_TITLE,
+    MAX_COLUMNS,
+    MAX_SKIPPED,
+    MAX_WORDS,
+    Answer,
+    Identifier,
+    Schema,
+    page_of,
+)
 from service.schemas.run import Fit, Warned
 
 FileKindName = Literal["stationary_stribeck", "dynamic_stribeck"]

@@ -5,6 +5,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, StringConstraints, TypeAdapter, model_validator
 
 from service.schemas.base import (
+    LONGEST_NOTE,
+    MAX_CONFIRMED,
+    MAX_CYCLES,
     Answer,
     ClutchName,
     Column,
@@ -20,7 +23,6 @@ from service.schemas.base import (
     StartedAt,
     page_of,
 )
-from service.schemas.limits import LONGEST_NOTE, MAX_CONFIRMED, MAX_CYCLES
 
 
 class IndicatorEstimate(Answer):

@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal, get_args
 from fastapi import Depends, Request
 
 from service.errors import FieldError, ForbiddenError, InvalidError, UnauthorizedError
-from service.schemas.limits import LONGEST_IDENTIFIER
+from service.schemas.base import LONGEST_IDENTIFIER
 from service.web.context import Context
 from storage.engine.database import GrantedKey, Question, Snapshot
 from storage.keys import KeyRow

@@ -28,8 +28,7 @@ from service.errors import (
 )
 from service.logging import request_id
 from service.queries.cache import to_json
-from service.schemas.base import Problem
-from service.schemas.limits import IDENTIFIER_PATTERN
+from service.schemas.base import IDENTIFIER_PATTERN, Problem
 from service.web.auth import route_of
 from service.web.limits import RETRY_AFTER_SECONDS
 from storage.engine.errors import DatabaseBusy, RawStoreUnavailable, StorageError, UnstorableText

@@ -23,7 +23,7 @@ from service.lives.tracks import predict_at
 from service.settings import DATABASE_VARIABLE
 from service.work import process
 from storage import channels, results, runs
-from storage.encoding.json_text import Json
+from storage.encoding import Json
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 

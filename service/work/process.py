@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 from service.settings import DATABASE_VARIABLE
-from storage.encoding.json_text import Json, to_text
+from storage.encoding import Json, to_text
 
 #: Of what a job's process said, so many bytes are logged: its last ones hold the traceback.
 _TAIL = 8000

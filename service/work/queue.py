@@ -22,7 +22,7 @@ from service.logging import request_id
 from service.settings import Settings
 from service.work.process import AwayError, Child, FailedError, Work, running
 from storage import jobs
-from storage.encoding.json_text import Json
+from storage.encoding import Json
 from storage.engine.database import Database
 from storage.engine.errors import StorageError
 from storage.jobs import JobRow

@@ -14,7 +14,7 @@ from service.settings import DATABASE_VARIABLE
 from service.work import process
 from service.work.background import AtOnce, in_background
 from service.work.process import AWAY
-from storage.encoding.json_text import Json
+from storage.encoding import Json
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseBusy, StorageUnavailable
 from storage.engine.opening import open_database

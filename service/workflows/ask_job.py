@@ -1,12 +1,15 @@
-"""A replay or a fleet refresh is asked for as a job, which stores what it computes; its end is stored when it has come."""
+"""A replay or a fleet refresh is asked for as a job, which stores what it computes; its end is stored when it has come.
+
+A job is cancelled: it is not begun any more, and where it runs its process learns of it and ends it.
+"""
 
 import secrets
 from collections.abc import Mapping
 from typing import Any
 
 from service import records
-from service.errors import BusyError
-from storage import jobs
+from service.errors import BusyError, NotFoundError
+from storage import diagnoses, jobs
 from storage.engine.database import Database
 from storage.jobs import JobRow, NewJob
 
@@ -53,3 +56,18 @@ def finish(database: Database, job: JobRow, ended: Mapping[str, Any], *, at: str
     state = jobs.FINISHED if problem is None else jobs.FAILED
     with database.writing(of=job.clutch_id) as connection:
         jobs.end(connection, job.job_id, state, at, problem=problem, claimer=job.claimed_by, progress=progress)
+
+
+def cancel(database: Database, row: JobRow, *, by: str, at: str) -> JobRow:
+    """Cancel a job in the name of `by`, and with it the diagnosis of that name, if it is one's; returns it as it is then.
+
+    One that has ended stays as it is. Raises NotFoundError.
+    """
+    problem = f"cancelled by {by}"
+    with database.writing(of=row.clutch_id) as connection:
+        if jobs.end(connection, row.job_id, jobs.CANCELLED, at, problem=problem):
+            diagnoses.fail(connection, row.job_id, at, problem)
+        ended = jobs.get(connection, row.job_id)
+    if ended is None:
+        raise NotFoundError(f"no job is known as {row.job_id!r}")
+    return ended

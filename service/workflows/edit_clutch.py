@@ -1,4 +1,5 @@
-"""A clutch's record is edited, or the clutch archived: what depends on the record is computed again before it is stored.
+"""A clutch is registered, and what is known already is not changed by posting; its record is edited, or the clutch archived:
+what depends on the record is computed again before it is stored.
 
 Curves depend on the geometry and on the torque channel's filter alone: where these change, every run is fitted again. The
 record that was registered stays stored.
@@ -13,6 +14,8 @@ from sqlalchemy import Connection
 from service import records, stored_runs
 from service.alarms import raising
 from service.columns import content_of
+from service.errors import ConflictError
+from service.lives.condition import RANK_UNKNOWN
 from service.lives.history import stationary_tests_of
 from service.lives.outlook import summarised
 from service.lives.recomputation import Results, Tracking, computed_again
@@ -133,3 +136,38 @@ def _store(connection: Connection, edited: _Edited, *, reason: str, by: str, at:
             revision=revision,
         )
         changes.insert(connection, change)
+
+
+def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:
+    """Register a clutch; returns whether it is new. Raises ConflictError where it is known with other content.
+
+    What is known is the record in force, and, where it was edited, that which was first registered.
+    """
+    record = clutch.model_dump(mode="json")
+    content = content_of(record)
+    with database.reading() as connection:
+        stored = clutches.get(connection, clutch.clutch_id)
+    if stored is None:
+        with database.writing() as connection:
+            stored = clutches.get(connection, clutch.clutch_id)
+            if stored is None:
+                row = ClutchRow(
+                    clutch_id=clutch.clutch_id,
+                    record=record,
+                    content_sha256=content,
+                    created_at=created_at,
+                    revision=0,
+                    rank=RANK_UNKNOWN,
+                    summary={},
+                )
+                clutches.insert(connection, row)
+                return True
+    stored_records = [stored.record] if stored.registered is None else [stored.record, stored.registered]
+    # with the defaults of fields that came after a record was stored
+    if content not in [
+        content_of(ClutchIn.model_validate(record).model_dump(mode="json")) for record in stored_records
+    ]:
+        raise ConflictError(
+            f"clutch {stored.clutch_id!r} is known with another record; records are not changed by posting"
+        )
+    return False

@@ -11,8 +11,8 @@ from sqlalchemy import Connection
 from service import records
 from service.errors import FieldError, InvalidError, NotPossibleNowError
 from service.records import inspection, inspection_answers, inspection_hash, photograph_answer
+from service.schemas.base import MAX_PHOTOGRAPHS
 from service.schemas.inspection import InspectionIn, MediaType
-from service.schemas.limits import MAX_PHOTOGRAPHS
 from storage import changes, clutches, inspections
 from storage.changes import NewChange
 from storage.engine.database import Database

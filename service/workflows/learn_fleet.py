@@ -23,11 +23,10 @@ from service.lives.recomputation import ClutchState, Receipt, Results, track
 from service.lives.tracks import CARRIED, mean_offset_of
 from service.settings import CODE_VERSION
 from service.work.background import AtOnce, directly
-from service.work.executor import Executor, InProcess
-from service.work.rounds import Ended, Ending, in_rounds
+from service.work.executor import Ended, Ending, Executor, InProcess, in_rounds
 from storage import assumptions, clutches, results
 from storage.assumptions import NOBODY, FleetPriorRow
-from storage.encoding.json_text import Json, to_object
+from storage.encoding import Json, to_object
 from storage.engine.database import Database
 
 #: Why a refresh leaves a clutch.

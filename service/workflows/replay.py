@@ -8,10 +8,9 @@ from service.errors import BusyError, ServiceError
 from service.lives.criteria import MAX_ATTEMPTS
 from service.stored_runs import Recomputed, Recorded
 from service.work.background import AtOnce, directly
-from service.work.executor import Executor, InProcess, WorkerLostError
-from service.work.rounds import Ending, in_rounds
+from service.work.executor import Ending, Executor, InProcess, WorkerLostError, in_rounds
 from storage import clutches
-from storage.encoding.json_text import Json
+from storage.encoding import Json
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 

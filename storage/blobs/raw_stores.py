@@ -12,7 +12,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, func, select, update
 
 from storage.dialects import WHOLE, among, upsert
-from storage.encoding.json_text import to_text
+from storage.encoding import to_text
 from storage.tables import channel, raw_removal, raw_store
 
 

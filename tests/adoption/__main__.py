@@ -17,7 +17,7 @@ import numpy as np
 
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.prognosis.criteria import HORIZON
-from service.work.cluster import executor_of
+from service.work.executor import executor_of
 from tests.adoption.trials import LOUD, STORE, Adopted, Trial, adopted, trials
 from tests.blind.__main__ import run, scheduler
 from tests.blind.lives import ARTEFACTS

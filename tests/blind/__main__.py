@@ -17,8 +17,7 @@ from typing import TypeVar
 
 from rich.console import Console
 
-from service.work.cluster import executor_of
-from service.work.executor import Executor
+from service.work.executor import Executor, executor_of
 from service.work.progress import progress
 from tests.blind import lives, table
 from tests.blind.rows import trials

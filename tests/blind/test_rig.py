@@ -35,7 +35,7 @@ ALLOWED = {
 #: What lives besides need: the service as whoever uses it sees it, and scores.
 IN_USE = {"models.prognosis.scoring", "service.app", "service.settings"}
 #: Where cases are run, which says nothing of what is looked for.
-EXECUTORS = {"service.work.cluster", "service.work.executor", "service.work.progress"}
+EXECUTORS = {"service.work.executor", "service.work.progress"}
 #: Loops say nothing of them that plateaus do not, and make the refits long.
 STEADY = {"running_in", "accelerated_wear", "pressure_offset", "torque_zero_shift", "interface_heating", "seasons"}
 CONTRACT = {

@@ -9,8 +9,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.plausibility import course, criteria, judgement, pace, slips
-from service.lives.plausibility import criteria as of_reading
 from service.lives.plausibility import doubts, reading
+from service.lives.plausibility import reading as of_reading
 
 Patches = tuple[tuple[object, str, Any], ...]
 #: A probability of nothing.

@@ -10,8 +10,8 @@ import pytest
 from service import records
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
+from service.workflows.edit_clutch import register
 from service.workflows.ingest_run import ingest
-from service.workflows.register_clutch import register
 from storage.engine.opening import open_database
 from tests.plausibility import slips, trials
 from tests.plausibility.bench import RECEIVED, Bench

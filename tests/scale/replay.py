@@ -34,14 +34,14 @@ from service.queries.cache import to_json
 from service.run_files.json_run import read_run
 from service.run_files.simulated import simulated_body
 from service.schemas.clutch import ClutchIn
-from service.work.cluster import executor_of
+from service.work.executor import executor_of
+from service.workflows.edit_clutch import register
 from service.workflows.ingest_run import ingest
-from service.workflows.register_clutch import register
 from service.workflows.replay import clutch_ids, replay
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from storage.tables import clutch, corrected_cof, filter_state, fit, prediction, run
-from storage.transfer.digest import digest
+from storage.transfer import digest
 from tests.scale.copies import multiply, name
 from tests.service.work.clusters import local_cluster
 

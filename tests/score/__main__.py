@@ -12,7 +12,7 @@ from functools import partial
 from rich.console import Console
 
 from service.defaults import SCHEDULERS
-from service.work.cluster import executor_of
+from service.work.executor import executor_of
 from service.work.progress import progress
 from tests.score import off_prior, on_prior, paper
 from tests.score.after_end import after_end

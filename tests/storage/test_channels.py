@@ -12,7 +12,7 @@ from service.workflows import raw_records
 from storage import channels, clutches, runs
 from storage.blobs import raw_stores
 from storage.blobs.stores import DATABASE, open_store
-from storage.encoding.codec import LONG
+from storage.encoding import LONG
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 from tests.storage.samples import clutch_row, columns, new_run

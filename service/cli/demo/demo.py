@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import typer
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from service.cli.diagnosis_view import shown
+from service.cli.diagnose import shown
 from service.cli.options import Seed, fail, out
 from service.client.clutchlife.answers import ServiceAwayError
 from service.client.clutchlife.client import diagnosed

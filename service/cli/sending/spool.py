@@ -3,23 +3,298 @@
 A run is copied into the spool before it is sent and removed when the service has answered that it is stored (now or
 earlier), so a crash or a power cut on the sender's side loses nothing. A run that the service refuses is moved to
 `refused/`, with the answer beside it; a run of which a newer version came is moved to `replaced/` and never sent.
+
+What is there always means one thing. Bytes (`.body`) without an `.entry` were not kept yet. An `.entry` without bytes
+follows them to the folder where they are, or is done. That a newer version replaces older ones is decided by one rename,
+that of `replacing.journal`, and carried out by whoever locks the folder next, with a lock that ends with its holder.
+
+Earlier releases wrote no `.entry`: `NAME.json` was a body, and `NAME.run` a record file with the parameters of its
+request in `NAME.asked`. They are read as entries of which less is known.
 """
 
+import errno
 import hashlib
 import json
 import os
+import sys
+import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, fields, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from service.cli.sending import entry as entries
-from service.cli.sending import run_head, spool_files
-from service.cli.sending.entry import BODY, ENTRY, PARTIAL, PROBLEM, RUNS, Entry
-from service.cli.sending.folder_lock import locked
-from service.cli.sending.run_head import same_run
-from service.cli.sending.spool_files import REFUSED, REPLACED
+from service.cli.sending import run_head
+from service.cli.sending.run_head import RunHead, same_run
+
+#: What is known of a run; its bytes; the same two of earlier releases, and their parameters; the answer to a refused run.
+ENTRY, BODY, OLD_BODIES, OLD_PARAMETERS, PROBLEM = ".entry", ".body", (".json", ".run"), ".asked", ".problem"
+#: What is sent to, below the clutch's address.
+RUNS, INSPECTIONS = "runs", "inspections"
+#: A file that is being written.
+PARTIAL = ".part"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """One run or inspection in a folder of the spool. `stem` is its number and its content's digest, the name of its files.
+
+    `failures`: tries at which the service was there and did not take the run; `perhaps_stored`: a try may have been carried
+    out without an answer.
+    """
+
+    stem: str
+    body: str
+    since: str
+    url: str | None = None
+    clutch_id: str | None = None
+    resource: str = RUNS
+    parameters: dict[str, str] | None = None
+    head: RunHead = field(default_factory=RunHead)
+    sources: tuple[str, ...] = ()
+    tries: int = 0
+    failures: int = 0
+    last_try: str | None = None
+    last_answer: str | None = None
+    perhaps_stored: bool = False
+    #: Whether it can be sent: a process that was killed may have left a record file without its parameters.
+    whole: bool = True
+
+    @property
+    def digest(self) -> str:
+        """What tells its content from others'."""
+        return digest(self.stem)
+
+    @property
+    def label(self) -> str:
+        """How a person would call the run."""
+        files = ", ".join(Path(source).name for source in self.sources)
+        return self.head.run_id or files or self.body
+
+
+def digest(stem: str) -> str:
+    """The part of a name that tells an entry's content from others'."""
+    return stem.partition("-")[2]
+
+
+def number(stem: str) -> int:
+    """An entry's place in the order in which runs came."""
+    digits = stem.partition("-")[0]
+    return int(digits) if digits.isdecimal() else 0
+
+
+def stamp(moment: float | None = None) -> str:
+    """Now, or that time since the epoch [s], as text in UTC."""
+    time = datetime.now(UTC) if moment is None else datetime.fromtimestamp(moment, UTC)
+    return time.isoformat(timespec="seconds")
+
+
+def read(folder: Path) -> list[Entry]:
+    """All entries of a folder, oldest first, whoever changes it meanwhile."""
+    names = {path.name for path in folder.glob("[0-9]*-*")}
+    entries = [load(folder, name.removesuffix(ENTRY)) for name in names if name.endswith(ENTRY)]
+    for name in names:
+        stem, suffix = Path(name).stem, Path(name).suffix
+        if suffix in OLD_BODIES and stem + ENTRY not in names:
+            entries.append(_old(folder, stem, suffix))
+    return sorted((entry for entry in entries if entry is not None), key=lambda entry: (number(entry.stem), entry.stem))
+
+
+def encoded(entry: Entry) -> bytes:
+    """The content of its `.entry` file."""
+    return json.dumps(asdict(entry), indent=1, ensure_ascii=False).encode()
+
+
+def load(folder: Path, stem: str) -> Entry | None:
+    """The entry of that name; None where there is none."""
+    path = folder / (stem + ENTRY)
+    try:
+        return decoded(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    except (ValueError, TypeError, KeyError):
+        body = next((stem + suffix for suffix in (BODY, *OLD_BODIES) if (folder / (stem + suffix)).exists()), stem)
+        return Entry(stem=stem, body=body, since=_written(path) or stamp(), whole=False)
+
+
+def decoded(content: bytes) -> Entry:
+    """The entry whose file holds this; raises ValueError, TypeError or KeyError where it holds none."""
+    record: dict[str, Any] = json.loads(content)
+    values = {name: record[name] for name in _NAMES & record.keys()}
+    return Entry(**values | {"head": RunHead(**record["head"]), "sources": tuple(record["sources"])})
+
+
+#: A later release's fields are passed over.
+_NAMES = {item.name for item in fields(Entry)}
+
+
+def _old(folder: Path, stem: str, suffix: str) -> Entry | None:
+    """An entry that an earlier release wrote; None where it has just gone."""
+    body = stem + suffix
+    since = _written(folder / body)
+    if since is None:
+        return None
+    parameters: dict[str, str] | None = None
+    try:
+        if suffix == ".json":
+            head = run_head.of_body((folder / body).read_bytes())
+        else:
+            parameters = json.loads((folder / stem).with_suffix(OLD_PARAMETERS).read_bytes())
+            head = run_head.of_file(parameters or {}, measurements=stem)
+    except (OSError, ValueError):
+        return Entry(stem=stem, body=body, since=since, whole=False)
+    return Entry(stem=stem, body=body, since=since, parameters=parameters, head=head)
+
+
+def _written(path: Path) -> str | None:
+    try:
+        return stamp(path.stat().st_mtime)
+    except OSError:
+        return None
+
+
+#: Seconds between two looks at a lock that another process holds. Chosen: short beside a request.
+_LOOK = 0.05
+_HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)
+
+
+class HeldError(Exception):
+    """Another process holds the lock."""
+
+
+@contextmanager
+def locked(path: Path, *, patience: float | None = None) -> Iterator[None]:
+    """Hold the lock of the file at `path`, which is made; HeldError where another holds it for longer than `patience` [s].
+
+    Without a patience it is waited for. Raises OSError where the file system keeps no locks.
+    """
+    deadline = None if patience is None else time.monotonic() + patience
+    with path.open("ab") as file:
+        while not _taken(file.fileno(), path):
+            if deadline is not None and time.monotonic() + _LOOK > deadline:
+                raise HeldError(str(path))
+            time.sleep(_LOOK)
+        yield
+
+
+def _taken(handle: int, path: Path) -> bool:
+    try:
+        if sys.platform == "win32":
+            import msvcrt  # only there
+
+            os.lseek(handle, 0, os.SEEK_SET)
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl  # not on Windows
+
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in _HELD:
+            return False
+        raise OSError(error.errno, f"{path} cannot be locked ({error.strerror}): choose a local folder") from error
+    return True
+
+
+REFUSED, REPLACED = "refused", "replaced"
+_JOURNAL = "replacing.journal"
+
+
+def write(folder: Path, name: str, content: bytes) -> None:
+    """A file below the spool's folder, whole or not at all."""
+    partial = folder / (Path(name).name + PARTIAL)
+    with partial.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    partial.replace(folder / name)
+
+
+def _sync(folder: Path) -> None:
+    """A rename is on the disk; where folders cannot be opened (Windows), the file system sees to it."""
+    if os.name == "posix":
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def store(folder: Path, entry: Entry, older: Sequence[Entry]) -> None:
+    """Make an entry wait, whose bytes are there, in the place of older versions: in one instant."""
+    if not older:
+        write(folder, entry.stem + ENTRY, encoded(entry))
+        _sync(folder)
+        return
+    journal = {"entry": encoded(entry).decode(), "older": [other.stem for other in older]}
+    write(folder, _JOURNAL, json.dumps(journal).encode())
+    _sync(folder)
+    carry_out(folder)
+
+
+def carry_out(folder: Path) -> None:
+    """What the journal says, if there is one: the newer entry waits, older ones are moved to `replaced/`."""
+    path = folder / _JOURNAL
+    if not path.exists():
+        return
+    journal = json.loads(path.read_bytes())
+    entry = decoded(journal["entry"].encode())
+    write(folder, entry.stem + ENTRY, encoded(entry))
+    _sync(folder)
+    for stem in journal["older"]:
+        older = load(folder, stem)
+        if digest(stem) == entry.digest:  # the same content, which lacked its parameters
+            for remnant in sorted(folder.glob(f"{stem}.*")):
+                remnant.unlink()
+        elif older is not None:
+            move(folder, older, REPLACED)
+    path.unlink()
+
+
+def move(folder: Path, entry: Entry, place: str) -> Path:
+    """Move an entry from the folder to `refused/` or `replaced/`; its bytes first. Where they are then."""
+    aside = folder / place
+    aside.mkdir(exist_ok=True)
+    body = folder / entry.body
+    if body.exists():
+        body.replace(aside / entry.body)
+    (folder / (entry.stem + ENTRY)).replace(aside / (entry.stem + ENTRY))
+    _sync(aside)
+    return aside / entry.body
+
+
+def remove(place: Path, entry: Entry) -> None:
+    """Delete an entry of the folder, of `refused/` or of `replaced/`; its bytes first."""
+    for name in (entry.body, entry.stem + ENTRY, entry.stem + OLD_PARAMETERS, entry.stem + PROBLEM):
+        (place / name).unlink(missing_ok=True)
+
+
+def mend(folder: Path, url: str | None, clutch_id: str | None) -> None:
+    """Finish what a killed process began, and give the entries of an earlier release an `.entry` of their own."""
+    for partial in sorted(folder.glob(f"*{PARTIAL}")):
+        partial.unlink()
+    for entry in read(folder):
+        if not (folder / entry.body).exists():
+            _follow(folder, entry)
+        elif entry.whole and entry.clutch_id is None:
+            owned = replace(entry, url=url, clutch_id=clutch_id)
+            write(folder, entry.stem + ENTRY, encoded(owned))
+    for body in sorted(folder.glob(f"*{BODY}")):
+        if not body.with_suffix(ENTRY).exists():
+            body.unlink()
+    for parameters in sorted(folder.glob(f"*{OLD_PARAMETERS}")):
+        if not parameters.with_suffix(OLD_BODIES[1]).exists():
+            parameters.unlink()
+
+
+def _follow(folder: Path, entry: Entry) -> None:
+    """Move an entry to where its bytes are; it is done where they are nowhere."""
+    for place in (REFUSED, REPLACED):
+        if (folder / place / entry.body).exists():
+            move(folder, entry, place)
+            return
+    remove(folder, entry)
+
 
 #: Bytes that are copied at once.
 _CHUNK = 1 << 20
@@ -59,7 +334,7 @@ class Spool:
     @classmethod
     def _owned(cls, path: Path) -> "Spool":
         for place in (path, path / REFUSED, path / REPLACED):
-            for entry in entries.read(place):
+            for entry in read(place):
                 if entry.clutch_id is not None:
                     return cls(folder=path, url=entry.url, clutch_id=entry.clutch_id)
         return cls(folder=path)
@@ -83,7 +358,7 @@ class Spool:
 
     @staticmethod
     def _entries(place: Path) -> list[Entry]:
-        return [entry for entry in entries.read(place) if (place / entry.body).exists()]
+        return [entry for entry in read(place) if (place / entry.body).exists()]
 
     def problem(self, entry: Entry) -> dict[str, Any]:
         """Why a run was refused."""
@@ -108,7 +383,7 @@ class Spool:
     def begin(self) -> None:
         """Finish what a killed process began; to be called before the first run is sent."""
         with self._changing():
-            spool_files.mend(self.folder, self.url, self.clutch_id)
+            mend(self.folder, self.url, self.clutch_id)
 
     def add(self, files: RunFiles, resource: str = RUNS) -> tuple[set[str], list[Entry]]:
         """Keep runs: JSON bodies (no parameters), or files with the parameters of their requests; or inspections' bodies.
@@ -120,7 +395,7 @@ class Spool:
         batch = set(digests)
         replaced: list[Entry] = []
         with self._changing():
-            spool_files.mend(self.folder, self.url, self.clutch_id)
+            mend(self.folder, self.url, self.clutch_id)
             waiting = self._entries(self.folder)
             for (path, parameters), digest in zip(files, digests, strict=True):
                 present = next((other for other in waiting if other.whole and other.digest == digest), None)
@@ -138,7 +413,7 @@ class Spool:
         """Make an entry wait that comes from this file, in the place of older versions."""
         if older or source not in entry.sources:
             sources = (*(other for other in entry.sources if other != source), source)
-            spool_files.store(self.folder, replace(entry, sources=sources), older)
+            store(self.folder, replace(entry, sources=sources), older)
 
     def _kept(self, number: int, path: Path, parameters: Mapping[str, str] | None, resource: str) -> Entry:
         """The bytes of a run copied into the spool; its entry is still to be stored."""
@@ -161,7 +436,7 @@ class Spool:
         return Entry(
             stem=stem,
             body=stem + BODY,
-            since=entries.stamp(),
+            since=stamp(),
             url=self.url,
             clutch_id=self.clutch_id,
             resource=resource,
@@ -172,9 +447,9 @@ class Spool:
     def note(self, entry: Entry, **changes: Any) -> None:
         """Change what is known of an entry, if it still waits. A full disk must not keep runs from being sent."""
         with suppress(OSError), self._changing():
-            current = entries.load(self.folder, entry.stem)
+            current = load(self.folder, entry.stem)
             if current is not None and current.whole:
-                spool_files.write(self.folder, entry.stem + ENTRY, entries.encoded(replace(current, **changes)))
+                write(self.folder, entry.stem + ENTRY, encoded(replace(current, **changes)))
 
     def done(self, entry: Entry) -> bool:
         """Remove an entry that the service has stored, and its copies refused or replaced; whether it still waited."""
@@ -184,7 +459,7 @@ class Spool:
                 for path in sorted((self.folder / place).glob(f"*-{entry.digest}.*")):
                     path.unlink()
             if waited:
-                spool_files.remove(self.folder, entry)
+                remove(self.folder, entry)
             return waited
 
     def refuse(self, entry: Entry, problem: dict[str, Any]) -> Path | None:
@@ -194,13 +469,13 @@ class Spool:
                 return None
             (self.folder / REFUSED).mkdir(exist_ok=True)
             answer = json.dumps(problem, indent=1, ensure_ascii=False).encode()
-            spool_files.write(self.folder, f"{REFUSED}/{entry.stem}{PROBLEM}", answer)
-            return spool_files.move(self.folder, entry, REFUSED)
+            write(self.folder, f"{REFUSED}/{entry.stem}{PROBLEM}", answer)
+            return move(self.folder, entry, REFUSED)
 
     def discard(self, place: str, entry: Entry) -> None:
         """Delete an entry for good: from the folder (""), from `refused` or from `replaced`."""
         with self._changing():
-            spool_files.remove(self.folder / place, entry)
+            remove(self.folder / place, entry)
 
     @contextmanager
     def sending(self, patience: float) -> Iterator[None]:
@@ -214,12 +489,12 @@ class Spool:
         """Be the only process that changes this spool."""
         self.folder.mkdir(parents=True, exist_ok=True)
         with locked(self.folder / "changing.lock"):
-            spool_files.carry_out(self.folder)
+            carry_out(self.folder)
             yield
 
 
 def _next(waiting: Sequence[Entry]) -> int:
-    return 1 + max((entries.number(entry.stem) for entry in waiting), default=0)
+    return 1 + max((number(entry.stem) for entry in waiting), default=0)
 
 
 def _older(other: Entry, entry: Entry, source: str, batch: Collection[str]) -> bool:

@@ -22,8 +22,53 @@ from service.errors import Notice
 from service.lives.criteria import OTHER_OIL
 from service.lives.history import DYNAMIC, STATIONARY, Event, Life, Shown, lives_of, pooled_value
 from service.lives.incoming_run import IncomingRun, SampledChannels
-from service.lives.plausibility import criteria
 from service.lives.run_analysis import Analysis
+
+# Mean COF of runs that are no stationary tests
+
+#: Deviation of a dynamic test's and of an engagement's COF from a stationary test's mean. Chosen.
+DYNAMIC_SD, ENGAGEMENT_SD = 0.03, 0.35
+#: The same of a COF taken from the rows, where no curve was fitted. Chosen: on the rigs it is off by 1 to 3 %.
+ROWS_SD = 0.05
+#: The same where pressures are not the reference's, a unit of their logarithm: torque is not quite in proportion.
+OTHER_PRESSURE_SD = 0.35
+#: The same a kelvin of oil temperature beyond `lives.OTHER_OIL`. Chosen: some three times what Hersey's similarity
+#: makes of the simulated rig's oil, 0.05 to 0.15 % a kelvin, for linings and additives differ.
+OTHER_OIL_SD = 0.004
+
+# Pressures, speeds and oil
+
+#: Share of tests made at other pressures or speeds than the reference test, deviation of the same and of others' logarithm.
+#: Chosen: a diagnosis advises such tests.
+OTHER_PROTOCOL, SAME_PROTOCOL_SD, OTHER_PROTOCOL_SD = 0.05, 0.03, 1.0
+#: Highest pressure [Pa] and speed [rad/s] of a rig of which nothing is known, and the deviations of their logarithms.
+#: Chosen: slow rigs are many.
+PRESSURE, LOG_PRESSURE_SD, SPEED, LOG_SPEED_SD = 8e5, 1.2, 200.0, 2.0
+#: Oil temperature [K] of a test and its deviation. Chosen: wet clutches are tested at 40 to 120 °C.
+OIL, OIL_SD = 273.15 + 80.0, 25.0
+
+# Dead channels (`dead_channels`). Chosen; an honest channel is far from each.
+
+#: Rows below which nothing is said of a channel [-].
+FEWEST_ROWS = 8
+#: A channel whose middle 90 % differ by less than this share of its size stands still.
+STILL = 2e-3
+#: Speed whose middle 90 % differ by less than this share of the highest is no Stribeck test.
+SPEED_STILL = 0.02
+#: Highest over lowest loaded pressure from which torque must follow, and the least exponent of torque over pressure.
+PRESSURE_SPAN, MIN_EXPONENT = 1.25, 0.4
+#: Scatter of torque [-] at one speed and one pressure from which pressure was not one: loops and stick-slip are less.
+SINGLE_LEVEL_SPREAD = 0.1
+#: A mean COF below this is no friction where torque scatters about zero by half of itself and more.
+NO_FRICTION = 0.004
+#: Oil temperatures [K] that no sensor in oil shows: below what pours, above what K under the name of °C may be.
+COLDEST, HOTTEST = 273.15 - 60.0, 273.15 + 450.0
+
+#: An open clutch's drag as a COF: the mean of its logarithm, and the deviation. Chosen: some 3 % of a pressed one's torque.
+LOG_DRAG = (math.log(0.003), 1.4)
+#: Deviation of log COF of a torque that was measured while the pressure sensor was dead, for the pressure is not known.
+PRESSED_SD = 0.5
+
 
 #: Bins of speed.
 _BINS = 16
@@ -118,22 +163,22 @@ class _Comparison:
         self, event: Event, shown: Shown, mean_cof: Mapping[float, tuple[float, float]] | None
     ) -> tuple[float, float] | None:
         """log COF of a run as the tests of its life show it, and its deviation; None where it shows none."""
-        own = {STATIONARY: 0.0, DYNAMIC: criteria.DYNAMIC_SD}.get(event.kind, criteria.ENGAGEMENT_SD)
+        own = {STATIONARY: 0.0, DYNAMIC: DYNAMIC_SD}.get(event.kind, ENGAGEMENT_SD)
         spread = math.hypot(own, odds.STEP_SD if self.corrected else 0.0)
         first = self.reference
         if first is not None and first.oil_temperature is not None and shown.oil is not None:
             beyond = max(abs(shown.oil - first.oil_temperature) - OTHER_OIL, 0.0)
-            spread = math.hypot(spread, criteria.OTHER_OIL_SD * beyond)
+            spread = math.hypot(spread, OTHER_OIL_SD * beyond)
         pooled = pooled_value(first.cofs, mean_cof) if mean_cof and first is not None else None
         if pooled is not None and pooled[0] > 0:
             return math.log(pooled[0]), math.hypot(spread, pooled[1] / pooled[0])
         if mean_cof:
             cof = math.fsum(cof for cof, _ in mean_cof.values()) / len(mean_cof)
         else:
-            cof, spread = shown.cof or 0.0, math.hypot(spread, criteria.ROWS_SD)
+            cof, spread = shown.cof or 0.0, math.hypot(spread, ROWS_SD)
         if first is not None and shown.pressure is not None and event.kind in (STATIONARY, DYNAMIC):
             apart = math.log(shown.pressure / max(first.cofs))
-            spread = math.hypot(spread, criteria.OTHER_PRESSURE_SD * apart)
+            spread = math.hypot(spread, OTHER_PRESSURE_SD * apart)
         return (math.log(cof), spread) if cof > 0 else None
 
     def _log_protocol(self, event: Event, shown: Shown) -> float:
@@ -142,19 +187,19 @@ class _Comparison:
         declared = None if event.duty is None else event.duty.speed
         speeds = self.life.speed_range
         pressure, speed = max(self.life.reference, default=None), None if speeds is None else speeds[1]
-        usual_pressure = (criteria.PRESSURE, criteria.LOG_PRESSURE_SD)
+        usual_pressure = (PRESSURE, LOG_PRESSURE_SD)
         total = _log_of(shown.pressure if is_test else None, pressure, usual_pressure)
         shown_speed = shown.speed if is_test or declared else None
-        total += _log_of(shown_speed, declared or speed, (criteria.SPEED, criteria.LOG_SPEED_SD))
+        total += _log_of(shown_speed, declared or speed, (SPEED, LOG_SPEED_SD))
         if shown.oil is not None:
-            total += _log_normal(shown.oil, criteria.OIL, criteria.OIL_SD)
+            total += _log_normal(shown.oil, OIL, OIL_SD)
         if shown.open_torque is not None and shown.open_torque > 0:  # an open clutch's drag
-            total += _log_normal(self._pressed(shown), *criteria.LOG_DRAG)
+            total += _log_normal(self._pressed(shown), *LOG_DRAG)
         return total
 
     def _pressed(self, shown: Shown) -> float:
         """log COF of the torque of an open clutch if it were pressed as in the reference test."""
-        levels = list(self.life.reference) or [criteria.PRESSURE]
+        levels = list(self.life.reference) or [PRESSURE]
         return math.log((shown.open_torque or 0.0) / self.geometry.torque_per_cof(sum(levels) / len(levels)))
 
     def slips(self, event: Event, shown: Shown) -> Iterator[Slip]:
@@ -172,7 +217,7 @@ class _Comparison:
                 yield Slip(name="oil", log_prior=share, likely=likely, unit=unit)
         if shown.open_torque is not None and shown.open_torque > 0:
             likely = self.reading(event, replace(shown, open_torque=None), None)
-            pressed = replace(likely, log_cof=self._pressed(shown), spread=criteria.PRESSED_SD)
+            pressed = replace(likely, log_cof=self._pressed(shown), spread=PRESSED_SD)
             yield Slip(name=DEAD_PRESSURE, log_prior=math.log(odds.OTHER_TEST), likely=pressed)
 
 
@@ -254,8 +299,8 @@ def _log_of(value: float | None, reference: float | None, usual: tuple[float, fl
     if reference is None or reference <= 0:
         return _log_normal(math.log(value), math.log(usual[0]), usual[1])
     off = math.log(value / reference)
-    same = math.log1p(-criteria.OTHER_PROTOCOL) + _log_normal(off, 0.0, criteria.SAME_PROTOCOL_SD)
-    other = math.log(criteria.OTHER_PROTOCOL) + _log_normal(off, 0.0, criteria.OTHER_PROTOCOL_SD)
+    same = math.log1p(-OTHER_PROTOCOL) + _log_normal(off, 0.0, SAME_PROTOCOL_SD)
+    other = math.log(OTHER_PROTOCOL) + _log_normal(off, 0.0, OTHER_PROTOCOL_SD)
     return max(same, other) + math.log1p(math.exp(-abs(same - other)))
 
 
@@ -270,7 +315,7 @@ def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notic
     """What is odd about the channels of a run."""
     doubts = list(_oil(columns.oil_temperature))
     pressed = columns.pressure >= UNLOADED
-    if columns.torque.size < criteria.FEWEST_ROWS:
+    if columns.torque.size < FEWEST_ROWS:
         return doubts
     if kind == DYNAMIC:
         doubts += _speed_stands(columns.speed)
@@ -278,14 +323,14 @@ def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notic
         return doubts
     torque = columns.torque[pressed]
     rows = columns.loaded()
-    if torque.size >= criteria.FEWEST_ROWS and _spread(torque) <= criteria.STILL * float(np.abs(np.median(torque))):
+    if torque.size >= FEWEST_ROWS and _spread(torque) <= STILL * float(np.abs(np.median(torque))):
         level = float(np.median(torque))
         message = f"torque stands still at {level:.4g} Nm whatever pressure and speed do: is the sensor connected?"
         return [*doubts, Notice(code=DEAD, message=message)]
-    if rows.torque.size < criteria.FEWEST_ROWS:
+    if rows.torque.size < FEWEST_ROWS:
         return doubts
     cof = float(np.abs(rows.cof_by_speed(geometry)[0]).mean())
-    if cof < criteria.NO_FRICTION and float(rows.torque.std()) > 0.5 * float(np.abs(rows.torque.mean())):
+    if cof < NO_FRICTION and float(rows.torque.std()) > 0.5 * float(np.abs(rows.torque.mean())):
         message = (
             f"torque is noise about zero ({rows.torque.mean():.3g} ± {rows.torque.std():.3g} Nm) under pressure: is the "
             "sensor connected?"
@@ -300,9 +345,9 @@ def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
     """Torque that does not go with pressure, or scatters at one pressure as if that had varied."""
     low, high = np.quantile(rows.pressure, [0.02, 0.98]).tolist()
     span = f"{low / PASCALS_PER_BAR:.3g} to {high / PASCALS_PER_BAR:.3g} bar"
-    if high > criteria.PRESSURE_SPAN * low:
+    if high > PRESSURE_SPAN * low:
         exponent, error = _exponent(rows)
-        if exponent + 3 * error < criteria.MIN_EXPONENT:
+        if exponent + 3 * error < MIN_EXPONENT:
             message = (
                 f"torque does not follow pressure: it goes with pressure to the power of {exponent:.2f} from {span}, about "
                 "1 is expected. Is a sensor disconnected, or does a column hold another channel?"
@@ -311,7 +356,7 @@ def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
         return []
     cofs, spreads = rows.cof_by_speed(geometry)
     scatter = float(np.median(spreads / np.maximum(np.abs(cofs), 1e-12)))
-    if scatter > criteria.SINGLE_LEVEL_SPREAD:
+    if scatter > SINGLE_LEVEL_SPREAD:
         message = (
             f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque at one speed scatters by {100 * scatter:.0f} "
             "%, as if pressure had varied: is its sensor connected?"
@@ -334,7 +379,7 @@ def _exponent(rows: Columns) -> tuple[float, float]:
 
 def _speed_stands(speed: FloatArray) -> list[Notice]:
     fastest = float(np.abs(speed).max())
-    if fastest > 1.0 and _spread(speed) > criteria.SPEED_STILL * fastest:
+    if fastest > 1.0 and _spread(speed) > SPEED_STILL * fastest:
         return []
     rpm = float(np.median(speed)) / RADIANS_PER_SECOND_PER_RPM
     message = f"speed stands still at {rpm:.4g} rpm in a dynamic test: is its sensor connected?"
@@ -345,8 +390,8 @@ def _oil(temperature: FloatArray | None) -> list[Notice]:
     if temperature is None:
         return []
     median = float(np.median(temperature))
-    still_at_zero = temperature.size >= criteria.FEWEST_ROWS and bool((np.abs(temperature - ZERO_CELSIUS) < 1e-6).all())
-    if criteria.COLDEST <= median <= criteria.HOTTEST and not still_at_zero:
+    still_at_zero = temperature.size >= FEWEST_ROWS and bool((np.abs(temperature - ZERO_CELSIUS) < 1e-6).all())
+    if COLDEST <= median <= HOTTEST and not still_at_zero:
         return []
     message = f"oil temperature is {median - ZERO_CELSIUS:.4g} °C, which no oil has in a test: is the sensor connected?"
     return [Notice(code=DEAD, message=message)]

@@ -13,7 +13,7 @@ from service.lists import from_cursor
 from service.queries import alarms
 from service.run_files.json_run import checked
 from service.schemas import alarm as schemas
-from service.schemas.limits import IDENTIFIER_PATTERN, LONGEST_IDENTIFIER
+from service.schemas.base import IDENTIFIER_PATTERN, LONGEST_IDENTIFIER
 from service.web import auth
 from service.web.answers import answer, described_body, json_answer, json_body, now, until_ended
 from service.web.context import Context, Cursor, Limit

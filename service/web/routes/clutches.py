@@ -23,7 +23,7 @@ from service.web.limits import USUAL_ITEMS
 from service.web.middleware import remember
 from service.web.problems import CHANGING, READING, SENDING
 from service.work.workers import CHANGE_SECONDS, Lane
-from service.workflows import register_clutch as registration
+from service.workflows import edit_clutch as registration
 from service.workflows.edit_clutch import edit
 from storage.clutches import Choice
 

@@ -19,8 +19,8 @@ from service.queries import (
     stribeck,
     surfaces,
 )
-from service.schemas.curves import LoopItem, SeriesItem
 from service.schemas.life import Method
+from service.schemas.over_life import LoopItem, SeriesItem
 from service.schemas.parameters import DiagnosisId, LifeNumber, Quantity, State, TrackedQuantity
 from service.web import answers
 from service.web.auth import Reader

@@ -23,7 +23,7 @@ from service.web.files import received, streamed
 from service.web.problems import READING, SENDING, described
 from service.work.workers import Lane
 from service.workflows.ingest_run import ingest_posted
-from storage.encoding.json_text import to_text
+from storage.encoding import to_text
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
 

@@ -12,8 +12,8 @@ from service.errors import TooLargeError, UnsupportedMediaTypeError
 from service.lists import page
 from service.queries import inspections
 from service.run_files.json_run import checked
+from service.schemas.base import MAX_PHOTOGRAPH_BYTES
 from service.schemas.inspection import InspectionIn, InspectionOut, InspectionPage, MediaType, PhotographOut
-from service.schemas.limits import MAX_PHOTOGRAPH_BYTES
 from service.schemas.parameters import ClutchId, InspectionId, PhotographId
 from service.schemas.run import Withdrawal
 from service.web import answers

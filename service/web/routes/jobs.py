@@ -18,7 +18,7 @@ from service.web.auth import OwnAdmin, OwnReader, name_of_caller, own_clutches, 
 from service.web.context import Cursor, Limit
 from service.web.limits import USUAL_ITEMS
 from service.web.problems import READING, SENDING
-from service.workflows import ask_job, cancel_job
+from service.workflows import ask_job
 from storage.jobs import OPEN
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
@@ -80,5 +80,5 @@ async def read_job(request: Request, context: OwnReader, job_id: JobId) -> Respo
 async def delete_job(request: Request, context: OwnAdmin, job_id: JobId) -> Response:
     """Cancel a job: one that waits is not begun, one that runs is ended in seconds. One that has ended stays as it is."""
     row = await run_in_threadpool(jobs.find, context.database, job_id, only=own_clutches(request))
-    cancel = partial(cancel_job.cancel, context.database, row, by=name_of_caller(request), at=now())
+    cancel = partial(ask_job.cancel, context.database, row, by=name_of_caller(request), at=now())
     return json_answer(jobs.shown(await run_in_threadpool(cancel)))

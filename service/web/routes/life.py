@@ -19,11 +19,9 @@ from service.queries.planned_duty import planned_life
 from service.queries.remaining_life import NO_CRITERIA, criteria_of, life_by_criteria, remaining_life
 from service.queries.surfaces import surface
 from service.run_files.json_run import checked
-from service.schemas.curves import LoopPage, SeriesPage, StribeckPage
-from service.schemas.degradation import Degradation, Surfaces
-from service.schemas.engagement import EngagementOut
 from service.schemas.fleet import Scores
 from service.schemas.life import Method, PlannedLife, ProgrammeIn, RemainingLife
+from service.schemas.over_life import Degradation, EngagementOut, LoopPage, SeriesPage, StribeckPage, Surfaces
 from service.schemas.parameters import Draws, EngagementRun, LifeNumber, Quantity, TrackedQuantity
 from service.web import answers
 from service.web.context import AtCycles, Prefer, PressureBar, Until

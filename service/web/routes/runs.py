@@ -25,7 +25,7 @@ from service.web.problems import CHANGING, READING, SENDING, described
 from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import change_run
 from service.workflows.ingest_run import ingest_posted
-from storage.encoding.json_text import to_text
+from storage.encoding import to_text
 from storage.engine.database import Database
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])

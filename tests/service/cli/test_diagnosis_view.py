@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from service.cli.diagnosis_view import shown
+from service.cli.diagnose import shown
 from service.lives.diagnosis.report import empty, public
 from tests.service.lives.diagnosis.test_campaign import EMPTY
 from tests.service.workflows.stand_in_engine import diagnose

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from service.schemas.limits import MAX_TORQUE_FILTER_MS
+from service.schemas.base import MAX_TORQUE_FILTER_MS
 from tests.models.loops.dynamic_records import FALLING, attractor, record
 from tests.models.records.test_torque_filter import FILTER, behind, spiking
 

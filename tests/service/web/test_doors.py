@@ -15,7 +15,7 @@ from fastapi.testclient import TestClient
 
 from service.queries import scores
 from service.web import limits
-from storage.encoding.json_text import to_text
+from storage.encoding import to_text
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import context_of
 from tests.service.web.test_connections import resident

@@ -16,13 +16,13 @@ from service.schemas.clutch import ClutchIn
 from service.settings import Settings
 from service.web.answers import to_json
 from service.work.executor import InProcess
+from service.workflows.edit_clutch import register
 from service.workflows.ingest_run import ingest
-from service.workflows.register_clutch import register
 from service.workflows.replay import clutch_ids, replay
 from storage import jobs
 from storage.engine.database import Database
 from storage.tables import filter_state, fit, prediction
-from storage.transfer.digest import digest
+from storage.transfer import digest
 from tests.support import ONCE, Server, stationary
 
 AT = "2026-11-02T10:00:00+00:00"

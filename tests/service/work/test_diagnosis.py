@@ -10,8 +10,8 @@ from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
 from service.schemas.diagnosis import IsolabilityOut
 from service.work.diagnosis import Task, diagnosed
+from service.workflows.edit_clutch import register
 from service.workflows.ingest_run import ingest
-from service.workflows.register_clutch import register
 from storage.engine.opening import open_database
 from tests.service.workflows import stand_in_engine
 from tests.support import stationary

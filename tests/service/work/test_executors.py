@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from service.work import cluster, progress
-from service.work.cluster import executor_of
-from service.work.executor import Executor, ExecutorUnavailableError, Outcome, Processes, WorkerLostError
+from service.work import executor as executors
+from service.work import progress
+from service.work.executor import Executor, ExecutorUnavailableError, Outcome, Processes, WorkerLostError, executor_of
 from tests.service.work import functions
 from tests.service.work.clusters import ROOT, LocalCluster, local_cluster
 from tests.support import free_port
@@ -138,7 +138,7 @@ def test_closing_ends_what_runs_at_once() -> None:
 
 def test_processes_end_with_the_one_that_started_them() -> None:
     source = (
-        "from service.work.cluster import executor_of\n"
+        "from service.work.executor import executor_of\n"
         "from tests.service.work.functions import pid\n"
         "import os, signal\n"
         "pool = executor_of('processes:2')\n"
@@ -156,8 +156,8 @@ def test_processes_end_with_the_one_that_started_them() -> None:
 
 
 def test_a_cluster_of_another_release_is_refused(dask_cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    own = cluster.release()
-    monkeypatch.setattr(cluster, "release", lambda: own | {"clutchlife": "0.0.1"})
+    own = executors.release()
+    monkeypatch.setattr(executors, "release", lambda: own | {"clutchlife": "0.0.1"})
     with pytest.raises(ExecutorUnavailableError, match=rf"clutchlife {own['clutchlife']} instead of 0\.0\.1"):
         executor_of(dask_cluster.address)
 
@@ -167,18 +167,18 @@ def test_a_worker_of_another_release_that_joins_later_is_refused(
     dask_cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with executor_of(dask_cluster.address) as made:
-        own = cluster.release()
-        monkeypatch.setattr(cluster, "release", lambda: own | {"numpy": "1.0"})
+        own = executors.release()
+        monkeypatch.setattr(executors, "release", lambda: own | {"numpy": "1.0"})
         with pytest.raises(ExecutorUnavailableError, match=r"instead of 1\.0: results could differ"):
             list(made.map(functions.squared, range(4)))
 
 
 def test_what_is_no_cluster_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr(executors, "CONNECT_SECONDS", 0.5)
     with pytest.raises(ExecutorUnavailableError, match="no Dask scheduler answers there"):
         executor_of(f"tcp://127.0.0.1:{free_port()}")
-    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 30.0)
-    monkeypatch.setattr(cluster, "WORKER_SECONDS", 0.5)
+    monkeypatch.setattr(executors, "CONNECT_SECONDS", 30.0)
+    monkeypatch.setattr(executors, "WORKER_SECONDS", 0.5)
     no_worker = pytest.raises(ExecutorUnavailableError, match="has no worker: dask worker tcp://")
     with local_cluster(0) as running, no_worker:
         executor_of(running.address)
@@ -200,7 +200,7 @@ def test_a_scheduler_that_ends_is_named() -> None:
 @pytest.mark.slow
 def test_a_cluster_whose_last_worker_ends_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     with local_cluster(1) as running, executor_of(running.address) as made:
-        monkeypatch.setattr(cluster, "WORKER_SECONDS", 1.0)
+        monkeypatch.setattr(executors, "WORKER_SECONDS", 1.0)
         with pytest.raises(ExecutorUnavailableError, match="has no worker any more"):
             list(made.map(functions.killed_always, range(6)))
 

@@ -19,7 +19,7 @@ from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
 from service.work import workers as module
 from service.work.workers import Lane, Workers, in_processes, in_threads
-from service.workflows import register_clutch
+from service.workflows import edit_clutch
 from service.workflows.ingest_run import ingest_posted
 from storage.engine.database import Database
 from storage.engine.opening import open_database
@@ -33,7 +33,7 @@ IN_TIME = 120.0
 @pytest.fixture
 def database(tmp_path: Path) -> Iterator[Database]:
     opened = open_database(f"sqlite:///{tmp_path / 'a.db'}")
-    register_clutch.register(opened, ClutchIn(clutch_id="c1"), created_at=AT)
+    edit_clutch.register(opened, ClutchIn(clutch_id="c1"), created_at=AT)
     yield opened
     opened.close()
 
@@ -54,7 +54,7 @@ def processes(database: Database) -> Iterator[Workers]:
 
 def test_a_call_sees_what_was_committed_before_it(database: Database, workers: Workers) -> None:
     assert workers.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
-    register_clutch.register(database, ClutchIn(clutch_id="c2"), created_at=AT)
+    edit_clutch.register(database, ClutchIn(clutch_id="c2"), created_at=AT)
     assert [workers.submit(lane, calls.ids).result(IN_TIME) for lane in Lane] == [["c1", "c2"]] * len(Lane)
 
 
@@ -113,7 +113,7 @@ def test_both_kinds_take_in_the_same_runs_alike(tmp_path: Path) -> None:
     receipts = []
     for name, make in (("threads", in_threads), ("processes", lambda opened: in_processes(opened, 2))):
         database = open_database(f"sqlite:///{tmp_path / name}.db")
-        register_clutch.register(database, ClutchIn(clutch_id="c1"), created_at=AT)
+        edit_clutch.register(database, ClutchIn(clutch_id="c1"), created_at=AT)
         made = make(database)
         bodies = [to_json(stationary(1000.0 * number, run_id=f"r{number}")) for number in range(4)]
         taken_in = [

@@ -14,9 +14,9 @@ from service.schemas.diagnosis import JobOut, JobPage
 from service.work.background import directly
 from service.work.workflow import MAX_REASONS, Task, done
 from service.workflows import ask_job, learn_fleet
-from service.workflows.register_clutch import register
+from service.workflows.edit_clutch import register
 from storage import jobs
-from storage.encoding.json_text import Json
+from storage.encoding import Json
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import back_up

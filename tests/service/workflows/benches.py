@@ -21,7 +21,7 @@ from service.queries import clutch_list, degradation, remaining_life, runs, scor
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
 from service.web.answers import to_json
-from service.workflows import change_run, ingest_run, register_clutch
+from service.workflows import change_run, edit_clutch, ingest_run
 from service.workflows.adopt_model import adopt
 from service.workflows.ingest_run import ingest
 from storage import diagnoses, results
@@ -106,7 +106,7 @@ class Bench:
     def __init__(self, path: Path, record: Mapping[str, Any] | None = None) -> None:
         self.database: Database = open_database(f"sqlite:///{path}")
         record = {"clutch_id": CLUTCH} | dict(record or {})
-        register_clutch.register(self.database, ClutchIn.model_validate(record), created_at=AT)
+        edit_clutch.register(self.database, ClutchIn.model_validate(record), created_at=AT)
 
     def send(self, run: Mapping[str, Any]) -> dict[str, Any]:
         """Post a run; its receipt."""

@@ -20,7 +20,7 @@ from service.queries import degradation
 from service.queries.cache import to_json
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
-from service.workflows import adopt_model, ingest_run, learn_fleet, register_clutch
+from service.workflows import adopt_model, edit_clutch, ingest_run, learn_fleet
 from service.workflows.adopt_model import adopt, finish_and_adopt
 from service.workflows.ingest_run import ingest
 from service.workflows.replay import replay_clutch
@@ -48,7 +48,7 @@ def url(tmp_path: Path) -> str:
 @pytest.fixture
 def database(url: str) -> Iterator[Database]:
     opened = open_database(url)
-    register_clutch.register(opened, ClutchIn(clutch_id="c1"), created_at=AT)
+    edit_clutch.register(opened, ClutchIn(clutch_id="c1"), created_at=AT)
     yield opened
     opened.close()
 
@@ -170,7 +170,7 @@ def test_a_run_that_comes_while_another_is_computed_counts_for_it(
     assert len(calls) == 2
     monkeypatch.undo()
     calm = open_database(f"sqlite:///{tmp_path / 'b.db'}")
-    register_clutch.register(calm, ClutchIn(clutch_id="c1"), created_at=AT)
+    edit_clutch.register(calm, ClutchIn(clutch_id="c1"), created_at=AT)
     for cycles in (0.0, 1000.0, 2000.0):
         post(calm, cycles)
     assert stored(database) == stored(calm)
@@ -183,7 +183,7 @@ def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
     database: Database, url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A run comes whenever the clutch is computed again: it is left as it was, the others are replayed all the same."""
-    register_clutch.register(database, ClutchIn(clutch_id="c2"), created_at=AT)
+    edit_clutch.register(database, ClutchIn(clutch_id="c2"), created_at=AT)
     post(database, 0.0)
     attempts = []
     recomputed = stored_runs.recomputed

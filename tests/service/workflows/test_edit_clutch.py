@@ -10,7 +10,7 @@ from service.errors import ArchivedError, ConflictError
 from service.queries import clutch_list
 from service.queries import runs as run_query
 from service.schemas.clutch import ClutchEdit, ClutchIn
-from service.workflows import edit_clutch, learn_fleet, register_clutch
+from service.workflows import edit_clutch, learn_fleet
 from storage.engine.opening import open_database
 from tests.service.workflows.benches import AT, CLUTCH, WHO, Bench, assert_same, body, stood_in
 
@@ -91,7 +91,7 @@ def test_the_record_in_force_and_the_one_that_was_registered_are_known(tmp_path:
 
     def register(fluid: str) -> bool:
         record = ClutchIn.model_validate({"clutch_id": CLUTCH, "fluid": fluid})
-        return register_clutch.register(bench.database, record, created_at=AT)
+        return edit_clutch.register(bench.database, record, created_at=AT)
 
     assert not register("first")
     assert not register("third")

@@ -9,7 +9,7 @@ from sqlalchemy import Connection
 
 from service.lives.incoming_run import IncomingRun, name_run
 from service.schemas.clutch import ClutchIn
-from service.workflows import register_clutch
+from service.workflows import edit_clutch
 from service.workflows.ingest_run import ingest
 from storage import clutches, runs
 from storage.engine.database import Database
@@ -27,7 +27,7 @@ def url(tmp_path: Path) -> str:
 @pytest.fixture
 def database(url: str) -> Iterator[Database]:
     opened = open_database(url)
-    register_clutch.register(opened, ClutchIn(clutch_id="c1"), created_at=AT)
+    edit_clutch.register(opened, ClutchIn(clutch_id="c1"), created_at=AT)
     yield opened
     opened.close()
 

@@ -11,7 +11,7 @@ from alembic.script import ScriptDirectory
 
 from models.prognosis.ended_lives import EndedLife
 from storage import assumptions, channels, clutches, diagnoses
-from storage.encoding.json_text import to_text
+from storage.encoding import to_text
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseTooNew, StorageUnavailable
 from storage.engine.integrity import other_schema

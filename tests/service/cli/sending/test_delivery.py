@@ -7,8 +7,7 @@ import httpx2
 import pytest
 
 from service.cli.sending.delivery import Sent, deliver
-from service.cli.sending.entry import INSPECTIONS
-from service.cli.sending.spool import Spool
+from service.cli.sending.spool import INSPECTIONS, Spool
 from service.client.clutchlife import transport
 from service.client.clutchlife.answers import RefusedError, ServiceAwayError
 from service.client.clutchlife.transport import Service
@@ -237,6 +236,6 @@ def test_a_full_disk_keeps_no_run_from_being_sent(sender: Sender, monkeypatch: p
         raise OSError(28, "No space left on device")
 
     sender.push(body(1))
-    monkeypatch.setattr("service.cli.sending.spool_files.write", full)
+    monkeypatch.setattr("service.cli.sending.spool.write", full)
     assert sender.send().stored == 1
     assert sender.counts == (1, 0, 0)

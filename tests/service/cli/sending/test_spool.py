@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from service.cli.sending import entry as entries
+from service.cli.sending import spool as entries
 from service.cli.sending.delivery import Sent, deliver
-from service.cli.sending.folder_lock import HeldError
-from service.cli.sending.spool import Spool
+from service.cli.sending.spool import HeldError, Spool
 from service.client.clutchlife.transport import Service
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body
 

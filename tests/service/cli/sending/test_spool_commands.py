@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from service.cli.main import app
-from service.cli.sending import transmission
+from service.cli.sending import delivery
 from service.cli.sending.spool import Spool
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body, problem
 from tests.service.cli.sending.test_spool import PARAMETERS, old_release, written
@@ -57,7 +57,7 @@ class Terminal:
 @pytest.fixture
 def terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Terminal:
     terminal = Terminal(tmp_path)
-    monkeypatch.setattr(transmission, "connect", terminal.connect)
+    monkeypatch.setattr(delivery, "connect", terminal.connect)
     return terminal
 
 

@@ -6,7 +6,7 @@ from contextlib import closing
 import pytest
 from fastapi.testclient import TestClient
 
-from service.schemas import limits
+from service.schemas import base
 from service.workflows import inspect_clutch
 from tests.service.web.routes.granting import granted
 from tests.service.web.routes.surfaces import FRESH, JPEG, WEBP, WORN, inspected, png, sha256
@@ -80,7 +80,7 @@ def test_a_photograph_that_is_too_large_is_refused(client: TestClient, monkeypat
     assert post(client, address, png() + bytes(1000 - len(png())))[0] == 201
     answer = client.post(f"{address}/photographs", content=png() + bytes(1000), headers={"Content-Type": "image/png"})
     assert (answer.status_code, "at most 1000 bytes" in answer.json()["detail"]) == (413, True)
-    assert limits.MAX_PHOTOGRAPH_BYTES == 16 * 2**20
+    assert base.MAX_PHOTOGRAPH_BYTES == 16 * 2**20
 
 
 def test_an_inspection_has_only_so_many_photographs(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

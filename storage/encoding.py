@@ -21,13 +21,16 @@ once: it is the double nearest to the decimal. A column that holds any other dou
 
     crc32 of the rest (4 bytes) | d (1 byte) | first k (8 bytes) | bytes of each plane (4 x 4 bytes) | the planes |
     rows that are minus zero, which k does not distinguish from zero (4 bytes each)
+
+JSON in text columns is compact, and without NaN or infinities: the library's functions, nothing of our own at every row.
 """
 
 import json
 import math
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -264,3 +267,13 @@ def decode_decimals(data: bytes | bytearray, length: int) -> NDArray[np.float64]
     column = np.asarray(np.cumsum(folded, out=folded) / 10.0**decimals, dtype=np.float64)
     column[minus] = -0.0
     return column
+
+
+Json: TypeAlias = dict[str, Any]
+
+#: Compact JSON text. Raises ValueError on NaN or an infinity, TypeError on a value that JSON does not have.
+to_text: Callable[[object], str] = json.JSONEncoder(allow_nan=False, ensure_ascii=False, separators=(",", ":")).encode
+#: The object that `to_text` wrote.
+to_object: Callable[[str], Json] = json.loads
+#: The list that `to_text` wrote.
+to_list: Callable[[str], list[Any]] = json.loads

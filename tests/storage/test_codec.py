@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
-from storage.encoding.codec import CODEC, decode, encode, pack, unpack
+from storage.encoding import CODEC, decode, encode, pack, unpack
 from storage.engine.errors import DamagedData
-from tests.storage.encoding.floats import same_bits
+from tests.storage.floats import same_bits
 
 AWKWARD = [0.0, -0.0, 5e-324, -2.2e-308, 1e308, -1.7976931348623157e308, float("inf"), float("-inf"), 0.1, 1 / 3]
 

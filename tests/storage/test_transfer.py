@@ -11,12 +11,11 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
+from storage import transfer as transfers
 from storage.engine.errors import ServiceRuns, TargetInUse, UnfinishedMigration
 from storage.engine.opening import find_database, open_database, service_lock
 from storage.tables import metadata
-from storage.transfer import transfer as transfers
-from storage.transfer.digest import digest
-from storage.transfer.transfer import transfer
+from storage.transfer import digest, transfer
 from tests.storage.engine.postgresql.server import PostgresServer
 
 ROWS = 7

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from storage.encoding.codec import decode_decimals, encode, encode_decimals
+from storage.encoding import decode_decimals, encode, encode_decimals
 from storage.engine.errors import DamagedData
-from tests.storage.encoding.floats import same_bits
+from tests.storage.floats import same_bits
 
 
 @given(

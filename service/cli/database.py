@@ -1,0 +1,284 @@
+"""Commands on the database itself, for the machine that holds it: a backup, the results computed again, and the like."""
+
+import random
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.progress import Progress
+
+from service.cli.options import (
+    DATABASE,
+    Database,
+    Scheduler,
+    err,
+    errors_in_a_line,
+    executor,
+    existing,
+    fail,
+    print_line,
+    read_only,
+    require_database,
+    require_file,
+)
+from storage.engine.errors import DatabaseTooOld
+
+
+def backup(path: Path, database: Database = DATABASE) -> None:
+    """A consistent copy of the database at PATH, as it is, while the service runs."""
+    from storage.engine.sqlite.database import back_up  # start-up time
+
+    with errors_in_a_line():
+        require_file(database, "back it up with pg_dump --format=custom")
+        require_database(database)
+        back_up(database, path)
+        left_out = _left_out(path)
+    print_line(str(path))
+    for address, blobs in left_out.items():
+        line = f"{blobs} raw records are not in it, they are in {address}: copy that now, after the database"
+        err.print(line, markup=False, soft_wrap=True)
+
+
+def _left_out(path: Path) -> dict[str, int]:
+    """How many blobs the copy names in which store; an earlier revision names none."""
+    from storage.blobs import raw_stores  # start-up time
+    from storage.engine.opening import find_database  # start-up time
+
+    with closing(find_database(f"sqlite:///{path.absolute()}")) as copied:
+        try:
+            with copied.reading() as connection:
+                return {address: blobs for address, (_, blobs) in raw_stores.numbers(connection).items()}
+        except DatabaseTooOld:
+            return {}
+
+
+def restore(
+    backup: Annotated[Path, typer.Argument(metavar="BACKUP", help="A backup, made by clutchlife backup")],
+    database: Database = DATABASE,
+) -> None:
+    """Put the file BACKUP in the place of the database, which is kept beside it.
+
+    No service may use the database meanwhile. A backup of an earlier release is migrated when the service starts.
+    """
+    from storage.engine.sqlite.backup import restore as put_back  # start-up time
+
+    with errors_in_a_line():
+        require_file(database, "put a dump back with pg_restore, while no service runs")
+        kept = put_back(database, backup)
+    print_line(f"{backup} is in the place of {database}")
+    if kept is not None:
+        print_line(f"what was there is kept as {kept}")
+
+
+if TYPE_CHECKING:
+    from service.work.background import AtOnce
+
+
+def replay(
+    clutch_ids_given: Annotated[list[str] | None, typer.Argument(metavar="[ID...]", help="Left out: all")] = None,
+    database: Database = DATABASE,
+    scheduler: Scheduler = "local",
+) -> None:
+    """Recompute all results from the raw runs, with the code that is installed now.
+
+    A clutch with a run that this code cannot evaluate keeps the results that it has; the others are gone on with.
+    """
+    from service.work.background import in_background  # start-up time: only this command needs it
+    from service.work.progress import progress  # start-up time: only this command needs it
+
+    def replay_all(at_once: "AtOnce") -> list[str]:
+        from service.workflows import replay as workflow  # start-up time, in the background
+
+        wanted, left = clutch_ids_given or workflow.clutch_ids(opened), []
+        advance(0, total=len(wanted))
+        for replayed in workflow.replay(opened, wanted, computing, at_once=at_once):
+            if replayed.error is not None:
+                left.append(replayed.clutch_id)
+                err.print(f"{replayed.clutch_id}: not replayed: {replayed.error}", markup=False, soft_wrap=True)
+            else:
+                print_line(f"{replayed.clutch_id}: {replayed.runs} runs")
+            advance()
+        return left
+
+    with existing(database) as opened, executor(scheduler) as computing, progress(err, "replaying") as advance:
+        left = in_background(replay_all)
+    if left:
+        fail(f"{len(left)} clutches keep the results that they had: {', '.join(left)}")
+
+
+def verify(
+    database: Database = DATABASE,
+    sample: Annotated[
+        int | None, typer.Option(min=0, help="Recompute this many clutches only, drawn again each time; left out, all")
+    ] = None,
+) -> None:
+    """Check pages, references and schema, the hashes of every run, inspection and photograph, and that all results follow.
+
+    Prints what is wrong, a line each; ends with 1 where anything is. Also while the service runs, and for a backup.
+    """
+    from service.queries.verification import (  # start-up time
+        check_inspections,  # start-up time
+        check_results,  # start-up time
+        check_runs,  # start-up time
+    )
+    from service.work.background import use_one_blas_thread  # start-up time
+    from storage import clutches  # start-up time
+    from storage.engine.integrity import other_schema  # start-up time
+
+    use_one_blas_thread()
+    findings = runs = inspections = photographs = 0
+    earlier: dict[str, int] = {}
+
+    def tell(lines: "list[str] | tuple[str, ...]") -> int:
+        for line in lines:
+            print_line(line)
+        return len(lines)
+
+    with read_only(database) as opened, Progress(console=err, transient=True) as progress:
+        with opened.reading() as connection:
+            damaged = tell(opened.damage(connection))
+            if damaged:  # what is read of a damaged file is not to be trusted: neither runs nor what follows from them
+                fail(f"{damaged} findings: the file is damaged. Put a backup back: clutchlife restore BACKUP")
+            findings += tell(other_schema(connection))
+            ids = clutches.all_ids(connection)
+        chosen = set(ids if sample is None else random.sample(ids, min(sample, len(ids))))
+        task = progress.add_task("verifying", total=len(ids))
+        for clutch_id in ids:
+            content = check_runs(opened, clutch_id)
+            runs += content.runs
+            surfaces = check_inspections(opened, clutch_id)
+            inspections, photographs = inspections + surfaces.inspections, photographs + surfaces.photographs
+            findings += tell(content.findings) + tell(surfaces.findings)
+            if clutch_id in chosen and not content.findings:
+                results = check_results(opened, clutch_id)
+                findings += tell(results.findings)
+                for version, count in results.earlier.items():
+                    earlier[version] = earlier.get(version, 0) + count
+            progress.advance(task)
+    for version, count in sorted(earlier.items()):
+        note = f"{count} results were made by release {version}: they can be computed again, and may differ (replay)"
+        print_line(note)
+    if inspections:
+        print_line(f"{inspections} inspections with {photographs} photographs are checked")
+    summary = (
+        f"{runs} runs of {len(ids)} clutches are checked, {len(chosen)} clutches computed again: {findings} findings"
+    )
+    if findings:
+        fail(summary)
+    print_line(summary)
+
+
+def migrate(
+    source: Annotated[str, typer.Option("--from", help="The database that is copied, and stays as it is")],
+    target: Annotated[str, typer.Option("--to", help="An empty database, or a file that is yet to be made")],
+) -> None:
+    """Copy a database into another, SQLite's or PostgreSQL's, and compare all of it; no service may run on either.
+
+    Interrupted, it goes on where it was when the command is given again. The target is used by no service until all tables
+    are the same on both sides, and every run is as it was sent.
+    """
+    from service.queries.verification import (  # start-up time
+        check_inspections,  # start-up time
+        check_runs,  # start-up time
+    )
+    from service.work.progress import progress  # start-up time
+    from storage import clutches  # start-up time
+    from storage.transfer import transfer  # start-up time
+
+    with errors_in_a_line():
+        require_database(source)
+        with transfer(source, target) as moving:
+            rows = moving.rows()
+            with progress(err, "copying rows") as advance:
+                advance(0, total=rows)
+                moving.copy(lambda _, count: advance(count))
+            with progress(err, "comparing rows") as advance:
+                advance(0, total=rows)
+                findings = moving.differing(lambda _, count: advance(count))
+            with moving.target.reading() as connection:
+                ids = clutches.all_ids(connection)
+            with progress(err, "checking clutches") as advance:
+                advance(0, total=len(ids))
+                for clutch_id in ids:
+                    findings += check_runs(moving.target, clutch_id).findings
+                    findings += check_inspections(moving.target, clutch_id).findings
+                    advance()
+            for finding in findings:
+                print_line(finding)
+            if findings:
+                fail(f"{len(findings)} findings: the target is not used. Remove it, and migrate again")
+            moving.release()
+    print_line(f"{rows} rows of {len(ids)} clutches are the same in both databases")
+
+
+app = typer.Typer(help="Where long raw records are kept beside the database.", no_args_is_help=True)
+
+_SECONDS_AN_HOUR = 3600.0
+#: Hours that a blob may be without a run that names it. Chosen: no run takes longer from its arrival to its commit, nor do
+#: the clocks of a store and of this machine differ by more; the least that is allowed is what a single run may take.
+_GRACE_HOURS, _MIN_GRACE_HOURS = 24.0, 1.0
+
+Address = Annotated[str, typer.Option("--to", help="database, folder:///path or s3://bucket/prefix")]
+
+
+@app.command("list")
+def list_stores(database: Database = DATABASE) -> None:
+    """Show every place in which long raw records are, how many columns and blobs, and which place new ones go to."""
+    from storage.blobs import raw_stores  # start-up time
+
+    with existing(database) as opened, opened.reading() as connection:
+        stores, numbers = raw_stores.all_of(connection), raw_stores.numbers(connection)
+    for store in stores:
+        columns, blobs = numbers.get(store.address, (0, 0))
+        used = ", in use" if store.in_use else ""
+        print_line(f"{store.address}: {columns} columns in {blobs} blobs{used}")
+    if not any(store.in_use for store in stores):
+        print_line("new raw records go into the database")
+
+
+@app.command()
+def move(to: Address, database: Database = DATABASE) -> None:
+    """Have new long raw records go to an address, and take those that are stored there too.
+
+    May run beside the service, and be interrupted and repeated. What is left in the former place `collect` removes.
+    """
+    from service.workflows.raw_records import move as move_all  # start-up time
+
+    with existing(database) as opened, Progress(console=err, transient=True) as progress:
+        task = progress.add_task("moving columns", total=None)
+        moved = move_all(opened, to, tell=lambda count: progress.update(task, completed=count))
+    print_line(f"{moved} columns are moved")
+
+
+@app.command()
+def relocate(
+    address: Annotated[str, typer.Argument(help="Where they were, as `list` shows it")],
+    to: Address,
+    database: Database = DATABASE,
+) -> None:
+    """Look for the raw records of one store at another address, to which the whole store was copied by other means.
+
+    All must be there. A run that comes in meanwhile is refused, or the command is: then copy and try again.
+    """
+    from service.workflows.raw_records import relocate as look_at  # start-up time
+
+    with existing(database) as opened:
+        count = look_at(opened, address, to)
+    print_line(f"{count} blobs are looked for there")
+
+
+@app.command()
+def collect(
+    database: Database = DATABASE,
+    grace_hours: Annotated[
+        float, typer.Option(min=_MIN_GRACE_HOURS, help="What was put within so many hours is left")
+    ] = _GRACE_HOURS,
+) -> None:
+    """Remove blobs that no run names, as interrupted posts and moves leave them. Safe while services run."""
+    from service.workflows.raw_records import collect as collect_all  # start-up time
+
+    with existing(database) as opened:
+        for store in collect_all(opened, grace=grace_hours * _SECONDS_AN_HOUR):
+            line = f"{store.address}: {store.named} blobs in use, {store.removed} removed, {store.new} too new to be removed"
+            print_line(line)
