@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from models.arrays import FloatArray
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS, bar
+from service.schemas import diagnosis as shapes
+from service.schemas.base import Answer
 
 if TYPE_CHECKING:  # start-up time: they load the whole diagnosis
     from models.diagnosis.experiments.candidates import Step
-    from models.diagnosis.report.report import Isolability, LoopTrace, Maps, Misfit, Report
+    from models.diagnosis.report.report import LoopTrace, Maps, Misfit, Report
     from models.diagnosis.validation.held_out import Gain
 
 #: Maps and traces are looked at: more digits than these only weigh.
 _DIGITS = 6
+
+
+#: The numbers of a gain that have other names where they are found.
+_GAIN = {"reduction_percent_sd": "reduction_sd", "prediction_log_score_gain": "forecast_log_score_gain"}
 
 
 def empty() -> dict[str, Any]:
@@ -49,85 +56,65 @@ def public(
 
     `before` and `after` are the remaining useful life under the baseline and under the extension.
     """
-    return {
+    return empty() | {
         "verdict": report.verdict.value,
         "causes": list(report.causes),
         "summary": " ".join(part for part in (report.summary, _remaining(report, before, after)) if part),
-        "explanations": [
-            {
-                "effects": list(explanation.effects),
-                "probability": finite(explanation.probability),
-                "sign_probability": None
-                if explanation.sign_probability is None
-                else finite(explanation.sign_probability),
-            }
-            for explanation in report.explanations
-        ],
+        "explanations": [_shaped(shapes.ExplanationOut, explanation) for explanation in report.explanations],
         "candidates": [
-            {
-                "effect": candidate.effect,
-                "title": candidate.title,
-                "probability": finite(candidate.probability),
-                "log_evidence_gain": finite(candidate.log_evidence_gain),
-                "estimate": {
-                    "name": candidate.estimate.name,
-                    "value": finite(candidate.estimate.value),
-                    "sd": finite(candidate.estimate.sd),
-                    "unit": candidate.estimate.unit,
-                    "interval": [finite(end) for end in candidate.estimate.interval],
-                },
-                "beside": list(candidate.beside),
-                "fit": None if candidate.fit is None else candidate.fit.value,
-            }
+            _shaped(shapes.CandidateOut, candidate, estimate=_shaped(shapes.Amplitude, candidate.estimate))
             for candidate in report.candidates
         ],
         "baseline": _misfit(report.baseline),
         "extended": _misfit(report.extended),
         "gain": _gain(report.gain, before, after),
         "advice": [
-            {
-                "key": test.key,
-                "test": test.test,
-                "separates": [test.effect, test.other],
-                "nats": finite(test.nats),
-                "probability": finite(test.probability),
-                "narrows": finite(test.narrows) if test.narrows else None,
-                "minutes": round(test.minutes, 1),
-                "steps": [_step(step, origin) for step in test.steps],
-            }
+            _shaped(
+                shapes.AdviceOut,
+                test,
+                separates=[test.effect, test.other],
+                narrows=finite(test.narrows) if test.narrows else None,
+                minutes=round(test.minutes, 1),
+                steps=[_step(step, origin) for step in test.steps],
+            )
             for test in report.advice
         ],
-        "visible": [
-            {
-                "effect": smallest.effect,
-                "amplitude": finite(smallest.amplitude),
-                "least": finite(smallest.least),
-                "unit": smallest.unit,
-            }
-            for smallest in report.visible
-        ],
+        "visible": [_shaped(shapes.VisibleOut, smallest) for smallest in report.visible],
         "not_adoptable": report.not_adoptable or None,
         "notes": [*notes, *report.notes],
         "statistics": {name: finite(value) for name, value in report.statistics.items()},
         "maps": None if report.maps is None else _maps(report.maps, origin),
         "loops": [_loop(loop, origin) for loop in report.loops],
-        "isolability": None if report.isolability is None else _isolability(report.isolability),
+        "isolability": None
+        if report.isolability is None
+        else {
+            "pairs": [
+                _shaped(
+                    shapes.PairOut,
+                    pair,
+                    key=pair.trial or None,
+                    test=pair.test or None,
+                    with_test=finite(pair.with_trial),
+                )
+                for pair in report.isolability.pairs
+            ],
+            "unseen": list(report.isolability.unseen),
+        },
     }
 
 
-def _isolability(isolability: Isolability) -> dict[str, Any]:
-    pairs = [
-        {
-            "effects": list(pair.effects),
-            "probability": finite(pair.probability),
-            "apart": pair.apart,
-            "key": pair.trial or None,
-            "test": pair.test or None,
-            "with_test": finite(pair.with_trial),
-        }
-        for pair in isolability.pairs
-    ]
-    return {"pairs": pairs, "unseen": list(isolability.unseen)}
+def _shaped(schema: type[Answer], found: object, **others: Any) -> dict[str, Any]:
+    """The fields of a schema, of what was found; the others in their places."""
+    return {name: others[name] if name in others else _plain(getattr(found, name)) for name in schema.model_fields}
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it."""
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return finite(value) if isinstance(value, float) else value
 
 
 def _remaining(report: Report, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
@@ -146,18 +133,17 @@ def _remaining(report: Report, before: Mapping[str, Any], after: Mapping[str, An
 
 
 def _step(step: Step, origin: float) -> dict[str, Any]:
-    return {
-        "kind": step.kind,
-        "pressures_bar": [round(bar(pressure), 4) for pressure in step.pressures],
-        "speeds_rpm": [round(speed / RADIANS_PER_SECOND_PER_RPM, 2) for speed in step.speeds],
-        "frequency_hz": step.frequency,
-        "periods": step.periods,
-        "oil_temperature_c": None if step.temperature is None else round(step.temperature - ZERO_CELSIUS, 2),
-        "repeats": step.repeats,
-        "cycles": step.cycles + origin,
-        "pause_hours": step.pause / 3600.0,
-        "minutes": round(step.minutes, 1),
-    }
+    return _shaped(
+        shapes.PlanStep,
+        step,
+        pressures_bar=[round(bar(pressure), 4) for pressure in step.pressures],
+        speeds_rpm=[round(speed / RADIANS_PER_SECOND_PER_RPM, 2) for speed in step.speeds],
+        frequency_hz=step.frequency,
+        oil_temperature_c=None if step.temperature is None else round(step.temperature - ZERO_CELSIUS, 2),
+        cycles=step.cycles + origin,
+        pause_hours=step.pause / 3600.0,
+        minutes=round(step.minutes, 1),
+    )
 
 
 def finite(value: float) -> float | None:
@@ -169,36 +155,21 @@ def finite(value: float) -> float | None:
 def _misfit(misfit: Misfit | None) -> dict[str, Any]:
     if misfit is None:
         return {"rmse_nm": None, "noise_nm": None, "unexplained_share": None, "where": []}
-    return {
-        "rmse_nm": finite(misfit.rmse),
-        "noise_nm": finite(misfit.noise),
-        "unexplained_share": finite(misfit.unexplained_share),
-        "where": [
-            {"axis": axis.axis, "strength": finite(axis.strength), "p_value": finite(axis.p_value)}
-            for axis in misfit.where
-        ],
-    }
-
-
-#: The public names of a gain's numbers.
-_GAIN = {
-    "rmse_before_nm": "rmse_before",
-    "rmse_after_nm": "rmse_after",
-    "reduction_percent": "reduction_percent",
-    "reduction_percent_sd": "reduction_sd",
-    "excess_before_nm": "excess_before",
-    "excess_after_nm": "excess_after",
-    "mse_percent_before": "mse_percent_before",
-    "mse_percent_after": "mse_percent_after",
-    "log_score_gain": "log_score_gain",
-    "prediction_log_score_gain": "forecast_log_score_gain",
-}
+    return _shaped(
+        shapes.MisfitOut,
+        misfit,
+        rmse_nm=finite(misfit.rmse),
+        noise_nm=finite(misfit.noise),
+        where=[_shaped(shapes.WhereOut, axis) for axis in misfit.where],
+    )
 
 
 def _gain(gain: Gain | None, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    numbers = [name for name in shapes.GainOut.model_fields if name not in {"held_out_runs", "remaining_useful_life"}]
+    found = {name: _GAIN.get(name, name.removesuffix("_nm")) for name in numbers}
     return {
         "held_out_runs": [] if gain is None else list(gain.held_out_runs),
-        **{public: None if gain is None else finite(getattr(gain, name)) for public, name in _GAIN.items()},
+        **{name: None if gain is None else finite(getattr(gain, own)) for name, own in found.items()},
         "remaining_useful_life": {"before": dict(before), "after": dict(after)},
     }
 
