@@ -207,7 +207,7 @@ def send(
         here = [kept for kept in spools if kept.url == url.rstrip("/")]
         for kept in spools:
             if kept not in here:
-                whose = f"{kept.clutch_id} at {kept.url}" if kept.url else "a clutch that is not stated: give --clutch"
+                whose = f"{kept.clutch_id} at {kept.url}"
                 say(f"{len(kept.waiting())} runs in {kept.folder} are not sent: they are of {whose}")
         if not here:
             print_line(f"nothing waits for {url}")
@@ -290,9 +290,7 @@ def _print(kept: list[Kept]) -> None:
     for run in kept:
         if run.spool != owner:
             owner = run.spool
-            name = (
-                f"{owner.clutch_id} at {owner.url}" if owner.clutch_id else "clutch not stated (an earlier release's)"
-            )
+            name = f"{owner.clutch_id} at {owner.url}" if owner.clutch_id else "clutch not stated"
             print_line(f"{name}, in {owner.folder}")
         print_line(f"  {_line(run)}")
 

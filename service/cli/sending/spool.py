@@ -7,9 +7,6 @@ earlier), so a crash or a power cut on the sender's side loses nothing. A run th
 What is there always means one thing. Bytes (`.body`) without an `.entry` were not kept yet. An `.entry` without bytes
 follows them to the folder where they are, or is done. That a newer version replaces older ones is decided by one rename,
 that of `replacing.journal`, and carried out by whoever locks the folder next, with a lock that ends with its holder.
-
-Earlier releases wrote no `.entry`: `NAME.json` was a body, and `NAME.run` a record file with the parameters of its
-request in `NAME.asked`. They are read as entries of which less is known.
 """
 
 import errno
@@ -28,8 +25,8 @@ from typing import Any
 from service.cli.sending import run_head
 from service.cli.sending.run_head import RunHead, same_run
 
-#: What is known of a run; its bytes; the same two of earlier releases, and their parameters; the answer to a refused run.
-ENTRY, BODY, OLD_BODIES, OLD_PARAMETERS, PROBLEM = ".entry", ".body", (".json", ".run"), ".asked", ".problem"
+#: What is known of a run; its bytes; the answer to a refused run.
+ENTRY, BODY, PROBLEM = ".entry", ".body", ".problem"
 #: What is sent to, below the clutch's address.
 RUNS, INSPECTIONS = "runs", "inspections"
 #: A file that is being written.
@@ -58,7 +55,7 @@ class Entry:
     last_try: str | None = None
     last_answer: str | None = None
     perhaps_stored: bool = False
-    #: Whether it can be sent: a process that was killed may have left a record file without its parameters.
+    #: Whether it can be sent: the file of what is known of it may be damaged.
     whole: bool = True
 
     @property
@@ -92,12 +89,7 @@ def stamp(moment: float | None = None) -> str:
 
 def read(folder: Path) -> list[Entry]:
     """All entries of a folder, oldest first, whoever changes it meanwhile."""
-    names = {path.name for path in folder.glob("[0-9]*-*")}
-    entries = [load(folder, name.removesuffix(ENTRY)) for name in names if name.endswith(ENTRY)]
-    for name in names:
-        stem, suffix = Path(name).stem, Path(name).suffix
-        if suffix in OLD_BODIES and stem + ENTRY not in names:
-            entries.append(_old(folder, stem, suffix))
+    entries = [load(folder, path.stem) for path in folder.glob(f"[0-9]*-*{ENTRY}")]
     return sorted((entry for entry in entries if entry is not None), key=lambda entry: (number(entry.stem), entry.stem))
 
 
@@ -110,12 +102,13 @@ def load(folder: Path, stem: str) -> Entry | None:
     """The entry of that name; None where there is none."""
     path = folder / (stem + ENTRY)
     try:
-        return decoded(path.read_bytes())
+        content, since = path.read_bytes(), stamp(path.stat().st_mtime)
     except FileNotFoundError:
         return None
+    try:
+        return decoded(content)
     except (ValueError, TypeError, KeyError):
-        body = next((stem + suffix for suffix in (BODY, *OLD_BODIES) if (folder / (stem + suffix)).exists()), stem)
-        return Entry(stem=stem, body=body, since=_written(path) or stamp(), whole=False)
+        return Entry(stem=stem, body=stem + BODY, since=since, whole=False)
 
 
 def decoded(content: bytes) -> Entry:
@@ -127,31 +120,6 @@ def decoded(content: bytes) -> Entry:
 
 #: A later release's fields are passed over.
 _NAMES = {item.name for item in fields(Entry)}
-
-
-def _old(folder: Path, stem: str, suffix: str) -> Entry | None:
-    """An entry that an earlier release wrote; None where it has just gone."""
-    body = stem + suffix
-    since = _written(folder / body)
-    if since is None:
-        return None
-    parameters: dict[str, str] | None = None
-    try:
-        if suffix == ".json":
-            head = run_head.of_body((folder / body).read_bytes())
-        else:
-            parameters = json.loads((folder / stem).with_suffix(OLD_PARAMETERS).read_bytes())
-            head = run_head.of_file(parameters or {}, measurements=stem)
-    except (OSError, ValueError):
-        return Entry(stem=stem, body=body, since=since, whole=False)
-    return Entry(stem=stem, body=body, since=since, parameters=parameters, head=head)
-
-
-def _written(path: Path) -> str | None:
-    try:
-        return stamp(path.stat().st_mtime)
-    except OSError:
-        return None
 
 
 #: Seconds between two looks at a lock that another process holds. Chosen: short beside a request.
@@ -243,7 +211,7 @@ def carry_out(folder: Path) -> None:
     _sync(folder)
     for stem in journal["older"]:
         older = load(folder, stem)
-        if digest(stem) == entry.digest:  # the same content, which lacked its parameters
+        if digest(stem) == entry.digest:  # the same content, of which was no longer known what it is
             for remnant in sorted(folder.glob(f"{stem}.*")):
                 remnant.unlink()
         elif older is not None:
@@ -265,26 +233,20 @@ def move(folder: Path, entry: Entry, place: str) -> Path:
 
 def remove(place: Path, entry: Entry) -> None:
     """Delete an entry of the folder, of `refused/` or of `replaced/`; its bytes first."""
-    for name in (entry.body, entry.stem + ENTRY, entry.stem + OLD_PARAMETERS, entry.stem + PROBLEM):
+    for name in (entry.body, entry.stem + ENTRY, entry.stem + PROBLEM):
         (place / name).unlink(missing_ok=True)
 
 
-def mend(folder: Path, url: str | None, clutch_id: str | None) -> None:
-    """Finish what a killed process began, and give the entries of an earlier release an `.entry` of their own."""
+def mend(folder: Path) -> None:
+    """Finish what a killed process began."""
     for partial in sorted(folder.glob(f"*{PARTIAL}")):
         partial.unlink()
     for entry in read(folder):
         if not (folder / entry.body).exists():
             _follow(folder, entry)
-        elif entry.whole and entry.clutch_id is None:
-            owned = replace(entry, url=url, clutch_id=clutch_id)
-            write(folder, entry.stem + ENTRY, encoded(owned))
     for body in sorted(folder.glob(f"*{BODY}")):
         if not body.with_suffix(ENTRY).exists():
             body.unlink()
-    for parameters in sorted(folder.glob(f"*{OLD_PARAMETERS}")):
-        if not parameters.with_suffix(OLD_BODIES[1]).exists():
-            parameters.unlink()
 
 
 def _follow(folder: Path, entry: Entry) -> None:
@@ -327,7 +289,7 @@ class Spool:
 
     @classmethod
     def every(cls, folder: Path) -> list["Spool"]:
-        """All spools below a folder; what an earlier release kept does not state whose it is."""
+        """All spools below a folder; whose one is, its entries say."""
         paths = sorted(path for path in folder.glob("[0-9a-f]*") if path.is_dir() and len(path.name) == _FOLDER_DIGITS)
         return [cls._owned(path) for path in paths]
 
@@ -383,7 +345,7 @@ class Spool:
     def begin(self) -> None:
         """Finish what a killed process began; to be called before the first run is sent."""
         with self._changing():
-            mend(self.folder, self.url, self.clutch_id)
+            mend(self.folder)
 
     def add(self, files: RunFiles, resource: str = RUNS) -> tuple[set[str], list[Entry]]:
         """Keep runs: JSON bodies (no parameters), or files with the parameters of their requests; or inspections' bodies.
@@ -395,7 +357,7 @@ class Spool:
         batch = set(digests)
         replaced: list[Entry] = []
         with self._changing():
-            mend(self.folder, self.url, self.clutch_id)
+            mend(self.folder)
             waiting = self._entries(self.folder)
             for (path, parameters), digest in zip(files, digests, strict=True):
                 present = next((other for other in waiting if other.whole and other.digest == digest), None)
@@ -500,7 +462,7 @@ def _next(waiting: Sequence[Entry]) -> int:
 def _older(other: Entry, entry: Entry, source: str, batch: Collection[str]) -> bool:
     """Whether `entry`, which comes from the file `source`, takes the place of `other`.
 
-    It does where `other` is an older version of its run, or the same content that a killed process left without parameters.
+    It does where `other` is an older version of its run, or the same content whose entry is damaged.
     """
     if not other.whole:
         return other.digest == entry.digest

@@ -1,6 +1,5 @@
-"""The spool on disk: what waits, what replaces what, and what an earlier release left."""
+"""The spool on disk: what waits, what replaces what, and what is damaged."""
 
-import hashlib
 import json
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -106,55 +105,30 @@ def test_a_clock_that_is_set_back_changes_no_order(
     assert contents(spool) == [body(2030), body(7000), body(2026)]
 
 
-def old_release(spool: Spool, number: int, content: bytes, parameters: dict[str, str] | None = None) -> Path:
-    """A run as the release before kept it."""
-    spool.folder.mkdir(parents=True, exist_ok=True)
-    digest = hashlib.sha256(content)
-    if parameters is None:
-        return written(spool.folder / f"{number:08d}-{digest.hexdigest()[:24]}.json", content)
-    digest.update(json.dumps(parameters, sort_keys=True).encode())
-    kept = written(spool.folder / f"{number:08d}-{digest.hexdigest()[:24]}.run", content)
-    written(kept.with_suffix(".asked"), json.dumps(parameters).encode())
-    return kept
-
-
 PARAMETERS = {"kind": "stationary_stribeck", "cycles": "5.0", "filename": "a.csv"}
 
 
-def test_a_spool_of_the_release_before_is_read_and_sent(spool: Spool, tmp_path: Path) -> None:
-    old_release(spool, 1, body(1, "r1"))
-    old_release(spool, 2, b"csv", PARAMETERS)
-    old_release(spool, 3, body(70000, "r3"))
-    old_release(spool, 4, b"no json")
-    assert [entry.head.run_id for entry in spool.waiting()] == ["r1", None, "r3", None]
-    assert spool.waiting()[1].parameters == PARAMETERS
-    assert Spool.every(spool.folder.parent) == [Spool(folder=spool.folder)]
-    _, replaced = spool.add([(written(tmp_path / "a.json", body(7000, "r3")), None)])
-    assert [entry.head.cycles for entry in replaced] == [70000]
-    spool.add([(written(tmp_path / "a.csv", b"csv"), PARAMETERS)])
-    assert contents(spool) == [body(1, "r1"), b"csv", b"no json", body(7000, "r3")]
-    assert Spool.every(spool.folder.parent) == [spool]
-    for entry in spool.waiting():
-        assert spool.done(entry)
-    spool.begin()
-    assert sorted(path.name for path in spool.folder.iterdir()) == ["changing.lock", "replaced"]
+def damage(spool: Spool) -> None:
+    """What is known of the first run that waits is lost."""
+    (spool.folder / (spool.waiting()[0].stem + ".entry")).write_text('{"head": ')
 
 
-def test_a_record_whose_parameters_were_lost_waits_for_its_file(spool: Spool, tmp_path: Path) -> None:
-    """The release before wrote the parameters after the record."""
-    old_release(spool, 1, b"csv", PARAMETERS).with_suffix(".asked").unlink()
+def test_a_run_of_which_nothing_is_known_any_more_waits_for_its_file(spool: Spool, tmp_path: Path) -> None:
+    file = (written(tmp_path / "a.csv", b"csv"), PARAMETERS)
+    spool.add([file])
+    damage(spool)
     spool.begin()
     assert spool.waiting() == []
     assert len(spool.broken()) == 1
-    _, replaced = spool.add([(written(tmp_path / "a.csv", b"csv"), PARAMETERS)])
+    assert Spool.every(spool.folder.parent) == [Spool(folder=spool.folder)]
+    _, replaced = spool.add([file])
     assert (contents(spool), spool.broken(), replaced) == ([b"csv"], [], [])
 
 
 def test_an_entry_that_cannot_be_read_is_kept_and_named(spool: Spool, tmp_path: Path) -> None:
     for cycles in (1, 2):
         spool.add([(written(tmp_path / f"{cycles}.json", body(cycles)), None)])
-    damaged = spool.folder / (spool.waiting()[0].stem + ".entry")
-    damaged.write_text('{"head": ')
+    damage(spool)
     spool.begin()
     assert contents(spool) == [body(2)]
     assert [spool.body(entry).read_bytes() for entry in spool.broken()] == [body(1)]

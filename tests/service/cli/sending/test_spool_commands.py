@@ -18,7 +18,7 @@ from service.cli.main import app
 from service.cli.sending import delivery
 from service.cli.sending.spool import Spool
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body, problem
-from tests.service.cli.sending.test_spool import PARAMETERS, old_release, written
+from tests.service.cli.sending.test_spool import damage, written
 
 
 class Terminal:
@@ -170,20 +170,15 @@ def test_only_runs_for_the_address_are_sent_there(terminal: Terminal) -> None:
     assert "nothing waits for" in terminal("spool", "send", "--url", URL)
 
 
-def test_runs_of_the_release_before_are_listed_and_sent_once_their_clutch_is_given(terminal: Terminal) -> None:
+def test_a_damaged_run_is_named_and_not_sent(terminal: Terminal) -> None:
     spool = Spool.of(terminal.folder / "spool", URL, "c1")
-    old_release(spool, 1, body(1, "r1"))
-    old_release(spool, 2, b"csv", PARAMETERS)
-    old_release(spool, 3, b"csv 2", PARAMETERS).with_suffix(".asked").unlink()
-    assert [(item["state"], item["clutch_id"]) for item in terminal.listed()] == [
-        ("waiting", None),
-        ("waiting", None),
-        ("broken", None),
-    ]
+    spool.add([(written(terminal.folder / "1.json", body(1)), None)])
+    damage(spool)
+    assert [(item["state"], item["clutch_id"]) for item in terminal.listed()] == [("broken", None)]
     assert "clutch not stated" in terminal("spool", "list")
-    assert "give --clutch" in terminal("spool", "send", "--url", URL)
-    output = terminal("spool", "send", "--url", URL, "--clutch", "c1")
-    assert "2 stored" in output
+    spool.add([(written(terminal.folder / "2.json", body(2)), None)])
+    output = terminal("spool", "send", "--url", URL)
+    assert "1 stored" in output
     assert "was not kept whole and is not sent" in output
 
 

@@ -11,7 +11,7 @@ from service.cli.sending.spool import Spool
 from service.client.clutchlife.transport import Service
 from tests.service.cli.sending.kills import every_kill
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body
-from tests.service.cli.sending.test_spool import PARAMETERS, contents, old_release, set_aside, written
+from tests.service.cli.sending.test_spool import PARAMETERS, contents, set_aside, written
 
 
 @pytest.fixture(autouse=True)
@@ -62,10 +62,6 @@ def waits(bench: Bench) -> None:
     bench.push(OLDER)
 
 
-def waits_since_the_release_before(bench: Bench) -> None:
-    old_release(bench.spool, 1, body(70000, "r1"))
-
-
 def test_a_killed_push_loses_nothing_and_keeps_no_half(tmp_path: Path) -> None:
     """Each kill of the first push: the run waits whole, or not at all; pushed again it waits once."""
     for bench in benches(
@@ -81,41 +77,33 @@ def test_a_killed_push_loses_nothing_and_keeps_no_half(tmp_path: Path) -> None:
         assert sorted(files) == [".body", ".body", ".entry", ".entry", ".lock"]
 
 
-@pytest.mark.parametrize("prepare", [waits, waits_since_the_release_before])
-def test_a_killed_correction_leaves_one_version(tmp_path: Path, prepare: Callable[[Bench], None]) -> None:
-    name = None if prepare is waits else "r1"
-    older, newer = body(70000, name), body(7000, name)
+def test_a_killed_correction_leaves_one_version(tmp_path: Path) -> None:
     outcomes = set()
-    for bench in benches(tmp_path, prepare, lambda bench: bench.push(newer)):
+    for bench in benches(tmp_path, waits, lambda bench: bench.push(NEWER)):
         bench.send()
         (delivered,) = bench.service.stored.values()
         outcomes.add(delivered)
-        assert set_aside(bench.spool) == ([older] if delivered == newer else [])
+        assert set_aside(bench.spool) == ([OLDER] if delivered == NEWER else [])
         assert contents(bench.spool) == []
-    assert outcomes == {older, newer}
+    assert outcomes == {OLDER, NEWER}
 
 
-@pytest.mark.parametrize("prepare", [waits, waits_since_the_release_before])
-def test_a_correction_that_is_pushed_again_after_a_kill_is_all_that_is_sent(
-    tmp_path: Path, prepare: Callable[[Bench], None]
-) -> None:
-    newer = NEWER if prepare is waits else body(7000, "r1")
-
+def test_a_correction_that_is_pushed_again_after_a_kill_is_all_that_is_sent(tmp_path: Path) -> None:
     def correct(bench: Bench) -> None:
-        bench.push(newer)
+        bench.push(NEWER)
         bench.send()
 
-    for bench in benches(tmp_path, prepare, correct):
+    for bench in benches(tmp_path, waits, correct):
         correct(bench)
-        assert list(bench.service.stored.values()) == [newer]
+        assert list(bench.service.stored.values()) == [NEWER]
         assert contents(bench.spool) == []
 
 
 def test_a_kill_while_sending_loses_and_doubles_nothing(tmp_path: Path) -> None:
-    """Of the runs one is stored, one is refused, one came from the release before, one has replaced another."""
+    """Of the runs one is stored, one is refused, one is a record file, one has replaced another."""
 
     def prepare(bench: Bench) -> None:
-        old_release(bench.spool, 1, b"csv", PARAMETERS)
+        bench.spool.add([(written(bench.files / "a.csv", b"csv"), PARAMETERS)])
         bench.push(body(1), "1.json")
         bench.push(body(-1), "2.json")
         bench.push(OLDER)
