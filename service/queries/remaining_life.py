@@ -251,7 +251,7 @@ def _usual(name: str, fraction: float, measured: MeasuredLife, pressure_bar: flo
         raise NotFoundError(f"{name} is not measured in this life")
     first = min(tracks, key=lambda series: (series.frequency_hz or 0.0, series.pressure))
     given: dict[str, Any] = {"quantity": name, "pressure_bar": pressure_bar}
-    if pressure_bar is None and quantity.family is not Family.MEAN_COF:
+    if pressure_bar is None and first.pressure != ALL_PRESSURES:
         given["pressure_bar"] = first.pressure / 1e5
     if quantity.family is Family.SLOPE:
         return CriterionIn(**given, speed_rpm=SLOPE_SPEEDS[1])

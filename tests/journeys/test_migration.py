@@ -6,7 +6,7 @@ import pytest
 
 from tests.journeys.test_postgresql import ENVIRONMENT, asked, fill
 from tests.storage.engine.postgresql.server import PostgresServer
-from tests.storage.transfer.test_transfer import digests
+from tests.storage.test_transfer import digests
 from tests.support import clutchlife, serving
 
 

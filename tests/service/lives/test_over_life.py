@@ -134,3 +134,6 @@ def test_the_tracked_model_stands_beside_a_measured_engagement(client: TestClien
     first = client.get(f"{CLUTCH}/engagement", params={"run_id": "duty-500"}).json()
     assert first["compared"]["run_id"] == "duty-500"
     assert first["duration_s"] == answer["duration_s"]
+    remaining = client.get(f"{CLUTCH}/remaining-useful-life", params={"quantity": "stop_time_s"})
+    assert remaining.status_code == 200, remaining.text
+    assert [item["quantity"] for item in remaining.json()["criteria"]] == ["stop_time_s"]
