@@ -22,6 +22,11 @@ def log_mean(logs: FloatArray | list[float]) -> float:
     return log_sum(logs) - float(np.log(len(logs)))
 
 
+def log_normal(off: FloatArray, variance: FloatArray) -> FloatArray:
+    """ln density of what is `off` the mean of a normal, any shape."""
+    return np.asarray(-0.5 * (np.log(2.0 * np.pi * variance) + off**2 / variance))
+
+
 def log_gain(info: FloatArray, score: FloatArray, sd: FloatArray | float) -> float:
     """The formula for coefficients of deviations sd [m] together; info [m, m], score [m]; 0 without coefficients.
 

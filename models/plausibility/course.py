@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.gaussian_evidence import log_normal
 from models.plausibility import criteria
 from models.tracking.courses import Course, basis
 from models.tracking.discrepancy import FUTURE, PAST, smooth
@@ -213,8 +214,3 @@ def log_physics(log_cof: FloatArray) -> FloatArray:
     """log of how far physics allows a COF, any shape: 0 for what wet clutches have, less beyond."""
     beyond = np.abs(log_cof - math.log(criteria.COF)) / criteria.LOG_COF_SD - criteria.USUAL
     return np.asarray(-0.5 * np.maximum(beyond, 0.0) ** 2)
-
-
-def log_normal(off: FloatArray, variance: FloatArray) -> FloatArray:
-    """log density of what is `off` the mean of a normal, any shape."""
-    return np.asarray(-0.5 * (np.log(2.0 * math.pi * variance) + off**2 / variance))

@@ -25,8 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.gaussian_evidence import log_normal
 from models.plausibility import criteria, pace
-from models.plausibility.course import Fit, Predicted, Tests, log_normal, log_outlying, log_physics
+from models.plausibility.course import Fit, Predicted, Tests, log_outlying, log_physics
 from models.plausibility.slips import OF_CLUTCH, OTHER_CLUTCH, OTHER_CYCLES, Reading, Run, Slip, slips_of
 
 #: No slip is proved by a number that underflows.

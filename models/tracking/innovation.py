@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import log_ndtr, ndtri_exp
 
-from models.arrays import FloatArray
+from models.gaussian_evidence import log_normal
 from models.tracking.criteria import FAR, FEWEST_BEFORE
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -56,9 +56,9 @@ def innovation(posterior: Posterior, last: Measurement, prior: Prior) -> float:
     """
     off = last.value - posterior.values(np.array([last.progress]))[0]
     variance = posterior.scatter_variance(last.value, prior) + last.variance
-    log_density = math.log1p(-prior.outlying_share) + _log_normal(off, variance)
+    log_density = math.log1p(-prior.outlying_share) + log_normal(off, variance)
     if prior.outlying_share > 0.0:
-        outlying = _log_normal(off, variance + (prior.outlying_size * prior.size) ** 2)
+        outlying = log_normal(off, variance + (prior.outlying_size * prior.size) ** 2)
         log_density = np.logaddexp(log_density, math.log(prior.outlying_share) + outlying)
     with np.errstate(divide="ignore"):
         log_weight = np.log(posterior.weight) - log_density
@@ -66,7 +66,3 @@ def innovation(posterior: Posterior, last: Measurement, prior: Prior) -> float:
     scaled = off / np.sqrt(variance)
     below, above = (min(float(np.logaddexp.reduce(log_weight + log_ndtr(sign * scaled))), 0.0) for sign in (1.0, -1.0))
     return float(ndtri_exp(below)) if below < above else -float(ndtri_exp(above))
-
-
-def _log_normal(off: FloatArray, variance: FloatArray) -> FloatArray:
-    return np.asarray(-0.5 * (np.log(2.0 * np.pi * variance) + off**2 / variance))

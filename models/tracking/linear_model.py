@@ -307,13 +307,10 @@ def _factor(rows: FloatArray) -> None:
 
 
 def _without(sums: Sums, terms: Terms) -> Sums:
+    """The sums of the points less what the further terms take off them, in place."""
     cross = terms.cross
     lost = {name: np.einsum("pj,pj->j", cross[i], cross[j]) for name, (i, j) in _PRODUCTS.items()}
     diagonal = np.einsum("kkj->kj", terms.rows[:, : terms.sd.shape[0]])
-    return _less(sums, lost | {"log_r": 2.0 * np.log(diagonal).sum(axis=0)}, terms.where)
-
-
-def _less(sums: Sums, lost: dict[str, FloatArray], where: NDArray[np.intp]) -> Sums:
-    for name, loss in lost.items():
-        getattr(sums, name)[where] -= loss
-    return Sums(**{name: getattr(sums, name) for name in lost})
+    for name, loss in (lost | {"log_r": 2.0 * np.log(diagonal).sum(axis=0)}).items():
+        getattr(sums, name)[terms.where] -= loss
+    return sums

@@ -105,7 +105,7 @@ class Ukf:
     """The filter, started from the first `together` >= 1 measurements; its updates use no random numbers.
 
     Chosen: started at the eighth test, with the posterior laid again at each before, forecasts of lives of eq. 6 are as good
-    (docs/appendix/prognosis.md), and a life of 16 tests takes 1.3 times as long.
+    (docs/appendix/prognosis.md), and a life of 16 tests takes 1.2 to 1.5 times as long.
     """
 
     together: int = 4
