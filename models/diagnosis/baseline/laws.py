@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.criteria import BELOW, CURVATURE_BOUNDS, EARLY
+from models.diagnosis import criteria
 from models.diagnosis.design.design import IntArray, Points
 from models.diagnosis.design.facts import Facts
 from models.friction.stribeck import GAMMA
@@ -131,7 +131,7 @@ class Laws:
         weights = np.stack([np.interp(pressure, levels, unit) for unit in np.eye(levels.size)], axis=-1)
         x = cycles / max(self.frame.last, 1.0)
         tilt = (pressure - 0.5 * (self.frame.lowest + self.frame.highest)) / self.frame.span
-        early = x * (1.0 + EARLY) / (x + EARLY)
+        early = x * (1.0 + criteria.EARLY) / (x + criteria.EARLY)
         columns = np.concatenate([np.stack([x, early, x * tilt], axis=-1), weights], axis=-1)
         return columns @ self.theta[DRIFT:-POWERS], columns
 
@@ -150,7 +150,7 @@ def falling_weight(
     log b, b within CURVATURE_BOUNDS. Below P⁻ the law goes on by its tangent, for a hyperbola has its pole there; by itself
     for `below` of the span (and of the way to the pole) first."""
     ratio = float(np.clip(span / np.exp(fall[0]), 1e-3, 60.0))
-    curvature = float(np.exp(np.clip(fall[1], *np.log(CURVATURE_BOUNDS))))
+    curvature = float(np.exp(np.clip(fall[1], *np.log(criteria.CURVATURE_BOUNDS))))
     at = np.append(high, 1.0)
     near = np.maximum(at, -below * min(1.0, 1.0 / (curvature * ratio)))
     stretched = 1.0 + curvature * ratio * near
@@ -235,7 +235,7 @@ class Scene:
         parameters = self.parameters
         if cycles is not None or pressure is not None:
             parameters = self.laws.parameters(
-                p, self.points.cycles if cycles is None else cycles, below=0.0 if pressure is None else BELOW
+                p, self.points.cycles if cycles is None else cycles, below=0.0 if pressure is None else criteria.BELOW
             )
         return self.points.engaged * curve(self.points.velocity if velocity is None else velocity, parameters)
 

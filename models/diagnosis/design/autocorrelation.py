@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.diagnosis.design.criteria import ALIKE_SAMPLING, FEWEST_PER_BIN, LEAST_CORRELATION, SIGNAL_HARMONICS
+from models.diagnosis.design import criteria
 from models.records.periods import harmonics
 
 #: Bounds that keep the process stationary and its covariance positive definite.
@@ -39,7 +39,7 @@ class Correlation:
     def of_neighbours(first: float, second: float) -> "Correlation":
         """With these correlations [-] of the first and the second neighbour, as far as there is such a process: no spectrum
         is negative anywhere, so w ρ is at most (1 + ρ)/2."""
-        if first < LEAST_CORRELATION:
+        if first < criteria.LEAST_CORRELATION:
             return Correlation()
         decay = min(max(second / first, _LEAST_DECAY), _MOST_DECAY)
         return Correlation(share=min(first / decay, _HALF * (1.0 + decay) / decay), decay=decay)
@@ -87,9 +87,9 @@ def sample_autocorrelation(
     torque: FloatArray, phase: FloatArray, used: NDArray[np.bool_], per_bin: float
 ) -> SampleAutocorrelation | None:
     """Of torque [n] Nm at phase [n] rad, where samples are `used` [n]; None where they are too few or all alike."""
-    if per_bin < FEWEST_PER_BIN or np.count_nonzero(used) < 8 * (2 * SIGNAL_HARMONICS + 1):
+    if per_bin < criteria.FEWEST_PER_BIN or np.count_nonzero(used) < 8 * (2 * criteria.SIGNAL_HARMONICS + 1):
         return None
-    basis = np.column_stack([np.ones(int(used.sum())), harmonics(phase[used], SIGNAL_HARMONICS)])
+    basis = np.column_stack([np.ones(int(used.sum())), harmonics(phase[used], criteria.SIGNAL_HARMONICS)])
     ridge = 1e-9 * used.sum() * np.eye(basis.shape[1])
     coefficients = np.linalg.solve(basis.T @ basis + ridge, basis.T @ torque[used])
     residual = np.zeros(torque.size)
@@ -111,7 +111,7 @@ def bin_autocorrelation(loops: Sequence[SampleAutocorrelation | None]) -> tuple[
         return None
     groups: dict[int, list[SampleAutocorrelation]] = {}
     for loop in estimated:
-        groups.setdefault(round(np.log(loop.per_bin) / np.log(ALIKE_SAMPLING)), []).append(loop)
+        groups.setdefault(round(np.log(loop.per_bin) / np.log(criteria.ALIKE_SAMPLING)), []).append(loop)
     correlations = []
     for alike in groups.values():
         first, second, per_bin = (

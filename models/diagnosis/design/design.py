@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
+from models.diagnosis.design import criteria
 from models.diagnosis.design.autocorrelation import bin_autocorrelation
-from models.diagnosis.design.criteria import MOST_LOOP_STATES, MOST_PLATEAUS, MOST_ROWS, PLATEAU_DURATION
 from models.diagnosis.design.facts import Facts, facts_of
 from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
 from models.records.criteria import UNLOADED
@@ -118,11 +118,11 @@ def thinned(campaign: Campaign, notes: list[str]) -> Campaign:
     """The campaign with states left out evenly where it is too large; `notes` gets a sentence on what was left out."""
     campaign = _with_fewer_loops(campaign, notes)
     states = np.unique([*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)])
-    size = sum(min(run.plateaus.torque.size, MOST_PLATEAUS) for run in campaign.stationary)
+    size = sum(min(run.plateaus.torque.size, criteria.MOST_PLATEAUS) for run in campaign.stationary)
     size += sum(_LOOPS_PER_TEST * BINS for _ in campaign.dynamic)
-    if size <= MOST_ROWS or states.size < 3:
+    if size <= criteria.MOST_ROWS or states.size < 3:
         return campaign
-    kept = _evenly(states, max(2, int(states.size * MOST_ROWS / size)))
+    kept = _evenly(states, max(2, int(states.size * criteria.MOST_ROWS / size)))
     notes.append(
         f"{states.size - len(kept)} of {states.size} states were left out, evenly: the campaign is very large."
     )
@@ -135,9 +135,9 @@ def thinned(campaign: Campaign, notes: list[str]) -> Campaign:
 
 def _with_fewer_loops(campaign: Campaign, notes: list[str]) -> Campaign:
     states = np.unique([run.cycles for run in campaign.dynamic])
-    if states.size <= MOST_LOOP_STATES:
+    if states.size <= criteria.MOST_LOOP_STATES:
         return campaign
-    kept = _evenly(states, MOST_LOOP_STATES)
+    kept = _evenly(states, criteria.MOST_LOOP_STATES)
     notes.append(f"Dynamic tests of {len(kept)} of {states.size} states were taken, evenly: there are very many.")
     return replace(campaign, dynamic=tuple(run for run in campaign.dynamic if run.cycles in kept))
 
@@ -319,13 +319,13 @@ def _plateaus(
     usable = np.flatnonzero(table.speed != 0)
     if usable.size < table.torque.size:
         notes.append(f"{run.run_id}: {table.torque.size - usable.size} plateaus at rest left out.")
-    if usable.size > MOST_PLATEAUS:
-        notes.append(f"{run.run_id}: {MOST_PLATEAUS} of {usable.size} plateaus taken, evenly.")
-        usable = usable[np.linspace(0, usable.size - 1, MOST_PLATEAUS).round().astype(int)]
+    if usable.size > criteria.MOST_PLATEAUS:
+        notes.append(f"{run.run_id}: {criteria.MOST_PLATEAUS} of {usable.size} plateaus taken, evenly.")
+        usable = usable[np.linspace(0, usable.size - 1, criteria.MOST_PLATEAUS).round().astype(int)]
     velocity = campaign.geometry.sliding_velocity(table.speed[usable])
     sign = np.copysign(1.0, velocity)
     count = usable.size
-    times = PLATEAU_DURATION * (np.arange(table.torque.size) + 0.5) if run.time is None else np.array(run.time)
+    times = criteria.PLATEAU_DURATION * (np.arange(table.torque.size) + 0.5) if run.time is None else np.array(run.time)
     clock = np.asarray(times[usable], dtype=np.float64)
     rise = plate_rise(table)
     consecutive = np.concatenate([[-1], np.where(np.diff(usable) == 1, offset + np.arange(count - 1), -1)])

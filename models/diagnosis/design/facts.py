@@ -9,19 +9,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, Oil, StationaryRun
-from models.diagnosis.design.criteria import (
-    FEWEST_BLOCKS,
-    FEWEST_TIMED,
-    LEAST_PAUSE,
-    LEAST_PLATE_RISE,
-    LONGEST_ENGAGEMENT,
-    MOST_ONSETS,
-    PACE_QUANTILE,
-    PAUSE_RATIO,
-    REFERENCE_TEMPERATURE,
-    USUAL_PRESSURE,
-    USUAL_TORQUE,
-)
+from models.diagnosis.design import criteria
 from models.records.criteria import UNLOADED
 from models.records.runs import Plateaus, Record, plate_rise
 
@@ -60,8 +48,8 @@ class Facts:
     duty_energies: FloatArray
     first_moment: float | None = None
     last_moment: float | None = None
-    usual_torque: float = USUAL_TORQUE
-    usual_pressure: float = USUAL_PRESSURE
+    usual_torque: float = criteria.USUAL_TORQUE
+    usual_pressure: float = criteria.USUAL_PRESSURE
     plate_warming: tuple[float, float] | None = None
     plate_in_all_tests: bool = False
 
@@ -75,8 +63,8 @@ class Facts:
         """Where something may have changed: (state before, cycles midway, state after). Where there are more than
         MOST_ONSETS, that many evenly, and those with an event in the log."""
         gaps = list(itertools.pairwise(self.states.tolist()))
-        if len(gaps) > MOST_ONSETS:
-            evenly = {gaps[i] for i in np.linspace(0, len(gaps) - 1, MOST_ONSETS).round().astype(int)}
+        if len(gaps) > criteria.MOST_ONSETS:
+            evenly = {gaps[i] for i in np.linspace(0, len(gaps) - 1, criteria.MOST_ONSETS).round().astype(int)}
             events = (*self.oil_changes, *self.sensor_zeros)
             logged = {gap for gap in gaps if any(gap[0] <= cycles <= gap[1] for cycles in events)}
             gaps = sorted(evenly | logged)
@@ -105,7 +93,9 @@ def facts_of(campaign: Campaign) -> Facts:
         oil=campaign.oil,
         states=np.unique(np.array([cycles for cycles, _, rows in under_load if rows.any()], dtype=np.float64)),
         temperature_measured=bool(temperatures),
-        reference_temperature=float(np.median(np.concatenate(temperatures))) if temperatures else REFERENCE_TEMPERATURE,
+        reference_temperature=float(np.median(np.concatenate(temperatures)))
+        if temperatures
+        else criteria.REFERENCE_TEMPERATURE,
         oil_changes=_events(campaign, EventKind.OIL_CHANGE),
         sensor_zeros=_events(campaign, EventKind.SENSOR_ZERO),
         rests=tuple(rests),
@@ -115,8 +105,8 @@ def facts_of(campaign: Campaign) -> Facts:
         duty_energies=np.array([duty.energy for duty in with_energy], dtype=np.float64),
         first_moment=min(timed) if spread else None,
         last_moment=max(timed) if spread else None,
-        usual_torque=_median(torques, USUAL_TORQUE),
-        usual_pressure=_median(pressures, USUAL_PRESSURE),
+        usual_torque=_median(torques, criteria.USUAL_TORQUE),
+        usual_pressure=_median(pressures, criteria.USUAL_PRESSURE),
         plate_warming=_plate_warming(campaign),
         plate_in_all_tests=bool(tests) and all(table.plate_temperature is not None for _, table in tests),
     )
@@ -133,7 +123,7 @@ def _plate_warming(campaign: Campaign) -> tuple[float, float] | None:
             flux = np.concatenate([np.abs(table.torque * table.speed) for table, _ in measured]) / area
             rise = np.concatenate([rise for _, rise in measured])
             off = flux - flux.mean()
-            slope = max(float(off @ rise) / max(float(off @ off), 1e-300), LEAST_PLATE_RISE)
+            slope = max(float(off @ rise) / max(float(off @ off), 1e-300), criteria.LEAST_PLATE_RISE)
             return float(rise.mean() - slope * flux.mean()), slope
     return None
 
@@ -171,13 +161,13 @@ def _long_gaps(campaign: Campaign) -> list[tuple[float, float, float]]:
     runs: list[Run] = [*campaign.stationary, *campaign.dynamic, *campaign.duty]
     timed = [(run.moment, run) for run in runs if run.moment is not None]
     timed.sort(key=lambda moment_and_run: (moment_and_run[0], moment_and_run[1].cycles))
-    if len(timed) < FEWEST_TIMED:
+    if len(timed) < criteria.FEWEST_TIMED:
         return []
     gaps = np.diff(np.array([moment for moment, _ in timed]))
     # some rigs send when a block began, some when it was over: the right reading gives the longer time per engagement
     readings = [_idle_time(gaps, timed, gap_follows_block) for gap_follows_block in (True, False)]
     _, idle = max(readings, key=lambda reading: reading[0])
-    least = max(LEAST_PAUSE, PAUSE_RATIO * float(np.median(idle)))
+    least = max(criteria.LEAST_PAUSE, criteria.PAUSE_RATIO * float(np.median(idle)))
     return [
         (float(moment), float(length), run.cycles)
         for length, (before, _), (moment, run) in zip(idle, timed[:-1], timed[1:], strict=True)
@@ -196,7 +186,9 @@ def _idle_time(gaps: FloatArray, timed: list[tuple[float, Run]], gap_follows_blo
         elif not isinstance(earlier, DutyRun) and not isinstance(later, DutyRun):
             engagements[i] = max(later.cycles - earlier.cycles, 0.0)
     worked = (engagements > 0) & np.isfinite(gaps)
-    if np.count_nonzero(worked) < FEWEST_BLOCKS:
+    if np.count_nonzero(worked) < criteria.FEWEST_BLOCKS:
         return 0.0, gaps
-    pace = min(float(np.quantile(gaps[worked] / engagements[worked], PACE_QUANTILE)), LONGEST_ENGAGEMENT)
+    pace = min(
+        float(np.quantile(gaps[worked] / engagements[worked], criteria.PACE_QUANTILE)), criteria.LONGEST_ENGAGEMENT
+    )
     return pace, np.maximum(gaps - pace * engagements, 0.0)

@@ -18,20 +18,8 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.diagnosis.design import criteria
 from models.diagnosis.design.autocorrelation import SampleAutocorrelation, sample_autocorrelation
-from models.diagnosis.design.criteria import (
-    CYCLE_SAMPLES,
-    FEWEST_BINS,
-    FULL_BIN,
-    LEAST_NOISE_SPEED,
-    LEAST_SPEED,
-    LEAST_SPEED_WITH_CORNERS,
-    MOST_SAMPLES,
-    REVERSES,
-    SAME_CYCLE_RESIDUAL,
-    SETTLING_SHARE,
-    SETTLING_TIME,
-)
 from models.friction.stribeck import GAMMA
 from models.records.criteria import SPEED_HARMONICS
 from models.records.outliers import beside, inliers
@@ -48,7 +36,7 @@ def period_differences(torque: FloatArray, bins: NDArray[np.intp], turns: FloatA
     cell = turn * count + bins
     samples = np.bincount(cell, minlength=periods * count).reshape(periods, count).astype(np.float64)
     sums = np.bincount(cell, weights=torque, minlength=periods * count).reshape(periods, count)
-    full = samples >= FULL_BIN * samples.max(axis=0)
+    full = samples >= criteria.FULL_BIN * samples.max(axis=0)
     samples, sums = np.where(full, samples, 0.0), np.where(full, sums, 0.0)
     before, sum_before = np.cumsum(samples, axis=0)[:-1], np.cumsum(sums, axis=0)[:-1]
     here, sum_here = samples[1:], sums[1:]
@@ -120,7 +108,7 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
     notes: list[str] = []
     before: Cycle | None = None
     for stretch in pressure_stretches(time, pressure):
-        step = max(1, (stretch.stop - stretch.start) // MOST_SAMPLES)
+        step = max(1, (stretch.stop - stretch.start) // criteria.MOST_SAMPLES)
         rows = slice(stretch.start, stretch.stop, step)
         sign = -1.0 if np.median(velocity[rows]) < 0 else 1.0
         samples = _Stretch(
@@ -150,7 +138,7 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
 def _speed_cycle(time: FloatArray, velocity: FloatArray, before: Cycle | None) -> Cycle | str:
     """The stretch's speed cycle: with the frequency of the stretch before where that fits here too, else fitted again."""
     count = SPEED_HARMONICS if before is None else before.cosine.size
-    step = 1 if count > SPEED_HARMONICS else max(1, time.size // CYCLE_SAMPLES)
+    step = 1 if count > SPEED_HARMONICS else max(1, time.size // criteria.CYCLE_SAMPLES)
     t, v = time[::step], velocity[::step]
     if before is not None and t.size > 4 * count:
         origin = 0.5 * float(t[0] + t[-1])
@@ -160,7 +148,7 @@ def _speed_cycle(time: FloatArray, velocity: FloatArray, before: Cycle | None) -
         noise = float(np.sqrt(((v - columns @ coefficients) ** 2).mean()))
         duration = float(time[-1] - time[0]) + float(time[-1] - time[0]) / max(time.size - 1, 1)
         periods = math.floor(duration * before.frequency + 0.01)
-        if periods >= 1 and noise <= SAME_CYCLE_RESIDUAL * before.noise + 1e-3 * before.amplitude:
+        if periods >= 1 and noise <= criteria.SAME_CYCLE_RESIDUAL * before.noise + 1e-3 * before.amplitude:
             stop = float(time[0]) + duration
             return replace(
                 before,
@@ -201,19 +189,19 @@ def _binned(stretch: _Stretch, cycle: Cycle) -> BinnedLoop | str:
     phase = np.asarray(width * (np.arange(PHASES) + 0.5), dtype=np.float64)
     speed = cycle.value(phase)
     fastest = float(speed.max())
-    if not fastest > 0 or float(speed.min()) < -REVERSES * fastest:
+    if not fastest > 0 or float(speed.min()) < -criteria.REVERSES * fastest:
         return "the speed changes sign; the loop was left out."
-    settling = min(SETTLING_TIME, cycle.stop - cycle.begin - 1 / cycle.frequency)
-    settled = cycle.begin + max(settling, SETTLING_SHARE / cycle.frequency)
+    settling = min(criteria.SETTLING_TIME, cycle.stop - cycle.begin - 1 / cycle.frequency)
+    settled = cycle.begin + max(settling, criteria.SETTLING_SHARE / cycle.frequency)
     inside = (time >= settled) & (time < cycle.stop)
     inside[inside] = beside(torque[inside])
     sample_phase = np.mod(cycle.phase(time), 2 * math.pi)
     position = sample_phase[inside] * (BINS / (2 * math.pi))
     number = np.minimum(position.astype(np.intp), BINS - 1)
     count = np.bincount(number, minlength=BINS).astype(np.float64)
-    slowest = LEAST_SPEED if cycle.cosine.size <= SPEED_HARMONICS else LEAST_SPEED_WITH_CORNERS
+    slowest = criteria.LEAST_SPEED if cycle.cosine.size <= SPEED_HARMONICS else criteria.LEAST_SPEED_WITH_CORNERS
     count[speed.reshape(BINS, -1).min(axis=1) < slowest * fastest] = 0.0
-    if np.count_nonzero(count) < FEWEST_BINS:
+    if np.count_nonzero(count) < criteria.FEWEST_BINS:
         return "too few samples lie in whole periods."
     # a bin's samples are of several periods: its clock is their mean
     turns = np.floor(cycle.phase(time[inside]) / (2 * math.pi))
@@ -221,7 +209,7 @@ def _binned(stretch: _Stretch, cycle: Cycle) -> BinnedLoop | str:
     passed = phase / (2 * math.pi) + np.repeat(mean_turn, PHASES // BINS)
     duration = float(time[inside][-1] - time[inside][0])
     per_bin = np.count_nonzero(inside) / (max(duration * cycle.frequency, 0.1) * BINS)
-    moving = inside & (cycle.value(sample_phase) > LEAST_NOISE_SPEED * fastest)
+    moving = inside & (cycle.value(sample_phase) > criteria.LEAST_NOISE_SPEED * fastest)
     angular = 2 * math.pi * cycle.frequency
     return BinnedLoop(
         pressure=stretch.pressure,

@@ -24,7 +24,7 @@ from scipy.linalg import solve_banded
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
-from models.diagnosis.design.criteria import USUAL_PRESSURE, USUAL_TORQUE
+from models.diagnosis.design import criteria
 from models.diagnosis.design.design import IntArray, Points
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.design.loop_bins import PHASES
@@ -167,8 +167,8 @@ class Effect:
 def sized(effect: Effect, facts: Facts) -> Effect:
     """The effect with the prior that fits this campaign's clutch."""
     factor = {
-        Measure.TORQUE: facts.usual_torque / USUAL_TORQUE,
-        Measure.PRESSURE: facts.usual_pressure / USUAL_PRESSURE,
+        Measure.TORQUE: facts.usual_torque / criteria.USUAL_TORQUE,
+        Measure.PRESSURE: facts.usual_pressure / criteria.USUAL_PRESSURE,
     }
     return (
         effect if effect.grows_with is None else replace(effect, prior_sd=effect.prior_sd * factor[effect.grows_with])

@@ -15,7 +15,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
-from models.diagnosis.design.criteria import PLATEAU_DURATION
+from models.diagnosis.design import criteria
 from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
@@ -211,7 +211,7 @@ def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, res
     oil = table.oil_temperature
     if trial.temperature is not None:
         oil = np.full(rows.size, trial.temperature)
-    taken = PLATEAU_DURATION * rows.size * (number + 1) + rested
+    taken = criteria.PLATEAU_DURATION * rows.size * (number + 1) + rested
     moment = None if pattern.moment is None else pattern.moment + taken
     return StationaryRun(
         run_id=f"trial-{number}",
@@ -302,7 +302,7 @@ def steps_of(campaign: Campaign, key: str) -> tuple[Step, ...]:
     before = max(cycles, default=0.0)
     for number, run in enumerate(then.stationary[len(campaign.stationary) :]):
         table, pause = run.plateaus, trial.rest * float(number % 2 == 0)
-        minutes = PLATEAU_DURATION * table.torque.size / 60.0 * trial.times + settling + pause / 60.0
+        minutes = criteria.PLATEAU_DURATION * table.torque.size / 60.0 * trial.times + settling + pause / 60.0
         minutes += _pace(campaign) * (run.cycles - before) / 60.0
         before = run.cycles
         steps.append(

@@ -17,9 +17,9 @@ import numpy as np
 from scipy.optimize import nnls
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import OPEN_DRAG
 from models.diagnosis.baseline.prediction import Prediction, predict
-from models.diagnosis.criteria import DISCREPANCY_SD, LEAST_NOISE
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.fitted_effect import (
     effect_columns,
@@ -106,7 +106,7 @@ class CandidateDistances:
             discrepancy = changes[:, None] * factors_at(design.rows, effect.effect, self._ranges)
             free = free_shapes(effect)
             own += [effect_columns(design, prediction, effect)[:, free], discrepancy]
-            precisions += [*effect_precisions(effect)[free], *[DISCREPANCY_SD**-2.0] * discrepancy.shape[1]]
+            precisions += [*effect_precisions(effect)[free], *[criteria.DISCREPANCY_SD**-2.0] * discrepancy.shape[1]]
         apart = np.stack([torque - rows.torques[rival] for torque in rows.torques], axis=1)
         silent = replace(
             fit, prediction=prediction, torque=rows.torques[rival], residual=np.zeros(apart.shape[0]), effects=()
@@ -149,7 +149,7 @@ def _noise_law(problem: FitProblem, torque: FloatArray) -> FloatArray:
         columns = np.stack([np.ones(int(part.sum())), torque[part] ** 2], axis=1) / variance[part, None]
         scale = columns.mean(axis=0)
         law = nnls(columns / scale, np.ones(columns.shape[0]))[0] / scale
-        laws.append([max(law[0], LEAST_NOISE**2 * float(np.median(variance[part]))), law[1]])
+        laws.append([max(law[0], criteria.LEAST_NOISE**2 * float(np.median(variance[part]))), law[1]])
     return np.array(laws)
 
 

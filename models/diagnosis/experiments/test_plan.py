@@ -15,18 +15,9 @@ import numpy as np
 from scipy.special import ndtr, softmax
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.criteria import (
-    COST_OF_RUN,
-    LEAST_ADVISED,
-    MOST_ADVISED,
-    MOST_RIVALS,
-    PREDICTION_ERROR,
-    RIVAL_MARGIN,
-    SURE,
-    WORTHWHILE,
-)
-from models.diagnosis.design.criteria import REFERENCE_TEMPERATURE
+from models.diagnosis.design import criteria as design_criteria
 from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.design.facts import facts_of
 from models.diagnosis.effects.fitted_effect import FittedEffect
@@ -48,7 +39,7 @@ def rivals_of(judgement: Judgement) -> tuple[tuple[Fitted, ...], tuple[Fitted, .
     nearby = [
         other
         for other in judgement.others
-        if len(other.slugs) == len(best.slugs) and other.evidence > best.evidence - RIVAL_MARGIN
+        if len(other.slugs) == len(best.slugs) and other.evidence > best.evidence - criteria.RIVAL_MARGIN
     ]
     return judgement.stand, tuple(nearby)
 
@@ -91,7 +82,7 @@ def advise(
     race = [rival for rival in credible if rival.fit.effects]
     if not race:
         return ()
-    rivals = [*race, *nearby][: max(len(race), MOST_RIVALS)]
+    rivals = [*race, *nearby][: max(len(race), criteria.MOST_RIVALS)]
     fits = [rival.fit for rival in rivals]
     evidences = np.array([rival.evidence for rival in rivals], dtype=np.float64)
     distances = CandidateDistances(problem, (*fits, bare(fits[0])))
@@ -99,7 +90,7 @@ def advise(
     ranked = []
     for key, rows in trials_of(campaign, problem.design, distances).items():
         chance, other, nats = _brought(before, distances.with_freedom(rows), evidences, len(race))
-        if np.isfinite(chance) and nats > LEAST_ADVISED:
+        if np.isfinite(chance) and nats > criteria.LEAST_ADVISED:
             effect, rival = _names(fits[0], fits[other] if len(race) > 1 else None)
             narrows = distances.size_left(rows) if len(race) == 1 else 0.0
             advice = Advice(
@@ -114,14 +105,16 @@ def advise(
             )
             # alone in the race, a cause is sure: what is left to learn is its size
             worth = chance if len(race) > 1 else -narrows
-            ranked.append(((worth - COST_OF_RUN * runs_of(key), nats), advice))
+            ranked.append(((worth - criteria.COST_OF_RUN * runs_of(key), nats), advice))
     first = _thermometer(campaign, problem, fits)
     ranked.sort(key=lambda trial: trial[0], reverse=True)
-    worthy = [advice for i, (_, advice) in enumerate(ranked) if i == 0 or advice.nats >= WORTHWHILE]
+    worthy = [advice for i, (_, advice) in enumerate(ranked) if i == 0 or advice.nats >= criteria.WORTHWHILE]
     if len(race) > 1:
-        sure = sorted((advice for advice in worthy if advice.probability >= SURE), key=lambda advice: advice.minutes)
+        sure = sorted(
+            (advice for advice in worthy if advice.probability >= criteria.SURE), key=lambda advice: advice.minutes
+        )
         worthy = [*sure, *(advice for advice in worthy if advice not in sure)]
-    return (*first, *worthy)[:MOST_ADVISED]
+    return (*first, *worthy)[: criteria.MOST_ADVISED]
 
 
 def _brought(
@@ -158,8 +151,8 @@ def decided(gained: FloatArray, evidences: FloatArray, freedom: FloatArray) -> f
 def distinguished(nats: FloatArray, lead: FloatArray | float = 0.0) -> FloatArray:
     """The probability that a candidate, if it is true, is left (SURE) against a rival that is behind by `lead` nats and
     expected to fall behind by so many `nats` more."""
-    odds = np.log(SURE / (1 - SURE))
-    sd = np.sqrt(1.0 + 2.0 * nats + (PREDICTION_ERROR * nats) ** 2)
+    odds = np.log(criteria.SURE / (1 - criteria.SURE))
+    sd = np.sqrt(1.0 + 2.0 * nats + (criteria.PREDICTION_ERROR * nats) ** 2)
     return np.asarray(ndtr((lead + nats - odds) / sd), dtype=np.float64)
 
 
@@ -204,7 +197,7 @@ def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[Fit]) -
     mistaken = any(effect.effect.slug == shift for fit in fits for effect in fit.effects)
     if problem.design.facts.temperature_measured or not mistaken or added is None:
         return []
-    added = replace(added, facts=replace(added.facts, reference_temperature=REFERENCE_TEMPERATURE))
+    added = replace(added, facts=replace(added.facts, reference_temperature=design_criteria.REFERENCE_TEMPERATURE))
     effect = OIL_TEMPERATURE
     usual = replace(fits[0], effects=(FittedEffect(effect=effect, amplitude=effect.prior_sd, shape=(0.0, AT_ONCE)),))
     distances = CandidateDistances(problem, (usual, bare(fits[0])))

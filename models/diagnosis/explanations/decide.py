@@ -12,7 +12,7 @@ otherwise                                                       ambiguous: the s
 from collections.abc import Mapping, Sequence
 from itertools import product
 
-from models.diagnosis.criteria import LIKELY, SURE
+from models.diagnosis import criteria
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
 from models.diagnosis.explanations.posterior import Posterior
 from models.diagnosis.explanations.verdict import (
@@ -49,14 +49,14 @@ def decide(explanations: Sequence[Explanation]) -> tuple[Verdict, tuple[str, ...
     """The verdict and its causes; UNCATALOGUED may stand among those of an ambiguous one."""
     shares = {explanation.effects: explanation.probability for explanation in explanations}
     nothing = shares.get((), 0.0)
-    if nothing >= LIKELY:
+    if nothing >= criteria.LIKELY:
         return Verdict.MODEL_ADEQUATE, ()
     unknown = sum(share for effects, share in shares.items() if UNCATALOGUED in effects)
-    sure = tuple(slug for slug, share in probabilities_by_slug(explanations).items() if share >= SURE)
+    sure = tuple(slug for slug, share in probabilities_by_slug(explanations).items() if share >= criteria.SURE)
     exactly = sum(share for effects, share in shares.items() if set(effects) == set(sure))
-    if sure and unknown <= 1.0 - SURE and exactly >= LIKELY:
+    if sure and unknown <= 1.0 - criteria.SURE and exactly >= criteria.LIKELY:
         return Verdict.CAUSE_NAMED, sure
-    if unknown >= LIKELY * (1.0 - nothing):
+    if unknown >= criteria.LIKELY * (1.0 - nothing):
         return (Verdict.CAUSE_AMBIGUOUS, (*sure, UNCATALOGUED)) if sure else (Verdict.UNEXPLAINED_STRUCTURE, ())
     return Verdict.CAUSE_AMBIGUOUS, tuple(dict.fromkeys(slug for effects in smallest(shares) for slug in effects))
 
@@ -66,7 +66,7 @@ def smallest(shares: Mapping[tuple[str, ...], float]) -> list[tuple[str, ...]]:
     chosen, mass = list[tuple[str, ...]](), 0.0
     something = 1.0 - shares.get((), 0.0)
     for effects, share in sorted(shares.items(), key=lambda item: -item[1]):
-        if mass >= SURE * something:
+        if mass >= criteria.SURE * something:
             break
         if effects:
             chosen.append(effects)

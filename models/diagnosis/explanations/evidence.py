@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import erfcx
 
 from models.arrays import FloatArray
-from models.diagnosis.criteria import CONTRAST_SIZES, TEMPLATE_ERRORS
+from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.catalogue import Column, columns_at_rows
 from models.diagnosis.effects.effect import log_amplitude_peak
@@ -66,7 +66,7 @@ def evidence_of(problem: FitProblem, fitted: Fit, columns: Sequence[Column] = ()
     projections = projections_beside(gram, problem.noise)
     for projected in projections:
         base = projected.evidence + _beside_bounds(projected, held, outward) + prior
-        wholes.append(base + _averaged(projected, wrong, own, TEMPLATE_ERRORS))
+        wholes.append(base + _averaged(projected, wrong, own, criteria.TEMPLATE_ERRORS))
         for axis, mine in places.items():
             structures[axis].append(base + _structure(projected.info[np.ix_(mine, mine)], projected.score[mine]))
         info, score = projected.info[catalogue, catalogue], projected.score[catalogue]
@@ -128,7 +128,7 @@ def _averaged(projected: Projected, wrong: slice, own: FloatArray, sizes: Sequen
 def _structure(info: FloatArray, score: FloatArray) -> float:
     """What smooth structure adds [nats], averaged over its size, all contrasts together or one of them alone."""
     values, vectors = independent(info)
-    sizes = np.array(CONTRAST_SIZES)[:, None]
+    sizes = np.array(criteria.CONTRAST_SIZES)[:, None]
     together = log_gain_alone(values, vectors.T @ score, sizes).sum(axis=1)
     alone = [log_mean(gains) for gains in log_gain_alone(np.maximum(np.diag(info), 0.0), score, sizes)]
     return log_mean([*together.tolist(), *alone])
@@ -138,7 +138,7 @@ def _likeliest(projected: Projected, mine: FloatArray) -> FloatArray:
     """The likeliest coefficients of smooth structure, at the size that suits it best."""
     values, vectors = independent(projected.info[np.ix_(mine, mine)])
     score = vectors.T @ projected.score[mine]
-    size = max(CONTRAST_SIZES, key=lambda size: float(log_gain_alone(values, score, size).sum()))
+    size = max(criteria.CONTRAST_SIZES, key=lambda size: float(log_gain_alone(values, score, size).sum()))
     return np.asarray(vectors @ (score / (values + size**-2.0)))
 
 

@@ -27,16 +27,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import expit
 
-from models.diagnosis.criteria import (
-    ANYTHING_WRONG,
-    MOST_REFITS,
-    NEGLIGIBLE,
-    RELATIVE,
-    SECOND,
-    SLACK,
-    UNCATALOGUED_SHARE,
-    VIBRATION_TRACE,
-)
+from models.diagnosis import criteria
 from models.diagnosis.effects.catalogue import BY_SLUG, Column, columns_at_rows, columns_of, effects_for
 from models.diagnosis.effects.effect import SCALES, Kind, Shape
 from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
@@ -150,16 +141,21 @@ class Prior:
     def __call__(self, alternative: Alternative) -> float:
         if alternative == NOTHING:
             return 0.0
-        wrong = np.log(ANYTHING_WRONG / (1 - ANYTHING_WRONG))
-        of_effect = np.log1p(-UNCATALOGUED_SHARE) - np.log(self.effects)
-        of_unknown = np.log(UNCATALOGUED_SHARE) - np.log(self.unknowns)
+        wrong = np.log(criteria.ANYTHING_WRONG / (1 - criteria.ANYTHING_WRONG))
+        of_effect = np.log1p(-criteria.UNCATALOGUED_SHARE) - np.log(self.effects)
+        of_unknown = np.log(criteria.UNCATALOGUED_SHARE) - np.log(self.unknowns)
         if not alternative.causes:
             return float(wrong + of_unknown)
         value = wrong + of_effect
         if len(alternative.causes) > 1:  # in either order
-            value += np.log(SECOND) + np.log(2.0) + np.log1p(-UNCATALOGUED_SHARE) - np.log(max(self.effects - 1, 1))
+            value += (
+                np.log(criteria.SECOND)
+                + np.log(2.0)
+                + np.log1p(-criteria.UNCATALOGUED_SHARE)
+                - np.log(max(self.effects - 1, 1))
+            )
         if alternative.unknown:
-            value += np.log(SECOND) + of_unknown
+            value += np.log(criteria.SECOND) + of_unknown
         return float(value)
 
 
@@ -238,13 +234,13 @@ class Search:
         return value + float(np.logaddexp(done, log_sum(left))) - done
 
     def _up(self) -> None:
-        while self._promises and self.refits < MOST_REFITS:
+        while self._promises and self.refits < criteria.MOST_REFITS:
             weights = self.weights()
             leader = max(self.nodes, key=lambda alternative: weights[alternative])
-            slack = SLACK * max(weights[leader] - weights[NOTHING], 0.0)
+            slack = criteria.SLACK * max(weights[leader] - weights[NOTHING], 0.0)
             hopes = {key: self._hope(key, leader, slack) for key in self._promises}
             key = max(hopes, key=lambda key: hopes[key])
-            if hopes[key] < log_sum(list(weights.values())) + np.log(NEGLIGIBLE):
+            if hopes[key] < log_sum(list(weights.values())) + np.log(criteria.NEGLIGIBLE):
                 causes = [key for key in hopes if key[0].causes]
                 if not causes or leader.causes or not leader.unknown or any(other.causes for other in self.nodes):
                     return
@@ -302,7 +298,7 @@ class Search:
         along = change @ units / np.maximum(np.linalg.norm(units, axis=0), 1e-300)
         alike: dict[str, int] = {}
         for place in np.argsort(-np.abs(along)).tolist():
-            if np.abs(along[place]) > RELATIVE * np.linalg.norm(change):
+            if np.abs(along[place]) > criteria.RELATIVE * np.linalg.norm(change):
                 alike.setdefault(self._columns[place].effect.slug, place)
         for slug, place in alike.items():
             column, relative = self._columns[place], Alternative((slug,))
@@ -421,7 +417,7 @@ class Search:
         for alternative in list(weights):  # what a vibration leaves in averages is no second thing
             trace = weights[alternative] - self.prior(alternative) - null.log_evidence
             unnamed = not alternative.causes and (is_axis(alternative.unknown) or alternative.unknown in LINES)
-            if unnamed and loudest + single > 0 and trace < VIBRATION_TRACE * loudest:
+            if unnamed and loudest + single > 0 and trace < criteria.VIBRATION_TRACE * loudest:
                 weights[NOTHING] = float(np.logaddexp(weights[NOTHING], weights.pop(alternative)))
         return Posterior(
             weights={alternative: weight - null.log_evidence for alternative, weight in weights.items()},

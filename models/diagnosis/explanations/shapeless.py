@@ -34,14 +34,7 @@ from scipy.ndimage import median_filter
 from scipy.special import gammaincc, gammaincinv
 
 from models.arrays import FloatArray
-from models.diagnosis.criteria import (
-    CHANGES_BETWEEN_TESTS,
-    CHANGES_WITHIN_TESTS,
-    OUTLYING_DEVIATIONS,
-    OUTLYING_FEWEST_RUNS,
-    OUTLYING_SHARE,
-    USUAL_VISCOSITY_CHANGE,
-)
+from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
 from models.diagnosis.explanations.evidence import projections_beside
 from models.diagnosis.noise.covariance import Noise, whitened
@@ -203,8 +196,8 @@ def _worst(problem: FitProblem, fitted: Fit) -> tuple[int | None, FloatArray]:
     count = np.bincount(design.rows.run, minlength=len(design.runs))
     beyond = np.maximum(np.bincount(design.rows.run, weights=squares, minlength=len(design.runs)) - count, 0.0)
     worst = int(np.argmax(beyond))
-    least = max(OUTLYING_SHARE * beyond.sum(), OUTLYING_DEVIATIONS**2 * count[worst])
-    if np.count_nonzero(count) < OUTLYING_FEWEST_RUNS or beyond[worst] < least:
+    least = max(criteria.OUTLYING_SHARE * beyond.sum(), criteria.OUTLYING_DEVIATIONS**2 * count[worst])
+    if np.count_nonzero(count) < criteria.OUTLYING_FEWEST_RUNS or beyond[worst] < least:
         return None, left
     return worst, left
 
@@ -224,8 +217,8 @@ def temperature_evidence(problem: FitProblem, fitted: Fit) -> float:
 
 def _averaged(projected: Projected, between: FloatArray, within: FloatArray) -> float:
     """Over the strengths."""
-    strengths = product(CHANGES_BETWEEN_TESTS, CHANGES_WITHIN_TESTS)
-    sds = [USUAL_VISCOSITY_CHANGE * (b * between + w * within) for b, w in strengths]
+    strengths = product(criteria.CHANGES_BETWEEN_TESTS, criteria.CHANGES_WITHIN_TESTS)
+    sds = [criteria.USUAL_VISCOSITY_CHANGE * (b * between + w * within) for b, w in strengths]
     return log_mean([log_gain(projected.info, projected.score, sd) for sd in sds])
 
 

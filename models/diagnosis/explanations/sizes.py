@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.criteria import COURSE_NEGLIGIBLE, COURSE_STEPS, DRAWS, SIZE_TAILS, SIZES_SAMPLED
+from models.diagnosis import criteria
 from models.diagnosis.effects.effect import Effect, Tried
 from models.diagnosis.effects.fitted_effect import (
     Draw,
@@ -108,7 +108,7 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
     if not components:
         return Sizes(by_slug={})
     weight = np.array([component.weight for component in components])
-    counts = np.diff(np.floor(np.cumsum(weight) * SIZES_SAMPLED + rng.random()), prepend=0.0).astype(int)
+    counts = np.diff(np.floor(np.cumsum(weight) * criteria.SIZES_SAMPLED + rng.random()), prepend=0.0).astype(int)
     width = max(component.mean.size for component in components)
     samples: list[tuple[float, int, tuple[FittedEffect, ...]]] = []
     sized: dict[str, list[tuple[float, int]]] = {}
@@ -122,10 +122,10 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
             samples.append(
                 (trend, index, tuple(effect for effect in effects if effect.effect.slug in judgement.causes))
             )
-    nothing = max(SIZES_SAMPLED - len(samples), 0)
+    nothing = max(criteria.SIZES_SAMPLED - len(samples), 0)
     samples += [(0.0, 0, ())] * nothing
     samples.sort(key=lambda sample: sample[0])
-    strata = np.array_split(np.arange(len(samples)), min(DRAWS, len(samples)))
+    strata = np.array_split(np.arange(len(samples)), min(criteria.DRAWS, len(samples)))
     chosen = [samples[stratum[stratum.size // 2]] for stratum in strata]
     return Sizes(
         draws=tuple(
@@ -150,7 +150,7 @@ def _size(pairs: Sequence[tuple[float, int]]) -> Size:
         value=float(sizes.mean()),
         sd=float(sizes.std()),
         interval=(low, high),
-        other_sign=min(positive, float((sizes < 0).mean())) * sizes.size / SIZES_SAMPLED,
+        other_sign=min(positive, float((sizes < 0).mean())) * sizes.size / criteria.SIZES_SAMPLED,
         courses=len(signs) > 1,
     )
 
@@ -160,17 +160,17 @@ def _components(problem: FitProblem, original: Fit, share: float) -> Iterator[_C
     fitted = replace(original, effects=tuple(_unshrunk(effect) for effect in original.effects))
     courses = list(_courses(problem, fitted))
     if not courses:
-        courses = [(0.0, fit(problem, fitted.laws, fitted.effects, steps=COURSE_STEPS))]
+        courses = [(0.0, fit(problem, fitted.laws, fitted.effects, steps=criteria.COURSE_STEPS))]
     logs = np.array([log for log, _ in courses])
     weights = np.exp(logs - logs.max())
     for weight, (_, fitted) in zip((share * weights / weights.sum()).tolist(), courses, strict=True):
-        if weight > share / SIZES_SAMPLED:
+        if weight > share / criteria.SIZES_SAMPLED:
             yield _component(problem, fitted, weight)
 
 
 def _unshrunk(fitted: FittedEffect) -> FittedEffect:
     """An effect whose size has a prior that is nearly flat in its logarithm: that it is at work is decided already."""
-    return replace(fitted, effect=replace(fitted.effect, tails=min(fitted.effect.tails, SIZE_TAILS)))
+    return replace(fitted, effect=replace(fitted.effect, tails=min(fitted.effect.tails, criteria.SIZE_TAILS)))
 
 
 def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
@@ -191,12 +191,12 @@ def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
                 for index in way:
                     shape = _with_free(kind[index].shape, effect)
                     tried = replace(near[place], effect=held, shape=shape)
-                    refit = fit(problem, laws, (*near[:place], tried, *near[place + 1 :]), steps=COURSE_STEPS)
+                    refit = fit(problem, laws, (*near[:place], tried, *near[place + 1 :]), steps=criteria.COURSE_STEPS)
                     if not np.isfinite(refit.cost) or refit.wrong_sign:
                         break
                     log = evidence_of(problem, refit, smooth=False).whole + kind[index].log_weight
                     best = max(best, log)
-                    if log < best - COURSE_NEGLIGIBLE:
+                    if log < best - criteria.COURSE_NEGLIGIBLE:
                         break
                     near, laws = refit.effects, refit.laws
                     yield log, refit

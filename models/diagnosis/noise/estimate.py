@@ -23,20 +23,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from models.arrays import FloatArray
-from models.diagnosis.criteria import (
-    ASSUMED,
-    CORRELATION_PRICE,
-    CORRELATION_PRICE_FROM_SAMPLES,
-    FEWEST,
-    FIRST_GAIN,
-    INFLATION_PRICE,
-    LEAST_COMPARED_BINS,
-    MOST_KINDS,
-    MOST_SPIKES,
-    SMOOTH_DEGREE,
-    SMOOTH_HARMONICS,
-    SPIKE,
-)
+from models.diagnosis import criteria
 from models.diagnosis.design.autocorrelation import Correlation
 from models.diagnosis.design.design import Design, IntArray
 from models.diagnosis.noise.covariance import Noise
@@ -75,7 +62,7 @@ def pieces_of(design: Design, part: NDArray[np.bool_]) -> list[Piece]:
     for rows in np.split(order, edges) if order.size else []:
         for piece in np.array_split(rows, max(1, -(-rows.size // _LONGEST))):
             looping = bool(piece[0] >= design.plateaus)
-            smooth_terms = 2 * SMOOTH_HARMONICS + 1 if looping else SMOOTH_DEGREE + 1
+            smooth_terms = 2 * criteria.SMOOTH_HARMONICS + 1 if looping else criteria.SMOOTH_DEGREE + 1
             if piece.size < smooth_terms + 3:
                 continue
             phase = design.rows.phase[piece]
@@ -87,11 +74,11 @@ def pieces_of(design: Design, part: NDArray[np.bool_]) -> list[Piece]:
 
 
 def _polynomials(count: int) -> FloatArray:
-    return np.asarray(legvander(np.linspace(-1.0, 1.0, count), SMOOTH_DEGREE), dtype=np.float64)
+    return np.asarray(legvander(np.linspace(-1.0, 1.0, count), criteria.SMOOTH_DEGREE), dtype=np.float64)
 
 
 def _harmonics(phase: FloatArray) -> FloatArray:
-    angles = np.arange(1, SMOOTH_HARMONICS + 1) * phase[:, None]
+    angles = np.arange(1, criteria.SMOOTH_HARMONICS + 1) * phase[:, None]
     return np.column_stack([np.ones_like(phase), np.cos(angles), np.sin(angles)])
 
 
@@ -121,25 +108,27 @@ def estimate_correlation(
     groups: dict[int, tuple[FloatArray, list[FloatArray]]] = {}
     for piece in pieces:
         relative = piece.remainder(residual) / deviation[piece.rows]
-        groups.setdefault(id(piece.contrasts), (piece.contrasts, []))[1].append(np.clip(relative, -SPIKE, SPIKE))
+        groups.setdefault(id(piece.contrasts), (piece.contrasts, []))[1].append(
+            np.clip(relative, -criteria.SPIKE, criteria.SPIKE)
+        )
     grid = [Correlation(), *(Correlation(share=share, decay=decay) for share in _SHARES for decay in _DECAYS)]
-    expected, price = Correlation(), CORRELATION_PRICE
+    expected, price = Correlation(), criteria.CORRELATION_PRICE
     if from_samples is not None:
-        expected, price = Correlation.of_neighbours(*from_samples), CORRELATION_PRICE_FROM_SAMPLES
+        expected, price = Correlation.of_neighbours(*from_samples), criteria.CORRELATION_PRICE_FROM_SAMPLES
         grid = [expected, *grid]
     if (
-        len(groups) > MOST_KINDS
+        len(groups) > criteria.MOST_KINDS
     ):  # loops whose bins all differ: each would have a likelihood of its own to be factorised
         grid = grid[:1]
     unit = {size: np.eye(size) for size in {series.size for series in period_differences}}
     for series in period_differences:
         contrasts = unit[series.size]
-        groups.setdefault(id(contrasts), (contrasts, []))[1].append(np.clip(series, -SPIKE, SPIKE))
+        groups.setdefault(id(contrasts), (contrasts, []))[1].append(np.clip(series, -criteria.SPIKE, criteria.SPIKE))
     logs, variances = [], []
     for number, correlation in enumerate(grid):
         likelihood, variance = _restricted_likelihood(correlation, groups)
         off = abs(float(np.log(correlation.variance_inflation / expected.variance_inflation)))
-        logs.append(likelihood - (0.0 if number == 0 else price) - INFLATION_PRICE * off)
+        logs.append(likelihood - (0.0 if number == 0 else price) - criteria.INFLATION_PRICE * off)
         variances.append(variance)
     weights = np.exp(np.array(logs) - max(logs))
     weights /= weights.sum()
@@ -176,11 +165,11 @@ _ROUNDS, _LARGEST_SQUARE = 4, 12.0
 def first_noise(design: Design) -> Noise:
     """Before anything is fitted: the assumed share of the torque."""
     level = design.usual_torque
-    deviation = (ASSUMED * np.abs(design.torque) + 0.2 * ASSUMED * level + 1e-12) / np.sqrt(
+    deviation = (criteria.ASSUMED * np.abs(design.torque) + 0.2 * criteria.ASSUMED * level + 1e-12) / np.sqrt(
         np.minimum(design.samples, 30)
     )
     white = Correlation()
-    return Noise(deviation=deviation, plateaus=white, loops=white, run_gain=FIRST_GAIN, curve_gain=0.0)
+    return Noise(deviation=deviation, plateaus=white, loops=white, run_gain=criteria.FIRST_GAIN, curve_gain=0.0)
 
 
 def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, before: Noise) -> tuple[Noise, bool]:
@@ -191,7 +180,7 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
     for part in (steady, ~steady):
         pieces = pieces_of(design, part)
         free = sum(piece.contrasts.shape[1] for piece in pieces)
-        if free < FEWEST:
+        if free < criteria.FEWEST:
             assumed = assumed or bool(part.any())
             correlations.append(Correlation())
             continue
@@ -202,8 +191,8 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
         correlation, scale = estimate_correlation(pieces, residual, np.sqrt(variance), from_samples, differences)
         deviation[part] *= scale
         correlations.append(correlation)
-    spiky = (np.abs(residual) > SPIKE * deviation) & _isolated(design, residual, deviation)
-    if spiky.mean() < MOST_SPIKES:
+    spiky = (np.abs(residual) > criteria.SPIKE * deviation) & _isolated(design, residual, deviation)
+    if spiky.mean() < criteria.MOST_SPIKES:
         deviation = np.where(spiky, np.abs(residual), deviation)
     return replace(before, deviation=deviation, plateaus=correlations[0], loops=correlations[1]), assumed
 
@@ -230,7 +219,7 @@ def _relative_differences(design: Design, variance: FloatArray, part: NDArray[np
     return [
         differences / np.sqrt(variance[rows] * design.samples[rows])
         for rows, differences in design.period_differences
-        if rows.size >= LEAST_COMPARED_BINS and part[rows[0]]
+        if rows.size >= criteria.LEAST_COMPARED_BINS and part[rows[0]]
     ]
 
 
@@ -244,5 +233,5 @@ def _isolated(design: Design, residual: FloatArray, deviation: FloatArray) -> ND
     step[owner[1:] != owner[:-1]] = np.inf  # the next row is on another curve
     nearest = np.minimum(np.append(step, np.inf), np.append(np.inf, step))
     isolated = np.empty(order.size, dtype=np.bool_)
-    isolated[order] = np.isfinite(nearest) & (nearest > SPIKE * deviation[order])
+    isolated[order] = np.isfinite(nearest) & (nearest > criteria.SPIKE * deviation[order])
     return isolated

@@ -11,6 +11,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction
+from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import (
     ATTRACTOR,
     BLOCK,
@@ -25,15 +26,6 @@ from models.diagnosis.baseline.laws import (
     falling_weight,
 )
 from models.diagnosis.baseline.prediction import frame_of
-from models.diagnosis.criteria import (
-    FEWEST_ROWS,
-    FEWEST_SPEEDS,
-    LEAST_NOISE_SHARE,
-    LEAST_TORQUE,
-    MANY_PLATEAUS,
-    MOST_TORQUE,
-    USUAL_CURVATURE,
-)
 from models.diagnosis.design.design import Design
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.gauss_newton import STEPS, Fit, FitStatus, fit
@@ -57,7 +49,7 @@ def starting_laws(design: Design, frame: Frame) -> Laws:
     theta = np.zeros(ATTRACTOR + frame.loop_pressures.size + POWERS)
     theta[KAPPA] = np.log(12 * design.usual_torque)
     high = (pressure - frame.lowest) / frame.span
-    theta[FALL] = np.log(0.6 * frame.span), np.log(USUAL_CURVATURE)
+    theta[FALL] = np.log(0.6 * frame.span), np.log(criteria.USUAL_CURVATURE)
     for k in range(4):
         best = np.inf
         for scale, decay in product(_SCALES, _DECAYS if k == RATIO and design.levels.size > 2 else (0.6,)):
@@ -170,13 +162,15 @@ class Baseline:
 def missing_for_baseline(design: Design) -> str:
     """What is missing for a pooled baseline, or nothing."""
     steady = design.rows.velocity[design.closed & design.rows.steady]
-    if steady.size < FEWEST_ROWS:
-        return f"there are {steady.size} plateaus of stationary tests under pressure, and at least {FEWEST_ROWS} are needed."
+    if steady.size < criteria.FEWEST_ROWS:
+        few = f"there are {steady.size} plateaus of stationary tests under pressure"
+        return f"{few}, and at least {criteria.FEWEST_ROWS} are needed."
     speeds = np.unique(np.round(steady / float(steady.max()), 3)).size
-    if speeds < FEWEST_SPEEDS:
-        return f"there are {speeds} distinct speeds, and at least {FEWEST_SPEEDS} are needed for a Stribeck curve."
+    if speeds < criteria.FEWEST_SPEEDS:
+        few = f"there are {speeds} distinct speeds"
+        return f"{few}, and at least {criteria.FEWEST_SPEEDS} are needed for a Stribeck curve."
     usual, largest = design.usual_torque, float(np.abs(design.torque).max())
-    if not (usual > LEAST_TORQUE and largest < MOST_TORQUE):
+    if not (usual > criteria.LEAST_TORQUE and largest < criteria.MOST_TORQUE):
         return f"torques of {usual:.3g} Nm in the median and {largest:.3g} Nm at most are no clutch's."
     return ""
 
@@ -186,7 +180,7 @@ def fit_baseline(design: Design) -> Baseline:
     frame = frame_of(design)
     start = starting_laws(design, frame)
     problem = FitProblem(design=design, noise=first_noise(design), priors=priors_of(design, start.theta, frame))
-    starts = (start, cautious_laws(design, start)) if design.plateaus < MANY_PLATEAUS else (start,)
+    starts = (start, cautious_laws(design, start)) if design.plateaus < criteria.MANY_PLATEAUS else (start,)
     first = _best_of(problem, starts, _ROUGH)
     problem, _ = _with_estimated_noise(problem, first)
     # with a noise that was only assumed the first fit may have ended in another valley
@@ -217,7 +211,7 @@ def _require_weights(problem: FitProblem, fitted: Fit) -> None:
         raise IndeterminateError("no finite torque can be fitted to these numbers.")
     parts = [deviation[: design.plateaus], deviation[design.plateaus :]]
     noise = min(float(np.median(part)) for part in parts if part.size)
-    if not noise >= LEAST_NOISE_SHARE * design.usual_torque:
+    if not noise >= criteria.LEAST_NOISE_SHARE * design.usual_torque:
         raise IndeterminateError(
             f"the readings hold no noise ({noise:.1g} Nm about {design.usual_torque:.3g} Nm), as those of a dead channel "
             "or of a formula do, and nothing can be weighed against it."

@@ -14,9 +14,9 @@ from typing import TypeAlias
 import numpy as np
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import BLOCK, LOG_CURVATURE, LOG_DECAY, POWERS, Laws
 from models.diagnosis.baseline.prediction import Prediction, predict
-from models.diagnosis.criteria import CURVATURE_BOUNDS
 from models.diagnosis.effects.effect import amplitude_cost
 from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns, effect_precisions, effect_rows
 from models.diagnosis.noise.covariance import whitening
@@ -179,7 +179,7 @@ def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fi
         move[block + 2 : block + BLOCK] = np.clip(move[block + 2 : block + BLOCK], -_LARGEST_STEP, _LARGEST_STEP)
     move[LOG_DECAY:-POWERS] = np.clip(move[LOG_DECAY:-POWERS], -_LARGEST_STEP, _LARGEST_STEP)
     theta = state.laws.theta + move
-    theta[LOG_CURVATURE] = np.clip(theta[LOG_CURVATURE], *np.log(CURVATURE_BOUNDS))
+    theta[LOG_CURVATURE] = np.clip(theta[LOG_CURVATURE], *np.log(criteria.CURVATURE_BOUNDS))
     for k in range(4):
         theta[k * BLOCK + 4 : k * BLOCK + 6] = np.clip(theta[k * BLOCK + 4 : k * BLOCK + 6], -3.0, 25.0)
     at, effects = count, []

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import ATTRACTOR, BLOCK, DRIFT, FALL, KAPPA, OPEN_DRAG, Frame
-from models.diagnosis.criteria import ALIKE_SD, DRAG_SD, USUAL_CURVATURE
 from models.diagnosis.design.design import Design
 from models.diagnosis.noise.covariance import Noise
 
@@ -38,18 +38,18 @@ def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
         block = k * BLOCK
         sds[block : block + BLOCK] = [spread, spread, 1.5, 1.5, 1.5, 0.7]
         means[block + 2 : block + BLOCK] = [0.0, 0.0, np.log(0.5 * design.facts.life), np.log(0.8)]
-    sds[FALL], means[FALL] = (0.7, 1.2), (np.log(0.6 * frame.span), np.log(USUAL_CURVATURE))
+    sds[FALL], means[FALL] = (0.7, 1.2), (np.log(0.6 * frame.span), np.log(criteria.USUAL_CURVATURE))
     sds[DRIFT:ATTRACTOR], means[DRIFT:ATTRACTOR] = (0.6, 0.4, 0.3), 0.0
     # friction may follow at once: one wide prior, and a step of deviation 1 from pressure to pressure
     sds[KAPPA], means[KAPPA] = 1.0, 0.0
     sds[KAPPA.start], means[KAPPA.start] = 3.0, np.log(12 * level)
-    sds[OPEN_DRAG], means[OPEN_DRAG] = DRAG_SD * level, 0.0
+    sds[OPEN_DRAG], means[OPEN_DRAG] = criteria.DRAG_SD * level, 0.0
     rows = np.diag(1 / sds)
     nodes = np.arange(size)[KAPPA]
     rows[nodes[1:], nodes[:-1]] = -1.0
     alike = np.zeros((4, size))
     for k in range(4):
-        alike[k, k * BLOCK + 2], alike[k, k * BLOCK + 3] = 1 / ALIKE_SD, -1 / ALIKE_SD
+        alike[k, k * BLOCK + 2], alike[k, k * BLOCK + 3] = 1 / criteria.ALIKE_SD, -1 / criteria.ALIKE_SD
     return Priors(
         rows=np.concatenate([rows, alike]),
         means=np.concatenate([means / sds, np.zeros(4)]),

@@ -24,19 +24,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import logsumexp
 
 from models.arrays import FloatArray
-from models.diagnosis.criteria import (
-    CURVE_GAINS,
-    DISCREPANCY_SD,
-    GAIN_SD_ABOVE,
-    GAIN_SD_BELOW,
-    LEAST_CURVE_GAIN_EVIDENCE,
-    LEAST_GAIN,
-    LEAST_SCATTER_INFORMATION,
-    MORE_CURVE_GAIN,
-    MOST_GAIN,
-    SMALL_CURVE_GAIN,
-    USUAL_GAIN,
-)
+from models.diagnosis import criteria
 from models.diagnosis.design.design import IntArray
 from models.diagnosis.effects.effect import amplitude_cost
 from models.diagnosis.effects.fitted_effect import (
@@ -113,14 +101,14 @@ def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None, *,
         matrix[-1, -1] += 2.0 * float(held) * amplitude_cost(effect.effect, effect.amplitude)
         at += columns.shape[1]
     diagonal = np.arange(at, base)
-    matrix[diagonal, diagonal] += DISCREPANCY_SD**-2.0
+    matrix[diagonal, diagonal] += criteria.DISCREPANCY_SD**-2.0
     return Gram(
         matrix=matrix, along=by_curve(white, gains), squares=gains.squares, run_of_curve=gains.run_of_curve, base=base
     )
 
 
 #: Scatters of the runs' gains [g] that are considered [-].
-GAINS: FloatArray = np.geomspace(LEAST_GAIN, MOST_GAIN, 13)
+GAINS: FloatArray = np.geomspace(criteria.LEAST_GAIN, criteria.MOST_GAIN, 13)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,15 +134,15 @@ class Projected:
 def projections_of(gram: Gram, noise: Noise) -> Iterator[Projected]:
     """With every scatter of the gains that is considered, one after the other: of the runs' gains, and of the curves' up to
     what the noise has or next above. Where the data ask for none of the latter without an effect, they do not with one."""
-    curves = [gain for gain in CURVE_GAINS if gain <= MORE_CURVE_GAIN * noise.curve_gain]
+    curves = [gain for gain in criteria.CURVE_GAINS if gain <= criteria.MORE_CURVE_GAIN * noise.curve_gain]
     return (project(gram, gain, curve) for curve in curves for gain in GAINS.tolist())
 
 
 def likely_curve_gain(gram: Gram) -> float:
     """The likeliest scatter of the curves' gains; none where another is not clearly likelier."""
-    best = [max(project(gram, gain, curve).evidence for gain in GAINS.tolist()) for curve in CURVE_GAINS]
+    best = [max(project(gram, gain, curve).evidence for gain in GAINS.tolist()) for curve in criteria.CURVE_GAINS]
     likeliest = int(np.argmax(best))
-    return CURVE_GAINS[likeliest] if best[likeliest] > best[0] + LEAST_CURVE_GAIN_EVIDENCE else 0.0
+    return criteria.CURVE_GAINS[likeliest] if best[likeliest] > best[0] + criteria.LEAST_CURVE_GAIN_EVIDENCE else 0.0
 
 
 def project(gram: Gram, run_gain: float, curve_gain: float) -> Projected:
@@ -168,7 +156,7 @@ def project(gram: Gram, run_gain: float, curve_gain: float) -> Projected:
     left = full[base:, base:] - half.T @ half
     fitted = float(np.log(np.diag(factor)).sum() - np.log(scale).sum())
     miss = float(left[-1, -1])
-    prior = log_gain_prior(run_gain) - float(np.log1p((curve_gain / SMALL_CURVE_GAIN) ** 2))
+    prior = log_gain_prior(run_gain) - float(np.log1p((curve_gain / criteria.SMALL_CURVE_GAIN) ** 2))
     profile = -0.5 * (miss + added) + prior
     return Projected(
         info=left[:-1, :-1],
@@ -184,8 +172,8 @@ def project(gram: Gram, run_gain: float, curve_gain: float) -> Projected:
 
 def log_gain_prior(run_gain: float) -> float:
     """ln p_0 of ln σ_g [nats], up to a constant, for the runs' scatter σ_g > 0."""
-    off = float(np.log(run_gain / USUAL_GAIN))
-    return -0.5 * (off / (GAIN_SD_BELOW if off < 0 else GAIN_SD_ABOVE)) ** 2
+    off = float(np.log(run_gain / criteria.USUAL_GAIN))
+    return -0.5 * (off / (criteria.GAIN_SD_BELOW if off < 0 else criteria.GAIN_SD_ABOVE)) ** 2
 
 
 def _factor(correlation: FloatArray) -> FloatArray:
@@ -226,7 +214,7 @@ class RunScatter:
     @property
     def assumed(self) -> bool:
         """Whether it is the prior, for the data hardly say more."""
-        return self.information < LEAST_SCATTER_INFORMATION
+        return self.information < criteria.LEAST_SCATTER_INFORMATION
 
 
 def run_scatter(projections: Sequence[Projected]) -> RunScatter:

@@ -14,31 +14,7 @@ from scipy.special import logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis.design.design import IntArray
-from models.diagnosis.raw_records.criteria import (
-    AMPLITUDE_WEIGHTS,
-    FARTHEST_BIN,
-    FEWEST_WINDOWS,
-    HIGHEST_SLOW,
-    LEAST_WINDOW_SHARE,
-    LONGEST_SLOW_WINDOW,
-    LONGEST_WINDOW,
-    LOUD,
-    LOWEST_BESIDE,
-    LOWEST_LINE,
-    MOST_PER_STRETCH,
-    MOST_WINDOWS,
-    NEAREST_BIN,
-    PRIOR_STRETCHES,
-    RISE_TIME,
-    SECOND_HARMONIC,
-    SECOND_PROBABILITY,
-    SHORTEST_WINDOW,
-    SLOW_SHARES,
-    SPACING,
-    SPEED_AVERAGE,
-    STANDSTILL_SHARE,
-    TIED_FREQUENCIES,
-)
+from models.diagnosis.raw_records import criteria
 from models.diagnosis.raw_records.swing import Line, amplitude, log_likelihood_ratios, trial_amplitudes
 from models.diagnosis.raw_records.whitened_torque import WhitenedRecord
 
@@ -70,21 +46,21 @@ def windows_of(
     places = [
         (record, first, stop)
         for record in records
-        for first, stop in _passages(record, above * top, below * top, STANDSTILL_SHARE * top, longest)
+        for first, stop in _passages(record, above * top, below * top, criteria.STANDSTILL_SHARE * top, longest)
     ]
-    if len(places) > MOST_WINDOWS:
-        places = [places[i] for i in np.linspace(0, len(places) - 1, MOST_WINDOWS).astype(int)]
-    if len(places) < FEWEST_WINDOWS:
+    if len(places) > criteria.MOST_WINDOWS:
+        places = [places[i] for i in np.linspace(0, len(places) - 1, criteria.MOST_WINDOWS).astype(int)]
+    if len(places) < criteria.FEWEST_WINDOWS:
         return None
-    count = 1 + int(min(highest, max(record.highest for record in records)) / SPACING)
-    frequency = SPACING * np.arange(count, dtype=np.float64)
+    count = 1 + int(min(highest, max(record.highest for record in records)) / criteria.SPACING)
+    frequency = criteria.SPACING * np.arange(count, dtype=np.float64)
     sums, weight = np.zeros((len(places), count), dtype=np.complex128), np.zeros((len(places), count))
-    lowest_line = LOWEST_LINE * np.array([[record.lowest] for record, _, _ in places])
+    lowest_line = criteria.LOWEST_LINE * np.array([[record.lowest] for record, _, _ in places])
     for row, (record, first, stop) in enumerate(places):
-        inside = (frequency > LOWEST_BESIDE * record.lowest) & (frequency < record.highest)
-        size = round(1.0 / (SPACING * record.step))
+        inside = (frequency > criteria.LOWEST_BESIDE * record.lowest) & (frequency < record.highest)
+        size = round(1.0 / (criteria.SPACING * record.step))
         slot = np.minimum(np.round((record.time[first:stop] - record.time[first]) / record.step).astype(int), size - 1)
-        envelope = -np.expm1(-np.arange(stop - first) * (record.step / RISE_TIME))
+        envelope = -np.expm1(-np.arange(stop - first) * (record.step / criteria.RISE_TIME))
         spectrum = np.fft.rfft(np.bincount(slot, record.matched[first:stop] * envelope, size))
         bins = np.flatnonzero(inside[: spectrum.size])
         weight[row, bins] = float(record.weight[first:stop] @ envelope**2) * record.response(frequency[bins])
@@ -108,12 +84,12 @@ def _passages(
     """Samples [first, stop) of windows with speeds [rad/s] between `above` and `below`, and on average above `standstill`;
     passages longer than `longest` [s] are cut into equal parts."""
     passages = []
-    speed = uniform_filter1d(np.abs(record.speed), max(1, round(SPEED_AVERAGE / record.step)), mode="nearest")
+    speed = uniform_filter1d(np.abs(record.speed), max(1, round(criteria.SPEED_AVERAGE / record.step)), mode="nearest")
     within = (speed >= above) & (speed <= below)
     for first, stop in zip(record.starts[:-1], record.starts[1:], strict=True):
         edges = np.flatnonzero(np.diff(np.concatenate([[False], within[first:stop], [False]]).astype(np.int8)))
         for enter, leave in zip(first + edges[::2], first + edges[1::2], strict=True):
-            if (leave - enter) * record.step < SHORTEST_WINDOW:
+            if (leave - enter) * record.step < criteria.SHORTEST_WINDOW:
                 continue
             parts = int(np.ceil((leave - enter) * record.step / longest))
             bounds = np.linspace(enter, leave, parts + 1).astype(int)
@@ -129,17 +105,17 @@ def best_slow_line(records: Sequence[WhitenedRecord], order: Line | None = None)
     """The evidence of a line at low speed, its size by the load's root; windows in which `order` passes its frequency are
     left out."""
     lines = []
-    for share in SLOW_SHARES:
-        windows = windows_of(records, share, LONGEST_SLOW_WINDOW, HIGHEST_SLOW)
+    for share in criteria.SLOW_SHARES:
+        windows = windows_of(records, share, criteria.LONGEST_SLOW_WINDOW, criteria.HIGHEST_SLOW)
         if windows is not None:
             size = np.sqrt(windows.torque / max(float(np.mean(windows.torque)), 1e-300))
             lines.append(_line(windows, size, order, share))
-    return _averaged(lines, len(SLOW_SHARES))
+    return _averaged(lines, len(criteria.SLOW_SHARES))
 
 
 def best_line(records: Sequence[WhitenedRecord], order: Line | None = None, above: float = 0.0) -> Line:
     """The evidence of a line at all speeds alike, or at all above a share of the highest."""
-    windows = windows_of(records, 1.0, LONGEST_WINDOW, np.inf, above)
+    windows = windows_of(records, 1.0, criteria.LONGEST_WINDOW, np.inf, above)
     return Line() if windows is None else _averaged([_line(windows, np.ones_like(windows.torque), order, 1.0)], 1)
 
 
@@ -156,27 +132,27 @@ def _line(windows: Windows, size: FloatArray, order: Line | None, share: float) 
     ∝ 1/f; with a second harmonic in it at low speed."""
     clear = _clear_of_order(windows, order)
     visible, beside = windows.visible & clear, windows.beside & clear
-    least = max(FEWEST_WINDOWS, LEAST_WINDOW_SHARE * visible.shape[0])
+    least = max(criteria.FEWEST_WINDOWS, criteria.LEAST_WINDOW_SHARE * visible.shape[0])
     frequencies = np.flatnonzero(visible.sum(axis=0) >= least)  # as multiples of SPACING
     if frequencies.size == 0:
         return Line(speed_share=share)
     power = np.where(beside, np.abs(windows.sums) ** 2 / np.maximum(windows.weight, 1e-300), 0.0)
-    noise = _noise_levels(power, beside, SPACING * windows.length)
+    noise = _noise_levels(power, beside, criteria.SPACING * windows.length)
     sums = np.where(visible, windows.sums * size[:, np.newaxis] / noise, 0.0)
     weight = np.where(visible, windows.weight * (size**2)[:, np.newaxis] / noise, 0.0)
     power = np.where(visible, power / noise, 0.0)
     logs = _log_likelihoods(power, sums, weight, frequencies, second_harmonic=share < 1.0)
     prior = 1.0 / frequencies / float(np.sum(1.0 / frequencies))
-    evidence = float(logsumexp(logs, b=AMPLITUDE_WEIGHTS[:, np.newaxis] * prior))
+    evidence = float(logsumexp(logs, b=criteria.AMPLITUDE_WEIGHTS[:, np.newaxis] * prior))
     _, _, column = np.unravel_index(int(logs.argmax()), logs.shape)
-    near = frequencies[np.abs(frequencies - frequencies[column]) < NEAREST_BIN]
+    near = frequencies[np.abs(frequencies - frequencies[column]) < criteria.NEAREST_BIN]
     best = near[
         int((power[:, near] * weight[:, near]).sum(axis=0).argmax())
     ]  # where the windows with most weight agree
     shown = visible[:, best]
     return Line(
         evidence=evidence,
-        position=float(SPACING * best),
+        position=float(criteria.SPACING * best),
         amplitude=amplitude(power[shown, best], weight[shown, best]),
         speed_share=share,
         peak=float(logs.max()),
@@ -196,12 +172,12 @@ def _log_likelihoods(
         double = 2 * frequencies
         inside = np.flatnonzero(double < power.shape[1])
         both[:, inside] += log_likelihood_ratios(
-            power[:, double[inside]], weight[:, double[inside]], SECOND_HARMONIC * amplitudes[:, inside]
+            power[:, double[inside]], weight[:, double[inside]], criteria.SECOND_HARMONIC * amplitudes[:, inside]
         )
-        for column in inside[np.argsort(-both[:, inside].max(axis=0))[:TIED_FREQUENCIES]]:
+        for column in inside[np.argsort(-both[:, inside].max(axis=0))[: criteria.TIED_FREQUENCIES]]:
             pair = [frequencies[column], double[column]]
             both[:, column] = _tied(sums[:, pair], weight[:, pair], amplitudes[:, column])
-    return np.stack([first + np.log(1 - SECOND_PROBABILITY), both + np.log(SECOND_PROBABILITY)])
+    return np.stack([first + np.log(1 - criteria.SECOND_PROBABILITY), both + np.log(criteria.SECOND_PROBABILITY)])
 
 
 def _tied(sums: ComplexArray, weight: FloatArray, amplitudes: FloatArray) -> FloatArray:
@@ -213,18 +189,21 @@ def _tied(sums: ComplexArray, weight: FloatArray, amplitudes: FloatArray) -> Flo
     lags = np.exp(-2j * np.pi * np.arange(_LAGS) / _LAGS)
     first = (sums[:, :1] * phases).real
     second = (lags[:, np.newaxis, np.newaxis] * (sums[:, 1:] * phases**2)).real
-    along, cost = first + SECOND_HARMONIC * second, 0.25 * (weight[:, 0] + SECOND_HARMONIC**2 * weight[:, 1])
+    along, cost = (
+        first + criteria.SECOND_HARMONIC * second,
+        0.25 * (weight[:, 0] + criteria.SECOND_HARMONIC**2 * weight[:, 1]),
+    )
     top = along.max(axis=-1)
     logs = []
     for a in amplitudes:
         by_window = a * top + np.log(np.exp(a * (along - top[..., np.newaxis])).mean(axis=-1)) - a**2 * cost
-        logs.append(logsumexp(np.minimum(by_window, MOST_PER_STRETCH).sum(axis=-1)) - np.log(_LAGS))
+        logs.append(logsumexp(np.minimum(by_window, criteria.MOST_PER_STRETCH).sum(axis=-1)) - np.log(_LAGS))
     return np.array(logs)
 
 
 def _clear_of_order(windows: Windows, order: Line | None) -> Bools:
     """[w, f]: false where the order, or its double, passes the frequency in the window."""
-    frequency = SPACING * np.arange(windows.sums.shape[1])
+    frequency = criteria.SPACING * np.arange(windows.sums.shape[1])
     if order is None:
         return np.ones(windows.sums.shape, dtype=np.bool_)
     low, high = (order.position / (2 * np.pi) * speed[:, np.newaxis] for speed in (windows.slowest, windows.fastest))
@@ -240,8 +219,8 @@ def _noise_levels(power: FloatArray, beside: Bools, independent: float) -> Float
     `independent` is how many independent values a bin counts for."""
     total, count = np.where(beside, power, 0.0).sum(axis=0), beside.sum(axis=0).astype(float)
     own = max(1, round(1.0 / independent))
-    near, side = max(NEAREST_BIN, 3 * own // 2), max(FARTHEST_BIN - NEAREST_BIN, 4 * own)
-    mean = _smoothed(total, count, side, independent, PRIOR_STRETCHES)
+    near, side = max(criteria.NEAREST_BIN, 3 * own // 2), max(criteria.FARTHEST_BIN - criteria.NEAREST_BIN, 4 * own)
+    mean = _smoothed(total, count, side, independent, criteria.PRIOR_STRETCHES)
     loud = _smoothed(total, count, side, independent, 1.0)
     crest = maximum_filter1d(_smoothed(total, count, own, independent, 1.0), side)
     pad, shift = near + side, near + side // 2
@@ -250,7 +229,7 @@ def _noise_levels(power: FloatArray, beside: Bools, independent: float) -> Float
         np.maximum(*(np.pad(level, pad, mode="edge")[padded + offset] for offset in (-shift, shift)))
         for level in (mean, loud, crest)
     )
-    return np.asarray(np.where(mean > LOUD, np.maximum(loud, crest), mean))
+    return np.asarray(np.where(mean > criteria.LOUD, np.maximum(loud, crest), mean))
 
 
 def _smoothed(total: FloatArray, count: FloatArray, width: int, independent: float, prior: float) -> FloatArray:

@@ -14,20 +14,7 @@ from scipy.special import logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis.design.design import IntArray
-from models.diagnosis.raw_records.criteria import (
-    ABOVE_ORDER,
-    AMPLITUDE_WEIGHTS,
-    BELOW_ORDER,
-    COHERENT_STRETCHES,
-    FEWEST_STRETCHES,
-    LEAST_VISIBLE,
-    LINE_SPEED,
-    LINE_WIDTH,
-    ORDERS,
-    PAIRED_ORDERS,
-    PAIRED_PROBABILITY,
-    STRETCH,
-)
+from models.diagnosis.raw_records import criteria
 from models.diagnosis.raw_records.swing import (
     Line,
     amplitude,
@@ -48,28 +35,34 @@ def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> L
     stretches = [_stretch_starts(record) for record in records]
     groups = _coherent_groups(records)
     sizes = _relative_sizes(records, stretches)
-    orders = sorted({round(k + offset, 1) for k in ORDERS for offset in (*BELOW_ORDER, 0.0, *ABOVE_ORDER)})
+    orders = sorted(
+        {
+            round(k + offset, 1)
+            for k in criteria.ORDERS
+            for offset in (*criteria.BELOW_ORDER, 0.0, *criteria.ABOVE_ORDER)
+        }
+    )
     demodulated = _demodulated(records, stretches, orders, line)
     by_order: dict[float, FloatArray] = {}
     best, highest = Line(), -np.inf
-    for order, probability in ORDERS.items():
-        logs = np.zeros((len(_LAWS), len(COHERENT_STRETCHES)))
+    for order, probability in criteria.ORDERS.items():
+        logs = np.zeros((len(_LAWS), len(criteria.COHERENT_STRETCHES)))
         for i, law in enumerate(_LAWS):
-            for j, kept in enumerate(COHERENT_STRETCHES):
+            for j, kept in enumerate(criteria.COHERENT_STRETCHES):
                 evidence, size, peak = _order_evidence(demodulated, order, sizes[law], groups[kept])
                 logs[i, j] = evidence
                 if evidence + np.log(probability) > highest and peak > 0:
                     highest = evidence + float(np.log(probability))
                     best = Line(position=order, amplitude=size, peak=peak)
         by_order[order] = logs
-    parts = [np.log(probability / by_order[k].size) + by_order[k].ravel() for k, probability in ORDERS.items()]
-    both = by_order[PAIRED_ORDERS[0]] + by_order[PAIRED_ORDERS[1]]
-    parts.append(np.log(PAIRED_PROBABILITY / both.size) + both.ravel())
+    parts = [np.log(probability / by_order[k].size) + by_order[k].ravel() for k, probability in criteria.ORDERS.items()]
+    both = by_order[criteria.PAIRED_ORDERS[0]] + by_order[criteria.PAIRED_ORDERS[1]]
+    parts.append(np.log(criteria.PAIRED_PROBABILITY / both.size) + both.ravel())
     return replace(best, evidence=float(logsumexp(np.concatenate(parts))))
 
 
 def _stretch_count(record: WhitenedRecord, first: int, stop: int) -> int:
-    return max(1, round((stop - first) * record.step / STRETCH))
+    return max(1, round((stop - first) * record.step / criteria.STRETCH))
 
 
 def _stretch_starts(record: WhitenedRecord) -> IntArray:
@@ -84,12 +77,12 @@ def _stretch_starts(record: WhitenedRecord) -> IntArray:
 def _coherent_groups(records: Sequence[WhitenedRecord]) -> dict[int, IntArray]:
     """For each number of stretches over which the phase is kept: the first stretches of the groups, which stay within a
     piece."""
-    groups: dict[int, list[int]] = {kept: [] for kept in COHERENT_STRETCHES}
+    groups: dict[int, list[int]] = {kept: [] for kept in criteria.COHERENT_STRETCHES}
     before = 0
     for record in records:
         for first, stop in zip(record.starts[:-1], record.starts[1:], strict=True):
             count = _stretch_count(record, first, stop)
-            for kept in COHERENT_STRETCHES:
+            for kept in criteria.COHERENT_STRETCHES:
                 parts = max(1, round(count / kept))
                 groups[kept] += (before + np.linspace(0, count, parts + 1)[:-1].astype(np.intp)).tolist()
             before += count
@@ -138,12 +131,12 @@ def _demodulated(
             visible = (frequency > record.lowest) & (frequency < record.highest)
             if line is not None:
                 distance = np.minimum(np.abs(frequency - line.position), np.abs(frequency - 2 * line.position))
-                slow = hertz * 2 * np.pi <= LINE_SPEED * line.speed_share * highest
-                visible &= ~((distance < LINE_WIDTH) & slow)
+                slow = hertz * 2 * np.pi <= criteria.LINE_SPEED * line.speed_share * highest
+                visible &= ~((distance < criteria.LINE_WIDTH) & slow)
             weight = record.weight * visible
             total = np.add.reduceat(carrier * (record.matched * visible), firsts)
             power = np.add.reduceat(weight * record.response(frequency), firsts)
-            enough = np.add.reduceat(visible.astype(float), firsts) > LEAST_VISIBLE * counts
+            enough = np.add.reduceat(visible.astype(float), firsts) > criteria.LEAST_VISIBLE * counts
             parts[order].append((total * enough, power * enough))
     return {
         k: (np.concatenate([d for d, _ in all_]), np.concatenate([n for _, n in all_])) for k, all_ in parts.items()
@@ -162,16 +155,16 @@ def _order_evidence(
 ) -> tuple[float, float, float]:
     """Evidence of an order, its amplitude, and the largest log likelihood ratio."""
     power, weight = _powers(demodulated[order], size, firsts)
-    if power.size < FEWEST_STRETCHES:
+    if power.size < criteria.FEWEST_STRETCHES:
         return 0.0, 0.0, 0.0
     sides = []
-    for offsets in (BELOW_ORDER, ABOVE_ORDER):
+    for offsets in (criteria.BELOW_ORDER, criteria.ABOVE_ORDER):
         beside = [_powers(demodulated[round(order + offset, 1)], size, firsts)[0] for offset in offsets]
         sides.append((float(sum(values.sum() for values in beside)), float(sum(values.size for values in beside))))
     noise = noise_level(*sides)
     logs = log_likelihood_ratios(power / noise, weight / noise, trial_amplitudes(weight / noise))
     return (
-        float(logsumexp(logs, b=AMPLITUDE_WEIGHTS)),
+        float(logsumexp(logs, b=criteria.AMPLITUDE_WEIGHTS)),
         amplitude(power / noise, weight / noise),
         float(logs.max()),
     )

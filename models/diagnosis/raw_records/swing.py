@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import i0e
 
 from models.arrays import FloatArray
-from models.diagnosis.raw_records.criteria import AMPLITUDES, FAINT, MOST_PER_STRETCH, PRIOR_STRETCHES
+from models.diagnosis.raw_records import criteria
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,18 +57,20 @@ def _log_bessel(x: FloatArray) -> FloatArray:
 def trial_amplitudes(weight: FloatArray) -> FloatArray:
     """a [s] to be tried for stretches of weight N [j] or, each column by itself, N [j, f]: [s] or [s, f]."""
     # λ contributes λ²/2 where it is small, and itself where it is large
-    faint = np.sqrt(2 * FAINT / np.maximum(np.square(weight).sum(axis=0), 1e-300))
-    return np.asarray(2.0 * np.sqrt(np.multiply.outer(AMPLITUDES**2, faint)))
+    faint = np.sqrt(2 * criteria.FAINT / np.maximum(np.square(weight).sum(axis=0), 1e-300))
+    return np.asarray(2.0 * np.sqrt(np.multiply.outer(criteria.AMPLITUDES**2, faint)))
 
 
 def noise_level(*sides: tuple[float, float]) -> float:
     """The mean of u beside an order, from (sum, count) on either side: that of the louder side."""
-    return max((total + PRIOR_STRETCHES) / (count + PRIOR_STRETCHES) for total, count in sides)
+    return max((total + criteria.PRIOR_STRETCHES) / (count + criteria.PRIOR_STRETCHES) for total, count in sides)
 
 
 def log_likelihood_ratios(power: FloatArray, weight: FloatArray, amplitudes: FloatArray) -> FloatArray:
     """log L(a)/L(0) [s] (or [s, f]) of u and N [j] (or [j, f]) at a [s] (or [s, f])."""
-    return np.stack([np.minimum(rice(power, 0.25 * weight * a**2), MOST_PER_STRETCH).sum(axis=0) for a in amplitudes])
+    return np.stack(
+        [np.minimum(rice(power, 0.25 * weight * a**2), criteria.MOST_PER_STRETCH).sum(axis=0) for a in amplitudes]
+    )
 
 
 def amplitude(power: FloatArray, weight: FloatArray) -> float:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.diagnosis.criteria import LEAST_LISTED, MOST_WORSE, NEGLIGIBLE, SIGN_UNDETERMINED
+from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import sized
@@ -40,7 +40,7 @@ def candidates_of(
     alone = [fitted for fitted in judgement.others if len(fitted.slugs) == 1]
     candidates = []
     for slug, probability in judgement.probabilities.items():
-        if probability < LEAST_LISTED and slug not in judgement.causes:
+        if probability < criteria.LEAST_LISTED and slug not in judgement.causes:
             continue
         fitted = next((f for f in (*judgement.stand, *alone, *judgement.others) if slug in f.slugs), None)
         evidence = judgement.evidence.get(slug, 0.0)
@@ -122,11 +122,13 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
     """Why an extension is not proposed, or nothing where one is or none was fitted. The verdict stays."""
     if not sizes.draws:
         return ""
-    if gain is not None and gain.rmse_after > MOST_WORSE * gain.rmse_before:
+    if gain is not None and gain.rmse_after > criteria.MOST_WORSE * gain.rmse_before:
         return "The extension is not proposed: its error on held-out runs is larger than the baseline's."
     if gain is not None and gain.log_score_gain < 0:
         return "The extension is not proposed: held-out runs are less likely with it than without."
-    return " ".join(_unsure(slug, size) for slug, size in sizes.by_slug.items() if size.other_sign > SIGN_UNDETERMINED)
+    return " ".join(
+        _unsure(slug, size) for slug, size in sizes.by_slug.items() if size.other_sign > criteria.SIGN_UNDETERMINED
+    )
 
 
 def _unsure(slug: str, size: Size) -> str:
@@ -214,7 +216,7 @@ def _notes(
     unfinished = [
         " and ".join(effect_name(slug) for slug in cause.slugs) for cause in judgement.stand if cause.unfinished
     ]
-    if posterior.null.fit.status is FitStatus.OUT_OF_STEPS and posterior.probabilities[NOTHING] > NEGLIGIBLE:
+    if posterior.null.fit.status is FitStatus.OUT_OF_STEPS and posterior.probabilities[NOTHING] > criteria.NEGLIGIBLE:
         unfinished.append("nothing at work")
     notes += [
         f"The fit with {name} ended before its optimum: its probability may be larger than stated."

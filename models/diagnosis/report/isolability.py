@@ -29,8 +29,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.criteria import LEAST_VISIBLE_SHARE, SURE, VISIBLE_POWER
 from models.diagnosis.effects.catalogue import CATALOGUE, Column
 from models.diagnosis.effects.effect import SCALES, Kind
 from models.diagnosis.effects.fitted_effect import FittedEffect
@@ -85,9 +85,9 @@ def amplitudes_of(posterior: Posterior) -> FloatArray:
     for projected in projections:
         info = np.maximum(np.diag(projected.info), 0.0)
         freedom = 0.5 * np.min([np.log1p((scale * sd) ** 2 * info) for scale in SCALES], axis=0)
-        needed = 0.5 * (np.sqrt(2 * (paid + freedom)) + float(ndtri(VISIBLE_POWER))) ** 2
+        needed = 0.5 * (np.sqrt(2 * (paid + freedom)) + float(ndtri(criteria.VISIBLE_POWER))) ** 2
         left = np.maximum(needed - best + projected.evidence, 0.0)
-        shown = info > LEAST_VISIBLE_SHARE * projected.whole
+        shown = info > criteria.LEAST_VISIBLE_SHARE * projected.whole
         amplitude = np.sqrt(2 * left / np.where(shown, info, 1.0))
         largest = np.maximum(largest, np.where(shown, amplitude, np.where(left > 0, np.inf, 0.0)))
     return largest
@@ -151,7 +151,7 @@ def _pair(campaign: Campaign, posterior: Posterior, effects: tuple[str, str], wa
     after = dict[str, float]()
     distances = [CandidateDistances(posterior.problem, way) for way in ways]
     now = min(float(distinguished(distance.distances(())[0, 1])) for distance in distances)
-    for distance in distances if now < SURE else ():
+    for distance in distances if now < criteria.SURE else ():
         for key, rows in trials_of(campaign, posterior.problem.design, distance).items():
             chance = float(distinguished(distance.distances(rows)[0, 1]))
             after[key] = min(after.get(key, 1.0), chance)
@@ -159,7 +159,7 @@ def _pair(campaign: Campaign, posterior: Posterior, effects: tuple[str, str], wa
     return Pair(
         effects=effects,
         probability=now,
-        apart=now >= SURE,
+        apart=now >= criteria.SURE,
         trial=trial,
         test=TRIALS[trial].text if trial else "",
         with_trial=after.get(trial, now),
@@ -168,7 +168,7 @@ def _pair(campaign: Campaign, posterior: Posterior, effects: tuple[str, str], wa
 
 def _parting(after: Mapping[str, float], now: float) -> str:
     """The least work that is sure to part two effects, else what helps most; empty where nothing does."""
-    sure = [key for key, chance in after.items() if chance >= SURE]
+    sure = [key for key, chance in after.items() if chance >= criteria.SURE]
     if sure:
         return min(sure, key=runs_of)
     best = max(after, key=after.__getitem__, default="")

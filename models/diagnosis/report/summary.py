@@ -8,16 +8,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from models.diagnosis.criteria import (
-    COMPANION_FROM,
-    FAR_FROM_FIT,
-    FEW_STATES,
-    LARGE_AMPLITUDE,
-    MAX_WORDS,
-    VISIBLE_MENTIONED,
-    WEAK_EVIDENCE,
-    WORTHWHILE,
-)
+from models.diagnosis import criteria
 from models.diagnosis.design.design import CLOCK, CYCLES, FREQUENCY, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.fitted_effect import Estimate
@@ -146,7 +137,10 @@ def _short(sentences: Sequence[Sentence]) -> list[Sentence]:
     kept = list(sentences)
     for matters in (MAY, SHOULD):
         for place in range(len(kept) - 1, -1, -1):
-            if sum(len(sentence.text.split()) for sentence in kept) > MAX_WORDS and kept[place].matters == matters:
+            if (
+                sum(len(sentence.text.split()) for sentence in kept) > criteria.MAX_WORDS
+                and kept[place].matters == matters
+            ):
                 del kept[place]
     return kept
 
@@ -161,7 +155,7 @@ def _adequate(report: Report) -> list[Sentence]:
         )
     ]
     sentences += _unseen(report)
-    if report.states < FEW_STATES:
+    if report.states < criteria.FEW_STATES:
         say = "says" if report.states == 1 else "say"
         few = f"{count_of(report.states, 'state')} of use {say} little about a course over life."
         sentences.append(Sentence(few, SHOULD))
@@ -170,13 +164,15 @@ def _adequate(report: Report) -> list[Sentence]:
 
 def _unseen(report: Report) -> list[Sentence]:
     """What these data would miss: the effects that must be largest against what is usual to be seen."""
-    short = [v for v in report.visible if v.amplitude > LARGE_AMPLITUDE * v.usual]
+    short = [v for v in report.visible if v.amplitude > criteria.LARGE_AMPLITUDE * v.usual]
     worst = sorted(short, key=lambda v: (-v.least / v.usual, -v.amplitude / v.usual))
-    missed = [_missed(visible) for visible in worst[:VISIBLE_MENTIONED]]
+    missed = [_missed(visible) for visible in worst[: criteria.VISIBLE_MENTIONED]]
     sentences = [Sentence(f"These data would miss {conjunction(missed)}.")] if missed else []
     if reach := [v for v in report.visible if v not in short]:
         reach.sort(key=lambda v: v.amplitude / v.usual)
-        sizes = [f"{effect_name(v.effect)} from {_amount(v.amplitude, v.unit)}" for v in reach[:VISIBLE_MENTIONED]]
+        sizes = [
+            f"{effect_name(v.effect)} from {_amount(v.amplitude, v.unit)}" for v in reach[: criteria.VISIBLE_MENTIONED]
+        ]
         sentences.append(Sentence(f"Nine times in ten they would have shown {conjunction(sizes)}.", SHOULD))
     if report.unseen:
         names = conjunction([effect_name(slug) for slug in report.unseen])
@@ -220,7 +216,7 @@ def _named(report: Report) -> list[Sentence]:
     companions = [
         f"{effect_name(item.effect)} (probability {probability(item.probability)})"
         for item in report.candidates
-        if item.effect not in causes and item.probability >= COMPANION_FROM
+        if item.effect not in causes and item.probability >= criteria.COMPANION_FROM
     ]
     if companions:
         sentences.append(
@@ -247,7 +243,9 @@ def _ambiguous(report: Report) -> list[Sentence]:
         ]
         listed.append(f"{' together with '.join(names)} ({'; '.join([probability(item.probability), *sizes])})")
     first = "Something is wrong that the model does not explain, and these data cannot distinguish which of these it is"
-    if sum(len(alternative.split()) for alternative in listed) > MAX_WORDS // 2:  # the sizes are in the report's fields
+    if (
+        sum(len(alternative.split()) for alternative in listed) > criteria.MAX_WORDS // 2
+    ):  # the sizes are in the report's fields
         short = [
             alternative if alternative.endswith("))") or ";" not in alternative else f"{alternative.split(';')[0]})"
             for alternative in listed
@@ -325,7 +323,7 @@ def _gained(report: Report) -> list[Sentence]:
 def _hardest(gain: Gain, extended: Misfit | None) -> str:
     """Where held-out runs are predicted far worse than they were fitted, and how far from what was kept that is."""
     hardest = gain.hardest
-    if hardest is None or extended is None or gain.rmse_after < FAR_FROM_FIT * extended.rmse:
+    if hardest is None or extended is None or gain.rmse_after < criteria.FAR_FROM_FIT * extended.rmse:
         return ""
     pressed = hardest.axis == PRESSURE
     size, unit = (1e-5, "bar") if pressed else (1.0, "cycles")
@@ -343,7 +341,7 @@ def _next(report: Report) -> list[Sentence]:
     if not report.advice:
         return []
     best = report.advice[0]
-    if best.nats < WEAK_EVIDENCE:
+    if best.nats < criteria.WEAK_EVIDENCE:
         return [Sentence("No test that was considered would add evidence.")]
     chance = f"probability {probability(best.probability)}"
     if best.narrows:
@@ -352,7 +350,7 @@ def _next(report: Report) -> list[Sentence]:
     if best.other == BASELINE:
         return [Sentence(f"Next, to confirm it ({chance}): {best.test}.")]
     pair = f"{effect_name(best.effect)} from {effect_name(best.other)}"
-    if best.nats < WORTHWHILE:
+    if best.nats < criteria.WORTHWHILE:
         return [Sentence(f"No single test would decide. The best: {best.test} (it tells {pair}; {chance}).")]
     return [Sentence(f"Next: {best.test}. It tells {pair} ({chance}).")]
 

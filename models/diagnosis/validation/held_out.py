@@ -16,15 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import KAPPA, Laws
-from models.diagnosis.criteria import (
-    FEWEST_PRESSURES_HELD_OUT,
-    FEWEST_STATES_AHEAD,
-    FEWEST_STATES_HELD_OUT,
-    FORWARD_SHARE,
-    PRESSURE_FOLDS,
-    STATE_FOLDS,
-)
 from models.diagnosis.design.design import CYCLES, PRESSURE, Design
 from models.diagnosis.effects.fitted_effect import effect_columns, effect_precisions
 from models.diagnosis.noise.covariance import Noise, whitening
@@ -136,19 +129,24 @@ def _folds(design: Design) -> list[BoolArray]:
     folds = []
     # readings of the open clutch hold no friction to predict: they are never left out
     states, levels = np.unique(design.rows.cycles[design.closed]), design.levels
-    if states.size >= FEWEST_STATES_HELD_OUT:
-        inner = min(STATE_FOLDS, states.size)
+    if states.size >= criteria.FEWEST_STATES_HELD_OUT:
+        inner = min(criteria.STATE_FOLDS, states.size)
         # neighbouring states go into different folds
         folds += [design.closed & np.isin(design.rows.cycles, states[start::inner]) for start in range(inner)]
-    if levels.size >= FEWEST_PRESSURES_HELD_OUT:
-        folds += [np.isin(design.level, levels[1:][start::PRESSURE_FOLDS]) for start in range(PRESSURE_FOLDS)]
+    if levels.size >= criteria.FEWEST_PRESSURES_HELD_OUT:
+        folds += [
+            np.isin(design.level, levels[1:][start :: criteria.PRESSURE_FOLDS])
+            for start in range(criteria.PRESSURE_FOLDS)
+        ]
     return folds
 
 
 def _ahead(design: Design) -> BoolArray | None:
     states = np.unique(design.rows.cycles[design.closed])
-    count = max(1, round(FORWARD_SHARE * states.size))
-    return design.closed & (design.rows.cycles >= states[-count]) if states.size >= FEWEST_STATES_AHEAD else None
+    count = max(1, round(criteria.FORWARD_SHARE * states.size))
+    return (
+        design.closed & (design.rows.cycles >= states[-count]) if states.size >= criteria.FEWEST_STATES_AHEAD else None
+    )
 
 
 def _without(noise: Noise, out: BoolArray) -> Noise:

@@ -9,7 +9,7 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.baseline.prediction import lag_of
 from models.diagnosis.campaign import Campaign, DynamicRun
-from models.diagnosis.design import loop_bins
+from models.diagnosis.design import criteria
 from models.diagnosis.design.design import Design, Points, build_design
 from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
 from models.friction.stribeck import GAMMA, StribeckParameters, torque
@@ -141,7 +141,7 @@ def test_the_reference_test_from_rest_is_what_the_lag_law_says(
 
     assert off() < share
     # the control: with a second to settle in, slow friction still remembers its start
-    monkeypatch.setattr(loop_bins, "SETTLING_TIME", 1.0)
+    monkeypatch.setattr(criteria, "SETTLING_TIME", 1.0)
     assert (off() > 10 * share) == (attractor < 100)
 
 
