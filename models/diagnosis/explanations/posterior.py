@@ -270,7 +270,7 @@ class Search:
         one leads elsewhere: the screen of a loud effect is far from linear (heating of 15 % settled at 400 s, 103
         nats behind what it does at once)."""
         weights = self.weights()
-        slack = SLACK * max(weights[leader] - weights[NOTHING], 0.0)
+        slack = criteria.SLACK * max(weights[leader] - weights[NOTHING], 0.0)
         near = [a for a in self.nodes if len(a.causes) == 1 and not a.unknown and weights[a] + slack >= weights[leader]]
         for alternative in [a for a in near if a not in self._tried]:
             self._tried.add(alternative)
