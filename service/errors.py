@@ -50,9 +50,12 @@ class InvalidError(ServiceError, status=422, slug="invalid-content", title="The 
     """The request is understood and its content is wrong."""
 
     @classmethod
-    def of(cls, error: FieldError) -> "InvalidError":
+    def of(
+        cls, message: str, *, code: str, pointer: str = "", value: str = "", row: int | None = None
+    ) -> "InvalidError":
         """The one thing that is wrong."""
-        return cls(error.message, errors=[error])
+        error = FieldError(pointer=pointer, code=code, message=message, row=row, value=value[:MAX_QUOTED])
+        return cls(message, errors=[error])
 
 
 class NotFoundError(ServiceError, status=404, slug="not-found", title="Not found"):

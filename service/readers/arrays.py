@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.errors import FieldError, InvalidError, Notice
+from service.errors import InvalidError, Notice
 from service.readers.clocks import UNITS, stated_clock
 from service.readers.column_names import column_of, known_channel, recognised
 from service.readers.limits import Limits
@@ -65,7 +65,7 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
             else ""
         )
         message = f"the file holds no array of numbers that could be a channel{hint}"
-        raise InvalidError.of(FieldError(pointer="", code="no_arrays", message=message))
+        raise InvalidError.of(message, code="no_arrays")
     if len(sources) > limits.most_columns:
         raise InvalidError(f"a file must not have more than {limits.most_columns} arrays, got {len(sources)}")
     if len({source.column.group for source in sources}) == 1:
@@ -133,8 +133,9 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
     across = 0 if shape[0] < shape[1] else 1
     width = shape[across]
     lists = [texts for texts in map(_texts, {**beside, **leaf.attributes}.values()) if len(texts) == width]
-    names = max(lists, key=lambda texts: (recognised(texts, ()), not all(map(is_unit, texts))), default=[])
-    units = next((texts for texts in lists if texts is not names and any(map(is_unit, texts))), [])
+    units = max(lists, key=_known_units, default=[])
+    units = units if 2 * _known_units(units) > width else []
+    names = max((texts for texts in lists if texts is not units), key=lambda texts: recognised(texts, ()), default=[])
     for index in range(width):
         title = names[index] if names else f"{name}[{index + 1}]"
         place = (index, slice(None)) if across == 0 else (slice(None), index)
@@ -144,6 +145,10 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
         yield _Source(
             replace(column, rows=shape[1 - across], clock=_clock(leaf, beside, shape[1 - across])), leaf, place
         )
+
+
+def _known_units(texts: list[str]) -> int:
+    return sum(map(is_unit, texts))
 
 
 def _titled(title: str, unit: str | None, group: str) -> dict[str, Any]:
@@ -229,7 +234,7 @@ def _values(source: _Source) -> NDArray[Any]:
             message = (
                 f"{shown}: save its physical values, or name the factor scale_factor where it is still to be applied"
             )
-            raise InvalidError.of(FieldError(pointer="", code="raw_counts", message=message))
+            raise InvalidError.of(message, code="raw_counts")
     factor, offset = (stated.get(name, default) for name, default in (("scale_factor", 1.0), ("add_offset", 0.0)))
     none = [value for name in ("_fillvalue", "missing_value") if (value := stated.get(name)) is not None]
     invalid = np.isin(values, none) if none and values.dtype.kind in "iuf" else None

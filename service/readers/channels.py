@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from service.columns import LineOf, check_arrays
-from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice, TooLargeError
+from service.errors import MAX_QUOTED, InvalidError, Notice, TooLargeError
 from service.readers.column_names import Taken, choose, is_counter, known_channel
 from service.readers.limits import Limits
 from service.readers.long_table import widened
@@ -62,7 +62,7 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     Raises InvalidError where a unit or a clock is not clear, a value is no number, or nothing is known; TooLargeError on too
     many values.
     """
-    table = widened(table, reading)
+    table, reading = widened(table, reading)
     taken = choose(table.columns, reading)
     series, table, taken, counts = _read(table, taken, reading, limits)
     notices = [*table.notices, *_left_out(table.columns, taken, reading)]
@@ -119,7 +119,7 @@ def _clocks(
         if following is None or not _agree(values[unused], values[following]):
             shown = " and ".join(columns[index].title or columns[index].shown() for index in times[:_MAX_NAMED])
             message = f"time_s must be one column, got {shown}; time=NAME chooses one"
-            raise InvalidError.of(FieldError(pointer="/time", code="ambiguous", message=message))
+            raise InvalidError.of(message, code="ambiguous", pointer="/time")
         if np.unique(values[unused]).size > np.unique(values[following]).size:
             clocks = {index: unused if clock == following else clock for index, clock in clocks.items()}
     return clocks
@@ -157,8 +157,10 @@ def _read(
         refuse_stand_ins(column.channel, read[column.index], table.line_of, reading)
     values: dict[int, FloatArray] = {}
     valid: dict[int, NDArray[np.bool_] | None] = {}
+    dated = [read[column.index] for column in taken if read[column.index].dtype.kind == "M"]
+    start = min((moments[~np.isnat(moments)].min() for moments in dated if not np.isnat(moments).all()), default=None)
     for column in taken:
-        values[column.index], valid[column.index] = _numbers(column, read.pop(column.index))
+        values[column.index], valid[column.index] = _numbers(column, read.pop(column.index), start)
         if column.channel == "time_s" and column.assumed:
             _refuse_serials(table.columns[column.index], values[column.index])
     taken = [column for column in taken if not column.guessed or _runs_on(values[column.index])]
@@ -212,8 +214,8 @@ def _without_gaps(name: str, own: _Series, table: Table, leave_out: bool) -> _Se
     return own
 
 
-def _numbers(column: Taken, values: NDArray[Any]) -> tuple[FloatArray, NDArray[np.bool_] | None]:
-    """Values in the channel's unit and which of them are valid; points in time as seconds since the first.
+def _numbers(column: Taken, values: NDArray[Any], start: Any) -> tuple[FloatArray, NDArray[np.bool_] | None]:
+    """Values in the channel's unit and which of them are valid; points in time as seconds since `start`.
 
     Raises InvalidError on any other type.
     """
@@ -221,12 +223,12 @@ def _numbers(column: Taken, values: NDArray[Any]) -> tuple[FloatArray, NDArray[n
     valid = ~mask if mask is not None and mask.any() else None
     values = np.asarray(values)
     if column.channel == "time_s" and values.dtype.kind in "Mm":
-        since = values - values[:1] if values.dtype.kind == "M" else values
+        since = values - start if values.dtype.kind == "M" and start is not None else values
         return np.where(np.isnat(since), np.nan, since / _SECOND), valid
     if values.dtype.kind not in "iuf" or values.ndim != 1:
         shown = f"values of type {values.dtype}" if values.ndim == 1 else f"{values.ndim} dimensions"
         message = f"{column.channel} must be numbers, got {shown}"
-        raise InvalidError.of(FieldError(pointer=f"/channels/{column.channel}", code="not_a_number", message=message))
+        raise InvalidError.of(message, code="not_a_number", pointer=f"/channels/{column.channel}")
     numbers = np.array(values, dtype=np.float64) if values.dtype != np.float64 or not values.flags.writeable else values
     column.conversion.apply(numbers)
     return numbers, valid
@@ -255,7 +257,7 @@ def _refuse_serials(column: Column, times: FloatArray) -> None:
         f"{column.shown()} may be {meaning}, or seconds, got {times[0]:.9g} and steps of {step:.3g}: "
         f"map=time_s:{name} [{unit}], or [s], says which"
     )
-    raise InvalidError.of(FieldError(pointer="/map", code="missing_unit", message=message))
+    raise InvalidError.of(message, code="missing_unit", pointer="/map")
 
 
 def _is_our_time(times: FloatArray) -> bool:
@@ -297,7 +299,7 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
     for name, own in series.items():
         if own.times is not None and own.times.size != own.values.size:
             message = f"{name} has {own.values.size} rows and its times {own.times.size}"
-            raise InvalidError.of(FieldError(pointer=f"/channels/{name}", code="ragged", message=message))
+            raise InvalidError.of(message, code="ragged", pointer=f"/channels/{name}")
     columns: dict[str, FloatArray] = {} if lead.times is None else {"time_s": lead.times}
     kept = np.ones(lead.values.size, dtype=np.bool_)
     invalid: dict[str, int] = {}
@@ -321,7 +323,7 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
         return columns
     if not kept.any():
         message = "no sample is left: the channels have no time in common at which all are valid"
-        raise InvalidError.of(FieldError(pointer="/channels", code="empty", message=message))
+        raise InvalidError.of(message, code="empty", pointer="/channels")
     return {name: column[kept] for name, column in columns.items()}
 
 
@@ -341,7 +343,7 @@ def _refuse_lengths(series: Mapping[str, _Series], lengths: Mapping[str, int]) -
         message = (
             f"all channels must be sampled by one clock, or each have its own; without a time: {', '.join(timeless)}"
         )
-    raise InvalidError.of(FieldError(pointer="", code="ragged", message=message))
+    raise InvalidError.of(message, code="ragged")
 
 
 def _resampled(
@@ -352,7 +354,7 @@ def _resampled(
     assert lead.times is not None  # noqa: S101
     if own.times.size == 0 or not (np.diff(own.times) > 0).all():
         message = f"{name} is sampled by a clock of its own, whose times must increase"
-        raise InvalidError.of(FieldError(pointer=f"/channels/{name}", code="time_backwards", message=message))
+        raise InvalidError.of(message, code="time_backwards", pointer=f"/channels/{name}")
     after = np.clip(np.searchsorted(own.times, lead.times), 1, max(own.times.size - 1, 1))
     valid = None
     if own.valid is not None and own.times.size > 1:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from models.arrays import FloatArray
-from service.errors import MAX_QUOTED, FieldError, InvalidError
+from service.errors import MAX_QUOTED, InvalidError
 from service.readers.table import Clock
 from service.readers.unit_table import conversion
 
@@ -88,4 +88,4 @@ def _in_hertz(number: float, unit: str, key: str) -> float:
 
 def _unknown(unit: str, key: str) -> InvalidError:
     message = f"the unit of {key[:MAX_QUOTED]} must be known, got {unit[:MAX_QUOTED]!r}"
-    return InvalidError.of(FieldError(pointer="", code="unknown_unit", message=message))
+    return InvalidError.of(message, code="unknown_unit")

@@ -117,7 +117,7 @@ def column_of(text: str, unit: str | None = None, group: str = "") -> Column:
         message = (
             f"a column's title must not be longer than {LONGEST_TITLE} characters, got {len(title)}: {shown!r} ..."
         )
-        raise InvalidError.of(FieldError(pointer="", code="title_too_long", message=message, value=shown))
+        raise InvalidError.of(message, code="title_too_long", value=shown)
     name, own = _taken_apart(" ".join(title.translate(_WIDE).split()))
     column = Column(name, own, group, title)
     return column if unit is None else with_unit(column, unit)
@@ -163,7 +163,7 @@ def with_unit(column: Column, unit: str | None) -> Column:
         if channel is None or conversion(channel, stated) != conversion(channel, column.unit):
             both = f"{column.unit[:MAX_QUOTED]!r} and {stated[:MAX_QUOTED]!r}"
             message = f"column {column.shown()!r} must be in one unit, got {both}"
-            raise InvalidError.of(FieldError(pointer="", code="mixed_units", message=message, value=both))
+            raise InvalidError.of(message, code="mixed_units", value=both)
     return replace(column, unit=stated or column.unit)
 
 
@@ -192,7 +192,7 @@ def parse_map(mapping: str | None) -> dict[str, Choice]:
 
 def _wrong_map(value: str, rule: str) -> InvalidError:
     message = f"map {rule}, got {value[:MAX_QUOTED]!r}"
-    return InvalidError.of(FieldError(pointer="/map", code="invalid_map", message=message, value=value[:MAX_QUOTED]))
+    return InvalidError.of(message, code="invalid_map", pointer="/map", value=value)
 
 
 def choices_of(reading: Reading) -> dict[str, Choice]:
@@ -316,7 +316,7 @@ def _find(columns: Sequence[Column], channel: str, name: str) -> int:
     message = (
         f"map names for {channel} the column {name[:MAX_QUOTED]!r}, which is not there; there are {_list(columns)}"
     )
-    raise InvalidError.of(FieldError(pointer="/map", code="no_such_column", message=message, value=name[:MAX_QUOTED]))
+    raise InvalidError.of(message, code="no_such_column", pointer="/map", value=name)
 
 
 def _twice(channel: str, *columns: Column) -> InvalidError:
@@ -327,7 +327,7 @@ def _twice(channel: str, *columns: Column) -> InvalidError:
     distinct = len(set(names)) == len(names)
     way = f"map={channel}:NAME chooses one" if distinct else "their names must differ"
     message = f"{channel} must be one column, got {shown}; {way}"
-    return InvalidError.of(FieldError(pointer=f"/channels/{channel}", code="ambiguous", message=message, value=shown))
+    return InvalidError.of(message, code="ambiguous", pointer=f"/channels/{channel}", value=shown)
 
 
 def _list(columns: Sequence[Column]) -> str:
@@ -397,6 +397,4 @@ def _conversion(channel: str, column: Column, choice: Choice | None, unit: str |
 def _wrong_unit(channel: str, column: Column, code: str, rule: str, got: str) -> InvalidError:
     shown = channel if _key(column.name) == channel else f"{channel} (column {column.shown()!r})"
     message = f"{shown}: the unit {rule}, got {got}"
-    return InvalidError.of(
-        FieldError(pointer=f"/channels/{channel}", code=code, message=message, value=(column.unit or "")[:MAX_QUOTED])
-    )
+    return InvalidError.of(message, code=code, pointer=f"/channels/{channel}", value=(column.unit or ""))

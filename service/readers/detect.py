@@ -1,15 +1,17 @@
-"""The format of a file, by its first bytes and its suffix; and its bytes, unpacked where it is packed with gzip."""
+"""The format of a file, by its first bytes and its suffix; and its bytes, unpacked where it is packed with gzip or one of
+those in a ZIP archive, no further than the limits allow."""
 
 import gzip
+import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import StrEnum
-from pathlib import Path, PurePath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import BinaryIO, Protocol
 
-from service.errors import MAX_QUOTED, BusyError, FieldError, InvalidError, TooLargeError
+from service.errors import MAX_QUOTED, BusyError, InvalidError, TooLargeError
 from service.readers.limits import Limits
 
 
@@ -79,6 +81,14 @@ _FOREIGN = {
     b"[{": "JSON: post it to the address of the runs",
     b"{": "JSON: post it to the address of the runs",
 }
+#: Suffixes of what is never a record; files in an archive are often accompanied by such.
+_NO_RECORDS = (
+    ".pdf", ".png", ".jpg", ".jpeg", ".docx", ".doc", ".md", ".html", ".xml", ".json", ".zip", ".exe", ".py", ".m",
+)  # fmt: skip
+_BLOCK = 1 << 20
+_MAX_MEMBERS = 10_000
+#: What zipfile raises on an archive that is damaged or encrypted, or packed in a way that it does not know.
+_DAMAGED = (OSError, ValueError, EOFError, RuntimeError, NotImplementedError, zipfile.BadZipFile, zlib.error)
 #: Bytes that are read to detect the format; every magic number is shorter.
 _HEAD = 4096
 
@@ -107,7 +117,7 @@ class _Unpacked:
     def __init__(self, file: BinaryIO, size: int, limits: Limits) -> None:
         self._unpacking = gzip.GzipFile(fileobj=file)
         self._packed = size
-        self._most = min(limits.most_bytes, max(limits.free_bytes, limits.most_ratio * size))
+        self._most = _most_unpacked(size, limits)
         self._done = 0
 
     def read(self, size: int, /) -> bytes:
@@ -151,16 +161,67 @@ def _of_archive(path: Path) -> Format:
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
-    except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError):
+    except _DAMAGED:
         return Format.ZIP
     workbook = "[Content_Types].xml" in names or {"mimetype", "content.xml"} <= set(names)
     return Format.WORKBOOK if workbook else Format.ZIP
 
 
+def check_archive(path: Path, limits: Limits) -> list[zipfile.ZipInfo]:
+    """The files of an archive that states to unpack to no more than the limits allow. Raises InvalidError, TooLargeError."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            listed = archive.infolist()
+    except _DAMAGED as error:
+        raise InvalidError(f"the ZIP archive cannot be read: {error}") from None
+    if len(listed) > _MAX_MEMBERS:
+        raise TooLargeError(f"a ZIP archive must not hold more than {_MAX_MEMBERS} files, got {len(listed)}")
+    packed = path.stat().st_size
+    most = _most_unpacked(packed, limits)
+    if sum(info.file_size for info in listed) > most:
+        raise TooLargeError(f"a ZIP archive of {packed} bytes must not unpack to more than {most} bytes, got more")
+    return listed
+
+
+def _most_unpacked(packed: int, limits: Limits) -> int:
+    """Bytes that a packed file of so many may unpack to."""
+    return min(limits.most_bytes, max(limits.free_bytes, limits.most_ratio * packed))
+
+
+def members(path: Path, limits: Limits) -> list[str]:
+    """The names of the files in an archive that may be records."""
+    # zipfile takes no empty name for a folder's
+    listed = [info for info in check_archive(path, limits) if info.filename and not info.is_dir() and info.file_size]
+    return [
+        info.filename
+        for info in listed
+        if not PurePosixPath(info.filename).name.startswith(".")
+        and "__MACOSX/" not in info.filename
+        and not info.filename.lower().endswith(_NO_RECORDS)
+    ]
+
+
+@contextmanager
+def unpacked(path: Path, name: str, limits: Limits) -> Iterator[Path]:
+    """One file of an archive, beside it. Raises InvalidError where it is encrypted or damaged, else TooLargeError."""
+    most = _most_unpacked(path.stat().st_size, limits)
+    with tempfile.NamedTemporaryFile(dir=path.parent) as plain:
+        try:
+            with zipfile.ZipFile(path) as archive, archive.open(name) as member:
+                while block := member.read(_BLOCK):
+                    plain.write(block)
+                    if plain.tell() > most:
+                        raise TooLargeError(f"{name!r} must not unpack to more than {most} bytes, got more")
+        except _DAMAGED as error:
+            raise InvalidError(f"{name!r} in the ZIP archive cannot be unpacked: {error}") from None
+        plain.flush()
+        yield Path(plain.name)
+
+
 def too_slow(kind: Format, limits: Limits) -> InvalidError:
     """The error of a file that takes more of a processor's time than it may."""
     message = f"the {kind} file cannot be read: it took longer than {limits.seconds} s of a processor"
-    return InvalidError.of(FieldError(pointer="", code="too_slow", message=message))
+    return InvalidError.of(message, code="too_slow")
 
 
 def overdue(kind: Format, limits: Limits) -> BusyError:

@@ -8,13 +8,13 @@ name over several columns may stand there too.
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 from typing import Any
 
-from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice
+from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers.column_names import bare_unit, column_of, known_channel, recognised
-from service.readers.limits import LONGEST_TITLE
-from service.readers.numerals import is_stamp
+from service.readers.limits import LONGEST_TITLE, LONGEST_UNIT
+from service.readers.numerals import NUMBER, is_stamp
 from service.readers.table import Column
 from service.readers.unit_table import conversion, is_unit
 
@@ -153,16 +153,16 @@ def _layout(
     start, labelled = _without_labelled(rows[:-1], comments, start, length)
     above = _text_rows_above(rows, comments, start)
     width = max((index + 1 for index, cell in enumerate(rows[start]) if cell not in (None, "")), default=0)
-    counted = _are_counted([row for row in rows[start : start + length] if not is_blank(row)][:_LONG_RUN])
+    data = [row for row in rows[start : start + length] if not is_blank(row)][:_LONG_RUN]
     best: tuple[tuple[int, int, int], list[str], int] | None = None
     for place, at in enumerate(above):
-        for titles in _titles(rows, above[place:], width, counted=counted):
+        for titles in _titles(rows, above[place:], width, data):
             filled = sum(map(bool, titles))
             channel_count = recognised(titles, named)
             enough = filled >= width if at in comments else filled >= min(2, width) or channel_count
             rank = (
                 channel_count,
-                int(len(titles) == width and max(map(len, titles), default=0) <= LONGEST_TITLE),
+                -abs(len(titles) - width) - LONGEST_TITLE * (max(map(len, titles), default=0) > LONGEST_TITLE),
                 int(not _are_units(titles)),
             )
             if enough and (best is None or rank > best[0]):
@@ -195,7 +195,7 @@ def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) 
     return text_rows
 
 
-def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int, *, counted: bool) -> Iterator[list[str]]:
+def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int, data: Sequence[Row]) -> Iterator[list[str]]:
     """The titles that a row may give: its own texts, those of all columns but the first, its gaps filled from above, and
     both rows' texts joined."""
     own = [_text(cell) for cell in rows[upwards[0]]]
@@ -204,7 +204,7 @@ def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int, *, counted:
     yield own
     if _are_units(own):
         return
-    if len(own) == width - 1 and counted:
+    if len(own) == width - 1 and _have_names(data, own):
         yield ["", *own]
     for row in upwards[1:2] if len(own) > 1 else upwards[1:]:
         above = [_text(cell) for cell in rows[row]]
@@ -217,11 +217,20 @@ def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int, *, counted:
         yield [f"{other} {name}".strip() for name, other in zip(padded, _filled(above, size), strict=False)]
 
 
-def _are_counted(rows: Sequence[Row]) -> bool:
-    """Whether rows of data begin with their numbers or with names, which no title stands above: R's row names."""
-    first = [_text(row[0]) if row else "" for row in rows]
-    counts = [[str(k + start) for k in range(len(first))] for start in (0, 1)]
-    return len(first) > 1 and (first in counts or (all(first) and not any(map(is_value, first))))
+def _have_names(rows: Sequence[Row], titles: Sequence[str]) -> bool:
+    """Whether rows of data begin with a name that no title stands above, as R writes them: a word, or numbers that count,
+    where the column after that of the times runs on as times do."""
+    first = [_text(row[0]) for row in rows]
+    if len(first) < 2 or not any(map(is_value, first)):
+        return len(first) > 1 and all(first)
+    timed = [
+        place for place, title in enumerate(titles) if known_channel(column_of(title[:LONGEST_TITLE]).name) == "time_s"
+    ]
+    if not timed or not all(cell.isdecimal() and len(cell) < LONGEST_UNIT for cell in first):
+        return False
+    numbers = [_text(row[timed[0] + 1]).replace(",", ".") for row in rows if len(row) == len(titles) + 1]
+    runs_on = all(NUMBER.fullmatch(cell) for cell in numbers) and all(b > a for a, b in pairwise(map(float, numbers)))
+    return all(int(b) == int(a) + 1 for a, b in pairwise(first)) and runs_on and len(numbers) == len(rows)
 
 
 def _filled(texts: Sequence[str], size: int) -> list[str]:
@@ -263,10 +272,10 @@ def _beside(units: Sequence[str], titles: Sequence[str], width: int) -> Iterator
     that are known, or known and no time, one after the other, as writers leave out what needs none."""
     yield units
     stated = [unit for unit in units if unit and not _UNIT_LABELS.fullmatch(unit)]
-    known = [known_channel(column_of(title).name) if len(title) <= LONGEST_TITLE else None for title in titles]
+    channels = [known_channel(column_of(title).name) if len(title) <= LONGEST_TITLE else None for title in titles]
     for places in (
-        [place for place, channel in enumerate(known) if channel],
-        [place for place, channel in enumerate(known) if channel not in (None, "time_s")],
+        [place for place, channel in enumerate(channels) if channel],
+        [place for place, channel in enumerate(channels) if channel not in (None, "time_s")],
     ):
         in_order = dict(zip(places, stated, strict=False))
         if (
@@ -316,4 +325,4 @@ def no_table(
         place, rule = filled[0], "a header with the channels' names, above rows of numbers"
     shown = " ".join(map(_text, rows[place] if rows else ())).strip()[:MAX_QUOTED]
     message = f"line {line_of(place)} must be {rule}, got {shown!r}"
-    return InvalidError.of(FieldError(pointer="", code="no_header", message=message, value=shown))
+    return InvalidError.of(message, code="no_header", value=shown)

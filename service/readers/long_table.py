@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice
+from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers.column_names import choices_of, choose, column_of, is_time, known_channel, recognised
 from service.readers.grid import is_value
 from service.readers.limits import LIMITS
@@ -24,11 +24,15 @@ from service.readers.unit_table import is_unit
 #: Rows of a table without lines by which its columns are judged, as many as others show.
 _MAX_LOOKED_AT = 20
 _VALUES = re.compile(r"val(?!id)|wert|reading|messung|数值|値|^y$", re.IGNORECASE)
+#: A column that says which values are valid, and what it says of those that are: in words, as a flag, by OPC's code.
+_QUALITY = re.compile(r"quality|valid|qualit|gültig", re.IGNORECASE)
+_GOOD = ("good", "ok", "valid", "true", "1", "1.0", "192", "192.0", "gut", "gültig")
 _SECOND = np.timedelta64(1, "s")
 
 
-def widened(table: Table, reading: Reading) -> Table:
-    """The table with a column for each name, every one with its own times; the table itself where it is of another form.
+def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
+    """The table with a column for each name, every one with its own times, and how it is read then; the table itself where
+    it is of another form.
 
     Raises InvalidError where the column of values or of times is not clear, or a channel has several units.
     """
@@ -36,23 +40,28 @@ def widened(table: Table, reading: Reading) -> Table:
     named = [choice.column for channel, choice in choices_of(reading).items() if channel != "time_s"]
     titles = {text for column in columns for text in (column.title, column.name)}
     if len(columns) < 2 or titles & set(named) or {known_channel(name) for name in titles} - {None, "time_s"}:
-        return table
+        return table, reading
     head = _head(table)
     words = [index for index, cells in head.items() if cells and not any(map(is_value, cells))]
     best = max(words, key=lambda index: recognised(_distinct(head[index]), named), default=None)
     if best is None or not recognised(_distinct(head[best]), named):
-        return table
+        return table, reading
     unit = next((index for index in words if index != best and all(map(is_unit, head[index]))), None)
     timed = _time(columns, reading)
     value = _value(
         columns, [index for index, cells in head.items() if cells and all(map(is_value, cells))], best, reading
     )
-    wanted = {index: "" for index in (best, unit) if index is not None} | {value: columns[value].shown()}
+    marked = next((index for index, column in enumerate(columns) if _QUALITY.search(column.name)), None)
+    wanted = {index: "" for index in (best, unit, marked) if index is not None} | {value: columns[value].shown()}
     cells = read_cells(table, wanted | ({} if timed is None else {timed[0]: "time_s"}), reading)
     names = np.array([str(cell).strip() for cell in cells[best].tolist()], dtype=object)
     units = np.array(
         [str(cell).strip() for cell in cells[unit].tolist()] if unit is not None else [""] * names.size, dtype=object
     )
+    if marked is not None:
+        qualities = np.array([str(cell).strip().casefold() for cell in cells[marked].tolist()], dtype=object)
+        good = np.isin(qualities, _GOOD) if np.isin(qualities, _GOOD).any() else qualities == qualities[0]
+        cells[value] = np.ma.MaskedArray(cells[value], mask=np.ma.getmaskarray(cells[value]) | ~good)
     times = None if timed is None else _seconds(cells[timed[0]], timed[1])
     rows = {name: np.flatnonzero(names == name) for name in dict.fromkeys(names.tolist()) if name}
     if len(rows) > LIMITS.most_columns:
@@ -64,7 +73,7 @@ def widened(table: Table, reading: Reading) -> Table:
     message = (
         f"the table has a row for each value: the {len(rows)} channels in {columns[best].shown()} were read as columns"
     )
-    return replace(
+    wide = replace(
         table,
         columns=tuple(_column(name, set(units[own].tolist()), own, times) for name, own in rows.items()),
         read=read,
@@ -73,6 +82,8 @@ def widened(table: Table, reading: Reading) -> Table:
         breaks=(),
         notices=[*table.notices, Notice(code="long_table", message=message)],
     )
+    untimed = {channel: choice for channel, choice in reading.mapping.items() if channel != "time_s"}
+    return wide, replace(reading, mapping=untimed, time=NO_TIME if reading.time == NO_TIME else "")
 
 
 def _head(table: Table) -> dict[int, list[Any]]:
@@ -97,7 +108,7 @@ def _time(columns: Sequence[Column], reading: Reading) -> tuple[int, Any] | None
     if len(places) > 1 and not named:
         shown = " and ".join(columns[index].shown() for index in places)
         message = f"time_s must be one column, got {shown}; time=NAME chooses one"
-        raise InvalidError.of(FieldError(pointer="/time", code="ambiguous", message=message))
+        raise InvalidError.of(message, code="ambiguous", pointer="/time")
     if not places:
         return None
     mapping = {} if named is None else {"time_s": named}
@@ -119,15 +130,15 @@ def _value(columns: Sequence[Column], numeric: Sequence[int], names: int, readin
         and (timed is None or timed.column not in (columns[index].title, columns[index].name))
     ]
     called = [index for index in others if _VALUES.search(columns[index].name)]
-    for found in (called, others):
-        if len(found) == 1:
-            return found[0]
+    for places in (called, others):
+        if len(places) == 1:
+            return places[0]
     shown = ", ".join(columns[index].shown() for index in called or others) or "none"
     message = (
         f"the table has a row for each value, whose channel {columns[names].shown()} names: one column must hold the "
         f"values, got {shown}; call it 'value', or save the table with a column for each channel"
     )
-    raise InvalidError.of(FieldError(pointer="", code="long_table", message=message))
+    raise InvalidError.of(message, code="long_table")
 
 
 def _seconds(times: NDArray[Any], conversion: Any) -> NDArray[np.float64]:
@@ -143,6 +154,6 @@ def _column(name: str, units: set[str], rows: NDArray[np.intp], times: NDArray[n
     if len(units) > 1:
         both = " and ".join(sorted(units))[:MAX_QUOTED]
         message = f"channel {name[:MAX_QUOTED]!r} must be in one unit, got {both}"
-        raise InvalidError.of(FieldError(pointer="", code="mixed_units", message=message))
+        raise InvalidError.of(message, code="mixed_units")
     clock = None if times is None else Clock(name, partial(times.__getitem__, rows))
     return replace(column_of(name, next(iter(units))), rows=rows.size, clock=clock)

@@ -15,7 +15,7 @@ from asammdf.blocks import v4_constants as v4c
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice
+from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers.column_names import choices_of, column_of
 from service.readers.limits import Limits
 from service.readers.table import Clock, Column, Reading, Table, cut_short
@@ -88,7 +88,7 @@ def _times(file: Any, group: int) -> FloatArray:
     converted = conversion("time_s", unit)
     if converted is None:
         message = f"the unit of the time of {_name(file, group)!r} must be known, got {unit[:MAX_QUOTED]!r}"
-        raise InvalidError.of(FieldError(pointer="", code="unknown_unit", message=message))
+        raise InvalidError.of(message, code="unknown_unit")
     times = np.array(file.get_master(group), dtype=np.float64)
     converted.apply(times)
     return times
@@ -118,7 +118,7 @@ def _refuse_formula(file: Any, group: int, index: int) -> None:
             f"{channel.name[:MAX_QUOTED]} is converted by a formula (MDF4 algebraic conversion), which is not computed "
             "here: record it with a linear, rational or tabular conversion, or export its physical values"
         )
-        raise InvalidError.of(FieldError(pointer="", code="algebraic_conversion", message=message))
+        raise InvalidError.of(message, code="algebraic_conversion")
 
 
 def _has_formula(conversion: Any, depth: int = 0) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import FieldError, InvalidError, Notice
+from service.errors import InvalidError, Notice
 from service.readers.numerals import NUMBER
 from service.readers.table import NO_MISSING, LineOf, Reading, Table, marks, place
 
@@ -84,9 +84,7 @@ def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, re
         f"{column.size} rows; half of the others lie between {np.quantile(measured, 0.25):.6g} and "
         f"{np.quantile(measured, 0.75):.6g}: missing={missing} leaves it out, missing={NO_MISSING} takes it as measured"
     )
-    raise InvalidError.of(
-        FieldError(pointer=f"/channels/{name}/{row}", row=row + 1, value=shown, code="no_value", message=message)
-    )
+    raise InvalidError.of(message, code="no_value", pointer=f"/channels/{name}/{row}", row=row + 1, value=shown)
 
 
 def _stand_in(column: FloatArray, *, steady: bool) -> float | None:

@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date, datetime, time, timedelta
 from decimal import Decimal
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -25,49 +26,45 @@ NUMBER = re.compile(r"[+-]?(\d++(\.\d*+)?|\.\d++)([eE][+-]?\d{1,4})?|[+-]?(nan|i
 _PLAIN = dict.fromkeys(map(ord, "0123456789.eE+-\n"))
 #: Thousands apart by an apostrophe or a blank, at the beginning of a cell.
 _APART = re.compile(r"^[+-]?[1-9]\d{0,2}(?:['’ \u00a0\u202f\u2009]\d{3})+(?![\d'’ \u00a0\u202f\u2009])", re.MULTILINE)
-_SIGNS = (".", ",")
 
 
-def _patterns(sign: str, other: str) -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]:
-    """Cells that show `sign` to be the decimal's; that show it to group; and that hold it as groups may."""
-    c, d = re.escape(sign), re.escape(other)
-    decimal = rf"^[+-]?(?:(?:0\d*|\d{{4,}}|){c}\d*|\d+{c}(?:\d{{0,2}}|\d{{4,}})|\d*{c}\d*[eE][+-]?\d+)$"
-    groups = rf"[+-]?(?!0)\d{{1,3}}(?:{c}\d{{2,3}})*{c}\d{{3}}"
-    grouping = rf"^(?:{groups}{d}\d*|[+-]?\d{{1,3}}(?:{c}\d{{2,3}})+{c}\d{{3}})$"
-    return (
-        re.compile(decimal, re.MULTILINE | re.ASCII),
-        re.compile(grouping, re.MULTILINE | re.ASCII),
-        re.compile(rf"{groups}(?:{d}\d*)?", re.ASCII),
-    )
+def _readable(decimal: str, groups: str) -> re.Pattern[str]:
+    """Cells that are numbers where `decimal` is the decimal sign and `groups` may group thousands (1,100; 1,23,456)."""
+    d, g = re.escape(decimal), re.escape(groups)
+    grouped = rf"(?!0)\d{{1,3}}(?:{g}\d{{2,3}})*{g}\d{{3}}(?:{d}\d*)?"
+    return re.compile(rf"[+-]?(?:{grouped}|\d+{d}?\d*(?:[eE][+-]?\d+)?|{d}\d+(?:[eE][+-]?\d+)?)", re.ASCII)
 
 
-_DECIMAL, _GROUPING, _GROUPED = (
-    dict(zip(_SIGNS, kind, strict=True)) for kind in zip(*(_patterns(*pair) for pair in (_SIGNS, _SIGNS[::-1])), strict=True)
-)  # fmt: skip
+_READABLE = {".": _readable(".", ","), ",": _readable(",", ".")}
+
+
+def _decimals(cell: Any) -> list[str]:
+    """The decimal signs by which a cell with a sign can be read."""
+    if not isinstance(cell, str) or ("." not in cell and "," not in cell):
+        return []
+    return [decimal for decimal, number in _READABLE.items() if number.fullmatch(cell.strip())]
 
 
 class Numerals:
     """The cells of one file: its decimal sign is given, or shown by the first cell that can be read in one way ("" until
-    then), and the dates of each column follow one order."""
+    then), the dates of each column follow one order, and all points in time are counted from one."""
 
     def __init__(self, reading: Reading) -> None:
         self.decimal = reading.decimal
         self._missing = {"", *marks(reading.missing)}
         self._stamps: dict[int, Stamps] = {}
+        self._origin: list[int] = []
 
     def settle(self, columns: Sequence[Sequence[Any]]) -> bool:
         """Learn the decimal sign from columns of cells; whether it is still open and a cell may be read in two ways."""
-        doubtful, shown = False, []
-        for cells in columns if not self.decimal else ():
-            text = "\n".join([cell.strip() for cell in cells if isinstance(cell, str)])
-            for sign, other in (_SIGNS, _SIGNS[::-1]):
-                if sign in text:
-                    shown += [(match.start(), sign) for match in (_DECIMAL[sign].search(text),) if match]
-                    shown += [(match.start(), other) for match in (_GROUPING[sign].search(text),) if match]
-                    doubtful = doubtful or any(map(_GROUPED[sign].fullmatch, text.split("\n")))
-        if shown:
-            self.decimal = min(shown)[1]
-        return doubtful and not shown
+        doubtful = False
+        for row in zip_longest(*columns) if not self.decimal else ():
+            for signs in map(_decimals, row):
+                if len(signs) == 1:
+                    self.decimal = signs[0]
+                    return False
+                doubtful = doubtful or len(signs) > 1
+        return doubtful
 
     def values(
         self,
@@ -85,7 +82,7 @@ class Numerals:
         if self.settle([cells for name, cells in zip(channels.values(), columns, strict=True) if name]):
             for name, cells in zip(channels.values(), columns, strict=True):
                 for row, cell in enumerate(cells):
-                    if isinstance(cell, str) and any(_GROUPED[sign].fullmatch(cell.strip()) for sign in _SIGNS):
+                    if len(_decimals(cell)) > 1:
                         raise _doubtful(name, before + row, cell.strip(), line_of)
         read: dict[int, NDArray[Any]] = {}
         wrong: list[tuple[int, str, str, str]] = []
@@ -125,7 +122,7 @@ class Numerals:
             cells = [cell.isoformat() for cell in cells]
         elif kinds != {str} or (index not in self._stamps and not is_stamp(cells[0])):
             return None
-        return self._stamps.setdefault(index, Stamps()).since_first(cells)
+        return self._stamps.setdefault(index, Stamps(self._origin)).since_first(cells)
 
     def _floats(self, cells: Sequence[Any]) -> FloatArray | None:
         """Cells as numbers; None where one is none, or not by this file's decimal sign."""
@@ -143,7 +140,7 @@ class Numerals:
             text = _APART.sub(lambda match: re.sub(r"[^\d+-]", "", match[0]), text.replace("−", "-"))
         other = "," if self.decimal == "." else "."
         if other in text and self.decimal:
-            if not all(_GROUPED[other].fullmatch(cell) for cell in text.split("\n") if other in cell):
+            if not all(_READABLE[self.decimal].fullmatch(cell) for cell in text.split("\n") if other in cell):
                 return None
             text = text.replace(other, "")
         text = text.replace(",", ".")
@@ -235,9 +232,7 @@ def _doubtful(name: str, row: int, cell: str, line_of: Callable[[int], int] | No
         f"{place(name, row, line_of)} may be {as_decimal} or {as_thousands}, got {cell!r}: every {sign!r} of the file "
         f"stands before exactly three digits; decimal={sign} reads {as_decimal}, decimal={other} reads {as_thousands}"
     )
-    return InvalidError.of(
-        FieldError(pointer="/decimal", row=row + 1, value=cell, code="ambiguous_number", message=message)
-    )
+    return InvalidError.of(message, code="ambiguous_number", pointer="/decimal", row=row + 1, value=cell)
 
 
 # --- points in time ---
@@ -282,11 +277,12 @@ def is_stamp(cell: str) -> bool:
 
 
 class Stamps:
-    """Points in time as text -> nanoseconds since the first: dates of every usual order, times of day, durations."""
+    """Points in time as text -> nanoseconds since `origin`, the first moment of a file's columns: dates of every usual
+    order, times of day, durations."""
 
-    def __init__(self) -> None:
-        self._first: int | None = None
-        self._last = 0
+    def __init__(self, origin: list[int]) -> None:
+        self._origin = origin
+        self._last: int | None = None
         self._days = 0
         self._dates: dict[str, int | None] = {}
         self._orders: set[str] = {"%d/%m/%Y", "%m/%d/%Y"}
@@ -302,13 +298,13 @@ class Stamps:
             nanoseconds = np.array(parsed, dtype=np.int64)
             if not self._dates:
                 nanoseconds = self._past_midnight(nanoseconds)
-        if self._first is None:
-            self._first = int(nanoseconds[0])
-        return (nanoseconds - self._first).astype("timedelta64[ns]")
+        if not self._origin:
+            self._origin.append(int(nanoseconds[0]))
+        return (nanoseconds - self._origin[0]).astype("timedelta64[ns]")
 
     def _past_midnight(self, times: NDArray[np.int64]) -> NDArray[np.int64]:
         """Times of day that go on where they step back by more than half a day."""
-        before = self._last if self._first is not None else times[0]
+        before = times[0] if self._last is None else self._last
         days = self._days + np.cumsum(np.diff(times, prepend=before) < -_DAY // 2)
         self._last, self._days = int(times[-1]), int(days[-1])
         return times + days * _DAY
@@ -359,7 +355,7 @@ class Stamps:
             message = (
                 f"the dates of the time column may be day/month or month/day, got {shown!r}: write them as 2026-11-02"
             )
-            raise InvalidError.of(FieldError(pointer="/channels/time_s", code="ambiguous_date", message=message))
+            raise InvalidError.of(message, code="ambiguous_date", pointer="/channels/time_s")
 
     def _day(self, written: str) -> int | None:
         """The day's number; None where it is no date."""

@@ -21,7 +21,7 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
     `factor` and `offset` to the channel's unit (null: the unit is not known). `problem` says why it cannot be read as it is.
     """
     try:
-        table = widened(table, reading)
+        table, reading = widened(table, reading)
         chosen = choose(table.columns, reading)
         taken = {column.index: column for column in chosen if not column.guessed or _differ(table, column.index)}
         problem = None

@@ -4,18 +4,16 @@
 are read by the same two steps in a process of their own (`sandbox`).
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from service.errors import InvalidError
 from service.readers import sandbox
-from service.readers.archive import members, unpacked
 from service.readers.channels import Channels, to_channels
 from service.readers.column_names import parse_map
-from service.readers.detect import Format, opened, sniff
+from service.readers.detect import Format, members, opened, sniff, unpacked
 from service.readers.limits import LIMITS, Limits
 from service.readers.preview import preview
 from service.readers.table import Reading, only
@@ -23,7 +21,6 @@ from service.readers.text import read_text
 
 #: Files of an archive that are tried, to find the one that holds channels. Chosen; a rig's folder of one test has few.
 _MAX_TRIED = 10
-Read = TypeVar("Read")
 
 
 def reading_of(mapping: str | None = None, **others: Any) -> Reading:
@@ -37,51 +34,51 @@ def read_file(path: Path, *, filename: str, reading: Reading | None = None, limi
     `filename` is the sender's name for it. Raises InvalidError or TooLargeError, and nothing else, whatever the file holds;
     BusyError where the service is ending, or a reader cannot start.
     """
-    reading = reading or Reading()
-    kind = sniff(path, filename, limits)
-    if kind is Format.ZIP:
-        return _in_archive(path, reading, limits, read_file)
-    if kind is not Format.TEXT:
-        return sandbox.read_isolated(kind, path, reading=reading, limits=limits)
-    return to_channels(read_text(partial(opened, path, limits), reading, limits), reading, limits)
+    channels: Channels = _read(path, filename, reading or Reading(), limits, "channels")
+    return channels
 
 
 def preview_file(
     path: Path, *, filename: str, reading: Reading | None = None, limits: Limits = LIMITS
 ) -> dict[str, Any]:
     """The table as it is read, and what each column is taken for (`preview.preview`). Raises as `read_file` does."""
-    reading = reading or Reading()
+    shown: dict[str, Any] = _read(path, filename, reading or Reading(), limits, "preview")
+    return shown
+
+
+def _read(path: Path, filename: str, reading: Reading, limits: Limits, answer: sandbox.Answer) -> Any:
     kind = sniff(path, filename, limits)
     if kind is Format.ZIP:
-        return _in_archive(path, reading, limits, preview_file)
+        return _in_archive(path, reading, limits, answer)
     if kind is not Format.TEXT:
-        return sandbox.preview_isolated(kind, path, reading=reading, limits=limits)
-    return preview(read_text(partial(opened, path, limits), reading, limits), reading)
+        return sandbox.read_isolated(kind, path, answer, reading=reading, limits=limits)
+    table = read_text(partial(opened, path, limits), reading, limits)
+    return preview(table, reading) if answer == "preview" else to_channels(table, reading, limits)
 
 
-def _in_archive(path: Path, reading: Reading, limits: Limits, read: Callable[..., Read]) -> Read:
+def _in_archive(path: Path, reading: Reading, limits: Limits, answer: sandbox.Answer) -> Any:
     """What the one record in an archive holds; of several the one that `reading` names, as `file` or `file/table`."""
+
+    def read(name: str, table: str) -> Any:
+        with unpacked(path, name, limits) as plain:
+            if sniff(plain, name, limits) is Format.ZIP:
+                raise InvalidError(f"{name!r} is an archive in an archive: send it by itself")
+            return _read(plain, name, replace(reading, table=table), limits, answer)
+
     names = members(path, limits)
     matching = [name for name in names if reading.table in (name, Path(name).name)]
     within = [name for name in names if reading.table.startswith(f"{name}/")]
     if len(matching) == 1:
-        return _member(path, matching[0], replace(reading, table=""), limits, read)
+        return read(matching[0], "")
     if within:
-        return _member(path, within[0], replace(reading, table=reading.table[len(within[0]) + 1 :]), limits, read)
-    records: dict[str, Read] = {}
-    refused: dict[str, InvalidError] = {}
+        return read(within[0], reading.table[len(within[0]) + 1 :])
+    records: dict[str, Any] = {}
+    refused: list[InvalidError] = []
     for name in names[:_MAX_TRIED]:
         try:
-            records[name] = _member(path, name, reading, limits, read)
+            records[name] = read(name, reading.table)
         except InvalidError as error:
-            refused[name] = error
+            refused.append(error)
     if not records and len(refused) == 1:
-        raise next(iter(refused.values()))
+        raise refused[0]
     return list(records.values())[only(list(records) or names, "", "file")]
-
-
-def _member(path: Path, name: str, reading: Reading, limits: Limits, read: Callable[..., Read]) -> Read:
-    with unpacked(path, name, limits) as plain:
-        if sniff(plain, name, limits) is Format.ZIP:
-            raise InvalidError(f"{name!r} is an archive in an archive: send it by itself")
-        return read(plain, filename=name, reading=reading, limits=limits)

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Literal
 
 import numpy as np
 
@@ -43,6 +43,8 @@ READERS = {
     Format.PARQUET: ("service.readers.parquet", "pyarrow", "parquet"),
 }
 
+#: What is asked of a file.
+Answer = Literal["channels", "preview"]
 #: Bytes of the line of JSON that the reading process answers with.
 _LONGEST_ANSWER = 1 << 20
 _BLOCK = 1 << 20
@@ -58,34 +60,14 @@ _MAX_OPEN_FILES = 64
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "XDG_CACHE_HOME", "MPLCONFIGDIR")
 
 
-def read_isolated(kind: Format, path: Path, *, reading: Reading, limits: Limits) -> Channels:
-    """The channels [n] of a file in their own units, read in a process of its own.
+def read_isolated(kind: Format, path: Path, answer: Answer, *, reading: Reading, limits: Limits) -> Any:
+    """The channels [n] of a file in their own units (`channels.Channels`), or its preview, read in a process of its own.
 
     What is unpacked is kept beside the file meanwhile.
     Raises InvalidError where the file cannot be read, or makes its reader crash or take too long; TooLargeError where it
     needs more memory than is allowed or holds more values; BusyError where its reader is not installed or cannot start, is
     overdue without having used its time of a processor, or was ended by somebody else.
     """
-    channels: Channels = _unpacked(kind, path, "channels", reading, limits)
-    return channels
-
-
-def preview_isolated(kind: Format, path: Path, *, reading: Reading, limits: Limits) -> dict[str, Any]:
-    """The preview of a file (`preview.preview`); raises as `read_isolated` does."""
-    shown: dict[str, Any] = _unpacked(kind, path, "preview", reading, limits)
-    return shown
-
-
-def not_installed(kind: Format, consequence: str) -> str | None:
-    """None where a format's package is installed, else `consequence` (a format is not read here) and how to install it."""
-    _, package, extra = READERS[kind]
-    if find_spec(package) is not None:
-        return None
-    command = f"pip install -e '.[{extra}]'" if extra else "pip install -e ."
-    return f"{consequence}: its library is missing, install it in the checkout where the service runs: {command}"
-
-
-def _unpacked(kind: Format, path: Path, answer: str, reading: Reading, limits: Limits) -> Any:
     if missing := not_installed(kind, f"{kind} is not read here"):
         raise BusyError(missing, errors=[FieldError(pointer="", code="format_not_installed", message=missing)])
     if not is_packed(path):
@@ -98,7 +80,16 @@ def _unpacked(kind: Format, path: Path, answer: str, reading: Reading, limits: L
         return _run(kind, Path(plain.name), answer, reading, limits)
 
 
-def _run(kind: Format, path: Path, answer: str, reading: Reading, limits: Limits) -> Any:
+def not_installed(kind: Format, consequence: str) -> str | None:
+    """None where a format's package is installed, else `consequence` (a format is not read here) and how to install it."""
+    _, package, extra = READERS[kind]
+    if find_spec(package) is not None:
+        return None
+    command = f"pip install -e '.[{extra}]'" if extra else "pip install -e ."
+    return f"{consequence}: its library is missing, install it in the checkout where the service runs: {command}"
+
+
+def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Limits) -> Any:
     request = {
         "kind": kind,
         "path": str(path.resolve()),
@@ -150,7 +141,7 @@ def _run(kind: Format, path: Path, answer: str, reading: Reading, limits: Limits
 
 def _unreadable(kind: Format, why: str, code: str = "unreadable") -> InvalidError:
     message = f"the {kind} file cannot be read: {why}"
-    return InvalidError.of(FieldError(pointer="", code=code, message=message))
+    return InvalidError.of(message, code=code)
 
 
 def _ending(code: int) -> str:

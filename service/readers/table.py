@@ -11,7 +11,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import MAX_QUOTED, FieldError, InvalidError, Notice
+from service.errors import MAX_QUOTED, InvalidError, Notice
 
 #: Row of a table, from 0 -> its line in the file, from 1.
 LineOf = Callable[[int], int]
@@ -147,10 +147,10 @@ def only(names: Sequence[str], wanted: str, kind: str) -> int:
     shown = ", ".join(repr(name[:MAX_QUOTED]) for name in names[:10]) + (" ..." if len(names) > 10 else "")
     missing = f"has no {kind} {wanted[:MAX_QUOTED]!r}" if wanted else f"holds {len(names)} {kind}s with channels"
     message = f"the file {missing}: table=NAME chooses one of {shown}"
-    raise InvalidError.of(FieldError(pointer="/table", code="which_table", message=message))
+    raise InvalidError.of(message, code="which_table", pointer="/table")
 
 
 def cut_short(defect: str) -> InvalidError:
     """The error of a file whose end is missing."""
     message = f"the file is cut off: {defect}"
-    return InvalidError.of(FieldError(pointer="", code="truncated", message=message))
+    return InvalidError.of(message, code="truncated")

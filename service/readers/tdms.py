@@ -12,7 +12,7 @@ import numpy as np
 from nptdms import TdmsFile  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from service.errors import MAX_QUOTED, FieldError, InvalidError
+from service.errors import MAX_QUOTED, InvalidError
 from service.readers.clocks import evenly, stated_clock
 from service.readers.column_names import column_of
 from service.readers.limits import Limits
@@ -88,7 +88,7 @@ def _clock(channel: Any, start: Any, earliest: Any) -> Clock | None:
         if str(properties.get("wf_xname") or "").strip().lower() in ("", "time"):
             name, shown = channel.name[:MAX_QUOTED], unit[:MAX_QUOTED]
             message = f"{name}: the unit of the waveform's time must be known, got {shown!r}"
-            raise InvalidError.of(FieldError(pointer="", code="unknown_unit", message=message))
+            raise InvalidError.of(message, code="unknown_unit")
         return None
     shift = 0.0 if start is None else float((np.datetime64(start) - np.datetime64(earliest)) / _SECOND)
     rows, factor = len(channel), converted.factor

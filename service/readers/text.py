@@ -9,7 +9,6 @@ import csv
 import io
 import re
 import time
-from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -87,7 +86,7 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
         above=cells[: form.at[form.layout.titles]],
         first_line=form.first_line,
         head=cells[form.first_line - 1 :],
-        line_of=body.lines.of,
+        line_of=body.line_of,
         breaks=body.breaks,
         notices=body.notices,
     )
@@ -286,30 +285,10 @@ def wrong_line(line: int, rule: str, code: str, got: str = "") -> InvalidError:
     """The error of a line that cannot be part of a table; `line` counts from 1."""
     shown = got[:MAX_QUOTED]
     message = f"line {line} {rule}" + (f", got {shown!r}" if got else "")
-    return InvalidError.of(FieldError(pointer="", code=code, message=message, value=shown))
+    return InvalidError.of(message, code=code, value=shown)
 
 
 # --- the rows of data ---
-
-
-class _Lines:
-    """The line of each row: rows begin on line `first`; lines that are no rows are counted in where they stand."""
-
-    def __init__(self, first: int) -> None:
-        self.first = first
-        self._rows: array[int] = array("q")
-
-    def skip(self, row: int, lines: int = 1) -> None:
-        """Count lines before row `row` that are no rows; rows from there on that were counted before are no rows either."""
-        while self._rows and self._rows[-1] > row:
-            self._rows.pop()
-            lines += 1
-        for _ in range(lines):
-            self._rows.append(row)
-
-    def of(self, row: int) -> int:
-        """The line of a row: rows count from 0, lines from 1."""
-        return self.first + row + bisect_right(self._rows, row)
 
 
 class _Body:
@@ -326,7 +305,9 @@ class _Body:
         named = len(form.layout.headings)
         self._width = named if any(self.first[named:]) else max(named, len(self.first))
         self._numerals = Numerals(reading)
-        self.lines = _Lines(form.first_line)
+        #: Of each block its first row, and the lines of its rows from 1; the line that comes next.
+        self._lines: list[tuple[int, Sequence[int]]] = []
+        self._line = form.first_line
         self._rows = 0
         self.breaks: list[int] = []
         self.notices: list[Notice] = []
@@ -337,6 +318,11 @@ class _Body:
     def rows(self) -> int:
         """How many rows were read."""
         return self._rows
+
+    def line_of(self, row: int) -> int:
+        """The line of a row that was read: rows count from 0, lines from 1."""
+        first, lines = self._lines[bisect_right(self._lines, row, key=lambda block: block[0]) - 1]
+        return lines[row - first]
 
     def read(self, channels: Mapping[int, str]) -> list[NDArray[Any]]:
         """The columns [n] by index. Raises InvalidError naming line and value, TooLargeError past the limits."""
@@ -352,11 +338,13 @@ class _Body:
                 if time.monotonic() > late:
                     raise overdue(Format.TEXT, self._limits)
                 text = self._without_footer(block) if last else block
+                self._lines.append((self._rows, range(self._line, self._line + text.count("\n"))))
                 numbers = None if dated else self._plain(text)
                 if numbers is None:
-                    columns = self._split(text, channels) or self._careful(text, channels)
+                    columns = self._even(text, channels) or self._careful(text, channels)
                 else:
                     columns = [numbers[:, index].copy() for index in channels]
+                self._line += block.count("\n")
                 for part, column in zip(parts, columns, strict=True):
                     part.append(column)
                 self._rows += columns[0].size
@@ -414,20 +402,19 @@ class _Body:
         except (ValueError, OverflowError):
             return None
 
-    def _split(self, block: str, channels: Mapping[int, str]) -> list[NDArray[Any]] | None:
+    def _even(self, block: str, channels: Mapping[int, str]) -> list[NDArray[Any]] | None:
         """The columns of a block of rows of as many cells, none in quotes; None for any other, and where a cell is wrong."""
         if '"' in block or any(f"\n{mark}" in "\n" + block for mark in _COMMENTS):
             return None
-        separator, width = self._separator or " ", self._width
+        separator, width, rows = self._separator or " ", self._width, block.count("\n")
         if separator == " ":
             block = re.sub(r" ?\n ?", "\n", re.sub(r"[ \t]+", " ", block)).lstrip(" ")
-        rows = block.count("\n")
         cells = block.replace("\n", f"{separator}\n{separator}").split(separator)
         if len(cells) != (width + 1) * rows + 1 or cells[width :: width + 1].count("\n") != rows:
             return None
         columns = [cells[index : -1 : width + 1] for index in channels]
         try:
-            return self._numerals.values(channels, columns, self.lines.of, self._rows)
+            return self._numerals.values(channels, columns, self.line_of, self._rows)
         except InvalidError:
             return None
 
@@ -436,7 +423,10 @@ class _Body:
         lines, at = block.split("\n")[:-1], 0
         if self._separator is None or '"' not in block:
             for line in lines:
-                yield line, 1, line.split(self._separator) if self._separator else _cells(line, " ")
+                cells = line.split(self._separator) if self._separator else _cells(line, " ")
+                # titles may be two blanks apart and cells one, or two where one is within a cell
+                even = self._separator or len(cells) == self._width
+                yield line, 1, cells if even else _cells(line, self._form.separator)
             return
         reader = csv.reader([f"{line}\n" for line in lines], delimiter=self._separator, skipinitialspace=True)
         try:
@@ -444,7 +434,7 @@ class _Body:
                 yield lines[at], reader.line_num - at, row
                 at = reader.line_num
         except csv.Error:
-            raise wrong_line(self.lines.of(self._rows) + at, "begins a quotation that does not end", "ragged") from None
+            raise wrong_line(self._line + at, "begins a quotation that does not end", "ragged") from None
 
     def _careful(self, block: str, channels: Mapping[int, str]) -> list[NDArray[Any]]:
         """The columns of any other block, without comments, blank lines and repeated titles.
@@ -452,23 +442,19 @@ class _Body:
         Raises InvalidError with every line of it that has too few or too many cells, or cells that are no numbers.
         """
         rows: list[list[str]] = []
-        separator = self._form.separator
-        left_out = 0
+        lines: list[int] = []
+        separator, line_number = self._form.separator, self._line
         for line, taken, cells in self._parsed(block):
             bare = line.strip()
             if bare and bare not in self._above and not is_comment(bare, separator) and bare.strip(separator):
-                if left_out:
-                    self.lines.skip(self._rows + len(rows), left_out)
                 rows.append(cells)
-                left_out = taken - 1
-                continue
-            left_out += taken
-            if bare == self._titles and self._rows + len(rows):
+                lines.append(line_number)
+            elif bare == self._titles and self._rows + len(rows):
                 while rows and is_footer(rows[-1], self.first):
-                    rows.pop()  # lines above the titles of a further table
-                    left_out += 1
+                    rows.pop(), lines.pop()  # lines above the titles of a further table
                 self.breaks.append(self._rows + len(rows))
-        self.lines.skip(self._rows + len(rows), left_out)
+            line_number += taken
+        self._lines[-1] = self._rows, lines
         errors = []
         for row, cells in enumerate(rows):
             if len(cells) != self._width and not self._fit(cells, channels):
@@ -477,11 +463,11 @@ class _Body:
             more = (
                 ""
                 if len(errors) == 1
-                else f"; {len(errors)} errors up to line {self.lines.of(self._rows + len(rows) - 1)}"
+                else f"; {len(errors)} errors up to line {self.line_of(self._rows + len(rows) - 1)}"
             )
             raise InvalidError(errors[0].message + more, errors=errors[:MAX_ERRORS], total=len(errors))
         columns = [[cells[index] for cells in rows] for index in channels]
-        return self._numerals.values(channels, columns, self.lines.of, self._rows)
+        return self._numerals.values(channels, columns, self.line_of, self._rows)
 
     def _fit(self, cells: list[str], channels: Mapping[int, str]) -> bool:
         """Whether a row is one with empty cells at its end, or none of those that are not taken; they are added."""
@@ -493,7 +479,7 @@ class _Body:
 
     def _ragged(self, row: int, cells: Sequence[str]) -> FieldError:
         line = (self._separator or " ").join(cells)[:MAX_QUOTED]
-        message = f"line {self.lines.of(row)} must have {self._width} cells, got {len(cells)}: {line!r}"
+        message = f"line {self.line_of(row)} must have {self._width} cells, got {len(cells)}: {line!r}"
         if recognised(cells, ()) > 1:
             message += ": another table begins there, send it in a file of its own"
         return FieldError(pointer="", row=row + 1, value=line, code="ragged", message=message)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from python_calamine import CalamineWorkbook, SheetTypeEnum
 
 from service.errors import InvalidError
-from service.readers.archive import check_archive
 from service.readers.column_names import choices_of, recognised
+from service.readers.detect import check_archive
 from service.readers.grid import (
     MAX_ROWS,
     Layout,

@@ -91,7 +91,7 @@ def _parsed(body: bytes, read: Callable[[Any], Answer]) -> Answer:
     except ValueError as error:
         _require_utf8(body)
         message = f"the body: Invalid JSON: {error}"
-        raise InvalidError.of(FieldError(pointer="", code="json_invalid", message=message)) from None
+        raise InvalidError.of(message, code="json_invalid") from None
     return read(sent)
 
 
@@ -114,7 +114,7 @@ def _too_many_marks(body: bytes, read: Callable[[Any], object]) -> InvalidError:
     except ValueError:
         pass  # nested too deeply, or no JSON from its beginning on
     message = f"the body must not hold more than {MAX_MARKS} quotation marks and opening brackets, got more"
-    return InvalidError.of(FieldError(pointer="", code="too_many_marks", message=message))
+    return InvalidError.of(message, code="too_many_marks")
 
 
 def _check_channels(sent: Any) -> None:
@@ -152,7 +152,7 @@ def _require_utf8(body: bytes) -> None:
 
 def _other_encoding(why: str) -> InvalidError:
     message = f"the body: JSON must be sent as UTF-8; {why}"
-    return InvalidError.of(FieldError(pointer="", code="encoding", message=message))
+    return InvalidError.of(message, code="encoding")
 
 
 def _validated(validate: Callable[[bytes], Answer], sent: object, items: int = _MAX_SHOWN) -> Answer:

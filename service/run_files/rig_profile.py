@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import PurePath
 
-from service.errors import FieldError, InvalidError
+from service.errors import InvalidError
 from service.readers.unit_table import conversion, spellings
 from service.schemas.base import MAX_CYCLES
 from service.schemas.rig import RigProfile
@@ -42,9 +42,7 @@ def require_usable(profile: RigProfile) -> None:
             message = (
                 f"columns.{number}.unit: {column.channel} is in one of {spellings(column.channel)}, got {column.unit!r}"
             )
-            raise InvalidError.of(
-                FieldError(pointer=f"/columns/{number}/unit", code="unknown_unit", message=message, value=column.unit)
-            )
+            raise InvalidError.of(message, code="unknown_unit", pointer=f"/columns/{number}/unit", value=column.unit)
     pattern = profile.file_name
     if pattern is None:
         return
@@ -58,7 +56,7 @@ def require_usable(profile: RigProfile) -> None:
         rule = "with {kind} needs kinds, the words that stand for each kind"
     if rule is not None:
         message = f"file_name {rule}, got {pattern!r}"
-        raise InvalidError.of(FieldError(pointer="/file_name", code="pattern", message=message, value=pattern))
+        raise InvalidError.of(message, code="pattern", pointer="/file_name", value=pattern)
 
 
 def named(profile: RigProfile, filename: str, cells: Mapping[str, str]) -> Named:

@@ -53,7 +53,7 @@ def read_file_run(
         name = "kind" if kind is None else "cycles"
         where = "no rig was named" if profile is None else f"the rig's profile finds none for {filename!r}"
         message = f"{name} must be given: {where}"
-        raise InvalidError.of(FieldError(pointer=f"/query/{name}", code="missing", message=message))
+        raise InvalidError.of(message, code="missing", pointer=f"/query/{name}")
     run = run_of(
         read,
         kind=kind,

@@ -239,6 +239,15 @@ TEXTS: dict[str, tuple[str | bytes, str | None]] = {
     "long.csv": (long("time_s,variable,value", "{t},{channel},{value}"), None),
     "long-with-units.csv": (long("Signal;Zeit;Wert;Einheit", "{name};00:00:{t:05.2f};{value};{unit}"), None),
     "long-units-in-names.csv": (long("TagName\tTime [ms]\tValue\tQuality", "{name} [{unit}]\t{ms}\t{value}\tGood"), None),
+    "long-with-a-bad-value.csv": (
+        long("Tag,Time [s],Value,Quality", "{channel},{t},{value},Good").replace(
+            "20.0909,Good", "20.0909,Good\ntorque_nm,0.052,0,Bad"), None,
+    ),
+    "labview-of-several-dates.lvm": (
+        "LabVIEW Measurement\nX_Columns\tMulti\n***End_of_Header***\n\nChannels\t3\nY_Unit_Label\tbar\trpm\tNm\n"
+        "***End_of_Header***\nX_Value\tPressure\tX_Value\tSpeed\tX_Value\tTorque\tComment\n"
+        + "".join(f"02.11.2026 07:00:{t:06.3f}\t{p}\t02.11.2026 07:00:{t:06.3f}\t{n}\t02.11.2026 07:00:{t:06.3f}\t{m}\n"
+                  for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
     "long-mapped.csv": (long("t [s],ch,y", "{t},{channel}#1,{value}"),
                         "pressure_bar:pressure_bar#1,speed_rpm:speed_rpm#1,torque_nm:torque_nm#1"),
 }  # fmt: skip
@@ -270,6 +279,23 @@ def test_a_slower_channel_in_the_same_rows_is_brought_to_their_clock(tmp_path: P
     (tmp_path / "a.csv").write_text("\n".join([f"{GERMAN};Öltemperatur [°C]", *lines]) + "\n", encoding="utf-8")
     with pytest.raises(InvalidError, match=r"pressure_bar\[5\] \(line 7\) must be a number, got '': fill the cell"):
         read_file(tmp_path / "a.csv", filename="a.csv")
+
+
+def test_dates_beside_each_channel_are_counted_from_one_moment(tmp_path: Path) -> None:
+    dates = [f"2026-11-02 07:00:{t:06.3f};{n};{p};2026-11-02 07:00:{t + 0.02:06.3f};{m}"
+             for t, p, n, m in zip(*RECORD.values(), strict=True)]  # fmt: skip
+    titles = "Zeit_n;n [rpm];p [bar];Zeit_M;M [Nm]"
+    (tmp_path / "a.csv").write_text("\n".join([titles, *dates]) + "\n", encoding="utf-8")
+    columns = read_file(tmp_path / "a.csv", filename="a.csv").columns
+    np.testing.assert_allclose(columns["speed_rpm"], RECORD["speed_rpm"][2:], rtol=1e-9)
+
+
+def test_the_time_of_a_table_of_one_value_a_row_is_chosen(tmp_path: Path) -> None:
+    text = long("Tag,Start time [ms],Time [s],Value", "{channel},{ms},{t},{value}").replace(",0.0,0.0,", ",9.5,0.0,")
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(InvalidError, match="got Start time and Time; time=NAME chooses one"):
+        read_file(tmp_path / "a.csv", filename="a.csv")
+    require_record(tmp_path / "a.csv", Reading(time="Time [s]"))
 
 
 def test_a_shorter_channel_has_the_times_beside_it(tmp_path: Path) -> None:
