@@ -1,7 +1,7 @@
 # make demo    a simulated clutch's life, posted run by run, with its prognosis      (ARGS=--exit to end by itself)
 # make shell   a shell in which clutchlife is a command
 # make test    all tests but those of `make slow`
-# make quick   those that need no browser and no server, in one process: half a minute to think by
+# make quick   those that need no browser and no server and take no time, in one process: 2,000 tests within a minute
 # make slow    what takes long and rarely fails: what intervals promise, counted over many lives; further ways to the same
 #              answer, files cut off anywhere, charts drawn by the large library                               (30 minutes)
 # make faults  kills the service and its commands hundreds of times, and sends what nobody sends: schemathesis over whole
@@ -70,7 +70,8 @@ test: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow" $(ARGS)
 
 quick: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "not slow and not outside" $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "not slow and not outside and not long" \
+		--ignore tests/journeys --ignore tests/statistical $(ARGS)
 
 slow: $(VENV)/.tests $(VENV)-generator/.ready
 	$(BIN)/python -m tests.browser

@@ -61,6 +61,79 @@ def test_mean_cof_is_the_mean_over_all_plateaus(nominal):
     assert nominal.mean_cof(7000) == pytest.approx(math.fsum(rows) / 280, rel=1e-9)
 
 
+class TestFindingsOfTheReference:
+    def test_fresh_clutch_gives_about_25_newton_metres_at_5_bar(self, nominal):
+        at_1000_rpm = np.interp(1000 * RPM, SPEEDS, curves(nominal, 0)[5.0])
+        assert at_1000_rpm == pytest.approx(25, abs=1)
+
+    def test_fresh_engagement_at_8_bar_exceeds_the_motors_limit(self, nominal):
+        # Section 2.3.1: the motor gives 20 Nm at most, and the engagement brings it to a standstill.
+        torques = [by_hand(nominal, 8 * BAR, 0, w * 0.058) for w in np.linspace(20, 2000, 50) * RPM]
+        assert min(torques) > 20
+
+    def test_pressure_laws_have_the_shapes_of_fig_9(self, nominal):
+        fresh = nominal.parameters(PROTOCOL_PRESSURES, 0)
+        for rising in (fresh.static_torque, fresh.stribeck_velocity, fresh.viscous_coefficient):
+            assert (np.diff(rising) > 0).all()
+            assert np.ptp(np.diff(rising)) == pytest.approx(0, abs=1e-9 * np.max(rising))  # a straight line
+        steps = np.diff(fresh.coulomb_ratio)
+        assert (steps < 0).all()
+        assert (np.diff(steps) > 0).all()  # ever flatter
+        assert steps[1:] / steps[:-1] == pytest.approx(np.full(5, steps[1] / steps[0]))  # towards an asymptote
+        assert np.all((fresh.coulomb_ratio > 0) & (fresh.coulomb_ratio < 1))
+
+    def test_at_4_bar_the_fresh_curve_rises_slightly(self, nominal):
+        curve = curves(nominal, 0)[4.0]
+        assert (np.diff(curve) > 0).all()
+        assert 0.02 < curve[-1] / curve[0] - 1 < 0.08
+
+    @pytest.mark.parametrize("pressure", [5.0, 5.5, 6.0, 6.5, 7.0])
+    def test_at_higher_pressure_the_fresh_curve_rises_then_falls(self, nominal, pressure):
+        curve = curves(nominal, 0)[pressure]
+        top = int(curve.argmax())
+        assert 150 * RPM < SPEEDS[top] < 600 * RPM
+        assert (np.diff(curve[: top + 1]) > 0).all()
+        assert (np.diff(curve[top:]) < 0).all()
+        assert curve[-1] < 0.95 * curve.max()
+
+    def test_the_fresh_low_speed_slope_grows_with_pressure(self, nominal):
+        fresh = curves(nominal, 0)
+        slopes = np.array([curve[2] - curve[0] for curve in fresh.values()])  # 20 to 120 rpm
+        assert (slopes > 0).all()
+        assert (np.diff(slopes) > 0).all()
+
+    def test_the_parameters_age_as_in_figs_10_and_11(self, nominal):
+        for pressure in PROTOCOL_PRESSURES:
+            life = nominal.parameters(pressure, np.array([0.0, 1000.0, 7000.0, 15_000.0]))
+            for falling in (life.static_torque, life.coulomb_ratio, life.stribeck_velocity):
+                assert (np.diff(falling) < 0).all()
+                assert falling[-1] > 0
+            assert (np.diff(life.viscous_coefficient) > 0).all()
+
+    def test_the_whole_curve_sinks_at_every_pressure(self, nominal):
+        stages = [curves(nominal, cycles) for cycles in (0, 1000, 7000, 15_000)]
+        for earlier, later in itertools.pairwise(stages):
+            assert all((later[p] < earlier[p]).all() for p in earlier)
+
+    def test_the_anti_shudder_slope_is_lost(self, nominal):
+        # Fig. 7(b), at 5 bar: the slope at low speed, here 20 to 220 rpm, turns and grows ever more negative.
+        slopes = [(c := curves(nominal, cycles)[5.0])[4] - c[0] for cycles in (0, 1000, 7000, 15_000)]
+        assert slopes[0] > 0
+        assert (np.diff(slopes) < 0).all()
+        assert slopes[-1] < -0.1 * curves(nominal, 15_000)[5.0].mean()
+        assert all((c[4] - c[0]) < 0 for c in curves(nominal, 15_000).values())
+        assert (np.diff(curves(nominal, 15_000)[5.0][:10]) < 0).all()
+
+    def test_the_drop_is_drastic_then_saturates(self, nominal):
+        cof = nominal.mean_cofs(np.array([0.0, 3000.0, 12_000.0, 15_000.0, 18_000.0]))
+        assert cof[0] - cof[1] > 0.5 * (cof[0] - cof[3])  # half of the loss in the first fifth of the life
+        assert cof[2] - cof[3] < (cof[0] - cof[1]) / 8  # an eighth of that over the last fifth
+        assert cof[3] - cof[4] < cof[2] - cof[3]
+
+    def test_mean_cof_is_halved_near_15_000_cycles(self, nominal):
+        assert nominal.end_of_life() == pytest.approx(15_000, rel=0.02)
+
+
 class TestEndOfLife:
     def test_is_where_mean_cof_crosses_on_a_dense_grid(self, nominal):
         cycles = np.arange(0.0, 40_000.0, 10.0)
