@@ -307,10 +307,12 @@ def _constants(tree: ast.Module) -> Iterator[tuple[str, str]]:
 def _of_function(function: ast.AST, constants: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
     assigned = [node for node in ast.walk(function) if isinstance(node, ast.Assign | ast.Return)]
     for node in ast.walk(function):
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("FieldError", "Notice"):
+        made = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
+        if isinstance(node, ast.Call) and made in ("FieldError", "Notice", "InvalidError.of"):
             given = {each.arg: each.value for each in node.keywords}
+            message = node.args[0] if made == "InvalidError.of" else given.get("message")
             for code in _codes(given.get("code"), constants):
-                yield node.func.id, code, _said(given.get("message"), assigned, node.lineno)  # type: ignore[attr-defined]
+                yield "Notice" if made == "Notice" else "FieldError", code, _said(message, assigned, node.lineno)
         elif isinstance(node, ast.Tuple) and len(node.elts) == 2:
             code, sentence = node.elts
             if isinstance(code, ast.Constant) and re.fullmatch(r"[a-z]+(_[a-z]+)+", str(code.value)):
