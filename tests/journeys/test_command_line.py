@@ -79,10 +79,10 @@ def test_push_waits_in_the_spool_while_the_service_is_away(tmp_path: Path) -> No
         run.write_text(json.dumps(stationary(1000, run_id="r1")))
         server.start()
         assert "2 stored, 0 known already, 0 refused" in clutchlife(*push)
-        assert list(spool.rglob("*.json")) == []
+        assert list(spool.rglob("*.body")) == []
         run.write_text(json.dumps(stationary(-1, run_id="r2")))
         assert "greater than or equal to 0" in clutchlife(*push, code=65)
-        assert "refused" in str(next(iter(spool.rglob("*.problem"))))
+        assert "refused" in clutchlife("spool", "list", "--spool", spool)
         assert "no clutch is known" in clutchlife(
             "push", run, "--clutch", "x", "--url", server.url, "--spool", spool, code=65
         )

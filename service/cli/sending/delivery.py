@@ -54,15 +54,12 @@ def transmit(
     if sent.failed:
         fail(f"{sent.failed} runs were not taken and stay in the spool; {_left(spools)}", EX_TEMPFAIL)
     if sent.refused:
-        places = ", ".join(str(spool.folder / "refused") for spool in spools if spool.refused())
-        fail(f"refused runs and the reasons are in {places}", EX_DATAERR)
+        fail(f"refused runs stay in {spools[0].folder}; clutchlife spool list has the reasons", EX_DATAERR)
 
 
 def _left(spools: Sequence[Spool]) -> str:
     """How many runs wait, and where."""
-    left = [(len(spool.waiting()), spool.folder) for spool in spools]
-    places = ", ".join(str(folder) for count, folder in left if count) or str(left[0][1])
-    return f"{sum(count for count, _ in left)} runs wait in {places}"
+    return f"{sum(len(spool.waiting()) for spool in spools)} runs wait in {spools[0].folder}"
 
 
 #: Runs in a row that an otherwise present service does not answer, after which it is taken to be away. Chosen: one run that
@@ -96,8 +93,6 @@ def deliver(service: Service, spool: Spool, sent: Sent, report: Report, on_run: 
     Raises ServiceAwayError where the service is away, RefusedError where it would refuse every run.
     """
     spool.begin()
-    for entry in spool.broken():
-        report(f"{spool.body(entry)} was not kept whole and is not sent: push its file again")
     for entry in spool.waiting():
         try:
             _send(service, spool, entry, sent, report)

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,7 +24,17 @@ from service.cli.options import (
     print_line,
 )
 from service.cli.sending.delivery import say, transmit
-from service.cli.sending.spool import INSPECTIONS, REFUSED, REPLACED, RUNS, Entry, HeldError, Spool, default_folder
+from service.cli.sending.spool import (
+    INSPECTIONS,
+    REFUSED,
+    REPLACED,
+    RUNS,
+    WAITING,
+    Entry,
+    HeldError,
+    Spool,
+    default_folder,
+)
 from service.client.clutchlife.answers import RefusedError, ServiceAwayError
 from service.client.clutchlife.transport import Service, connect
 from service.run_files import manifest
@@ -99,7 +109,7 @@ def _request(
 
 def _replacement(spool: Spool, entry: Entry) -> str:
     stored = "; a try got no answer, so it may be stored: withdraw it then" if entry.perhaps_stored else ""
-    place = spool.folder / "replaced" / entry.body
+    place = spool.body(entry)
     return f"{entry.label}: the version that waited since {entry.since} is replaced and not sent, see {place}{stored}"
 
 
@@ -157,21 +167,6 @@ def _register(service: Service, clutch_id: str, paths: list[Path]) -> None:
 app = typer.Typer(help="Runs that wait to be sent, or were refused.", no_args_is_help=True)
 
 Clutch = Annotated[str | None, typer.Option("--clutch", help="Of this clutch only")]
-WAITING, BROKEN = "waiting", "broken"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Kept:
-    """An entry with the spool that it is in, and what it is there: waiting, broken, refused or replaced."""
-
-    spool: Spool
-    state: str
-    entry: Entry
-
-    @property
-    def place(self) -> str:
-        """The folder below the spool's."""
-        return self.state if self.state in (REFUSED, REPLACED) else ""
 
 
 @app.command(name="list")
@@ -184,9 +179,9 @@ def list_runs(
     with errors_in_a_line():
         kept = _kept(spool, clutch)
         if as_json:
-            typer.echo(json.dumps({"items": [_item(run) for run in kept]}, indent=1, ensure_ascii=False))
+            typer.echo(json.dumps({"items": [_item(spool, entry) for entry in kept]}, indent=1, ensure_ascii=False))
             return
-        _print(kept)
+        _print(spool, kept)
         if not kept:
             print_line(f"nothing is in the spool {spool}")
 
@@ -224,51 +219,42 @@ def empty(
 ) -> None:
     """Delete what is in the spool, for good, after showing it and asking; runs that were never sent are counted."""
     with errors_in_a_line():
-        kept = [run for run in _kept(spool, clutch) if run.place or not refused]
+        kept = [entry for entry in _kept(spool, clutch) if entry.state != WAITING or not refused]
         if not kept:
             print_line("nothing to delete")
             return
-        _print(kept)
-        waiting = sum(not run.place for run in kept)
+        _print(spool, kept)
+        waiting = sum(entry.state == WAITING for entry in kept)
         question = f"Delete these {len(kept)} for good? {waiting} of them wait and were never stored."
         if not yes and not typer.confirm(question, err=True):
             fail("nothing was deleted")
         try:
-            for owner in {run.spool.folder: run.spool for run in kept}.values():
-                with owner.sending(0.0):
-                    for run in kept:
-                        if run.spool == owner:
-                            owner.discard(run.place, run.entry)
+            for owner, entries in groupby(kept, _owner):
+                with Spool.of(spool, *owner).sending(0.0):
+                    Spool.of(spool, *owner).discard(entries)
         except HeldError:
             fail("a process is sending from the spool: try again when it has ended", EX_TEMPFAIL)
         print_line(f"{len(kept)} deleted, {waiting} of them never stored")
 
 
-def _kept(folder: Path, clutch: str | None) -> list[Kept]:
+def _kept(folder: Path, clutch: str | None) -> list[Entry]:
     """Everything in the spools, of one clutch where it is given."""
-    kept = []
     if folder.exists() and not folder.is_dir():
         fail(f"{folder} is not a folder", EX_DATAERR)
-    for spool in Spool.every(folder):
-        if clutch is None or spool.clutch_id == clutch:
-            states = {
-                WAITING: spool.waiting(),
-                BROKEN: spool.broken(),
-                REFUSED: spool.refused(),
-                REPLACED: spool.replaced(),
-            }
-            kept += [
-                Kept(spool=spool, state=state, entry=entry) for state, members in states.items() for entry in members
-            ]
-    return kept
+    spools = [spool for spool in Spool.every(folder) if clutch in (None, spool.clutch_id)]
+    return [entry for spool in spools for entry in (*spool.waiting(), *spool.refused(), *spool.replaced())]
 
 
-def _item(run: Kept) -> dict[str, Any]:
-    entry, head = run.entry, run.entry.head
+def _owner(entry: Entry) -> tuple[str, str]:
+    return entry.url, entry.clutch_id
+
+
+def _item(folder: Path, entry: Entry) -> dict[str, Any]:
+    head = entry.head
     return {
-        "state": run.state,
-        "clutch_id": run.spool.clutch_id,
-        "url": run.spool.url,
+        "state": entry.state,
+        "clutch_id": entry.clutch_id,
+        "url": entry.url,
         "resource": entry.resource,
         "run_id": head.run_id,
         "files": list(entry.sources),
@@ -279,34 +265,28 @@ def _item(run: Kept) -> dict[str, Any]:
         "last_try": entry.last_try,
         "last_answer": entry.last_answer,
         "perhaps_stored": entry.perhaps_stored,
-        "problem": run.spool.problem(entry) if run.state == REFUSED else None,
-        "path": str(run.spool.folder / run.place / entry.body),
+        "problem": entry.problem if entry.state == REFUSED else None,
+        "path": str(folder / entry.body),
     }
 
 
-def _print(kept: list[Kept]) -> None:
+def _print(folder: Path, kept: list[Entry]) -> None:
     """A line a clutch, and a line a run."""
-    owner = None
-    for run in kept:
-        if run.spool != owner:
-            owner = run.spool
-            name = f"{owner.clutch_id} at {owner.url}" if owner.clutch_id else "clutch not stated"
-            print_line(f"{name}, in {owner.folder}")
-        print_line(f"  {_line(run)}")
+    for (url, clutch_id), entries in groupby(kept, _owner):
+        print_line(f"{clutch_id} at {url}, in {folder}")
+        for entry in entries:
+            print_line(f"  {_line(entry)}")
 
 
-def _line(run: Kept) -> str:
-    entry, head = run.entry, run.entry.head
+def _line(entry: Entry) -> str:
+    head = entry.head
     kind = "inspection" if entry.resource == INSPECTIONS else head.kind or "kind not stated"
     cycles = "cycles not stated" if head.cycles is None else f"{head.cycles:g} cycles"
     tried = (
         "not tried yet" if not entry.tries else f"tried {entry.tries} times, last {entry.last_try}: {entry.last_answer}"
     )
-    if run.state == REFUSED:
-        problem = run.spool.problem(entry)
-        tried = str(problem.get("detail") or problem.get("title") or "the reason is not there")
-    elif run.state == BROKEN:
-        tried = "not kept whole: push its file again"
-    elif run.state == REPLACED:
+    if entry.state == REFUSED:
+        tried = str(entry.problem.get("detail") or entry.problem.get("title") or "the reason is not there")
+    elif entry.state == REPLACED:
         tried = "a newer version was pushed"
-    return f"{run.state:<8}  {entry.label}  {kind}  {cycles}  since {entry.since}  {tried}"
+    return f"{entry.state:<8}  {entry.label}  {kind}  {cycles}  since {entry.since}  {tried}"

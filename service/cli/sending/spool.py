@@ -1,22 +1,20 @@
 """Runs and inspections that are still to be sent, kept on disk until the service has stored them.
 
 A run is copied into the spool before it is sent and removed when the service has answered that it is stored (now or
-earlier), so a crash or a power cut on the sender's side loses nothing. A run that the service refuses is moved to
-`refused/`, with the answer beside it; a run of which a newer version came is moved to `replaced/` and never sent.
+earlier), so a crash or a power cut on the sender's side loses nothing. Of a run that the service refuses the answer is kept
+beside it; a run of which a newer version came is marked as replaced and never sent.
 
-What is there always means one thing. Bytes (`.body`) without an `.entry` were not kept yet. An `.entry` without bytes
-follows them to the folder where they are, or is done. That a newer version replaces older ones is decided by one rename,
-that of `replacing.journal`, and carried out by whoever locks the folder next, with a lock that ends with its holder.
+The bytes of each are a file of the folder; an SQLite database beside them says whose they are, in which state, and what came
+of the tries. Bytes are on the disk before their entry is, and are deleted before it: without an entry they were not kept
+yet, and an entry without bytes is done. That a newer version replaces older ones is one transaction.
 """
 
-import errno
 import hashlib
 import json
 import os
-import sys
-import time
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass, field, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,27 +23,44 @@ from typing import Any
 from service.cli.sending import run_head
 from service.cli.sending.run_head import RunHead, same_run
 
-#: What is known of a run; its bytes; the answer to a refused run.
-ENTRY, BODY, PROBLEM = ".entry", ".body", ".problem"
+#: What is known of all; the bytes of one; a file that is being written.
+DATABASE, BODY, PARTIAL = "spool.sqlite", ".body", ".part"
 #: What is sent to, below the clutch's address.
 RUNS, INSPECTIONS = "runs", "inspections"
-#: A file that is being written.
-PARTIAL = ".part"
+WAITING, REFUSED, REPLACED = "waiting", "refused", "replaced"
+#: [s] How long a change waits for those of other processes. Chosen: a file of a gigabyte is copied in much less.
+_PATIENCE = 600.0
+#: Bytes that are copied at once.
+_CHUNK = 1 << 20
+#: Hexadecimal digits of the name of a lock and of a content.
+_LOCK_DIGITS, _CONTENT_DIGITS = 16, 24
+_TABLE = """CREATE TABLE IF NOT EXISTS entry (number INTEGER PRIMARY KEY, url TEXT NOT NULL, clutch_id TEXT NOT NULL,
+    state TEXT NOT NULL, digest TEXT NOT NULL, known TEXT NOT NULL)"""
+#: A commit is on the disk, and so is that its journal is gone.
+_DURABLE = "PRAGMA synchronous = EXTRA"
+_OF_STATE = "SELECT * FROM entry WHERE url = ? AND clutch_id = ? AND state = ? ORDER BY number"
+#: An entry that waits, by its number, and what was set aside of its content.
+_COPIES = """SELECT number FROM entry
+    WHERE url = ? AND clutch_id = ? AND digest = ? AND (state <> 'waiting' OR number = ?) ORDER BY number"""
+_THERE = "SELECT * FROM entry WHERE number = ? AND digest = ? AND state = 'waiting'"
+
+RunFiles = Sequence[tuple[Path, Mapping[str, str] | None]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """One run or inspection in a folder of the spool. `stem` is its number and its content's digest, the name of its files.
+    """One run or inspection: its place in the order in which they came, and what tells its content from others'.
 
     `failures`: tries at which the service was there and did not take the run; `perhaps_stored`: a try may have been carried
-    out without an answer.
+    out without an answer; `problem`: why it was refused.
     """
 
-    stem: str
-    body: str
+    number: int
+    url: str
+    clutch_id: str
+    state: str = WAITING
+    digest: str
     since: str
-    url: str | None = None
-    clutch_id: str | None = None
     resource: str = RUNS
     parameters: dict[str, str] | None = None
     head: RunHead = field(default_factory=RunHead)
@@ -55,13 +70,12 @@ class Entry:
     last_try: str | None = None
     last_answer: str | None = None
     perhaps_stored: bool = False
-    #: Whether it can be sent: the file of what is known of it may be damaged.
-    whole: bool = True
+    problem: dict[str, Any] = field(default_factory=dict)
 
     @property
-    def digest(self) -> str:
-        """What tells its content from others'."""
-        return digest(self.stem)
+    def body(self) -> str:
+        """The name of the file with its bytes."""
+        return _body(self.number, self.digest)
 
     @property
     def label(self) -> str:
@@ -70,61 +84,32 @@ class Entry:
         return self.head.run_id or files or self.body
 
 
-def digest(stem: str) -> str:
-    """The part of a name that tells an entry's content from others'."""
-    return stem.partition("-")[2]
+#: Columns of the table; the other fields are JSON in its last one, of which a later release's are passed over.
+_COLUMNS = ("number", "url", "clutch_id", "state", "digest")
+_KNOWN = {item.name for item in fields(Entry)} - set(_COLUMNS)
 
 
-def number(stem: str) -> int:
-    """An entry's place in the order in which runs came."""
-    digits = stem.partition("-")[0]
-    return int(digits) if digits.isdecimal() else 0
+def _body(number: int, digest: str) -> str:
+    return f"{number:08d}-{digest}{BODY}"
 
 
-def stamp(moment: float | None = None) -> str:
-    """Now, or that time since the epoch [s], as text in UTC."""
-    time = datetime.now(UTC) if moment is None else datetime.fromtimestamp(moment, UTC)
-    return time.isoformat(timespec="seconds")
+def _put(database: sqlite3.Connection, entry: Entry) -> None:
+    """Store an entry, in the place of the one of its number."""
+    values = asdict(entry)
+    columns = [values.pop(name) for name in _COLUMNS]
+    known = json.dumps(values, ensure_ascii=False)
+    database.execute("INSERT OR REPLACE INTO entry VALUES (?, ?, ?, ?, ?, ?)", (*columns, known))
 
 
-def read(folder: Path) -> list[Entry]:
-    """All entries of a folder, oldest first, whoever changes it meanwhile."""
-    entries = [load(folder, path.stem) for path in folder.glob(f"[0-9]*-*{ENTRY}")]
-    return sorted((entry for entry in entries if entry is not None), key=lambda entry: (number(entry.stem), entry.stem))
+def _entry(row: Sequence[Any]) -> Entry:
+    known = json.loads(row[len(_COLUMNS)])
+    values = dict(zip(_COLUMNS, row, strict=False)) | {name: known[name] for name in _KNOWN & known.keys()}
+    return Entry(**values | {"head": RunHead(**known["head"]), "sources": tuple(known["sources"])})
 
 
-def encoded(entry: Entry) -> bytes:
-    """The content of its `.entry` file."""
-    return json.dumps(asdict(entry), indent=1, ensure_ascii=False).encode()
-
-
-def load(folder: Path, stem: str) -> Entry | None:
-    """The entry of that name; None where there is none."""
-    path = folder / (stem + ENTRY)
-    try:
-        content, since = path.read_bytes(), stamp(path.stat().st_mtime)
-    except FileNotFoundError:
-        return None
-    try:
-        return decoded(content)
-    except (ValueError, TypeError, KeyError):
-        return Entry(stem=stem, body=stem + BODY, since=since, whole=False)
-
-
-def decoded(content: bytes) -> Entry:
-    """The entry whose file holds this; raises ValueError, TypeError or KeyError where it holds none."""
-    record: dict[str, Any] = json.loads(content)
-    values = {name: record[name] for name in _NAMES & record.keys()}
-    return Entry(**values | {"head": RunHead(**record["head"]), "sources": tuple(record["sources"])})
-
-
-#: A later release's fields are passed over.
-_NAMES = {item.name for item in fields(Entry)}
-
-
-#: Seconds between two looks at a lock that another process holds. Chosen: short beside a request.
-_LOOK = 0.05
-_HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)
+def stamp() -> str:
+    """Now, as text in UTC."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 class HeldError(Exception):
@@ -132,50 +117,33 @@ class HeldError(Exception):
 
 
 @contextmanager
-def locked(path: Path, *, patience: float | None = None) -> Iterator[None]:
-    """Hold the lock of the file at `path`, which is made; HeldError where another holds it for longer than `patience` [s].
+def _opened(path: Path, patience: float) -> Iterator[sqlite3.Connection]:
+    """The database in a file, which is made; HeldError where another process holds it for longer than `patience` [s].
 
-    Without a patience it is waited for. Raises OSError where the file system keeps no locks.
+    Its other errors are OSError, as where the disk is full, the file is damaged, or the file system keeps no locks.
     """
-    deadline = None if patience is None else time.monotonic() + patience
-    with path.open("ab") as file:
-        while not _taken(file.fileno(), path):
-            if deadline is not None and time.monotonic() + _LOOK > deadline:
-                raise HeldError(str(path))
-            time.sleep(_LOOK)
-        yield
-
-
-def _taken(handle: int, path: Path) -> bool:
     try:
-        if sys.platform == "win32":
-            import msvcrt  # only there
-
-            os.lseek(handle, 0, os.SEEK_SET)
-            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl  # not on Windows
-
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        if error.errno in _HELD:
-            return False
-        raise OSError(error.errno, f"{path} cannot be locked ({error.strerror}): choose a local folder") from error
-    return True
+        with closing(sqlite3.connect(path, timeout=patience, isolation_level=None)) as database:
+            yield database
+    except sqlite3.Error as error:
+        if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY:
+            raise HeldError(str(path)) from error
+        raise OSError(f"{path} cannot be used ({error}): a spool is a local folder that can be written") from error
 
 
-REFUSED, REPLACED = "refused", "replaced"
-_JOURNAL = "replacing.journal"
+def _there(database: sqlite3.Connection, entry: Entry) -> Entry | None:
+    """An entry as it is now; None where it waits no more."""
+    row = database.execute(_THERE, (entry.number, entry.digest)).fetchone()
+    return None if row is None else _entry(row)
 
 
-def write(folder: Path, name: str, content: bytes) -> None:
-    """A file below the spool's folder, whole or not at all."""
-    partial = folder / (Path(name).name + PARTIAL)
-    with partial.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    partial.replace(folder / name)
+def _read(folder: Path, query: str, *values: str) -> list[tuple[Any, ...]]:
+    """Rows of a folder's database; none where nothing was ever kept."""
+    path = folder / DATABASE
+    if not path.is_file() or path.stat().st_size == 0:
+        return []
+    with _opened(path, _PATIENCE) as database:
+        return database.execute(query, values).fetchall()
 
 
 def _sync(folder: Path) -> None:
@@ -188,84 +156,6 @@ def _sync(folder: Path) -> None:
             os.close(handle)
 
 
-def store(folder: Path, entry: Entry, older: Sequence[Entry]) -> None:
-    """Make an entry wait, whose bytes are there, in the place of older versions: in one instant."""
-    if not older:
-        write(folder, entry.stem + ENTRY, encoded(entry))
-        _sync(folder)
-        return
-    journal = {"entry": encoded(entry).decode(), "older": [other.stem for other in older]}
-    write(folder, _JOURNAL, json.dumps(journal).encode())
-    _sync(folder)
-    carry_out(folder)
-
-
-def carry_out(folder: Path) -> None:
-    """What the journal says, if there is one: the newer entry waits, older ones are moved to `replaced/`."""
-    path = folder / _JOURNAL
-    if not path.exists():
-        return
-    journal = json.loads(path.read_bytes())
-    entry = decoded(journal["entry"].encode())
-    write(folder, entry.stem + ENTRY, encoded(entry))
-    _sync(folder)
-    for stem in journal["older"]:
-        older = load(folder, stem)
-        if digest(stem) == entry.digest:  # the same content, of which was no longer known what it is
-            for remnant in sorted(folder.glob(f"{stem}.*")):
-                remnant.unlink()
-        elif older is not None:
-            move(folder, older, REPLACED)
-    path.unlink()
-
-
-def move(folder: Path, entry: Entry, place: str) -> Path:
-    """Move an entry from the folder to `refused/` or `replaced/`; its bytes first. Where they are then."""
-    aside = folder / place
-    aside.mkdir(exist_ok=True)
-    body = folder / entry.body
-    if body.exists():
-        body.replace(aside / entry.body)
-    (folder / (entry.stem + ENTRY)).replace(aside / (entry.stem + ENTRY))
-    _sync(aside)
-    return aside / entry.body
-
-
-def remove(place: Path, entry: Entry) -> None:
-    """Delete an entry of the folder, of `refused/` or of `replaced/`; its bytes first."""
-    for name in (entry.body, entry.stem + ENTRY, entry.stem + PROBLEM):
-        (place / name).unlink(missing_ok=True)
-
-
-def mend(folder: Path) -> None:
-    """Finish what a killed process began."""
-    for partial in sorted(folder.glob(f"*{PARTIAL}")):
-        partial.unlink()
-    for entry in read(folder):
-        if not (folder / entry.body).exists():
-            _follow(folder, entry)
-    for body in sorted(folder.glob(f"*{BODY}")):
-        if not body.with_suffix(ENTRY).exists():
-            body.unlink()
-
-
-def _follow(folder: Path, entry: Entry) -> None:
-    """Move an entry to where its bytes are; it is done where they are nowhere."""
-    for place in (REFUSED, REPLACED):
-        if (folder / place / entry.body).exists():
-            move(folder, entry, place)
-            return
-    remove(folder, entry)
-
-
-#: Bytes that are copied at once.
-_CHUNK = 1 << 20
-#: Hexadecimal digits of a folder's and of a content's name.
-_FOLDER_DIGITS, _CONTENT_DIGITS = 16, 24
-
-RunFiles = Sequence[tuple[Path, Mapping[str, str] | None]]
-
-
 def default_folder() -> Path:
     """$XDG_STATE_HOME/clutchlife/spool, or ~/.local/state/clutchlife/spool."""
     state = os.environ.get("XDG_STATE_HOME")
@@ -274,78 +164,56 @@ def default_folder() -> Path:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spool:
-    """The spool of one service and one clutch; `url` and `clutch_id` are None where nothing in the folder states them."""
+    """What a folder keeps for one clutch at one service."""
 
     folder: Path
-    url: str | None = None
-    clutch_id: str | None = None
+    url: str
+    clutch_id: str
 
     @classmethod
     def of(cls, folder: Path, url: str, clutch_id: str) -> "Spool":
-        """The spool for a clutch at a service, below the folder of all."""
-        url = url.rstrip("/")
-        name = hashlib.sha256(f"{url}\n{clutch_id}".encode()).hexdigest()[:_FOLDER_DIGITS]
-        return cls(folder=folder / name, url=url, clutch_id=clutch_id)
+        """The spool for a clutch at a service."""
+        return cls(folder=folder, url=url.rstrip("/"), clutch_id=clutch_id)
 
     @classmethod
     def every(cls, folder: Path) -> list["Spool"]:
-        """All spools below a folder; whose one is, its entries say."""
-        paths = sorted(path for path in folder.glob("[0-9a-f]*") if path.is_dir() and len(path.name) == _FOLDER_DIGITS)
-        return [cls._owned(path) for path in paths]
-
-    @classmethod
-    def _owned(cls, path: Path) -> "Spool":
-        for place in (path, path / REFUSED, path / REPLACED):
-            for entry in read(place):
-                if entry.clutch_id is not None:
-                    return cls(folder=path, url=entry.url, clutch_id=entry.clutch_id)
-        return cls(folder=path)
+        """All spools of a folder that hold anything."""
+        owners = _read(folder, "SELECT DISTINCT url, clutch_id FROM entry ORDER BY url, clutch_id")
+        return [cls(folder=folder, url=url, clutch_id=clutch_id) for url, clutch_id in owners]
 
     def waiting(self) -> list[Entry]:
         """What is to be sent, in the order in which it came; what failed inside the service comes last."""
-        whole = [entry for entry in self._entries(self.folder) if entry.whole]
-        return sorted(whole, key=lambda entry: entry.failures)
-
-    def broken(self) -> list[Entry]:
-        """What cannot be sent as it is: a process was killed while it kept it. Its file is to be pushed again."""
-        return [entry for entry in self._entries(self.folder) if not entry.whole]
+        return sorted(self._in_state(WAITING), key=lambda entry: entry.failures)
 
     def refused(self) -> list[Entry]:
         """What the service refused."""
-        return self._entries(self.folder / REFUSED)
+        return self._in_state(REFUSED)
 
     def replaced(self) -> list[Entry]:
         """What was not sent because a newer version came."""
-        return self._entries(self.folder / REPLACED)
+        return self._in_state(REPLACED)
 
-    @staticmethod
-    def _entries(place: Path) -> list[Entry]:
-        return [entry for entry in read(place) if (place / entry.body).exists()]
-
-    def problem(self, entry: Entry) -> dict[str, Any]:
-        """Why a run was refused."""
-        try:
-            problem = json.loads((self.folder / REFUSED / (entry.stem + PROBLEM)).read_bytes())
-        except (OSError, ValueError):
-            return {}
-        return problem if isinstance(problem, dict) else {}
+    def _in_state(self, state: str) -> list[Entry]:
+        entries = map(_entry, _read(self.folder, _OF_STATE, self.url, self.clutch_id, state))
+        return [entry for entry in entries if self.body(entry).exists()]
 
     def body(self, entry: Entry) -> Path:
-        """The file that is sent."""
+        """The file with an entry's bytes."""
         return self.folder / entry.body
 
     def awaits(self, entry: Entry) -> bool:
         """Whether an entry is still to be sent: it was not sent by another process, and no newer version came."""
-        with self._changing():
-            return self._there(entry)
-
-    def _there(self, entry: Entry) -> bool:
-        return (self.folder / (entry.stem + ENTRY)).exists()
+        with self._changing() as database:
+            return _there(database, entry) is not None
 
     def begin(self) -> None:
         """Finish what a killed process began; to be called before the first run is sent."""
-        with self._changing():
-            mend(self.folder)
+        with self._changing() as database:
+            kept = {_body(*row): row[0] for row in database.execute("SELECT number, digest FROM entry")}
+            there = {path.name for path in self.folder.iterdir() if path.suffix in (BODY, PARTIAL)}
+            for name in sorted(there - kept.keys()):
+                (self.folder / name).unlink()
+            self._remove(database, [(number, name) for name, number in kept.items() if name not in there])
 
     def add(self, files: RunFiles, resource: str = RUNS) -> tuple[set[str], list[Entry]]:
         """Keep runs: JSON bodies (no parameters), or files with the parameters of their requests; or inspections' bodies.
@@ -356,29 +224,33 @@ class Spool:
         digests = [_digest(path, parameters) for path, parameters in files]
         batch = set(digests)
         replaced: list[Entry] = []
-        with self._changing():
-            mend(self.folder)
-            waiting = self._entries(self.folder)
-            for (path, parameters), digest in zip(files, digests, strict=True):
-                present = next((other for other in waiting if other.whole and other.digest == digest), None)
-                entry = present or self._kept(_next(waiting), path, parameters, resource)
-                source = str(path.resolve())
-                older = [other for other in waiting if _older(other, entry, source, batch)]
-                self._wait(entry, older, source)
-                gone = {entry.stem, *(other.stem for other in older)}
-                waiting = [*(other for other in waiting if other.stem not in gone), entry]
-                replaced += [other for other in older if other.whole]
-                batch.add(entry.digest)
+        self.begin()
+        for (path, parameters), digest in zip(files, digests, strict=True):
+            source = str(path.resolve())
+            with self._changing() as database:
+                waiting = list(map(_entry, database.execute(_OF_STATE, (self.url, self.clutch_id, WAITING))))
+                present = next((other for other in waiting if other.digest == digest), None)
+                entry = present or self._copied(database, path, parameters, resource)
+                older = [
+                    other
+                    for other in waiting
+                    if other.digest not in batch | {entry.digest}
+                    and same_run(other.head, entry.head, same_file=source in other.sources)
+                ]
+                if older or source not in entry.sources:
+                    sources = (*(other for other in entry.sources if other != source), source)
+                    _put(database, replace(entry, sources=sources))
+                for other in older:
+                    _put(database, replace(other, state=REPLACED))
+            replaced += older
+            batch.add(entry.digest)
         return batch, replaced
 
-    def _wait(self, entry: Entry, older: Sequence[Entry], source: str) -> None:
-        """Make an entry wait that comes from this file, in the place of older versions."""
-        if older or source not in entry.sources:
-            sources = (*(other for other in entry.sources if other != source), source)
-            store(self.folder, replace(entry, sources=sources), older)
-
-    def _kept(self, number: int, path: Path, parameters: Mapping[str, str] | None, resource: str) -> Entry:
+    def _copied(
+        self, database: sqlite3.Connection, path: Path, parameters: Mapping[str, str] | None, resource: str
+    ) -> Entry:
         """The bytes of a run copied into the spool; its entry is still to be stored."""
+        (number,) = database.execute("SELECT coalesce(max(number), 0) + 1 FROM entry").fetchone()
         partial = self.folder / f"{number:08d}{PARTIAL}"
         sha256 = hashlib.sha256()
         with path.open("rb") as file, partial.open("wb") as copy:
@@ -393,81 +265,74 @@ class Spool:
         else:
             head = run_head.of_file(parameters, measurements)
             sha256.update(_text(parameters))
-        stem = f"{number:08d}-{sha256.hexdigest()[:_CONTENT_DIGITS]}"
-        partial.replace(self.folder / (stem + BODY))
-        return Entry(
-            stem=stem,
-            body=stem + BODY,
-            since=stamp(),
+        entry = Entry(
+            number=number,
             url=self.url,
             clutch_id=self.clutch_id,
+            digest=sha256.hexdigest()[:_CONTENT_DIGITS],
+            since=stamp(),
             resource=resource,
             parameters=None if parameters is None else dict(parameters),
             head=head,
         )
+        partial.replace(self.body(entry))
+        _sync(self.folder)
+        return entry
 
     def note(self, entry: Entry, **changes: Any) -> None:
         """Change what is known of an entry, if it still waits. A full disk must not keep runs from being sent."""
-        with suppress(OSError), self._changing():
-            current = load(self.folder, entry.stem)
-            if current is not None and current.whole:
-                write(self.folder, entry.stem + ENTRY, encoded(replace(current, **changes)))
+        with suppress(OSError), self._changing() as database:
+            current = _there(database, entry)
+            if current is not None:
+                _put(database, replace(current, **changes))
 
     def done(self, entry: Entry) -> bool:
         """Remove an entry that the service has stored, and its copies refused or replaced; whether it still waited."""
-        with self._changing():
-            waited = self._there(entry)
-            for place in (REFUSED, REPLACED):
-                for path in sorted((self.folder / place).glob(f"*-{entry.digest}.*")):
-                    path.unlink()
-            if waited:
-                remove(self.folder, entry)
+        with self._changing() as database:
+            waited = _there(database, entry) is not None
+            numbers = database.execute(_COPIES, (self.url, self.clutch_id, entry.digest, entry.number)).fetchall()
+            self._remove(database, [(number, _body(number, entry.digest)) for (number,) in numbers])
             return waited
 
     def refuse(self, entry: Entry, problem: dict[str, Any]) -> Path | None:
-        """Move an entry that the service refuses to `refused/`, with the answer beside it; None where it waits no more."""
-        with self._changing():
-            if not self._there(entry):
+        """Set aside an entry that the service refuses, with the answer; where it is, None where it waits no more."""
+        with self._changing() as database:
+            current = _there(database, entry)
+            if current is None:
                 return None
-            (self.folder / REFUSED).mkdir(exist_ok=True)
-            answer = json.dumps(problem, indent=1, ensure_ascii=False).encode()
-            write(self.folder, f"{REFUSED}/{entry.stem}{PROBLEM}", answer)
-            return move(self.folder, entry, REFUSED)
+            _put(database, replace(current, state=REFUSED, problem=problem))
+            return self.body(current)
 
-    def discard(self, place: str, entry: Entry) -> None:
-        """Delete an entry for good: from the folder (""), from `refused` or from `replaced`."""
-        with self._changing():
-            remove(self.folder / place, entry)
+    def discard(self, entries: Iterable[Entry]) -> None:
+        """Delete entries for good, in whatever state."""
+        with self._changing() as database:
+            self._remove(database, [(entry.number, entry.body) for entry in entries])
+
+    def _remove(self, database: sqlite3.Connection, entries: Sequence[tuple[int, str]]) -> None:
+        """Delete entries by their numbers and the names of their bytes; these first, which makes room on a full disk."""
+        for _, name in entries:
+            (self.folder / name).unlink(missing_ok=True)
+        database.executemany("DELETE FROM entry WHERE number = ?", [(number,) for number, _ in entries])
 
     @contextmanager
     def sending(self, patience: float) -> Iterator[None]:
         """Be the only process that sends from this spool; HeldError where another is for longer than `patience` [s]."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        with locked(self.folder / "sending.lock", patience=patience):
+        name = hashlib.sha256(f"{self.url}\n{self.clutch_id}".encode()).hexdigest()[:_LOCK_DIGITS]
+        with _opened(self.folder / f"{name}.lock", patience) as lock:
+            lock.execute("BEGIN EXCLUSIVE")
             yield
 
     @contextmanager
-    def _changing(self) -> Iterator[None]:
-        """Be the only process that changes this spool."""
+    def _changing(self) -> Iterator[sqlite3.Connection]:
+        """A transaction, while which no other process changes the folder; once it has ended it is on the disk."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        with locked(self.folder / "changing.lock"):
-            carry_out(self.folder)
-            yield
-
-
-def _next(waiting: Sequence[Entry]) -> int:
-    return 1 + max((number(entry.stem) for entry in waiting), default=0)
-
-
-def _older(other: Entry, entry: Entry, source: str, batch: Collection[str]) -> bool:
-    """Whether `entry`, which comes from the file `source`, takes the place of `other`.
-
-    It does where `other` is an older version of its run, or the same content whose entry is damaged.
-    """
-    if not other.whole:
-        return other.digest == entry.digest
-    new = other.digest != entry.digest and other.digest not in batch
-    return new and same_run(other.head, entry.head, same_file=source in other.sources)
+        with _opened(self.folder / DATABASE, _PATIENCE) as database:
+            database.execute(_DURABLE)
+            database.execute("BEGIN IMMEDIATE")
+            database.execute(_TABLE)
+            yield database
+            database.execute("COMMIT")
 
 
 def _digest(path: Path, parameters: Mapping[str, str] | None) -> str:

@@ -1,10 +1,14 @@
-"""A process that is killed before any of its operations on files: every open, rename, removal and new folder."""
+"""A process that is killed before any of its operations on files: every open, rename, removal and new folder, and every
+statement of a database."""
 
+import sqlite3
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
+from typing import Any
 
-_OPERATIONS = ("open", "os.rename", "os.remove", "os.mkdir", "os.truncate")
+_OPERATIONS = ("open", "os.rename", "os.remove", "os.mkdir", "os.truncate", "sqlite3.connect")
 
 
 class KilledError(BaseException):
@@ -20,7 +24,12 @@ class _Killer:
         self.installed = False
 
     def __call__(self, event: str, arguments: tuple[object, ...]) -> None:
-        if self.folder is None or event not in _OPERATIONS or not str(arguments[0]).startswith(self.folder):
+        if event in _OPERATIONS and self.folder is not None and str(arguments[0]).startswith(self.folder):
+            self.count(event, arguments)
+
+    def count(self, event: str, arguments: tuple[object, ...]) -> None:
+        """An operation, which is not carried out where it is the fatal one or comes after it."""
+        if self.folder is None:
             return
         if self.left == 0:
             raise KilledError(f"{event} {arguments}")
@@ -30,6 +39,21 @@ class _Killer:
 _killer = _Killer()
 
 
+class _Connection(sqlite3.Connection):
+    """A database whose statements are operations on its file."""
+
+    def execute(self, *arguments: Any) -> sqlite3.Cursor:
+        _killer.count("statement", arguments)
+        return super().execute(*arguments)
+
+    def executemany(self, *arguments: Any) -> sqlite3.Cursor:
+        _killer.count("statement", arguments)
+        return super().executemany(*arguments)
+
+
+_connect = sqlite3.connect
+
+
 @contextmanager
 def killed_before(operation: int, folder: object) -> Iterator[None]:
     """Kill what happens inside before its operation of that number, from 0."""
@@ -37,10 +61,11 @@ def killed_before(operation: int, folder: object) -> Iterator[None]:
         sys.addaudithook(_killer)
         _killer.installed = True
     _killer.folder, _killer.left = str(folder), operation
+    sqlite3.connect = partial(_connect, factory=_Connection)  # type: ignore[assignment]
     try:
         yield
     finally:
-        _killer.folder = None
+        _killer.folder, sqlite3.connect = None, _connect
 
 
 def every_kill(folder_of: Callable[[int], object], act: Callable[[int], None]) -> Iterator[int]:

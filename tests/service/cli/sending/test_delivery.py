@@ -63,7 +63,7 @@ def test_a_run_that_the_service_refuses_is_set_aside_with_the_reason(sender: Sen
     sender.push(body(2, "good"), "2.json")
     assert str(sender.send()) == "1 stored, 0 known already, 1 refused"
     assert sender.counts == (1, 0, 1)
-    assert sender.spool.problem(sender.spool.refused()[0])["detail"] == "because"
+    assert sender.spool.refused()[0].problem["detail"] == "because"
     assert "because" in sender.lines[0]
 
 
@@ -236,6 +236,6 @@ def test_a_full_disk_keeps_no_run_from_being_sent(sender: Sender, monkeypatch: p
         raise OSError(28, "No space left on device")
 
     sender.push(body(1))
-    monkeypatch.setattr("service.cli.sending.spool.write", full)
+    monkeypatch.setattr("service.cli.sending.spool._put", full)
     assert sender.send().stored == 1
     assert sender.counts == (1, 0, 0)

@@ -1,8 +1,9 @@
 """The spool on disk: what waits, what replaces what, and what is damaged."""
 
-import json
+import sqlite3
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -29,7 +30,7 @@ def contents(spool: Spool) -> list[bytes]:
 
 
 def set_aside(spool: Spool) -> list[bytes]:
-    return [(spool.folder / "replaced" / entry.body).read_bytes() for entry in spool.replaced()]
+    return [spool.body(entry).read_bytes() for entry in spool.replaced()]
 
 
 def test_runs_wait_in_the_order_in_which_they_came(spool: Spool, tmp_path: Path) -> None:
@@ -108,44 +109,28 @@ def test_a_clock_that_is_set_back_changes_no_order(
 PARAMETERS = {"kind": "stationary_stribeck", "cycles": "5.0", "filename": "a.csv"}
 
 
-def damage(spool: Spool) -> None:
-    """What is known of the first run that waits is lost."""
-    (spool.folder / (spool.waiting()[0].stem + ".entry")).write_text('{"head": ')
-
-
-def test_a_run_of_which_nothing_is_known_any_more_waits_for_its_file(spool: Spool, tmp_path: Path) -> None:
-    file = (written(tmp_path / "a.csv", b"csv"), PARAMETERS)
-    spool.add([file])
-    damage(spool)
-    spool.begin()
-    assert spool.waiting() == []
-    assert len(spool.broken()) == 1
-    assert Spool.every(spool.folder.parent) == [Spool(folder=spool.folder)]
-    _, replaced = spool.add([file])
-    assert (contents(spool), spool.broken(), replaced) == ([b"csv"], [], [])
-
-
-def test_an_entry_that_cannot_be_read_is_kept_and_named(spool: Spool, tmp_path: Path) -> None:
-    for cycles in (1, 2):
-        spool.add([(written(tmp_path / f"{cycles}.json", body(cycles)), None)])
-    damage(spool)
-    spool.begin()
-    assert contents(spool) == [body(2)]
-    assert [spool.body(entry).read_bytes() for entry in spool.broken()] == [body(1)]
+def test_a_damaged_spool_is_said_so_and_keeps_what_it_has(spool: Spool, tmp_path: Path) -> None:
+    spool.add([(written(tmp_path / "1.json", body(1)), None)])
+    kept = spool.body(spool.waiting()[0])
+    (spool.folder / "spool.sqlite").write_bytes(b"no database, but long enough to be taken for one" * 20)
+    for act in (spool.waiting, spool.begin, lambda: Spool.every(spool.folder)):
+        with pytest.raises(OSError, match=r"spool\.sqlite cannot be used"):
+            act()
+    assert kept.read_bytes() == body(1)
 
 
 def test_fields_of_a_later_release_are_passed_over(spool: Spool, tmp_path: Path) -> None:
     spool.add([(written(tmp_path / "1.json", body(1)), None)])
-    path = spool.folder / (spool.waiting()[0].stem + ".entry")
-    path.write_text(json.dumps(json.loads(path.read_bytes()) | {"colour": "red"}))
+    with closing(sqlite3.connect(spool.folder / "spool.sqlite", isolation_level=None)) as database:
+        database.execute("UPDATE entry SET known = json_set(known, '$.colour', 'red')")
     assert contents(spool) == [body(1)]
 
 
 def test_a_stored_run_takes_its_refused_and_replaced_copies_along(spool: Spool, tmp_path: Path) -> None:
     run = tmp_path / "run.json"
     spool.add([(written(run, body(1)), None)])
-    assert spool.refuse(spool.waiting()[0], {"detail": "no"}) == spool.folder / "refused" / spool.refused()[0].body
-    assert spool.problem(spool.refused()[0]) == {"detail": "no"}
+    assert spool.refuse(spool.waiting()[0], {"detail": "no"}) == spool.body(spool.refused()[0])
+    assert spool.refused()[0].problem == {"detail": "no"}
     for cycles in (1, 2, 1):
         spool.add([(written(run, body(cycles)), None)])
     assert (len(spool.refused()), len(spool.replaced())) == (1, 2)
@@ -175,5 +160,5 @@ def test_many_push_at_once_and_nothing_is_lost(spool: Spool, tmp_path: Path) -> 
 
     with ThreadPoolExecutor(4) as senders:
         list(senders.map(push, range(4)))
-    assert spool.waiting() == spool.refused() == spool.replaced() == spool.broken() == []
+    assert spool.waiting() == spool.refused() == spool.replaced() == []
     assert len(service.stored) == 4 * 8 + 8

@@ -18,7 +18,7 @@ from service.cli.main import app
 from service.cli.sending import delivery
 from service.cli.sending.spool import Spool
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body, problem
-from tests.service.cli.sending.test_spool import damage, written
+from tests.service.cli.sending.test_spool import written
 
 
 class Terminal:
@@ -142,8 +142,7 @@ def test_the_spool_is_emptied_after_a_question(terminal: Terminal) -> None:
     assert [item["clutch_id"] for item in terminal.listed()] == ["c1"]
     terminal("spool", "empty", "--yes")
     assert terminal.listed() == []
-    left = [path for path in (terminal.folder / "spool").rglob("*") if path.is_file() and path.suffix != ".lock"]
-    assert left == []
+    assert list((terminal.folder / "spool").rglob("*.body")) == []
 
 
 def test_the_spool_is_not_emptied_under_a_sender(terminal: Terminal) -> None:
@@ -168,18 +167,6 @@ def test_only_runs_for_the_address_are_sent_there(terminal: Terminal) -> None:
     assert sorted(terminal.service.stored.values()) == [body(1), body(2)]
     assert "http://other.test" not in terminal.asked
     assert "nothing waits for" in terminal("spool", "send", "--url", URL)
-
-
-def test_a_damaged_run_is_named_and_not_sent(terminal: Terminal) -> None:
-    spool = Spool.of(terminal.folder / "spool", URL, "c1")
-    spool.add([(written(terminal.folder / "1.json", body(1)), None)])
-    damage(spool)
-    assert [(item["state"], item["clutch_id"]) for item in terminal.listed()] == [("broken", None)]
-    assert "clutch not stated" in terminal("spool", "list")
-    spool.add([(written(terminal.folder / "2.json", body(2)), None)])
-    output = terminal("spool", "send", "--url", URL)
-    assert "1 stored" in output
-    assert "was not kept whole and is not sent" in output
 
 
 def test_refusals_end_the_command_as_data_errors_and_absence_as_a_failure_for_now(terminal: Terminal) -> None:
