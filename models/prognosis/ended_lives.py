@@ -200,24 +200,26 @@ class Kin:
     def together(self, own: FloatArray, weight: FloatArray, as_of: float) -> tuple[FloatArray, FloatArray]:
         """The end of life as a sample with its weights, from a filter's `own` ends [n] with weights [n] that sum to one.
 
-        It holds these as they are (all of those behind `as_of`), weighted by the predictive, and `ends`. How well the
-        filter's ends agree with the predictive, against an end anywhere, is evidence that the clutch is of the kind.
+        It holds these as they are (all of those behind `as_of`), weighted by the predictive, and `ends`; of what is ahead
+        of a clutch of the kind the share `lawful` is the former. How well the filter's ends agree with the predictive, against
+        an end anywhere, is evidence that the clutch is of the kind, and none for eq. 6 against their courses.
         """
         ahead = own > as_of
         near = ahead & np.isfinite(own)
         agreeing = np.zeros(own.size)
         agreeing[near] = weight[near] * np.exp(self.predictive.log_density(np.log(own[near] / self.centre)))
         agreed, left = float(agreeing.sum()), float(weight[ahead].sum())
-        by_law = self.lawful * _ANYWHERE * agreed / left if agreed > 0.0 else 0.0
-        by_course = (1.0 - self.lawful) * math.exp(min(self.log_odds, _MOST_LOG_ODDS))
+        lawful = self.lawful if agreed > 0.0 else 0.0
+        by_law = lawful * _ANYWHERE * agreed / left if lawful else 0.0
+        by_course = (1.0 - lawful) * math.exp(min(self.log_odds, _MOST_LOG_ODDS))
         odds = (by_law + by_course) * (1.0 - criteria.OTHER_KIND) / criteria.OTHER_KIND
         of_kind = odds / (1.0 + odds)
-        shared = left * of_kind / (by_law + by_course)
-        parts = [np.where(ahead, 1.0 - of_kind, 1.0) * weight, shared * by_course * self.weight]
-        if by_law > 0.0:
-            parts.insert(1, shared * by_law * agreeing / agreed)
-            return np.concatenate([own, own, self.ends]), np.concatenate(parts)
-        return np.concatenate([own, self.ends]), np.concatenate(parts)
+        parts = [
+            np.where(ahead, 1.0 - of_kind, 1.0) * weight,
+            left * of_kind * lawful * agreeing / (agreed or 1.0),
+            left * of_kind * (1.0 - lawful) * self.weight,
+        ]
+        return np.concatenate([own, own, self.ends]), np.concatenate(parts)
 
 
 def as_its_kind(
