@@ -71,7 +71,7 @@ COURSE_SIZE_SD, COURSE_STRETCH_SD = 0.1, np.array([0.2, 0.35, 0.5])
 #: What is known before of the share of a kind that follows eq. 6 with nothing beside it, worth so many ended lives that do,
 #: and that do not: Jeffreys' beta. By whole courses simulated kinds of eq. 6 then have 0.92 with ten ended lives and 0.81
 #: with two, real ones of the half for developing 0.06 and 0.17. CRPS at 80 % of a life of eq. 6 falls from 2.1 times that of
-#: its filter alone to 1.1 times with ten ended lives, from 2.8 to 1.3 with three; that of real lives stays. A fixed share of
+#: its filter alone to 1.0 times with ten ended lives, from 2.8 to 1.1 with three; that of real lives stays. A fixed share of
 #: a half costs the former 1.3 times, and real lives a sixth; (1, 0.5) forecasts four lives that accelerate 2 % later.
 LAWFUL_WORTH = (0.5, 0.5)
 #: How often a clutch is of another kind than its fleet, before its tests have spoken. Chosen: what is left to another kind

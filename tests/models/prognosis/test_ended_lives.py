@@ -207,6 +207,15 @@ def test_what_is_behind_stays_behind_and_weights_sum_to_one() -> None:
         assert given[ends <= 660.0].sum() == pytest.approx(0.1)
 
 
+@pytest.mark.parametrize("log_odds", [1.0, 20.0])
+def test_courses_that_fit_a_clutch_do_not_take_the_share_of_its_filter(log_odds: float) -> None:
+    """Of a kind of which four in five follow eq. 6, as its courses did as well."""
+    kin = said(measured(1_100.0, 0.6), lives())
+    own, weight = np.linspace(500.0, 1_500.0, 100), np.full(100, 0.01)
+    _, given = replace(kin, lawful=0.8, log_odds=log_odds).together(own, weight, 660.0)
+    assert given[-kin.ends.size :].sum() == pytest.approx(0.2 * weight[own > 660.0].sum(), rel=0.05)
+
+
 def test_a_clutch_that_has_outlived_all_of_them_by_far_is_not_of_their_kind() -> None:
     tests = measured(8_000.0, 0.6)
     assert of_kind(said(tests, lives())) < 0.1
