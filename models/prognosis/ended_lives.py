@@ -200,8 +200,8 @@ class Kin:
     def together(self, own: FloatArray, weight: FloatArray, as_of: float) -> tuple[FloatArray, FloatArray]:
         """The end of life as a sample with its weights, from a filter's `own` ends [n] with weights [n] that sum to one.
 
-        It holds these as they are (all of those behind `as_of`), weighted by the predictive, and `ends`; of what is ahead
-        of a clutch of the kind the share `lawful` is the former. How well the filter's ends agree with the predictive, against
+        It holds these as they are (all of those behind `as_of`), weighted by the predictive, and `ends`; of a clutch of the
+        kind the share `lawful` of what is ahead is the former. How well the filter's ends agree with the predictive, against
         an end anywhere, is evidence that the clutch is of the kind, and none for eq. 6 against their courses.
         """
         ahead = own > as_of
