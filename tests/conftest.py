@@ -25,8 +25,15 @@ settings.load_profile("untimed")
 OUTSIDE = {"postgresql", "s3", "on_server", "in_bucket", "browser", "server"}
 #: Tests of the service that run on a server, too, in every run; the others do so in `make slow`. Tests of storage always do.
 ON_BOTH = {"test_repeated_run.py", "test_compute_then_store.py", "test_raw_run.py"}
-#: Files and tests that take longer than 0.1 s of the processor; `make quick ARGS=--durations=20` shows what belongs here.
+#: Folders, files and tests that take longer than 0.1 s of the processor; `make quick ARGS=--durations=20` shows what belongs
+#: here.
 LONG = frozenset(Path(__file__).with_name("long.txt").read_text(encoding="utf-8").split())
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """`make quick` does not import a file of which it would run nothing."""
+    named = collection_path.relative_to(config.rootpath).as_posix()
+    return True if "not long" in config.option.markexpr and named in LONG else None
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -38,7 +45,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         used = {*getattr(item, "fixturenames", ()), *(value for value in drawn.values() if isinstance(value, str))}
         if used & OUTSIDE or "journeys" in item.path.parts:
             item.add_marker("outside")
-        if item.nodeid.partition("::")[0] in LONG or item.nodeid.partition("[")[0] in LONG:
+        if item.nodeid.partition("[")[0] in LONG:
             item.add_marker("long")
         if "on_server" in used and "/tests/service/" in item.path.as_posix() and item.path.name not in ON_BOTH:
             item.add_marker("slow")
