@@ -37,9 +37,11 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 def violations(page: Page) -> list[str]:
-    """What axe finds, a line an element."""
-    page.evaluate(AXE_SCRIPT)
-    found: dict[str, Any] = page.evaluate("axe.run({resultTypes: ['violations']})")
+    """What axe finds, a line an element; in an open dialog alone, for what is behind it was looked at before."""
+    if page.evaluate("window.axe === undefined"):
+        page.evaluate(AXE_SCRIPT)
+    looked_at = "document.querySelector('dialog[open]') ?? document"
+    found: dict[str, Any] = page.evaluate(f"axe.run({looked_at}, {{resultTypes: ['violations']}})")
     assert found["passes"] is not None
     return [
         f"{each['id']}: {node['html'][:160]} {node['failureSummary'][:300]}"
@@ -92,10 +94,9 @@ def test_a_clutch_with_a_diagnosis_and_all_that_opens(
     turned(page, "diagnosis").locator("#diagnosis .verdict").wait_for()
     assert violations(page) == []
     turned(page, "overview").locator("#held").get_by_text("1 run is held").wait_for()
-    for button in ("Confirm", "Correct the cycles", "Withdraw"):
-        page.locator("#held").get_by_role("button", name=button).click()
-        assert violations(page) == []
-        page.keyboard.press("Escape")
+    page.locator("#held").get_by_role("button", name="Correct the cycles").click()  # the form that has all fields
+    assert violations(page) == []
+    page.keyboard.press("Escape")
     turned(page, "diagnosis").get_by_role("button", name="Adopt the extended model").click()
     assert violations(page) == []
     page.keyboard.press("Escape")
