@@ -1,8 +1,10 @@
-"""Clients of a service in this process."""
+"""Clients of a service in this process, and the databases that they begin with."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from fastapi.testclient import TestClient
@@ -10,6 +12,7 @@ from fastapi.testclient import TestClient
 from service.app import create_app
 from service.settings import Settings
 from tests.storage.samples import lay_empty
+from tests.support import stationary
 
 
 @contextmanager
@@ -22,3 +25,23 @@ def client_on(database_url: str, **settings: Any) -> Iterator[TestClient]:
         app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000), raise_server_exceptions=False
     ) as found:
         yield found
+
+
+@cache
+def filled(*cycles: float, clutch_id: str = "c1") -> bytes:
+    """A database with `c1` and with a clutch that has stationary tests at those cycles; made once, for each test to copy."""
+    with TemporaryDirectory() as folder:
+        with client_on(f"sqlite:///{folder}/a.db") as client:
+            for each in dict.fromkeys(("c1", clutch_id)):
+                assert client.post("/v1/clutches", json={"clutch_id": each}).status_code == 201
+            for each in cycles:
+                assert client.post(f"/v1/clutches/{clutch_id}/runs", json=stationary(each)).status_code == 201
+        return Path(folder, "a.db").read_bytes()
+
+
+@contextmanager
+def client_of(path: Path, *cycles: float, clutch_id: str = "c1") -> Iterator[TestClient]:
+    """A client of a service on a copy of that database."""
+    path.write_bytes(filled(*cycles, clutch_id=clutch_id))
+    with client_on(f"sqlite:///{path}") as client:
+        yield client

@@ -2,13 +2,26 @@
 
 import logging
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from fastapi.testclient import TestClient
 
-from tests.service.clients import client_on
+from service.dashboard import assets, pages
+from tests.service.clients import client_of
 from tests.storage.samples import lay_empty
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _pages_are_read_once() -> Iterator[None]:
+    """And not for each service, of which it is half of the start."""
+    routes = cache(lambda: pages.router(assets.load()))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("service.app.assets", SimpleNamespace(load=lambda: None))
+        patched.setattr("service.app.dashboard", SimpleNamespace(router=lambda _: routes()))
+        yield
 
 
 @pytest.fixture(autouse=True)
@@ -34,6 +47,5 @@ def database_url(tmp_path: Path) -> str:
 @pytest.fixture
 def client(database_url: str) -> Iterator[TestClient]:
     """A client on this machine, with one clutch registered."""
-    with client_on(database_url) as found:
-        assert found.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
+    with client_of(Path(database_url.removeprefix("sqlite:///"))) as found:
         yield found

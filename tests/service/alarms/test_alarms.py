@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ from fastapi.testclient import TestClient
 
 from service.alarms import outbox
 from tests.service.alarms.receiving import SECRET, Receiver, receiving, signed_rightly
+from tests.service.clients import client_of
 from tests.support import stationary
 
 CYCLES = (0.0, 1000.0, 2000.0, 3000.0)
@@ -21,12 +23,10 @@ def receiver() -> Iterator[Receiver]:
 
 
 @pytest.fixture
-def life(client: TestClient) -> TestClient:
+def life(tmp_path: Path) -> Iterator[TestClient]:
     """A clutch `e` with as many tests as a prognosis needs."""
-    client.post("/v1/clutches", json={"clutch_id": "e"})
-    for cycles in CYCLES:
-        assert client.post("/v1/clutches/e/runs", json=stationary(cycles)).status_code == 201
-    return client
+    with client_of(tmp_path / "clutchlife.db", *CYCLES, clutch_id="e") as found:
+        yield found
 
 
 def rule(client: TestClient, **fields: Any) -> dict[str, Any]:

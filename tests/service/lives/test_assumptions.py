@@ -35,6 +35,7 @@ def said(client: TestClient, name: str, **asked: str | float) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_energy_as_severity_predicts_the_recent_duty(client: TestClient) -> None:
     """Light blocks, then heavy ones: wear goes with energy, and the remaining cycles are cycles of heavy duty."""
     for name, counted in (("by-energy", "dissipated_energy"), ("by-cycles", "cycles")):

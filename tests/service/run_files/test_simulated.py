@@ -1,8 +1,8 @@
 """Simulated runs as files of every format, and back: the same bits, the same fits, the same loops."""
 
 import json
-import subprocess
-import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from service.run_files.json_run import read_run
 from service.run_files.record_writer import RecordFormat, write_record
 from service.run_files.simulated import simulated_body, simulated_channels, simulated_head
 from service.run_files.upload import read_file_run
-from tests.support import one_quick
+from tests.support import clutchlife, one_quick
 
 GEOMETRY = Geometry()
 FORMATS = ("csv", "tdms", "mdf4")
@@ -39,18 +39,21 @@ def measured(programme: Programme) -> list[SimulatedRun]:
 
 
 @pytest.fixture(scope="module")
-def campaigns(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """A short campaign by the command, in a folder a format. MDF4's package warns as it is loaded: not in this process."""
-    folder = tmp_path_factory.mktemp("campaigns")
-    for form in ("json", *FORMATS):
-        simulated("--out", folder / form, "--format", form)
-    return {form: folder / form for form in ("json", *FORMATS)}
+
+    @cache
+    def made(form: str) -> Path:
+        folder = tmp_path_factory.mktemp("campaigns") / form
+        simulated("--out", folder, "--format", form)
+        return folder
+
+    return made
 
 
-def simulated(*options: str | Path) -> subprocess.CompletedProcess[str]:
+def simulated(*options: str | Path) -> str:
     """`clutchlife simulate` with one test at most."""
-    called = [sys.executable, "-m", "service.cli.main", "simulate", "--seed", "7", "--tests", "1", *map(str, options)]
-    return subprocess.run(called, check=True, capture_output=True, text=True)
+    return clutchlife("simulate", "--seed", "7", "--tests", "1", *options)
 
 
 def runs_in(folder: Path) -> list[manifest.RunFile]:
@@ -67,17 +70,17 @@ def incoming(file: manifest.RunFile) -> Any:
 
 
 @pytest.mark.parametrize("form", one_quick(FORMATS))
-def test_every_format_holds_the_run_bit_for_bit(campaigns: dict[str, Path], form: str) -> None:
-    plain, other = ([incoming(file) for file in runs_in(campaigns[name])] for name in ("json", form))
+def test_every_format_holds_the_run_bit_for_bit(campaign: Callable[[str], Path], form: str) -> None:
+    plain, other = ([incoming(file) for file in runs_in(campaign(name))] for name in ("json", form))
     assert len(plain) == 3
     assert {run.run_id: run.content_sha256 for run in plain} == {run.run_id: run.content_sha256 for run in other}
-    assert {path.suffix for path in campaigns[form].rglob("*.*")} == {".json", RecordFormat(form).suffix}
+    assert {path.suffix for path in campaign(form).rglob("*.*")} == {".json", RecordFormat(form).suffix}
 
 
 @pytest.mark.parametrize("form", one_quick(FORMATS))
-def test_every_format_gives_the_same_fits_and_loops(campaigns: dict[str, Path], form: str) -> None:
+def test_every_format_gives_the_same_fits_and_loops(campaign: Callable[[str], Path], form: str) -> None:
     stationary, dynamic = measured(Programme(dynamic=DynamicTest()))
-    read = {run.kind: run for run in map(incoming, runs_in(campaigns[form]))}
+    read = {run.kind: run for run in map(incoming, runs_in(campaign(form)))}
     fits = fit_curves(curves_by_pressure(stationary.plateaus, GEOMETRY))
     again = fit_curves(curves_by_pressure(stationary_plateaus(read["stationary_stribeck"].channels), GEOMETRY))
     for fit, back in zip(fits, again, strict=True):

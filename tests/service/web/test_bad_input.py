@@ -2,12 +2,14 @@
 
 import json
 import sqlite3
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.service.clients import client_of
 from tests.support import stationary
 
 RUNS = "/v1/clutches/c1/runs"
@@ -21,7 +23,19 @@ def content(path: Path) -> list[str]:
     return found
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
+def database_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("bad") / "clutchlife.db"
+
+
+@pytest.fixture(scope="module")
+def client(database_file: Path) -> Iterator[TestClient]:
+    """One for all: what is refused leaves nothing behind."""
+    with client_of(database_file) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
 def known(client: TestClient) -> dict[str, Any]:
     """A run that is there already."""
     body = stationary(0, run_id="known")
@@ -76,11 +90,11 @@ CASES = [
 
 @pytest.mark.parametrize(("body", "pointer", "row", "value", "code"), CASES, ids=lambda each: str(each)[:40])
 def test_a_wrong_run_is_refused_and_leaves_no_trace(
-    client: TestClient, known: dict[str, Any], tmp_path: Path, body: dict[str, Any], pointer: str, row: int | None,
+    client: TestClient, known: dict[str, Any], database_file: Path, body: dict[str, Any], pointer: str, row: int | None,
     value: str | None, code: str | None,
 ) -> None:  # fmt: skip
     assert known
-    before = content(tmp_path / "clutchlife.db")
+    before = content(database_file)
     answer = client.post(RUNS, content=json.dumps(body), headers={"Content-Type": "application/json"})
     assert answer.status_code == 422
     assert answer.headers["content-type"] == "application/problem+json"
@@ -91,7 +105,7 @@ def test_a_wrong_run_is_refused_and_leaves_no_trace(
     assert value is None or first["value"] == value
     assert code is None or first["code"] == code
     assert pointer.split("/")[-2 if row else -1] in first["message"]
-    assert content(tmp_path / "clutchlife.db") == before
+    assert content(database_file) == before
 
 
 @pytest.mark.parametrize("channel", ["pressure_bar", "speed_rpm", "torque_nm"])
@@ -105,12 +119,12 @@ def test_ragged_and_empty_channels_are_named(client: TestClient, channel: str) -
 
 
 def test_other_content_under_a_known_name_is_a_conflict(
-    client: TestClient, known: dict[str, Any], tmp_path: Path
+    client: TestClient, known: dict[str, Any], database_file: Path
 ) -> None:
-    before = content(tmp_path / "clutchlife.db")
+    before = content(database_file)
     assert client.post(RUNS, json=known | {"cycles": 1}).status_code == 409
     assert client.post("/v1/clutches", json={"clutch_id": "c1", "fluid": "water"}).status_code == 409
-    assert content(tmp_path / "clutchlife.db") == before
+    assert content(database_file) == before
 
 
 @pytest.mark.parametrize(
@@ -200,15 +214,15 @@ def test_a_wrong_clutch_is_422(client: TestClient, record: dict[str, Any]) -> No
 
 
 @pytest.mark.parametrize("cycles", [5e-324, 1.4e-168, 1e-7, 2e-6, 1e-3])
-def test_a_run_at_next_to_no_cycles_is_tracked(client: TestClient, cycles: float) -> None:
+def test_a_run_at_next_to_no_cycles_is_tracked(tmp_path: Path, cycles: float) -> None:
     """What a course is up to there is lost in rounding."""
-    client.post("/v1/clutches", json={"clutch_id": "c1"})
-    for number, at in enumerate((0.0, cycles)):
-        receipt = client.post("/v1/clutches/c1/runs", json=stationary(at, run_id=f"r{number}"))
-        assert receipt.status_code == 201
-        if receipt.json()["state"] == "held":
-            assert client.post(f"/v1/clutches/c1/runs/r{number}/confirm", json={}).status_code == 200
-    for method in ("particle", "ukf", "grid"):
-        life = client.get("/v1/clutches/c1/remaining-useful-life", params={"method": method})
-        assert life.status_code == 200
-        assert life.json()["as_of_cycles"] == cycles
+    with client_of(tmp_path / "a.db") as client:
+        for number, at in enumerate((0.0, cycles)):
+            receipt = client.post(RUNS, json=stationary(at, run_id=f"r{number}"))
+            assert receipt.status_code == 201
+            if receipt.json()["state"] == "held":
+                assert client.post(f"{RUNS}/r{number}/confirm", json={}).status_code == 200
+        for method in ("particle", "ukf", "grid"):
+            life = client.get("/v1/clutches/c1/remaining-useful-life", params={"method": method})
+            assert life.status_code == 200
+            assert life.json()["as_of_cycles"] == cycles

@@ -167,6 +167,7 @@ def test_doubts_change_nothing_and_are_the_same_twice() -> None:
     assert bench.events == before
 
 
+@pytest.mark.slow
 def test_honest_campaigns_are_not_held() -> None:
     """Some 300 runs in every way of running a campaign, in order and shuffled: at most three held.
 
@@ -187,6 +188,7 @@ def test_honest_campaigns_are_not_held() -> None:
     assert held <= 3
 
 
+@pytest.mark.slow
 def test_slips_of_whole_campaigns_are_held() -> None:
     """One slip of cycles in each of 40 campaigns: at 95 % held, fewer than 34 are held once in 200 such tests."""
     held = 0

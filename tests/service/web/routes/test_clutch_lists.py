@@ -1,17 +1,36 @@
 """Lists of clutches by state, by what is searched for and by name; how many there are; what a bound key sees of it."""
 
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.service.clients import client_of, client_on
 from tests.service.web.routes.granting import granted
 from tests.support import stationary
 
 
-@pytest.fixture
-def fleet(client: TestClient) -> TestClient:
+@pytest.fixture(scope="module")
+def laid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """c1, without a run; two that wear, one of them to its end and with a held run; one that is archived."""
+    path = tmp_path_factory.mktemp("fleet") / "clutchlife.db"
+    with client_of(path) as client:
+        fill(client)
+    return path
+
+
+@pytest.fixture
+def fleet(laid: Path, tmp_path: Path) -> Iterator[TestClient]:
+    """A client of a service on a copy of it."""
+    shutil.copyfile(laid, tmp_path / "copy.db")
+    with client_on(f"sqlite:///{tmp_path / 'copy.db'}") as client:
+        yield client
+
+
+def fill(client: TestClient) -> None:
     for clutch_id, material in (("ageing", "Carbon"), ("ended", "carbon_2"), ("gone", "paper")):
         record = {"clutch_id": clutch_id, "friction_material": material}
         assert client.post("/v1/clutches", json=record).status_code == 201
@@ -23,7 +42,6 @@ def fleet(client: TestClient) -> TestClient:
     odd["channels"]["torque_nm"] = [100 * value for value in odd["channels"]["torque_nm"]]
     assert client.post("/v1/clutches/ended/runs", json=odd).json()["state"] == "held"
     assert client.patch("/v1/clutches/gone", json={"archived": True}).status_code == 200
-    return client
 
 
 def ids(client: TestClient, question: str, **asked: Any) -> list[str]:

@@ -93,6 +93,7 @@ def test_a_worker_that_died_is_not_ready_until_another_is_up(tmp_path: Path) -> 
         with httpx2.Client(timeout=30) as http:
             while 'clutchlife_worker_calls{lane="runs"} 0.0' not in http.get(f"{server.url}/metrics").text:
                 assert time.monotonic() < deadline, "the workers are not up"
+                time.sleep(0.1)
             found = workers_of(server.pid)
             assert len(found) == 2
             assert http.get(url).status_code == 200
