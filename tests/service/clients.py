@@ -1,5 +1,6 @@
 """Clients of a service in this process, and the databases that they begin with."""
 
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -25,6 +26,14 @@ def client_on(database_url: str, **settings: Any) -> Iterator[TestClient]:
         app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000), raise_server_exceptions=False
     ) as found:
         yield found
+
+
+@contextmanager
+def client_on_copy(laid: Path, folder: Path, **settings: Any) -> Iterator[TestClient]:
+    """A client of a service on a copy, in that folder, of a database that several tests begin with."""
+    shutil.copyfile(laid, folder / "copy.db")
+    with client_on(f"sqlite:///{folder / 'copy.db'}", **settings) as client:
+        yield client
 
 
 @cache

@@ -27,7 +27,7 @@ def aged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     database = f"sqlite:///{tmp_path_factory.mktemp('aged') / 'clutchlife.db'}"
     with client_on(database, clutch_metrics=True) as client:
         client.post("/v1/clutches", json={"clutch_id": "bench"})
-        for run in simulate(7, most_tests=3, programme=Programme(dynamic=DynamicTest(rate=25.0))):
+        for run in simulate(7, most_tests=3, programme=Programme(dynamic=DynamicTest(rate=25.0, pressures=(4e5, 6e5)))):
             assert client.post("/v1/clutches/bench/runs", json=simulated_body(run)).status_code == 201
         yield client
 

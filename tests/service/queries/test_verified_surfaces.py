@@ -5,33 +5,34 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
-from service.app import create_app
 from service.cli.main import app
 from service.queries.verification import CheckedInspections, check_inspections
-from service.settings import Settings
 from storage.engine.opening import find_database
 from storage.engine.sqlite.database import back_up
+from tests.service.clients import client_of
 from tests.service.web.routes.surfaces import FRESH, WORN, inspected, png, sha256
 
 
-@pytest.fixture
-def copy(tmp_path: Path) -> str:
-    """A backup of a database with two inspections, which show the same photograph, and one of them another."""
-    url = f"sqlite:///{tmp_path}/clutchlife.db"
-    with TestClient(
-        create_app(Settings(database=url)), base_url="http://127.0.0.1", client=("127.0.0.1", 50000)
-    ) as client:
-        assert client.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
+@pytest.fixture(scope="module")
+def inspected_twice(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A database with two inspections, which show the same photograph, and one of them another."""
+    path = tmp_path_factory.mktemp("inspected") / "clutchlife.db"
+    with client_of(path) as client:
         for body, reds in ((FRESH, (1,)), (WORN, (1, 2))):
             address = inspected(client, body)
             for red in reds:
                 headers = {"Content-Type": "image/png"}
                 answer = client.post(f"{address}/photographs", content=png(red), headers=headers)
                 assert answer.status_code == 201
-    back_up(url, tmp_path / "copy.db")
+    return f"sqlite:///{path}"
+
+
+@pytest.fixture
+def copy(inspected_twice: str, tmp_path: Path) -> str:
+    """A backup of it."""
+    back_up(inspected_twice, tmp_path / "copy.db")
     return f"sqlite:///{tmp_path}/copy.db"
 
 

@@ -1,7 +1,9 @@
 """A life is declared ended: it reads so, takes in nothing later, can be taken back, and teaches its fleet."""
 
 import csv
+from collections.abc import Iterator
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from service.lives.history import Event, require_within_ends
 from service.workflows.learn_fleet import refresh
 from storage.engine.opening import open_database
 from tests.real import loaders
+from tests.service.clients import client_of, client_on_copy
 from tests.support import stationary
 
 RUNS, LIFE = "/v1/clutches/c1/runs", "/v1/clutches/c1/remaining-useful-life"
@@ -28,12 +31,20 @@ def post(client: TestClient, body: dict[str, Any], status: int = 201, path: str 
     return answer.json()
 
 
-@pytest.fixture
-def tested(client: TestClient) -> TestClient:
+@pytest.fixture(scope="module")
+def laid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A clutch with four tests up to 3000 cycles, half of the way to its end."""
-    for cycles in (0, 1000, 2000, 3000):
-        post(client, stationary(cycles, run_id=f"test-{cycles}", **FEW))  # type: ignore[arg-type]
-    return client
+    path = tmp_path_factory.mktemp("tested") / "a.db"
+    with client_of(path) as client:
+        for cycles in (0, 1000, 2000, 3000):
+            post(client, stationary(cycles, run_id=f"test-{cycles}", **FEW))  # type: ignore[arg-type]
+    return path
+
+
+@pytest.fixture
+def tested(laid: Path, tmp_path: Path) -> Iterator[TestClient]:
+    with client_on_copy(laid, tmp_path) as client:
+        yield client
 
 
 def life(client: TestClient, **query: Any) -> Any:

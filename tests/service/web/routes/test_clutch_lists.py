@@ -1,6 +1,5 @@
 """Lists of clutches by state, by what is searched for and by name; how many there are; what a bound key sees of it."""
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from tests.service.clients import client_of, client_on
+from tests.service.clients import client_of, client_on_copy
 from tests.service.web.routes.granting import granted
 from tests.support import stationary
 
@@ -25,8 +24,7 @@ def laid(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def fleet(laid: Path, tmp_path: Path) -> Iterator[TestClient]:
     """A client of a service on a copy of it."""
-    shutil.copyfile(laid, tmp_path / "copy.db")
-    with client_on(f"sqlite:///{tmp_path / 'copy.db'}") as client:
+    with client_on_copy(laid, tmp_path) as client:
         yield client
 
 

@@ -1,6 +1,5 @@
 """Lives that end by more than mean COF, and tracks of any quantity, over HTTP."""
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from models.rig.campaign import simulate
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
 from service.run_files.simulated import simulated_body
-from tests.service.clients import client_on
+from tests.service.clients import client_on, client_on_copy
 from tests.support import one_quick
 
 WAIT = {"Prefer": "wait=60"}
@@ -29,7 +28,7 @@ def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     record = {"clutch_id": "s", "origin": "simulated", "end_of_life": {"criteria": [{"quantity": "mean_cof"}, SHUDDER]}}
     with client_on(f"sqlite:///{path}") as client:
         assert client.post("/v1/clutches", json=record).status_code == 201
-        for run in simulate(7, most_tests=6, programme=Programme(dynamic=DynamicTest(rate=25.0))):
+        for run in simulate(7, most_tests=6, programme=Programme(dynamic=DynamicTest(rate=25.0, pressures=(5e5, 7e5)))):
             assert client.post("/v1/clutches/s/runs", json=simulated_body(run)).status_code == 201
     return path
 
@@ -37,8 +36,7 @@ def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def tested(filled: Path, tmp_path: Path) -> Iterator[TestClient]:
     """A client of a service on a copy of it."""
-    shutil.copyfile(filled, tmp_path / "copy.db")
-    with client_on(f"sqlite:///{tmp_path / 'copy.db'}") as client:
+    with client_on_copy(filled, tmp_path) as client:
         yield client
 
 
