@@ -51,7 +51,7 @@ def test_a_campaign_is_pushed_exported_and_pushed_again(campaign: Path, server: 
     clutchlife("export", "sim-7", "--out", tmp_path / "export", "--url", server.url)
     exported = json.loads((tmp_path / "export" / "results" / "remaining-useful-life-particle.json").read_bytes())
     assert exported == first
-    with serving(tmp_path / "second.db") as second:
+    with serving(tmp_path / "second.db", loaded=True) as second:
         output = clutchlife(
             "push", tmp_path / "export", "--clutch", "sim-7", "--url", second.url, "--spool", tmp_path / "spool"
         )
@@ -165,6 +165,7 @@ def test_keys_open_and_close_the_service(server: Server) -> None:
     assert ask("GET", keys["read"]) == 401
 
 
+@pytest.mark.slow
 def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops_and_inspections() -> None:
     """Until Ctrl-C; `--exit` ends by itself instead."""
     called = [sys.executable, "-u", "-m", "service.cli.main", "demo", "--no-browser"]

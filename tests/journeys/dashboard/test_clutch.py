@@ -82,11 +82,7 @@ def watched_3d(browser_3d: Browser, life: Server) -> Iterator[Watched]:
 
 
 def opened(watched: Watched) -> Page:
-    if "/clutches/sim-1" in watched.page.url:
-        return watched.page
-    page = watched.open("/clutches/sim-1")
-    pointed_at(page)
-    return page
+    return watched.page if "/clutches/sim-1" in watched.page.url else watched.open("/clutches/sim-1")
 
 
 def drawn(page: Page, name: str) -> Locator:
@@ -101,6 +97,7 @@ def drawn(page: Page, name: str) -> Locator:
 @pytest.mark.slow
 def test_every_chart_is_drawn(browser: Browser, watched_3d: Watched) -> None:
     page = opened(watched_3d)
+    pointed_at(page)
     for tab, names in CHARTS.items():
         turned(page, tab)
         expect(page.locator("figure.chart:visible h3")).to_have_text(list(names.values()))
@@ -194,6 +191,7 @@ def test_units_are_chosen_and_kept(browser: Browser, life: Server) -> None:
 @pytest.mark.slow
 def test_dark_and_light_are_chosen_and_the_charts_follow(browser: Browser, watched_3d: Watched) -> None:
     page = opened(watched_3d)
+    pointed_at(page)
     button = page.locator("#theme")
     assert button.inner_text() == "Theme: system"
     for theme, dark in (("light", False), ("dark", True), ("system", False)):
@@ -246,6 +244,7 @@ def test_what_the_page_says_is_what_the_service_says(watched: Watched) -> None:
 @pytest.mark.slow
 def test_every_chart_has_a_table_a_png_and_a_csv(watched_3d: Watched) -> None:
     page = opened(watched_3d)
+    pointed_at(page)
     for name in ("fan", "landscape"):
         chart = drawn(page, name)
         chart.locator("summary").click()

@@ -75,7 +75,7 @@ def text(cycles: int) -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("ending", "content", "torque"), [pytest.param("csv", text, "Mz", marks=pytest.mark.slow), ("xlsx", workbook, "Mx")]
+    ("ending", "content", "torque"), [("csv", text, "Mz"), pytest.param("xlsx", workbook, "Mx", marks=pytest.mark.slow)]
 )
 def test_the_second_file_of_a_rig_is_taken_without_a_question(
     watched: Watched, server: Server, ending: str, content: Any, torque: str

@@ -17,7 +17,7 @@ from tests.support import ONCE, Server, serving, stationary
 
 pytestmark = pytest.mark.browser
 
-CLUTCHES = 400
+CLUTCHES = 250
 MAX_ROWS = 150
 #: Between two cards of a phone's page, px.
 GAP = 13

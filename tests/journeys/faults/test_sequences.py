@@ -1,6 +1,6 @@
 """Whole sequences of requests, each made of what earlier ones answered: no answer breaks the description, none is a fault.
 
-CI sends some 200 requests; `make faults` sends 5,000.
+CI sends some 100 requests; `make faults` sends 5,000.
 """
 
 from collections import Counter
@@ -65,7 +65,7 @@ def sequences(url: str) -> tuple[type, Told]:
 
 
 @pytest.mark.parametrize(
-    "number", [pytest.param(200, id="200 requests"), pytest.param(5000, id="5,000 requests", marks=pytest.mark.slow)]
+    "number", [pytest.param(100, id="100 requests"), pytest.param(5000, id="5,000 requests", marks=pytest.mark.slow)]
 )
 def test_no_sequence_of_requests_breaks_the_description(number: int, tmp_path: Path) -> None:
     with serving(tmp_path / "clutchlife.db", loaded=True) as server:

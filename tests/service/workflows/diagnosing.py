@@ -5,14 +5,26 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
 from fastapi.testclient import TestClient
 
+from models.diagnosis.extension import Extension
 from service.app import create_app
 from service.settings import Settings
 from tests.service.workflows import stand_in_engine
 from tests.support import stationary
 
 BASE = "/v1/clutches/c1"
+
+
+@contextmanager
+def stood_in() -> Iterator[None]:
+    """What an adopted extension does is stood in for, here and in the process of a diagnosis."""
+    with pytest.MonkeyPatch.context() as patched:
+        for name, method in stand_in_engine.METHODS.items():
+            patched.setattr(Extension, name, method)
+        patched.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+        yield
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """The diagnosis through the service: asked for, stored, adopted, refused; with an engine that stands in for the real one."""
 
+import shutil
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -19,8 +20,7 @@ from service.web.auth import SCOPES, Scope, make_key
 from service.workflows.replay import replay_clutch
 from storage import keys
 from storage.engine.opening import open_database
-from tests.service.workflows import stand_in_engine
-from tests.service.workflows.diagnosing import BASE, diagnosed, post_tests, service
+from tests.service.workflows.diagnosing import BASE, diagnosed, post_tests, service, stood_in
 from tests.support import one_quick
 
 RUL = f"{BASE}/remaining-useful-life"
@@ -29,17 +29,33 @@ EXTENDED = {"name": "extended", "effects": EFFECTS}
 BASELINE = {"name": "baseline", "effects": []}
 
 
-@pytest.fixture(autouse=True)
-def _stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, method in stand_in_engine.METHODS.items():
-        monkeypatch.setattr(Extension, name, method)
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+@pytest.fixture(scope="module", autouse=True)
+def _stand_in() -> Iterator[None]:
+    with stood_in():
+        yield
 
 
 @pytest.fixture
 def client(tmp_path: Path) -> Iterator[TestClient]:
     with service(tmp_path) as found:
         yield found
+
+
+@pytest.fixture(scope="module")
+def laid(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The file of a clutch with five tests and a diagnosis of them, and the diagnosis' id."""
+    folder = tmp_path_factory.mktemp("diagnosed")
+    with service(folder) as found:
+        post_tests(found, 0, 1000, 2000, 3000, 4000)
+        return folder / "a.db", str(diagnosed(found)["diagnosis_id"])
+
+
+@pytest.fixture
+def examined(laid: tuple[Path, str], tmp_path: Path) -> Iterator[tuple[TestClient, str]]:
+    """A service on a copy of it."""
+    shutil.copyfile(laid[0], tmp_path / "a.db")
+    with service(tmp_path) as found:
+        yield found, laid[1]
 
 
 def said(client: TestClient) -> list[Any]:
@@ -85,11 +101,13 @@ def test_a_report_is_answered_stored_and_listed(client: TestClient) -> None:
     assert client.get(answer.headers["Location"]).json() == report | {"stale": True}
 
 
-def test_the_plan_of_a_diagnosis_is_a_protocol_that_a_rig_can_run(client: TestClient, tmp_path: Path) -> None:
+def test_the_plan_of_a_diagnosis_is_a_protocol_that_a_rig_can_run(
+    examined: tuple[TestClient, str], tmp_path: Path
+) -> None:
     """The circle: diagnose, the plan as a file, its tests on the simulated rig, sent, so that a next diagnosis has them.
     With the real engine tests/documents/test_pages.py goes round it."""
-    post_tests(client, 0, 1000, 2000, 3000)
-    at = client.post(f"{BASE}/diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"}).headers["Location"]
+    client, diagnosis_id = examined
+    at = f"{BASE}/diagnoses/{diagnosis_id}"
     plan = client.get(f"{at}/plan")
     PlanOut.model_validate(plan.json())
     (test,) = plan.json()["tests"]
@@ -109,7 +127,7 @@ def test_the_plan_of_a_diagnosis_is_a_protocol_that_a_rig_can_run(client: TestCl
     tests = planned_tests(tmp_path / "plan.csv", 1)
     assert tests == planned_tests(tmp_path / "plan.json", 1)
     made = planned(
-        7, tests, clutch=simulated_clutch(7), sensor=Sensor(), ageing=Ageing.CYCLES, cycles=3000, wear=3000.0
+        7, tests, clutch=simulated_clutch(7), sensor=Sensor(), ageing=Ageing.CYCLES, cycles=4000, wear=4000.0
     )
     sent = [client.post(f"{BASE}/runs", json=simulated_body(run)) for run in made]
     assert [answer.status_code for answer in sent] == [201] * len(sent)
@@ -121,10 +139,10 @@ def test_the_plan_of_a_diagnosis_is_a_protocol_that_a_rig_can_run(client: TestCl
     assert client.get(at).json()["stale"]
 
 
-def test_what_is_adopted_moves_every_answer_and_back_again(client: TestClient) -> None:
-    post_tests(client, 0, 1000, 2000, 3000, 4000)
+def test_what_is_adopted_moves_every_answer_and_back_again(examined: tuple[TestClient, str]) -> None:
+    client, diagnosis_id = examined
     before, receipts = said(client), client.get(f"{BASE}/runs").json()
-    report = diagnosed(client)
+    report = client.get(f"{BASE}/diagnoses/{diagnosis_id}").json()
     life = report["gain"]["remaining_useful_life"]
     shown = client.get(RUL).json()
     assert life["before"] == {name: shown[name] for name in life["before"]}
@@ -227,16 +245,16 @@ def test_what_is_unknown_or_wrong_is_refused(client: TestClient) -> None:
 
 @pytest.mark.parametrize("error", one_quick([KeyError, ValueError, NotFiniteError]))
 def test_a_run_is_taken_whatever_the_model_makes_of_it(
-    client: TestClient, monkeypatch: pytest.MonkeyPatch, error: type[Exception]
+    examined: tuple[TestClient, str], monkeypatch: pytest.MonkeyPatch, error: type[Exception]
 ) -> None:
     def artefact(*_: Any) -> Any:
         raise error("a model that breaks")
 
-    post_tests(client, 0, 1000, 2000)
-    diagnosed(client, adopt=True)
+    client, diagnosis_id = examined
+    assert client.put(f"{BASE}/model", json={"diagnosis_id": diagnosis_id}).status_code == 200
     monkeypatch.setattr(Extension, "artefact", artefact)
-    post_tests(client, 3000)
-    assert client.get(RUL).json()["runs_used"] == 4
+    post_tests(client, 5000)
+    assert client.get(RUL).json()["runs_used"] == 6
 
 
 def test_who_may_read_may_not_ask_or_adopt(client: TestClient, tmp_path: Path) -> None:
