@@ -139,6 +139,7 @@ def test_without_oil_temperature_the_plate_is_above_its_own_coldest() -> None:
     assert facts_of(given).plate_warming is not None
 
 
+@pytest.mark.slow
 def test_an_adopted_model_takes_off_by_the_plate_of_a_later_test() -> None:
     given = with_plate(campaign(7, heated), RISE)
     extension = look(given).extension

@@ -14,6 +14,7 @@ import pytest
 from service.work.background import AtOnce, directly, in_background
 from storage import clutches
 from storage.engine.opening import open_database
+from tests.support import one_quick
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="this system has no such policy")
 
@@ -110,7 +111,7 @@ app(["replay", "c1", "--database", sys.argv[2]])
 """
 
 
-@pytest.mark.parametrize("at", ["computes", "stores"])
+@pytest.mark.parametrize("at", one_quick(["stores", "computes"]))
 def test_an_interrupt_ends_a_command_in_the_middle_and_leaves_nothing_half_done(tmp_path: Path, at: str) -> None:
     url = f"sqlite:///{tmp_path / 'a.db'}"
     open_database(url).close()

@@ -19,7 +19,7 @@ from service.work import progress
 from service.work.executor import Executor, ExecutorUnavailableError, Outcome, Processes, WorkerLostError, executor_of
 from tests.service.work import functions
 from tests.service.work.clusters import ROOT, LocalCluster, local_cluster
-from tests.support import free_port
+from tests.support import free_port, one_quick
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def executor(request: pytest.FixtureRequest) -> Iterator[Executor]:
         yield made
 
 
-@pytest.fixture(params=["processes:2", "cluster"])
+@pytest.fixture(params=one_quick(["processes:2", "cluster"]))
 def killed(request: pytest.FixtureRequest) -> Iterator[Executor]:
     """An executor whose processes the test may kill."""
     if request.param == "cluster":
