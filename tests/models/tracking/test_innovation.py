@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 from models.tracking.criteria import FAR, FEWEST_BEFORE
 from models.tracking.filters.grid import Grid
-from models.tracking.innovation import Innovation, innovation, last_innovation
+from models.tracking.innovation import innovation, last_innovation
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from tests.models.tracking.tracked_series import PLAIN, PRIOR, TYPICAL, series
@@ -67,8 +67,3 @@ def test_nothing_is_off_track_after_few_tests_or_across_an_event() -> None:
     posterior = drawn(far, PRIOR)
     assert last_innovation(posterior, far[-FEWEST_BEFORE:], PRIOR) is None
     assert last_innovation(posterior, [*far[:-1], replace(far[-1], epoch=1)], PRIOR) is None
-
-
-@pytest.mark.parametrize(("value", "off"), [(FAR, False), (-FAR, False), (1.01 * FAR, True), (-np.inf, True)])
-def test_the_limit_itself_is_on_the_track(value: float, off: bool) -> None:
-    assert Innovation(value=value).off_track is off

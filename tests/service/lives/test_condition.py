@@ -8,11 +8,10 @@ from typing import Any
 import pytest
 
 from models.prognosis.criteria import QUANTILES
-from service.lives.condition import STATES, bound_in_words, rank_of, state_of, top_line
+from service.lives.condition import bound_in_words, rank_of, state_of, top_line
 from service.lives.payloads import filters_disagree
 from service.queries import clutch_list, degradation, series
 from service.queries.remaining_life import remaining_life
-from service.schemas.life import ProgrammeIn
 from tests.service.workflows.benches import CLUTCH, Bench, body, stood_in
 from tests.support import one_quick
 
@@ -20,7 +19,6 @@ from tests.support import one_quick
 PRESENT = ("mean_cof", "mean_cof_sd", "measured_at_cycles", "fraction_of_initial", "health")
 METHODS = ("particle", "ukf", "grid")
 SLOPE = {"quantity": "slope", "speed_rpm": 100, "pressure_bar": 4.0, "below": -1.0}
-PLAN = ProgrammeIn.model_validate({"programme": [{"cycles": 5000}]})
 
 
 @pytest.fixture
@@ -202,10 +200,6 @@ def test_the_top_line_answers_and_says_what_to_do(
     line = top_line(known, disputed=diagnosis is not None, diagnosis=diagnosis)
     assert line["headline"].startswith(headline)
     assert line["action"].startswith(action)
-
-
-def test_the_states_stand_in_the_order_of_the_contract() -> None:
-    assert STATES == ("failure", "maintenance", "check", "out_of_specification", "normal")
 
 
 def test_a_clutch_that_shudders_is_no_longer_normal(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ import pytest
 
 from models.diagnosis.criteria import DRAWS, SIGN_UNDETERMINED
 from models.diagnosis.diagnose import diagnose
-from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.report.report import Report
 from tests.models.diagnosis.rehearsals import rehearsal
 
@@ -49,9 +48,3 @@ def test_draws_weigh_one_and_carry_only_what_the_report_names(shifted: Report) -
     sizes = [effect["amplitude"] for draw in shifted.extension.content["draws"] for effect in draw["effects"]]
     assert len(set(sizes)) > DRAWS // 2
     assert np.mean(np.array(sizes) < 0) <= SIGN_UNDETERMINED
-
-
-@pytest.mark.parametrize("slug", ["inertia_torque", "oil_temperature"])
-def test_a_size_outside_physics_is_no_candidate(slug: str) -> None:
-    """A moment of inertia of -1e-4 kg m² was offered with probability 1."""
-    assert BY_SLUG[slug].positive

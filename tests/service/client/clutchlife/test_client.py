@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from service.client.clutchlife import Client, ClutchlifeError, DiagnosisFailedError, RefusedError, ServiceAwayError
+from service.client.clutchlife import Client, ClutchlifeError, RefusedError, ServiceAwayError
 from service.client.clutchlife.tables import columns, table
 from tests.support import Server, free_port, serving, stationary
 
@@ -97,10 +97,6 @@ def test_a_diagnosis_is_waited_for(client: Client) -> None:
     report = client.diagnose("e")
     assert report["status"] == "finished"
     assert client.diagnoses("e").loc[0, "diagnosis_id"] == report["diagnosis_id"]
-
-
-def test_a_diagnosis_that_failed_is_an_exception() -> None:
-    assert DiagnosisFailedError("the diagnosis failed: x", {"detail": "x"}).problem == {"detail": "x"}
 
 
 ITEMS: list[dict[str, Any]] = [{"a": 1, "b": {"c": None, "d": [1]}}, {"a": 2.5, "b": {"c": "x", "d": []}}]
