@@ -7,12 +7,6 @@ from tests.architecture.source import CHAPTERS, ROOT, Module, imports, imports_o
 DIAGNOSIS = "models.diagnosis"
 
 
-def chapter_of(name: str) -> str | None:
-    """The chapter of the diagnosis that a module belongs to; None outside."""
-    head, _, rest = name.removeprefix(DIAGNOSIS).partition(".")
-    return rest.split(".")[0] if name.startswith(f"{DIAGNOSIS}.") and not head else None
-
-
 def test_an_import_inside_a_function_says_why() -> None:
     wrong = sorted(
         {

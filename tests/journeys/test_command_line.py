@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support import ONCE, Server, clutchlife, serving, stationary
+from tests.support import ONCE, Server, clutchlife, serving
 
 
 @pytest.fixture(scope="module")
@@ -65,44 +65,6 @@ def test_the_command_starts_without_database_and_numerics() -> None:
     looked = f"import sys, service.cli.main; print([name for name in {heavy!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", looked], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
-
-
-@pytest.mark.slow
-def test_push_waits_in_the_spool_while_the_service_is_away(tmp_path: Path) -> None:
-    run, spool = tmp_path / "run.json", tmp_path / "spool"
-    run.write_text(json.dumps(stationary(0, run_id="r0")))
-    with serving(tmp_path / "clutchlife.db") as server:
-        ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
-        push = ("push", run, "--clutch", "c1", "--url", server.url, "--spool", spool, "--patience", "0.5")
-        server.stop()
-        assert "1 runs wait" in clutchlife(*push, code=75)
-        run.write_text(json.dumps(stationary(1000, run_id="r1")))
-        server.start()
-        assert "2 stored, 0 known already, 0 refused" in clutchlife(*push)
-        assert list(spool.rglob("*.body")) == []
-        run.write_text(json.dumps(stationary(-1, run_id="r2")))
-        assert "greater than or equal to 0" in clutchlife(*push, code=65)
-        assert "refused" in clutchlife("spool", "list", "--spool", spool)
-        assert "no clutch is known" in clutchlife(
-            "push", run, "--clutch", "x", "--url", server.url, "--spool", spool, code=65
-        )
-    assert "is not there" in clutchlife("push", tmp_path / "nothing", "--clutch", "c1", code=65)
-
-
-@pytest.mark.slow
-def test_replay_gives_the_same_again_and_backup_a_copy(campaign: Path, tmp_path: Path) -> None:
-    database = tmp_path / "clutchlife.db"
-    url = f"sqlite:///{database}"
-    with serving(database) as server:
-        clutchlife("push", campaign, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
-        before = results(server.url)
-        clutchlife("backup", tmp_path / "copy.db", "--database", url)
-        clutchlife("backup", tmp_path / "copy.db", "--database", url, code=1)
-        clutchlife("replay", "--database", url)
-        assert results(server.url) == before
-    with serving(tmp_path / "copy.db") as copy:
-        assert results(copy.url) == before
-    assert "no clutch is known" in clutchlife("replay", "nobody", "--database", url, code=1)
 
 
 @pytest.mark.slow

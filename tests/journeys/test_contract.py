@@ -223,16 +223,3 @@ def test_etags_change_when_and_only_when_the_content_does(http: httpx2.Client) -
     assert (
         http.get(f"{BASE}/runs/stationary-0", headers={"If-None-Match": tags["/runs/stationary-0"]}).status_code == 304
     )
-
-
-def test_health_and_description(http: httpx2.Client) -> None:
-    assert http.get("/livez").json()["status"] == "alive"
-    assert http.get("/readyz").json()["status"] == "ready"
-    described = http.get("/openapi.json").json()
-    assert "/v1/clutches/{clutch_id}/remaining-useful-life" in described["paths"]
-    assert http.get("/", follow_redirects=True).status_code == 200
-    for address, status in (("/nothing", 404), ("/v1/clutches/x/runs/y/z", 404)):
-        answer = http.get(address)
-        assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json")
-    wrong = http.delete(BASE)
-    assert (wrong.status_code, wrong.headers["content-type"]) == (405, "application/problem+json")

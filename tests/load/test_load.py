@@ -1,8 +1,6 @@
 """The load generator itself: what it sends, what it counts, what it would miss."""
 
-import asyncio
 import json
-from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
@@ -13,35 +11,6 @@ from tests.load.bodies import Post, life
 from tests.load.checks import lost_of
 from tests.load.field import ROUTES, Acknowledged, Counts
 from tests.load.report import Loaded, demands, markdown
-
-Handler = Callable[[bytes], Awaitable[bytes | None]]
-
-
-async def stub(answer: Handler) -> tuple[asyncio.Server, int]:
-    """A server that answers each request head with these bytes, or closes the connection at None; and its port."""
-
-    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        try:
-            while True:
-                head = await reader.readuntil(b"\r\n\r\n")
-                length = head.lower().partition(b"content-length:")[2].split(b"\r\n")[0]
-                await reader.readexactly(int(length or 0))
-                sent = await answer(head)
-                if sent is None:
-                    return
-                writer.write(sent)
-        except (asyncio.IncompleteReadError, ConnectionResetError):
-            return
-        finally:
-            writer.close()
-
-    server = await asyncio.start_server(serve, "127.0.0.1", 0)
-    return server, server.sockets[0].getsockname()[1]
-
-
-def response(status: str, body: bytes = b"{}", *headers: str) -> bytes:
-    head = "\r\n".join((f"HTTP/1.1 {status}", f"Content-Length: {len(body)}", *headers, "", ""))
-    return head.encode() + body
 
 
 def run_named(name: str) -> Post:

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 
 from tests.service.clients import client_on
 from tests.service.queries.test_scores import mean_torque
-from tests.service.workflows.test_learn_fleet import SPEEDS, client_of
+from tests.service.workflows.test_learn_fleet import SPEEDS
 from tests.support import stationary
 
 HEAVY, LIGHT = 40.0, 10.0
@@ -75,7 +75,7 @@ def test_by_energy_too_the_order_of_arrival_does_not_matter(tmp_path: Path) -> N
     ]
     answers = []
     for place, order in enumerate((range(9), (8, 3, 1, 7, 0, 5, 2, 6, 4))):
-        with client_of(f"sqlite:///{tmp_path / f'{place}.db'}") as client:
+        with client_on(f"sqlite:///{tmp_path / f'{place}.db'}") as client:
             client.post("/v1/clutches", json={"clutch_id": "c1", "severity": {"basis": "dissipated_energy"}})
             for index in order:
                 cycles, value = posts[index][1:]

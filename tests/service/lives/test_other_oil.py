@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 
 from service.lives.assumptions import Assumptions, ModelInForce
 from service.lives.history import Event, Life
-from tests.service.workflows.test_learn_fleet import client_of
+from tests.service.clients import client_on
 from tests.support import stationary
 
 BASE = "/v1/clutches/c1"
@@ -78,7 +78,7 @@ def test_whatever_the_order_the_first_test_by_cycles_is_the_reference(client: Te
     names = [run["run_id"] for run in (*USUAL, COLD)]
     assert [name for name in names if "other_oil_temperature" in codes(client, name)] == [COLD["run_id"]]
     answers = [life(client)]
-    with client_of(f"sqlite:///{tmp_path / 'in_order.db'}") as other:
+    with client_on(f"sqlite:///{tmp_path / 'in_order.db'}") as other:
         assert other.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
         for run in sorted((*USUAL, COLD), key=lambda run: float(run["cycles"])):
             post(other, run)

@@ -11,11 +11,7 @@ from service.lives.condition import recent
 from service.lives.criteria import MAX_LINE_POINTS
 from service.lives.history import Event
 from service.queries import clutch_list
-from storage import clutches
-from storage.engine.database import Database
 from tests.support import stationary
-
-AT = "2026-11-02T10:00:00+00:00"
 
 
 def test_a_clutch_says_its_last_run_and_its_mean_cof(client: TestClient) -> None:
@@ -45,18 +41,6 @@ def test_a_line_is_short_and_ends_with_the_last_value(count: int) -> None:
 def test_without_a_measurement_there_is_no_line() -> None:
     events = [Event(run_id="a", kind="run_in", cycles=0.0, moment=0.0)]
     assert recent(events, SimpleNamespace(measurements=[]))["mean_cof"] == []  # type: ignore[arg-type]
-
-
-def _forgotten(client: TestClient, database: Database) -> set[bool]:
-    """Whether the diagnosis is of an earlier life: by the summary as it is, and without what it says of the life."""
-    said = {client.get("/v1/clutches/c1").json()["diagnosis"]["earlier_life"]}
-    with database.writing() as connection:
-        row = clutches.get(connection, "c1")
-        assert row is not None
-        assert "life" in row.summary
-        old = {name: value for name, value in row.summary.items() if name != "life"}
-        clutches.set_summary(connection, "c1", row.rank, old, life="", state=row.state, if_disputed=row.state)
-    return said | {client.get("/v1/clutches").json()["items"][0]["diagnosis"]["earlier_life"]}
 
 
 def test_a_list_is_made_anew_only_after_a_commit(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

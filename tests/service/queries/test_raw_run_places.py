@@ -12,11 +12,10 @@ import pytest
 from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
-from service.app import create_app
 from service.cli.main import app
-from service.settings import Settings
 from service.web import readiness
 from storage.blobs.stores import DATABASE, BlobStore, open_store
+from tests.service.clients import client_on
 from tests.support import stationary
 
 SAMPLES = 20_000
@@ -40,10 +39,7 @@ def long_run(cycles: float = 0.0) -> dict[str, Any]:
 @contextmanager
 def service(database: str, raw: str | None = None) -> Iterator[TestClient]:
     """A service in this process."""
-    made = create_app(Settings(workers=0, database=database, raw=raw, max_body_mb=8))
-    with TestClient(
-        made, base_url="http://127.0.0.1", client=("127.0.0.1", 50000), raise_server_exceptions=False
-    ) as client:
+    with client_on(database, raw=raw, max_body_mb=8) as client:
         client.post("/v1/clutches", json={"clutch_id": "c1"})
         yield client
 

@@ -1,19 +1,15 @@
 """Clutches that are to be replayed by a job, seen and ended midway: what the tests of replays as jobs share."""
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import httpx2
-from fastapi.testclient import TestClient
 from sqlalchemy import text
 
-from service.app import create_app
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
-from service.settings import Settings
 from service.web.answers import to_json
 from service.work.executor import InProcess
 from service.workflows.edit_clutch import register
@@ -113,11 +109,3 @@ def ended(server: Server, job_id: str) -> dict[str, Any]:
             return job
         assert time.monotonic() < deadline, job
         time.sleep(0.1)
-
-
-@contextmanager
-def client_of(database: Database, **settings: Any) -> Iterator[TestClient]:
-    """A service in this process on the database."""
-    application = create_app(Settings(workers=0, database=database.url, **settings))
-    with TestClient(application, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
-        yield client

@@ -6,12 +6,12 @@ import pytest
 
 from storage.engine.database import Database
 from storage.engine.opening import open_database
+from tests.service.clients import client_on
 from tests.service.work.replaying import (
     CLUTCHES,
     WAIT,
     age,
     aged,
-    client_of,
     ended,
     midway,
     stock,
@@ -25,7 +25,7 @@ from tests.support import ONCE, Server, serving
 def test_a_cancelled_replay_leaves_whole_clutches(in_file: Database) -> None:
     expected = stock(in_file)
     age(in_file)
-    with client_of(in_file, job_lease_seconds=1) as client:
+    with client_on(in_file.url, job_lease_seconds=1) as client:
         asked = client.post("/v1/jobs", json={"kind": "replay"}).json()["job_id"]
         midway(client.get, asked, in_file.url)
         cancelled = client.delete(f"/v1/jobs/{asked}").json()

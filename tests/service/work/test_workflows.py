@@ -21,15 +21,16 @@ from storage.engine.database import Database
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import back_up
 from storage.tables import fleet_prior
+from tests.service.clients import client_on
 from tests.service.web.routes.granting import granted
-from tests.service.work.replaying import AT, WAIT, age, aged, client_of, stock, stored
+from tests.service.work.replaying import AT, WAIT, age, aged, stock, stored
 
 LIFE = "/v1/clutches/{}/remaining-useful-life"
 
 
 def test_a_replay_stores_what_one_in_process_does(database: Database) -> None:
     expected = stock(database, 3)
-    with client_of(database) as client:
+    with client_on(database.url) as client:
         before = client.get(LIFE.format("c0")).json()
         age(database)
         asked = client.post("/v1/jobs", json={"kind": "replay", "clutch_id": "c1"}, headers=WAIT)
@@ -63,7 +64,7 @@ def test_a_clutch_that_is_left_is_named_with_the_reason(in_file: Database, caplo
             )
         )
     age(in_file)
-    with client_of(in_file) as client:
+    with client_on(in_file.url) as client:
         job = client.post("/v1/jobs", json={"kind": "replay"}, headers=WAIT).json()
     result = job["result"]
     assert (job["state"], result["replayed"], result["left"]) == ("finished", 1, 1)
@@ -98,7 +99,7 @@ def test_the_result_has_few_reasons_and_the_log_all(capsys: pytest.CaptureFixtur
 def test_a_fleet_refresh_stores_what_one_in_process_does(in_file: Database, tmp_path: Path) -> None:
     before = stock(in_file, 4, tests=6)
     back_up(in_file.url, tmp_path / "copy.db")
-    with client_of(in_file) as client:
+    with client_on(in_file.url) as client:
         job = client.post("/v1/jobs", json={"kind": "fleet_refresh"}, headers=WAIT).json()
         JobOut.model_validate(job)
         assert (job["state"], job["clutch_id"]) == ("finished", None)
@@ -140,7 +141,7 @@ def test_who_asks_twice_joins_and_too_many_are_sent_away(database: Database) -> 
 
 def test_what_is_asked_for_is_checked(in_file: Database) -> None:
     stock(in_file, 1, tests=1)
-    with client_of(in_file, most_replays=1, job_lease_seconds=1) as client:
+    with client_on(in_file.url, most_replays=1, job_lease_seconds=1) as client:
         for body, status in (
             ({"kind": "replay", "clutch_id": "unknown"}, 404),
             ({"kind": "fleet_refresh", "clutch_id": "c0"}, 422),
@@ -158,7 +159,7 @@ def test_what_is_asked_for_is_checked(in_file: Database) -> None:
 
 def test_a_bound_key_has_its_own_clutches_replayed_and_no_others(in_file: Database) -> None:
     stock(in_file, 2, tests=1)
-    with client_of(in_file) as client:
+    with client_on(in_file.url) as client:
         bound = granted(client, "admin", clutches=["c1"])
         for body in ({"kind": "replay"}, {"kind": "fleet_refresh"}, {"kind": "replay", "clutch_id": "c0"}):
             assert client.post("/v1/jobs", json=body, headers=bound).status_code == 403, body

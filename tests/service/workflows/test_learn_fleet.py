@@ -10,14 +10,13 @@ from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
 from service import records
-from service.app import create_app
 from service.cli.main import app
 from service.lives.plausibility.doubts import Judged
 from service.lives.recomputation import ClutchState, Tracking
-from service.settings import Settings
 from service.workflows import learn_fleet
 from service.workflows.replay import replay_clutch
 from storage.engine.opening import open_database
+from tests.service.clients import client_on
 from tests.support import stationary
 
 LIFE = "/v1/clutches/{}/remaining-useful-life"
@@ -45,12 +44,6 @@ def url(tmp_path: Path) -> str:
     return f"sqlite:///{tmp_path / 'fleet.db'}"
 
 
-def client_of(url: str) -> TestClient:
-    return TestClient(
-        create_app(Settings(workers=0, database=url)), base_url="http://127.0.0.1", client=("127.0.0.1", 50000)
-    )
-
-
 def width(said: dict[str, dict[str, float | None]]) -> float:
     low, high = (said["end_of_life_cycles"][q] for q in ("0.1", "0.9"))
     return math.log((1e6 if high is None else high) / (1e6 if low is None else low))
@@ -65,7 +58,7 @@ def refresh(url: str, advance: Callable[[], object] = lambda: None) -> learn_fle
 
 
 def test_a_fleet_teaches_the_next_clutch_and_nobody_itself(url: str) -> None:
-    with client_of(url) as client:
+    with client_on(url) as client:
         for number, scale in enumerate((5000.0, 6000.0, 7000.0, 6500.0)):
             post(client, f"old-{number}", scale)
         post(client, "new", 6000.0, last=2000)
@@ -98,7 +91,7 @@ def test_lives_that_ended_calibrate_the_next(url: str, monkeypatch: pytest.Monke
     """They accelerate, and forecasts of such lives are late at first: the next is stated to end where the others did."""
     monkeypatch.setattr("service.workflows.ingest_run.doubts_together", lambda *_, **__: Judged())
     ends = {"old-0": 8_000.0, "old-1": 8_600.0, "old-2": 9_100.0, "old-3": 9_800.0, "new": 8_900.0}
-    with client_of(url) as client:
+    with client_on(url) as client:
         for name, end in ends.items():
             assert client.post("/v1/clutches", json={"clutch_id": name}).status_code == 201
             last = 4_500 if name == "new" else 750 * math.ceil(1.15 * end / 750)
@@ -131,7 +124,7 @@ def test_lives_that_ended_calibrate_the_next(url: str, monkeypatch: pytest.Monke
 
 
 def test_a_refresh_that_learns_nothing_new_changes_nothing(url: str) -> None:
-    with client_of(url) as client:
+    with client_on(url) as client:
         for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
             post(client, f"old-{number}", scale, last=6000)
         post(client, "new", 6000.0, last=2000)
@@ -148,7 +141,7 @@ def test_a_refresh_that_learns_nothing_new_changes_nothing(url: str) -> None:
 
 @pytest.mark.slow
 def test_a_refresh_that_read_before_another_stored_does_not_undo_it(url: str) -> None:
-    with client_of(url) as client:
+    with client_on(url) as client:
         for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
             post(client, f"old-{number}", scale, last=6000)
         read = []
@@ -170,7 +163,7 @@ def test_posting_on_and_tracking_anew_agree_under_a_fleets_prior(tmp_path: Path)
     answers = []
     for order in ((0, 1, 2, 3, 4), (0, 4, 2, 1, 3)):
         url = f"sqlite:///{tmp_path / str(order[1])}.db"
-        with client_of(url) as client:
+        with client_on(url) as client:
             for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
                 post(client, f"old-{number}", scale, last=6000)
             refresh(url)
@@ -193,7 +186,7 @@ def test_a_run_that_comes_before_its_clutch_is_brought_up_is_tracked_under_the_p
     url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A fleet has learned, and a run is quicker than the refresh: what is stored is what a replay gives."""
-    with client_of(url) as client:
+    with client_on(url) as client:
         for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
             post(client, f"old-{number}", scale, last=6000)
         post(client, "new", 6000.0, last=3000)
@@ -217,7 +210,7 @@ def test_a_run_that_comes_before_its_clutch_is_brought_up_is_tracked_under_the_p
 def test_a_clutch_that_gets_a_run_whenever_it_is_tracked_anew_is_left_to_the_next_refresh(
     url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with client_of(url) as client:
+    with client_on(url) as client:
         for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
             post(client, f"old-{number}", scale, last=5000)
         post(client, "live", 6000.0, last=1000)

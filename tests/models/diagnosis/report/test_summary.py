@@ -173,13 +173,6 @@ def test_many_alternatives_are_shortened() -> None:
     assert len(said.split()) <= MAX_WORDS
 
 
-def ambiguous(*given: Candidate) -> str:
-    """The paragraph where the choice is between these candidates."""
-    listed = explanations_of({(each.effect,): each.probability for each in given})
-    found = findings(Verdict.CAUSE_AMBIGUOUS, *(each.effect for each in given))
-    return summarise(replace(found, explanations=listed, candidates=given))
-
-
 @pytest.mark.parametrize(
     ("hardest", "place"),
     [

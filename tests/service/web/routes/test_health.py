@@ -1,15 +1,11 @@
 """Ready is who can work: database, disk, memory and workers, found out without a lock; alive is who answers."""
 
-import multiprocessing
-import multiprocessing.connection
 import os
 import shutil
 import signal
-import sqlite3
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
 from pathlib import Path
 
 import httpx2
@@ -24,7 +20,6 @@ from tests.service.web.test_stopping import family
 from tests.support import ONCE, serving
 
 WHOLE = dict.fromkeys(("database", "disk", "memory", "workers"), "ok")
-_SPAWN = multiprocessing.get_context("spawn")
 
 
 def test_a_service_that_can_work_says_so(client: TestClient) -> None:
@@ -50,13 +45,6 @@ def test_too_little_room_is_not_ready_and_says_how_little(
             name: "ok" for name in WHOLE if name != part
         }
         assert client.get("/livez").status_code == 200
-
-
-def _hold(path: str, begin: str, say: "multiprocessing.connection.Connection") -> None:
-    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
-        connection.execute(begin)
-        say.send("held")
-        say.recv()
 
 
 def test_ready_at_once_while_all_threads_wait_for_the_write_lock(client: TestClient) -> None:
