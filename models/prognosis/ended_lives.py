@@ -67,8 +67,6 @@ _FARTHEST = 3.0
 _FLATTEST = 0.3
 #: Deviation of x: tests may begin when half of the way is behind.
 _LEVEL_SD = 0.5
-#: Evidence for the kind counts up to this, so that it stays a number.
-_MOST_LOG_ODDS = 50.0
 #: Means, and deviations, that a predictive with censored values is averaged over.
 _NODES = 16
 
@@ -211,7 +209,7 @@ class Kin:
         agreed, left = float(agreeing.sum()), float(weight[ahead].sum())
         lawful = self.lawful if agreed > 0.0 else 0.0
         by_law = lawful * _ANYWHERE * agreed / left if lawful else 0.0
-        by_course = (1.0 - lawful) * math.exp(min(self.log_odds, _MOST_LOG_ODDS))
+        by_course = (1.0 - lawful) * math.exp(self.log_odds)
         odds = (by_law + by_course) * (1.0 - criteria.OTHER_KIND) / criteria.OTHER_KIND
         of_kind = odds / (1.0 + odds)
         parts = [
