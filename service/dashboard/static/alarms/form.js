@@ -1,7 +1,7 @@
 // @ts-check
 // Questions of the alarms' page: a rule, a receiver. Each resolves to what is to be sent, null where it is left.
 
-import { field, h } from "../shared/dom.js";
+import { answered, field, h } from "../shared/dom.js";
 import { numberOf, NOT_A_NUMBER } from "../shared/format.js";
 import { WATCHED } from "./words.js";
 
@@ -42,14 +42,7 @@ function question(title, fields, read) {
       h("div", { class: "buttons" }, cancel, h("button", { class: "main" }, "Save")),
     ),
   );
-  document.body.append(dialog);
-  dialog.showModal();
-  return new Promise((resolve) => {
-    dialog.addEventListener("close", () => {
-      dialog.remove();
-      resolve(result);
-    });
-  });
+  return answered(dialog, () => result);
 }
 
 /**

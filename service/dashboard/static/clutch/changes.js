@@ -4,7 +4,7 @@
 
 import { doubtList } from "../sending/receipt.js";
 import { clutchPath, Problem, readAll, sendJson } from "../shared/api.js";
-import { field, h } from "../shared/dom.js";
+import { answered, field, h } from "../shared/dom.js";
 import { fixed, kindName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { isCorrected } from "./states.js";
@@ -423,13 +423,7 @@ function ask({ title, lines, action, optional = false, cycles, choice, note, sen
       h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"), go),
     ),
   );
-  document.body.append(dialog);
-  dialog.showModal();
+  const closed = answered(dialog, () => result);
   if (cycles !== undefined) number.select();
-  return new Promise((resolve) => {
-    dialog.addEventListener("close", () => {
-      dialog.remove();
-      resolve(result);
-    });
-  });
+  return closed;
 }

@@ -1,7 +1,7 @@
 // @ts-check
 // A question before something changes, which says what will change.
 
-import { h } from "../shared/dom.js";
+import { answered, h } from "../shared/dom.js";
 import { lifeBars } from "./lifebars.js";
 
 /** @import { BeforeAndAfter } from "../shared/types.js" */
@@ -28,12 +28,5 @@ export function confirm({ title, points, action, life = null }) {
       h("button", { value: "yes", class: "main" }, action),
     ),
   );
-  document.body.append(dialog);
-  dialog.showModal();
-  return new Promise((resolve) => {
-    dialog.addEventListener("close", () => {
-      resolve(dialog.returnValue === "yes");
-      dialog.remove();
-    });
-  });
+  return answered(dialog, () => dialog.returnValue === "yes");
 }

@@ -4,7 +4,7 @@
 // keeps a drawing as small as its thumbnail, and the whole of one while it is open.
 
 import { clutchPath, readFile } from "../shared/api.js";
-import { h } from "../shared/dom.js";
+import { answered, h } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 
 /** @import { InspectionOut } from "../shared/types.js" */
@@ -108,12 +108,7 @@ export class Photographs {
     const image = h("img", { alt: text });
     let address = "";
     dialog.append(h("h2", { id: "photograph-title" }, text), image, h("div", { class: "buttons" }, close));
-    dialog.addEventListener("close", () => {
-      dialog.remove();
-      URL.revokeObjectURL(address);
-    });
-    document.body.append(dialog);
-    dialog.showModal();
+    void answered(dialog, () => URL.revokeObjectURL(address));
     try {
       const file = await readFile(path);
       if (!dialog.open) return;

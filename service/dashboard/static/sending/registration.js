@@ -2,7 +2,7 @@
 // A clutch is registered by a form that is submitted, never by a name that was typed: all its values are shown first.
 
 import { sendJson } from "../shared/api.js";
-import { field, h } from "../shared/dom.js";
+import { answered, field, h } from "../shared/dom.js";
 import { problemView } from "../shared/problem_view.js";
 
 /**
@@ -102,14 +102,7 @@ export function register(id, options = {}) {
     h("p", { class: "quiet" }, "These are the values of the reference's clutch. Change what is different on yours."),
     form(id, options.record ?? null, end, () => dialog.close()),
   );
-  document.body.append(dialog);
-  dialog.showModal();
-  return new Promise((resolve) => {
-    dialog.addEventListener("close", () => {
-      dialog.remove();
-      resolve(result);
-    });
-  });
+  return answered(dialog, () => result);
 }
 
 /**

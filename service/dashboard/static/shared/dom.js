@@ -159,6 +159,24 @@ export function menu(label, entries) {
 }
 
 /**
+ * Show a dialog; `result` of it once it is closed.
+ * @template Result
+ * @param {HTMLDialogElement} dialog
+ * @param {() => Result} result
+ * @returns {Promise<Result>}
+ */
+export function answered(dialog, result) {
+  document.body.append(dialog);
+  dialog.showModal();
+  return new Promise((resolve) => {
+    dialog.addEventListener("close", () => {
+      dialog.remove();
+      resolve(result());
+    });
+  });
+}
+
+/**
  * Give an address's content to the user as a file.
  * @param {string} name
  * @param {string} address

@@ -2,7 +2,7 @@
 // Asks for a key where the service wants one; it is kept for this tab only.
 
 import { key, Problem } from "./api.js";
-import { h } from "./dom.js";
+import { answered, h } from "./dom.js";
 
 /**
  * Resolves when a key has been given.
@@ -27,15 +27,7 @@ function askForKey(problem) {
     ),
   );
   dialog.addEventListener("cancel", (event) => event.preventDefault());
-  document.body.append(dialog);
-  dialog.showModal();
-  return new Promise((resolve) => {
-    dialog.addEventListener("close", () => {
-      key.set(input.value.trim());
-      dialog.remove();
-      resolve();
-    });
-  });
+  return answered(dialog, () => key.set(input.value.trim()));
 }
 
 /**
