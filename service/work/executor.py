@@ -14,14 +14,14 @@ import platform
 import signal
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 from importlib.metadata import version
-from types import TracebackType
-from typing import Any, Generic, Protocol, Self, TypeVar, cast
+from typing import Any, Generic, Self, TypeVar, cast
 
 from service.defaults import SCHEDULERS
 from service.work.background import end_with_parent, use_one_blas_thread, yield_to_others
@@ -53,13 +53,13 @@ class Outcome(Generic[Result]):
         return cast("Result", self.result)  # which may be None
 
 
-class Executor(Protocol):
+class Executor(ABC):
     """Calls a function for each of many inputs. `close` it, or leave its `with` block, at the end."""
 
-    @property
-    def elsewhere(self) -> bool:
-        """Whether other processes compute: then an input must hold all that the function needs, and be picklable."""
+    #: Whether other processes compute: then an input must hold all that the function needs, and be picklable.
+    elsewhere: bool
 
+    @abstractmethod
     def map(
         self, function: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool = True
     ) -> Iterator[Outcome[Result]]:
@@ -70,31 +70,14 @@ class Executor(Protocol):
         Raises ExecutorUnavailableError where the cluster cannot be used.
         """
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027  (this process has nothing to end)
         """End all work at once, from any thread."""
-
-    def __enter__(self) -> Self:
-        """The executor itself."""
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close it."""
-
-
-class Closing:
-    """The `with` block of an executor."""
-
-    def close(self) -> None:
-        """Nothing to end."""
 
     def __enter__(self) -> Self:
         """The executor itself."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_raised: object) -> None:
         """Close it."""
         self.close()
 
@@ -116,7 +99,7 @@ def _carried(error: Exception) -> Exception:
     return error
 
 
-class InProcess(Closing):
+class InProcess(Executor):
     """The executor `local`."""
 
     elsewhere = False
@@ -139,22 +122,6 @@ class InProcess(Closing):
 MAX_LOST = 3
 
 
-class Submitter(Protocol):
-    """What calls functions elsewhere."""
-
-    def width(self) -> int:
-        """How many inputs are to be on their way at once."""
-
-    def submit(self, function: Callable[[Any], Any], item: Any) -> Any:
-        """A future of `called(function, item)`."""
-
-    def first(self, futures: Sequence[Any]) -> set[Any]:
-        """Wait until at least one has ended; those that have."""
-
-    def ended(self, future: Any) -> tuple[Any, Exception | None]:
-        """What `called` returned; raises WorkerLostError where its process has ended."""
-
-
 @dataclass(slots=True)
 class _Task:
     """An input on its way, and how often its process has ended."""
@@ -164,57 +131,78 @@ class _Task:
     lost: int = 0
 
 
-def bounded(
-    submitter: Submitter, function: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool
-) -> Iterator[Outcome[Result]]:
-    """As `Executor.map`.
+class _Elsewhere(Executor):
+    """An executor whose processes get inputs one by one."""
 
-    An input whose process has ended twice is sent alone: where others run in processes that end together, it is the one to
-    blame if it ends so again.
-    """
-    numbered = iter(enumerate(items))
-    running: dict[Any, _Task] = {}
-    waiting: list[_Task] = []
-    done: dict[int, Outcome[Result]] = {}
-    following, exhausted = 0, False
+    elsewhere = True
 
-    def take() -> _Task | None:
-        nonlocal exhausted
-        if waiting:
-            return waiting.pop(0)
-        following_input = None if exhausted else next(numbered, None)
-        exhausted = following_input is None
-        return None if following_input is None else _Task(*following_input)
+    @abstractmethod
+    def width(self) -> int:
+        """How many inputs are to be on their way at once."""
 
-    try:
-        while True:
-            alone = any(task.lost > 1 for task in (*waiting, *running.values()))
-            width = 1 if alone else submitter.width()
-            while len(running) + len(done) * in_order < width or not running:
-                task = take()
-                if task is None:
-                    break
-                running[submitter.submit(function, task.item)] = task
-            if not running:
-                return
-            for future in submitter.first(list(running)):
-                task = running.pop(future)
-                try:
-                    result, error = submitter.ended(future)
-                except WorkerLostError as lost:
-                    task.lost += 1
-                    if task.lost < MAX_LOST:
-                        waiting.append(task)
-                        continue
-                    result, error = None, lost
-                done[task.index] = Outcome(index=task.index, result=result, error=error)
-            ready = sorted(done) if not in_order else _run_of(done, following)
-            for index in ready:
-                yield done.pop(index)
-            following += len(ready)
-    finally:
-        for future in running:
-            future.cancel()
+    @abstractmethod
+    def submit(self, function: Callable[[Any], Any], item: Any) -> Any:
+        """A future of `called(function, item)`."""
+
+    @abstractmethod
+    def first(self, futures: Sequence[Any]) -> set[Any]:
+        """Wait until at least one has ended; those that have."""
+
+    @abstractmethod
+    def ended(self, future: Any) -> tuple[Any, Exception | None]:
+        """What `called` returned; raises WorkerLostError where its process has ended."""
+
+    def map(
+        self, function: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool = True
+    ) -> Iterator[Outcome[Result]]:
+        """As `Executor.map`.
+
+        An input whose process has ended twice is sent alone: where others run in processes that end together, it is the
+        one to blame if it ends so again.
+        """
+        numbered = iter(enumerate(items))
+        running: dict[Any, _Task] = {}
+        waiting: list[_Task] = []
+        done: dict[int, Outcome[Result]] = {}
+        following, exhausted = 0, False
+
+        def take() -> _Task | None:
+            nonlocal exhausted
+            if waiting:
+                return waiting.pop(0)
+            following_input = None if exhausted else next(numbered, None)
+            exhausted = following_input is None
+            return None if following_input is None else _Task(*following_input)
+
+        try:
+            while True:
+                alone = any(task.lost > 1 for task in (*waiting, *running.values()))
+                width = 1 if alone else self.width()
+                while len(running) + len(done) * in_order < width or not running:
+                    task = take()
+                    if task is None:
+                        break
+                    running[self.submit(function, task.item)] = task
+                if not running:
+                    return
+                for future in self.first(list(running)):
+                    task = running.pop(future)
+                    try:
+                        result, error = self.ended(future)
+                    except WorkerLostError as lost:
+                        task.lost += 1
+                        if task.lost < MAX_LOST:
+                            waiting.append(task)
+                            continue
+                        result, error = None, lost
+                    done[task.index] = Outcome(index=task.index, result=result, error=error)
+                ready = sorted(done) if not in_order else _run_of(done, following)
+                for index in ready:
+                    yield done.pop(index)
+                following += len(ready)
+        finally:
+            for future in running:
+                future.cancel()
 
 
 def _run_of(done: dict[int, Any], first: int) -> list[int]:
@@ -226,26 +214,18 @@ def _run_of(done: dict[int, Any], first: int) -> list[int]:
     return ready
 
 
-#: Inputs on their way for each process. Chosen: one is computed, and one is there when that has ended.
+#: Inputs on their way for each process or thread. Chosen: one is computed, and one is there when that has ended.
 INPUTS_AHEAD = 2
 
 
-class Processes(Closing):
+class Processes(_Elsewhere):
     """The executor `processes:N`. A process that ends is replaced, and what it did is done again."""
-
-    elsewhere = True
 
     def __init__(self, count: int) -> None:
         self.count = count
         self._pool: _Pool | None = None
         self._closed = False
         self._lock = threading.Lock()
-
-    def map(
-        self, function: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool = True
-    ) -> Iterator[Outcome[Result]]:
-        """As `Executor.map`."""
-        return bounded(self, function, items, in_order=in_order)
 
     def close(self) -> None:
         """End the processes, whatever they do."""
@@ -318,8 +298,6 @@ CONNECT_SECONDS, WORKER_SECONDS = 10.0, 60.0
 _COUNT_SECONDS = 5.0
 #: [s] Between two looks for what has ended. Chosen: little beside an input that takes a second.
 _LOOK_SECONDS = 0.02
-#: Inputs on their way for each thread of a worker. Chosen: one is computed, and one is there when that has ended.
-_INPUTS_AHEAD = 2
 #: What must be the same on both sides, for the same results to the last bit.
 _OF_RESULTS = ("clutchlife", "numpy", "scipy")
 
@@ -330,10 +308,8 @@ def release() -> dict[str, str]:
     return {"python": platform.python_version()} | {name: version(name) for name in _OF_RESULTS}
 
 
-class Cluster(Closing):
+class Cluster(_Elsewhere):
     """The executor of a scheduler's address. What a worker did that has ended is done again by another."""
-
-    elsewhere = True
 
     def __init__(self, address: str) -> None:
         try:
@@ -357,12 +333,6 @@ class Cluster(Closing):
             self.close()
             raise
 
-    def map(
-        self, function: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool = True
-    ) -> Iterator[Outcome[Result]]:
-        """As `Executor.map`."""
-        return bounded(self, function, items, in_order=in_order)
-
     def close(self) -> None:
         """Drop what waits, and leave the cluster."""
         self._client.close()
@@ -370,7 +340,7 @@ class Cluster(Closing):
     def width(self) -> int:
         """Two inputs for each thread that the cluster has."""
         self._count()
-        return _INPUTS_AHEAD * max(1, self._threads)
+        return INPUTS_AHEAD * max(1, self._threads)
 
     def submit(self, function: Callable[[Any], Any], item: Any) -> Any:
         """A future of `called` on a worker, which refuses it where it has another release."""
