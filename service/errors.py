@@ -1,7 +1,8 @@
 """The errors that a caller may get: one base, mapped to HTTP once (`service.web.problems`); and notices."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 #: Errors that one answer lists; chosen: a screenful. The total is always stated.
 MAX_ERRORS = 50
@@ -60,6 +61,16 @@ class InvalidError(ServiceError, status=422, slug="invalid-content", title="The 
 
 class NotFoundError(ServiceError, status=404, slug="not-found", title="Not found"):
     """No object has that name."""
+
+
+Found = TypeVar("Found")
+
+
+def found(row: Found | None, what: str, name: str, *, only: Collection[str] | None = None) -> Found:
+    """What was looked up by its name. Raises NotFoundError where there is none, or it is of no clutch among `only` these."""
+    if row is None or (only is not None and getattr(row, "clutch_id", None) not in only):
+        raise NotFoundError(f"no {what} is known as {name[:80]!r}")
+    return row
 
 
 def unknown_clutch(clutch_id: str) -> NotFoundError:

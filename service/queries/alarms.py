@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from service.alarms import raising, receivers
-from service.errors import NotFoundError
+from service.errors import found
 from service.lists import Place
 from service.lists import page as page_of
 from service.schemas.alarm import DeliveryOut
@@ -34,9 +34,7 @@ def look_up(database: Database, alarm_id: str, *, only: Collection[str] | None =
     """A rule, of `only` these clutches. Raises NotFoundError."""
     with database.reading() as connection:
         row = alarms.get(connection, alarm_id)
-    if row is None or (only is not None and row.clutch_id not in only):
-        raise NotFoundError(f"no alarm is known as {alarm_id[:80]!r}")
-    return rule_out(row)
+    return rule_out(found(row, "alarm", alarm_id, only=only))
 
 
 def events(
@@ -60,9 +58,7 @@ def event(database: Database, event_id: str, *, only: Collection[str] | None = N
     """What was raised. Raises NotFoundError."""
     with database.reading() as connection:
         row = alarms.event(connection, event_id)
-    if row is None or (only is not None and row.clutch_id not in only):
-        raise NotFoundError(f"no event of an alarm is known as {event_id[:80]!r}")
-    return raising.event_out(row)
+    return raising.event_out(found(row, "event of an alarm", event_id, only=only))
 
 
 def receiver_out(row: WebhookRow, *, secret: str | None = None) -> dict[str, Any]:
@@ -88,14 +84,14 @@ def receiver_page(database: Database, *, limit: int, after: Place | None) -> dic
 def receiver(database: Database, webhook_id: str) -> dict[str, Any]:
     """A receiver. Raises NotFoundError."""
     with database.reading() as connection:
-        return receiver_out(_receiver(webhooks.get(connection, webhook_id), webhook_id))
+        return receiver_out(found(webhooks.get(connection, webhook_id), "webhook", webhook_id))
 
 
 def deliveries(database: Database, webhook_id: str, *, limit: int, after: Place | None) -> dict[str, Any]:
     """A page of what a receiver was sent or is to be sent, newest first. Raises NotFoundError."""
     before = None if after is None else after[0]
     with database.reading() as connection:
-        _receiver(webhooks.get(connection, webhook_id), webhook_id)
+        found(webhooks.get(connection, webhook_id), "webhook", webhook_id)
         rows = webhooks.deliveries(connection, webhook_id, limit=limit + 1, before=before)
     following = (float(rows[limit - 1].delivery_key), "") if len(rows) > limit else None
     return page_of([delivery_out(row) for row in rows[:limit]], following)
@@ -113,9 +109,3 @@ def delivery_out(row: DeliveryRow) -> dict[str, Any]:
     again = row.state == webhooks.WAITING and row.due > 0.0
     next_attempt = datetime.fromtimestamp(row.due, UTC).isoformat(timespec="seconds") if again else None
     return of_row(DeliveryOut, row, next_attempt_at=next_attempt)
-
-
-def _receiver(row: WebhookRow | None, webhook_id: str) -> WebhookRow:
-    if row is None:
-        raise NotFoundError(f"no webhook is known as {webhook_id[:80]!r}")
-    return row

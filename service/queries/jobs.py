@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from typing import Any
 
-from service.errors import NotFoundError
+from service.errors import found
 from service.lists import Place
 from service.schemas.base import of_row
 from service.schemas.diagnosis import JobOut
@@ -15,10 +15,7 @@ from storage.jobs import JobRow
 def find(database: Database, job_id: str, *, only: Collection[str] | None) -> JobRow:
     """The job, of one of `only` these clutches. Raises NotFoundError, too where it is another's."""
     with database.reading() as connection:
-        row = jobs.get(connection, job_id)
-    if row is None or (only is not None and row.clutch_id not in only):
-        raise NotFoundError(f"no job is known as {job_id!r}")
-    return row
+        return found(jobs.get(connection, job_id), "job", job_id, only=only)
 
 
 def page(

@@ -30,6 +30,7 @@ from service.web.auth import Admin, Reader, name_of_caller, snapshot_of
 from service.web.context import Context, Cursor, Limit, Whole
 from service.web.limits import LONGEST_WAIT_SECONDS, USUAL_ITEMS, WAIT_SECONDS
 from service.web.middleware import Again, remember
+from service.web.problems import CHANGING
 from service.web.revalidation import Made
 from service.work.workers import Lane
 from storage import clutches
@@ -158,12 +159,7 @@ async def clutch_answer(of: OfClutch, name: str, make: Callable[[], bytes], *arg
     # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
     key = (of.clutch_id, name, *arguments)
     held = await kept(context, key, revision, make)
-
-    def again(request: Request) -> Response | None:
-        held = context.cache.held(key, snapshot_of(request).revision)
-        return None if held is None else tagged(request, held, JSON_TYPE, snapshot_of(request).revision)
-
-    remember(of.request, again)
+    remember(of.request, held_again(context, key))
     return tagged(of.request, held, JSON_TYPE, revision)
 
 
@@ -190,7 +186,7 @@ async def computed_answer(
     revision = _revision(request, clutch_id)
     revision, whole = await _computed(request, context, clutch_id, revision, query, arguments, prefer, lane)
     if of.limit == ALL_ITEMS and of.after is None:
-        remember(request, _computed_again(context, clutch_id, query, arguments))
+        remember(request, held_again(context, (clutch_id, name_of(query), *arguments)))
         return tagged(request, whole, JSON_TYPE, revision)
 
     def one_page() -> bytes:
@@ -280,15 +276,14 @@ async def begin_computed(context: Context, clutch_id: str, query: Callable[..., 
     context.revalidation.begin((clutch_id, name_of(query)), revision, body)
 
 
-def _computed_again(
-    context: Context, clutch_id: str, query: Callable[..., dict[str, Any]], arguments: tuple[Hashable, ...]
-) -> Again:
-    key = (clutch_id, name_of(query), *arguments)
+def held_again(context: Context, key: Hashable, *, of_clutch: bool = True) -> Again:
+    """What answers the same address again, by what the cache holds for the clutch's present revision, or else for the last
+    commit of all."""
 
     def again(request: Request) -> Response | None:
-        revision = snapshot_of(request).revision
-        whole = None if revision is None else context.cache.held(key, revision)
-        return None if whole is None else tagged(request, whole, JSON_TYPE, revision)
+        snapshot = snapshot_of(request)
+        held = context.cache.held(key, snapshot.revision if of_clutch else snapshot.version)
+        return None if held is None else tagged(request, held, JSON_TYPE, snapshot.revision if of_clutch else None)
 
     return again
 
@@ -354,11 +349,25 @@ def require_json(request: Request) -> None:
         raise UnsupportedMediaTypeError(f"send the body as application/json, not as {kind[:80]!r}")
 
 
-def described_body(schema: type[BaseModel] | dict[str, Any], example: dict[str, Any]) -> dict[str, Any]:
-    """The body for the API's description, since the routes read it themselves."""
-    described = schema if isinstance(schema, dict) else schema.model_json_schema()
+def taking(
+    body: type[BaseModel] | dict[str, Any],
+    answered: type[BaseModel],
+    example: dict[str, Any],
+    responses: Mapping[int | str, dict[str, Any]] = CHANGING,
+    also: Mapping[int, str] | None = None,
+    *,
+    required: bool = True,
+) -> dict[str, Any]:
+    """How a route that takes a body is described, since it reads that itself: the body with an example, its answer, and what
+    other statuses `also` mean that come with the same answer."""
+    described = body if isinstance(body, dict) else body.model_json_schema()
     content = {"application/json": {"schema": described, "example": example}}
-    return {"requestBody": {"required": True, "content": content}}
+    others = {status: {"model": answered, "description": meaning} for status, meaning in (also or {}).items()}
+    return {
+        "response_model": answered,
+        "responses": dict(responses) | others,
+        "openapi_extra": {"requestBody": {"required": required, "content": content}},
+    }
 
 
 Looked = TypeVar("Looked")

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from service import records
-from service.errors import BusyError, NotFoundError
+from service.errors import BusyError, found
 from storage import diagnoses, jobs
 from storage.engine.database import Database
 from storage.jobs import JobRow, NewJob
@@ -67,7 +67,4 @@ def cancel(database: Database, row: JobRow, *, by: str, at: str) -> JobRow:
     with database.writing(of=row.clutch_id) as connection:
         if jobs.end(connection, row.job_id, jobs.CANCELLED, at, problem=problem):
             diagnoses.fail(connection, row.job_id, at, problem)
-        ended = jobs.get(connection, row.job_id)
-    if ended is None:
-        raise NotFoundError(f"no job is known as {row.job_id!r}")
-    return ended
+        return found(jobs.get(connection, row.job_id), "job", row.job_id)

@@ -3,14 +3,12 @@
 import secrets
 from typing import Any
 
-from sqlalchemy import Connection
-
 from service import records
 from service.alarms import raising
-from service.errors import NotFoundError
+from service.errors import found
 from service.schemas.alarm import AlarmIn
 from storage import alarms, clutches
-from storage.alarms import AlarmRow, EventRow
+from storage.alarms import AlarmRow
 from storage.dialects import ALL_ROWS
 from storage.engine.database import Database
 
@@ -29,7 +27,7 @@ def save(database: Database, rule: AlarmIn, *, by: str, at: str, alarm_id: str |
             if same:
                 return same[0], False
         else:
-            find(connection, alarm_id)
+            found(alarms.get(connection, alarm_id), "alarm", alarm_id)
         row = AlarmRow(
             alarm_id=alarm_id or secrets.token_hex(8),
             clutch_id=rule.clutch_id,
@@ -49,7 +47,7 @@ def save(database: Database, rule: AlarmIn, *, by: str, at: str, alarm_id: str |
 def remove(database: Database, alarm_id: str) -> None:
     """Delete a rule: what it has raised is cleared, and stays listed. Raises NotFoundError."""
     with database.writing() as connection:
-        find(connection, alarm_id)
+        found(alarms.get(connection, alarm_id), "alarm", alarm_id)
         concerned = [event.clutch_id for event in alarms.open_of_alarm(connection, alarm_id)]
         alarms.remove(connection, alarm_id)
         for clutch_id in concerned:
@@ -59,31 +57,15 @@ def remove(database: Database, alarm_id: str) -> None:
 def acknowledge(database: Database, event_id: str, *, note: str, by: str, at: str) -> dict[str, Any]:
     """Note that `by` has seen an alarm; what was acknowledged or is over already stays as it is. Raises NotFoundError."""
     with database.writing() as connection:
-        row = find_event(connection, event_id)
+        row = found(alarms.event(connection, event_id), "event of an alarm", event_id)
         if row.state == alarms.RAISED:
             alarms.acknowledge(connection, event_id, at=at, by=by, note=note)
-        return raising.event_out(find_event(connection, event_id))
+        return raising.event_out(found(alarms.event(connection, event_id), "event of an alarm", event_id))
 
 
 def test(database: Database, alarm_id: str) -> list[str]:
     """Put a test into the outbox of each of a rule's receivers; the names of the deliveries. Raises NotFoundError."""
     with database.writing() as connection:
-        row = find(connection, alarm_id)
+        row = found(alarms.get(connection, alarm_id), "alarm", alarm_id)
         receivers = raising.receivers_of(connection, row.clutch_id)
         return raising.to_receivers(connection, raising.TEST, raising.test_event(row), receivers)
-
-
-def find(connection: Connection, alarm_id: str) -> AlarmRow:
-    """A rule. Raises NotFoundError."""
-    row = alarms.get(connection, alarm_id)
-    if row is None:
-        raise NotFoundError(f"no alarm is known as {alarm_id[:80]!r}")
-    return row
-
-
-def find_event(connection: Connection, event_id: str) -> EventRow:
-    """What a rule has raised. Raises NotFoundError."""
-    row = alarms.event(connection, event_id)
-    if row is None:
-        raise NotFoundError(f"no event of an alarm is known as {event_id[:80]!r}")
-    return row

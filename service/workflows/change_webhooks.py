@@ -4,7 +4,7 @@ import secrets
 
 from service import records
 from service.alarms import raising
-from service.errors import NotFoundError
+from service.errors import found
 from service.schemas.alarm import AlarmIn, WebhookIn
 from storage import keys, webhooks
 from storage.alarms import AlarmRow
@@ -32,17 +32,14 @@ def add(database: Database, receiver: WebhookIn, *, by: str, at: str) -> Webhook
 def remove(database: Database, webhook_id: str) -> None:
     """Delete a receiver, its secret and its deliveries. Raises NotFoundError."""
     with database.writing() as connection:
-        if webhooks.get(connection, webhook_id) is None:
-            raise NotFoundError(f"no webhook is known as {webhook_id[:80]!r}")
+        found(webhooks.get(connection, webhook_id), "webhook", webhook_id)
         webhooks.remove(connection, webhook_id)
 
 
 def test(database: Database, webhook_id: str, *, at: str) -> list[str]:
     """Put a test into a receiver's outbox; the name of the delivery. Raises NotFoundError."""
     with database.writing() as connection:
-        row = webhooks.get(connection, webhook_id)
-        if row is None:
-            raise NotFoundError(f"no webhook is known as {webhook_id[:80]!r}")
+        row = found(webhooks.get(connection, webhook_id), "webhook", webhook_id)
         rule = AlarmIn(clutch_id=row.content["clutch_id"], quantity="held_runs", name="test")
         alarm = AlarmRow(
             alarm_id="test",

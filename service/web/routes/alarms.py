@@ -15,7 +15,7 @@ from service.run_files.json_run import checked
 from service.schemas import alarm as schemas
 from service.schemas.base import IDENTIFIER_PATTERN, LONGEST_IDENTIFIER
 from service.web import auth
-from service.web.answers import answer, described_body, json_answer, json_body, now, until_ended
+from service.web.answers import answer, json_answer, json_body, now, taking, until_ended
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
 from service.web.problems import CHANGING, READING, SENDING
@@ -54,9 +54,7 @@ async def list_alarms(
 @router.post(
     "",
     status_code=201,
-    response_model=schemas.AlarmOut,
-    responses=SENDING | {200: {"model": schemas.AlarmOut, "description": "The rule is there already"}},
-    openapi_extra=described_body(schemas.AlarmIn, schemas.EXAMPLE),
+    **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE, SENDING, {200: "The rule is there already"}),
 )
 async def post_alarm(request: Request, context: auth.OwnIngester) -> Response:
     """Make a rule; what it raises of the clutches as they are is raised at once."""
@@ -93,11 +91,7 @@ async def read_event(request: Request, context: auth.OwnReader, event_id: EventI
 
 @router.post(
     "/events/{event_id}/acknowledge",
-    response_model=schemas.EventOut,
-    responses=CHANGING,
-    openapi_extra={
-        "requestBody": described_body(schemas.AcknowledgeIn, {"note": "ordered"})["requestBody"] | {"required": False}
-    },
+    **taking(schemas.AcknowledgeIn, schemas.EventOut, {"note": "ordered"}, required=False),
 )
 async def acknowledge_event(request: Request, context: auth.OwnIngester, event_id: EventId) -> Response:
     """Say that somebody has seen an alarm; the body may be left out."""
@@ -115,12 +109,7 @@ async def read_alarm(request: Request, context: auth.OwnReader, alarm_id: AlarmI
     return await answer(request, lambda: alarms.look_up(context.database, alarm_id, only=own))
 
 
-@router.put(
-    "/{alarm_id}",
-    response_model=schemas.AlarmOut,
-    responses=CHANGING,
-    openapi_extra=described_body(schemas.AlarmIn, schemas.EXAMPLE),
-)
+@router.put("/{alarm_id}", **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE))
 async def put_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Replace a rule; what it has raised is cleared where the new one would not keep it."""
     await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.own_clutches(request))
@@ -155,9 +144,9 @@ async def list_webhooks(
 @webhook_router.post(
     "",
     status_code=201,
-    response_model=schemas.WebhookOut,
-    responses=SENDING,
-    openapi_extra=described_body(schemas.WebhookIn, {"url": "https://example.org/hook", "secret": "wet-clutch-7000"}),
+    **taking(
+        schemas.WebhookIn, schemas.WebhookOut, {"url": "https://example.org/hook", "secret": "wet-clutch-7000"}, SENDING
+    ),
 )
 async def post_webhook(request: Request, context: auth.Admin) -> Response:
     """Add a receiver. Where no secret is given one is made, and answered this once."""

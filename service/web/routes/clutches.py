@@ -21,7 +21,7 @@ from service.web import answers, auth
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
 from service.web.middleware import remember
-from service.web.problems import CHANGING, READING, SENDING
+from service.web.problems import READING, SENDING
 from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import edit_clutch as registration
 from service.workflows.edit_clutch import edit
@@ -45,9 +45,7 @@ EXAMPLE = {
 @router.post(
     "",
     status_code=201,
-    response_model=ClutchOut,
-    responses=SENDING | {200: {"model": ClutchOut, "description": "Known already, with the same content"}},
-    openapi_extra=answers.described_body(ClutchIn, EXAMPLE),
+    **answers.taking(ClutchIn, ClutchOut, EXAMPLE, SENDING, {200: "Known already, with the same content"}),
 )
 async def register_clutch(request: Request, context: auth.OwnIngester) -> Response:
     """Register a clutch. Everything but `clutch_id` has a default: the reference's clutch."""
@@ -104,15 +102,10 @@ async def totals(request: Request, context: auth.OwnReader, archived: Archived =
 
 async def _of_all(request: Request, context: Context, key: Hashable, make: Callable[[], bytes]) -> Response:
     """A GET's answer that any commit may change, made once for what is committed."""
-
-    def again(request: Request) -> Response | None:
-        held = context.cache.held(key, auth.snapshot_of(request).version)
-        return None if held is None else answers.tagged(request, held, answers.JSON_TYPE)
-
     # the version before the rows are read: what is committed meanwhile makes another
     held = await answers.kept(context, key, auth.snapshot_of(request).version, make)
     if auth.own_clutches(request) is None:
-        remember(request, again)
+        remember(request, answers.held_again(context, key, of_clutch=False))
     return answers.tagged(request, held, answers.JSON_TYPE)
 
 
@@ -124,10 +117,10 @@ async def read_clutch(request: Request, context: auth.Reader, clutch_id: ClutchI
 
 @router.patch(
     "/{clutch_id}",
-    response_model=ClutchOut,
-    responses=CHANGING,
-    openapi_extra=answers.described_body(
-        ClutchEdit, {"reason": "the drawing says so", "geometry": {"inner_diameter_mm": 98, "outer_diameter_mm": 133}}
+    **answers.taking(
+        ClutchEdit,
+        ClutchOut,
+        {"reason": "the drawing says so", "geometry": {"inner_diameter_mm": 98, "outer_diameter_mm": 133}},
     ),
 )
 async def edit_clutch(request: Request, context: auth.Admin, clutch_id: ClutchId) -> Response:

@@ -32,9 +32,9 @@ Prefer = Annotated[
 @router.post(
     "/diagnoses",
     status_code=201,
-    response_model=DiagnosisOut,
-    responses=SENDING | {202: {"model": DiagnosisOut, "description": "It still runs: look again at `Location`"}},
-    openapi_extra=answers.described_body(DiagnosisIn, {"adopt": False}),
+    **answers.taking(
+        DiagnosisIn, DiagnosisOut, {"adopt": False}, SENDING, {202: "It still runs: look again at `Location`"}
+    ),
 )
 async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
     """Have all runs of the clutch's present life diagnosed. A question while the same runs are being diagnosed joins in."""
@@ -88,12 +88,7 @@ async def read_model(of: answers.Of) -> Response:
     return await answers.answer(of.request, partial(diagnoses.model, of.database, of.clutch_id))
 
 
-@router.put(
-    "/model",
-    response_model=ModelOut,
-    responses=SENDING,
-    openapi_extra=answers.described_body(ModelIn, {"diagnosis_id": "3f9a1c0b7d2e4f56"}),
-)
+@router.put("/model", **answers.taking(ModelIn, ModelOut, {"diagnosis_id": "3f9a1c0b7d2e4f56"}, SENDING))
 async def put_model(request: Request, context: Admin, clutch_id: ClutchId) -> Response:
     """Adopt what a diagnosis found, or return to the baseline; all is tracked again before this is answered."""
     wanted = checked(ModelIn, await answers.json_body(request))

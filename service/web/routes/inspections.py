@@ -53,10 +53,13 @@ EXAMPLE = {
 @router.post(
     "",
     status_code=201,
-    response_model=InspectionOut,
-    responses=SENDING
-    | {200: {"model": InspectionOut, "description": "The same inspection again; withdrawn where its `state` says so"}},
-    openapi_extra=answers.described_body(InspectionIn, EXAMPLE),
+    **answers.taking(
+        InspectionIn,
+        InspectionOut,
+        EXAMPLE,
+        SENDING,
+        {200: "The same inspection again; withdrawn where its `state` says so"},
+    ),
 )
 async def post_inspection(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Post what was found on the friction surface after so many cycles: roughness R_a, skewness R_sk, a note."""
@@ -82,9 +85,7 @@ async def read_inspection(of: answers.Of, inspection_id: InspectionId) -> Respon
 
 @router.post(
     "/{inspection_id}/withdraw",
-    response_model=InspectionOut,
-    responses=CHANGING,
-    openapi_extra=answers.described_body(Withdrawal, {"reason": "it was the disc of the bench beside it"}),
+    **answers.taking(Withdrawal, InspectionOut, {"reason": "it was the disc of the bench beside it"}),
 )
 async def withdraw_inspection(of: answers.ChangeOf, inspection_id: InspectionId) -> Response:
     """Withdraw an inspection. It stays stored and listed, with its photographs."""
@@ -92,10 +93,7 @@ async def withdraw_inspection(of: answers.ChangeOf, inspection_id: InspectionId)
 
 
 @router.post(
-    "/{inspection_id}/restore",
-    response_model=InspectionOut,
-    responses=CHANGING,
-    openapi_extra=answers.described_body(Withdrawal, {"reason": "it was this disc after all"}),
+    "/{inspection_id}/restore", **answers.taking(Withdrawal, InspectionOut, {"reason": "it was this disc after all"})
 )
 async def restore_inspection(of: answers.ChangeOf, inspection_id: InspectionId) -> Response:
     """Take a withdrawal back."""

@@ -13,7 +13,7 @@ from service.queries import jobs
 from service.run_files.json_run import checked
 from service.schemas.diagnosis import JobIn, JobOut, JobPage
 from service.schemas.parameters import JobId, OfState
-from service.web.answers import answer, described_body, json_answer, json_body, now, preferred_wait, until_ended
+from service.web.answers import answer, json_answer, json_body, now, preferred_wait, taking, until_ended
 from service.web.auth import OwnAdmin, OwnReader, name_of_caller, own_clutches, require_clutch
 from service.web.context import Cursor, Limit
 from service.web.limits import USUAL_ITEMS
@@ -32,9 +32,13 @@ Prefer = Annotated[
 @router.post(
     "",
     status_code=202,
-    response_model=JobOut,
-    responses=SENDING | {200: {"model": JobOut, "description": "It has ended within the time that was to be waited"}},
-    openapi_extra=described_body(JobIn, {"kind": "replay", "clutch_id": "bench3-017"}),
+    **taking(
+        JobIn,
+        JobOut,
+        {"kind": "replay", "clutch_id": "bench3-017"},
+        SENDING,
+        {200: "It has ended within the time that was to be waited"},
+    ),
 )
 async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -> Response:
     """Ask for a replay or a fleet refresh. Where the same waits or runs already it is that one which is answered."""

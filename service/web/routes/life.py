@@ -25,7 +25,7 @@ from service.schemas.over_life import Degradation, EngagementOut, LoopPage, Seri
 from service.schemas.parameters import Draws, EngagementRun, LifeNumber, Quantity, TrackedQuantity
 from service.web import answers
 from service.web.context import AtCycles, Prefer, PressureBar, Until
-from service.web.problems import CHANGING, READING
+from service.web.problems import READING
 from service.work.workers import Lane
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["remaining life"])
@@ -61,10 +61,9 @@ async def remaining_useful_life(
 
 @router.post(
     "/remaining-useful-life/forecast",
-    response_model=PlannedLife,
-    responses=CHANGING,
-    openapi_extra=answers.described_body(
+    **answers.taking(
         ProgrammeIn,
+        PlannedLife,
         {
             "programme": [
                 {"cycles": 5000, "energy_per_cycle_kj": 25, "sd": 2},

@@ -28,7 +28,7 @@ from service.schemas.parameters import (
     RigName,
 )
 from service.schemas.rig import Preview, RigIn, RigOut, RigPage
-from service.web.answers import answer, described_body, json_answer, json_body, now
+from service.web.answers import answer, json_answer, json_body, now, taking
 from service.web.auth import Admin, Ingester, OwnIngester, OwnReader, name_of_caller, require_clutch
 from service.web.context import Context, Cursor, Limit
 from service.web.files import received
@@ -76,24 +76,13 @@ async def read_rig(request: Request, context: OwnReader, name: RigName) -> Respo
     return await answer(request, lambda: rigs.look_up(context.database, name))
 
 
-@router.post(
-    "",
-    status_code=201,
-    response_model=RigOut,
-    responses=SENDING | {200: {"model": RigOut, "description": "The profile is saved already"}},
-    openapi_extra=described_body(RigIn, EXAMPLE),
-)
+@router.post("", status_code=201, **taking(RigIn, RigOut, EXAMPLE, SENDING, {200: "The profile is saved already"}))
 async def post_rig(request: Request, context: Ingester) -> Response:
     """Save a new rig profile: how the files of a rig are read."""
     return await _saved(request, context, None)
 
 
-@router.put(
-    "/{name}",
-    response_model=RigOut,
-    responses=CHANGING | {201: {"model": RigOut, "description": "The profile is new"}},
-    openapi_extra=described_body(RigIn, EXAMPLE),
-)
+@router.put("/{name}", **taking(RigIn, RigOut, EXAMPLE, CHANGING, {201: "The profile is new"}))
 async def put_rig(request: Request, context: Admin, name: RigName) -> Response:
     """Replace a rig profile. Runs that were read by the former one stay as they are until they are read again."""
     return await _saved(request, context, name)

@@ -21,7 +21,7 @@ from service.web import answers
 from service.web.auth import Ingester, Reader, name_of_caller
 from service.web.files import PARQUET_TYPE, kept_body, preferred, streamed
 from service.web.limits import LARGE_BODY_BYTES
-from service.web.problems import CHANGING, READING, SENDING, described
+from service.web.problems import READING, SENDING, described
 from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import change_run
 from service.workflows.ingest_run import ingest_posted
@@ -52,9 +52,7 @@ EXAMPLE = {
 @router.post(
     "",
     status_code=201,
-    response_model=Receipt,
-    responses=SENDING | {200: {"model": Receipt, "description": "The same run again: the same receipt"}},
-    openapi_extra=answers.described_body(RUN_IN.json_schema(), EXAMPLE),
+    **answers.taking(RUN_IN.json_schema(), Receipt, EXAMPLE, SENDING, {200: "The same run again: the same receipt"}),
 )
 async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Post a run, in any order of cycles. The receipt says what was made of it; by then it is stored for good."""
@@ -111,12 +109,7 @@ async def read_run_with_channels(
     return streamed(body, media_type, headers)
 
 
-@router.patch(
-    "/{run_id}",
-    response_model=Receipt,
-    responses=CHANGING,
-    openapi_extra=answers.described_body(Correction, {"cycles": 7000, "reason": "typed a zero too many"}),
-)
+@router.patch("/{run_id}", **answers.taking(Correction, Receipt, {"cycles": 7000, "reason": "typed a zero too many"}))
 async def correct_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     """Correct a run's cycles, or read its file again by a rig's profile; it counts where it is plausible so. What was sent
     stays stored."""
@@ -127,24 +120,14 @@ async def correct_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     return await _changed(change_run.correct, of, run_id, wanted.reason, cycles=wanted.cycles)
 
 
-@router.post(
-    "/{run_id}/withdraw",
-    response_model=Receipt,
-    responses=CHANGING,
-    openapi_extra=answers.described_body(Withdrawal, {"reason": "the torque sensor was unplugged"}),
-)
+@router.post("/{run_id}/withdraw", **answers.taking(Withdrawal, Receipt, {"reason": "the torque sensor was unplugged"}))
 async def withdraw_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     """Take a run out of the clutch's history. It stays stored and listed."""
     reason = checked(Withdrawal, await answers.json_body(of.request)).reason
     return await _changed(change_run.withdraw, of, run_id, reason)
 
 
-@router.post(
-    "/{run_id}/restore",
-    response_model=Receipt,
-    responses=CHANGING,
-    openapi_extra=answers.described_body(Withdrawal, {"reason": "it was the other sensor"}),
-)
+@router.post("/{run_id}/restore", **answers.taking(Withdrawal, Receipt, {"reason": "it was the other sensor"}))
 async def restore_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     """Take a withdrawal back: the run is accepted or held as it was before."""
     reason = checked(Withdrawal, await answers.json_body(of.request)).reason
@@ -153,10 +136,8 @@ async def restore_run(of: answers.ChangeOf, run_id: RunId) -> Response:
 
 @router.post(
     "/confirm",
-    response_model=RunPage,
-    responses=CHANGING,
-    openapi_extra=answers.described_body(
-        Confirmations, {"run_ids": ["test-7000", "test-8000"], "reason": "the clutch was run over the weekend"}
+    **answers.taking(
+        Confirmations, RunPage, {"run_ids": ["test-7000", "test-8000"], "reason": "the clutch was run over the weekend"}
     ),
 )
 async def confirm_runs(of: answers.ChangeOf) -> Response:
@@ -167,10 +148,7 @@ async def confirm_runs(of: answers.ChangeOf) -> Response:
 
 
 @router.post(
-    "/{run_id}/confirm",
-    response_model=Receipt,
-    responses=CHANGING,
-    openapi_extra=answers.described_body(Confirmation, {"reason": "the clutch was run over the weekend"}),
+    "/{run_id}/confirm", **answers.taking(Confirmation, Receipt, {"reason": "the clutch was run over the weekend"})
 )
 async def confirm_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     """Accept a held run as it was sent."""
