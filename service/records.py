@@ -39,7 +39,6 @@ from service.schemas.inspection import PhotographOut
 from service.schemas.rig import RigOut
 from service.settings import CODE_VERSION
 from storage import assumptions, changes, clutches, diagnoses, inspections, jobs, results, rigs, runs
-from storage.changes import NewChange
 from storage.clutches import ClutchRow
 from storage.diagnoses import VerdictRow
 from storage.inspections import InspectionRow, PhotographRow
@@ -240,18 +239,8 @@ def store_judged(
         )
         if event.run_id in aside:
             results.write_fits(connection, row.run_key, fit_rows(levels.get(event.run_id, ()), aside[event.run_id]))
-        change = NewChange(
-            clutch_id=clutch_id,
-            run_id=event.run_id,
-            at=at,
-            by=BY_EVIDENCE,
-            action=action,
-            reason=judged.reasons[event.run_id],
-            before=summary(row),
-            after=summary(after),
-            revision=revision,
-        )
-        changes.insert(connection, change)
+        entry = {"run_id": event.run_id, "at": at, "by": BY_EVIDENCE, "reason": judged.reasons[event.run_id]}
+        changes.insert(connection, clutch_id, action, summary(row), summary(after), revision=revision, **entry)
 
 
 def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:

@@ -14,7 +14,7 @@ from service import records
 from service.columns import whole
 from service.errors import InvalidError, NotFoundError
 from service.lives.engagements import DUTY_KINDS, StoredEngagement, stored_engagement
-from service.lives.history import ByPressure, Event, order
+from service.lives.history import ByPressure, Event, order, stationary_tests_of
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader
 from service.lives.outlook import Evidence, engagement_rows, needs_evidence, summarised
@@ -53,6 +53,14 @@ def evidence_for(database: Database, state: ClutchState, reader: RunReader) -> E
         return None
     with database.reading() as connection:
         return replace(evidence(connection, state.clutch_id), reader=reader)
+
+
+def tracked_again(database: Database, state: ClutchState, levels: Levels, receipts: Mapping[str, Receipt]) -> Results:
+    """What follows from a clutch's state where that is another than the stored one, and its runs are the same."""
+    reader = run_reader(database, state.clutch_id)
+    final, computed = computed_again(state, levels, receipts, reader, evaluated=stationary_tests_of(state.events))
+    evidence = evidence_for(database, final, reader)
+    return replace(computed, summary=summarised(final, computed.tracking or Tracking(), evidence))
 
 
 def engagements(connection: Connection, clutch_id: str) -> list[dict[str, Any]]:
@@ -209,8 +217,7 @@ def recomputed(recorded: Recorded) -> Recomputed:
     events = order([replace(event, **measured[event.run_id]) for event in state.events])
     held = tuple(replace(event, **measured[event.run_id]) for event in state.held)
     state = replace(state, events=events, held=held)
-    tests = reader.stationary_tests(state.lives[-1]) if events else iter(())
-    final, computed = computed_again(state, levels, receipts, tests, reader, evaluated={})
+    final, computed = computed_again(state, levels, receipts, reader, evaluated={})
     cofs = {}
     for run_id, event in aside.items():
         event = replace(event, **measured[run_id])

@@ -1,13 +1,13 @@
 """Rules of alarms, and what they have raised: once for a rule and a clutch until it is cleared, newest first."""
 
 from collections.abc import Collection
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Double, Row, Text, bindparam, delete, func, or_, select, update
+from sqlalchemy import Connection, Double, Text, bindparam, delete, func, or_, select, update
 
 from storage.dialects import ALL_ROWS, among, upsert
-from storage.encoding import Json, to_object, to_text
+from storage.encoding import Json, Rows, to_text
 from storage.tables import NOT_CLEARED, alarm, alarm_event, run
 
 RAISED, ACKNOWLEDGED, CLEARED = "raised", "acknowledged", "cleared"
@@ -54,6 +54,7 @@ class EventRow(NewEvent):
         return CLEARED if self.cleared_at is not None else RAISED if self.acknowledged_at is None else ACKNOWLEDGED
 
 
+_rules, _new_events, _events = Rows(AlarmRow), Rows(NewEvent), Rows(EventRow)
 _put = upsert(alarm)
 _by_id = select(alarm).where(alarm.c.alarm_id == bindparam("wanted"))
 _in_order = select(alarm).where(alarm.c.alarm_id > bindparam("after")).order_by(alarm.c.alarm_id)
@@ -97,14 +98,12 @@ _IN_STATE = {
 
 def put(connection: Connection, row: AlarmRow) -> None:
     """Store a rule, in the place of the one of that name."""
-    values = asdict(row) | {"enabled": int(row.enabled), "content": to_text(row.content)}
-    connection.execute(_put[connection.dialect.name], values)
+    connection.execute(_put[connection.dialect.name], _rules.values(row))
 
 
 def get(connection: Connection, alarm_id: str) -> AlarmRow | None:
     """The rule in force, or None."""
-    row = connection.execute(_by_id, {"wanted": alarm_id}).first()
-    return None if row is None else _rule(row)
+    return _rules.first(connection.execute(_by_id, {"wanted": alarm_id}))
 
 
 def remove(connection: Connection, alarm_id: str) -> None:
@@ -117,35 +116,33 @@ def page(connection: Connection, *, limit: int, after: str = "", only: Collectio
     query, values = _in_order.limit(limit), {"after": after}
     if only is not None:
         query, values = query.where(among(alarm.c.clutch_id, "of_only")), values | {"of_only": to_text(sorted(only))}
-    return [_rule(row) for row in connection.execute(query, values)]
+    return _rules.all(connection.execute(query, values))
 
 
 def enabled(connection: Connection, clutch_id: str | None = None) -> list[AlarmRow]:
     """The rules that are in use, those that may be of a clutch where it is named."""
     query = _enabled if clutch_id is None else _enabled.where(_of_or_all)
-    return [_rule(row) for row in connection.execute(query, {} if clutch_id is None else {"of_clutch": clutch_id})]
+    return _rules.all(connection.execute(query, {} if clutch_id is None else {"of_clutch": clutch_id}))
 
 
 def insert_event(connection: Connection, row: NewEvent) -> None:
     """Raise an alarm. Raises IntegrityError where the rule's alarm of the clutch is not cleared yet."""
-    values = {field.name: getattr(row, field.name) for field in fields(NewEvent)}
-    connection.execute(_insert_event, values | {"content": to_text(row.content)})
+    connection.execute(_insert_event, _new_events.values(row))
 
 
 def event(connection: Connection, event_id: str) -> EventRow | None:
     """An alarm, or None."""
-    row = connection.execute(_event_by_id, {"wanted": event_id}).first()
-    return None if row is None else _event(row)
+    return _events.first(connection.execute(_event_by_id, {"wanted": event_id}))
 
 
 def open_of_clutch(connection: Connection, clutch_id: str) -> dict[str, EventRow]:
     """alarm_id -> the alarm of a clutch that is not cleared."""
-    return {row.alarm_id: _event(row) for row in connection.execute(_open, {"of_clutch": clutch_id})}
+    return {raised.alarm_id: raised for raised in _events.all(connection.execute(_open, {"of_clutch": clutch_id}))}
 
 
 def open_of_alarm(connection: Connection, alarm_id: str) -> list[EventRow]:
     """What a rule has raised and is not cleared."""
-    return [_event(row) for row in connection.execute(_open_of_alarm, {"of_alarm": alarm_id})]
+    return _events.all(connection.execute(_open_of_alarm, {"of_alarm": alarm_id}))
 
 
 def events(
@@ -168,7 +165,7 @@ def events(
     if only is not None:
         query = query.where(among(alarm_event.c.clutch_id, "of_only"))
         values["of_only"] = to_text(sorted(only))
-    return [_event(row) for row in connection.execute(query, values)]
+    return _events.all(connection.execute(query, values))
 
 
 def clear(connection: Connection, event_id: str, at: str, content: Json) -> None:
@@ -190,13 +187,3 @@ def last_heard(connection: Connection, clutch_ids: Collection[str]) -> dict[str,
     """clutch_id -> when its last run arrived, of those of these clutches that have one."""
     rows = connection.execute(_last_heard, {"of_clutches": to_text(sorted(clutch_ids))})
     return {row.clutch_id: row[1] for row in rows}
-
-
-def _rule(row: Row[tuple[object, ...]]) -> AlarmRow:
-    values = row._asdict()
-    return AlarmRow(**values | {"enabled": bool(values["enabled"]), "content": to_object(values["content"])})
-
-
-def _event(row: Row[tuple[object, ...]]) -> EventRow:
-    values = row._asdict()
-    return EventRow(**values | {"content": to_object(values["content"])})

@@ -4,14 +4,14 @@ Priors are kept by kind of clutch, version, and the clutches that were left out.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, delete, func, select
+from sqlalchemy import Connection, bindparam, delete, func, select
 
 from storage.dialects import json_length
-from storage.encoding import Json, to_list, to_object, to_text
+from storage.encoding import Json, Rows, to_list, to_text
 from storage.tables import adopted_model, corrected_cof, fleet_prior, run
 
 # --- adopted models ---
@@ -29,8 +29,9 @@ class AdoptedRow:
     adopted_at: str
 
 
+_adoptions = Rows(AdoptedRow)
 _adoption_versions = (
-    select(adopted_model.c.version, adopted_model.c.diagnosis_id, adopted_model.c.adopted_at)
+    select(adopted_model)
     .where(adopted_model.c.clutch_id == bindparam("of_clutch"))
     .order_by(adopted_model.c.version.desc())
 )
@@ -57,18 +58,17 @@ _adoption_clear = delete(corrected_cof).where(
 
 def current_adoption(connection: Connection, clutch_id: str) -> AdoptedRow | None:
     """The version in force, None before the first."""
-    row = connection.execute(_adoption_newest, {"of_clutch": clutch_id}).first()
-    return None if row is None else AdoptedRow(**row._asdict())
+    return _adoptions.first(connection.execute(_adoption_newest, {"of_clutch": clutch_id}))
 
 
 def adoptions_of(connection: Connection, clutch_id: str) -> list[AdoptedRow]:
     """All versions, newest first."""
-    return [AdoptedRow(**row._asdict()) for row in connection.execute(_adoption_versions, {"of_clutch": clutch_id})]
+    return _adoptions.all(connection.execute(_adoption_versions, {"of_clutch": clutch_id}))
 
 
 def insert_adoption(connection: Connection, clutch_id: str, row: AdoptedRow) -> None:
     """Store a version. Raises IntegrityError where it is there or its diagnosis unknown."""
-    connection.execute(_adoption_adopt, {"clutch_id": clutch_id} | asdict(row))
+    connection.execute(_adoption_adopt, _adoptions.values(row, clutch_id=clutch_id))
 
 
 def corrected_cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, CorrectedCof]]:
@@ -125,6 +125,7 @@ class FleetPriorRow:
     code_version: str
 
 
+_priors = Rows(FleetPriorRow)
 _fleet_insert = sa.insert(fleet_prior)
 _fleet_current = (
     select(fleet_prior)
@@ -166,22 +167,12 @@ _fleet_forget = delete(fleet_prior).where(
 
 def insert_fleet_prior(connection: Connection, row: FleetPriorRow) -> None:
     """Store a prior. Raises IntegrityError where this version is there."""
-    values = {
-        "fleet": fleet_key(row.fleet),
-        "version": row.version,
-        "left_out": row.left_out,
-        "created_at": row.created_at,
-        "members": to_text(row.members),
-        "content": to_text(row.content),
-        "code_version": row.code_version,
-    }
-    connection.execute(_fleet_insert, values)
+    connection.execute(_fleet_insert, _priors.values(row, fleet=fleet_key(row.fleet)))
 
 
 def current_fleet_prior(connection: Connection, fleet: Json) -> FleetPriorRow | None:
     """The newest version of a kind of clutch, learned from all of them; None before the first."""
-    row = connection.execute(_fleet_current, {"of_fleet": fleet_key(fleet)}).first()
-    return None if row is None else _fleet_row(row)
+    return _priors.first(connection.execute(_fleet_current, {"of_fleet": fleet_key(fleet)}))
 
 
 def groups(members: Sequence[str]) -> list[Sequence[str]]:
@@ -204,13 +195,13 @@ def fleet_prior_for(connection: Connection, fleet: Json, clutch_id: str, version
         return None
     members = to_list(version_row.members)
     left_out = members[members.index(clutch_id) % _GROUPS] if clutch_id in members else NOBODY
-    row = connection.execute(_fleet_without, values | {"of_version": version_row.version, "wanted": left_out}).first()
-    return None if row is None else _fleet_row(row)
+    values |= {"of_version": version_row.version, "wanted": left_out}
+    return _priors.first(connection.execute(_fleet_without, values))
 
 
 def current_fleet_priors(connection: Connection) -> list[FleetPriorRow]:
     """The newest version of every kind of clutch."""
-    return [_fleet_row(row) for row in connection.execute(_fleet_all_current)]
+    return _priors.all(connection.execute(_fleet_all_current))
 
 
 def count_ended_lives(connection: Connection) -> int:
@@ -227,11 +218,3 @@ def forget_left_out(connection: Connection, fleet: Json, *, before: int) -> None
 def fleet_key(fleet: Json) -> str:
     """A kind of clutch as it is stored."""
     return to_text(dict(sorted(fleet.items())))
-
-
-def _fleet_row(row: Row[tuple[object, ...]]) -> FleetPriorRow:
-    values = row._asdict()
-    values["fleet"] = to_object(values["fleet"])
-    values["members"] = tuple(to_list(values["members"]))
-    values["content"] = to_object(values["content"])
-    return FleetPriorRow(**values)

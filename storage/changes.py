@@ -1,12 +1,12 @@
 """The audit trail: who changed what of a clutch or of one of its runs, when and why. Rows are added, never changed."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Double, Row, Text, bindparam, func, or_, select
+from sqlalchemy import Connection, Double, Text, bindparam, func, or_, select
 
 from storage.dialects import ALL_ROWS
-from storage.encoding import Json, to_object, to_text
+from storage.encoding import Json, Rows, to_text
 from storage.tables import change
 
 HOLD, CONFIRM, WITHDRAW, RESTORE, CORRECT = "hold", "confirm", "withdraw", "restore", "correct"
@@ -22,9 +22,11 @@ SHOWN = ("at", "by", "action", "run_id", "reason", "before", "after")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NewChange:
-    """A change that is about to be stored: `run_id` None where it is of the clutch, `revision` the clutch's after it."""
+class ChangeRow:
+    """A stored change: `run_id` None where it is of the clutch, `revision` the clutch's after it; the later, the greater its
+    key."""
 
+    change_key: int
     clutch_id: str
     run_id: str | None
     at: str
@@ -35,19 +37,12 @@ class NewChange:
     after: Json
     revision: int
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ChangeRow(NewChange):
-    """A stored change; the later, the greater its key."""
-
-    change_key: int
-
     def entry(self) -> Json:
         """What the trail shows of it."""
         return {name: getattr(self, name) for name in SHOWN}
 
 
-_NEW = tuple(field.name for field in fields(NewChange))
+_rows = Rows(ChangeRow)
 _insert = sa.insert(change)
 _of_clutch = change.c.clutch_id == bindparam("of_clutch")
 _newest_first = (
@@ -63,10 +58,22 @@ _newest_first = (
 _last_of_history = select(func.max(change.c.revision)).where(_of_clutch, change.c.action.in_(OF_HISTORY))
 
 
-def insert(connection: Connection, row: NewChange) -> None:
+def insert(
+    connection: Connection,
+    clutch_id: str,
+    action: str,
+    before: Json,
+    after: Json,
+    *,
+    at: str,
+    by: str,
+    revision: int,
+    run_id: str | None = None,
+    reason: str = "",
+) -> None:
     """Store a change. Raises IntegrityError where the clutch is unknown."""
-    values = {name: getattr(row, name) for name in _NEW}
-    connection.execute(_insert, values | {"before": to_text(row.before), "after": to_text(row.after)})
+    of = {"clutch_id": clutch_id, "run_id": run_id, "action": action, "at": at, "by": by, "revision": revision}
+    connection.execute(_insert, of | {"reason": reason, "before": to_text(before), "after": to_text(after)})
 
 
 def page(
@@ -84,16 +91,9 @@ def page(
         "most": ALL_ROWS if limit is None else limit,
         "before_key": 2.0**62 if before is None else before,
     }
-    return [_row(row) for row in connection.execute(_newest_first, values)]
+    return _rows.all(connection.execute(_newest_first, values))
 
 
 def last_of_history(connection: Connection, clutch_id: str) -> int:
     """The revision of the last change of what the clutch's history holds, 0 where there was none."""
     return connection.execute(_last_of_history, {"of_clutch": clutch_id}).scalar() or 0
-
-
-def _row(row: Row[tuple[object, ...]]) -> ChangeRow:
-    values = row._asdict()
-    values["before"] = to_object(values["before"])
-    values["after"] = to_object(values["after"])
-    return ChangeRow(**values)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, Select, Text, bindparam, case, func, select, tuple_, update
+from sqlalchemy import Connection, Select, Text, bindparam, case, func, select, tuple_, update
 
 from storage.dialects import among, json_fields
-from storage.encoding import Json, to_object, to_text
+from storage.encoding import Json, Rows, to_text
 from storage.tables import HELD_ONLY, clutch, run
 
 
@@ -60,6 +60,7 @@ class Counts:
     held: int
 
 
+_stored = Rows(ClutchRow)
 _insert = sa.insert(clutch)
 _of_wanted = clutch.c.clutch_id == bindparam("wanted")
 _by_id = select(clutch).where(_of_wanted)
@@ -110,28 +111,12 @@ _revisions = select(clutch.c.clutch_id, clutch.c.revision).order_by(clutch.c.clu
 
 def insert(connection: Connection, row: ClutchRow) -> None:
     """Store a new clutch. Raises IntegrityError where its id is taken."""
-    values = {
-        "clutch_id": row.clutch_id,
-        "record": to_text(row.record),
-        "content_sha256": row.content_sha256,
-        "created_at": row.created_at,
-        "revision": row.revision,
-        "rank": row.rank,
-        "summary": to_text(row.summary),
-        "archived": int(row.archived),
-        "registered": None if row.registered is None else to_text(row.registered),
-        "state": row.state,
-        "disputed": row.disputed,
-        "silent": row.silent,
-        "searched": _searched(row.clutch_id, row.record),
-    }
-    connection.execute(_insert, values)
+    connection.execute(_insert, _stored.values(row, searched=_searched(row.clutch_id, row.record)))
 
 
 def get(connection: Connection, clutch_id: str) -> ClutchRow | None:
     """The clutch, or None."""
-    row = connection.execute(_by_id, {"wanted": clutch_id}).first()
-    return None if row is None else _row(row)
+    return _stored.first(connection.execute(_by_id, {"wanted": clutch_id}))
 
 
 def page(
@@ -154,7 +139,7 @@ def page(
         values |= {"after_id": after[1]} if by_name else {"after_rank": after[0], "after_id": after[1]}
     # their ids by an index alone, however many are passed over; then the rows
     ids = list(connection.execute(query, values).scalars())
-    rows = {row.clutch_id: _row(row) for row in connection.execute(_rows, {"wanted": ids})}
+    rows = {row.clutch_id: row for row in _stored.all(connection.execute(_rows, {"wanted": ids}))}
     return [rows[clutch_id] for clutch_id in ids]
 
 
@@ -284,16 +269,6 @@ def all_ids(connection: Connection) -> list[str]:
 def revisions(connection: Connection) -> dict[str, int]:
     """The revisions of all clutches by id, ascending."""
     return {row.clutch_id: row.revision for row in connection.execute(_revisions)}
-
-
-def _row(row: Row[tuple[object, ...]]) -> ClutchRow:
-    values = row._asdict()
-    values["record"] = to_object(values["record"])
-    values["summary"] = to_object(values["summary"])
-    values["archived"] = bool(values["archived"])
-    values["registered"] = None if values["registered"] is None else to_object(values["registered"])
-    del values["searched"]
-    return ClutchRow(**values)
 
 
 def _searched(clutch_id: str, record: Json) -> str:

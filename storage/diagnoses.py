@@ -1,13 +1,13 @@
 """Diagnoses of a clutch: running, then finished or failed; newest first, and the verdict of the newest that has finished."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Double, Row, bindparam, select, update
+from sqlalchemy import Connection, Double, bindparam, select, update
 
 from storage.dialects import json_fields
-from storage.encoding import Json, to_object, to_text
+from storage.encoding import Json, Rows, to_object, to_text
 from storage.runs import ACCEPTED
 from storage.tables import adopted_model, diagnosis, run
 
@@ -43,7 +43,7 @@ class DiagnosisRow(NewDiagnosis):
     problem: str | None
 
 
-_NEW = tuple(field.name for field in fields(NewDiagnosis))
+_new, _rows = Rows(NewDiagnosis), Rows(DiagnosisRow)
 _insert = sa.insert(diagnosis)
 _of_clutch = diagnosis.c.clutch_id == bindparam("of_clutch")
 _by_id = select(diagnosis).where(_of_clutch, diagnosis.c.diagnosis_id == bindparam("wanted"))
@@ -79,19 +79,18 @@ _last_run = select(sa.func.max(run.c.run_key)).where(run.c.clutch_id == bindpara
 
 def insert(connection: Connection, row: NewDiagnosis) -> None:
     """Store a diagnosis that is running. Raises IntegrityError where its clutch is unknown or its id taken."""
-    connection.execute(_insert, {name: getattr(row, name) for name in _NEW} | {"status": RUNNING})
+    connection.execute(_insert, _new.values(row, status=RUNNING))
 
 
 def get(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisRow | None:
     """The diagnosis, or None."""
-    row = connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": diagnosis_id}).first()
-    return None if row is None else _row(row)
+    return _rows.first(connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": diagnosis_id}))
 
 
 def page(connection: Connection, clutch_id: str, *, limit: int, before: float | None = None) -> list[DiagnosisRow]:
     """At most `limit` diagnoses, newest first; `before` is the key of the last diagnosis of the page before."""
     values = {"of_clutch": clutch_id, "most": limit, "before": 2.0**62 if before is None else before}
-    return [_row(row) for row in connection.execute(_newest, values)]
+    return _rows.all(connection.execute(_newest, values))
 
 
 def running(connection: Connection, clutch_id: str, last_run_key: int, *, since: int = 0) -> list[str]:
@@ -117,13 +116,6 @@ def fail(connection: Connection, diagnosis_id: str, at: str, problem: str) -> bo
 def last_run_key(connection: Connection, clutch_id: str) -> int:
     """The key of the clutch's accepted run that was stored last, 0 where there is none."""
     return connection.execute(_last_run, {"of_clutch": clutch_id}).scalar() or 0
-
-
-def _row(row: Row[tuple[object, ...]]) -> DiagnosisRow:
-    values = row._asdict()
-    for name in ("report", "extension"):
-        values[name] = None if values[name] is None else to_object(values[name])
-    return DiagnosisRow(**values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

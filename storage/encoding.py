@@ -23,17 +23,22 @@ once: it is the double nearest to the decimal. A column that holds any other dou
     rows that are minus zero, which k does not distinguish from zero (4 bytes each)
 
 JSON in text columns is compact, and without NaN or infinities: the library's functions, nothing of our own at every row.
+
+`Rows` makes values of rows and rows of values: the type of a dataclass' field says how its column is stored. A JSON object,
+a list or a tuple is JSON text, named arrays are packed, a flag is 0 or 1; all else is stored as it is.
 """
 
 import json
 import math
 import struct
 import zlib
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeAlias
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import UnionType
+from typing import Any, Generic, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
+from sqlalchemy import Result, Row
 
 from storage.engine.errors import DamagedData
 
@@ -277,3 +282,60 @@ to_text: Callable[[object], str] = json.JSONEncoder(allow_nan=False, ensure_asci
 to_object: Callable[[str], Json] = json.loads
 #: The list that `to_text` wrote.
 to_list: Callable[[str], list[Any]] = json.loads
+
+
+Value = TypeVar("Value")
+_Coding = tuple[Callable[[Any], Any], Callable[[Any], Any]]
+
+
+class Rows(Generic[Value]):
+    """The rows that hold the fields of a dataclass, and perhaps other columns beside them."""
+
+    def __init__(self, kind: type[Value]) -> None:
+        self._kind = kind
+        hints = get_type_hints(kind)
+        self.names = tuple(hints)
+        codings = {name: _coding(hint) for name, hint in hints.items()}
+        self._coded = {name: coding for name, coding in codings.items() if coding is not None}
+
+    def values(self, value: Value, **others: object) -> dict[str, Any]:
+        """The columns of a row, by name; `others` take the place of the value's own, or come beside them."""
+        columns = {name: getattr(value, name) for name in self.names}
+        for name, (encode, _) in self._coded.items():
+            columns[name] = None if columns[name] is None else encode(columns[name])
+        return columns | others
+
+    def of(self, row: Row[*tuple[Any, ...]]) -> Value:
+        """The value that a row holds."""
+        fields = row._asdict()
+        if len(fields) > len(self.names):
+            fields = {name: fields[name] for name in self.names}
+        for name, (_, decode) in self._coded.items():
+            fields[name] = None if fields[name] is None else decode(fields[name])
+        return self._kind(**fields)
+
+    def all(self, rows: Iterable[Row[*tuple[Any, ...]]]) -> list[Value]:
+        """The values of several rows."""
+        return [self.of(row) for row in rows]
+
+    def first(self, rows: Result[*tuple[Any, ...]]) -> Value | None:
+        """The value of the first row, None where there is none."""
+        row = rows.first()
+        return None if row is None else self.of(row)
+
+
+def _tuple(text: str) -> tuple[Any, ...]:
+    return tuple(to_list(text))
+
+
+def _coding(hint: Any) -> _Coding | None:
+    """To what is stored and back; None where a field is stored as it is."""
+    kinds = get_args(hint) if get_origin(hint) is UnionType else (hint,)
+    codings: dict[Any, _Coding] = {
+        dict: (to_text, to_object),
+        tuple: (to_text, _tuple),
+        Sequence: (to_text, _tuple),
+        Mapping: (pack, unpack),
+        bool: (int, bool),
+    }
+    return next((codings[plain] for kind in kinds if (plain := get_origin(kind) or kind) in codings), None)

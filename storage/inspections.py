@@ -5,13 +5,13 @@ inspection that was withdrawn stays stored with its photographs.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, select, tuple_, update
+from sqlalchemy import Connection, bindparam, select, tuple_, update
 
 from storage.dialects import ALL_ROWS, among
-from storage.encoding import Json, to_object, to_text
+from storage.encoding import Json, Rows, to_text
 from storage.runs import ACCEPTED
 from storage.tables import inspection, inspection_photograph, photograph
 
@@ -49,7 +49,8 @@ class PhotographRow:
     received_by: str
 
 
-_NEW = tuple(field.name for field in fields(NewInspection))
+_new, _rows = Rows(NewInspection), Rows(InspectionRow)
+_shown = Rows(PhotographRow)
 _insert = sa.insert(inspection)
 _insert_photograph = sa.insert(photograph)
 _attach = sa.insert(inspection_photograph)
@@ -86,15 +87,13 @@ _data = (
 
 def insert(connection: Connection, row: NewInspection) -> int:
     """Store a new inspection and return its key. Raises IntegrityError where the clutch is unknown or has this id."""
-    values = {name: getattr(row, name) for name in _NEW} | {"content": to_text(row.content)}
-    inspection_key: int = next(iter(connection.execute(_insert, values).inserted_primary_key or ()))
+    inspection_key: int = next(iter(connection.execute(_insert, _new.values(row)).inserted_primary_key or ()))
     return inspection_key
 
 
 def get(connection: Connection, clutch_id: str, inspection_id: str) -> InspectionRow | None:
     """The inspection, or None."""
-    row = connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": inspection_id}).first()
-    return None if row is None else _row(row)
+    return _rows.first(connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": inspection_id}))
 
 
 def page(
@@ -105,7 +104,7 @@ def page(
     query = _in_order
     if after is not None:
         query, values = query.where(_after), values | {"at": after[0], "after_id": after[1]}
-    return [_row(row) for row in connection.execute(query, values)]
+    return _rows.all(connection.execute(query, values))
 
 
 def set_state(connection: Connection, inspection_key: int, state: str) -> None:
@@ -118,8 +117,7 @@ def photographs(connection: Connection, inspection_keys: Sequence[int]) -> dict[
     """inspection_key -> the photographs of those inspections in the order in which they came, without their content."""
     of_keys: dict[int, list[PhotographRow]] = {key: [] for key in inspection_keys}
     for row in connection.execute(_photographs, {"of_keys": to_text(list(inspection_keys))}):
-        values = row._asdict()
-        of_keys[values.pop("inspection_key")].append(PhotographRow(**values))
+        of_keys[row.inspection_key].append(_shown.of(row))
     return of_keys
 
 
@@ -137,8 +135,3 @@ def attach(connection: Connection, inspection_key: int, row: PhotographRow, cont
         connection.execute(_insert_photograph, stored)
     attached = {"received_at": row.received_at, "received_by": row.received_by, "position": position}
     connection.execute(_attach, attached | {"inspection_key": inspection_key, "sha256": row.sha256})
-
-
-def _row(row: Row[tuple[object, ...]]) -> InspectionRow:
-    values = row._asdict()
-    return InspectionRow(**values | {"content": to_object(values["content"])})

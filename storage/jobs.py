@@ -6,13 +6,13 @@ on SQLite one process writes at a time anyway.
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Double, Row, Text, and_, bindparam, func, or_, select, update
+from sqlalchemy import Connection, Double, Text, and_, bindparam, func, or_, select, update
 
 from storage.dialects import among, now_in_seconds
-from storage.encoding import Json, to_object, to_text
+from storage.encoding import Json, Rows, to_text
 from storage.tables import OPEN_ONLY, job
 
 WAITING, RUNNING, FINISHED, FAILED, CANCELLED = "waiting", "running", "finished", "failed", "cancelled"
@@ -48,13 +48,12 @@ class JobRow(NewJob):
     problem: str | None
 
 
-_NEW = tuple(field.name for field in fields(NewJob))
-_COLUMNS = [job.c[field.name] for field in fields(JobRow)]
+_new, _rows = Rows(NewJob), Rows(JobRow)
 _insert = sa.insert(job)
 _wanted = job.c.job_id == bindparam("wanted")
-_by_id = select(*_COLUMNS).where(_wanted)
+_by_id = select(job).where(_wanted)
 _newest = (
-    select(*_COLUMNS)
+    select(job)
     .where(
         job.c.job_key < bindparam("before", type_=Double),
         or_(bindparam("in_state", type_=Text).is_(None), job.c.state == bindparam("in_state")),
@@ -63,7 +62,7 @@ _newest = (
     .limit(bindparam("most"))
 )
 _same = (
-    select(*_COLUMNS)
+    select(job)
     .where(
         OPEN_ONLY, job.c.kind == bindparam("of_kind"), job.c.clutch_id.is_not_distinct_from(bindparam("of", type_=Text))
     )
@@ -122,14 +121,12 @@ _end_open = update(job).where(_wanted, OPEN_ONLY).values(**_ended)
 
 def insert(connection: Connection, row: NewJob) -> None:
     """Store a job that waits. Raises IntegrityError where its clutch is unknown or its id taken."""
-    values = {name: getattr(row, name) for name in _NEW} | {"arguments": to_text(row.arguments)}
-    connection.execute(_insert, values | {"state": WAITING, "attempts": 0})
+    connection.execute(_insert, _new.values(row, state=WAITING, attempts=0))
 
 
 def get(connection: Connection, job_id: str) -> JobRow | None:
     """The job, or None."""
-    row = connection.execute(_by_id, {"wanted": job_id}).first()
-    return None if row is None else _row(row)
+    return _rows.first(connection.execute(_by_id, {"wanted": job_id}))
 
 
 def page(
@@ -149,7 +146,7 @@ def page(
             query.where(among(job.c.clutch_id, "of_clutches")),
             values | {"of_clutches": to_text(list(only))},
         )
-    return [_row(row) for row in connection.execute(query, values)]
+    return _rows.all(connection.execute(query, values))
 
 
 def count_open(connection: Connection, kind: str) -> int:
@@ -159,8 +156,7 @@ def count_open(connection: Connection, kind: str) -> int:
 
 def find_open(connection: Connection, kind: str, clutch_id: str | None) -> JobRow | None:
     """The job of a kind and a clutch that waits or runs, the first of them; `clutch_id` None: of no single clutch."""
-    row = connection.execute(_same, {"of_kind": kind, "of": clutch_id}).first()
-    return None if row is None else _row(row)
+    return _rows.first(connection.execute(_same, {"of_kind": kind, "of": clutch_id}))
 
 
 def any_waiting(connection: Connection, kind: str) -> bool:
@@ -223,10 +219,3 @@ def end(
     if claimer is not None:
         return connection.execute(_end_claimed, values | {"claimer": claimer}).rowcount == 1
     return connection.execute(_end_open, values).rowcount == 1
-
-
-def _row(row: Row[tuple[object, ...]]) -> JobRow:
-    values = row._asdict()
-    values["arguments"] = to_object(values["arguments"])
-    values["progress"] = None if values["progress"] is None else to_object(values["progress"])
-    return JobRow(**values)

@@ -1,11 +1,11 @@
 """Access keys. Only the hash of a secret is kept; a revoked key stays listed and grants nothing."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, exists, or_, select, update
+from sqlalchemy import Connection, bindparam, exists, or_, select, update
 
-from storage.encoding import to_list, to_text
+from storage.encoding import Rows
 from storage.tables import access_key
 
 
@@ -28,6 +28,7 @@ class KeyRow:
     last_used_at: str | None = None
 
 
+_rows = Rows(KeyRow)
 _insert = sa.insert(access_key)
 _active = access_key.c.revoked_at.is_(None)
 _any = select(exists(select(access_key.c.key_id)))
@@ -42,7 +43,7 @@ _use = update(access_key).where(_of_wanted).values(last_used_at=bindparam("at"))
 
 def insert(connection: Connection, row: KeyRow) -> None:
     """Store a new key. Raises IntegrityError where its id or its secret is taken."""
-    connection.execute(_insert, asdict(row) | {"clutches": None if row.clutches is None else to_text(row.clutches)})
+    connection.execute(_insert, _rows.values(row))
 
 
 def any_ever(connection: Connection) -> bool:
@@ -57,7 +58,7 @@ def any_active(connection: Connection, at: str) -> bool:
 
 def all_keys(connection: Connection) -> list[KeyRow]:
     """All keys, revoked ones too, oldest first."""
-    return [_row(row) for row in connection.execute(_all)]
+    return _rows.all(connection.execute(_all))
 
 
 def revoke(connection: Connection, key_id: str, revoked_at: str) -> bool:
@@ -68,9 +69,3 @@ def revoke(connection: Connection, key_id: str, revoked_at: str) -> bool:
 def note_use(connection: Connection, key_id: str, at: str) -> None:
     """Note when a key was last used."""
     connection.execute(_use, {"wanted": key_id, "at": at})
-
-
-def _row(row: Row[tuple[object, ...]]) -> KeyRow:
-    values = row._asdict()
-    values["clutches"] = None if values["clutches"] is None else tuple(to_list(values["clutches"]))
-    return KeyRow(**values)

@@ -6,16 +6,15 @@ a row a clutch, method and pressure.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
-from sqlalchemy import Connection, Row, bindparam, delete, select
+from sqlalchemy import Connection, bindparam, delete, select
 
 from storage.dialects import upsert
-from storage.encoding import Json, pack, to_list, to_object, to_text, unpack
+from storage.encoding import Json, Rows
 from storage.engine.errors import DamagedData
 from storage.tables import filter_state, fit, prediction, run
 
@@ -52,12 +51,11 @@ class FitRow:
 
 
 _MATRICES = ("covariance", "unbiased_covariance")
-_FIT_NAMES = tuple(field.name for field in fields(FitRow))
-_fit_columns = [fit.c.run_key, *(fit.c[name] for name in _FIT_NAMES)]
+_fits = Rows(FitRow)
 _fit_insert = sa.insert(fit)
 _fit_delete = delete(fit).where(fit.c.run_key == bindparam("of_run"))
 _fit_of_clutch = (
-    select(*_fit_columns)
+    select(fit)
     .join(run, run.c.run_key == fit.c.run_key)
     .where(run.c.clutch_id == bindparam("of_clutch"))
     .order_by(run.c.cycles, run.c.run_id, fit.c.pressure)
@@ -83,8 +81,7 @@ def fits_of(connection: Connection, clutch_id: str) -> dict[int, list[FitRow]]:
     """The fits of a clutch's runs by run_key, runs in order, pressures ascending; runs without fits are left out."""
     fits: dict[int, list[FitRow]] = {}
     for row in connection.execute(_fit_of_clutch, {"of_clutch": clutch_id}):
-        run_key, curve = _fit_row(row)
-        fits.setdefault(run_key, []).append(curve)
+        fits.setdefault(row.run_key, []).append(_fits.of(row))
     return fits
 
 
@@ -97,23 +94,11 @@ def cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, tup
 
 
 def _fit_values(run_key: int, row: FitRow) -> dict[str, object]:
-    values = {name: getattr(row, name) for name in _FIT_NAMES}
     for name in _MATRICES:
-        matrix = values[name]
+        matrix = getattr(row, name)
         if matrix is not None and len(matrix) != 16:
             raise ValueError(f"{name} must hold 16 numbers, got {len(matrix)}")
-        values[name] = None if matrix is None else to_text(matrix)
-    values["undetermined"] = to_text(row.undetermined)
-    return {"run_key": run_key, **values}
-
-
-def _fit_row(row: Row[Any]) -> tuple[int, FitRow]:
-    run_key: int = row[0]
-    values: dict[str, Any] = dict(zip(_FIT_NAMES, row[1:], strict=True))
-    for name in _MATRICES:
-        values[name] = None if values[name] is None else tuple(to_list(values[name]))
-    values["undetermined"] = tuple(to_list(values["undetermined"]))
-    return run_key, FitRow(**values)
+    return _fits.values(row, run_key=run_key)
 
 
 # --- predictions ---
@@ -130,11 +115,10 @@ class PredictionRow:
     code_version: str
 
 
+_predictions = Rows(PredictionRow)
 _prediction_put = upsert(prediction)
 _prediction_of_clutch = prediction.c.clutch_id == bindparam("of_clutch")
-_prediction_series = select(
-    prediction.c.cycles, prediction.c.method, prediction.c.pressure, prediction.c.payload, prediction.c.code_version
-).where(
+_prediction_series = select(prediction).where(
     _prediction_of_clutch,
     prediction.c.method == bindparam("of_method"),
     prediction.c.pressure == bindparam("of_pressure"),
@@ -147,17 +131,7 @@ _prediction_clear = delete(prediction).where(_prediction_of_clutch)
 
 def put_predictions(connection: Connection, clutch_id: str, rows: Sequence[PredictionRow]) -> None:
     """Store predictions, each in place of the one of the same method, pressure and cycles."""
-    values = [
-        {
-            "clutch_id": clutch_id,
-            "method": row.method,
-            "pressure": row.pressure,
-            "cycles": row.cycles,
-            "payload": to_text(row.payload),
-            "code_version": row.code_version,
-        }
-        for row in rows
-    ]
+    values = [_predictions.values(row, clutch_id=clutch_id) for row in rows]
     if values:
         connection.execute(_prediction_put[connection.dialect.name], values)
 
@@ -168,27 +142,19 @@ def prediction_at(
     """The last prediction of a series, or the last one not beyond `at_cycles`; None where there is none."""
     values: dict[str, str | float] = {"of_clutch": clutch_id, "of_method": method, "of_pressure": pressure}
     if at_cycles is None:
-        row = connection.execute(_prediction_last, values).first()
-    else:
-        row = connection.execute(_prediction_last_at, {**values, "at_most": at_cycles}).first()
-    return None if row is None else _prediction_row(*row)
+        return _predictions.first(connection.execute(_prediction_last, values))
+    return _predictions.first(connection.execute(_prediction_last_at, {**values, "at_most": at_cycles}))
 
 
 def predictions_of(connection: Connection, clutch_id: str, method: str, pressure: float) -> list[PredictionRow]:
     """All predictions of a series, cycles ascending."""
     values = {"of_clutch": clutch_id, "of_method": method, "of_pressure": pressure}
-    return [_prediction_row(*row) for row in connection.execute(_prediction_history, values)]
+    return _predictions.all(connection.execute(_prediction_history, values))
 
 
 def clear_predictions(connection: Connection, clutch_id: str) -> None:
     """Drop all predictions of a clutch, which are about to be computed again."""
     connection.execute(_prediction_clear, {"of_clutch": clutch_id})
-
-
-def _prediction_row(cycles: float, method: str, pressure: float, payload: str, code_version: str) -> PredictionRow:
-    return PredictionRow(
-        cycles=cycles, method=method, pressure=pressure, payload=to_object(payload), code_version=code_version
-    )
 
 
 # --- filter states ---
@@ -205,35 +171,16 @@ class FilterStateRow:
     code_version: str
 
 
+_states = Rows(FilterStateRow)
 _state_put = upsert(filter_state)
 _state_of_clutch = filter_state.c.clutch_id == bindparam("of_clutch")
-_state_get = (
-    select(
-        filter_state.c.method,
-        filter_state.c.pressure,
-        filter_state.c.runs,
-        filter_state.c.arrays,
-        filter_state.c.code_version,
-    )
-    .where(_state_of_clutch)
-    .order_by(filter_state.c.method, filter_state.c.pressure)
-)
+_state_get = select(filter_state).where(_state_of_clutch).order_by(filter_state.c.method, filter_state.c.pressure)
 _state_clear = delete(filter_state).where(_state_of_clutch)
 
 
 def put_filter_states(connection: Connection, clutch_id: str, rows: Sequence[FilterStateRow]) -> None:
     """Store states, each in place of the one of the same method and pressure."""
-    values = [
-        {
-            "clutch_id": clutch_id,
-            "method": row.method,
-            "pressure": row.pressure,
-            "runs": row.runs,
-            "arrays": pack(row.arrays),
-            "code_version": row.code_version,
-        }
-        for row in rows
-    ]
+    values = [_states.values(row, clutch_id=clutch_id) for row in rows]
     if values:
         connection.execute(_state_put[connection.dialect.name], values)
 
@@ -241,14 +188,12 @@ def put_filter_states(connection: Connection, clutch_id: str, rows: Sequence[Fil
 def filter_states_of(connection: Connection, clutch_id: str) -> dict[tuple[str, float], FilterStateRow]:
     """The states of a clutch by (method, pressure). Raises DamagedData, naming the state."""
     states = {}
-    for method, pressure, runs, data, code_version in connection.execute(_state_get, {"of_clutch": clutch_id}):
+    for row in connection.execute(_state_get, {"of_clutch": clutch_id}):
         try:
-            arrays = unpack(data)
+            states[row.method, row.pressure] = _states.of(row)
         except DamagedData as error:
-            raise DamagedData(f"state of {method} at {pressure:g} Pa of clutch {clutch_id!r}: {error}") from error
-        states[method, pressure] = FilterStateRow(
-            method=method, pressure=pressure, runs=runs, arrays=arrays, code_version=code_version
-        )
+            name = f"state of {row.method} at {row.pressure:g} Pa of clutch {clutch_id!r}"
+            raise DamagedData(f"{name}: {error}") from error
     return states
 
 

@@ -1,12 +1,12 @@
 """Rig profiles by name: how the files that a rig's recorder writes are read."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, select
+from sqlalchemy import Connection, bindparam, select
 
 from storage.dialects import ALL_ROWS, upsert
-from storage.encoding import Json, to_object, to_text
+from storage.encoding import Json, Rows
 from storage.tables import rig
 
 
@@ -21,6 +21,7 @@ class RigRow:
     saved_by: str
 
 
+_rows = Rows(RigRow)
 _insert = sa.insert(rig)
 _put = upsert(rig)
 _by_name = select(rig).where(rig.c.name == bindparam("wanted"))
@@ -29,30 +30,20 @@ _in_order = select(rig).where(rig.c.name > bindparam("after")).order_by(rig.c.na
 
 def insert(connection: Connection, row: RigRow) -> None:
     """Store a new profile. Raises IntegrityError where the name is taken."""
-    connection.execute(_insert, _values(row))
+    connection.execute(_insert, _rows.values(row))
 
 
 def put(connection: Connection, row: RigRow) -> None:
     """Store a profile in the place of the one of that name."""
-    connection.execute(_put[connection.dialect.name], _values(row))
+    connection.execute(_put[connection.dialect.name], _rows.values(row))
 
 
 def get(connection: Connection, name: str) -> RigRow | None:
     """The profile in force, or None."""
-    row = connection.execute(_by_name, {"wanted": name}).first()
-    return None if row is None else _row(row)
+    return _rows.first(connection.execute(_by_name, {"wanted": name}))
 
 
 def page(connection: Connection, *, limit: int | None = None, after: str = "") -> list[RigRow]:
     """Profiles by name, at most `limit`, behind the name `after`."""
     values = {"after": after, "most": ALL_ROWS if limit is None else limit}
-    return [_row(row) for row in connection.execute(_in_order, values)]
-
-
-def _values(row: RigRow) -> dict[str, object]:
-    return asdict(row) | {"content": to_text(row.content)}
-
-
-def _row(row: Row[tuple[object, ...]]) -> RigRow:
-    values = row._asdict()
-    return RigRow(**values | {"content": to_object(values["content"])})
+    return _rows.all(connection.execute(_in_order, values))

@@ -8,10 +8,10 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, Select, Text, bindparam, exists, func, or_, select, tuple_, update
+from sqlalchemy import Connection, Select, Text, bindparam, exists, func, or_, select, tuple_, update
 
 from storage.dialects import ALL_ROWS, Pair, json_text, json_value
-from storage.encoding import Json, to_list, to_object, to_text
+from storage.encoding import Json, Rows, to_text
 from storage.tables import HELD_ONLY, fit, run
 
 ACCEPTED, HELD, WITHDRAWN = "accepted", "held", "withdrawn"
@@ -84,6 +84,7 @@ class RunInOrder:
     duty_duration_s: float | None = None
 
 
+_new, _stored, _listed = Rows(NewRun), Rows(RunRow), Rows(ReceiptRow)
 _insert = sa.insert(run)
 _of_clutch = run.c.clutch_id == bindparam("of_clutch")
 _by_id = select(run).where(_of_clutch, run.c.run_id == bindparam("wanted"))
@@ -93,7 +94,7 @@ _CHOSEN = (
     or_(bindparam("of_state", type_=Text).is_(None), run.c.state == bindparam("of_state")),
 )
 _ordered = select(run).where(*_CHOSEN).order_by(run.c.cycles, run.c.run_id).limit(bindparam("most"))
-_receipts = _ordered.with_only_columns(*(run.c[field.name] for field in fields(ReceiptRow)))
+_receipts = _ordered.with_only_columns(*(run.c[name] for name in _listed.names))
 _after = tuple_(run.c.cycles, run.c.run_id) > tuple_(bindparam("after_cycles"), bindparam("after_id"))
 _fitted = exists().where(fit.c.run_key == run.c.run_key)
 _LIGHT = tuple(field.name for field in fields(RunInOrder))
@@ -136,24 +137,18 @@ _set_results = update(run).where(run.c.run_key == bindparam("wanted"))
 
 def insert(connection: Connection, row: NewRun) -> int:
     """Store a new run and return its key. Raises IntegrityError where the clutch is unknown or has this run_id."""
-    values = {field.name: getattr(row, field.name) for field in fields(NewRun)}
-    values["details"] = to_text(row.details)
-    values["receipt"] = to_text(row.receipt)
-    values["doubts"] = to_text(row.doubts)
-    run_key: int = next(iter(connection.execute(_insert, values).inserted_primary_key or ()))
+    run_key: int = next(iter(connection.execute(_insert, _new.values(row)).inserted_primary_key or ()))
     return run_key
 
 
 def get(connection: Connection, clutch_id: str, run_id: str) -> RunRow | None:
     """The run, or None."""
-    row = connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": run_id}).first()
-    return None if row is None else _row(row)
+    return _stored.first(connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": run_id}))
 
 
 def read_again_as(connection: Connection, clutch_id: str, content_sha256: str) -> RunRow | None:
     """The run whose file was read again since it was sent, with that content; or None."""
-    row = connection.execute(_read_again_as, {"of_clutch": clutch_id, "of_content": content_sha256}).first()
-    return None if row is None else _row(row)
+    return _stored.first(connection.execute(_read_again_as, {"of_clutch": clutch_id, "of_content": content_sha256}))
 
 
 def page(
@@ -172,7 +167,7 @@ def page(
     """
     query, values = _behind(_ordered.where(_fitted) if fitted else _ordered, after)
     values |= {"of_clutch": clutch_id, "of_kind": kind, "of_state": state, "most": ALL_ROWS if limit is None else limit}
-    return [_row(row) for row in connection.execute(query, values)]
+    return _stored.all(connection.execute(query, values))
 
 
 def receipts(
@@ -187,7 +182,7 @@ def receipts(
     """The same, as much as a list shows."""
     query, values = _behind(_receipts, after)
     values |= {"of_clutch": clutch_id, "of_kind": kind, "of_state": state, "most": limit}
-    return [ReceiptRow(**row._asdict()) for row in connection.execute(query, values)]
+    return _listed.all(connection.execute(query, values))
 
 
 def _behind(query: Select[Any], after: tuple[float, str] | None) -> tuple[Select[Any], dict[str, object]]:
@@ -264,11 +259,3 @@ def set_state(
 def _in_order(connection: Connection, query: Select[Any], clutch_id: str) -> list[RunInOrder]:
     rows = connection.execute(query, {"of_clutch": clutch_id})
     return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in rows]
-
-
-def _row(row: Row[tuple[object, ...]]) -> RunRow:
-    values = row._asdict()
-    values["doubts"] = tuple(to_list(values["doubts"]))
-    values["details"] = to_object(values["details"])
-    values["receipt"] = to_object(values["receipt"])
-    return RunRow(**values)

@@ -5,13 +5,13 @@ it is due again when the lease has run out. So each is sent at least once.
 """
 
 from collections.abc import Collection
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Double, Row, bindparam, delete, func, select, update
+from sqlalchemy import Connection, Double, bindparam, delete, func, select, update
 
 from storage.dialects import now_in_seconds
-from storage.encoding import Json, to_object, to_text
+from storage.encoding import Json, Rows
 from storage.tables import WAITING_ONLY, delivery, webhook
 
 WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"
@@ -54,6 +54,7 @@ class DeliveryRow(NewDelivery):
     problem: str | None
 
 
+_receivers, _new, _deliveries = Rows(WebhookRow), Rows(NewDelivery), Rows(DeliveryRow)
 _insert = sa.insert(webhook)
 _by_id = select(webhook).where(webhook.c.webhook_id == bindparam("wanted"))
 _in_order = select(webhook).where(webhook.c.webhook_id > bindparam("after")).order_by(webhook.c.webhook_id)
@@ -110,19 +111,18 @@ _waiting = select(func.count()).select_from(delivery).where(WAITING_ONLY)
 
 def insert(connection: Connection, row: WebhookRow) -> None:
     """Store a receiver. Raises IntegrityError where its name is taken."""
-    connection.execute(_insert, asdict(row) | {"content": to_text(row.content)})
+    connection.execute(_insert, _receivers.values(row))
 
 
 def get(connection: Connection, webhook_id: str) -> WebhookRow | None:
     """A receiver, or None."""
-    row = connection.execute(_by_id, {"wanted": webhook_id}).first()
-    return None if row is None else _receiver(row)
+    return _receivers.first(connection.execute(_by_id, {"wanted": webhook_id}))
 
 
 def page(connection: Connection, *, limit: int | None = None, after: str = "") -> list[WebhookRow]:
     """Receivers by name, behind the name `after`."""
     query = _in_order if limit is None else _in_order.limit(limit)
-    return [_receiver(row) for row in connection.execute(query, {"after": after})]
+    return _receivers.all(connection.execute(query, {"after": after}))
 
 
 def remove(connection: Connection, webhook_id: str) -> None:
@@ -133,14 +133,12 @@ def remove(connection: Connection, webhook_id: str) -> None:
 
 def insert_delivery(connection: Connection, row: NewDelivery) -> None:
     """Put what is to be sent into the outbox, due at once."""
-    values = {field.name: getattr(row, field.name) for field in fields(NewDelivery)}
-    connection.execute(_insert_delivery, values | {"state": WAITING, "due": 0.0, "attempts": 0})
+    connection.execute(_insert_delivery, _new.values(row, state=WAITING, due=0.0, attempts=0))
 
 
 def find_delivery(connection: Connection, delivery_id: str) -> DeliveryRow | None:
     """A delivery, or None."""
-    row = connection.execute(_delivery, {"wanted": delivery_id}).first()
-    return None if row is None else DeliveryRow(**row._asdict())
+    return _deliveries.first(connection.execute(_delivery, {"wanted": delivery_id}))
 
 
 def deliveries(
@@ -148,7 +146,7 @@ def deliveries(
 ) -> list[DeliveryRow]:
     """What was sent or is to be sent to a receiver, newest first; `before` is the key of the last of the page before."""
     values = {"wanted": webhook_id, "most": limit, "before": 2.0**62 if before is None else before}
-    return [DeliveryRow(**row._asdict()) for row in connection.execute(_newest, values)]
+    return _deliveries.all(connection.execute(_newest, values))
 
 
 def any_due(connection: Connection) -> bool:
@@ -162,8 +160,7 @@ def claim(connection: Connection, *, lease: float, most: int, passing: Collectio
     keys = list(connection.execute(_due, {"most": most, "passing": sorted(passing)}).scalars())
     if keys:
         connection.execute(_claim, [{"wanted": key, "lease": lease} for key in keys])
-    rows = [connection.execute(_claimed, {"wanted": key}).one() for key in keys]
-    return [DeliveryRow(**row._asdict()) for row in rows]
+    return _deliveries.all(connection.execute(_claimed, {"wanted": key}).one() for key in keys)
 
 
 def end(
@@ -189,8 +186,3 @@ def release_all(connection: Connection) -> None:
 def count_waiting(connection: Connection) -> int:
     """How many wait to be sent."""
     return int(connection.execute(_waiting).scalar_one())
-
-
-def _receiver(row: Row[tuple[object, ...]]) -> WebhookRow:
-    values = row._asdict()
-    return WebhookRow(**values | {"content": to_object(values["content"])})

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -42,14 +42,15 @@ class RunReader:
     """A clutch's runs as they were sent, read when they are asked for.
 
     `read(run_id)` gives a run with its channels, `describe(run_id)` without; `sampled` are those that are sampled records,
-    `torque_filter` [s] is the time constant of their torque channel's low-pass. A history's runs are at its cycles, whatever
-    was sent.
+    `torque_filter` [s] is the time constant of their torque channel's low-pass. `cut` gives, by run_id, the stationary test
+    of a life that was cut already. A history's runs are at its cycles, whatever was sent.
     """
 
     read: Callable[[str], IncomingRun]
     describe: Callable[[str], IncomingRun]
     sampled: frozenset[str]
     torque_filter: float
+    cut: Mapping[str, Callable[[Life], StationaryRun | None]] = field(default_factory=dict)
 
     def campaign_runs(self, events: Sequence[Event], *, origin: float) -> list[CampaignRun]:
         """The runs of a life in order, sampled records left out."""
@@ -66,13 +67,15 @@ class RunReader:
             if event.kind != STATIONARY:
                 continue
             try:
-                sent = _placed(self.read(event.run_id), event)
-                run = run_of(sent, origin=life.origin, torque_filter=self.torque_filter)
+                run = self.cut[event.run_id](life) if event.run_id in self.cut else self._cut(event, life)
             except ValueError as error:  # a record that this release cuts no longer
                 _log.warning("%s: %s", event.run_id, error)
                 continue
             if isinstance(run, StationaryRun):
                 yield run
+
+    def _cut(self, event: Event, life: Life) -> CampaignRun:
+        return run_of(_placed(self.read(event.run_id), event), origin=life.origin, torque_filter=self.torque_filter)
 
 
 def _placed(run: IncomingRun, event: Event) -> IncomingRun:

@@ -3,15 +3,14 @@
 Computed with the results of every run and change, and stored with them as the clutch's summary.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from models.diagnosis.campaign import StationaryRun
 from service.errors import NotFoundError
 from service.lives.condition import SHOWN, SUMMARY, recent
 from service.lives.engagements import StoredEngagement, engagements_over_life
-from service.lives.history import Event, Life, lives_of, moment_at, order, pace_of
+from service.lives.history import Event, lives_of, moment_at, order, pace_of
 from service.lives.model_correction import RunReader
 from service.lives.payloads import ended
 from service.lives.quantities.ends import CriterionEnd, criteria_answer, criterion_end
@@ -23,14 +22,12 @@ from service.schemas.life import CriterionIn
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
-    """What was measured of a clutch by run_id, of its held runs too; `tests` gives the stationary tests of a life, where not
-    the `reader` does."""
+    """What was measured of a clutch by run_id, of its held runs too."""
 
     levels: Levels
     receipts: Mapping[str, Receipt]
     engagements: Mapping[str, StoredEngagement]
     reader: RunReader | None = None
-    tests: Callable[[Life], Iterable[StationaryRun]] | None = None
 
 
 def needs_evidence(state: ClutchState) -> bool:
@@ -73,8 +70,7 @@ def with_held(state: ClutchState, evidence: Evidence) -> ClutchState:
     among = replace(state, events=order([*state.events, *state.held]), held=())
     if evidence.reader is None:
         raise ValueError("a history with held runs needs a reader of them")
-    tests = evidence.tests or evidence.reader.stationary_tests
-    return with_cofs(among, evidence.levels, tests(among.lives[-1]), evidence.reader)[0]
+    return with_cofs(among, evidence.levels, evidence.reader)[0]
 
 
 def outlook(state: ClutchState, method: str, evidence: Evidence, filters: States) -> dict[str, Any]:

@@ -6,8 +6,9 @@ checks that the state's revision is still the newest. An `Arrival` is a run as i
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from models.clutch import Geometry
@@ -18,7 +19,6 @@ from service.lives.assumptions import Assumptions, LearnedPrior, ModelInForce, s
 from service.lives.condition import SHOWN
 from service.lives.diagnosis.campaign import tested
 from service.lives.history import (
-    STATIONARY,
     ByPressure,
     Corrected,
     Event,
@@ -154,17 +154,16 @@ def computed_again(
     state: ClutchState,
     levels: Levels,
     receipts: Mapping[str, Receipt],
-    tests: Iterable[StationaryRun],
     reader: RunReader,
     *,
     evaluated: Mapping[str, str | None],
 ) -> tuple[ClutchState, Results]:
     """Mean COFs over the protocol of each life, freed of the artefacts of the model in force, and all tracked again.
 
-    `levels` and `receipts` are those of all runs; `tests` the stationary tests of the present life, read only where a model
-    is in force; `evaluated` as `loops_again` takes it. Returns the state with its mean COFs, and what is to be stored.
+    `levels` and `receipts` are those of all runs; `evaluated` as `loops_again` takes it. Returns the state with its mean
+    COFs, and what is to be stored.
     """
-    final, cofs, corrected = with_cofs(state, levels, tests, reader)
+    final, cofs, corrected = with_cofs(state, levels, reader)
     fresh = {run_id: receipts[run_id] | {"fits": fit_items(levels[run_id], cofs[run_id])} for run_id in cofs}
     for run_id, items in loops_again(final, levels, reader, evaluated).items():
         fresh[run_id] = receipts[run_id] | {"loops": items}
@@ -181,14 +180,14 @@ def computed_again(
 
 
 def with_cofs(
-    state: ClutchState, levels: Levels, tests: Iterable[StationaryRun], reader: RunReader
+    state: ClutchState, levels: Levels, reader: RunReader
 ) -> tuple[ClutchState, dict[str, ByPressure], dict[str, Corrected]]:
     """The state with the mean COFs of its events, those that the fits give by run_id, and those that the model in force
     corrects; arguments as of `computed_again`."""
     cofs = _all_cofs(state.lives, levels, state.geometry)
     events = tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in state.events)
     plain = replace(state, events=events)
-    corrected = _corrected(plain, tests, reader)
+    corrected = _corrected(plain, reader)
     events = tuple(event.corrected(corrected.get(event.run_id)) for event in plain.events)
     return replace(plain, events=events), cofs, corrected
 
@@ -236,12 +235,12 @@ def _all_cofs(lives: Sequence[Life], levels: Levels, geometry: Geometry) -> dict
     return cofs
 
 
-def _corrected(state: ClutchState, tests: Iterable[StationaryRun], reader: RunReader) -> dict[str, Corrected]:
+def _corrected(state: ClutchState, reader: RunReader) -> dict[str, Corrected]:
     if state.extension is None or not state.events:
         return {}
     life = state.lives[-1]
     runs = reader.campaign_runs(life.events, origin=life.origin)
-    return corrected_cofs(state.extension, state.record, life, runs, tests)
+    return corrected_cofs(state.extension, state.record, life, runs, reader.stationary_tests(life))
 
 
 def corrected_newest(
@@ -343,17 +342,6 @@ def test_of(arrival: Arrival, life: Life) -> StationaryRun | None:
     return tested(arrival.run, plateaus, arrival.analysis.times, origin=life.origin)
 
 
-def tests_with(reader: RunReader, life: Life, arrival: Arrival) -> Iterator[StationaryRun]:
-    """The stationary tests of a life in order, the run that comes in among them."""
-    for event in life.events:
-        if event.run_id != arrival.run.run_id:
-            yield from reader.stationary_tests(replace(life, events=(event,)))
-        elif event.kind == STATIONARY:
-            test = test_of(arrival, life)
-            if test is not None:
-                yield test
-
-
 def reader_with(stored: RunReader, arrival: Arrival) -> RunReader:
     """The stored runs, and the one that comes in."""
     name = arrival.run.run_id
@@ -362,4 +350,5 @@ def reader_with(stored: RunReader, arrival: Arrival) -> RunReader:
         read=lambda run_id: arrival.run if run_id == name else stored.read(run_id),
         describe=lambda run_id: arrival.run if run_id == name else stored.describe(run_id),
         sampled=stored.sampled | ({name} if arrival.sampled else frozenset()),
+        cut={name: partial(test_of, arrival)},
     )

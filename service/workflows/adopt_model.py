@@ -12,13 +12,10 @@ from sqlalchemy import Connection
 
 from service import records, stored_runs
 from service.errors import NotFoundError, NothingToAdoptError
-from service.lives.history import stationary_tests_of
 from service.lives.model_correction import extension_of
-from service.lives.outlook import summarised
-from service.lives.recomputation import Adoption, ClutchState, Results, Tracking, computed_again
+from service.lives.recomputation import Adoption, ClutchState, Results
 from storage import assumptions, changes, clutches, diagnoses, jobs
 from storage.assumptions import AdoptedRow
-from storage.changes import NewChange
 from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database
 
@@ -104,18 +101,10 @@ def _change(
             assumptions.insert_adoption(connection, clutch_id, row)
             records.store(connection, clutch_id, results)
             records.note_dispute(connection, clutch_id)
-            change = NewChange(
-                clutch_id=clutch_id,
-                run_id=None,
-                at=adopted_at,
-                by=by,
-                action=changes.ADOPT,
-                reason="",
-                before={"diagnosis_id": None if newest is None else newest.diagnosis_id},
-                after={"diagnosis_id": diagnosis_id},
-                revision=clutches.bump_revision(connection, clutch_id),
-            )
-            changes.insert(connection, change)
+            was = {"diagnosis_id": None if newest is None else newest.diagnosis_id}
+            now = {"diagnosis_id": diagnosis_id}
+            revision = clutches.bump_revision(connection, clutch_id)
+            changes.insert(connection, clutch_id, changes.ADOPT, was, now, at=adopted_at, by=by, revision=revision)
             return
 
 
@@ -128,12 +117,7 @@ def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> 
     if adoption is not None:
         _require_present(adoption, state.lives[-1].name if state.events else "")
     state = replace(state, adoptions=(adoption,))
-    reader = stored_runs.run_reader(database, clutch_id)
-    tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
-    evaluated = stationary_tests_of(state.events)
-    final, results = computed_again(state, levels, receipts, tests, reader, evaluated=evaluated)
-    evidence = stored_runs.evidence_for(database, final, reader)
-    return state, replace(results, summary=summarised(final, results.tracking or Tracking(), evidence))
+    return state, stored_runs.tracked_again(database, state, levels, receipts)
 
 
 def _in_force(connection: Connection, clutch_id: str, diagnosis_id: str | None) -> bool:

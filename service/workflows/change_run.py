@@ -48,7 +48,6 @@ from service.lives.run_analysis import analyse
 from service.run_files.upload import read_file_run
 from service.settings import CODE_VERSION
 from storage import changes, channels, clutches, results, runs
-from storage.changes import NewChange
 from storage.channels import Encoded
 from storage.engine.database import Database
 from storage.runs import RunRow
@@ -371,12 +370,11 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _C
     reader = loaded.reader(database)
     computed = Results()
     if own or judged.changes or any(row.state == runs.ACCEPTED for row in loaded.rows):
-        tests = reader.stationary_tests(after.lives[-1]) if after.events else iter(())
         evaluated = stationary_tests_of(before.events)
         if loaded.again is not None:  # its own loops, and those that are held against its curves
             again = loaded.row.run_id
             evaluated = {loop: test for loop, test in evaluated.items() if again not in (loop, test)}
-        after, computed = computed_again(after, loaded.levels, receipts, tests, reader, evaluated=evaluated)
+        after, computed = computed_again(after, loaded.levels, receipts, reader, evaluated=evaluated)
     aside = {}
     for other in [*judged.held, *out]:
         name = other.run_id
@@ -443,18 +441,10 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
             after |= _read_as(loaded.again.run.file or {})
         if before["doubts"] == after["doubts"]:
             del before["doubts"], after["doubts"]
-        change = NewChange(
-            clutch_id=clutch_id,
-            run_id=row.run_id,
-            at=request.at,
-            by=request.by,
-            action=request.action,
-            reason=request.reason,
-            before=before,
-            after=after,
-            revision=revision,
+        asked = {"at": request.at, "by": request.by, "reason": request.reason}
+        changes.insert(
+            connection, clutch_id, request.action, before, after, run_id=row.run_id, revision=revision, **asked
         )
-        changes.insert(connection, change)
 
 
 def _read_as(file: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ record that was registered stays stored.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import Connection
@@ -16,13 +16,10 @@ from service.alarms import raising
 from service.columns import content_of
 from service.errors import ConflictError
 from service.lives.condition import RANK_UNKNOWN
-from service.lives.history import stationary_tests_of
-from service.lives.outlook import summarised
-from service.lives.recomputation import Results, Tracking, computed_again
+from service.lives.recomputation import Results
 from service.schemas.clutch import ClutchIn
 from service.stored_runs import Recomputed
 from storage import changes, clutches
-from storage.changes import NewChange
 from storage.clutches import ClutchRow
 from storage.engine.database import Database
 
@@ -83,12 +80,7 @@ def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results 
         levels, receipts = records.levels(connection, record.clutch_id), records.receipts(connection, record.clutch_id)
     if (record.geometry, record.torque_filter) != (before.geometry, before.torque_filter):
         return stored_runs.recomputed(stored_runs.recorded(database, state))
-    reader = stored_runs.run_reader(database, record.clutch_id)
-    tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
-    evaluated = stationary_tests_of(state.events)
-    state, results = computed_again(state, levels, receipts, tests, reader, evaluated=evaluated)
-    evidence = stored_runs.evidence_for(database, state, reader)
-    return replace(results, summary=summarised(state, results.tracking or Tracking(), evidence))
+    return stored_runs.tracked_again(database, state, levels, receipts)
 
 
 def _entries(edited: _Edited) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
@@ -124,18 +116,7 @@ def _store(connection: Connection, edited: _Edited, *, reason: str, by: str, at:
     raising.evaluate(connection, clutch_id)  # an archived one has no alarms
     revision = clutches.bump_revision(connection, clutch_id)
     for action, before, after in _entries(edited):
-        change = NewChange(
-            clutch_id=clutch_id,
-            run_id=None,
-            at=at,
-            by=by,
-            action=action,
-            reason=reason,
-            before=before,
-            after=after,
-            revision=revision,
-        )
-        changes.insert(connection, change)
+        changes.insert(connection, clutch_id, action, before, after, at=at, by=by, reason=reason, revision=revision)
 
 
 def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:

@@ -47,13 +47,11 @@ from service.lives.recomputation import (
     reader_with,
     set_aside,
     test_of,
-    tests_with,
     track,
 )
 from service.lives.run_analysis import LevelFit, analyse, loops_of
 from service.settings import CODE_VERSION
 from storage import changes, channels, clutches, results, runs
-from storage.changes import NewChange
 from storage.channels import PackedFile
 from storage.engine.database import Database
 from storage.runs import NewRun, RunRow
@@ -234,9 +232,8 @@ def _with_others(
         receipts = records.receipts(connection, before.clutch_id) | {event.run_id: answer}
         levels = records.levels(connection, before.clutch_id) | own
     reader = reader_with(stored_runs.run_reader(database, before.clutch_id), arrival)
-    tests = tests_with(reader, state.lives[-1], arrival) if state.events else iter(())
     evaluated = stationary_tests_of(before.events)
-    final, computed = computed_again(state, levels, receipts, tests, reader, evaluated=evaluated)
+    final, computed = computed_again(state, levels, receipts, reader, evaluated=evaluated)
     computed = _summarised(database, final, computed, arrival, answer)
     aside, changed = {}, dict(computed.receipts)
     for other in judged.held:
@@ -272,9 +269,8 @@ def _among(
         with database.reading() as connection:
             receipts = records.receipts(connection, state.clutch_id) | {event.run_id: answer}
         reader = reader_with(stored_runs.run_reader(database, state.clutch_id), arrival)
-        tests = tests_with(reader, state.lives[-1], arrival)
         evaluated = _evaluated(before, state, event)
-        state, computed = computed_again(state, levels, receipts, tests, reader, evaluated=evaluated)
+        state, computed = computed_again(state, levels, receipts, reader, evaluated=evaluated)
         return _summarised(database, state, computed, arrival, answer)
     corrected: dict[str, Corrected] = {}
     if state.extension is not None and event is state.events[-1]:
@@ -322,7 +318,6 @@ def _evidence(database: Database, state: ClutchState, arrival: Arrival, answer: 
         receipts={**stored.receipts, name: answer},
         engagements={**stored.engagements, **({} if engagement is None else {name: engagement})},
         reader=reader,
-        tests=lambda life: tests_with(reader, life, arrival),
     )
 
 
@@ -378,18 +373,10 @@ def _store(
     if outcome.teaches:
         records.ask_fleet_refresh(connection, by=by, at=arrival.received_at)
     if outcome.doubts:
-        change = NewChange(
-            clutch_id=clutch_id,
-            run_id=run.run_id,
-            at=arrival.received_at,
-            by=by,
-            action=changes.HOLD,
-            reason="",
-            before={},
-            after=records.summary(row),
-            revision=revision,
+        held, at = records.summary(row), arrival.received_at
+        changes.insert(
+            connection, clutch_id, changes.HOLD, {}, held, run_id=run.run_id, at=at, by=by, revision=revision
         )
-        changes.insert(connection, change)
     return records.receipt(row)
 
 

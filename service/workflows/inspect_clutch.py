@@ -14,7 +14,6 @@ from service.records import inspection, inspection_answers, inspection_hash, pho
 from service.schemas.base import MAX_PHOTOGRAPHS
 from service.schemas.inspection import InspectionIn, MediaType
 from storage import changes, clutches, inspections
-from storage.changes import NewChange
 from storage.engine.database import Database
 from storage.inspections import InspectionRow, NewInspection, PhotographRow
 from storage.runs import ACCEPTED, WITHDRAWN
@@ -110,18 +109,9 @@ def _change(
         row = inspection(connection, clutch_id, inspection_id)
         if row.state != state:
             inspections.set_state(connection, row.inspection_key, state)
-            change = NewChange(
-                clutch_id=clutch_id,
-                run_id=None,
-                at=at,
-                by=by,
-                action=action,
-                reason=reason,
-                before=_summary(row, row.state),
-                after=_summary(row, state),
-                revision=clutches.bump_revision(connection, clutch_id),
-            )
-            changes.insert(connection, change)
+            was, now = _summary(row, row.state), _summary(row, state)
+            revision = clutches.bump_revision(connection, clutch_id)
+            changes.insert(connection, clutch_id, action, was, now, at=at, by=by, reason=reason, revision=revision)
         return _answer(connection, clutch_id, inspection_id)
 
 

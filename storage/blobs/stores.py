@@ -12,7 +12,7 @@ import logging
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
 from functools import lru_cache
@@ -70,19 +70,6 @@ def fetched(store: BlobStore, name: str) -> bytes:
     if sha256 != name:
         raise DamagedData(f"the blob {name} in {store.address} is damaged: its sha256 is {sha256}")
     return data
-
-
-def copy_blobs(source: BlobStore, target: BlobStore, names: Iterable[str]) -> int:
-    """Copy blobs that the target lacks, each held against its name; how many were copied. May be interrupted and repeated.
-
-    Raises DamagedData where one is missing or damaged in the source.
-    """
-    copied = 0
-    for name in names:
-        if not target.exists(name):
-            target.put(name, fetched(source, name))
-            copied += 1
-    return copied
 
 
 _FOLDER_MODE = 0o700

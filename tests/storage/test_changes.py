@@ -1,35 +1,29 @@
 """The audit trail: rows are added, read newest first, of a clutch or of one run."""
 
 import pytest
+from sqlalchemy import Connection
 from sqlalchemy.exc import IntegrityError
 
 from storage import changes
-from storage.changes import NewChange
 from storage.engine.database import Database
 from tests.storage.samples import store_two_clutches
 
 CLUTCH = "bench3-017"
 
 
-def new_change(number: int, *, action: str = changes.WITHDRAW, run_id: str | None = "run-0001") -> NewChange:
-    return NewChange(
-        clutch_id=CLUTCH,
-        run_id=run_id,
-        at="2026-11-02T10:00:00+00:00",
-        by="key:ab12 bench 3",
-        action=action,
-        reason=f"Grund {number} ü",
-        before={"state": "accepted"},
-        after={"state": "withdrawn", "number": number},
-        revision=number,
-    )
+def insert(
+    connection: Connection, number: int, *, action: str = changes.WITHDRAW, run_id: str | None = "run-0001"
+) -> None:
+    after = {"state": "withdrawn", "number": number}
+    who = {"at": "2026-11-02T10:00:00+00:00", "by": "key:ab12 bench 3", "reason": f"Grund {number} ü"}
+    changes.insert(connection, CLUTCH, action, {"state": "accepted"}, after, run_id=run_id, revision=number, **who)
 
 
 def test_a_trail_is_read_newest_first_page_by_page(database: Database) -> None:
     store_two_clutches(database)
     with database.writing() as connection:
         for number in range(5):
-            changes.insert(connection, new_change(number, run_id=None if number == 3 else f"run-{number % 2}"))
+            insert(connection, number, run_id=None if number == 3 else f"run-{number % 2}")
     with database.reading() as connection:
         whole = changes.page(connection, CLUTCH)
         assert [row.revision for row in whole] == [4, 3, 2, 1, 0]
@@ -46,11 +40,11 @@ def test_the_last_change_of_a_history_is_none_that_leaves_it_alone(database: Dat
     with database.writing() as connection:
         assert changes.last_of_history(connection, CLUTCH) == 0
         for number, action in enumerate(actions, start=1):
-            changes.insert(connection, new_change(number, action=action))
+            insert(connection, number, action=action)
         assert changes.last_of_history(connection, CLUTCH) == 2
         assert changes.last_of_history(connection, "other") == 0
 
 
 def test_a_change_belongs_to_a_clutch(database: Database) -> None:
     with pytest.raises(IntegrityError, match=r"(?i)foreign key"), database.writing() as connection:
-        changes.insert(connection, new_change(1))
+        insert(connection, 1)

@@ -155,15 +155,16 @@ class FileWatch(Watch):
         return rows[0] if rows else None
 
 
-class Transactions(Database):
-    """The transactions of a database file. Threads share it; `close` it at the end."""
+class FileDatabase(Database):
+    """An open file. Made by `open_file`."""
 
     path: Path
+    journal_mode: str
     watch: FileWatch
 
-    def __init__(self, path: Path, lock_timeout: float, *, writable: bool = True) -> None:
-        self.path = path
-        self.lock_timeout = lock_timeout
+    def __init__(self, path: Path, *, journal_mode: str, lock_timeout: float, writable: bool = True) -> None:
+        self.path, self.url = path, f"sqlite:///{path.absolute()}"
+        self.journal_mode = journal_mode
         self._write_lock = WriteLock(path, lock_timeout)
         self._closed = False
         self._engine = make_engine(path, lock_timeout, writable=writable)
@@ -202,17 +203,6 @@ class Transactions(Database):
         """Raise StorageUnavailable after `close`."""
         if self._closed:
             raise StorageUnavailable(f"the database {self.path} has been closed")
-
-
-class FileDatabase(Transactions):
-    """An open file. Made by `open_file`."""
-
-    journal_mode: str
-
-    def __init__(self, path: Path, *, journal_mode: str, lock_timeout: float, writable: bool = True) -> None:
-        super().__init__(path, lock_timeout, writable=writable)
-        self.url = f"sqlite:///{path.absolute()}"
-        self.journal_mode = journal_mode
 
     def faults(self, *, least_free: int) -> dict[str, str]:
         """What keeps the file or its disk from being used."""

@@ -29,7 +29,7 @@ from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 from storage.engine.opening import open_database
-from storage.engine.sqlite.database import Transactions
+from storage.engine.sqlite.database import FileDatabase
 from storage.jobs import NewJob
 from tests.service.workflows import stand_in_engine
 from tests.support import stationary
@@ -96,10 +96,10 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
 def numerics(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
     """How often something was computed; computing while this process holds the write lock fails the test."""
     lock, calls = threading.local(), []
-    writing = Transactions.writing
+    writing = FileDatabase.writing
 
     @contextmanager
-    def watched(self: Transactions, **of: Any) -> Iterator[Any]:
+    def watched(self: FileDatabase, **of: Any) -> Iterator[Any]:
         with writing(self, **of) as connection:
             lock.held = True
             try:
@@ -107,7 +107,7 @@ def numerics(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
             finally:
                 lock.held = False
 
-    monkeypatch.setattr(Transactions, "writing", watched)
+    monkeypatch.setattr(FileDatabase, "writing", watched)
 
     def outside(function: Callable[..., Any]) -> Callable[..., Any]:
         def called(*arguments: Any, **named: Any) -> Any:

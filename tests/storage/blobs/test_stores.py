@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from storage.blobs import stores
-from storage.blobs.stores import BlobStore, copy_blobs, fetched, name_of, normal_address, open_store
+from storage.blobs.stores import BlobStore, fetched, name_of, normal_address, open_store
 from storage.engine.errors import DamagedData, MissingBlob, RawStoreUnavailable
 
 DATA = bytes(range(256)) * 3000
@@ -148,18 +148,3 @@ def test_addresses_have_one_form_and_no_secrets() -> None:
         with pytest.raises(ValueError, match="raw records are kept in") as caught:
             normal_address(wrong)
         assert not wrong or wrong not in str(caught.value)
-
-
-def test_blobs_are_copied_between_kinds_of_stores_and_checked(store: BlobStore, tmp_path: Path) -> None:
-    target = open_store(f"folder://{tmp_path}/other")
-    target.set_mark("ours too")
-    blobs = [DATA, b"short", b""]
-    for data in blobs:
-        store.put(name_of(data), data)
-    assert copy_blobs(store, target, [name_of(DATA)]) == 1
-    assert copy_blobs(store, target, map(name_of, blobs)) == 2  # goes on where it ended
-    assert all(fetched(target, name_of(data)) == data for data in blobs)
-    store.put(name_of(b"another"), b"damaged")
-    with pytest.raises(DamagedData, match="is damaged"):
-        copy_blobs(store, target, [name_of(b"another")])
-    assert not target.exists(name_of(b"another"))
