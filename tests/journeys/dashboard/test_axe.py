@@ -8,21 +8,22 @@ import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.driving import Watched, pointed_at, serving_with_engine, turned
+from tests.browser.driving import Watched, pointed_at, turned
 from tests.browser.lives import post, worn
-from tests.support import stationary
+from tests.service.workflows import stand_in_engine
+from tests.support import serving, stationary
 
 pytestmark = pytest.mark.browser
 
-ENGINE = "tests.service.workflows.stand_in_engine:diagnose"
 PHONE = {"width": 390, "height": 844}
 WIDE = {"width": 1360, "height": 900}
 
 
 @pytest.fixture(scope="module")
 def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with serving_with_engine(tmp_path_factory.mktemp("axe") / "clutchlife.db", ENGINE) as found:
-        with httpx2.Client(base_url=found, timeout=60) as http:
+    engine = {"CLUTCHLIFE_ENGINE": f"{stand_in_engine.__name__}:diagnose"}
+    with serving(tmp_path_factory.mktemp("axe") / "clutchlife.db", loaded=True, environment=engine) as server:
+        with httpx2.Client(base_url=server.url, timeout=60) as http:
             worn(http, "bench", last=4000)
             odd = stationary(5000, run_id="odd")
             odd["channels"]["torque_nm"] = [100 * value for value in odd["channels"]["torque_nm"]]
@@ -33,7 +34,7 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
             http.post("/v1/clutches/bench/diagnoses", json={"adopt": False}).raise_for_status()
             # what the charts show is made before the page asks: this is not about how long that takes beside a browser
             http.get("/v1/clutches/bench/degradation", headers={"Prefer": "wait=60"}).raise_for_status()
-        yield found
+        yield server.url
 
 
 def violations(page: Page) -> list[str]:
