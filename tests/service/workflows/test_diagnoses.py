@@ -219,15 +219,6 @@ def test_a_rebuild_ends_the_model(client: TestClient) -> None:
     assert client.get(BASE).json()["diagnosis"]["earlier_life"] is False
 
 
-def test_nothing_to_adopt_is_refused(client: TestClient) -> None:
-    report = diagnosed(client, adopt=True)
-    assert (report["verdict"], report["adopted"], report["as_of_cycles"]) == ("model_adequate", False, None)
-    refused = client.put(f"{BASE}/model", json={"diagnosis_id": report["diagnosis_id"]})
-    assert (refused.status_code, refused.headers["Content-Type"]) == (409, "application/problem+json")
-    assert refused.json()["title"] == "There is nothing to adopt"
-    assert client.get(f"{BASE}/model").json()["versions"] == []
-
-
 def test_what_is_unknown_or_wrong_is_refused(client: TestClient) -> None:
     assert client.put(f"{BASE}/model", json={"diagnosis_id": "nothing"}).status_code == 404
     assert client.get(f"{BASE}/diagnoses/nothing").status_code == 404

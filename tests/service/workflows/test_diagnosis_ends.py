@@ -130,8 +130,14 @@ def left_running(folder: Path, *, attempts: int) -> None:
 
 
 def test_what_a_dead_service_left_running_is_made_by_the_next(tmp_path: Path) -> None:
+    """And of a clutch without a test there is nothing to adopt."""
     with service(tmp_path) as client:
-        report = diagnosed(client)
+        report = diagnosed(client, adopt=True)
+        assert (report["verdict"], report["adopted"], report["as_of_cycles"]) == ("model_adequate", False, None)
+        refused = client.put(f"{BASE}/model", json={"diagnosis_id": report["diagnosis_id"]})
+        assert (refused.status_code, refused.headers["Content-Type"]) == (409, "application/problem+json")
+        assert refused.json()["title"] == "There is nothing to adopt"
+        assert client.get(f"{BASE}/model").json()["versions"] == []
     left_running(tmp_path, attempts=1)
     with service(tmp_path) as client:
         again = ended(client, report["diagnosis_id"])
