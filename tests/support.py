@@ -21,9 +21,10 @@ import pytest
 
 
 def one_quick(values: Iterable[Any]) -> list[Any]:
-    """Values of a parameter of which the first is tried in every run, the others by `make slow`."""
+    """Values of a parameter, several as tuples, of which the first is tried in every run, the others by `make slow`."""
     first, *others = values
-    return [first, *(pytest.param(value, marks=pytest.mark.slow) for value in others)]
+    each = [value if isinstance(value, tuple) else (value,) for value in others]
+    return [first, *(pytest.param(*value, marks=pytest.mark.slow) for value in each)]
 
 
 PRESSURES_BAR = (4.0, 4.5, 5.0, 5.5, 6.0, 6.5, 7.0)

@@ -55,7 +55,13 @@ FILES: dict[str, tuple[Callable[[int], str], str]] = {
 }
 
 
-@pytest.mark.parametrize("kind", FILES)
+#: Which takes ten times as long as the others.
+WIDE = "columns"
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=pytest.mark.slow) if kind == WIDE else kind for kind in FILES]
+)
 def test_work_and_memory_are_linear(kind: str) -> None:
     make, expected = FILES[kind]
     sizes = (10_000, 40_000)

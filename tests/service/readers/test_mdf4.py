@@ -9,6 +9,7 @@ import pytest
 
 from service.errors import InvalidError
 from service.readers.read_file import read_file, reading_of
+from tests.support import one_quick
 
 #: Writes files of 20 rows and three channels into a folder, a channel (`time`: the clock) with a conversion.
 _WRITE = """
@@ -49,7 +50,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(("name", "where"), [("formula", "torque_nm"), ("clock", "time"), ("ranges", "torque_nm")])
+@pytest.mark.parametrize(
+    ("name", "where"), one_quick([("formula", "torque_nm"), ("clock", "time"), ("ranges", "torque_nm")])
+)
 def test_a_formula_in_a_file_is_refused_and_named(folder: Path, name: str, where: str) -> None:
     with pytest.raises(InvalidError, match="converted by a formula") as caught:
         read_file(folder / f"{name}.mf4", filename=f"{name}.mf4", reading=reading_of("torque_nm:torque_nm"))
@@ -59,7 +62,7 @@ def test_a_formula_in_a_file_is_refused_and_named(folder: Path, name: str, where
 
 @pytest.mark.parametrize(
     ("name", "expected"),
-    [("linear", 2.0 * np.arange(20) + 1.0), ("rational", np.arange(20) / 2.0), ("aside", np.arange(20.0))],
+    one_quick([("linear", 2.0 * np.arange(20) + 1.0), ("rational", np.arange(20) / 2.0), ("aside", np.arange(20.0))]),
 )
 def test_other_conversions_are_applied_and_other_channels_hinder_nothing(
     folder: Path, name: str, expected: np.ndarray

@@ -13,6 +13,7 @@ from service.errors import InvalidError, ServiceError, TooLargeError
 from service.readers.limits import LIMITS
 from service.readers.read_file import read_file, reading_of
 from tests.service.readers.sample_files import UNITS, record, write_mdf, write_parquet, write_tdms
+from tests.support import one_quick
 
 Writer = Callable[..., Path]
 FORMATS: list[tuple[Writer, str]] = [(write_tdms, "a.tdms"), (write_mdf, "a.mf4"), (write_parquet, "a.parquet")]
@@ -130,7 +131,7 @@ def test_two_lengths_without_times_are_refused_by_name(tmp_path: Path) -> None:
         read(write_tdms(tmp_path / "a.tdms", {"torque_nm": columns["torque_nm"]}, units=UNITS, more=slow))
 
 
-@pytest.mark.parametrize(("write", "name"), [(write_tdms, "a.tdms"), (write_mdf, "a.mf4")])
+@pytest.mark.parametrize(("write", "name"), one_quick([(write_tdms, "a.tdms"), (write_mdf, "a.mf4")]))
 def test_two_channels_of_one_name_are_refused(tmp_path: Path, write: Writer, name: str) -> None:
     columns = record(100)
     path = write(tmp_path / name, columns, units=UNITS, more={"torque_nm": columns["torque_nm"]})
@@ -138,6 +139,7 @@ def test_two_channels_of_one_name_are_refused(tmp_path: Path, write: Writer, nam
         read(path)
 
 
+@pytest.mark.slow
 def test_mdf_3_is_refused_and_packed_mdf_4_is_read(tmp_path: Path) -> None:
     columns = record()
     packed = write_mdf(tmp_path / "b.mf4", columns, units=UNITS, compression=2)
