@@ -18,6 +18,8 @@ WARM = ("oil_temperature",)
 MOST_ADVISED = 3
 #: Whose error beyond noise an extension has to halve.
 HALVED = ("oil_temperature", "oil_change")
+#: What a campaign of one to three speeds can show.
+FEW_SPEEDS = ("oil_temperature", "torque_zero_shift", "pressure_offset", "accelerated_wear", "oil_change")
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,12 @@ def _special(seed: int, count: int) -> list[Trial]:
         row = f"raw/{slug}"
         wanted = {"raw": True, "loops": False, "rate": 100.0}
         made += [Trial(row, s, (slug,), 20.0, wanted=wanted) for s in _seeds(row, seed, count // 3 or 1)]
+    for speeds in (1, 2, 3):
+        few = {"speeds": speeds, "loops": False, "states": 12}
+        made += [Trial(f"few/none/{speeds}", s, wanted=few) for s in _seeds(f"few/none/{speeds}", seed, count)]
+        for slug in FEW_SPEEDS:
+            row = f"few/{slug}/{speeds}"
+            made += [Trial(row, s, (slug,), 80.0, wanted=few) for s in _seeds(row, seed, count // 3 or 1)]
     row = "raw/none"
     wanted = {"raw": True, "loops": False}
     made += [Trial(row, s, wanted=wanted) for s in _seeds(row, seed, count)]
@@ -191,6 +199,14 @@ def counts() -> list[Count]:
             lambda o: o.verdict != "model_adequate",
             most=0.02,
         ),
+        Count(
+            "one to three speeds, nothing hidden: any verdict but `model_adequate`",
+            "few/none",
+            lambda o: o.verdict != "model_adequate",
+            most=0.02,
+        ),
+        Count("one to three speeds, λ = 80: in the set", "few/", lambda o: o.in_set, among=lambda o: bool(o.truth)),
+        Count("… named and wrong", "few/", lambda o: o.wrong, most=0.02, among=lambda o: bool(o.truth)),
         Count("crashed", "", lambda one: one.verdict == "crashed", most=0.0),
     ]
     return lines

@@ -36,12 +36,14 @@ _SPEED, _PRESSURE, _LIFE, _CLOCK, _HARMONICS = 4, 2, 3, 3, 2
 class Evidence:
     """About one fit [nats, up to one constant]: `whole` with the templates' errors; `structure` by axis what smooth
     structure adds to it, and `patterns` its likeliest form [N] Nm; `screened` are the given columns projected off the fit,
-    one for each scatter of the gains."""
+    one for each scatter of the gains; `misfit` is χ²/N, what is left of the residual when the templates' errors and
+    structure on all axes, at its largest size, have taken their part, near 1 where that is noise."""
 
     whole: float
     structure: Mapping[str, float]
     patterns: Mapping[str, FloatArray]
     screened: tuple[Projected, ...]
+    misfit: float
 
 
 def evidence_of(problem: FitProblem, fitted: Fit, columns: Sequence[Column] = (), *, smooth: bool = True) -> Evidence:
@@ -72,7 +74,14 @@ def evidence_of(problem: FitProblem, fitted: Fit, columns: Sequence[Column] = ()
         info, score = projected.info[catalogue, catalogue], projected.score[catalogue]
         screened.append(replace(projected, info=info, score=score, whole=projected.whole[catalogue], evidence=base))
     whole = log_sum(wholes)
+    likely = projections[int(np.argmax(wholes))]
+    flexible = slice(contrasted.start, wrong.stop)
+    sd = np.concatenate(
+        [np.full(len(axes), criteria.CONTRAST_SIZES[-1]), np.where(own > 0, *criteria.TEMPLATE_ERRORS[-1])]
+    )
+    info, score = likely.info[flexible, flexible] + np.diag(sd**-2.0), likely.score[flexible]
     return Evidence(
+        misfit=(likely.miss - float(score @ np.linalg.solve(info, score))) / design.torque.size,
         whole=whole,
         structure={axis: log_sum(logs) - whole for axis, logs in structures.items()},
         patterns={

@@ -393,7 +393,9 @@ class Search:
 
     def posterior(self, raw: Sequence[RawEvidence], without: frozenset[str]) -> Posterior:
         """The list as far as it was searched; what was not refitted counts as it was screened
-        about the likeliest parent, no more than what was refitted; a refit that failed excludes it."""
+        about the likeliest parent, no more than what was refitted; a refit that failed excludes it. Where nothing that was
+        refitted leaves noise, the likeliest structure may be as rough as the noise then looks, s² = χ²/N times larger:
+        N (s² - 1 - ln s²)/2 nats."""
         weights = self.weights()
         most = max(weights.values())
         for key, (_, _, start) in self._promises.items():
@@ -419,6 +421,12 @@ class Search:
             unnamed = not alternative.causes and (is_axis(alternative.unknown) or alternative.unknown in LINES)
             if unnamed and loudest + single > 0 and trace < criteria.VIBRATION_TRACE * loudest:
                 weights[NOTHING] = float(np.logaddexp(weights[NOTHING], weights.pop(alternative)))
+        misfit = min(nodes[0].evidence.misfit for nodes in self.nodes.values())
+        if misfit > criteria.MISFIT:
+            nameless = [alternative for alternative in weights if alternative.unknown and not alternative.causes]
+            rough = max(nameless, key=weights.__getitem__)
+            inflated = 0.5 * self.problem.design.torque.size * (misfit - 1.0 - np.log(misfit))
+            weights[rough] = max(weights.values()) + inflated
         return Posterior(
             weights={alternative: weight - null.log_evidence for alternative, weight in weights.items()},
             nodes={alternative: nodes[0] for alternative, nodes in self.nodes.items()},

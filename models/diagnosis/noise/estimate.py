@@ -9,9 +9,11 @@ piece that nothing smooth reaches and R(w, ρ) the correlation of its rows,
 
     log L(w, ρ) = -½ (m ln s² + Σ_pieces ln |Aᵀ R A|),     s² = Σ xᵀ (Aᵀ R A)⁻¹ x/m,    x = Aᵀ residual,   m values in all
 
-What the model gets wrong is smooth along a curve; the contrasts do not see it, so it is not mistaken for noise. A deviation
-sent along is not used: rigs misjudge it, and the data show it as well. How far repeated runs scatter is estimated with the
-baseline (`pooled_fit.projection`).
+What the model gets wrong is smooth along a curve; the contrasts do not see it, so it is not mistaken for noise. Where it is
+sharp (traction that drops to nothing within a few rows at rest), short pieces of the curves show far less than whole ones:
+then they are taken, without those that hold the drop. Curves of few speeds are no curves: the same point from state to state
+is one there. A deviation sent along is not used: rigs misjudge it, and the data show it as well. How far repeated runs
+scatter is estimated with the baseline (`pooled_fit.projection`).
 """
 
 from collections.abc import Sequence
@@ -28,8 +30,8 @@ from models.diagnosis.design.autocorrelation import Correlation
 from models.diagnosis.design.design import Design, IntArray
 from models.diagnosis.noise.covariance import Noise
 
-#: Longer curves are cut, for the basis of a piece costs its length cubed.
-_LONGEST = 120
+#: Longer curves are cut, for the basis of a piece costs its length cubed; short pieces have so many rows at most.
+_LONGEST, _SHORT = 120, 15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +46,10 @@ class Piece:
         """What is left [n] Nm of residual [N] Nm on the piece's rows without its smooth part."""
         return np.asarray(self.contrasts @ (self.contrasts.T @ residual[self.rows]), dtype=np.float64)
 
+    def mean_square(self, residual: FloatArray) -> float:
+        """The remainder's variance [Nm²]."""
+        return float(np.mean((self.contrasts.T @ residual[self.rows]) ** 2))
+
 
 def owners(design: Design) -> IntArray:
     """The number [N] of each row's curve or loop."""
@@ -51,16 +57,27 @@ def owners(design: Design) -> IntArray:
     return np.asarray(np.where(design.rows.steady, design.curve, loops), dtype=np.intp)
 
 
-def pieces_of(design: Design, part: NDArray[np.bool_]) -> list[Piece]:
-    """Curves and loops among the rows of `part` [N] that have rows enough, long ones cut."""
-    owner = owners(design)
-    pieces = []
+def pieces_of(design: Design, part: NDArray[np.bool_], longest: int = _LONGEST) -> list[Piece]:
+    """Curves and loops among the rows of `part` [N] that have rows enough, cut to `longest` rows."""
+    return _pieces(design, np.flatnonzero(part), owners(design), longest)
+
+
+def pieces_over_life(design: Design, part: NDArray[np.bool_]) -> list[Piece]:
+    """The same speed and pressure from state to state, among the rows of `part` [N], where curves have too few speeds: what
+    scatters from run to run counts for noise then."""
     indices = np.flatnonzero(part)
+    speed = np.round(design.rows.velocity / max(float(design.rows.velocity.max()), 1e-300), 2)
+    same = np.unique(np.stack([design.level, speed], axis=1), axis=0, return_inverse=True)[1]
+    return _pieces(design, indices[np.argsort(design.rows.cycles[indices], kind="stable")], same, _LONGEST)
+
+
+def _pieces(design: Design, indices: IntArray, owner: IntArray, longest: int) -> list[Piece]:
+    pieces = []
     order = indices[np.argsort(owner[indices], kind="stable")]
     edges = np.flatnonzero(np.diff(owner[order])) + 1
     cache: dict[bytes, FloatArray] = {}
     for rows in np.split(order, edges) if order.size else []:
-        for piece in np.array_split(rows, max(1, -(-rows.size // _LONGEST))):
+        for piece in np.array_split(rows, max(1, -(-rows.size // longest))):
             looping = bool(piece[0] >= design.plateaus)
             smooth_terms = 2 * criteria.SMOOTH_HARMONICS + 1 if looping else criteria.SMOOTH_DEGREE + 1
             if piece.size < smooth_terms + 3:
@@ -71,6 +88,19 @@ def pieces_of(design: Design, part: NDArray[np.bool_]) -> list[Piece]:
                 cache[key] = _contrasts(_harmonics(phase) if looping else _polynomials(piece.size))
             pieces.append(Piece(rows=piece, contrasts=cache[key]))
     return pieces
+
+
+def calm_pieces(design: Design, part: NDArray[np.bool_], residual: FloatArray) -> list[Piece]:
+    """The pieces of `part` [N] whose remainder of residual [N] Nm is noise: whole curves, unless short pieces typically show
+    less than a SHARP-th of their mean square; then those short ones that show less than SHARP times what is typical."""
+    whole, short = pieces_of(design, part), pieces_of(design, part, _SHORT)
+    if not part[0] or not short:  # a loop's harmonics do not become fewer in a part of it
+        return whole
+    of_whole, of_short = (np.array([piece.mean_square(residual) for piece in pieces]) for pieces in (whole, short))
+    if criteria.SHARP * np.median(of_short) >= np.median(of_whole):
+        return whole
+    typical = float(np.median(of_short))
+    return [piece for piece, square in zip(short, of_short, strict=True) if square < criteria.SHARP * typical]
 
 
 def _polynomials(count: int) -> FloatArray:
@@ -178,14 +208,19 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
     correlations, assumed = [], False
     steady = np.arange(residual.size) < design.plateaus
     for part in (steady, ~steady):
-        pieces = pieces_of(design, part)
-        free = sum(piece.contrasts.shape[1] for piece in pieces)
-        if free < criteria.FEWEST:
+        pieces = calm_pieces(design, part, residual)
+        along_curves = _free(pieces) >= criteria.FEWEST
+        if not along_curves and part[0]:
+            pieces = pieces_over_life(design, part)
+        if _free(pieces) < criteria.FEWEST:
             assumed = assumed or bool(part.any())
             correlations.append(Correlation())
             continue
         variance = _variance(pieces, residual, torque, design.samples)
         deviation[part] = np.sqrt(variance[part])
+        if not along_curves:
+            correlations.append(Correlation())
+            continue
         from_samples = design.bin_autocorrelation if part[-1] else None  # loops are the last rows
         differences = _relative_differences(design, variance, part)
         correlation, scale = estimate_correlation(pieces, residual, np.sqrt(variance), from_samples, differences)
@@ -195,6 +230,10 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
     if spiky.mean() < criteria.MOST_SPIKES:
         deviation = np.where(spiky, np.abs(residual), deviation)
     return replace(before, deviation=deviation, plateaus=correlations[0], loops=correlations[1]), assumed
+
+
+def _free(pieces: Sequence[Piece]) -> int:
+    return sum(piece.contrasts.shape[1] for piece in pieces)
 
 
 def _variance(pieces: Sequence[Piece], residual: FloatArray, torque: FloatArray, samples: FloatArray) -> FloatArray:

@@ -165,10 +165,6 @@ def missing_for_baseline(design: Design) -> str:
     if steady.size < criteria.FEWEST_ROWS:
         few = f"there are {steady.size} plateaus of stationary tests under pressure"
         return f"{few}, and at least {criteria.FEWEST_ROWS} are needed."
-    speeds = np.unique(np.round(steady / float(steady.max()), 3)).size
-    if speeds < criteria.FEWEST_SPEEDS:
-        few = f"there are {speeds} distinct speeds"
-        return f"{few}, and at least {criteria.FEWEST_SPEEDS} are needed for a Stribeck curve."
     usual, largest = design.usual_torque, float(np.abs(design.torque).max())
     if not (usual > criteria.LEAST_TORQUE and largest < criteria.MOST_TORQUE):
         return f"torques of {usual:.3g} Nm in the median and {largest:.3g} Nm at most are no clutch's."
@@ -232,6 +228,13 @@ def _notes(design: Design, assumed: bool) -> tuple[str, ...]:
     notes = list(design.notes)
     if assumed:
         notes.append("Too few rows to estimate the noise: 1 % of the torque is assumed.")
+    velocity = design.rows.velocity[design.closed & design.rows.steady]
+    speeds = np.unique(np.round(velocity / float(velocity.max()), 3)).size
+    if speeds < criteria.CURVE_SPEEDS:
+        notes.append(
+            f"{speeds} speed{'s' * (speeds > 1)} cannot show the form of a Stribeck curve: what depends on speed alone is "
+            "not seen here; what depends on use, pressure, time within a test or temperature is."
+        )
     if not design.facts.temperature_measured:
         notes.append("No oil temperature was measured: any slow course of it competes with the other causes.")
     return tuple(notes)

@@ -96,6 +96,7 @@ class Wish:
     rate: float = 100.0
     frequencies: tuple[float, ...] = (0.1,)
     full: bool = False  # the reference's 7 x 40
+    speeds: int | None = None  # so few of them, from a third of the highest up
 
 
 def draw_plan(rng: np.random.Generator, wish: Wish) -> Plan:
@@ -106,6 +107,8 @@ def draw_plan(rng: np.random.Generator, wish: Wish) -> Plan:
     speeds = np.linspace(20, 1970, 40 if full else int(rng.integers(20, 41)))
     if wish.raw:
         pressures, speeds = np.linspace(4.0, 7.0, 5), np.linspace(20, 1970, 20)
+    if wish.speeds is not None:
+        speeds = np.linspace(20, 1970, wish.speeds + 3)[2:-1]
     life = _life(rng, wish)
     order = _order(rng, pressures, speeds, wish)
     sites = [_stationary(rng, life, order, wish)]

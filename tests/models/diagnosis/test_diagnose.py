@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.diagnosis import diagnose as diagnose_module
-from models.diagnosis.campaign import Campaign, MaintenanceEvent
+from models.diagnosis.campaign import Campaign, MaintenanceEvent, StationaryRun
 from models.diagnosis.campaign import EventKind as Event
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.catalogue import BY_SLUG
@@ -141,21 +141,22 @@ def test_the_same_generator_the_same_answer() -> None:
     assert first.summary == second.summary
 
 
-def test_too_little_data_says_what_is_missing() -> None:
+def test_nothing_at_all_is_too_little() -> None:
     assert look(Campaign()).verdict is Verdict.INSUFFICIENT_DATA
-    full = campaign(1, cycles=(0.0, 1000.0), loops=False)
-    few = tuple(
-        replace(
-            run,
-            plateaus=Plateaus(
-                pressure=run.plateaus.pressure, speed=np.full_like(run.plateaus.speed, 50.0), torque=run.plateaus.torque
-            ),
-        )
-        for run in full.stationary
-    )
-    report = look(replace(full, stationary=few))
-    assert report.verdict is Verdict.INSUFFICIENT_DATA
-    assert "speeds" in report.summary
+
+
+def at_one_speed(run: StationaryRun) -> StationaryRun:
+    pressure = run.plateaus.pressure[::5]
+    scatter = np.random.default_rng(int(run.cycles)).standard_normal(pressure.size)
+    torque_there = 20.0 * pressure / 5e5 * (1 + 0.005 * scatter)
+    return replace(run, plateaus=Plateaus(pressure=pressure, speed=np.full_like(pressure, 50.0), torque=torque_there))
+
+
+def test_a_campaign_of_one_speed_is_judged_and_says_what_it_cannot_show() -> None:
+    full = campaign(1, cycles=tuple(np.linspace(0.0, 9000.0, 10)), loops=False)
+    report = look(replace(full, stationary=tuple(at_one_speed(run) for run in full.stationary)))
+    assert report.verdict is Verdict.MODEL_ADEQUATE
+    assert any("1 speed cannot show" in note for note in report.notes)
 
 
 @pytest.mark.slow
