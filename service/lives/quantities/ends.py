@@ -153,7 +153,8 @@ def criteria_answer(measured: MeasuredLife, ends: Sequence[CriterionEnd], curren
     if not samples:
         nothing = {"status": INSUFFICIENT, "probability_of_reaching": None, "at_least": None}
         items = [_item(end, now, 0.0) for end in ends]
-        return _quantiles(None, now) | nothing | {"current": {**current, "health": None}, "criteria": items}
+        asked = {"current": {**current, "health": None}, "criterion": _criterion(ends[0]), "criteria": items}
+        return _quantiles(None, now) | nothing | asked
     shares: FloatArray = np.ones(1)
     first: Sample = samples[0]
     if len(samples) > 1:

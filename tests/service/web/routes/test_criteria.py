@@ -125,6 +125,16 @@ def test_an_earlier_life_stays_reachable(tested: TestClient) -> None:
     assert ended["life"]["number"] == 1
     assert ended["status"] != "insufficient_data"
     assert asked(tested, "remaining-useful-life")["status"] == "insufficient_data"
+
+
+def test_too_few_tests_of_a_quantity_name_that_quantity(tested: TestClient) -> None:
+    assert tested.post("/v1/clutches", json={"clutch_id": "s2", "origin": "simulated"}).status_code == 201
+    for run in simulate(7, most_tests=2):
+        assert tested.post("/v1/clutches/s2/runs", json=simulated_body(run)).status_code == 201
+    query = {"quantity": "static_torque_nm", "pressure_bar": 5}
+    answer = tested.get("/v1/clutches/s2/remaining-useful-life", params=query, headers=WAIT).json()
+    assert answer["status"] == "insufficient_data"
+    assert answer["criterion"]["quantity"] == "static_torque_nm"
     assert tested.get("/v1/clutches/s/degradation", params={"life": 3}, headers=WAIT).status_code == 404
 
 
