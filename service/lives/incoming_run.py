@@ -1,7 +1,7 @@
 """A run on its way in: what was sent, checked, with its channels bit for bit, and its step into the models' units."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ class IncomingRun:
     kind: str
     cycles: float
     run_id: str
-    content_sha256: str
+    content_sha256: str = ""
     started_at: str | None = None
     origin: str = "measured"
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
@@ -35,52 +35,25 @@ class IncomingRun:
     file: Mapping[str, Any] | None = None
 
 
-def name_run(
-    *,
-    kind: str,
-    cycles: float,
-    run_id: str | None,
-    started_at: str | None,
-    origin: str,
-    channels: Mapping[str, FloatArray],
-    details: Mapping[str, Any],
-) -> IncomingRun:
-    """A run with its content's hash, and its name derived from that where none was given.
+def name_run(run: IncomingRun) -> IncomingRun:
+    """The run with its content's hash, and its name derived from that where none was given.
 
     Raises InvalidError where a stationary test holds neither a curve that could be fitted nor an open clutch, and where the
     time of a dynamic test steps back.
     """
-    content = content_hash(
-        kind=kind, cycles=cycles, started_at=started_at, origin=origin, channels=channels, details=details
-    )
-    run = IncomingRun(
-        kind=kind,
-        cycles=cycles,
-        run_id=run_id or f"{kind}-{content[:16]}",
-        content_sha256=content,
-        started_at=started_at,
-        origin=origin,
-        channels=channels,
-        details=details,
-    )
-    if kind == "dynamic_stribeck":
-        _require_forward(channels["time_s"])
-    if kind == "stationary_stribeck" and "time_s" not in channels:
-        _require_readings(channels)
-    return run
+    content = content_hash(run)
+    if run.kind == "dynamic_stribeck":
+        _require_forward(run.channels["time_s"])
+    if run.kind == "stationary_stribeck" and "time_s" not in run.channels:
+        _require_readings(run.channels)
+    return replace(run, run_id=run.run_id or f"{run.kind}-{content[:16]}", content_sha256=content)
 
 
-def content_hash(
-    *,
-    kind: str,
-    cycles: float,
-    started_at: str | None,
-    origin: str,
-    channels: Mapping[str, FloatArray],
-    details: Mapping[str, Any],
-) -> str:
+def content_hash(run: IncomingRun) -> str:
     """The sha256 of everything but the name: kind, cycles, instant, origin, details and every value of every channel."""
-    return content_with_columns([kind, cycles, instant(started_at), origin, dict(details)], channels)
+    return content_with_columns(
+        [run.kind, run.cycles, instant(run.started_at), run.origin, dict(run.details)], run.channels
+    )
 
 
 def sampled_record(channels: Mapping[str, FloatArray]) -> Record:

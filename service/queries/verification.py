@@ -9,7 +9,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from sqlalchemy import Connection
@@ -55,14 +55,7 @@ def _finding(database: Database, row: RunRow) -> str | None:
         sent = incoming(row, channels.values_of(columns))
     except DamagedData as error:
         return f"run {row.run_id} is damaged: {error}"
-    sha256 = content_hash(
-        kind=sent.kind,
-        cycles=row.cycles if row.sent_cycles is None else row.sent_cycles,
-        started_at=sent.started_at,
-        origin=sent.origin,
-        channels=sent.channels,
-        details=sent.details,
-    )
+    sha256 = content_hash(replace(sent, cycles=row.cycles if row.sent_cycles is None else row.sent_cycles))
     file = row.details.get("file")
     if file is not None:
         finding = _file_finding(stored_file, row.run_id, file["sha256"])

@@ -60,15 +60,16 @@ def _run(sent: Any) -> IncomingRun:
         details |= {"event": run.event, "note": run.note}
         if run.event == END_OF_LIFE:
             details["reason"] = run.reason or WORN
-    return name_run(
+    sent = IncomingRun(
         kind=run.kind,
         cycles=run.cycles,
-        run_id=run.run_id,
+        run_id=run.run_id or "",
         started_at=None if run.started_at is None else run.started_at.isoformat(),
         origin=run.origin,
         channels=check_columns(columns) if columns else {},
         details=details,
     )
+    return name_run(sent)
 
 
 def read_run_on_disk(path: Path) -> IncomingRun:

@@ -94,16 +94,16 @@ def run_of(
         columns = {name: column for name, column in columns.items() if name != "time_s"}
         check_arrays(columns)  # a plateau has no negative pressure, which a sample may have
     accepted = (*NEEDED[kind], *_ALLOWED[kind])
-    run = name_run(
+    run = IncomingRun(
         kind=kind,
         cycles=cycles,
-        run_id=run_id,
+        run_id=run_id or "",
         started_at=started_at,
         origin=origin,
         channels={name: column for name, column in columns.items() if name in accepted},
-        details={},
+        file={"warnings": [asdict(notice) for notice in notices]},
     )
-    return replace(run, file={"warnings": [asdict(notice) for notice in notices]})
+    return name_run(run)
 
 
 def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:

@@ -15,6 +15,7 @@ import os
 import signal
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, InvalidStateError
@@ -22,7 +23,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
 from multiprocessing import forkserver, resource_tracker
-from typing import Any, Protocol
+from typing import Any
 
 from service.errors import BusyError
 from service.logging import LogFormat, LogLevel, request_id
@@ -114,25 +115,28 @@ class _LostError(Exception):
     """The process has ended before it answered."""
 
 
-class _Worker(Protocol):
-    """What makes a lane's calls, one at a time; its own thread calls all but `check`, which waits for nothing."""
+class _Worker(ABC):
+    """What makes a lane's calls, one at a time; its own thread calls all but `check`, which waits for nothing. Without a
+    process of its own it is always there, and ends by itself."""
 
     #: Whether it has ended, or been ended, and is not there again.
-    lost: bool
+    lost = False
 
+    @abstractmethod
     def call(self, call: _Call) -> Any:
         """What the call's function returns or raises. Raises _LostError."""
 
     def look(self) -> bool:
         """See that it is there, and start it where it is not; whether it is."""
+        return True
 
-    def check(self, now: float) -> None:
+    def check(self, now: float) -> None:  # noqa: B027  (a thread cannot be ended)
         """End what does not answer."""
 
-    def stop(self) -> None:
+    def stop(self) -> None:  # noqa: B027  (as above: who asked has been answered)
         """End it, whatever it does."""
 
-    def end(self) -> None:
+    def end(self) -> None:  # noqa: B027  (as above)
         """End it: it has nothing to do."""
 
 
@@ -366,10 +370,8 @@ def _join(threads: Iterable[threading.Thread], seconds: float) -> None:
         thread.join(max(0.0, deadline - time.monotonic()))
 
 
-class _Here:
+class _Here(_Worker):
     """Calls in the thread itself."""
-
-    lost = False
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -378,20 +380,8 @@ class _Here:
         request_id.set(call.request)
         return call.function(self._database, *call.arguments)
 
-    def look(self) -> bool:
-        return True
 
-    def check(self, now: float) -> None:
-        """Nothing ends a thread."""
-
-    def stop(self) -> None:
-        """Nothing ends a thread; who asked has been answered."""
-
-    def end(self) -> None:
-        """It ends by itself."""
-
-
-class _Elsewhere:
+class _Elsewhere(_Worker):
     """Calls in a process, which `arguments` (the database, how it yields and logs) begin.
 
     Only `check` and `stop` are called from other threads; they end processes and wait for nothing.

@@ -33,10 +33,8 @@ def database(url: str) -> Iterator[Database]:
 
 
 def oil_change() -> IncomingRun:
-    return name_run(
-        kind="maintenance", cycles=5.0, run_id="oil", started_at=None, origin="measured", channels={},
-        details={"event": "oil_change", "note": ""},
-    )  # fmt: skip
+    details = {"event": "oil_change", "note": ""}
+    return name_run(IncomingRun(kind="maintenance", cycles=5.0, run_id="oil", details=details))
 
 
 def test_the_same_run_of_two_threads_is_stored_once(database: Database) -> None:
