@@ -19,6 +19,10 @@ from service.run_files.rig_profile import require_usable
 from service.schemas.rig import RigProfile
 from service.web.limits import MAX_BYTES_IN_MEMORY
 
+FILE_TYPE = "application/octet-stream"
+#: A file of any format, as the API's description has it, and as the body of a request.
+FILE_CONTENT = {FILE_TYPE: {"schema": {"type": "string", "format": "binary"}}}
+FILE_BODY = {"requestBody": {"required": True, "content": FILE_CONTENT}}
 PARQUET_TYPE = "application/vnd.apache.parquet"
 #: Bytes of a file that are sent at once. Chosen: a few writes to the socket.
 _PIECE = 1 << 18

@@ -19,7 +19,7 @@ from service.schemas.base import Origin
 from service.schemas.run import Receipt
 from service.web.answers import JSON_TYPE, Of, now, unchanged
 from service.web.auth import Ingester, name_of_caller
-from service.web.files import received, streamed
+from service.web.files import FILE_BODY, FILE_CONTENT, FILE_TYPE, received, streamed
 from service.web.problems import READING, SENDING, described
 from service.work.workers import Lane
 from service.workflows.ingest_run import ingest_posted
@@ -28,12 +28,6 @@ from storage.encoding import to_text
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
 
 SENDING_FILE = SENDING | described(NoRoomError)
-_BODY = {
-    "requestBody": {
-        "required": True,
-        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
-    }
-}
 
 
 @router.post(
@@ -41,7 +35,7 @@ _BODY = {
     status_code=201,
     response_model=Receipt,
     responses=SENDING_FILE | {200: {"model": Receipt, "description": "The same run again: the same receipt"}},
-    openapi_extra=_BODY,
+    openapi_extra=FILE_BODY,
 )
 async def post_run_file(
     request: Request,
@@ -90,10 +84,9 @@ async def post_run_file(
     return Response(content=to_text(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
 
-_FILE_TYPE = "application/octet-stream"
 _READING_FILE = READING | {
     200: {
-        "content": {_FILE_TYPE: {"schema": {"type": "string", "format": "binary"}}},
+        "content": FILE_CONTENT,
         "description": "The file as it was sent",
     }
 }
@@ -110,4 +103,4 @@ async def read_run_file(of: Of, run_id: parameters.RunId) -> Response:
         path = Path(folder) / "file"
         await asyncio.wrap_future(of.context.workers.submit(Lane.RECORDS, copy_file, of.clutch_id, run_id, path))
         body = path.open("rb")  # its name goes with the folder, its content when it is closed
-    return streamed(body, _FILE_TYPE, headers)
+    return streamed(body, FILE_TYPE, headers)

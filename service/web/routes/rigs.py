@@ -31,7 +31,7 @@ from service.schemas.rig import Preview, RigIn, RigOut, RigPage
 from service.web.answers import answer, json_answer, json_body, now, taking
 from service.web.auth import Admin, Ingester, OwnIngester, OwnReader, name_of_caller, require_clutch
 from service.web.context import Context, Cursor, Limit
-from service.web.files import received
+from service.web.files import FILE_BODY, received
 from service.web.limits import USUAL_ITEMS
 from service.web.problems import CHANGING, READING, SENDING
 from service.work.workers import Lane
@@ -40,12 +40,6 @@ from service.workflows.save_rig import save
 router = APIRouter(prefix="/v1/rigs", tags=["rigs"])
 import_router = APIRouter(prefix="/v1/import", tags=["rigs"])
 
-_BODY = {
-    "requestBody": {
-        "required": True,
-        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
-    }
-}
 EXAMPLE = {
     "name": "bench-3",
     "columns": [
@@ -101,7 +95,7 @@ async def _saved(request: Request, context: Context, name: str | None) -> Respon
     return json_answer(saved.model_dump(mode="json"), 201 if new else 200, Location=f"/v1/rigs/{saved.name}")
 
 
-@import_router.post("/preview", response_model=Preview, responses=CHANGING, openapi_extra=_BODY)
+@import_router.post("/preview", response_model=Preview, responses=CHANGING, openapi_extra=FILE_BODY)
 async def preview_file(
     request: Request,
     context: OwnIngester,
