@@ -75,6 +75,7 @@ def test_a_disk_that_hangs_is_not_ready_in_time(client: TestClient, monkeypatch:
     hangs.set()
 
 
+@pytest.mark.slow
 def test_a_worker_that_died_is_not_ready_until_another_is_up(tmp_path: Path) -> None:
     with serving(tmp_path / "a.db", environment={"CLUTCHLIFE_WORKERS": "2"}) as server:
         url, deadline = f"{server.url}/readyz", time.monotonic() + 60
