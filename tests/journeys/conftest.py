@@ -1,4 +1,4 @@
-"""Journeys go to a service in a process of its own, over a real socket."""
+"""Journeys go to a service in a process of its own, over a real socket, where that is what they are about."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,6 +8,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from tests.browser.driving import FLAT, chromium, launched
+from tests.service.clients import client_on
 from tests.support import Server, serving
 
 
@@ -19,9 +20,9 @@ def server(tmp_path: Path) -> Iterator[Server]:
 
 
 @pytest.fixture
-def http(server: Server) -> Iterator[httpx2.Client]:
-    """A client for it."""
-    with httpx2.Client(base_url=server.url, timeout=60) as client:
+def http(tmp_path: Path) -> Iterator[httpx2.Client]:
+    """A client of a service in this process: what is asked here is the same over a socket."""
+    with client_on(f"sqlite:///{tmp_path}/a.db", max_body_mb=64) as client:
         yield client
 
 

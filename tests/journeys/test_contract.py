@@ -1,4 +1,4 @@
-"""The public contract's examples, one after another, against a running service."""
+"""The public contract's examples, one after another."""
 
 import csv
 import io

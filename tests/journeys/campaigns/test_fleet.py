@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Iterator
 
 import httpx2
 import pytest
@@ -17,6 +18,12 @@ def post(http: httpx2.Client, name: str, scale: float, last: int) -> None:
         wear = 0.9 * (1 - (1 + cycles / scale) ** -0.9) + 0.002 * math.sin(cycles)
         body = stationary(cycles, wear=wear, speeds=SPEEDS, pressures=(5.0,), run_id=f"t{cycles}")
         assert http.post(f"/v1/clutches/{name}/runs", json=body).status_code == 201
+
+
+@pytest.fixture
+def http(server: Server) -> Iterator[httpx2.Client]:
+    with httpx2.Client(base_url=server.url, timeout=60) as client:
+        yield client
 
 
 @pytest.mark.slow
