@@ -52,7 +52,8 @@ def routed(client: TestClient) -> list[str]:
 
 
 def post(client: TestClient, cycles: float) -> None:
-    assert client.post("/v1/clutches/c1/runs", json=stationary(cycles)).status_code == 201
+    run = stationary(cycles, pressures=(5.0,))
+    assert client.post("/v1/clutches/c1/runs", json=run).status_code == 201
 
 
 @pytest.mark.parametrize("address", POLLED)
