@@ -32,7 +32,8 @@ import json
 import math
 import struct
 import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
 from types import UnionType
 from typing import Any, Generic, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
 
@@ -305,23 +306,27 @@ class Rows(Generic[Value]):
             columns[name] = None if columns[name] is None else encode(columns[name])
         return columns | others
 
-    def of(self, row: Row[*tuple[Any, ...]]) -> Value:
-        """The value that a row holds."""
-        fields = row._asdict()
-        if len(fields) > len(self.names):
-            fields = {name: fields[name] for name in self.names}
-        for name, (_, decode) in self._coded.items():
-            fields[name] = None if fields[name] is None else decode(fields[name])
-        return self._kind(**fields)
+    def reader(self, rows: Result[*tuple[Any, ...]]) -> Callable[[Row[*tuple[Any, ...]]], Value]:
+        """What makes a value of each of these rows: where its fields stand is found once for all."""
+        columns = list(rows.keys())
+        taken = itemgetter(*map(columns.index, self.names))
 
-    def all(self, rows: Iterable[Row[*tuple[Any, ...]]]) -> list[Value]:
+        def of(row: Row[*tuple[Any, ...]]) -> Value:
+            fields = dict(zip(self.names, taken(row), strict=True))
+            for name, (_, decode) in self._coded.items():
+                fields[name] = None if fields[name] is None else decode(fields[name])
+            return self._kind(**fields)
+
+        return of
+
+    def all(self, rows: Result[*tuple[Any, ...]]) -> list[Value]:
         """The values of several rows."""
-        return [self.of(row) for row in rows]
+        return list(map(self.reader(rows), rows))
 
     def first(self, rows: Result[*tuple[Any, ...]]) -> Value | None:
         """The value of the first row, None where there is none."""
-        row = rows.first()
-        return None if row is None else self.of(row)
+        of, row = self.reader(rows), rows.first()
+        return None if row is None else of(row)
 
 
 def _tuple(text: str) -> tuple[Any, ...]:

@@ -116,8 +116,10 @@ def set_state(connection: Connection, inspection_key: int, state: str) -> None:
 def photographs(connection: Connection, inspection_keys: Sequence[int]) -> dict[int, list[PhotographRow]]:
     """inspection_key -> the photographs of those inspections in the order in which they came, without their content."""
     of_keys: dict[int, list[PhotographRow]] = {key: [] for key in inspection_keys}
-    for row in connection.execute(_photographs, {"of_keys": to_text(list(inspection_keys))}):
-        of_keys[row.inspection_key].append(_shown.of(row))
+    rows = connection.execute(_photographs, {"of_keys": to_text(list(inspection_keys))})
+    of = _shown.reader(rows)
+    for row in rows:
+        of_keys[row.inspection_key].append(of(row))
     return of_keys
 
 

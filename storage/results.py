@@ -80,8 +80,10 @@ def write_fits(connection: Connection, run_key: int, rows: Sequence[FitRow]) -> 
 def fits_of(connection: Connection, clutch_id: str) -> dict[int, list[FitRow]]:
     """The fits of a clutch's runs by run_key, runs in order, pressures ascending; runs without fits are left out."""
     fits: dict[int, list[FitRow]] = {}
-    for row in connection.execute(_fit_of_clutch, {"of_clutch": clutch_id}):
-        fits.setdefault(row.run_key, []).append(_fits.of(row))
+    rows = connection.execute(_fit_of_clutch, {"of_clutch": clutch_id})
+    of = _fits.reader(rows)
+    for row in rows:
+        fits.setdefault(row.run_key, []).append(of(row))
     return fits
 
 
@@ -188,9 +190,11 @@ def put_filter_states(connection: Connection, clutch_id: str, rows: Sequence[Fil
 def filter_states_of(connection: Connection, clutch_id: str) -> dict[tuple[str, float], FilterStateRow]:
     """The states of a clutch by (method, pressure). Raises DamagedData, naming the state."""
     states = {}
-    for row in connection.execute(_state_get, {"of_clutch": clutch_id}):
+    rows = connection.execute(_state_get, {"of_clutch": clutch_id})
+    of = _states.reader(rows)
+    for row in rows:
         try:
-            states[row.method, row.pressure] = _states.of(row)
+            states[row.method, row.pressure] = of(row)
         except DamagedData as error:
             name = f"state of {row.method} at {row.pressure:g} Pa of clutch {clutch_id!r}"
             raise DamagedData(f"{name}: {error}") from error

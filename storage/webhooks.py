@@ -160,7 +160,8 @@ def claim(connection: Connection, *, lease: float, most: int, passing: Collectio
     keys = list(connection.execute(_due, {"most": most, "passing": sorted(passing)}).scalars())
     if keys:
         connection.execute(_claim, [{"wanted": key, "lease": lease} for key in keys])
-    return _deliveries.all(connection.execute(_claimed, {"wanted": key}).one() for key in keys)
+    rows = [_deliveries.first(connection.execute(_claimed, {"wanted": key})) for key in keys]
+    return [row for row in rows if row is not None]
 
 
 def end(
