@@ -1,9 +1,6 @@
 """Raw records beside the database: never lost, whoever ends in the middle; what nothing names is collected, nothing else."""
 
-import os
-import signal
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +17,7 @@ from storage.engine.database import Database
 from storage.engine.errors import DamagedData, DatabaseBusy, RawStoreUnavailable
 from storage.engine.opening import open_database
 from storage.tables import channel
+from tests.journeys.faults.test_kills import killed_after
 from tests.storage.samples import clutch_row, columns, new_run
 
 LENGTH = 20_000
@@ -217,23 +215,6 @@ def test_a_store_that_was_copied_is_found_at_its_new_address(
         name(database, 2, on_its_way)
     with pytest.raises(ValueError, match="known are"):
         raw_records.relocate(database, in_folder, to)
-
-
-def killed_after(seconds: float, act: Callable[[], object]) -> bool:
-    """Do something in a process that is killed after some time; whether it had come to its end."""
-    child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            act()
-            code = 0
-        finally:
-            os._exit(code)
-    time.sleep(seconds)
-    os.kill(child, signal.SIGKILL)
-    _, status = os.waitpid(child, 0)
-    assert not os.WIFEXITED(status) or os.WEXITSTATUS(status) == 0, "it failed by itself"
-    return os.WIFEXITED(status)
 
 
 def test_kills_between_blob_and_row_lose_no_run_and_leave_only_what_is_collected(
