@@ -32,6 +32,8 @@ from models.diagnosis.noise.covariance import Noise
 
 #: Longer curves are cut, for the basis of a piece costs its length cubed; short pieces have so many rows at most.
 _LONGEST, _SHORT = 120, 15
+#: The degree up to which an error over pressure is smooth: the laws over pressure are of the first with a curvature.
+_OVER_PRESSURE = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,16 +64,25 @@ def pieces_of(design: Design, part: NDArray[np.bool_], longest: int = _LONGEST) 
     return _pieces(design, np.flatnonzero(part), owners(design), longest)
 
 
-def pieces_over_life(design: Design, part: NDArray[np.bool_]) -> list[Piece]:
-    """The same speed and pressure from state to state, among the rows of `part` [N], where curves have too few speeds: what
-    scatters from run to run counts for noise then."""
-    indices = np.flatnonzero(part)
-    speed = np.round(design.rows.velocity / max(float(design.rows.velocity.max()), 1e-300), 2)
-    same = np.unique(np.stack([design.level, speed], axis=1), axis=0, return_inverse=True)[1]
-    return _pieces(design, indices[np.argsort(design.rows.cycles[indices], kind="stable")], same, _LONGEST)
+def pieces_across_curves(design: Design, part: NDArray[np.bool_]) -> list[Piece]:
+    """Where curves have too few speeds, the same speed over the pressures of a run, among the rows of `part` [N]; with too
+    few pressures as well the same point from state to state, where what scatters from run to run counts for noise."""
+    indices, rows = np.flatnonzero(part), design.rows
+    speed = np.round(rows.velocity / max(float(rows.velocity.max()), 1e-300), 2)
+    pieces = list[Piece]()
+    for across, fixed, degree in (
+        (rows.pressure, rows.run, _OVER_PRESSURE),
+        (rows.cycles, design.level, criteria.SMOOTH_DEGREE),
+    ):
+        same = np.unique(np.stack([speed, fixed], axis=1), axis=0, return_inverse=True)[1]
+        ordered = indices[np.argsort(across[indices], kind="stable")]
+        pieces = pieces if _free(pieces) >= criteria.FEWEST else _pieces(design, ordered, same, _LONGEST, degree)
+    return pieces
 
 
-def _pieces(design: Design, indices: IntArray, owner: IntArray, longest: int) -> list[Piece]:
+def _pieces(
+    design: Design, indices: IntArray, owner: IntArray, longest: int, degree: int = criteria.SMOOTH_DEGREE
+) -> list[Piece]:
     pieces = []
     order = indices[np.argsort(owner[indices], kind="stable")]
     edges = np.flatnonzero(np.diff(owner[order])) + 1
@@ -79,13 +90,13 @@ def _pieces(design: Design, indices: IntArray, owner: IntArray, longest: int) ->
     for rows in np.split(order, edges) if order.size else []:
         for piece in np.array_split(rows, max(1, -(-rows.size // longest))):
             looping = bool(piece[0] >= design.plateaus)
-            smooth_terms = 2 * criteria.SMOOTH_HARMONICS + 1 if looping else criteria.SMOOTH_DEGREE + 1
+            smooth_terms = 2 * criteria.SMOOTH_HARMONICS + 1 if looping else degree + 1
             if piece.size < smooth_terms + 3:
                 continue
             phase = design.rows.phase[piece]
             key = phase.tobytes()  # all zeros for plateaus: their number alone counts
             if key not in cache:
-                cache[key] = _contrasts(_harmonics(phase) if looping else _polynomials(piece.size))
+                cache[key] = _contrasts(_harmonics(phase) if looping else _polynomials(piece.size, degree))
             pieces.append(Piece(rows=piece, contrasts=cache[key]))
     return pieces
 
@@ -103,8 +114,8 @@ def calm_pieces(design: Design, part: NDArray[np.bool_], residual: FloatArray) -
     return [piece for piece, square in zip(short, of_short, strict=True) if square < criteria.SHARP * typical]
 
 
-def _polynomials(count: int) -> FloatArray:
-    return np.asarray(legvander(np.linspace(-1.0, 1.0, count), criteria.SMOOTH_DEGREE), dtype=np.float64)
+def _polynomials(count: int, degree: int) -> FloatArray:
+    return np.asarray(legvander(np.linspace(-1.0, 1.0, count), degree), dtype=np.float64)
 
 
 def _harmonics(phase: FloatArray) -> FloatArray:
@@ -211,7 +222,7 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
         pieces = calm_pieces(design, part, residual)
         along_curves = _free(pieces) >= criteria.FEWEST
         if not along_curves and part[0]:
-            pieces = pieces_over_life(design, part)
+            pieces = pieces_across_curves(design, part)
         if _free(pieces) < criteria.FEWEST:
             assumed = assumed or bool(part.any())
             correlations.append(Correlation())
