@@ -41,6 +41,8 @@ _EXPONENT = 0.8
 _ROBUST_STEPS = 4
 _LEAST_SHARE, _MOST_SHARE = 0.25, 0.6
 _DECAYS = (0.25, 0.6, 1.5)
+#: Where the law of V_S begins.
+_VELOCITY = 2 * BLOCK
 
 
 def starting_laws(design: Design, frame: Frame) -> Laws:
@@ -68,7 +70,15 @@ def starting_laws(design: Design, frame: Frame) -> Laws:
                 ]
                 if k == RATIO:
                     theta[LOG_DECAY] = np.log(decay * frame.span)
+    if _speeds(design).size < criteria.CURVE_SPEEDS:  # no curve determines V_S, and a fit does not leave V_S = 0
+        theta[_VELOCITY : _VELOCITY + 4] = *np.repeat(design.rows.velocity.min(), 2), 0.0, 0.0
     return Laws(theta=theta, frame=frame)
+
+
+def _speeds(design: Design) -> FloatArray:
+    """The distinct speeds [n] of plateaus under pressure, shares of the highest."""
+    velocity = design.rows.velocity[design.closed & design.rows.steady]
+    return np.unique(np.round(velocity / float(velocity.max()), 2))
 
 
 def cautious_laws(design: Design, start: Laws) -> Laws:
@@ -228,8 +238,7 @@ def _notes(design: Design, assumed: bool) -> tuple[str, ...]:
     notes = list(design.notes)
     if assumed:
         notes.append("Too few rows to estimate the noise: 1 % of the torque is assumed.")
-    velocity = design.rows.velocity[design.closed & design.rows.steady]
-    speeds = np.unique(np.round(velocity / float(velocity.max()), 3)).size
+    speeds = _speeds(design).size
     if speeds < criteria.CURVE_SPEEDS:
         notes.append(
             f"{speeds} speed{'s' * (speeds > 1)} cannot show the form of a Stribeck curve: what depends on speed alone is "
