@@ -286,7 +286,7 @@ def _error(report: Report) -> str:
     if misfit.rmse <= misfit.noise:
         return f"{error}, no more than noise, but correlated{f' along {where}' if where else ''}."
     percent = 100 * misfit.unexplained_share
-    share = f"{'less than 0.1' if percent < _LEAST_PERCENT else number(percent)} % of its square is no noise"
+    share = f"{'less than 0.1' if percent < _LEAST_PERCENT else number(percent)} % of its square is not noise"
     return f"{error} (noise alone: {number(misfit.noise)} Nm); {share}{f', and depends on {where}' if where else ''}."
 
 
@@ -314,10 +314,10 @@ def _gained(report: Report) -> list[Sentence]:
     ]
     if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         return sentences
-    ahead = "It also predicts the last states better from the first ones, so remaining life follows it."
+    ahead = f"From the first states, {model} predicts the last ones better, so remaining life follows it."
     if not gain.forecast_log_score_gain > 0:
-        ahead = "It predicts the last states from the first ones no better: remaining life does not follow its course."
-    return [*sentences, Sentence(ahead)]
+        ahead = f"From the first states, {model} predicts the last ones no better: remaining life does not follow it."
+    return [*sentences, Sentence(ahead, SHOULD if report.verdict is Verdict.CAUSE_AMBIGUOUS else MUST)]
 
 
 def _hardest(gain: Gain, extended: Misfit | None) -> str:
@@ -331,9 +331,8 @@ def _hardest(gain: Gain, extended: Misfit | None) -> str:
     if hardest.beyond > 0.0:
         kept = f"{number(size * hardest.beyond)} {unit} beyond all that were kept"
     place = f"{'at' if pressed else 'after'} {number(size * hardest.value)} {unit}"
-    return (
-        f"It errs most {place}, {kept}: by {number(hardest.rmse)} Nm RMS, beside {number(extended.rmse)} Nm in the fit."
-    )
+    beside = f"by {number(hardest.rmse)} Nm RMS, beside {number(extended.rmse)} Nm in the fit."
+    return f"Held out, the runs {place}, {kept}, are predicted worst: {beside}"
 
 
 def _next(report: Report) -> list[Sentence]:

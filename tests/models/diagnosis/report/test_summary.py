@@ -125,7 +125,7 @@ def test_what_is_named_is_explained_with_its_size_its_gain_and_the_next_test() -
     assert BY_SLUG["oil_temperature"].physics in said
     assert "0.363 ± 0.055, positive with probability above 0.99" in said
     assert "the extended model errs by 7.5 ± 0.9 % less" in said or "errs by 7.4 ± 0.9 % less" in said
-    assert "predicts the last states better" in said
+    assert "predicts the last ones better" in said
     assert "It tells oil change from running in (probability 0.80)." in said
 
 
@@ -182,7 +182,7 @@ def test_many_alternatives_are_shortened() -> None:
         ),
         (
             Hardest(axis="pressure_bar", value=5e5, rmse=2.5, beyond=0.0),
-            "at 5 bar, between others that were kept: by 2.5",
+            "at 5 bar, between others that were kept, are predicted worst: by 2.5",
         ),
     ],
 )
@@ -191,6 +191,6 @@ def test_held_out_errors_far_beyond_the_fit_are_explained(hardest: Hardest, plac
     found = findings(Verdict.CAUSE_NAMED, "oil_change")
     far = replace(GAIN, rmse_after=1.52, rmse_before=1.9, hardest=hardest)
     said = summarise(replace(found, gain=far, extended=replace(MISFIT, rmse=0.0217)))
-    assert f"It errs most {place}" in said
+    assert f"the runs {place}" in said
     assert "beside 0.0217 Nm in the fit." in said
-    assert "errs most" not in summarise(replace(found, gain=replace(GAIN, hardest=hardest)))
+    assert "predicted worst" not in summarise(replace(found, gain=replace(GAIN, hardest=hardest)))
