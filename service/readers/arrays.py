@@ -4,6 +4,9 @@ A vector is a column; a matrix is several, with the names that a list of as many
 what stands beside an array under the usual names: attributes of HDF5, fields and variables of MATLAB.
 """
 
+import contextlib
+import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -20,7 +23,13 @@ from service.readers.unit_table import is_unit
 
 _DATA = ("data", "values", "value", "y", "samples")
 #: Factors that a file states beside raw counts; whether they were applied already only its program knows.
-_GAINS, _OFFSETS = ("gain", "scale", "factor", "slope", "multiplier", "sensitivity", "calibration"), ("offset", "zero")
+_GAINS = frozenset(
+    ["gain", "scale", "scaling", "factor", "slope", "multiplier", "sensitivity", "calibration", "resolution", "lsb"]
+)
+_OFFSETS = {"offset", "zero"}
+#: What is said of an array stands under such a name beside it (`C1_Data`, `C1_Header`).
+_HEADERS = ("header", "info", "meta", "attributes")
+_LABELS = ("label", "name", "signalname", "channelname")
 _CHARACTERS = "SUO"
 #: Folders in folders, at most. Chosen: recorders have three.
 _DEEPEST = 8
@@ -51,7 +60,7 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
 
     Raises InvalidError where it holds no array that could be a channel.
     """
-    sources = list(_sources(tree, "", 0, {}))
+    sources = list(_sources(_paired(tree), "", 0, {}))
     groups = tuple(dict.fromkeys(source.column.group for source in sources))
     if reading.table:
         chosen = groups[only(groups, reading.table, "group")]
@@ -84,6 +93,18 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
     )
 
 
+def _paired(tree: Tree) -> Tree:
+    """The tree with arrays and what is said of them in one folder, where they stand as `C1_Data` beside `C1_Header`."""
+    paired = dict(tree)
+    headers = {key.lower(): value for key, value in tree.items() if isinstance(value, Mapping)}
+    for key, value in tree.items():
+        base, _, kind = key.rpartition("_")
+        held = [headers[name] for end in _HEADERS if (name := f"{base}_{end}".lower()) in headers]
+        if isinstance(value, Leaf) and kind.lower() in _DATA and held:
+            paired[base] = {**held[0], kind: paired.pop(key)}
+    return paired
+
+
 def _complete(sources: list[_Source]) -> list[str]:
     """The groups that each hold a torque, a speed and a pressure: tests of their own."""
     channels_by_group: dict[str, set[str | None]] = {}
@@ -94,7 +115,7 @@ def _complete(sources: list[_Source]) -> list[str]:
 
 def _sources(tree: Tree, group: str, depth: int, above: Tree) -> Iterator[_Source]:
     """The columns of a folder and of those in it; `above` is what the folders above state."""
-    stated = {**above, **_scalars(tree)}
+    stated = {**above, **_scalars(tree), **{key: node for key, node in tree.items() if key.lower() in UNITS}}
     for name, node in tree.items():
         path = f"{group}/{name}" if group else name
         if isinstance(node, Mapping):
@@ -104,7 +125,7 @@ def _sources(tree: Tree, group: str, depth: int, above: Tree) -> Iterator[_Sourc
                 key for key, value in lowered.items() if isinstance(value, Leaf) and _rows(value) and value is not data
             ]
             if data is not None and not [key for key in rest if known_channel(key) != "time_s"]:
-                label = _text(lowered.get("label")) or _text(lowered.get("name")) or name
+                label = next((_text(lowered[key]) for key in _LABELS if _text(lowered.get(key))), name)
                 times = [
                     _source(key, node[key], path, {**stated, **node}) for key in node if known_channel(key) == "time_s"
                 ]
@@ -120,8 +141,13 @@ def _sources(tree: Tree, group: str, depth: int, above: Tree) -> Iterator[_Sourc
 def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Source]:
     """The columns of one array: a vector, the fields of a compound one, or those of a matrix."""
     if leaf.data.dtype.names:
-        for part in leaf.data.dtype.names:
-            yield _Source(Column(**_titled(part, None, group), rows=leaf.data.shape[0]), leaf, part)
+        rows, parts = leaf.data.shape[0], leaf.data.dtype.names
+        lists = [texts for texts in map(_texts, leaf.attributes.values()) if len(texts) == len(parts)]
+        units = max(lists, key=_known_units, default=[])
+        for at, part in enumerate(parts):
+            stated = stated_unit(part, leaf.attributes) or stated_unit(f"field_{at}", leaf.attributes)
+            column = column_of(part, units[at] if _known_units(units) else stated, group)
+            yield _Source(replace(column, rows=rows, clock=_clock(leaf, beside, rows)), leaf, part)
         return
     source = _source(name, leaf, group, beside)
     if source is not None:
@@ -151,9 +177,22 @@ def _known_units(texts: list[str]) -> int:
     return sum(map(is_unit, texts))
 
 
-def _titled(title: str, unit: str | None, group: str) -> dict[str, Any]:
-    column = column_of(title, unit, group)
-    return {"name": column.name, "unit": column.unit, "group": column.group, "title": column.title}
+def parsed(value: Any) -> Any:
+    """What a text holds as JSON; the value itself where it is none."""
+    with contextlib.suppress(ValueError):
+        return json.loads(value) if isinstance(value, str) else value
+    return value
+
+
+def stated_unit(name: str, beside: Tree) -> str | None:
+    """The unit of a column among what stands beside it: as `torque_unit`, or under `units` by its name."""
+    lowered = {key.lower(): value for key, value in beside.items()}
+    for key in UNITS:
+        by_name = parsed(lowered.get(key))
+        under = {at.lower(): unit for at, unit in by_name.items()} if isinstance(by_name, Mapping) else {}
+        if unit := _text(under.get(name.lower())) or _text(lowered.get(f"{name.lower()}_{key}")):
+            return unit
+    return None
 
 
 def _source(name: str, node: Any, group: str, beside: Tree) -> _Source | None:
@@ -162,10 +201,11 @@ def _source(name: str, node: Any, group: str, beside: Tree) -> _Source | None:
         return None
     lowered = {key.lower(): value for key, value in node.attributes.items()}
     stated = next((_text(lowered[key]) for key in UNITS if _text(lowered.get(key))), None)
+    stated = stated or stated_unit(name, beside)
     if stated is None and any(key.lower() in _DATA for key in beside):
         stated = next((_text(value) for key, value in beside.items() if key.lower() in UNITS and _text(value)), None)
     moments = node.data.dtype.kind in "Mm"
-    column = Column(**_titled(name, None if moments else stated, group))
+    column = column_of(name, None if moments else stated, group)
     unit = "s" if moments else column.unit
     return _Source(replace(column, unit=unit, rows=rows, clock=_clock(node, beside, rows)), node, Ellipsis)
 
@@ -220,21 +260,29 @@ def _texts(value: Any) -> list[str]:
     return [_text(item) for item in array.reshape(-1)] if array.dtype.kind in _CHARACTERS else []
 
 
+def refuse_counts(shown: str, values: NDArray[Any], stated: Mapping[str, Any]) -> None:
+    """Raise InvalidError on whole numbers beside a factor, which may be raw counts or values that it was applied to."""
+    for name, held in stated.items() if values.dtype.kind in "iu" else ():
+        words, number = set(re.split(r"[\W_]+|(?<=[a-z])(?=[A-Z])", name)), _number(held)
+        words = {word.lower() for word in words}
+        if number is not None and ((words & _GAINS and number != 1) or (words & _OFFSETS and number != 0)):
+            message = (
+                f"{shown} holds whole numbers beside {name} = {number:g}: save its physical values, or name the factor "
+                "scale_factor where it is still to be applied"
+            )
+            raise InvalidError.of(message, code="raw_counts")
+
+
 def _values(source: _Source) -> NDArray[Any]:
     """The values, scaled as NetCDF's conventions say; values that stand for none are masked.
 
-    Raises InvalidError on raw counts beside a factor of another name. Source: CF Conventions, 8.1, packed data.
+    Source: CF Conventions, 8.1, packed data.
     """
     values = np.asarray(source.leaf.data[source.index]).reshape(-1)
     stated = {key.lower(): _number(value) for key, value in source.leaf.attributes.items()}
-    for names, neutral in ((_GAINS, 1.0), (_OFFSETS, 0.0)):
-        name = next((name for name in names if stated.get(name) not in (None, neutral)), None)
-        if name is not None and values.dtype.kind in "iu":
-            shown = f"{source.column.shown()} holds whole numbers beside {name} = {stated[name]:g}"
-            message = (
-                f"{shown}: save its physical values, or name the factor scale_factor where it is still to be applied"
-            )
-            raise InvalidError.of(message, code="raw_counts")
+    attributes = source.leaf.attributes
+    others = {key: held for key, held in attributes.items() if key.lower() not in ("scale_factor", "add_offset")}
+    refuse_counts(source.column.shown(), values, others)
     factor, offset = (stated.get(name, default) for name, default in (("scale_factor", 1.0), ("add_offset", 0.0)))
     none = [value for name in ("_fillvalue", "missing_value") if (value := stated.get(name)) is not None]
     invalid = np.isin(values, none) if none and values.dtype.kind in "iuf" else None

@@ -5,7 +5,7 @@ its recorder's clock, else the one time column of the table.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,10 @@ from service.columns import LineOf, check_arrays
 from service.errors import MAX_QUOTED, InvalidError, Notice, TooLargeError
 from service.readers.column_names import Taken, choose, is_counter, known_channel
 from service.readers.limits import Limits
-from service.readers.long_table import widened
+from service.readers.long_table import says_valid, valid_rows, widened
 from service.readers.no_values import refuse_stand_ins, without_stated, without_totals
 from service.readers.numerals import empty_cells, read_cells
-from service.readers.table import NO_TIME, Clock, Column, Reading, Table, labels, marks, only
+from service.readers.table import NO_MISSING, NO_TIME, Clock, Column, Reading, Table, labels, marks, only
 
 #: The code of the notice that lists unused columns.
 LEFT_OUT = "columns_left_out"
@@ -28,6 +28,8 @@ _SECOND = np.timedelta64(1, "s")
 _LEADING = ("torque_nm", "speed_rpm", "pressure_bar")
 #: Steps of the time that repeated titles may interrupt a table for. Chosen: a printed page takes none, a new test minutes.
 _LONGEST_PAUSE = 10
+#: A second, in days; as a step in seconds, less than rigs sample at.
+_SECOND_OF_DAY = 1.2e-5
 #: Empty cells that show a channel of a lower rate. Chosen: fewer may have been left empty by hand.
 _MIN_GAPS = 4
 #: Columns that one notice names.
@@ -150,7 +152,8 @@ def _read(
     if stated > limits.most_values:
         raise TooLargeError(f"a file must not hold more than {limits.most_values} values, got {stated}")
     channels = {column.index: column.channel for column in taken}
-    read = read_cells(table, channels, reading)
+    says = [] if reading.missing == NO_MISSING else [i for i, own in enumerate(table.columns) if says_valid(own)]
+    read = read_cells(table, dict.fromkeys(says, "") | channels, reading)
     read, table = without_totals(read, [column.index for column in taken if column.channel != "time_s"], table)
     for column in taken:
         read[column.index] = without_stated(read[column.index], reading)
@@ -178,6 +181,11 @@ def _read(
             own = times[key] if isinstance(clock, Clock) else None if clock is None else values[clock]
             whole = _Series(values[column.index], valid[column.index], key, own)
             series[column.channel] = _without_gaps(column.channel, whole, table, bool(marks(reading.missing)))
+    marked = [valid_rows(table.columns[index], read[index]) for index in says if index in read]
+    for name, held in series.items():
+        for good in marked:
+            if good is not None and good.size == held.values.size:
+                held = series[name] = replace(held, valid=good if held.valid is None else held.valid & good)
     if not series:  # a time alone: shown as such, and refused for what it lacks
         series = {"time_s": _Series(values[indices[0]], None, None, None)}
     counts = bool(used) and len(times) == 1 and used[0].counts
@@ -245,7 +253,8 @@ def _refuse_serials(column: Column, times: FloatArray) -> None:
         np.median(np.diff(times)),
     )
     unit, meaning = "d", "days, as spreadsheets and MATLAB count dates"
-    if not (days.all() and np.ptp(times) < 5 and step < 1e-3):
+    fractions = times.min() >= 0 and times.max() <= 1 and 0 < step < _SECOND_OF_DAY
+    if not fractions and not (days.all() and np.ptp(times) < 5 and step < 1e-3):
         since = [
             (name, factor) for name, factor in (("ms", 1e3), ("µs", 1e6), ("ns", 1e9)) if _is_our_time(times / factor)
         ]

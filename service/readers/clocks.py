@@ -13,13 +13,18 @@ from service.errors import MAX_QUOTED, InvalidError
 from service.readers.table import Clock
 from service.readers.unit_table import conversion
 
+#: Names of steps beside a unit of time, and of a count or something else without.
+_COUNTED = "cycle|zyklus|takt|interval|intervall|intervalo|period|サイクル"
 #: What states a clock. A name may end in its unit (`dt_ms`, `Sample rate [Hz]`).
 _STEPS = (
-    r"dt|ts|t_s|delta_?[tx]|(?:wf_|x_)?increment|(?:h|x_?)resolution|sampl(?:e|ing)_?(?:interval|time|period)|abtast(?:intervall|zeit)"
-    "|サンプリング周期|采样(?:间隔|周期)"
+    r"dt|ts|t_s|t_?sampl(?:e|ing)|delta_?[tx]|(?:wf_|x_)?increment|(?:h|x_?)resolution|time_?step|zeitschritt|schrittweite"
+    r"|(?:sampl(?:e|ing)|scan|log(?:ging)?|record(?:ing)?)_?(?:interval|time|period|cycle)|abtast(?:intervall|zeit)"
+    r"|messintervall|サンプリング周期|采样(?:间隔|周期)|intervalo_de_muestreo|pas_de_temps|период_дискретизации|"
+    + _COUNTED
 )
 _RATES = (
-    r"fs|f_s|sampl(?:e|ing)_?(?:rate|frequency)|rate|(?:abtast|mess)(?:rate|frequenz)"
+    r"fs|f_s|(?:sampl(?:e|ing)|scan|data|acquisition)_?(?:rate|frequency)|rate|(?:abtast|mess)(?:rate|frequenz)"
+    "|frecuencia_de_muestreo|frequenza_di_campionamento|частота_дискретизации"
     "|fréquence_d['’]échantillonnage|サンプリング周波数|采样(?:频)?率"
 )
 _STARTS = "t0|x0|wf_start_offset|start_value|hoffset"
@@ -56,11 +61,13 @@ def evenly(start: float, step: float, rows: int) -> FloatArray:
 def _stated(named: Mapping[str, float | str], names: str) -> tuple[float, str, str] | None:
     """The number under one of the names, its unit ("" where none is stated), and the name."""
     for key, value in named.items():
-        match = re.fullmatch(rf"(?:{names})(?:_?[\[(]?(?P<unit>[^\W_]+/?[^\W_]*)[\])]?)?", key)
+        match = re.fullmatch(rf"(?:{names})(?:[_\[(]+(?P<unit>[^\W_]+/?[^\W_]*)[\])]?)?", key)
         text = _VALUE.fullmatch(value) if isinstance(value, str) else None
         if match is None or (isinstance(value, str) and text is None):
             continue
         unit = match["unit"]
+        if not unit and re.fullmatch(_COUNTED, key) and not (text and text[2].strip()):
+            continue
         if unit and (_HERTZ.get(unit) if names == _RATES else conversion("time_s", unit)) is None:
             continue
         number = float(text[1].replace(",", ".")) if text else float(value)

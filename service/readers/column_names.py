@@ -16,17 +16,19 @@ _LETTERS = {"M": "torque_nm", "n": "speed_rpm", "p": "pressure_bar", "t": "time_
 
 _WORDS = {
     "time_s": "time zeit timestamp timestamps zeitstempel elapsed_time elapsed messzeit time_stamp x_value datetime "
-    "date_time uhrzeit datum_zeit datum_uhrzeit datum/uhrzeit date/time temps tiempo tempo 时间 時間 時刻 время",
+    "date_time uhrzeit datum_zeit datum_uhrzeit datum/uhrzeit date/time temps tiempo tempo tout czas čas tijd tid zaman "
+    "时间 時間 時刻 время 시간",
     "pressure_bar": "pressure druck line_pressure leitungsdruck anpressdruck kolbendruck "
     "clutch_pressure kupplungsdruck piston_pressure druck_ist pressure_actual p_ist p_line pression presión presion "
-    "pressione 压力 油压 壓力 油壓 圧力 油圧 давление",
+    "pressione pressão ciśnienie tlak tryck basınç druk 压力 油压 壓力 油壓 圧力 油圧 давление 압력",
     "speed_rpm": "speed drehzahl rotational_speed rotation_speed shaft_speed differential_speed slip_speed motor_speed "
     "relative_speed drehgeschwindigkeit winkelgeschwindigkeit angular_velocity angular_speed differenzdrehzahl "
     "schlupfdrehzahl motordrehzahl drehzahl_ist n_ist n_motor n_rel n_diff omega speed_actual rpm vitesse "
-    "vitesse_de_rotation velocidad velocidad_de_giro velocità 转速 轉速 回転数 回転速度 частота_вращения обороты",
+    "vitesse_de_rotation velocidad velocidad_de_giro velocità velocidade rotação prędkość prędkość_obrotowa otáčky "
+    "toerental varvtal devir hız 회전수 转速 轉速 回転数 回転速度 частота_вращения обороты",
     "torque_nm": "torque drehmoment moment friction_torque reibmoment clutch_torque kupplungsmoment "
     "drehmoment_ist torque_actual m_ist m_d md m_r couple couple_de_frottement par par_motor par_de_fricción coppia "
-    "扭矩 转矩 轉矩 トルク 摩擦トルク момент",
+    "binário koppel vridmoment kroutící_moment moment_obrotowy tork 扭矩 转矩 轉矩 トルク 摩擦トルク момент 토크",
     "torque_sd_nm": "torque_sd torque_std torque_deviation standard_deviation_of_torque "
     "drehmoment_standardabweichung standardabweichung_drehmoment",
     "oil_temperature_c": "oil_temperature oil_temp oiltemperature oiltemp öltemperatur öltemp t_oil t_öl toil töl "
@@ -44,8 +46,8 @@ _WORDS = {
 _TIMES = (
     "time", "zeit", "temps", "tiempo", "tempo", "stamp", "date", "datum", "index", "时间", "時間", "時刻", "日時", "время",
 )  # fmt: skip
-#: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports.
-_SECONDS = frozenset({"x_value", "timestamps"})
+#: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports, Simulink's.
+_SECONDS = frozenset({"x_value", "timestamps", "tout"})
 
 #: Columns that one message names.
 _MAX_NAMED = 10
@@ -78,6 +80,13 @@ def _key(name: str) -> str:
 
 _BY_KEY = {_key(word): channel for channel, words in _WORDS.items() for word in words.split()}
 _BY_KEY |= {name: name for name in CHANNELS}
+#: What in a name may say that its values are multiples.
+_SCALED = re.compile(r"(?P<sign>[x×*·/]) ?(?P<number>10+|0[.,]0*1)(?![\d^])")
+#: Words at either end of a name that say that its values are means.
+_MEAN = re.compile(
+    r"(?:^(?:mean|average|avg|ave)|[\s_./(-]+(?:mean|average|avg|ave|mittel(?:wert)?|moyenne|moy|media)\)?$)[\s_.-]*",
+    re.I,
+)
 _WIDE = str.maketrans("（）［］｛｝，／：【】", "()[]{},/:[]")
 _BRACKETED = re.compile(
     r"(?P<name>.*?)\s*/?\s*(?:\[(?P<square>[^\[\]]*)\]|[({<](?P<unit>[^\[\](){}<>]*)[)}>])[\s:.]*", re.DOTALL
@@ -90,9 +99,12 @@ _BETWEEN = re.compile(r"\s*[,;:|]\s*|\s*/\s*|\s+in\s+|[\s_]+")
 
 
 def known_channel(name: str) -> str | None:
-    """The public channel that a name stands for, or None; what follows a backslash names a device (`torque\\CAN:1`)."""
+    """The public channel that a name stands for, or None; what follows a backslash names a device (`torque\\CAN:1`), and a
+    mean may be said to be one (`Torque/AVE`)."""
     bare = name.partition("\\")[0].strip()
-    return _LETTERS.get(bare) or (_BY_KEY.get(_key(bare)) if 1 < len(bare) <= LONGEST_NAME else None)
+    if not 1 < len(bare) <= LONGEST_NAME:
+        return _LETTERS.get(bare)
+    return _BY_KEY.get(_key(bare)) or _BY_KEY.get(_key(_MEAN.sub("", bare)))
 
 
 def is_time(column: Column) -> bool:
@@ -237,6 +249,9 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
             continue
         indices.setdefault(channel, []).append(index)
     for channel, positions in indices.items():
+        plain = [index for index in positions if not _MEAN.search(columns[index].name)]
+        if len(positions) > len(plain) > 0:
+            positions = indices[channel] = plain  # a mean beside the signal itself
         if len(positions) > 1 and channel != "time_s":
             raise _twice(channel, *(columns[index] for index in positions))
     guessed = {
@@ -340,11 +355,15 @@ def unit_in_title(channel: str, title: str) -> str | None:
     if len(title) > LONGEST_NAME:
         return None
     words = [title[start.start() :].strip(" .:,;_-()[]") for start in _WORD_STARTS.finditer(title)]
-    return next((word for word in words if word and conversion(channel, word)), None)
+    return next((word for word in words if is_unit(word) and conversion(channel, word)), None)
 
 
 def _may_state(channel: str, title: str) -> str | None:
-    """A word within a title that is another unit than the channel's own (`Mz [kNm] filtered`); None where there is none."""
+    """A word within a title that is another unit than the channel's own (`Mz [kNm] filtered`), or the unit of a title that
+    may say that its values are scaled (`Mz x10`, `Mz/10`); None where there is none."""
+    if scaled := _SCALED.search(title[:LONGEST_NAME]):
+        factor = float(scaled["number"].replace(",", "."))
+        return f"x{factor if scaled['sign'] == '/' else 1 / factor:g} {CHANNELS[channel].unit}"
     for word in re.finditer(r"[^\W\d_]{2,}(?:/[^\W\d_]+)?", title[:LONGEST_NAME]):
         for part in (word[0], word[0][-3:]):
             converted = conversion(channel, part)
@@ -361,7 +380,8 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
     if choice is None:
         return "s" if column.unit is None and _key(column.name) in _SECONDS else column.unit
     public = _key(column.name) == channel
-    stated = column.unit or (None if public else unit_in_title(channel, column.name))
+    scaled = _SCALED.search(column.name) is not None
+    stated = column.unit or (None if public or scaled else unit_in_title(channel, column.name))
     wanted = choice.unit or (None if choice.column == column.title else column_of(choice.column).unit)
     if wanted and stated not in (None, choice.stated) and conversion(channel, stated) != conversion(channel, wanted):
         rule = f"must be {wanted}, as its profile or map says"

@@ -26,8 +26,24 @@ _MAX_LOOKED_AT = 20
 _VALUES = re.compile(r"val(?!id)|wert|reading|messung|数值|値|^y$", re.IGNORECASE)
 #: A column that says which values are valid, and what it says of those that are: in words, as a flag, by OPC's code.
 _QUALITY = re.compile(r"quality|valid|qualit|gültig", re.IGNORECASE)
-_GOOD = ("good", "ok", "valid", "true", "1", "1.0", "192", "192.0", "gut", "gültig")
+_GOOD, _BAD = (
+    {"good", "ok", "valid", "192", "192.0", "gut", "gültig"},
+    {"bad", "nok", "invalid", "schlecht", "ungültig"},
+)
+_ON, _OFF = {"true", "1", "1.0"}, {"false", "0", "0.0"}
 _SECOND = np.timedelta64(1, "s")
+
+
+def says_valid(column: Column) -> bool:
+    """Whether a column says which rows are valid, by its title."""
+    return _QUALITY.search(column.name) is not None
+
+
+def valid_rows(column: Column, cells: NDArray[Any]) -> NDArray[np.bool_] | None:
+    """Which rows a column says to be valid [n]; None where it does not say so in words or flags that are known."""
+    words = np.array([str(cell).strip().casefold() for cell in cells.tolist()], dtype=object)
+    good = _GOOD | (_OFF if re.search("invalid|ungültig", column.name, re.IGNORECASE) else _ON)
+    return np.isin(words, list(good)) if set(words) <= good | _BAD | _ON | _OFF else None
 
 
 def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
@@ -51,7 +67,7 @@ def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
     value = _value(
         columns, [index for index, cells in head.items() if cells and all(map(is_value, cells))], best, reading
     )
-    marked = next((index for index, column in enumerate(columns) if _QUALITY.search(column.name)), None)
+    marked = next((index for index, column in enumerate(columns) if says_valid(column)), None)
     wanted = {index: "" for index in (best, unit, marked) if index is not None} | {value: columns[value].shown()}
     cells = read_cells(table, wanted | ({} if timed is None else {timed[0]: "time_s"}), reading)
     names = np.array([str(cell).strip() for cell in cells[best].tolist()], dtype=object)
@@ -59,8 +75,8 @@ def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
         [str(cell).strip() for cell in cells[unit].tolist()] if unit is not None else [""] * names.size, dtype=object
     )
     if marked is not None:
-        qualities = np.array([str(cell).strip().casefold() for cell in cells[marked].tolist()], dtype=object)
-        good = np.isin(qualities, _GOOD) if np.isin(qualities, _GOOD).any() else qualities == qualities[0]
+        good = valid_rows(columns[marked], cells[marked])
+        good = cells[marked] == cells[marked][0] if good is None else good
         cells[value] = np.ma.MaskedArray(cells[value], mask=np.ma.getmaskarray(cells[value]) | ~good)
     times = None if timed is None else _seconds(cells[timed[0]], timed[1])
     rows = {name: np.flatnonzero(names == name) for name in dict.fromkeys(names.tolist()) if name}

@@ -5,6 +5,7 @@ Runs in the reading process of `sandbox`. Source: ASAM MDF 4.2, Measurement Data
 
 import shutil
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -72,7 +73,7 @@ def _column(file: Any, group: int, index: int, several: bool) -> Column:
     unit = file.get_channel_unit(group=group, index=index)
     column = column_of(file.groups[group].channels[index].name, unit, name)
     clock = Clock(group, partial(_times, file, group)) if group in file.masters_db and _is_time(file, group) else None
-    return Column(column.name, column.unit, column.group, column.title, rows, clock)
+    return replace(column, rows=rows, clock=clock)
 
 
 def _is_time(file: Any, group: int) -> bool:

@@ -241,7 +241,7 @@ _DATE = r"(?P<date>\d{1,4}[-/.年]\d{1,2}[-/.月]\d{1,4}日?|\d{1,2}[- ][A-Za-z]
 _STAMP = re.compile(
     rf"(?:{_DATE}[T ,]*)?(?:(?P<days>-?\d+) days?,? *)?"
     r"(?:(?P<sign>[+-]?)(?P<first>\d{1,4}):(?P<second>\d{1,2})(?::(?P<third>\d{1,2}))?(?:[.,:](?P<fraction>\d{1,9}))?)?"
-    r" ?(?P<half>[AaPp][Mm])?(?: ?(?:Z|UTC)| ?(?P<zone>[+-]\d\d:?\d\d))?",
+    r" ?(?P<half>[AaPp][Mm])?(?: ?(?:Z|UTC|GMT)| ?(?P<zone>[+-]\d\d:?\d\d))?",
     re.ASCII,
 )
 #: Durations as MATLAB (`0.01 sec`) and ISO 8601 (`PT0.01S`, polars) write them.

@@ -4,6 +4,8 @@ Runs in the reading process of `sandbox`. Source: apache/parquet-format.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +14,11 @@ import pyarrow.parquet as parquet  # type: ignore[import-untyped]
 import pyarrow.types as kinds  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from service.errors import InvalidError
-from service.readers.column_names import column_of
+from service.errors import MAX_QUOTED, InvalidError
+from service.readers.arrays import parsed, refuse_counts, stated_unit
+from service.readers.column_names import column_of, known_channel
 from service.readers.limits import Limits
+from service.readers.numerals import is_stamp
 from service.readers.table import Column, Reading, Table
 
 _UNITS = (b"unit", b"units", b"Unit")
@@ -29,18 +33,36 @@ def read_table(path: Path, _: Reading, limits: Limits) -> Table:
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
         # one at a time: memory is that of a column
-        return [_values(file.read(columns=[fields[index].name], use_threads=False).column(0)) for index in taken]
+        columns = []
+        for field in (fields[index] for index in taken):
+            columns.append(_values(file.read(columns=[field.name], use_threads=False).column(0)))
+            refuse_counts(field.name[:MAX_QUOTED], columns[-1], _stated(field.metadata))
+        return columns
 
-    columns = [_column(field, file.metadata.num_rows) for field in fields]
+    beside = _stated(file.schema_arrow.metadata)
+    columns = [_column(field, file, beside) for field in fields]
     return Table(columns=tuple(columns), read=read)
 
 
-def _column(field: Any, rows: int) -> Column:
+def _stated(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
+    """What the file says of its columns, as texts and folders, those of pandas' `attrs` among them."""
+    stated: dict[str, Any] = {}
+    for key, value in (metadata or {}).items():
+        held = parsed(value.decode("utf-8", "replace"))
+        stated |= {key.decode("utf-8", "replace"): held} | (
+            held if key == b"PANDAS_ATTRS" and isinstance(held, dict) else {}
+        )
+    return stated
+
+
+def _column(field: Any, file: Any, beside: Mapping[str, Any]) -> Column:
     metadata = field.metadata or {}
     unit = next((metadata[key].decode("utf-8", "replace") for key in _UNITS if key in metadata), None)
     moment = kinds.is_temporal(field.type)
-    column = column_of(field.name, None if moment else unit)
-    return Column(column.name, "s" if moment else column.unit, "", column.title, rows)
+    if known_channel(field.name) == "time_s" and kinds.is_large_string(field.type) | kinds.is_string(field.type):
+        moment = any(is_stamp(str(batch[0][0])) for batch in islice(file.iter_batches(1, columns=[field.name]), 1))
+    column = column_of(field.name, None if moment else unit or stated_unit(field.name, beside))
+    return replace(column, unit="s" if moment else column.unit, rows=file.metadata.num_rows)
 
 
 def _values(column: Any) -> NDArray[Any]:

@@ -4,6 +4,7 @@ Runs in the reading process of `sandbox`. Source: NI, TDMS File Format Internal 
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,11 @@ from nptdms import TdmsFile  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from service.errors import MAX_QUOTED, InvalidError
+from service.readers.arrays import refuse_counts
 from service.readers.clocks import evenly, stated_clock
 from service.readers.column_names import column_of
 from service.readers.limits import Limits
+from service.readers.numerals import is_stamp
 from service.readers.table import Clock, Column, Reading, Table, cut_short
 from service.readers.unit_table import conversion
 
@@ -39,7 +42,10 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     ]
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
-        return [channels[index][:] for index in taken]
+        values_by_index = {index: channels[index][:] for index in taken}
+        for index, values in values_by_index.items():
+            refuse_counts(channels[index].name[:MAX_QUOTED], values, _stated(channels[index].properties))
+        return list(values_by_index.values())
 
     return Table(
         columns=tuple(
@@ -62,9 +68,10 @@ def _stated(properties: Mapping[str, Any]) -> dict[str, float | str]:
 
 def _column(channel: Any, grouped: bool, clock: Clock | None) -> Column:
     stated = next((str(channel.properties[name]) for name in _UNITS if channel.properties.get(name)), None)
-    moments = channel.dtype is not None and channel.dtype.kind == "M"
+    kind = "" if channel.dtype is None else channel.dtype.kind
+    moments = kind == "M" or (kind in "OSU" and is_stamp(str(channel[0])))
     column = column_of(channel.name, None if moments else stated, channel.group_name if grouped else "")
-    return Column(column.name, "s" if moments else column.unit, column.group, column.title, len(channel), clock)
+    return replace(column, unit="s" if moments else column.unit, rows=len(channel), clock=clock)
 
 
 def _clocks(channels: list[Any]) -> list[Clock | None]:

@@ -34,7 +34,7 @@ _FIRST_BLOCK, _BLOCK = 1 << 17, 1 << 18
 _COMMENTS = ("#", "%", "//")
 _NEWLINE, _COMMA = b"\n,"
 #: Encodings that are tried where text is not UTF-8; of those that read as many titles the first.
-_ENCODINGS = ("cp1252", "gb18030", "shift_jis", "euc_jp", "big5", "euc_kr", "cp1251")
+_ENCODINGS = ("cp1252", "cp1250", "cp1254", "gb18030", "shift_jis", "euc_jp", "big5", "euc_kr", "cp1251")
 #: Pairs of bytes as Chinese text has them, and single ones as Western text has them.
 _CHINESE = re.compile(rb"(?:[\x00-\x7f]|[\xa1-\xf7][\xa1-\xfe])*")
 #: Cells of which the last is in quotes and goes on; a quotation mark within a cell is no other (3/4").

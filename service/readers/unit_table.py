@@ -66,7 +66,7 @@ _SPEED = (
     _spelled(
         1.0,
         "rpm 1/min min-1 /min U/min r/min rmin-1 rev/min revmin-1 Upm Umdr/min revolutions/min tr/min trs/min tr/mn "
-        "giri/min",
+        "giri/min obr/min ot/min varv/min omw/min dev/dak dev/dk d/dak d/dk",
     )
     | _spelled(1.0, "об/мин мин-1 转/分 转/分钟 轉/分 回転/分 回/分")
     | _spelled(1e3, "krpm 1000/min 1000rpm")
@@ -119,9 +119,31 @@ _BY_KEY = {
 } | {"": dict.fromkeys(map(_key, _FOREIGN.split()), Conversion())}
 
 
+#: A unit of which a value counts several: `10 ms`, `0.1 Nm`, `x1000 rpm`, `10^-3 Nm`.
+_MULTIPLE = re.compile(
+    r"(?P<sign>[x×]?) *(?:(?P<number>\d+(?:[.,]\d+)?)|10\^(?P<power>[+-]?\d)) *[x×*·]? *(?P<unit>[^\W\d].*)"
+)
+
+
 def conversion(channel: str, unit: str) -> Conversion | None:
-    """From a stated unit to the channel's own; None where the unit is not in the table."""
-    return _BY_KEY[CHANNELS[channel].unit].get(_key(unit))
+    """From a stated unit to the channel's own; None where the unit is not in the table.
+
+    A unit may be a multiple of one in the table; but `10 bar`, and any other whole number without a sign, may be a sensor's
+    range, where it is no time's. NetCDF's times end in the moment from which they count.
+    """
+    table = _BY_KEY[CHANNELS[channel].unit]
+    unit = re.sub(r" since .*", "", unit) if channel == "time_s" else unit
+    found, multiple = table.get(_key(unit)), _MULTIPLE.fullmatch(unit[:LONGEST_UNIT])
+    if found is None and multiple is not None:
+        factor = float((multiple["number"] or f"1e{multiple['power']}").replace(",", "."))
+        of = table.get(_key(multiple["unit"]))
+        if (
+            of is not None
+            and of.offset == 0
+            and (channel == "time_s" or multiple["sign"] or multiple["power"] or factor < 1)
+        ):
+            return Conversion(of.factor * factor)
+    return found
 
 
 def is_unit(text: str) -> bool:

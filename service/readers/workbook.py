@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from python_calamine import CalamineWorkbook, SheetTypeEnum
+from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
 
 from service.errors import InvalidError
+from service.readers.clocks import stated_clock
 from service.readers.column_names import choices_of, recognised
 from service.readers.detect import check_archive
 from service.readers.grid import (
@@ -29,7 +30,7 @@ from service.readers.grid import (
     was_turned,
 )
 from service.readers.limits import Limits
-from service.readers.table import Reading, Table, only
+from service.readers.table import Reading, Table, labels, only
 
 #: Rows of data that a person is shown.
 _MAX_SHOWN = 20
@@ -63,6 +64,8 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
             tables[name] = rows, layout
     if not tables and refused:
         raise refused[0]
+    visible = {sheet.name for sheet in book.sheets_metadata if sheet.visible == SheetVisibleEnum.Visible}
+    tables = {name: held for name, held in tables.items() if name in visible} or tables
     name = list(tables)[only(list(tables) or sheets, "", "sheet")]
     table = _table(name, *tables[name], reading, tuple(sheets), limits)
     return replace(table, notices=[*table.notices, was_turned()]) if name in on_side else table
@@ -116,12 +119,14 @@ def _table(
     def line_of(row: int) -> int:
         return lines[row] + 1
 
+    shown_above = tuple(tuple(map(_shown, row)) for row in rows[max(titles - MAX_ROWS, 0) : titles])
+    clock = stated_clock(labels(shown_above), lambda: len(lines))
     return Table(
-        columns=layout.columns(),
+        columns=tuple(replace(column, clock=clock) for column in layout.columns()),
         read=read,
         name=name,
         others=sheets,
-        above=tuple(tuple(map(_shown, row)) for row in rows[max(titles - MAX_ROWS, 0) : titles]),
+        above=shown_above,
         first_line=start + 1,
         head=tuple(tuple(map(_shown, rows[line])) for line in lines[:_MAX_SHOWN]),
         line_of=line_of,

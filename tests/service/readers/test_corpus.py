@@ -4,9 +4,10 @@ All hold the same record or the same plateaus; what differs is how it is written
 """
 
 import io
+import json
 import re
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -14,12 +15,16 @@ import h5py
 import numpy as np
 import openpyxl  # type: ignore[import-untyped]
 import pandas as pd  # type: ignore[import-untyped]
+import pyarrow as pa  # type: ignore[import-untyped]
+import pyarrow.parquet as parquet  # type: ignore[import-untyped]
 import pytest
 import scipy.io
 import xlsxwriter  # type: ignore[import-untyped]
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from nptdms import ChannelObject, TdmsWriter  # type: ignore[import-untyped]
 
+from models.arrays import FloatArray
 from service.columns import CHANNELS
 from service.errors import InvalidError, TooLargeError
 from service.readers import hdf5 as hdf5_reader
@@ -339,7 +344,7 @@ REFUSED = {
         "a time such as 2026-11-02 07:00:00.5",
     ),
     "absolute-pressure": ("t [s];p [bar(a)]\n0;1\n", None, "'bar(a)'"),
-    "a-factor-in-the-unit": ("t [s];p [0.1 bar]\n0;1\n", None, "'0.1 bar'"),
+    "a-sensor's-range-or-a-factor": ("t [s];p [10 bar]\n0;1\n", None, "'10 bar'"),
     "days-of-a-spreadsheet": (
         "Datum;M [Nm]\n46000.25000012;1\n46000.25000023;2\n",
         "time_s:Datum",
@@ -856,6 +861,99 @@ def test_no_array_is_accepted_with_a_factor_or_a_clock_that_is_off(
     for place, channel in enumerate(PLATEAUS):
         expected = [UNITS[CHANNELS[channel].unit][units[channel]].factor * row[place] for row in values]
         np.testing.assert_allclose(columns[channel], expected, rtol=1e-9, err_msg=channel)
+
+
+def assert_record(columns: Mapping[str, FloatArray]) -> None:
+    assert columns.keys() == RECORD.keys()
+    for channel, values in RECORD.items():
+        np.testing.assert_allclose(columns[channel], values, rtol=1e-9, atol=1e-9, err_msg=channel)
+
+
+def test_a_header_beside_its_data_is_used(tmp_path: Path) -> None:
+    """As catman writes MATLAB files; the units are not the channels' own."""
+    units = {"time_s": ("ms", 1e3), "pressure_bar": ("kPa", 100), "speed_rpm": ("rpm", 1), "torque_nm": ("Nm", 1)}
+    held: dict[str, object] = {}
+    for number, (channel, (unit, factor)) in enumerate(units.items(), 1):
+        held[f"Channel_{number}_Data"] = RECORD[channel] * factor
+        held[f"Channel_{number}_Header"] = {"SignalName": channel.rpartition("_")[0], "Unit": unit}
+    scipy.io.savemat(tmp_path / "a.mat", held)
+    assert_record(read_file(tmp_path / "a.mat", filename="a.mat").columns)
+
+
+@pytest.mark.parametrize("way", ["text of JSON", "list", "attribute of each"])
+def test_units_beside_a_compound_or_a_group_are_used(tmp_path: Path, way: str) -> None:
+    names, units = ["time", "pressure", "speed", "torque"], ["ms", "MPa", "rpm", "Nm"]
+    columns = [RECORD["time_s"] * 1e3, RECORD["pressure_bar"] / 10, RECORD["speed_rpm"], RECORD["torque_nm"]]
+
+    def fill(file: h5py.File) -> None:
+        if way == "text of JSON":
+            file.attrs["units"] = json.dumps(dict(zip(names, units, strict=True)))
+            for name, column in zip(names, columns, strict=True):
+                file.create_dataset(name, data=column)
+            return
+        rows = np.array(list(zip(*columns, strict=True)), dtype=[(name, "f8") for name in names])
+        held = file.create_dataset("log", data=rows)
+        each = {f"{name}_unit": unit for name, unit in zip(names, units, strict=True)}
+        held.attrs.update({"units": units} if way == "list" else each)
+
+    assert_record(read_hdf5(tmp_path / "a.h5", fill).columns)
+
+
+@pytest.mark.parametrize("name", ["Scale", "CalibrationFactor", "lsb_weight", "resolution"])
+def test_whole_numbers_beside_any_factor_are_refused(tmp_path: Path, name: str) -> None:
+    counts = np.round(RECORD["torque_nm"] * 100).astype(np.int16)
+    with TdmsWriter(tmp_path / "a.tdms") as writer:
+        writer.write_segment([ChannelObject("g", "Torque", counts, properties={"unit_string": "Nm", name: 0.01})])
+    field = pa.field("torque", pa.int16(), metadata={"unit": "Nm", name: "0.01"})
+    parquet.write_table(pa.table([counts], schema=pa.schema([field])), tmp_path / "a.parquet")
+    for file in ("a.tdms", "a.parquet"):
+        with pytest.raises(InvalidError, match=f"beside {name} = 0.01"):
+            read_file(tmp_path / file, filename=file)
+
+
+@pytest.mark.parametrize(("title", "factor"), [("Mz x10", 0.1), ("Mz/100", 100.0), ("Mz x10 Nm", 0.1)])
+def test_a_mapped_title_that_may_be_scaled_is_refused_until_the_map_says_so(
+    tmp_path: Path, title: str, factor: float
+) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text(f"pressure_bar,speed_rpm,{title}\n5,100,20\n5,200,19\n", encoding="utf-8")
+    with pytest.raises(InvalidError, match=f"may be x{factor:g} Nm"):
+        read_file(file, filename="a.csv", reading=reading_of(f"torque_nm:{title}"))
+    for unit, expected in ((f"x{factor:g} Nm", 20 * factor), ("Nm", 20.0)):
+        columns = read_file(file, filename="a.csv", reading=reading_of(f"torque_nm:{title} [{unit}]")).columns
+        np.testing.assert_allclose(columns["torque_nm"][0], expected)
+
+
+@pytest.mark.parametrize(("title", "good", "bad"), [("M gültig", 1, 0), ("Quality", "Good", "Bad"), ("invalid", 0, 1)])
+def test_rows_that_a_column_marks_invalid_are_left_out(tmp_path: Path, title: str, good: object, bad: object) -> None:
+    marks = [bad if row == 3 else good for row in range(ROWS)]
+    lines = [f"{line},{mark}\n" for line, mark in zip(rows().splitlines(), marks, strict=True)]
+    (tmp_path / "a.csv").write_text(",".join(RECORD) + f",{title}\n" + "".join(lines), encoding="utf-8")
+    read = read_file(tmp_path / "a.csv", filename="a.csv")
+    np.testing.assert_allclose(read.columns["torque_nm"], np.delete(RECORD["torque_nm"], 3))
+    assert "invalid_samples" in [notice.code for notice in read.notices]
+
+
+def test_fractions_of_a_day_are_refused_until_the_map_says_what_they_are(tmp_path: Path) -> None:
+    lines = [f"{0.33 + row / 86400:.12f},5,{100 + row},20\n" for row in range(ROWS)]
+    (tmp_path / "a.csv").write_text("Time,pressure_bar,speed_rpm,torque_nm\n" + "".join(lines), encoding="utf-8")
+    with pytest.raises(InvalidError, match="may be days"):
+        read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("time_s:Time"))
+    read = read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("time_s:Time [d]"))
+    np.testing.assert_allclose(np.diff(read.columns["time_s"]), 1, atol=1e-4)
+
+
+def test_a_clock_above_the_table_of_a_sheet_is_used_and_a_hidden_sheet_is_not(tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    hidden = book.create_sheet("raw")
+    hidden.sheet_state = "hidden"
+    for one in book:
+        one.append(["Sampling cycle", "10ms"])
+        one.append(["Druck [bar]", "Drehzahl [1/min]", "M [Nm]"])
+        for row in zip(*(RECORD[name].tolist() for name in PLATEAUS), strict=True):
+            one.append(row)
+    book.save(tmp_path / "a.xlsx")
+    assert_record(read_file(tmp_path / "a.xlsx", filename="a.xlsx").columns)
 
 
 def _grouped(cell: str, decimal: str, thousands: str) -> str:

@@ -45,3 +45,14 @@ def test_units_are_converted(channel: str, unit: str, value: float, expected: fl
 )  # fmt: skip
 def test_units_of_something_else_are_not_known(channel: str, unit: str) -> None:
     assert conversion(channel, unit) is None
+
+
+@pytest.mark.parametrize(
+    ("channel", "unit", "factor"),
+    [("time_s", "10 ms", 0.01), ("time_s", "100ns", 1e-7), ("torque_nm", "0.1 Nm", 0.1), ("speed_rpm", "x1000 rpm", 1e3),
+     ("torque_nm", "10^-3 kNm", 1.0), ("time_s", "milliseconds since 2026-11-02 08:00:00", 1e-3)],
+)  # fmt: skip
+def test_a_multiple_of_a_unit_is_that_many(channel: str, unit: str, factor: float) -> None:
+    converted = conversion(channel, unit)
+    assert converted is not None
+    assert converted.factor == pytest.approx(factor)
