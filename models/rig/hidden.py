@@ -82,7 +82,10 @@ def hidden_in(run: SimulatedRun, clutch: SimulatedClutch, sizes: Mapping[str, fl
 def effect_of(slug: str) -> HiddenEffect:
     """The effect of this slug; raises ValueError that lists all of them."""
     if slug not in EFFECTS:
-        listed = ", ".join(f"{effect.slug} ({effect.size:g} {effect.unit})" for effect in EFFECTS.values())
+        listed = ", ".join(
+            f"{effect.slug} ({effect.meaning}: {effect.size:g}{effect.unit and ' '}{effect.unit})"
+            for effect in EFFECTS.values()
+        )
         raise ValueError(f"there is no hidden effect {slug!r}; there are, with their usual sizes: {listed}")
     return EFFECTS[slug]
 
@@ -218,7 +221,7 @@ def _accelerated_wear(size: float, rows: Rows) -> FloatArray:
 
 _ALL = (
     HiddenEffect(
-        slug="oil_temperature", meaning="power of the viscosity's ratio", unit="-", size=1.0, change=_oil_temperature
+        slug="oil_temperature", meaning="power of the viscosity's ratio", unit="", size=1.0, change=_oil_temperature
     ),
     HiddenEffect(
         slug="interface_heating",
@@ -228,7 +231,7 @@ _ALL = (
         change=_interface_heating,
     ),
     HiddenEffect(
-        slug="viscous_exponent", meaning="change of the exponent", unit="-", size=0.3, change=_viscous_exponent
+        slug="viscous_exponent", meaning="change of the exponent", unit="", size=0.3, change=_viscous_exponent
     ),
     HiddenEffect(slug="hydrodynamic_drag", meaning="drag in mid speed", unit="Nm", size=1.0, change=_hydrodynamic_drag),
     HiddenEffect(

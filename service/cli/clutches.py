@@ -46,7 +46,7 @@ def register(
         Path | None, typer.Option(exists=True, dir_okay=False, help="A JSON file with the clutch's record")
     ] = None,
 ) -> None:
-    """Register a clutch, so that runs of it can be sent; what is not given has the reference's values."""
+    """Register a clutch, so that runs of it can be sent; what you leave out is as in the reference paper."""
     fields: dict[str, Any] = {} if record is None else json.loads(record.read_bytes())
     if not isinstance(fields, dict):
         raise ValueError(f"{record} must hold a JSON object")  # noqa: TRY004  (a wrong file, not a wrong call)

@@ -175,8 +175,8 @@ def migrate(
 ) -> None:
     """Copy a database into another, SQLite's or PostgreSQL's, and compare all of it; no service may run on either.
 
-    Interrupted, it goes on where it was when the command is given again. The target is used by no service until all tables
-    are the same on both sides, and every run is as it was sent.
+    If it was interrupted, give the same command again: it goes on where it stopped. The target is used by no service until
+    all tables are the same on both sides, and every run is as it was sent.
     """
     from service.queries.verification import (  # start-up time
         check_inspections,  # start-up time

@@ -88,6 +88,8 @@ def _export(service: Service, clutch: str, out_folder: Path) -> None:
         _tables(service, clutch, results)
         _write(results / "about.json", _about(service, clutch_out, record))
     print_line(f"{count} runs of {clutch} in {out_folder}, results in {results}")
+    if not _parquet_can_be_written():
+        print_line("tables are CSV and XLSX only: for Parquet too, install pyarrow (the extra `parquet`)")
 
 
 def _tables(service: Service, clutch: str, folder: Path) -> None:
@@ -97,9 +99,13 @@ def _tables(service: Service, clutch: str, folder: Path) -> None:
     place.mkdir(exist_ok=True)
     for name, text in tables.items():
         (place / f"{name}.csv").write_text(text, encoding="utf-8", newline="")
-        if importlib.util.find_spec("pyarrow") is not None:
+        if _parquet_can_be_written():
             _write_parquet(place / f"{name}.csv")
     write_workbook(folder / "tables.xlsx", {name: csv.reader(io.StringIO(text)) for name, text in tables.items()})
+
+
+def _parquet_can_be_written() -> bool:
+    return importlib.util.find_spec("pyarrow") is not None  # an extra
 
 
 def _write_parquet(path: Path) -> None:

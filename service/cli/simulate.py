@@ -52,10 +52,13 @@ def simulate(
     ] = None,
     frequency: Annotated[
         list[float] | None,
-        typer.Option(min=0.01, max=5, help="Frequency of a dynamic test's speed [Hz]; repeated: a test each"),
+        typer.Option(
+            min=0.01, max=5, help="Frequency of the speed in dynamic tests, in Hz; given twice, each is tested at both"
+        ),
     ] = None,
     pressures: Annotated[
-        list[float] | None, typer.Option(min=4, max=8, help="A pressure of the tests [bar]; repeated: all of them")
+        list[float] | None,
+        typer.Option(min=4, max=8, help="A pressure of the tests in bar; repeat it for more of them"),
     ] = None,
     plan: Annotated[
         Path | None,

@@ -58,7 +58,7 @@ def relocate(database: Database, address: str, to: str) -> int:
         if not target.exists(name):
             raise ValueError(f"{target.address} lacks the blob {name}: copy all of {store.address} there first")
     if target.mark() != store.mark:
-        raise ValueError(f"{target.address} is no copy of {store.address}: the mark in it is another")
+        raise ValueError(f"{target.address} is no copy of {store.address}: it has the mark of another database")
     with database.writing() as connection:
         if raw_stores.numbers(connection).get(store.address, (0, 0))[1] != count:
             raise ValueError(f"a run has come in meanwhile: copy all of {store.address} there once more")
@@ -162,7 +162,7 @@ def _claim(database: Database, address: str) -> None:
 
 def _require_mark(store: BlobStore, mark: str) -> None:
     if store.mark() != mark:
-        raise ValueError(f"{store.address} is not marked as this database's: it is left as it is")
+        raise ValueError(f"{store.address} is not marked as this database's, so nothing in it was changed")
 
 
 def _store_at(database: Database, address: str) -> RawStore:

@@ -33,6 +33,12 @@ def table(
         shared = {name: value for name, value in item.items() if name not in left_out}
         parts: Sequence[Mapping[str, Any]] = (item.get(row_of) if row_of else None) or ({},)
         rows += [dict(_cells(shared | dict(part))) for part in parts]
+    names = {name for row in rows for name in row}
+    objects = {name for name in names if any(other.startswith(f"{name}.") for other in names)}
+    # of an object that only some items have the others say null, or nothing in braces
+    rows = [
+        {name: value for name, value in row.items() if name not in objects or value not in (None, {})} for row in rows
+    ]
     if library == "pandas":
         return importlib.import_module("pandas").DataFrame(rows)
     # of all rows: the first ones may have nulls where later ones have numbers

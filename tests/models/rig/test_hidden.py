@@ -65,7 +65,7 @@ def test_a_squeezed_film_is_in_the_clutch_only_where_it_is_hidden() -> None:
 
 def test_every_hidden_effect_is_of_the_catalogue_and_an_unknown_one_lists_them() -> None:
     assert EFFECTS.keys() <= {effect.slug for effect in CATALOGUE}
-    with pytest.raises(ValueError, match=r"torque_zero_shift \(1.5 Nm\)"):
+    with pytest.raises(ValueError, match=r"torque_zero_shift \(zero shift in the end: 1.5 Nm\)"):
         effect_of("warm_oil")
 
 

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from service.client.clutchlife import Client, ClutchlifeError, RefusedError, ServiceAwayError
-from service.client.clutchlife.tables import columns, table
+from service.client.clutchlife.tables import Frames, columns, table
 from tests.support import Server, free_port, serving, stationary
 
 ROOT = Path(__file__).parents[4]
@@ -108,6 +108,13 @@ def test_tables_have_a_column_for_each_part_of_an_item() -> None:
     assert table(ITEMS, "list") == ITEMS
     polars = pytest.importorskip("polars")
     assert isinstance(table(ITEMS, "polars"), polars.DataFrame)
+
+
+@pytest.mark.parametrize("library", ["pandas", "polars"])
+def test_an_object_that_only_some_items_have_is_no_empty_column_beside_its_own(library: Frames) -> None:
+    pytest.importorskip(library)
+    frame = table([{"a": 1, "b": None}, {"a": 2, "b": {"c": 3}}, {"a": 4, "b": {}}], library)
+    assert list(frame.columns) == ["a", "b.c"]
 
 
 def test_a_frame_has_a_row_for_each_measurement() -> None:
