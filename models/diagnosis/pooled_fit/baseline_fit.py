@@ -32,6 +32,7 @@ from models.diagnosis.pooled_fit.gauss_newton import STEPS, Fit, FitStatus, fit
 from models.diagnosis.pooled_fit.problem import FitProblem, priors_of
 from models.diagnosis.pooled_fit.projection import gram_of, likely_curve_gain
 from models.friction.identification import fit_curves
+from models.friction.stribeck import GAMMA
 from models.records.runs import Curve
 
 #: So many stationary runs are fitted curve by curve.
@@ -41,8 +42,8 @@ _EXPONENT = 0.8
 _ROBUST_STEPS = 4
 _LEAST_SHARE, _MOST_SHARE = 0.25, 0.6
 _DECAYS = (0.25, 0.6, 1.5)
-#: Where the law of V_S begins.
-_VELOCITY = 2 * BLOCK
+#: Where the laws of M_s, V_S and C_v begin.
+_STATIC, _VELOCITY, _VISCOUS = 0, 2 * BLOCK, 3 * BLOCK
 
 
 def starting_laws(design: Design, frame: Frame) -> Laws:
@@ -70,9 +71,20 @@ def starting_laws(design: Design, frame: Frame) -> Laws:
                 ]
                 if k == RATIO:
                     theta[LOG_DECAY] = np.log(decay * frame.span)
-    if _speeds(design).size < criteria.CURVE_SPEEDS:  # no curve determines V_S, and a fit does not leave V_S = 0
-        theta[_VELOCITY : _VELOCITY + 4] = *np.repeat(design.rows.velocity.min(), 2), 0.0, 0.0
+    if _speeds(design).size < criteria.CURVE_SPEEDS:
+        _share_torque(theta, design)
     return Laws(theta=theta, frame=frame)
+
+
+def _share_torque(theta: FloatArray, design: Design) -> None:
+    """Where no curve determines how torque is shared, V_S is the lowest speed, and half of torque is viscous, ageing as M_s:
+    from V_S = 0 or C_v < 0, where fits of single curves end, the pooled fit does not come back."""
+    lowest = float(design.rows.velocity.min())
+    ends = [float(np.median(design.torque[design.level == level])) for level in design.levels[[0, -1]]]
+    theta[_STATIC : _STATIC + 2] /= 2.0
+    theta[_VELOCITY : _VELOCITY + 4] = lowest, lowest, 0.0, 0.0
+    theta[_VISCOUS : _VISCOUS + 2] = 0.5 * np.array(ends) / lowest**GAMMA
+    theta[_VISCOUS + 2 : _VISCOUS + BLOCK] = theta[_STATIC + 2 : _STATIC + BLOCK]
 
 
 def _speeds(design: Design) -> FloatArray:
