@@ -53,7 +53,7 @@ def test_the_plate_is_measured_where_that_is_asked_for(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--hide", "warm_oil"), "oil_temperature (1 -), interface_heating (15 %)"),
+        (("--hide", "warm_oil"), "interface_heating (loss of torque at 0.32 W/mm²: 15 %)"),
         (("--hide", "shaft_ripple:loud"), "the size in Nm"),
     ],
 )
