@@ -12,6 +12,7 @@ from models.diagnosis.design.autocorrelation import Correlation, arma
 from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.explanations.verdict import Verdict
+from models.diagnosis.noise import estimate
 from models.diagnosis.noise.covariance import Noise, gains_of, whitened, without_gains
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
@@ -39,6 +40,18 @@ def test_noise_is_found_beside_something_smooth(design: Design, memory: float) -
     assert abs(share - 0.01) < 0.0012  # some 600 rows, and the correlation is estimated from few
     next_row = noise.plateaus.share * noise.plateaus.decay
     assert abs(next_row - memory) < 0.15
+
+
+def test_a_sharp_drop_is_no_noise(design: Design, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Traction near rest drops within three readings: the noise of real sweeps was taken for thirteen times what it is."""
+    monkeypatch.setattr(estimate, "_SHORT", 8)  # curves of 24 readings here: a third of the pieces holds the drop
+    white = np.random.default_rng(SEED).standard_normal(design.torque.size)
+    dropping = design.rows.steady & (design.rows.velocity < np.unique(design.rows.velocity[: design.plateaus])[3])
+    residual = 0.01 * design.torque * white / np.sqrt(design.samples) - np.where(dropping, design.torque, 0.0)
+    noise, assumed = estimate_noise(design, residual, design.torque, first_noise(design))
+    calm = np.flatnonzero(~dropping[: design.plateaus])
+    assert not assumed
+    assert 0.007 < np.median(noise.deviation[calm] / design.torque[calm]) < 0.015
 
 
 def test_a_flat_likelihood_does_not_choose_persistent_noise(design: Design) -> None:
