@@ -41,6 +41,8 @@ MINUTES ?= 10
 HELP := service/dashboard/help
 # what checks JavaScript: of `make check` alone, everything else needs Python only
 JAVASCRIPT := tests/javascript/node_modules
+# the pip of Python 3.11 reads the lists of packages with so many releases in more than twice the time
+PIP := "pip>=25.1"
 
 # what filterpy declares for its plots and no part of the product imports: 98 MB that stay out of every lock but that of the
 # tests, which draw the gallery; which is why locked
@@ -158,7 +160,7 @@ rivals: $(VENV)-rivals/.ready
 
 $(VENV)-rivals/.ready: pyproject.toml | $(VENV)/.python
 	$(PYTHON) -m venv $(VENV)-rivals
-	$(VENV)-rivals/bin/python -m pip install --quiet --disable-pip-version-check "pip>=25.1"
+	$(VENV)-rivals/bin/python -m pip install --quiet --disable-pip-version-check $(PIP)
 	$(VENV)-rivals/bin/python -m pip install --quiet --disable-pip-version-check --group rivals --editable .
 	@touch $@
 
@@ -167,6 +169,7 @@ $(VENV)/.python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Clutchlife needs Python 3.11 or later, '$(PYTHON)' is $$($(PYTHON) --version). Name another: make PYTHON=..." >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' || { echo "'$(PYTHON)' cannot make virtual environments; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(PIP)
 	@touch $@
 
 $(VENV)-lowest/.tests: pyproject.toml tests/requirements-lowest.txt | $(VENV)/.python
@@ -191,6 +194,7 @@ $(VENV)-generator/.ready: tests/requirements-generator.txt | $(VENV)/.python
 
 $(VENV)-docs/.ready: docs/requirements.txt | $(VENV)/.python
 	$(PYTHON) -m venv $(VENV)-docs
+	$(VENV)-docs/bin/python -m pip install --quiet --disable-pip-version-check $(PIP)
 	$(VENV)-docs/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r docs/requirements.txt
 	@touch $@
 
