@@ -111,7 +111,10 @@ def _clocks(
         own = [index for index in times if columns[index].group == columns[column.index].group]
         before = [index for index in own if index < column.index]
         if own:
-            clocks[column.index] = before[-1] if before else own[0]
+            chosen, recorder = before[-1] if before else own[0], columns[column.index].clock
+            coarse = np.unique(values[chosen]).size < values[chosen].size
+            finer = recorder if recorder is not None and coarse and _agree(recorder.read(), values[chosen]) else None
+            clocks[column.index] = finer or chosen
         else:
             clocks[column.index] = columns[column.index].clock or (times[0] if len(times) == 1 else None)
     for place, unused in enumerate(times):
@@ -282,11 +285,13 @@ def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Readin
         for index, column in enumerate(columns)
         if index not in used and (column.title or column.name) and not (reading.time == NO_TIME and _is_time(column))
     ]
+    part = [f"{column.channel} from {columns[column.index].shown()}" for column in taken if column.in_part]
+    notices = [Notice(code="name_in_part", message=f"names were understood in part: {', '.join(part)}")] if part else []
     if not others:
-        return []
+        return notices
     more = f" and {len(others) - _MAX_NAMED} more" if len(others) > _MAX_NAMED else ""
     message = f"columns that are no channel were left out: {', '.join(others[:_MAX_NAMED])}{more}"
-    return [Notice(code=LEFT_OUT, message=message)]
+    return [*notices, Notice(code=LEFT_OUT, message=message)]
 
 
 def _is_time(column: Column) -> bool:

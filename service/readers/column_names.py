@@ -4,6 +4,8 @@ import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
+from functools import lru_cache
 
 from service.columns import CHANNELS
 from service.errors import MAX_QUOTED, FieldError, InvalidError
@@ -13,41 +15,70 @@ from service.readers.unit_table import Conversion, conversion, is_unit, spelling
 
 #: Single letters have their meaning in mechanics: capitals count (M is a torque, n a speed, p a pressure, t a time).
 _LETTERS = {"M": "torque_nm", "n": "speed_rpm", "p": "pressure_bar", "t": "time_s"}
-
-_WORDS = {
-    "time_s": "time zeit timestamp timestamps zeitstempel elapsed_time elapsed messzeit time_stamp x_value datetime "
-    "date_time uhrzeit datum_zeit datum_uhrzeit datum/uhrzeit date/time temps tiempo tempo tout czas čas tijd tid zaman "
-    "时间 時間 時刻 время 시간",
-    "pressure_bar": "pressure druck line_pressure leitungsdruck anpressdruck kolbendruck "
-    "clutch_pressure kupplungsdruck piston_pressure druck_ist pressure_actual p_ist p_line pression presión presion "
-    "pressione pressão ciśnienie tlak tryck basınç druk 压力 油压 壓力 油壓 圧力 油圧 давление 압력",
-    "speed_rpm": "speed drehzahl rotational_speed rotation_speed shaft_speed differential_speed slip_speed motor_speed "
-    "relative_speed drehgeschwindigkeit winkelgeschwindigkeit angular_velocity angular_speed differenzdrehzahl "
-    "schlupfdrehzahl motordrehzahl drehzahl_ist n_ist n_motor n_rel n_diff omega speed_actual rpm vitesse "
-    "vitesse_de_rotation velocidad velocidad_de_giro velocità velocidade rotação prędkość prędkość_obrotowa otáčky "
-    "toerental varvtal devir hız 회전수 转速 轉速 回転数 回転速度 частота_вращения обороты",
-    "torque_nm": "torque drehmoment moment friction_torque reibmoment clutch_torque kupplungsmoment "
-    "drehmoment_ist torque_actual m_ist m_d md m_r couple couple_de_frottement par par_motor par_de_fricción coppia "
-    "binário koppel vridmoment kroutící_moment moment_obrotowy tork 扭矩 转矩 轉矩 トルク 摩擦トルク момент 토크",
-    "torque_sd_nm": "torque_sd torque_std torque_deviation standard_deviation_of_torque "
-    "drehmoment_standardabweichung standardabweichung_drehmoment",
-    "oil_temperature_c": "oil_temperature oil_temp oiltemperature oiltemp öltemperatur öltemp t_oil t_öl toil töl "
-    "temperature_oil temperatur_öl theta_oil theta_öl sump_temperature sumpftemperatur oil_sump_temperature "
-    "température_d'huile température_huile temperatura_del_aceite temperatura_aceite temperatura_olio 油温 油溫",
-    "plate_temperature_front_c": "plate_temperature_front front_plate_temperature plate_temp_front t_plate_front "
-    "temperature_plate_front theta_plate_front plattentemperatur_vorn plattentemperatur_vorne lamellentemperatur_vorn "
-    "lamellentemperatur_vorne t_platte_vorn t_lamelle_vorn plate_temperature plate_temp t_plate plattentemperatur "
-    "lamellentemperatur t_lamelle",
-    "plate_temperature_rear_c": "plate_temperature_rear rear_plate_temperature plate_temp_rear t_plate_rear "
-    "temperature_plate_rear theta_plate_rear plattentemperatur_hinten lamellentemperatur_hinten t_platte_hinten "
-    "t_lamelle_hinten",
+#: Names that are no words: LabVIEW's of its times, and a unit that stands for what is in it.
+_NAMES = {name: name for name in CHANNELS} | {"x_value": "time_s", "rpm": "speed_rpm"}
+#: Quantity -> the words that name it. One with a dash may also end a compound (Anpressdruck, 油压, Messzeit).
+_NOUNS = {
+    "time_s": "time -zeit temps tiempo tempo tout -stamp timestamps -stempel date datum datetime fecha elapsed čas czas "
+    "tijd tid zaman -时间 -時間 -時刻 -日時 время 시간",
+    "pressure_bar": "pressure press -druck pression presión presion pressione pressão ciśnienie tlak tryck basınç druk "
+    "-压力 -油压 -壓力 -油壓 -圧力 -油圧 давление -압력",
+    "speed_rpm": "speed spd velocity -drehzahl -geschwindigkeit omega vitesse velocidad velocità velocidade rotação "
+    "prędkość otáčky toerental varvtal devir hız -회전수 -转速 -轉速 -回転数 -回転速度 обороты -frequenz frequency "
+    "frecuencia fréquence частота",
+    "torque_nm": "torque trq tq md -moment couple par coppia binário koppel vridmoment tork -扭矩 -转矩 -轉矩 -トルク "
+    "момент -토크",
+    "temperature": "temperature temp oiltemp oiltemperature -temperatur température temperatura theta -温 -溫 температура",
 }
-#: Words of time, within any name.
-_TIMES = (
-    "time", "zeit", "temps", "tiempo", "tempo", "stamp", "date", "datum", "index", "时间", "時間", "時刻", "日時", "время",
-)  # fmt: skip
+#: Letters that stand for a quantity beside another word or a unit, which decides between several.
+_SYMBOLS = {
+    "p": ("pressure_bar",), "n": ("speed_rpm",), "m": ("torque_nm",), "t": ("time_s", "torque_nm", "temperature"),
+}  # fmt: skip
+#: Words at a name that say that its values are means.
+_MEANS = {"mean", "average", "avg", "ave", "mittelwert", "mittel", "moyenne", "moy", "media"}
+#: Words that leave a quantity that of the clutch.
+_PLAIN = (
+    "ist act actual istwert messwert measured sensor signal channel kanal clutch kupplung kupplungs embrayage embrague of "
+    "the de del der des di du d"
+)
+_PLAIN_OF = {
+    "time_s": "standardmessrate time zeit mess uhr date datum elapsed hora y und and",
+    "pressure_bar": "line leitung leitungs anpress kolben piston",
+    "speed_rpm": "rotational rotation shaft differential diff slip motor relative rel dreh winkel angular differenz schlupf "
+    "giro obrotowa drum trommel welle вращения",
+    "torque_nm": "friction reib frottement fricción dreh motor obrotowy kroutící 摩擦 r",
+    "temperature": "",
+}
+_OIL = {
+    "oil",
+    "oiltemp",
+    "oiltemperature",
+    "öl",
+    "sump",
+    "sumpf",
+    "huile",
+    "aceite",
+    "olio",
+    "óleo",
+    "oleju",
+    "масла",
+    "油",
+}
+_PLATE, _REAR = {"plate", "platte", "platten", "lamelle", "lamellen"}, {"rear", "hinten"}
+_SPREAD = {"sd", "std", "deviation", "standard", "standardabweichung"}
+#: Beginnings of words that make it another thing than what is measured at the clutch.
+_OTHER = re.compile(
+    "set|soll|sp$|target|ziel|cmd|command|demand|anford|ref|desired|consign|nomin|nenn|rated|lim|grenz|alarm|warn|max|min|"
+    "peak|spitz|sd$|std|stand|devia|abweich|err|fehl|difference|ratio|rate|grad|deriv|änderung|offset|zero|null|tar[ae]$|"
+    "gain|coef|koef|calc|berech|estim|model|simul|predict|drag|schlepp|bearing|lager|loss|verlust|lube|schmier|ambient|"
+    "umgeb|baro|luft|air$|supply|versorg|tank|pump|fan$|raw$|roh$"
+)
 #: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports, Simulink's.
 _SECONDS = frozenset({"x_value", "timestamps", "tout"})
+
+_FREQUENCY = re.compile("fr[eé]qu?[eu]|frecu|частота")
+#: Channels in whose unit another column may be the one that is meant.
+_MEASURED = ("pressure_bar", "speed_rpm", "torque_nm")
 
 #: Columns that one message names.
 _MAX_NAMED = 10
@@ -58,7 +89,7 @@ class Taken:
     """A column that is taken: the file's `index`-th as `channel`, with its conversion to the channel's unit.
 
     `assumed`: neither file nor caller states a unit, and the channel's own was taken. `guessed`: a time by its unit and a
-    word in its name, which its values must bear out.
+    word in its name, which its values must bear out. `in_part`: words of its name are not known, and no other column fits.
     """
 
     channel: str
@@ -66,6 +97,7 @@ class Taken:
     conversion: Conversion
     assumed: bool = False
     guessed: bool = False
+    in_part: bool = False
 
 
 def _key(name: str) -> str:
@@ -78,18 +110,23 @@ def _key(name: str) -> str:
     return re.sub(r"[\s._\-]+", "_", plain).strip("_")
 
 
-_BY_KEY = {_key(word): channel for channel, words in _WORDS.items() for word in words.split()}
-_BY_KEY |= {name: name for name in CHANNELS}
-#: What in a name may say that its values are multiples.
-_SCALED = re.compile(r"(?P<sign>[x×*·/]) ?(?P<number>10+|0[.,]0*1)(?![\d^])")
-#: Words at either end of a name that say that its values are means.
-_MEAN = re.compile(
-    r"(?:^(?:mean|average|avg|ave)|[\s_./(-]+(?:mean|average|avg|ave|mittel(?:wert)?|moyenne|moy|media)\)?$)[\s_.-]*",
-    re.I,
+_QUANTITIES = {word.strip("-"): quantity for quantity, words in _NOUNS.items() for word in words.split()}
+_ENDS = [word.strip("-") for words in _NOUNS.values() for word in words.split() if word.startswith("-")]
+_NEUTRAL = {quantity: _MEANS.union(f"{_PLAIN} {words}".split()) for quantity, words in _PLAIN_OF.items()}
+#: What in a name may say that its values are multiples: `x10`, `/100`, `(10^-3)`, `gain 10`, `10*M`.
+_SCALED = re.compile(
+    r"(?P<over>/ ?)(?P<number>10+|0[.,]0*1)(?![\d^.,])"
+    r"|(?:(?<![^\W_])[x×]|[*·(]|fa[ck]tor|gain|scale|times)[ :=]*"
+    r"(?:(?P<times>10{1,6}|0[.,]0*1)(?![\d^.,]\d?)|10\^(?P<power>[+-]?\d))"
+    r"|(?<![\w.,])(?P<before>10{1,6}|0[.,]0*1) ?(?:[x×](?![^\W_])|[*·])",
+    re.IGNORECASE,
 )
 _WIDE = str.maketrans("（）［］｛｝，／：【】", "()[]{},/:[]")
 _BRACKETED = re.compile(
     r"(?P<name>.*?)\s*/?\s*(?:\[(?P<square>[^\[\]]*)\]|[({<](?P<unit>[^\[\](){}<>]*)[)}>])[\s:.]*", re.DOTALL
+)
+_RANGE = re.compile(
+    r"(?:(?P<least>[+-]?\d+)(?:[.,]\d+)? ?(?:\.{2,3}|…|-|–|to|bis) ?|±|\+/-)(?P<most>[+-]?\d+)(?:[.,]\d+)? ?(?=1/|[^\W\d])"
 )
 #: Where a word of a title may begin: after what is no letter or digit, and at a capital after a small
 #: letter that is no prefix of a unit (kNm).
@@ -98,18 +135,80 @@ _WORD_STARTS = re.compile(r"(?<![^\W_])(?=[^\W_°])|(?<=[a-jln-zäöüß])(?=[A-
 _BETWEEN = re.compile(r"\s*[,;:|]\s*|\s*/\s*|\s+in\s+|[\s_]+")
 
 
-def known_channel(name: str) -> str | None:
-    """The public channel that a name stands for, or None; what follows a backslash names a device (`torque\\CAN:1`), and a
-    mean may be said to be one (`Torque/AVE`)."""
+class Sense(Enum):
+    """How a name is understood: wholly; but for words that are not known; as another thing (a set point, a limit); not."""
+
+    WHOLE, PART, OTHER, UNKNOWN = range(4)
+
+
+@lru_cache(maxsize=4096)
+def meaning(name: str, unit: str | None = None) -> tuple[str | None, Sense]:
+    """The channel that a name and its unit stand for, and how well they are understood.
+
+    One quantity's noun, or without any its symbol, names the channel; the other words leave it that of the clutch, make it
+    another thing, or are not known. What follows a backslash names a device (`torque\\CAN:1`); numbers and few letters
+    before them are labels (`CH1-1`). A symbol, and a name that is understood in part, must have a unit that fits.
+    """
     bare = name.partition("\\")[0].strip()
-    if not 1 < len(bare) <= LONGEST_NAME:
-        return _LETTERS.get(bare)
-    return _BY_KEY.get(_key(bare)) or _BY_KEY.get(_key(_MEAN.sub("", bare)))
+    key = _key(bare) if len(bare) <= LONGEST_NAME else ""
+    if known := _LETTERS.get(bare) or _NAMES.get(key):
+        return known, Sense.WHOLE
+    words = _words(bare) if key else []
+    parts = [(word, next((end for end in _ENDS if word.endswith(end)), word)) for word in words]
+    parts = [(word, word if word in _QUANTITIES else noun) for word, noun in parts]
+    quantities = {_QUANTITIES[noun] for _, noun in parts if noun in _QUANTITIES}
+    rest = {word.removesuffix(noun) if noun in _QUANTITIES else word for word, noun in parts} - {""}
+    by_noun = bool(quantities)
+    if not by_noun:
+        symbol = next((word for word in words if word in _SYMBOLS), "")
+        quantities = {q for q in _SYMBOLS.get(symbol, ()) if (len(words) > 1 and unit is None) or _measures(q, unit)}
+        quantities = {"temperature"} & quantities if rest & (_OIL | _PLATE) else quantities - {"temperature"}
+    if len(quantities) != 1:
+        return None, Sense.UNKNOWN
+    (quantity,) = quantities
+    rest -= {word for word, of in _SYMBOLS.items() if quantity in of} | _NEUTRAL[quantity]
+    channel = quantity
+    if quantity == "temperature":
+        hot = rest | set(words)
+        channel = "oil_temperature_c" if hot & _OIL else "plate_temperature_" + ("rear_c" if hot & _REAR else "front_c")
+        if not hot & (_OIL | _PLATE):
+            return None, Sense.UNKNOWN
+        rest -= _OIL | _PLATE | _REAR | {"front", "vorn", "vorne"}
+    elif quantity == "torque_nm" and rest & _SPREAD:
+        channel, rest = "torque_sd_nm", rest - _SPREAD
+    if any(map(_OTHER.match, rest)):
+        return None, Sense.OTHER
+    if any(_FREQUENCY.search(noun) for _, noun in parts) and (rest or len(words) == 1 == len(set(parts[0]))):
+        return None, Sense.UNKNOWN
+    if not rest and (by_noun or unit is None or _measures(quantity, unit)):
+        return channel, Sense.WHOLE
+    return (channel, Sense.PART) if _measures(quantity, unit) else (None, Sense.UNKNOWN)
+
+
+def _words(name: str) -> list[str]:
+    """The words of a name in small letters, without labels that end in a number."""
+    apart = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name)
+    return re.findall(r"[^\W\d_]+", re.sub(r"(?<![^\W_])(?:ch|ai|cnt|kanal|[a-z])?\d+(?![^\W_])", " ", _key(apart)))
+
+
+def _measures(quantity: str, unit: str | None) -> bool:
+    """Whether a unit is one of a quantity's."""
+    return unit is not None and conversion(quantity if quantity in CHANNELS else "oil_temperature_c", unit) is not None
+
+
+def known_channel(name: str) -> str | None:
+    """The public channel that a name stands for, whatever its unit, or None."""
+    channel, sense = meaning(name)
+    return channel if sense is Sense.WHOLE else None
+
+
+def _is_another(name: str) -> bool:
+    return any(map(_OTHER.match, _words(name[:LONGEST_NAME])))
 
 
 def is_time(column: Column) -> bool:
     """Whether a column is a time by its name, or may be one by its unit."""
-    return known_channel(column.name) == "time_s" or _may_be_time(column)
+    return meaning(column.name, column.unit)[0] == "time_s" or _may_be_time(column)
 
 
 def is_counter(column: Column) -> bool:
@@ -136,12 +235,13 @@ def column_of(text: str, unit: str | None = None, group: str = "") -> Column:
 
 
 def _taken_apart(title: str) -> tuple[str, str | None]:
-    if known_channel(title):
-        return title, None
     if match := _BRACKETED.fullmatch(title):
         return match["name"].strip(), bare_unit(match["square"] if match["unit"] is None else match["unit"])
+    if known_channel(title):
+        return title, None
     for name, unit in _endings(title):
-        if is_unit(unit) and (known_channel(name) or _stands_apart(title, name, unit)):
+        channel = meaning(name, unit)[0] if is_unit(unit) else None
+        if (channel and conversion(channel, unit)) or (is_unit(unit) and _stands_apart(title, name, unit)):
             return name, unit
     return title, None
 
@@ -161,15 +261,20 @@ def _endings(title: str) -> Iterator[tuple[str, str]]:
 
 
 def bare_unit(text: str) -> str | None:
-    """A unit without its brackets; None where nothing is stated."""
+    """A unit without its brackets and the range of its sensor (`0..10 bar`, `±200 Nm`); None where nothing is stated."""
     unit = text.translate(_WIDE).strip()
     unit = (unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()", "{}", "<>") else unit).strip().removeprefix("in ")
+    within = _RANGE.match(unit)
+    if within and (not within["least"] or float(within["least"]) < float(within["most"])):
+        unit = unit[within.end() :]
     return unit if re.search(r"[^-_=?.*/|\s]", unit) else None
 
 
 def with_unit(column: Column, unit: str | None) -> Column:
     """A column with the unit that the file states beside the name; raises InvalidError where the name states another."""
     stated = bare_unit(unit or "")
+    if stated and column.unit and is_unit(stated) and not is_unit(column.unit):
+        return replace(column, name=column.title, unit=stated)  # `Torque (filtered)` is no unit
     if stated and column.unit and stated != column.unit:
         channel = known_channel(column.name)
         if channel is None or conversion(channel, stated) != conversion(channel, column.unit):
@@ -222,7 +327,7 @@ def recognised(titles: Sequence[str], named: Sequence[str]) -> int:
     for title in titles:
         if 0 < len(title) <= LONGEST_TITLE:
             column = column_of(title)
-            channel = known_channel(column.name) or ("time_s" if is_time(column) else None)
+            channel = "time_s" if is_time(column) else meaning(column.name, column.unit)[0]
             keys = {_key(title), _key(column.name)} & wanted
             channels |= keys or ({channel} if channel else set())
     return len(channels)
@@ -240,29 +345,39 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
     if len(by_map) < len(named):
         shown = ",".join(f"{name}:{choice.column}" for name, choice in named.items())
         raise _wrong_map(shown, "must not name one column for two channels")
+    senses = [meaning(column.name, column.unit) for column in columns]
     indices: dict[str, list[int]] = {}
-    for index, column in enumerate(columns):
-        channel = by_map.get(index) or (None if reading.only_named else known_channel(column.name))
-        if channel is None or (channel in named and index not in by_map):
-            continue
-        if channel == "time_s" and reading.time == NO_TIME:
-            continue
-        indices.setdefault(channel, []).append(index)
+    in_part: dict[str, list[int]] = {}
+    for index, (channel, sense) in enumerate(senses):
+        if index in by_map:
+            indices.setdefault(by_map[index], []).append(index)
+        elif (
+            channel
+            and channel not in named
+            and not reading.only_named
+            and (channel, reading.time) != ("time_s", NO_TIME)
+        ):
+            (indices if sense is Sense.WHOLE else in_part).setdefault(channel, []).append(index)
     for channel, positions in indices.items():
-        plain = [index for index in positions if not _MEAN.search(columns[index].name)]
+        # neither a mean beside the signal itself nor what stands in a group of set points
+        plain = [i for i in positions if not (_MEANS & {*_words(columns[i].name)} or _is_another(columns[i].group))]
         if len(positions) > len(plain) > 0:
-            positions = indices[channel] = plain  # a mean beside the signal itself
+            positions = indices[channel] = plain
         if len(positions) > 1 and channel != "time_s":
             raise _twice(channel, *(columns[index] for index in positions))
-    guessed = {
-        index
-        for index, column in enumerate(columns)
-        if not ({"time_s"} & {*indices, *named})
-        and reading.time != NO_TIME
-        and not reading.only_named
-        and index not in by_map
-        and _may_be_time(column)
-    }
+    guessed: set[int] = set()
+    if not ({"time_s"} & {*indices, *named} or reading.time == NO_TIME or reading.only_named):
+        unknown = [
+            i for i, (channel, sense) in enumerate(senses) if sense is Sense.UNKNOWN and _may_be_time(columns[i])
+        ]
+        guessed = {*in_part.pop("time_s", () if by_map else unknown)}
+    for channel, positions in in_part.items():
+        rivals = [
+            index for index, (_, sense) in enumerate(senses)
+            if sense is Sense.UNKNOWN and index not in by_map and _measures(channel, columns[index].unit)
+        ]  # fmt: skip
+        if channel not in indices and len(positions) == 1 and (not rivals or channel not in _MEASURED):
+            indices[channel] = positions
     if not indices:
         raise InvalidError(f"the file holds no known channel: it has {_list(columns)}; {remedy(columns)}")
     if guessed:
@@ -278,22 +393,16 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
                 continue
             converted = _conversion(channel, columns[index], choice, unit)
             assumed = unit is None and not public
-            taken.append(Taken(channel, index, converted, assumed, channel == "time_s" and index in guessed))
+            in_part_only = senses[index][1] is Sense.PART and index not in by_map
+            taken.append(Taken(channel, index, converted, assumed, index in guessed, in_part_only))
     if without_unit:
         raise _no_unit(without_unit, reading)
     return sorted(taken, key=lambda column: column.index)
 
 
 def _may_be_time(column: Column) -> bool:
-    """Whether a column in a unit of time has a word of time in its name, or no name."""
-    name = column.name.casefold()
-    timed = name in ("", "t") or any(word in name for word in _TIMES)
-    return (
-        timed
-        and known_channel(column.name) is None
-        and column.unit is not None
-        and conversion("time_s", column.unit) is not None
-    )
+    """Whether a column that is in a unit of time may be the clock, if its values run on as one."""
+    return meaning(column.name, column.unit)[1] is Sense.UNKNOWN and _measures("time_s", column.unit)
 
 
 def _no_unit(columns: Sequence[tuple[str, Column]], reading: Reading) -> InvalidError:
@@ -359,11 +468,7 @@ def unit_in_title(channel: str, title: str) -> str | None:
 
 
 def _may_state(channel: str, title: str) -> str | None:
-    """A word within a title that is another unit than the channel's own (`Mz [kNm] filtered`), or the unit of a title that
-    may say that its values are scaled (`Mz x10`, `Mz/10`); None where there is none."""
-    if scaled := _SCALED.search(title[:LONGEST_NAME]):
-        factor = float(scaled["number"].replace(",", "."))
-        return f"x{factor if scaled['sign'] == '/' else 1 / factor:g} {CHANNELS[channel].unit}"
+    """A word within a title that is another unit than the channel's own (`Mz [kNm] filtered`); None where there is none."""
     for word in re.finditer(r"[^\W\d_]{2,}(?:/[^\W\d_]+)?", title[:LONGEST_NAME]):
         for part in (word[0], word[0][-3:]):
             converted = conversion(channel, part)
@@ -375,15 +480,32 @@ def _may_state(channel: str, title: str) -> str | None:
 def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
     """The unit that the file, the map or the profile states; None where none does.
 
-    A column that a map names may end in its unit, whatever parts them.
+    A column that a map names may end in its unit, whatever parts them. Where a title says that its values are scaled, only
+    the map says how.
     """
-    if choice is None:
-        return "s" if column.unit is None and _key(column.name) in _SECONDS else column.unit
     public = _key(column.name) == channel
-    scaled = _SCALED.search(column.name) is not None
-    stated = column.unit or (None if public or scaled else unit_in_title(channel, column.name))
-    wanted = choice.unit or (None if choice.column == column.title else column_of(choice.column).unit)
-    if wanted and stated not in (None, choice.stated) and conversion(channel, stated) != conversion(channel, wanted):
+    scaled = None if public else _SCALED.search(column.name[:LONGEST_NAME])
+    ends_in = None if choice is None or public or scaled else unit_in_title(channel, column.name)
+    stated = column.unit or ends_in
+    exact = choice is None or choice.column == column.title
+    wanted = None if choice is None else choice.unit or (None if exact else column_of(choice.column).unit)
+    if scaled and wanted is None and (choice is None or choice.factor == 1):
+        number = float(
+            (scaled["number"] or scaled["times"] or scaled["before"] or f"1e{scaled['power']}").replace(",", ".")
+        )
+        own = stated or CHANNELS[channel].unit
+        factor = number if scaled["over"] else 1 / number
+        named, others = f"map={channel}:{column.name}", f"[x{1 / factor:g} {own}] or [x1 {own}]"
+        rule = f"may be x{factor:g} {own}: {named} [x{factor:g} {own}], {others} says which"
+        raise _wrong_unit(channel, column, "missing_unit", rule, "no clear one")
+    if choice is None:
+        return "s" if stated is None and _key(column.name) in _SECONDS else stated
+    if (
+        not scaled
+        and wanted
+        and stated not in (None, choice.stated)
+        and conversion(channel, stated) != conversion(channel, wanted)
+    ):
         rule = f"must be {wanted}, as its profile or map says"
         raise _wrong_unit(channel, column, "mixed_units", rule, repr(stated[:MAX_QUOTED]))
     unit = wanted or stated

@@ -12,9 +12,9 @@ from itertools import pairwise, zip_longest
 from typing import Any
 
 from service.errors import MAX_QUOTED, InvalidError, Notice
-from service.readers.column_names import bare_unit, column_of, known_channel, recognised
+from service.readers.column_names import bare_unit, column_of, known_channel, recognised, with_unit
 from service.readers.limits import LONGEST_TITLE, LONGEST_UNIT
-from service.readers.numerals import NUMBER, is_stamp
+from service.readers.numerals import NUMBER, is_stamp, with_unit_apart
 from service.readers.table import Column
 from service.readers.unit_table import conversion, is_unit
 
@@ -57,7 +57,7 @@ class Layout:
         return tuple(
             replace(column_of(title, group=group), unit="s")
             if _is_moment(cell) or _is_word(title, cell)
-            else column_of(title, unit, group)
+            else with_unit(column_of(title, unit, group), with_unit_apart(cell)[1])
             for title, unit, group, cell in self.headings
         )
 
@@ -123,7 +123,7 @@ def is_blank(row: Row) -> bool:
 def is_value(cell: Any) -> bool:
     """Whether a cell is a number or a point in time."""
     if isinstance(cell, str):
-        return bool(cell) and (NUMERIC.fullmatch(cell) is not None or is_stamp(cell))
+        return bool(cell) and (NUMERIC.fullmatch(cell) is not None or is_stamp(cell) or bool(with_unit_apart(cell)[1]))
     return cell is not None and not isinstance(cell, bool)
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
 from service.readers.table import Reading, Table, marks, place
+from service.readers.unit_table import is_unit
 
 #: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_arrays` refuses with their row. Digits
 #: are never given back, or a long run of them with a letter behind it would be tried from every digit to every other.
@@ -35,6 +36,19 @@ def _readable(decimal: str, groups: str) -> re.Pattern[str]:
     return re.compile(rf"[+-]?(?:{grouped}|\d+{d}?\d*(?:[eE][+-]?\d+)?|{d}\d+(?:[eE][+-]?\d+)?)", re.ASCII)
 
 
+#: A number with its unit behind it.
+_WITH_UNIT = re.compile(
+    r"(?P<number>[+−-]? *(?:\d[\d.,'’\u00a0\u202f\u2009]*+|[.,]\d++)(?:[eE][+-]?\d{1,4})?) ?"
+    r"(?P<unit>(?:1/)?[^\W\d_].{0,20}|[°%].{0,9})"
+)
+
+
+def with_unit_apart(cell: Any) -> tuple[Any, str]:
+    """A cell that holds a number and its unit (`12,5 Nm`), as both; any other cell and no unit."""
+    match = _WITH_UNIT.fullmatch(cell.strip()) if isinstance(cell, str) else None
+    return (match["number"], match["unit"]) if match and is_unit(match["unit"]) else (cell, "")
+
+
 _READABLE = {".": _readable(".", ","), ",": _readable(",", ".")}
 
 
@@ -42,7 +56,8 @@ def _decimals(cell: Any) -> list[str]:
     """The decimal signs by which a cell with a sign can be read."""
     if not isinstance(cell, str) or ("." not in cell and "," not in cell):
         return []
-    return [decimal for decimal, number in _READABLE.items() if number.fullmatch(cell.strip())]
+    bare = with_unit_apart(cell)[0].strip()
+    return [decimal for decimal, number in _READABLE.items() if number.fullmatch(bare)]
 
 
 class Numerals:
@@ -53,7 +68,9 @@ class Numerals:
         self.decimal = reading.decimal
         self._missing = {"", *marks(reading.missing)}
         self._stamps: dict[int, Stamps] = {}
+        self._units: dict[int, str] = {}
         self._origin: list[int] = []
+        self._zones: set[str] = set()
 
     def settle(self, columns: Sequence[Sequence[Any]]) -> bool:
         """Learn the decimal sign from columns of cells; whether it is still open and a cell may be read in two ways."""
@@ -83,7 +100,7 @@ class Numerals:
             for name, cells in zip(channels.values(), columns, strict=True):
                 for row, cell in enumerate(cells):
                     if len(_decimals(cell)) > 1:
-                        raise _doubtful(name, before + row, cell.strip(), line_of)
+                        raise _doubtful(name, before + row, with_unit_apart(cell)[0].strip(), line_of)
         read: dict[int, NDArray[Any]] = {}
         wrong: list[tuple[int, str, str, str]] = []
         total = 0
@@ -97,7 +114,8 @@ class Numerals:
             values = self._moments(index, cells) if name == "time_s" and not wrong else None
             values = self._floats(cells) if values is None else values
             values = self._with_gaps(cells) if values is None else values
-            for row, rule in self._wrong(cells, name == "time_s") if values is None else ():
+            values = self._without_units(index, cells) if values is None else values
+            for row, rule in self._wrong(index, cells, name == "time_s") if values is None else ():
                 total += 1
                 if total <= MAX_ERRORS:
                     wrong.append((before + row, name, _shown(cells[row]), rule))
@@ -122,7 +140,7 @@ class Numerals:
             cells = [cell.isoformat() for cell in cells]
         elif kinds != {str} or (index not in self._stamps and not is_stamp(cells[0])):
             return None
-        return self._stamps.setdefault(index, Stamps(self._origin)).since_first(cells)
+        return self._stamps.setdefault(index, Stamps(self._origin, self._zones)).since_first(cells)
 
     def _floats(self, cells: Sequence[Any]) -> FloatArray | None:
         """Cells as numbers; None where one is none, or not by this file's decimal sign."""
@@ -162,12 +180,23 @@ class Numerals:
         )
         return None if values is None else np.ma.MaskedArray(values, mask=gaps)
 
-    def _wrong(self, cells: Sequence[Any], timed: bool) -> Iterator[tuple[int, str]]:
+    def _without_units(self, index: int, cells: Sequence[Any]) -> NDArray[Any] | None:
+        """Cells as numbers that all have behind them the unit of the column's first; None where one has not."""
+        unit = self._units.setdefault(index, next((unit for _, unit in map(with_unit_apart, cells) if unit), ""))
+        held = [cell.strip() if isinstance(cell, str) else cell for cell in cells]
+        if not unit or not all(cell in (None, "") or (isinstance(cell, str) and cell.endswith(unit)) for cell in held):
+            return None
+        bare = [(cell or "").removesuffix(unit).rstrip() for cell in held]
+        values = self._floats(bare)
+        return self._with_gaps(bare) if values is None else values
+
+    def _wrong(self, index: int, cells: Sequence[Any], timed: bool) -> Iterator[tuple[int, str]]:
         """The rows of a column that are no numbers, each with the rule that it breaks."""
         swapped = Numerals(Reading(decimal="," if self.decimal == "." else "."))
         for row, cell in enumerate(cells):
-            if self._floats([cell]) is None:
-                rule = "must be a number"
+            unit = self._units.get(index, "")
+            if (self._without_units(index, [cell]) if unit else self._floats([cell])) is None:
+                rule = f"must be a number in {unit}, as the first" if unit else "must be a number"
                 if self.decimal and isinstance(cell, str) and swapped._floats([cell]) is not None:
                     rule = f"must have the decimal sign {self.decimal!r} as before"
                 yield (
@@ -237,11 +266,25 @@ def _doubtful(name: str, row: int, cell: str, line_of: Callable[[int], int] | No
 
 # --- points in time ---
 
-_DATE = r"(?P<date>\d{1,4}[-/.年]\d{1,2}[-/.月]\d{1,4}日?|\d{1,2}[- ][A-Za-z]{3}[- ]\d{4})"
+_DATE = r"(?P<date>\d{1,4}[-/.年]\d{1,2}[-/.月]\d{1,4}日?)"
+#: Beginnings of the months' names in English, German, French, Spanish, Italian and Portuguese.
+_MONTHS = {
+    name: month
+    for month, names in {
+        1: "jan jän gen ene", 2: "feb fév fev", 3: "mar mär mrz", 4: "apr avr abr", 5: "may mai mag", 6: "jun juin giu",
+        7: "jul juil lug", 8: "aug aoû ago", 9: "sep set", 10: "oct okt ott out", 11: "nov", 12: "dec dez déc dic",
+    }.items()
+    for name in names.split()
+}  # fmt: skip
+_NAMED = re.compile(
+    r"(?:[^\W\d]{2,10}[.,]{0,2} )?(?:(?P<day>\d{1,2})(?:\.|st|nd|rd|th)?[ /-]?(?:de )?)?(?P<month>[^\W\d]{3,10})\.?[ /-]?"
+    r"(?:de )?(?(day)|(?P<second>\d{1,2},? ))(?P<year>\d{4}|\d\d)(?!\d)"
+)
 _STAMP = re.compile(
     rf"(?:{_DATE}[T ,]*)?(?:(?P<days>-?\d+) days?,? *)?"
     r"(?:(?P<sign>[+-]?)(?P<first>\d{1,4}):(?P<second>\d{1,2})(?::(?P<third>\d{1,2}))?(?:[.,:](?P<fraction>\d{1,9}))?)?"
-    r" ?(?P<half>[AaPp][Mm])?(?: ?(?:Z|UTC|GMT)| ?(?P<zone>[+-]\d\d:?\d\d))?",
+    r" ?(?P<half>[AaPp]\.? ?[Mm]\.?)?(?: ?(?:(?P<utc>Z|UTC|GMT)|(?P<zone>[+-]\d\d:?\d\d)))?"
+    r"(?: ?\[?(?P<named>[A-Z]{2,5}|[A-Z][A-Za-z]{1,14}/[A-Z][A-Za-z_]{1,20})\]?)?",
     re.ASCII,
 )
 #: Durations as MATLAB (`0.01 sec`) and ISO 8601 (`PT0.01S`, polars) write them.
@@ -259,8 +302,6 @@ _ORDERS = (
     "%Y年%m月%d日",
     "%d.%m.%Y",
     "%d-%m-%Y",
-    "%d-%b-%Y",
-    "%d %b %Y",
     "%d.%m.%y",
 )
 #: The day from which days are counted, so that nanoseconds fit 64 bits.
@@ -268,9 +309,19 @@ _EPOCH = datetime(2000, 1, 1)
 _DAY = 86_400 * 10**9
 
 
+def _in_numbers(cell: str) -> str:
+    """A text with the month's name at its beginning as a number: `27. Nov. 2026 07:00` as `27.11.2026 07:00`."""
+    match = _NAMED.match(cell) if cell[:1].isalnum() else None
+    name = match["month"].casefold() if match else ""
+    month, day = _MONTHS.get(name[:4]) or _MONTHS.get(name[:3]), match and (match["day"] or match["second"])
+    if match is None or month is None or not day:
+        return cell
+    return f"{day.strip(', ')}.{month}.{match['year']}{cell[match.end() :]}"
+
+
 def is_stamp(cell: str) -> bool:
     """Whether a text has the form of a point in time or of a duration with colons."""
-    match = _STAMP.fullmatch(cell.strip())
+    match = _STAMP.fullmatch(_in_numbers(cell.strip()))
     return (match is not None and bool(match["date"] or match["first"])) or _DURATION.fullmatch(
         cell.strip()
     ) is not None
@@ -278,10 +329,10 @@ def is_stamp(cell: str) -> bool:
 
 class Stamps:
     """Points in time as text -> nanoseconds since `origin`, the first moment of a file's columns: dates of every usual
-    order, times of day, durations."""
+    order, times of day, durations. A zone's name (`CET`) is one for all `zones` of the file, and shifts nothing."""
 
-    def __init__(self, origin: list[int]) -> None:
-        self._origin = origin
+    def __init__(self, origin: list[int], zones: set[str]) -> None:
+        self._origin, self._zones = origin, zones
         self._last: int | None = None
         self._days = 0
         self._dates: dict[str, int | None] = {}
@@ -312,7 +363,11 @@ class Stamps:
     def _iso(self, cells: Sequence[str]) -> NDArray[np.int64] | None:
         """By numpy where all are ISO 8601 without a zone."""
         if any(
-            cell[:2] not in ("19", "20") or len(cell) < 16 or cell.count("-") != 2 or "+" in cell or cell[-1] == "Z"
+            cell[:2] not in ("19", "20")
+            or len(cell) < 16
+            or cell.count("-") != 2
+            or "+" in cell
+            or not cell[-1].isdigit()
             for cell in cells
         ):
             return None
@@ -322,7 +377,7 @@ class Stamps:
             return None
 
     def _nanoseconds(self, cell: str) -> int | None:
-        match = _STAMP.fullmatch(cell.strip())
+        match = _STAMP.fullmatch(_in_numbers(cell.strip()))
         if match is None or not (match["date"] or match["first"]):
             return _duration(cell.strip())
         first, second, third = (int(match[name] or 0) for name in ("first", "second", "third"))
@@ -333,10 +388,16 @@ class Stamps:
             else:
                 first, second, third = 0, first, second
         if match["half"]:
-            first = first % 12 + 12 * (match["half"].lower() == "pm")
+            first = first % 12 + 12 * (match["half"][0].lower() == "p")
         total = ((first * 60 + second) * 60 + third) * 10**9 + int((match["fraction"] or "").ljust(9, "0"))
         total *= -1 if match["sign"] == "-" else 1
         zone = (match["zone"] or "").replace(":", "")
+        if match["date"]:
+            self._zones.add("UTC" if zone or match["utc"] else match["named"] or "")
+        if len(self._zones) > 1 and self._zones != {"", "UTC"}:
+            shown = " and ".join(sorted(name or "none" for name in self._zones))
+            message = f"the times must be in one zone, or each with its hours from UTC (+01:00), got {shown}"
+            raise InvalidError.of(message, code="ambiguous_date", pointer="/channels/time_s")
         if zone:
             total -= (1 if zone[0] == "+" else -1) * (int(zone[1:3]) * 60 + int(zone[3:])) * 60 * 10**9
         day = self._day(match["date"]) if match["date"] else 0
@@ -347,7 +408,8 @@ class Stamps:
 
         Raises InvalidError where several days may be of either order.
         """
-        dates = {cell.strip().partition(" ")[0] for cell in cells if "/" in cell} - self._dates.keys()
+        slashed = (re.match(r"\s*(\d{1,4}/\d{1,2}/\d{1,4})", cell) for cell in cells if "/" in cell)
+        dates = {match[1] for match in slashed if match} - self._dates.keys()
         for written in dates:
             self._orders = {order for order in self._orders if _day_by(written, order) is not None} or self._orders
         if len(self._orders) > 1 and len(dates | {written for written in self._dates if "/" in written}) > 1:

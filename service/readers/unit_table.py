@@ -69,8 +69,8 @@ _SPEED = (
         "giri/min obr/min ot/min varv/min omw/min dev/dak dev/dk d/dak d/dk",
     )
     | _spelled(1.0, "об/мин мин-1 转/分 转/分钟 轉/分 回転/分 回/分")
-    | _spelled(1e3, "krpm 1000/min 1000rpm")
-    | _spelled(60.0, "U/s r/s rev/s rps tr/s об/с 转/秒")
+    | _spelled(1e3, "krpm 1000/min")
+    | _spelled(60.0, "U/s r/s rev/s rps tr/s об/с 转/秒 Hz")
     | _spelled(1 / RADIANS_PER_SECOND_PER_RPM, "rad/s rad/sec rads rads-1 рад/с 弧度/秒")
     | _spelled(1 / 6, "deg/s °/s")
 )
@@ -93,10 +93,10 @@ _TEMPERATURE = (
 )
 #: By the channel's unit: the spellings that may be stated.
 UNITS = {"s": _TIME, "bar": _PRESSURE, "rpm": _SPEED, "Nm": _TORQUE, "°C": _TEMPERATURE}
+_OF_EACH = ("time_s", "pressure_bar", "speed_rpm", "torque_nm")
 #: Units of no channel, and 1/s, which may be turns or radians: a title that ends in one is not taken for another.
 _FOREIGN = (
-    "V mV A mA N kN lbf W kW J kJ % ‰ m mm µm cm inch kg g deg ° rad l/min l/h m/s mm/s m/s2 bara psia "
-    "atm Hz kHz 1/s s-1"
+    "V mV A mA N kN lbf W kW J kJ % ‰ m mm µm cm inch kg g deg ° rad l/min l/h m/s mm/s m/s2 bara psia atm kHz 1/s s-1"
 )
 
 
@@ -119,37 +119,40 @@ _BY_KEY = {
 } | {"": dict.fromkeys(map(_key, _FOREIGN.split()), Conversion())}
 
 
-#: A unit of which a value counts several: `10 ms`, `0.1 Nm`, `x1000 rpm`, `10^-3 Nm`.
+#: A unit of which a value counts several: `10 ms`, `0.1 Nm`, `1/10 Nm`, `x1000 rpm`, `10^-3 Nm`, `rpm x1000`.
 _MULTIPLE = re.compile(
-    r"(?P<sign>[x×]?) *(?:(?P<number>\d+(?:[.,]\d+)?)|10\^(?P<power>[+-]?\d)) *[x×*·]? *(?P<unit>[^\W\d].*)"
+    r"(?P<sign>[x×]?) *(?:(?P<over>1/)?(?P<number>\d+(?:[.,]\d+)?)|10\^(?P<power>[+-]?\d)) *[x×*·]? *(?P<unit>[^\W\d].*)"
 )
+_AFTER = re.compile(r"(?P<unit>[^\W\d].*?) *[x×*·] *(?P<number>1000|10\^3)")
+_RAISED = re.compile(r"(?<=10)[⁺⁻]?[⁰¹²³⁴-⁹]")
 
 
 def conversion(channel: str, unit: str) -> Conversion | None:
     """From a stated unit to the channel's own; None where the unit is not in the table.
 
     A unit may be a multiple of one in the table; but `10 bar`, and any other whole number without a sign, may be a sensor's
-    range, where it is no time's. NetCDF's times end in the moment from which they count.
+    range, where it is no time's and no thousand turns. NetCDF's times end in the moment from which they count.
     """
     table = _BY_KEY[CHANNELS[channel].unit]
     unit = re.sub(r" since .*", "", unit) if channel == "time_s" else unit
-    found, multiple = table.get(_key(unit)), _MULTIPLE.fullmatch(unit[:LONGEST_UNIT])
-    if found is None and multiple is not None:
-        factor = float((multiple["number"] or f"1e{multiple['power']}").replace(",", "."))
-        of = table.get(_key(multiple["unit"]))
-        if (
-            of is not None
-            and of.offset == 0
-            and (channel == "time_s" or multiple["sign"] or multiple["power"] or factor < 1)
-        ):
-            return Conversion(of.factor * factor)
-    return found
+    if (found := table.get(_key(unit))) is not None:
+        return found
+    short = _AFTER.sub(r"\g<number> \g<unit>", unit[:LONGEST_UNIT])
+    short = _RAISED.sub(lambda power: "^" + unicodedata.normalize("NFKC", power[0]).replace("−", "-"), short)
+    multiple = _MULTIPLE.fullmatch(short)
+    of = None if multiple is None else table.get(_key(multiple["unit"]))
+    if multiple is None or of is None or of.offset != 0:
+        return None
+    factor = float((multiple["number"] or f"1e{multiple['power']}").replace(",", "."))
+    factor = 1 / factor if multiple["over"] and factor else factor
+    clear = multiple["sign"] or multiple["power"] or factor < 1 or (channel == "speed_rpm" and factor == 1000)
+    return Conversion(of.factor * factor) if channel == "time_s" or clear else None
 
 
 def is_unit(text: str) -> bool:
     """Whether a text is the spelling of a unit, of any channel or of another quantity."""
     key = _key(text)
-    return any(key in table for table in _BY_KEY.values())
+    return any(key in table for table in _BY_KEY.values()) or any(conversion(name, text) for name in _OF_EACH)
 
 
 def spellings(channel: str) -> str:

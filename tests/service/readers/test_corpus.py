@@ -253,6 +253,23 @@ TEXTS: dict[str, tuple[str | bytes, str | None]] = {
         "***End_of_Header***\nX_Value\tPressure\tX_Value\tSpeed\tX_Value\tTorque\tComment\n"
         + "".join(f"02.11.2026 07:00:{t:06.3f}\t{p}\t02.11.2026 07:00:{t:06.3f}\t{n}\t02.11.2026 07:00:{t:06.3f}\t{m}\n"
                   for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
+    "units-in-cells.csv": ("Zeit;Druck;Drehzahl;Drehmoment\n"
+                           + re.sub("(.*);(.*);(.*);(.*)", r"\1 s;\2 bar;\3 1/min;\4 Nm", rows(";", ",")), None),
+    "zone-by-name.csv": (stamps("%d.%m.%Y %H:%M:%S.%f MEZ"), None),
+    "zone-in-brackets.csv": (stamps("%Y-%m-%dT%H:%M:%S.%f+01:00[Europe/Berlin]"), None),
+    "german-months.csv": (stamps("27. Dez. 2026 %H:%M:%S.%f"), None),
+    "spanish-months.csv": (stamps("12-ene-26 %H:%M:%S.%f").replace("timestamp", "Fecha y hora"), None),
+    "english-months.csv": (stamps('"Nov 27, 2026 %I:%M:%S.%f %p"'), None),
+    "ranges-of-sensors.csv": ("t s,p 0-16 bar,n (0...3000 1/min),Torque [±200 Nm]\n" + rows(), None),
+    "places-in-titles.csv": ("Time [s],CH1-1 Pressure [bar],Drum.n_diff [rpm],Torque @ 80 °C [Nm]\n" + rows(), None),
+    "set-points.csv": ("Zeit [s];p Soll [bar];p Ist [bar];n_act [1/min];Torque (filtered)\n;;;;Nm\n"
+                       + re.sub("(?m)^([^;]*);", r"\1;9;", rows(";")), None),
+    "thousands-of-turns.csv": ("t [s],p [bar],n / 1000 min⁻¹,M [10⁻³ kNm]\n"
+                               + "".join(f"{t},{p},{n / 1000},{m}\n"
+                                         for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
+    "dates-coarser-than-the-rate-above.csv": (
+        "Sampling interval,10ms\n\nDate&Time,p [bar],n [rpm],M [Nm]\n"
+        + "2026/11/02 07:00:00," + rows(names=PLATEAUS).replace("\n", "\n2026/11/02 07:00:00,")[:-20], None),
     "long-mapped.csv": (long("t [s],ch,y", "{t},{channel}#1,{value}"),
                         "pressure_bar:pressure_bar#1,speed_rpm:speed_rpm#1,torque_nm:torque_nm#1"),
 }  # fmt: skip
@@ -318,11 +335,24 @@ def test_a_shorter_channel_has_the_times_beside_it(tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "units-in-cells": (
-        "t;M\n0 s;21 Nm\n1 s;22 Nm\n",
+    "units-in-cells-that-differ": (
+        "t [s];M\n0;21 Nm\n1;22 mNm\n",
         None,
-        "line 2 must be a row of numbers, under the titles of line 1",
+        "torque_nm[1] (line 3) must be a number in Nm, as the first, got '22 mNm'",
     ),
+    "two-zones": (
+        "time;M [Nm]\n2026-10-25 02:59:59 CEST;1\n2026-10-25 02:00:00 CET;2\n",
+        None,
+        "in one zone, or each with its hours",
+    ),
+    "a-factor-in-a-title": (
+        "t [s];Torque x10 [Nm]\n0;210\n",
+        "torque_nm:Torque x10 [Nm]",
+        "[x0.1 Nm], [x10 Nm] or [x1 Nm]",
+    ),
+    "a-factor-in-a-title-without-a-map": ("t [s];Drehzahl x100 [1/min]\n0;12\n", None, "[x0.01 1/min], [x100 1/min]"),
+    "a-factor-behind-a-unit": ("t;M\ns;Nm*10\n0;2.1\n", None, "'Nm*10'"),
+    "two-torques": ("t [s];Torque A1 [Nm];Torque A2 [Nm]\n0;1;2\n", None, "torque_nm must be one column"),
     "two-times-that-differ": (
         "Timestamp;Time (s);M [Nm]\n" + "".join(f"2026-11-02 08:00:0{s};{2 * s};1\n" for s in range(5)),
         None,

@@ -40,7 +40,7 @@ def test_units_are_converted(channel: str, unit: str, value: float, expected: fl
 
 @pytest.mark.parametrize(
     ("channel", "unit"),
-    [("pressure_bar", "mPa"), ("pressure_bar", "Nm"), ("torque_nm", "MNm"), ("speed_rpm", "s"), ("speed_rpm", "Hz"),
+    [("pressure_bar", "mPa"), ("pressure_bar", "Nm"), ("torque_nm", "MNm"), ("speed_rpm", "s"), ("speed_rpm", "kHz"),
      ("oil_temperature_c", "Pa"), ("time_s", ""), ("torque_nm", "V")],
 )  # fmt: skip
 def test_units_of_something_else_are_not_known(channel: str, unit: str) -> None:
