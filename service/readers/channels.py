@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from service.columns import LineOf, check_arrays
 from service.errors import MAX_QUOTED, InvalidError, Notice, TooLargeError
-from service.readers.column_names import Taken, choose, is_counter, known_channel
+from service.readers.column_names import Taken, choices_of, choose, is_counter, known_channel, no_unit
 from service.readers.limits import Limits
 from service.readers.long_table import says_valid, valid_rows, widened
 from service.readers.no_values import refuse_stand_ins, without_stated, without_totals
@@ -30,6 +30,8 @@ _LEADING = ("torque_nm", "speed_rpm", "pressure_bar")
 _LONGEST_PAUSE = 10
 #: A second, in days; as a step in seconds, less than rigs sample at.
 _SECOND_OF_DAY = 1.2e-5
+#: Seconds since 1970 of 1990 and 2100.
+_OUR_TIME = (6.3e8, 4.1e9)
 #: Empty cells that show a channel of a lower rate. Chosen: fewer may have been left empty by hand.
 _MIN_GAPS = 4
 #: Columns that one notice names.
@@ -168,7 +170,8 @@ def _read(
     for column in taken:
         values[column.index], valid[column.index] = _numbers(column, read.pop(column.index), start)
         if column.channel == "time_s" and column.assumed:
-            _refuse_serials(table.columns[column.index], values[column.index])
+            found = _in_seconds(table.columns[column.index], values[column.index], reading)
+            table = table if found is None else replace(table, notices=[*table.notices, found])
     taken = [column for column in taken if not column.guessed or _runs_on(values[column.index])]
     clocks = {} if reading.time == NO_TIME else _clocks(table.columns, taken, values)
     used = [clock for clock in clocks.values() if isinstance(clock, Clock)]
@@ -245,36 +248,33 @@ def _numbers(column: Taken, values: NDArray[Any], start: Any) -> tuple[FloatArra
     return numbers, valid
 
 
-def _refuse_serials(column: Column, times: FloatArray) -> None:
-    """Raise InvalidError where times without a unit may be days as spreadsheets or MATLAB count them: days of our time since
-    1900 or the year 0, less than five of them, and steps that would be shorter than a rig samples; or a computer's
-    milliseconds, microseconds or nanoseconds since 1970, which as seconds are thousands of years."""
+def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> Notice | None:
+    """Scale times without a unit that only as a computer's milliseconds, microseconds or nanoseconds since 1970 are of our
+    time, in place, from the first on, and say so.
+
+    Raises InvalidError where no map takes them for seconds, or where they may be days as spreadsheets or MATLAB count them:
+    of our time since 1900 or the year 0, less than five of them, in steps that would be shorter than a rig samples.
+    """
+    for unit, factor in (("ms", 1e3), ("µs", 1e6), ("ns", 1e9)):
+        if times.size and times.min() / factor > _OUR_TIME[0] and times.max() / factor < _OUR_TIME[1]:
+            times -= times[0]
+            times /= factor
+            return Notice(code="unit_found", message=f"{column.shown()} was read as {unit} since 1970")
+    name = column.title or column.name
+    if "time_s" not in choices_of(reading):
+        raise no_unit([("time_s", column)], reading)
     if times.size < 2:
-        return
-    days, step = (
-        ((times > 20_000) & (times < 80_000)) | ((times > 700_000) & (times < 800_000)),
-        np.median(np.diff(times)),
-    )
-    unit, meaning = "d", "days, as spreadsheets and MATLAB count dates"
+        return None
+    days = ((times > 20_000) & (times < 80_000)) | ((times > 700_000) & (times < 800_000))
+    step = np.median(np.diff(times))
     fractions = times.min() >= 0 and times.max() <= 1 and 0 < step < _SECOND_OF_DAY
     if not fractions and not (days.all() and np.ptp(times) < 5 and step < 1e-3):
-        since = [
-            (name, factor) for name, factor in (("ms", 1e3), ("µs", 1e6), ("ns", 1e9)) if _is_our_time(times / factor)
-        ]
-        if not since:
-            return
-        unit, meaning = since[0][0], f"{since[0][0]} since 1970"
-    name = column.title or column.name
+        return None
     message = (
-        f"{column.shown()} may be {meaning}, or seconds, got {times[0]:.9g} and steps of {step:.3g}: "
-        f"map=time_s:{name} [{unit}], or [s], says which"
+        f"{column.shown()} may be days, as spreadsheets and MATLAB count dates, or seconds, got {times[0]:.9g} and steps of "
+        f"{step:.3g}: map=time_s:{name} [d], or [s], says which"
     )
     raise InvalidError.of(message, code="missing_unit", pointer="/map")
-
-
-def _is_our_time(times: FloatArray) -> bool:
-    """Whether all are seconds since 1970 between 1990 and 2100."""
-    return bool(((times > 6.3e8) & (times < 4.1e9)).all())
 
 
 def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Reading) -> list[Notice]:

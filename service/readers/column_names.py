@@ -116,8 +116,8 @@ _NEUTRAL = {quantity: _MEANS.union(f"{_PLAIN} {words}".split()) for quantity, wo
 #: What in a name may say that its values are multiples: `x10`, `/100`, `(10^-3)`, `gain 10`, `10*M`.
 _SCALED = re.compile(
     r"(?P<over>/ ?)(?P<number>10+|0[.,]0*1)(?![\d^.,])"
-    r"|(?:(?<![^\W_])[x×]|[*·(]|fa[ck]tor|gain|scale|times)[ :=]*"
-    r"(?:(?P<times>10{1,6}|0[.,]0*1)(?![\d^.,]\d?)|10\^(?P<power>[+-]?\d))"
+    r"|(?:(?:(?<![^\W_])[x×]|[*·(])[ :=]*|(?:fa[ck]tor|gain|s[ck]al|mult|times|verstärk)[^\d]{0,15})"
+    r"(?:(?P<times>10{1,6}|0[.,]0*1)(?![\d^.,]\d?)|10\^(?P<power>[+-]?\d)|(?P<part>1/10+))"
     r"|(?<![\w.,])(?P<before>10{1,6}|0[.,]0*1) ?(?:[x×](?![^\W_])|[*·])",
     re.IGNORECASE,
 )
@@ -131,6 +131,7 @@ _RANGE = re.compile(
 #: Where a word of a title may begin: after what is no letter or digit, and at a capital after a small
 #: letter that is no prefix of a unit (kNm).
 _WORD_STARTS = re.compile(r"(?<![^\W_])(?=[^\W_°])|(?<=[a-jln-zäöüß])(?=[A-Z])|(?<!°)(?=°)")
+_BRACKET = re.compile(r"[\[({<]([^\[\](){}<>]*(?:\([^()]*\))?)[\])}>]")
 #: What may stand between a name and its unit: a comma, a slash, "in", blanks or underscores.
 _BETWEEN = re.compile(r"\s*[,;:|]\s*|\s*/\s*|\s+in\s+|[\s_]+")
 
@@ -188,7 +189,9 @@ def meaning(name: str, unit: str | None = None) -> tuple[str | None, Sense]:
 def _words(name: str) -> list[str]:
     """The words of a name in small letters, without labels that end in a number."""
     apart = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name)
-    return re.findall(r"[^\W\d_]+", re.sub(r"(?<![^\W_])(?:ch|ai|cnt|kanal|[a-z])?\d+(?![^\W_])", " ", _key(apart)))
+    return re.findall(
+        r"[^\W\d_]+", re.sub(r"(?<![^\W_])(?:ch|ai|cnt|kanal|max_?|[a-z])?\d+(?![^\W_])", " ", _key(apart))
+    )
 
 
 def _measures(quantity: str, unit: str | None) -> bool:
@@ -235,6 +238,9 @@ def column_of(text: str, unit: str | None = None, group: str = "") -> Column:
 
 
 def _taken_apart(title: str) -> tuple[str, str | None]:
+    for bracket in reversed(list(_BRACKET.finditer(title))):
+        if (unit := bare_unit(bracket[1])) and is_unit(unit) and bracket.start():
+            return f"{title[: bracket.start()].rstrip(' /')} {title[bracket.end() :].strip(' :.')}".strip(), unit
     if match := _BRACKETED.fullmatch(title):
         return match["name"].strip(), bare_unit(match["square"] if match["unit"] is None else match["unit"])
     if known_channel(title):
@@ -390,13 +396,14 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
             public = _key(columns[index].name) == channel
             if unit is None and choice is None and not public:
                 without_unit.append((channel, columns[index]))
-                continue
+                if channel != "time_s":
+                    continue
             converted = _conversion(channel, columns[index], choice, unit)
             assumed = unit is None and not public
             in_part_only = senses[index][1] is Sense.PART and index not in by_map
             taken.append(Taken(channel, index, converted, assumed, index in guessed, in_part_only))
-    if without_unit:
-        raise _no_unit(without_unit, reading)
+    if any(channel != "time_s" for channel, _ in without_unit):
+        raise no_unit(without_unit, reading)
     return sorted(taken, key=lambda column: column.index)
 
 
@@ -405,7 +412,7 @@ def _may_be_time(column: Column) -> bool:
     return meaning(column.name, column.unit)[1] is Sense.UNKNOWN and _measures("time_s", column.unit)
 
 
-def _no_unit(columns: Sequence[tuple[str, Column]], reading: Reading) -> InvalidError:
+def no_unit(columns: Sequence[tuple[str, Column]], reading: Reading) -> InvalidError:
     """The error of columns whose units nobody states, with the one map that takes all of them for the channels' own."""
     errors = []
     for channel, column in columns:
@@ -490,9 +497,8 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
     exact = choice is None or choice.column == column.title
     wanted = None if choice is None else choice.unit or (None if exact else column_of(choice.column).unit)
     if scaled and wanted is None and (choice is None or choice.factor == 1):
-        number = float(
-            (scaled["number"] or scaled["times"] or scaled["before"] or f"1e{scaled['power']}").replace(",", ".")
-        )
+        written = scaled["number"] or scaled["times"] or scaled["before"] or f"1e{scaled['power']}"
+        number = 1 / float(scaled["part"][2:]) if scaled["part"] else float(written.replace(",", "."))
         own = stated or CHANNELS[channel].unit
         factor = number if scaled["over"] else 1 / number
         named, others = f"map={channel}:{column.name}", f"[x{1 / factor:g} {own}] or [x1 {own}]"

@@ -3,6 +3,7 @@
 Runs in the reading process of `sandbox`. Source: NI, TDMS File Format Internal Structure; Waveform properties (wf_*).
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -23,6 +24,10 @@ from service.readers.table import Clock, Column, Reading, Table, cut_short
 from service.readers.unit_table import conversion
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")
+#: Kinds of scales that npTDMS computes.
+_SCALES = {
+    "Linear", "Polynomial", "Table", "RTD", "Strain", "Thermistor", "Thermocouple", "Add", "Subtract", "AdvancedAPI",
+}  # fmt: skip
 _SECOND = np.timedelta64(1, "s")
 
 
@@ -35,6 +40,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     channels = [channel for group in groups for channel in group.channels() if len(channel)]
     if len(channels) > limits.most_columns:
         raise InvalidError(f"a file must not have more than {limits.most_columns} channels, got {len(channels)}")
+    scales = [_scales(channel) for channel in channels]
     beside = {group.name: _stated({**file.properties, **group.properties}) for group in groups}
     clocks = [
         clock or stated_clock(beside[channel.group_name] | _stated(channel.properties), partial(len, channel))
@@ -42,7 +48,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     ]
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
-        values_by_index = {index: channels[index][:] for index in taken}
+        values_by_index = {index: _scaled(channels[index], scales[index]) for index in taken}
         for index, values in values_by_index.items():
             refuse_counts(channels[index].name[:MAX_QUOTED], values, _stated(channels[index].properties))
         return list(values_by_index.values())
@@ -55,6 +61,30 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         name=reading.table,
         others=tuple(group.name for group in file.groups()),
     )
+
+
+def _scales(channel: Any) -> dict[str, str]:
+    """The kinds of scales that are still to be applied to a channel, by the beginning of their properties' names.
+
+    npTDMS takes a polynomial without a size for one of four coefficients: they are counted here.
+    """
+    stated = channel.properties
+    if stated.get("NI_Scaling_Status") == "scaled":
+        return {}
+    kinds = {key: str(kind) for key, kind in stated.items() if re.fullmatch(r"NI_Scale\[\d+\]_Scale_Type", key)}
+    for of in (key.replace("Scale_Type", "Polynomial_Coefficients") for key in kinds if kinds[key] == "Polynomial"):
+        stated.setdefault(f"{of}_Size", sum(other.startswith(f"{of}[") for other in stated))
+    return kinds
+
+
+def _scaled(channel: Any, scales: Mapping[str, str]) -> NDArray[Any]:
+    """A channel's physical values; raises InvalidError on a scale for which npTDMS would give raw counts."""
+    if unknown := set(scales.values()) - _SCALES:
+        name, kind = channel.name[:MAX_QUOTED], min(unknown)[:MAX_QUOTED]
+        message = f"{name} is scaled by {kind!r}, which is not known: save its physical values"
+        raise InvalidError.of(message, code="raw_counts")
+    values: NDArray[Any] = channel[:]
+    return values
 
 
 def _stated(properties: Mapping[str, Any]) -> dict[str, float | str]:

@@ -71,7 +71,7 @@ _SPEED = (
     | _spelled(1.0, "об/мин мин-1 转/分 转/分钟 轉/分 回転/分 回/分")
     | _spelled(1e3, "krpm 1000/min")
     | _spelled(60.0, "U/s r/s rev/s rps tr/s об/с 转/秒 Hz")
-    | _spelled(1 / RADIANS_PER_SECOND_PER_RPM, "rad/s rad/sec rads rads-1 рад/с 弧度/秒")
+    | _spelled(1 / RADIANS_PER_SECOND_PER_RPM, "rad/s rad/sec rads rads-1 radps рад/с 弧度/秒")
     | _spelled(1 / 6, "deg/s °/s")
 )
 _TORQUE = (
