@@ -3,6 +3,7 @@
 And the one PostgreSQL server, and the one that speaks S3, of those that need it; a database of its own for every test, a
 file or one on the server; a place of its own for raw records, a folder or a bucket."""
 
+import gc
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -49,6 +50,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("long")
         if "on_server" in used and "/tests/service/" in item.path.as_posix() and item.path.name not in ON_BOTH:
             item.add_marker("slow")
+
+
+def pytest_collection_finish() -> None:
+    """What was collected stays: nothing is gained by looking through it again and again for what can go."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -1,17 +1,12 @@
 """Driving a browser: launched the same way everywhere, and pages that note whatever they must not do."""
 
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 from playwright.sync_api import Browser, BrowserType, Page, expect, sync_playwright
 
 from tests.browser import system
-from tests.support import free_port, wait_until_ready
 
 #: [ms] How long a page may take to show what is waited for: on a busy machine a diagnosis took more than 20 s.
 _PATIENCE = 60_000
@@ -110,36 +105,3 @@ class Watched:
         found = (self.violations(), self.abroad(), self.errors())
         self.context.close()
         assert found == ([], [], []), found
-
-
-_ENGINE = """
-import importlib, sys, uvicorn
-from models.diagnosis.extension import Extension
-from service.app import create_app
-from service.settings import Settings
-settings = Settings(workers=0, database=sys.argv[1], engine=sys.argv[3])
-stand_in = importlib.import_module(sys.argv[3].partition(":")[0])
-for name, method in stand_in.METHODS.items():
-    setattr(Extension, name, method)
-uvicorn.run(create_app(settings), port=int(sys.argv[2]), log_level="warning")
-"""
-
-
-@contextmanager
-def serving_with_engine(database: Path, engine: str) -> Iterator[str]:
-    """A service whose diagnoses are made by a stand-in engine, which says what its extensions do there; its URL."""
-    port = free_port()
-    command = [sys.executable, "-c", _ENGINE, f"sqlite:///{database}", str(port), engine]
-    root = Path(__file__).parents[2]
-    process = subprocess.Popen(
-        command,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(root), os.environ.get("PYTHONPATH", "")])},
-        cwd=root,
-    )
-    url = f"http://127.0.0.1:{port}"
-    try:
-        wait_until_ready(url, lambda: process.poll() is not None)
-        yield url
-    finally:
-        process.terminate()
-        process.wait(timeout=30)

@@ -16,12 +16,12 @@ import typer
 from prometheus_client.parser import text_string_to_metric_families
 
 from service import errors
-from service.app import create_app
 from service.cli import main as command_line
 from service.cli import options
 from service.settings import PREFIX, Settings
 from service.web.metrics import Metrics
 from storage.engine.opening import open_database
+from tests.service.clients import described
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "reference"
@@ -36,7 +36,7 @@ Json = Mapping[str, Any]
 
 def pages() -> dict[Path, str]:
     """All pages by their path."""
-    description = create_app(Settings()).openapi()
+    description = described()
     made = {
         "settings": settings(),
         "commands": commands(),

@@ -51,7 +51,7 @@ def test_a_run_gets_its_receipt(http: httpx2.Client) -> None:
     assert receipt["clutch_id"] == "bench3-017"
     assert (receipt["kind"], receipt["cycles"], receipt["duplicate"]) == ("stationary_stribeck", 0, False)
     assert len(receipt["content_sha256"]) == 64
-    assert [fit["pressure_bar"] for fit in receipt["fits"]] == [4.0, 4.5, 5.0, 5.5, 6.0, 6.5, 7.0]
+    assert [fit["pressure_bar"] for fit in receipt["fits"]] == [4.0, 5.0, 6.0, 7.0]
     for fit in receipt["fits"]:
         assert set(fit["parameters"]) == set(fit["standard_errors"]) == PARAMETERS
         assert fit["acceptable"] is (fit["mse_percent"] < 5)
@@ -160,29 +160,18 @@ def test_the_other_answers_and_their_csv_exports(http: httpx2.Client) -> None:
     assert [item["cycles"] for item in stribeck] == [0, 1000, 2000, 3000, 4000]
     assert stribeck[0]["pressure_laws"]["static_torque_nm"]["slope_per_bar"] > 0
     assert http.get(f"{BASE}/loops").json() == {"items": [], "next": None}
-    for name, whole in (("degradation", degradation), ("series", http.get(f"{BASE}/series").json()["items"])):
-        collected: list[dict[str, Any]] = []
-        params: dict[str, Any] = {"limit": 7}
-        while True:
-            page = http.get(f"{BASE}/{name}", params=params).json()
-            collected += page["items"]
-            assert len(page["items"]) <= 7
-            if page["next"] is None:
-                break
-            params["cursor"] = page["next"]
-        assert collected == whole
     assert {row["quantity"] for row in http.get(f"{BASE}/series").json()["items"]} > PARAMETERS | {"remaining_cycles"}
-    for name, rows in (("degradation", 36), ("stribeck", 35), ("loops", 0), ("runs", 5), ("remaining-useful-life", 7)):
+    for name, rows in (("degradation", 21), ("stribeck", 20), ("loops", 0), ("runs", 5), ("remaining-useful-life", 7)):
         answer = http.get(f"{BASE}/{name}.csv")
         assert answer.headers["content-type"] == "text/csv; charset=utf-8"
         assert len(list(csv.DictReader(io.StringIO(answer.text)))) == rows
     series = list(csv.DictReader(io.StringIO(http.get(f"{BASE}/series.csv?quantity=mean_cof").text)))
-    assert len(series) == 5 * 7 + 5
+    assert len(series) == 5 * 4 + 5
     body = stationary(2000)
     assert http.get(f"{BASE}/runs/stationary-2000").json()["channels"] == body["channels"]
 
 
-def test_lists_page_and_are_worst_first(http: httpx2.Client) -> None:
+def test_the_worst_comes_first(http: httpx2.Client) -> None:
     post_life(http, last=4)
     http.post("/v1/clutches", json={"clutch_id": "fresh"})
     http.post("/v1/clutches", json={"clutch_id": "worn"})
@@ -192,14 +181,6 @@ def test_lists_page_and_are_worst_first(http: httpx2.Client) -> None:
     assert [item["clutch_id"] for item in page["items"]] == ["worn", "bench3-017", "fresh"]
     assert page["items"][1]["summary"]["remaining_cycles"]["0.5"] > 0
     assert page["next"] is None
-    collected, cursor = [], {}
-    while True:
-        page = http.get(f"{BASE}/runs", params={"limit": 2} | cursor).json()
-        collected += [item["run_id"] for item in page["items"]]
-        if page["next"] is None:
-            break
-        cursor = {"cursor": page["next"]}
-    assert collected == [f"stationary-{1000 * index}" for index in range(5)]
 
 
 def test_etags_change_when_and_only_when_the_content_does(http: httpx2.Client) -> None:

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from service.app import create_app
-from service.settings import Settings
+from tests.service.clients import described
 from tests.support import Server
 
 ROOT = Path(__file__).parents[2]
@@ -106,10 +105,10 @@ def test_settings_are_documented() -> None:
 
 
 def test_every_address_is_documented() -> None:
-    described = create_app(Settings()).openapi()
+    description = described()
     text = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8") + (
         ROOT / "docs" / "reference" / "operations.md"
     ).read_text(encoding="utf-8")
-    for address in described["paths"]:
+    for address in description["paths"]:
         name = address.rstrip("/").rsplit("/", 1)[-1].removesuffix(".csv")
         assert name.startswith("{") or name in text, address

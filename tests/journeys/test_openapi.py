@@ -8,11 +8,10 @@ from hypothesis import HealthCheck, given, settings
 from schemathesis import GenerationMode, checks
 from schemathesis.schemas import APIOperation
 
-from service.app import create_app
-from service.settings import Settings
+from tests.service.clients import described
 from tests.support import ONCE, Server, serving, stationary
 
-SCHEMA = schemathesis.openapi.from_dict(create_app(Settings()).openapi())
+SCHEMA = schemathesis.openapi.from_dict(described())
 OPERATIONS = [operation.ok() for operation in SCHEMA.get_all_operations()]
 #: What JSON schema cannot say (equal lengths, a curve in the data, a clutch that is there) is refused all the same.
 EXCLUDED = [checks.positive_data_acceptance]
@@ -42,7 +41,7 @@ CASES = [(operation, GenerationMode.POSITIVE) for operation in OPERATIONS] + [
 def test_every_answer_keeps_to_the_description(api: Server, operation: APIOperation, mode: GenerationMode) -> None:
     """All of schemathesis' checks: documented statuses, types, schemas, wrong data refused, nothing unexpected."""
 
-    @settings(max_examples=8, derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=4, derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck))
     @given(case=operation.as_strategy(generation_mode=mode))
     def check(case: schemathesis.Case) -> None:
         if "clutch_id" in case.path_parameters and mode is GenerationMode.POSITIVE:

@@ -8,6 +8,7 @@ from tests.support import Server
 pytestmark = pytest.mark.browser
 
 
+@pytest.mark.slow  # that no page loads anything from elsewhere tests/service/web/test_root_path.py says of its addresses
 def test_the_api_describes_itself_without_the_internet(server: Server, browser: Browser) -> None:
     page = browser.new_page()
     requested: list[str] = []

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from tests.browser.driving import Watched
-from tests.support import clutchlife, serving
+from tests.support import ONCE, clutchlife, serving, stationary
 
 BELOW = "/tools/clutch"
 
@@ -60,18 +60,21 @@ def proxy(upstream: str) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def below(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of a service behind such a proxy, with a short campaign that the command line has sent through it."""
+    """The address of a service behind such a proxy, with three tests that were sent through it."""
     folder = tmp_path_factory.mktemp("proxy")
     environment = {"CLUTCHLIFE_ROOT_PATH": BELOW, "CLUTCHLIFE_INSECURE_LOCAL": "true"}
     with serving(folder / "clutchlife.db", loaded=True, environment=environment) as server, proxy(server.url) as url:
-        clutchlife("simulate", "--seed", "7", "--no-dynamic", "--tests", "4", "--out", folder / "campaign")
-        sent = ("push", folder / "campaign", "--clutch", "sim-7", "--url", url, "--spool", folder / "spool")
-        assert ", 0 refused" in clutchlife(*sent)
+        ONCE.post(f"{url}/v1/clutches", json={"clutch_id": "bench"}).raise_for_status()
+        for cycles in (0, 1000, 2000):
+            ONCE.post(f"{url}/v1/clutches/bench/runs", json=stationary(cycles)).raise_for_status()
         yield url
 
 
 @pytest.mark.slow
 def test_the_command_line_finds_the_service_below_the_path(below: str, tmp_path: Path) -> None:
+    clutchlife("simulate", "--seed", "7", "--no-dynamic", "--tests", "4", "--out", tmp_path / "campaign")
+    sent = ("push", tmp_path / "campaign", "--clutch", "sim-7", "--url", below, "--spool", tmp_path / "spool")
+    assert ", 0 refused" in clutchlife(*sent)
     assert "sim-7" in clutchlife("life", "sim-7", "--url", f"{below}/")
     assert "verdict" in clutchlife("diagnose", "sim-7", "--url", below, "--json").lower()
     clutchlife("export", "sim-7", "--out", tmp_path / "all", "--url", below)
@@ -83,8 +86,8 @@ def test_pages_work_below_the_path(below: str, browser: Browser) -> None:
     watched = Watched(browser, below)
     page = watched.page
     page.goto(f"{below}/")
-    page.get_by_role("link", name="sim-7").click()
-    expect(page).to_have_url(f"{below}/clutches/sim-7")
+    page.get_by_role("link", name="bench").click()
+    expect(page).to_have_url(f"{below}/clutches/bench")
     page.locator("#chart-fan .plot").wait_for()
     page.get_by_role("link", name="All clutches").click()
     expect(page).to_have_url(f"{below}/")

@@ -23,7 +23,7 @@ def name(number: int) -> str:
 
 def life(database: Path | str, bodies: list[bytes]) -> None:
     """Post a life to a service on a new file, or on an empty database at an address."""
-    with serving(database) as server, httpx2.Client(base_url=server.url, timeout=60) as http:
+    with serving(database, loaded=True) as server, httpx2.Client(base_url=server.url, timeout=60) as http:
         http.post("/v1/clutches", json={"clutch_id": name(0)}).raise_for_status()
         for body in bodies:
             http.post(

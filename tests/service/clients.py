@@ -1,5 +1,6 @@
 """Clients of a service in this process, and the databases that they begin with."""
 
+import json
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +15,16 @@ from service.app import create_app
 from service.settings import Settings
 from tests.storage.samples import lay_empty
 from tests.support import stationary
+
+
+@cache
+def _description() -> str:
+    return json.dumps(create_app(Settings()).openapi())
+
+
+def described() -> Any:
+    """The description at /openapi.json: made once, for that takes a second, and a copy each, for libraries add to it."""
+    return json.loads(_description())
 
 
 @contextmanager

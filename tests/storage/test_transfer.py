@@ -17,6 +17,7 @@ from storage.engine.opening import find_database, open_database, service_lock
 from storage.tables import metadata
 from storage.transfer import digest, transfer
 from tests.storage.engine.postgresql.server import PostgresServer
+from tests.support import one_quick
 
 ROWS = 7
 #: Where a row has a number, these: the last digits, the smallest, the largest and a whole one, which SQLite packs.
@@ -117,6 +118,7 @@ def killed(source: str, target: str, after: int) -> None:
         moving.copy(advance)
 
 
+@pytest.mark.parametrize("target", one_quick(["server", "file"]), indirect=True)
 def test_a_killed_migration_goes_on_where_it_was_and_is_used_by_nobody_before(
     in_file: str, target: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,10 +7,10 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.driving import Watched, serving_with_engine, turned
+from tests.browser.driving import Watched, turned
 from tests.browser.lives import post, worn
 from tests.browser.pixels import seen
-from tests.support import ONCE, stationary
+from tests.support import ONCE, serving, stationary
 
 pytestmark = pytest.mark.browser
 expect.set_options(timeout=30_000)
@@ -20,10 +20,11 @@ ENGINE = "tests.service.workflows.stand_in_engine:diagnose"
 
 @pytest.fixture
 def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with serving_with_engine(tmp_path_factory.mktemp("diagnosis") / "clutchlife.db", ENGINE) as found:
-        with httpx2.Client(base_url=found, timeout=60) as http:
+    database = tmp_path_factory.mktemp("diagnosis") / "clutchlife.db"
+    with serving(database, loaded=True, environment={"CLUTCHLIFE_ENGINE": ENGINE}) as server:
+        with httpx2.Client(base_url=server.url, timeout=60) as http:
             worn(http, "bench", last=5000)
-        yield found
+        yield server.url
 
 
 def told(url: str, path: str) -> dict[str, Any]:

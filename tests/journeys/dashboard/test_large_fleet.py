@@ -133,6 +133,7 @@ def test_a_jump_into_the_middle_reads_only_what_is_in_sight(watched: Watched) ->
     assert settled(page)[0] == before
 
 
+@pytest.mark.slow
 def test_search_finds_one_far_down_and_chips_count_what_is_found(watched: Watched) -> None:
     page = opened(watched)
     page.evaluate("scrollTo(0, document.documentElement.scrollHeight)")

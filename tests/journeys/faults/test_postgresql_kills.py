@@ -42,7 +42,7 @@ def require_all(url: str, acknowledged: Acknowledged, on_their_way: int) -> None
     assert findings(url) == []
 
 
-@kills(3, 50)
+@kills(2, 50)
 def test_no_acknowledged_run_is_lost_where_the_service_is_killed(postgres: PostgresServer, number: int) -> None:
     url, rng = postgres.fresh(), random.Random(number)  # noqa: S311 - moments, not secrets
     acknowledged: Acknowledged = {}

@@ -1,6 +1,6 @@
 """Whole sequences of requests, each made of what earlier ones answered: no answer breaks the description, none is a fault.
 
-CI sends some 100 requests; `make faults` sends 5,000.
+CI sends some 50 requests; `make faults` sends 5,000.
 """
 
 from collections import Counter
@@ -16,8 +16,7 @@ from hypothesis.stateful import run_state_machine_as_test
 from schemathesis import checks
 from schemathesis.core.failures import FailureGroup
 
-from service.app import create_app
-from service.settings import Settings
+from tests.service.clients import described
 from tests.support import ONCE, serving, stationary
 
 #: What the description cannot say is refused all the same; a clutch that was named by chance may be there; and that what is
@@ -44,7 +43,7 @@ def asks_for_a_diagnosis(case: schemathesis.Case) -> bool:
 def sequences(url: str) -> tuple[type, Told]:
     """The state machine of the description against a service, and what it is told."""
     told = Told()
-    machine = schemathesis.openapi.from_dict(create_app(Settings()).openapi()).as_state_machine()
+    machine = schemathesis.openapi.from_dict(described()).as_state_machine()
 
     class Sequences(machine):  # type: ignore[misc, valid-type]
         def get_call_kwargs(self, _case: schemathesis.Case) -> dict[str, Any]:
@@ -65,7 +64,7 @@ def sequences(url: str) -> tuple[type, Told]:
 
 
 @pytest.mark.parametrize(
-    "number", [pytest.param(100, id="100 requests"), pytest.param(5000, id="5,000 requests", marks=pytest.mark.slow)]
+    "number", [pytest.param(50, id="50 requests"), pytest.param(5000, id="5,000 requests", marks=pytest.mark.slow)]
 )
 def test_no_sequence_of_requests_breaks_the_description(number: int, tmp_path: Path) -> None:
     with serving(tmp_path / "clutchlife.db", loaded=True) as server:

@@ -76,7 +76,7 @@ class Watched:
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
     folder, temporary = tmp_path_factory.mktemp("wrong"), tmp_path_factory.mktemp("temporary")
     with (
-        serving(folder / "a.db", environment={"TMPDIR": str(temporary)}) as server,
+        serving(folder / "a.db", loaded=True, environment={"TMPDIR": str(temporary)}) as server,
         httpx2.Client(base_url=server.url, timeout=120) as client,
     ):
         yield Watched(server, client, (folder / "a.db-files", temporary))
@@ -162,6 +162,7 @@ def test_a_file_larger_than_is_taken(service: Watched) -> None:
     assert service.state() == service.before
 
 
+@pytest.mark.slow
 def test_many_at_once(service: Watched) -> None:
     """Eight senders of cut-off files at a time: all are refused, and the service lives."""
     answers: list[int] = []

@@ -96,10 +96,10 @@ def test_a_plot_has_samples_as_they_were_measured_and_every_peak(database: Datab
         assert (found[name].min(), found[name].max()) == (column.min(), column.max())
 
 
-@pytest.mark.parametrize("points", [1, 10, 279])
+@pytest.mark.parametrize("points", [1, 10, 159])
 def test_plateaus_come_whole(database: Database, tmp_path: Path, points: int) -> None:
     body = json.loads(written(database, tmp_path / "body", "plateaus", points=points))
-    assert len(body["channels"]["torque_nm"]) == body["samples"] == 280
+    assert len(body["channels"]["torque_nm"]) == body["samples"] == 160
 
 
 def test_a_packed_body_is_the_same_body(database: Database, tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_ragged_and_empty_channels_are_named(client: TestClient, channel: str) -
     body = stationary(0)
     body["channels"][channel].pop()
     found = client.post(RUNS, json=body).json()["errors"]
-    assert [(each["pointer"], each["code"], each["row"]) for each in found] == [(f"/channels/{channel}", "ragged", 280)]
+    assert [(each["pointer"], each["code"], each["row"]) for each in found] == [(f"/channels/{channel}", "ragged", 160)]
     body["channels"][channel] = []
     assert client.post(RUNS, json=body).json()["errors"][0]["code"] == "empty"
 

@@ -61,6 +61,7 @@ def test_a_stop_amid_posts_ends_with_0_and_keeps_every_acknowledged_run(tmp_path
         rig.join()
     assert refused == []
     assert len(acknowledged) < 1500, "it was not stopped"
+    server.loaded = True
     server.start()
     stored = {item["run_id"] for item in ONCE.get(f"{server.url}{RUNS}?limit=1000").json()["items"]}
     assert server.stop() == 0

@@ -91,10 +91,8 @@ def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
     "how",
     [
         "dies",
-        "raises",
-        "writes garbage",
         "writes a list",
-        "says nothing",
+        *(pytest.param(how, marks=pytest.mark.slow) for how in ("raises", "writes garbage", "says nothing")),
         "cannot start",
         "cannot be stored",
         "cannot end",

@@ -92,7 +92,7 @@ def test_a_clutch_says_its_state_and_why(fleet: TestClient) -> None:
         "ended": {"name": "failure", "why": "the end of life is reached: mean COF at 50 % of new"},
         "ageing": {
             "name": "normal",
-            "why": "at least 2,600 cycles are left with 95 %",
+            "why": "at least 2,400 cycles are left with 95 %",
         },
         "c1": {"name": "check", "why": "no run yet that counts"},
     }

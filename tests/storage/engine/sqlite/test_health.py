@@ -12,6 +12,7 @@ import pytest
 
 from storage.engine.database import Database
 from storage.engine.opening import open_database
+from tests.support import one_quick
 
 #: Bytes that must be free in these tests.
 LEAST_FREE = 16 << 20
@@ -83,7 +84,7 @@ def _hold(path: str, begin: str, say: "multiprocessing.connection.Connection") -
         say.recv()
 
 
-@pytest.mark.parametrize("begin", ["BEGIN IMMEDIATE", "BEGIN EXCLUSIVE"])
+@pytest.mark.parametrize("begin", one_quick(["BEGIN EXCLUSIVE", "BEGIN IMMEDIATE"]))
 def test_ready_at_once_while_another_process_holds_the_lock(tmp_path: Path, journal_mode: str, begin: str) -> None:
     spawn = multiprocessing.get_context("spawn")
     with closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
