@@ -49,21 +49,10 @@ _PLAIN_OF = {
     "torque_nm": "friction reib frottement fricción dreh motor obrotowy kroutící 摩擦 r",
     "temperature": "",
 }
+#: Whose temperature it is.
 _OIL = {
-    "oil",
-    "oiltemp",
-    "oiltemperature",
-    "öl",
-    "sump",
-    "sumpf",
-    "huile",
-    "aceite",
-    "olio",
-    "óleo",
-    "oleju",
-    "масла",
-    "油",
-}
+    "oil", "oiltemp", "oiltemperature", "öl", "sump", "sumpf", "huile", "aceite", "olio", "óleo", "oleju", "масла", "油",
+}  # fmt: skip
 _PLATE, _REAR = {"plate", "platte", "platten", "lamelle", "lamellen"}, {"rear", "hinten"}
 _SPREAD = {"sd", "std", "deviation", "standard", "standardabweichung"}
 #: Beginnings of words that make it another thing than what is measured at the clutch.
@@ -75,7 +64,7 @@ _OTHER = re.compile(
 )
 #: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports, Simulink's.
 _SECONDS = frozenset({"x_value", "timestamps", "tout"})
-
+#: Words that are a speed only beside one of what turns.
 _FREQUENCY = re.compile("fr[eé]qu?[eu]|frecu|частота")
 #: Channels in whose unit another column may be the one that is meant.
 _MEASURED = ("pressure_bar", "speed_rpm", "torque_nm")
@@ -115,10 +104,10 @@ _ENDS = [word.strip("-") for words in _NOUNS.values() for word in words.split() 
 _NEUTRAL = {quantity: _MEANS.union(f"{_PLAIN} {words}".split()) for quantity, words in _PLAIN_OF.items()}
 #: What in a name may say that its values are multiples: `x10`, `/100`, `(10^-3)`, `gain 10`, `10*M`.
 _SCALED = re.compile(
-    r"(?P<over>/ ?)(?P<number>10+|0[.,]0*1)(?![\d^.,])"
-    r"|(?:(?:(?<![^\W_])[x×]|[*·(])[ :=]*|(?:fa[ck]tor|gain|s[ck]al|mult|times|verstärk)[^\d]{0,15})"
-    r"(?:(?P<times>10{1,6}|0[.,]0*1)(?![\d^.,]\d?)|10\^(?P<power>[+-]?\d)|(?P<part>1/10+))"
-    r"|(?<![\w.,])(?P<before>10{1,6}|0[.,]0*1) ?(?:[x×](?![^\W_])|[*·])",
+    r"/ ?(?:10+|0[.,]0*1)(?![\d^.,])|(?<![\w.,])(?:10+|0[.,]0*1) ?(?:[x×](?![^\W_])|[*·])"
+    r"|(?:(?:(?<![^\W_])(?-i:x)|[×*·]) ?|(?:fa[ck]tor|gain|s[ck]al|mult|times|verstärk)\D{0,15})"
+    r"(?:10\^[+-]?\d|(?!1(?!\d))\d+(?:[.,]\d+)?)"
+    r"|(?<![^\W_])X(?:10+|0[.,]0*1)(?!\d)|\((?:10\^[+-]?\d|1/10+|10+|0[.,]0*1)\)",
     re.IGNORECASE,
 )
 _WIDE = str.maketrans("（）［］｛｝，／：【】", "()[]{},/:[]")
@@ -238,9 +227,12 @@ def column_of(text: str, unit: str | None = None, group: str = "") -> Column:
 
 
 def _taken_apart(title: str) -> tuple[str, str | None]:
-    for bracket in reversed(list(_BRACKET.finditer(title))):
-        if (unit := bare_unit(bracket[1])) and is_unit(unit) and bracket.start():
-            return f"{title[: bracket.start()].rstrip(' /')} {title[bracket.end() :].strip(' :.')}".strip(), unit
+    units = [found for found in _BRACKET.finditer(title) if found.start() and is_unit(bare_unit(found[1]) or "")]
+    if len(units) == 1:
+        name = f"{title[: units[0].start()].rstrip(' /')} {title[units[0].end() :].strip(' :.')}".strip()
+        return name, bare_unit(units[0][1])
+    if units:
+        return title, None  # which one it is in, it does not say
     if match := _BRACKETED.fullmatch(title):
         return match["name"].strip(), bare_unit(match["square"] if match["unit"] is None else match["unit"])
     if known_channel(title):
@@ -351,18 +343,14 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
     if len(by_map) < len(named):
         shown = ",".join(f"{name}:{choice.column}" for name, choice in named.items())
         raise _wrong_map(shown, "must not name one column for two channels")
+    passed_over = {*named, "time_s"} if reading.time == NO_TIME else {*named}
     senses = [meaning(column.name, column.unit) for column in columns]
     indices: dict[str, list[int]] = {}
     in_part: dict[str, list[int]] = {}
     for index, (channel, sense) in enumerate(senses):
         if index in by_map:
             indices.setdefault(by_map[index], []).append(index)
-        elif (
-            channel
-            and channel not in named
-            and not reading.only_named
-            and (channel, reading.time) != ("time_s", NO_TIME)
-        ):
+        elif channel and channel not in passed_over and not reading.only_named:
             (indices if sense is Sense.WHOLE else in_part).setdefault(channel, []).append(index)
     for channel, positions in indices.items():
         # neither a mean beside the signal itself nor what stands in a group of set points
@@ -372,11 +360,9 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
         if len(positions) > 1 and channel != "time_s":
             raise _twice(channel, *(columns[index] for index in positions))
     guessed: set[int] = set()
-    if not ({"time_s"} & {*indices, *named} or reading.time == NO_TIME or reading.only_named):
-        unknown = [
-            i for i, (channel, sense) in enumerate(senses) if sense is Sense.UNKNOWN and _may_be_time(columns[i])
-        ]
-        guessed = {*in_part.pop("time_s", () if by_map else unknown)}
+    if "time_s" not in {*indices, *passed_over} and not reading.only_named:
+        unknown = [] if by_map else [index for index, column in enumerate(columns) if _may_be_time(column)]
+        guessed = {*in_part.pop("time_s", unknown)}
     for channel, positions in in_part.items():
         rivals = [
             index for index, (_, sense) in enumerate(senses)
@@ -494,26 +480,23 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
     scaled = None if public else _SCALED.search(column.name[:LONGEST_NAME])
     ends_in = None if choice is None or public or scaled else unit_in_title(channel, column.name)
     stated = column.unit or ends_in
-    exact = choice is None or choice.column == column.title
-    wanted = None if choice is None else choice.unit or (None if exact else column_of(choice.column).unit)
+    wanted = None if choice is None else choice.unit
+    if choice is not None and choice.column != column.title:
+        wanted = wanted or column_of(choice.column).unit
     if scaled and wanted is None and (choice is None or choice.factor == 1):
-        written = scaled["number"] or scaled["times"] or scaled["before"] or f"1e{scaled['power']}"
-        number = 1 / float(scaled["part"][2:]) if scaled["part"] else float(written.replace(",", "."))
+        number = float(re.findall(r"-?\d+(?:[.,]\d+)?", scaled[0])[-1].replace(",", "."))
+        number = 10**number if "^" in scaled[0] else number
         own = stated or CHANNELS[channel].unit
-        factor = number if scaled["over"] else 1 / number
+        factor = number if "/" in scaled[0] else 1 / number
         named, others = f"map={channel}:{column.name}", f"[x{1 / factor:g} {own}] or [x1 {own}]"
         rule = f"may be x{factor:g} {own}: {named} [x{factor:g} {own}], {others} says which"
         raise _wrong_unit(channel, column, "missing_unit", rule, "no clear one")
     if choice is None:
         return "s" if stated is None and _key(column.name) in _SECONDS else stated
-    if (
-        not scaled
-        and wanted
-        and stated not in (None, choice.stated)
-        and conversion(channel, stated) != conversion(channel, wanted)
-    ):
+    differ = stated not in (None, choice.stated) and wanted and not scaled
+    if differ and conversion(channel, stated or "") != conversion(channel, wanted or ""):
         rule = f"must be {wanted}, as its profile or map says"
-        raise _wrong_unit(channel, column, "mixed_units", rule, repr(stated[:MAX_QUOTED]))
+        raise _wrong_unit(channel, column, "mixed_units", rule, repr((stated or "")[:MAX_QUOTED]))
     unit = wanted or stated
     if unit is None and not public and (word := _may_state(channel, column.name)):
         rule = f"may be {word}: map={channel}:{column.name} [{word}], or [{CHANNELS[channel].unit}], says which"
@@ -527,10 +510,7 @@ def _conversion(channel: str, column: Column, choice: Choice | None, unit: str |
     A column that a map names without a unit is in the channel's unit.
     """
     own, public = CHANNELS[channel].unit, _key(column.name) == channel
-    if unit is None:
-        converted: Conversion | None = Conversion()
-    else:
-        converted = conversion(channel, unit)
+    converted = Conversion() if unit is None else conversion(channel, unit)
     if converted is None:
         rule = f"must be a known one ({spellings(channel)})"
         raise _wrong_unit(channel, column, "unknown_unit", rule, repr((unit or "")[:MAX_QUOTED]))

@@ -287,13 +287,13 @@ _STAMP = re.compile(
     r"(?: ?\[?(?P<named>[A-Z]{2,5}|[A-Z][A-Za-z]{1,14}/[A-Z][A-Za-z_]{1,20})\]?)?",
     re.ASCII,
 )
-#: Durations as MATLAB (`0.01 sec`) and ISO 8601 (`PT0.01S`, polars) write them.
+#: Durations by ISO 8601 (`PT0.01S`), as polars writes them.
 _DURATION = re.compile(
-    r"(?P<sign>[+-]?)(?:P(?:(?P<days>\d{1,6})D)?T(?=\d)(?:(?P<hours>\d{1,6})H)?(?:(?P<minutes>\d{1,6})M)?"
-    r"(?:(?P<seconds>\d{1,9}(?:\.\d{1,12})?)S)?|(?P<number>\d{1,9}(?:\.\d{1,15})?(?:e-?\d\d)?) (?P<unit>sec|min|hr|days?))",
+    r"(?P<sign>[+-]?)P(?:(?P<days>\d{1,6})D)?T(?=\d)(?:(?P<hours>\d{1,6})H)?(?:(?P<minutes>\d{1,6})M)?"
+    r"(?:(?P<seconds>\d{1,9}(?:\.\d{1,12})?)S)?",
     re.ASCII,
 )
-_SECONDS = {"seconds": 1, "minutes": 60, "hours": 3600, "days": 86_400, "sec": 1, "min": 60, "hr": 3600, "day": 86_400}
+_SECONDS = {"seconds": 1, "minutes": 60, "hours": 3600, "days": 86_400}
 #: Orders of a date's parts, but for those with slashes.
 _ORDERS = (
     "%Y-%m-%d",
@@ -432,11 +432,8 @@ def _duration(cell: str) -> int | None:
     match = _DURATION.fullmatch(cell)
     if match is None:
         return None
-    parts = {name: match[name] for name in ("days", "hours", "minutes", "seconds") if match[name]}
-    parts |= {match["unit"]: match["number"]} if match["unit"] else {}
-    return (-1 if match["sign"] == "-" else 1) * sum(
-        round(float(n) * _SECONDS[name] * 1e9) for name, n in parts.items()
-    )
+    total = sum(round(float(match[name] or 0) * seconds * 1e9) for name, seconds in _SECONDS.items())
+    return -total if match["sign"] == "-" else total
 
 
 def _day_by(written: str, order: str) -> int | None:
