@@ -7,8 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
-
 from service.cli.main import app
 from tests.documents.reference import ROOT
 from tests.support import serving
@@ -24,6 +22,8 @@ def blocks() -> list[str]:
 
 def draw(url: str, folder: Path) -> list[Path]:
     """Every figure from the clutch sim-7 of a service; the same clutch gives the same bytes."""
+    import matplotlib as mpl  # 0.4 s for whoever draws, not for every collection
+
     mpl.use("svg")
     mpl.rcParams |= {"svg.hashsalt": "clutchlife", "figure.constrained_layout.use": True}
     preamble, *figures = blocks()

@@ -6,7 +6,6 @@ from contextlib import contextmanager
 
 import httpx2
 import pytest
-from moto.server import ThreadedMotoServer
 
 from storage.blobs.stores import open_store
 
@@ -16,6 +15,8 @@ CREDENTIALS = {"AWS_ACCESS_KEY_ID": "an id", "AWS_SECRET_ACCESS_KEY": "a-very-se
 @contextmanager
 def s3_server() -> Iterator[str]:
     """The address of a server."""
+    from moto.server import ThreadedMotoServer  # 0.7 s for whoever starts one, not for every collection
+
     server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     server.start()
     host, port = server.get_host_and_port()
