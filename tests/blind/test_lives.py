@@ -13,6 +13,7 @@ from tests.blind.rig.world import read
 SECONDS = (5, 31)
 
 
+@pytest.mark.slow
 def test_the_true_course_is_that_of_what_is_measured() -> None:
     """Mean torque over pressure at the states, computed from noise-free readings on the reference's own grid."""
     hidden = hide(SECONDS, ("running_in",), 50.0, loops=False, full=True)

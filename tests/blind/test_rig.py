@@ -19,6 +19,7 @@ from tests.blind.rig.refit import LEAST_GAIN, spreads, theta_at
 from tests.blind.rig.sensor import Whitening
 from tests.blind.rig.sent import campaign, runs
 from tests.blind.rig.world import Effect, follow, read
+from tests.support import one_quick
 
 FOLDER = Path(__file__).parent
 #: What the blind tests may take from the product: how data goes in, how reports come out, the one function under test.
@@ -229,7 +230,9 @@ def test_an_advised_test_is_made_with_the_same_secret(shifted: Hidden, key: str)
         np.testing.assert_array_equal(was.plateaus.torque, now.plateaus.torque)
 
 
-@pytest.mark.parametrize("slug", ["inertia_torque", "torque_zero_shift", "squeeze_film", "hydrodynamic_drag"])
+@pytest.mark.parametrize(
+    "slug", one_quick(["hydrodynamic_drag", "inertia_torque", "torque_zero_shift", "squeeze_film"])
+)
 def test_an_open_clutch_has_its_own_drag_and_what_is_no_friction(slug: str) -> None:
     hidden = hide((5, 7), (slug,), 50.0, states=4)
     after = with_test(hidden, "open_clutch")

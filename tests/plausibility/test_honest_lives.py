@@ -12,7 +12,7 @@ from tests.plausibility import slips
 from tests.plausibility.bench import Bench
 from tests.plausibility.honest_lives import KINDS, life
 from tests.real import loaders
-from tests.support import stationary
+from tests.support import one_quick, stationary
 
 Body = dict[str, Any]
 
@@ -49,7 +49,7 @@ def test_a_first_test_that_comes_late_shuts_nothing_out(start: float) -> None:
     assert bench.held == ()
 
 
-@pytest.mark.parametrize("share", [0.75, 0.85, 1.2, 1.3])
+@pytest.mark.parametrize("share", one_quick([0.75, 0.85, 1.2, 1.3]))
 def test_a_new_level_is_asked_about_at_most_once(share: float) -> None:
     """After a declared oil change, and with nothing declared."""
     before = even(1000.0, share=0.99, count=14)

@@ -7,6 +7,7 @@ from models.diagnosis.criteria import DRAWS, SIGN_UNDETERMINED
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.report.report import Report
 from tests.models.diagnosis.rehearsals import rehearsal
+from tests.models.diagnosis.test_diagnose import of_planted
 
 
 @pytest.fixture(scope="module")
@@ -14,9 +15,9 @@ def creeping() -> Report:
     return diagnose(rehearsal(7, {"pressure_offset": 0.5}, dynamic=False, tests=12), rng=np.random.default_rng(0))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def shifted() -> Report:
-    return diagnose(rehearsal(5, {"torque_zero_shift": 3.0}, dynamic=False, tests=12), rng=np.random.default_rng(0))
+    return of_planted("torque_zero_shift")
 
 
 @pytest.mark.slow
