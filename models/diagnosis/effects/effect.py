@@ -65,9 +65,11 @@ class Measure(StrEnum):
 
 class Discrepancy(StrEnum):
     """Along what a template's form is uncertain (`effects.fitted_effect`); MOTION: in loops against plateaus. How an
-    effect depends on pressure is what distinguishes it from others, so no discrepancy over pressure is allowed."""
+    effect depends on pressure is what distinguishes it from others, so no effect's own discrepancy is over PRESSURE; the
+    small one of every template is."""
 
     SPEED = "speed"
+    PRESSURE = "pressure"
     LIFE = "life"
     CLOCK = "clock"
     MOTION = "motion"

@@ -40,7 +40,8 @@ _AT_BOUND = 0.01
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FittedEffect:
-    """An effect in a model: its amplitude, its shape, and in a draw the factors b [m] of its discrepancy."""
+    """An effect in a model: its amplitude, its shape, and in a draw the factors b [m] of its discrepancy and of its
+    template's small errors."""
 
     effect: Effect
     amplitude: float
@@ -98,14 +99,21 @@ def free_shapes(fitted: FittedEffect) -> NDArray[np.bool_]:
 
 #: Along what φ is uncertain: the lowest value and the range in a campaign.
 Ranges: TypeAlias = Mapping[Discrepancy, tuple[float, float]]
+#: Orders of the cosines by which an effect's form is uncertain, and of those by which any template may be a little off;
+#: and the harmonics of a loop of the latter.
 _ORDERS = {Discrepancy.SPEED: (1, 2), Discrepancy.LIFE: (1,), Discrepancy.CLOCK: (1,), Discrepancy.MOTION: (1,)}
+_SMALL = {Discrepancy.SPEED: 4, Discrepancy.PRESSURE: 2, Discrepancy.LIFE: 3, Discrepancy.CLOCK: 3}
+_HARMONICS = 2
 
 
 def drawn_change(drawn: FittedEffect, scene: Scene, ranges: Ranges) -> FloatArray:
     """Change of torque [P] Nm. A course that is followed far enough ends friction; it does not reverse it."""
     change = drawn.effect.change(scene, drawn.amplitude, drawn.shape)
     if any(drawn.factors):
-        change = change * (1.0 + factors_at(scene.points, drawn.effect, ranges) @ np.array(drawn.factors))
+        factors = np.concatenate(
+            [factors_at(scene.points, drawn.effect, ranges), small_factors_at(scene.points, ranges)], axis=1
+        )
+        change = change * (1.0 + factors @ np.array(drawn.factors))
     return np.maximum(change, -scene.curve) if drawn.effect.kind is Kind.COURSE else change
 
 
@@ -126,9 +134,26 @@ def factors_at(points: Points, effect: Effect, ranges: Ranges) -> FloatArray:
     return np.stack(factors, axis=1) if factors else np.zeros((points.run.size, 0))
 
 
+def small_factors_at(points: Points, ranges: Ranges) -> FloatArray:
+    """φ [P, m] within ±1 at points: smooth factors over every axis that a campaign varied, by which any template may be a
+    little wrong; beyond its range that at its end."""
+    values, factors = _along(points), [np.zeros((points.run.size, 0))]
+    for along, orders in _SMALL.items():
+        low, width = ranges[along]
+        if width > 0:
+            unit = np.clip((values[along] - low) / width, 0.0, 1.0)
+            factors.append(np.cos(np.pi * unit[:, None] * np.arange(1, orders + 1)))
+    if ranges[Discrepancy.MOTION][1] > 0:
+        turns = points.phase[:, None] * np.arange(1, _HARMONICS + 1)
+        waves = np.where(points.steady[:, None], 0.0, np.concatenate([np.cos(turns), np.sin(turns)], axis=1))
+        factors += [np.where(points.steady, 1.0, 0.0)[:, None], waves]
+    return np.concatenate(factors, axis=1)
+
+
 def _along(points: Points) -> dict[Discrepancy, FloatArray]:
     return {
         Discrepancy.SPEED: points.velocity,
+        Discrepancy.PRESSURE: points.pressure,
         Discrepancy.LIFE: points.cycles,
         Discrepancy.CLOCK: points.clock,
         Discrepancy.MOTION: np.where(points.steady, 1.0, 0.0),

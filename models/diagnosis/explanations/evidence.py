@@ -20,16 +20,20 @@ from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.catalogue import Column, columns_at_rows
 from models.diagnosis.effects.effect import log_amplitude_peak
-from models.diagnosis.effects.fitted_effect import discrepancy_factors, effect_precisions, effect_rows, free_shapes
+from models.diagnosis.effects.fitted_effect import (
+    discrepancy_factors,
+    effect_precisions,
+    effect_rows,
+    free_shapes,
+    ranges_of,
+    small_factors_at,
+)
 from models.diagnosis.explanations.contrasts import contrasts_of, no_contrasts
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import GAINS, Gram, Projected, gram_of, project
 from models.gaussian_evidence import independent, log_gain, log_gain_alone, log_mean, log_sum
-
-#: Orders of the cosines over speed, pressure, life and clock, and harmonics of a loop, by which any template may be off.
-_SPEED, _PRESSURE, _LIFE, _CLOCK, _HARMONICS = 4, 2, 3, 3, 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,12 +55,13 @@ def evidence_of(problem: FitProblem, fitted: Fit, columns: Sequence[Column] = ()
     smooth structure beside it unless not wanted."""
     design = problem.design
     contrasts = contrasts_of(design, fitted.prediction) if smooth else no_contrasts(design)
-    errors, own = _template_errors(design, fitted)
-    exact = replace(
-        fitted, effects=tuple(replace(e, effect=replace(e.effect, discrepancies=())) for e in fitted.effects)
+    factors, own = template_errors(design, fitted)
+    changes = (
+        columns_at_rows(design, fitted.prediction, columns),
+        contrasts.columns,
+        off_by(design, fitted, factors),
     )
-    changes = (columns_at_rows(design, fitted.prediction, columns), contrasts.columns, errors)
-    gram = gram_of(problem, exact, np.concatenate(changes, axis=1))
+    gram = gram_of(problem, exactly(fitted), np.concatenate(changes, axis=1))
     gram, outward = _held_at_bounds(gram, int(problem.priors.free.sum()), fitted)
     ends = np.cumsum([outward.size, *(change.shape[1] for change in changes)])
     held, catalogue, contrasted, wrong = (slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
@@ -92,38 +97,33 @@ def evidence_of(problem: FitProblem, fitted: Fit, columns: Sequence[Column] = ()
     )
 
 
+def exactly(fitted: Fit) -> Fit:
+    """A fit whose templates are exact: their errors are columns of their own."""
+    return replace(
+        fitted, effects=tuple(replace(e, effect=replace(e.effect, discrepancies=())) for e in fitted.effects)
+    )
+
+
 def projections_beside(gram: Gram, noise: Noise) -> list[Projected]:
     """At every second scatter of the runs' gains, with the curves' as estimated without an effect and with none: an effect
     may be what made them scatter."""
     return [project(gram, gain, curve) for curve in sorted({noise.curve_gain, 0.0}) for gain in GAINS[::2].tolist()]
 
 
-def _template_errors(design: Design, fitted: Fit) -> tuple[FloatArray, FloatArray]:
-    """The changes [N, m] Nm by every factor with which the effects may be off, and [m] 1 for those in which an effect's form
-    is uncertain by itself, 0 for the others."""
-    columns, own = [np.zeros((design.torque.size, 0))], list[float]()
-    for effect in fitted.effects:
-        uncertain, other = discrepancy_factors(design, effect.effect), _any_factors(design)
-        columns.append(
-            effect_rows(design, fitted.prediction, effect)[:, None] * np.concatenate([uncertain, other], axis=1)
-        )
-        own += [1.0] * uncertain.shape[1] + [0.0] * other.shape[1]
-    return np.concatenate(columns, axis=1), np.array(own)
+def template_errors(design: Design, fitted: Fit) -> tuple[list[FloatArray], FloatArray]:
+    """By effect the factors φ [N, m] at the rows with which it may be off, and over all effects [Σ m] 1 for those in which
+    an effect's form is uncertain by itself, 0 for the others."""
+    small = small_factors_at(design.rows, ranges_of(design.rows))
+    uncertain = [discrepancy_factors(design, effect.effect) for effect in fitted.effects]
+    own = [np.repeat([1.0, 0.0], [factors.shape[1], small.shape[1]]) for factors in uncertain]
+    return [np.concatenate([factors, small], axis=1) for factors in uncertain], np.concatenate([np.zeros(0), *own])
 
 
-def _any_factors(design: Design) -> FloatArray:
-    """φ [N, m] within ±1: smooth factors over every axis, by which any template may be a little wrong."""
-    rows, out = design.rows, [np.zeros((design.torque.size, 0))]
-    axes = ((rows.velocity, _SPEED), (rows.pressure, _PRESSURE), (rows.cycles, _LIFE), (rows.clock, _CLOCK))
-    for values, orders in axes:
-        if np.ptp(values) > 0:
-            unit = (values - values.min()) / np.ptp(values)
-            out.append(np.cos(np.pi * unit[:, None] * np.arange(1, orders + 1)))
-    if design.loops:
-        turns = rows.phase[:, None] * np.arange(1, _HARMONICS + 1)
-        waves = np.where(rows.steady[:, None], 0.0, np.concatenate([np.cos(turns), np.sin(turns)], axis=1))
-        out += [np.where(rows.steady, 1.0, 0.0)[:, None], waves]
-    return np.concatenate(out, axis=1)
+def off_by(design: Design, fitted: Fit, factors: Sequence[FloatArray]) -> FloatArray:
+    """The changes [N, Σ m] Nm by every factor [N, m] with which the effects may be off."""
+    rows = [effect_rows(design, fitted.prediction, effect) for effect in fitted.effects]
+    changes = [change[:, None] * own for change, own in zip(rows, factors, strict=True)]
+    return np.concatenate([np.zeros((design.torque.size, 0)), *changes], axis=1)
 
 
 def _averaged(projected: Projected, wrong: slice, own: FloatArray, sizes: Sequence[tuple[float, float]]) -> float:

@@ -8,8 +8,10 @@ the template's discrepancies are jointly normal, with the mean that the discrepa
 
     (a, s, b) ~ N(fit + C g, C),     C = (Jᵀ V⁻¹ J)⁻¹, everything else free, g the gradient of the likelihood there
 
-and the size that is stated is that after the last state, a (1 + Σ_k b_k φ_k). Explanations count with their probability;
-what is left to one is nothing at work.
+under each size of the templates' errors and scatter of the gains, weighed by evidence as in `evidence`. The size that is
+stated is that after the last state, a (1 + Σ_k b_k φ_k) e^(f z): what a template calls an amplitude another rig's form of
+the same cause would call a little differently, and no data of torque show it. The draws have no f, for their torque is
+what was measured. Explanations count with their probability; what is left to one is nothing at work.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,16 +25,16 @@ from models.diagnosis.effects.effect import Effect, Tried
 from models.diagnosis.effects.fitted_effect import (
     Draw,
     FittedEffect,
-    discrepancy_factors,
     effect_columns,
     effect_rows,
     smooth_places,
 )
-from models.diagnosis.explanations.evidence import evidence_of
+from models.diagnosis.explanations.evidence import evidence_of, exactly, off_by, projections_beside, template_errors
 from models.diagnosis.explanations.verdict import Judgement
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import gram_of, projections_of
+from models.diagnosis.pooled_fit.projection import Gram, Projected, gram_of
+from models.gaussian_evidence import log_gain, log_sum
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +120,8 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
         for off, trend in zip(offs, trends.tolist(), strict=True):
             effects = component.effects(off)
             for effect, size in zip(effects, component.sizes(effects), strict=True):
-                sized.setdefault(effect.effect.slug, []).append((size, index))
+                form = float(np.exp(criteria.SIZE_FORM * rng.standard_normal()))
+                sized.setdefault(effect.effect.slug, []).append((size * form, index))
             samples.append(
                 (trend, index, tuple(effect for effect in effects if effect.effect.slug in judgement.causes))
             )
@@ -165,7 +168,7 @@ def _components(problem: FitProblem, original: Fit, share: float) -> Iterator[_C
     weights = np.exp(logs - logs.max())
     for weight, (_, fitted) in zip((share * weights / weights.sum()).tolist(), courses, strict=True):
         if weight > share / criteria.SIZES_SAMPLED:
-            yield _component(problem, fitted, weight)
+            yield from _components_of(problem, fitted, weight)
 
 
 def _unshrunk(fitted: FittedEffect) -> FittedEffect:
@@ -227,35 +230,39 @@ def _most_alike(fitted: Fit, effect: FittedEffect, kind: Sequence[Tried]) -> int
     return int(np.argmax(along))
 
 
-def _component(problem: FitProblem, fitted: Fit, weight: float) -> _Component:
-    design = problem.design
-    gram = gram_of(problem, fitted)
-    gains = max(projections_of(gram, problem.noise), key=lambda projected: projected.evidence)
-    inverse = gram.covariance(gains.run_gain, gains.curve_gain)
-    slope = gram.with_gains(gains.run_gain, gains.curve_gain)[0][: gram.base, -1]
-    own = slice(int(problem.priors.free.sum()), gram.base)
-    values, vectors = np.linalg.eigh(inverse[own, own])
-    rows = [effect_rows(design, fitted.prediction, effect) for effect in fitted.effects]
-    factors = [discrepancy_factors(design, effect.effect) for effect in fitted.effects]
+def _components_of(problem: FitProblem, fitted: Fit, weight: float) -> Iterator[_Component]:
+    """A refit's components: one for each scatter of the gains and size of the templates' errors that counts."""
+    design, free = problem.design, int(problem.priors.free.sum())
+    factors, own = template_errors(design, fitted)
+    errors = off_by(design, fitted, factors)
+    gram = gram_of(problem, exactly(fitted), errors)
+    supposed = [
+        (projected, np.where(own > 0, *size))
+        for projected in projections_beside(gram, problem.noise)
+        for size in criteria.TEMPLATE_ERRORS
+    ]
+    logs = [projected.evidence + log_gain(projected.info, projected.score, sd) for projected, sd in supposed]
     steady = design.closed & design.rows.steady
     states = design.rows.cycles[steady]
     last, first = steady & (design.rows.cycles == states.max()), steady & (design.rows.cycles == states.min())
-    columns = np.concatenate(
-        [
-            *(effect_columns(design, fitted.prediction, effect) for effect in fitted.effects),
-            *(change[:, None] * own_factors for change, own_factors in zip(rows, factors, strict=True)),
-        ],
-        axis=1,
-    )
-    whole = np.sum(rows, axis=0)
-    return _Component(
-        weight=weight,
-        fit=fitted,
-        mean=(inverse @ slope)[own],
-        root=vectors * np.sqrt(np.maximum(values, 0.0)),
-        trend=(
-            float(whole[last].mean() - whole[first].mean()),
-            columns[last].mean(axis=0) - columns[first].mean(axis=0),
-        ),
-        last=tuple(own_factors[last].mean(axis=0) for own_factors in factors),
-    )
+    columns = np.concatenate([*(effect_columns(design, fitted.prediction, e) for e in fitted.effects), errors], axis=1)
+    whole = np.sum([effect_rows(design, fitted.prediction, effect) for effect in fitted.effects], axis=0)
+    rising = columns[last].mean(axis=0) - columns[first].mean(axis=0)
+    trend = float(whole[last].mean() - whole[first].mean())
+    for (projected, sd), log in zip(supposed, logs, strict=True):
+        share = weight * float(np.exp(log - log_sum(logs)))
+        if share * criteria.SIZES_SAMPLED >= 1.0:
+            mean, root = _normal(gram, projected, sd, free)
+            at_end = tuple(own_factors[last].mean(axis=0) for own_factors in factors)
+            yield _Component(weight=share, fit=fitted, mean=mean, root=root, trend=(trend, rising), last=at_end)
+
+
+def _normal(gram: Gram, projected: Projected, sd: FloatArray, free: int) -> tuple[FloatArray, FloatArray]:
+    """Mean and root of the covariance of all behind the first `free`, of which the last have deviations sd >= 0."""
+    matrix = gram.with_gains(projected.run_gain, projected.curve_gain)[0]
+    scale = np.concatenate([1 / np.sqrt(np.maximum(np.diag(matrix)[: gram.base], 1e-300)), sd])
+    scaled = matrix[:-1, :-1] * scale[:, None] * scale
+    scaled[np.diag_indices(scale.size)] += np.repeat([0.0, 1.0], [gram.base, sd.size])
+    inverse = np.linalg.pinv(scaled, hermitian=True) * scale[:, None] * scale
+    values, vectors = np.linalg.eigh(inverse[free:, free:])
+    return (inverse @ matrix[:-1, -1])[free:], vectors * np.sqrt(np.maximum(values, 0.0))
