@@ -9,7 +9,7 @@ import pytest
 from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
 from models.diagnosis.design.criteria import MOST_PLATEAUS
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.fitted_effect import Draw, FittedEffect, ranges_of
+from models.diagnosis.effects.fitted_effect import Draw, FittedEffect, ranges_of, small_factors_at
 from models.diagnosis.effects.readings import DAYS, STRAIGHT
 from models.diagnosis.effects.thermal import log_viscosity_ratio
 from models.diagnosis.extension import Extension, NotFiniteError, build_extension, facts_from, facts_to
@@ -185,7 +185,8 @@ def test_every_draw_is_a_correction_of_its_own_and_they_weigh_as_they_should(war
 def test_a_draw_carries_the_template_s_discrepancy_along_life(warm):
     """1 + b cos(π x): as much more in the first state as less in the last, and beyond it as in the last."""
     effect = BY_SLUG["torque_zero_shift"]
-    zero = FittedEffect(effect=effect, amplitude=0.4, shape=(0.0, -1.0, *STRAIGHT), factors=(0.25, 0.0))
+    small = (0.0,) * small_factors_at(warm.design.points, ranges_of(warm.design.rows)).shape[1]
+    zero = FittedEffect(effect=effect, amplitude=0.4, shape=(0.0, -1.0, *STRAIGHT), factors=(0.25, 0.0, *small))
     built = extended(warm, Draw(weight=1.0, laws=warm.baseline.fit.laws, effects=(zero,)))
     tests = warm.campaign.stationary
     assert np.allclose(built.artefact(tests[0], warm.campaign), 0.4 * 1.25)
