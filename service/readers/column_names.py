@@ -28,7 +28,7 @@ _NOUNS = {
     "frecuencia fréquence частота",
     "torque_nm": "torque trq tq md -moment couple par coppia binário koppel vridmoment tork -扭矩 -转矩 -轉矩 -トルク "
     "момент -토크",
-    "temperature": "temperature temp oiltemp oiltemperature -temperatur température temperatura theta -温 -溫 температура",
+    "temperature": "temperature -temp oiltemp oiltemperature -temperatur température temperatura theta -温 -溫 температура",
 }
 #: Letters that stand for a quantity beside another word or a unit, which decides between several.
 _SYMBOLS = {
@@ -46,7 +46,7 @@ _PLAIN_OF = {
     "pressure_bar": "line leitung leitungs anpress kolben piston",
     "speed_rpm": "rotational rotation shaft differential diff slip motor relative rel dreh winkel angular differenz schlupf "
     "giro obrotowa drum trommel welle вращения",
-    "torque_nm": "friction reib frottement fricción dreh motor obrotowy kroutící 摩擦 r",
+    "torque_nm": "friction reib frottement fricción dreh obrotowy kroutící 摩擦 r",
     "temperature": "",
 }
 #: Whose temperature it is.

@@ -31,6 +31,8 @@ _MAX_TITLE_ROWS = 12
 _UNIT_LABELS = re.compile(
     r"[a-z]{0,2}_?unit[éàs]*(_label)?s?:?|einheit(en)?:?|unidad(es)?:?|单位|單位|単位", re.IGNORECASE
 )
+#: What a row begins with that holds a factor for each column.
+_FACTORS = re.compile(r"\w*[ _]?(?:fa[ck]tor|gain|s[ck]al|slope|mult)", re.IGNORECASE)
 NUMERIC = re.compile(
     r"[+−-]? *(\d[\d.,'’\u00a0\u202f\u2009]*+|[.,]\d++)( ?[dDeE][+-]?\d{1,4})?|[+−-]?(nan|inf|infinity)",
     re.IGNORECASE | re.ASCII,
@@ -98,7 +100,7 @@ def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, 
     for index, row in enumerate(rows):
         if index in comments or is_blank(row):
             continue
-        if any(map(is_value, row)):
+        if _has_values(row):
             start, length = (start, length + 1) if length else (index, 1)
         elif length:
             yield start, length
@@ -125,6 +127,24 @@ def is_value(cell: Any) -> bool:
     if isinstance(cell, str):
         return bool(cell) and (NUMERIC.fullmatch(cell) is not None or is_stamp(cell) or bool(with_unit_apart(cell)[1]))
     return cell is not None and not isinstance(cell, bool)
+
+
+def _has_values(row: Row) -> bool:
+    """Whether a row holds values: not one of units of which some are multiples (`s;bar;0.01 Nm`)."""
+    values = [is_value(cell) for cell in row if cell not in (None, "")]
+    return any(values) and (all(values) or not _are_units(row))
+
+
+def refuse_factors(above: Sequence[Sequence[str]]) -> None:
+    """Raise InvalidError where a line above the data has factors of the columns, which may be applied to them or not."""
+    for row in above:
+        numbers = [cell for cell in row[1:] if NUMBER.fullmatch(cell.replace(",", "."))]
+        others = [cell for cell in numbers if float(cell.replace(",", ".")) != 1]
+        if len(numbers) > 1 and others and _FACTORS.match(row[0]):
+            what = (
+                f"the line {row[0][:MAX_QUOTED]!r} holds factors, which may have been applied or not, got {others[0]}"
+            )
+            raise InvalidError.of(f"{what}: take it out of a file of physical values", code="raw_counts")
 
 
 def is_footer(row: Row, other: Row) -> bool:
@@ -186,7 +206,7 @@ def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) 
     text_rows: list[int] = []
     for index in range(start - 1, -1, -1):
         row = rows[index]
-        if index in comments or not any(map(is_value, row)):
+        if index in comments or not _has_values(row):
             text_rows += [] if is_blank(row) else [index]
         elif not is_footer(row, rows[start]) and [_text(cell) for cell in row] != [str(k + 1) for k in range(len(row))]:
             break

@@ -309,8 +309,13 @@ _EPOCH = datetime(2000, 1, 1)
 _DAY = 86_400 * 10**9
 
 
+#: The order of C's ctime: `Fri Nov 27 07:00:00 2026`.
+_CTIME = re.compile(r"[^\W\d]{2,3} ([^\W\d]{3}) +(\d{1,2}) ([\d:.]{5,15}) (\d{4})")
+
+
 def _in_numbers(cell: str) -> str:
     """A text with the month's name at its beginning as a number: `27. Nov. 2026 07:00` as `27.11.2026 07:00`."""
+    cell = _CTIME.sub(r"\2 \1 \4 \3", cell) if cell[:1].isalpha() else cell
     match = _NAMED.match(cell) if cell[:1].isalnum() else None
     name = match["month"].casefold() if match else ""
     month, day = _MONTHS.get(name[:4]) or _MONTHS.get(name[:3]), match and (match["day"] or match["second"])

@@ -24,7 +24,17 @@ from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, Not
 from service.readers.clocks import stated_clock
 from service.readers.column_names import choices_of, is_counter, recognised
 from service.readers.detect import ByteSource, Format, overdue, too_slow
-from service.readers.grid import MAX_ROWS, Layout, find_table, is_footer, left_out, no_table, turned, was_turned
+from service.readers.grid import (
+    MAX_ROWS,
+    Layout,
+    find_table,
+    is_footer,
+    left_out,
+    no_table,
+    refuse_factors,
+    turned,
+    was_turned,
+)
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
 from service.readers.numerals import Numerals, is_stamp
 from service.readers.table import Column, Reading, Table, labels
@@ -80,6 +90,7 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
         return replace(table, notices=[*table.notices, was_turned()])
     body = _Body(opened, form, reading, limits)
     cells = tuple(tuple(_cells(line, form.separator)) for line in form.lines[: form.first_line + 19])
+    refuse_factors(cells[: form.first_line - 1])
     return Table(
         columns=tuple(_with_clocks(form.layout.columns(), cells[: form.first_line - 1], body)),
         read=body.read,

@@ -26,6 +26,7 @@ from service.readers.grid import (
     is_value,
     left_out,
     no_table,
+    refuse_factors,
     turned,
     was_turned,
 )
@@ -119,6 +120,7 @@ def _table(
     def line_of(row: int) -> int:
         return lines[row] + 1
 
+    refuse_factors([[*map(_shown, row)] for row in rows[max(start - MAX_ROWS, 0) : start]])
     shown_above = tuple(tuple(map(_shown, row)) for row in rows[max(titles - MAX_ROWS, 0) : titles])
     clock = stated_clock(labels(shown_above), lambda: len(lines))
     return Table(

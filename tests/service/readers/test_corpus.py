@@ -265,6 +265,10 @@ TEXTS: dict[str, tuple[str | bytes, str | None]] = {
     "english-months.csv": (stamps('"Nov 27, 2026 %I:%M:%S.%f %p"'), None),
     "ranges-of-sensors.csv": ("t s,p 0-16 bar,n (0...3000 1/min),Torque [±200 Nm]\n" + rows(), None),
     "places-in-titles.csv": ("Time [s],CH1-1 Pressure [bar],Drum.n_diff [rpm],Torque @ 80 °C [Nm]\n" + rows(), None),
+    "c-times.csv": (stamps("Fri Nov 27 %H:%M:%S.%f 2026"), None),
+    "a-multiple-among-units.csv": ("Zeit;Druck;Drehzahl;Moment\ns;bar;1/min;0,01 kNm\n"
+                                   + "".join(f"{t};{p};{n};{m / 10}\n"
+                                             for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
     "set-points.csv": ("Zeit [s];p Soll [bar];p Ist [bar];n_act [1/min];Torque (filtered)\n;;;;Nm\n"
                        + re.sub("(?m)^([^;]*);", r"\1;9;", rows(";")), None),
     "thousands-of-turns.csv": ("t [s],p [bar],n / 1000 min⁻¹,M [10⁻³ kNm]\n"
@@ -354,6 +358,11 @@ REFUSED = {
         "[x0.1 Nm], [x10 Nm] or [x1 Nm]",
     ),
     "a-factor-in-a-title-without-a-map": ("t [s];Drehzahl x100 [1/min]\n0;12\n", None, "[x0.01 1/min], [x100 1/min]"),
+    "a-row-of-factors": (
+        "t;M\ns;Nm\nFaktor;1;0,1\n0;210\n1;211\n",
+        None,
+        "holds factors, which may have been applied or not",
+    ),
     "a-factor-behind-a-unit": ("t;M\ns;Nm*10\n0;2.1\n", None, "'Nm*10'"),
     "two-torques": ("t [s];Torque A1 [Nm];Torque A2 [Nm]\n0;1;2\n", None, "torque_nm must be one column"),
     "two-times-that-differ": (
