@@ -116,14 +116,14 @@ def opened(watched: Watched) -> Page:
 
 def test_the_importer_is_used_by_keyboard_and_passes_axe(watched: Watched) -> None:
     page = opened(watched)
-    drop(page, {"other.csv": text(5000).replace(b"Mz", b"M_z1")})
+    drop(page, {"other.csv": text(5000).replace(b"Mz", b"Spur")})
     dialog = page.get_by_role("dialog", name="Send a run")
-    expect(dialog.get_by_label("Channel of M_z1")).to_be_visible()
-    dialog.get_by_label("Channel of M_z1").focus()
+    expect(dialog.get_by_label("Channel of Spur")).to_be_visible()
+    dialog.get_by_label("Channel of Spur").focus()
     page.keyboard.type("torque, nm")
-    expect(dialog.get_by_label("Unit of M_z1")).to_have_value("kNm")
-    expect(dialog.get_by_label("Channel of M_z1")).to_be_focused()
-    expect(dialog.get_by_label("Channel of M_z1")).to_have_value("torque_nm")
+    expect(dialog.get_by_label("Unit of Spur")).to_have_value("kNm")
+    expect(dialog.get_by_label("Channel of Spur")).to_be_focused()
+    expect(dialog.get_by_label("Channel of Spur")).to_have_value("torque_nm")
     assert violations(page) == []
 
 
