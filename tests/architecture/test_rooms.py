@@ -20,4 +20,7 @@ def test_the_document_names_the_files_of_an_errand(name: str, errand: Callable[[
     assert paths, "nothing was watched"
     assert all((ROOT / path).is_file() for path in paths)
     documented = document.paths_of(document.parts(document.DOCUMENT.read_text(encoding="utf-8"))[name])
+    if set(documented) != set(paths):  # what another thread entered meanwhile is entered once
+        again = errand()
+        paths = [path for path in paths if path in again]
     assert set(documented) == set(paths), "docs/explanation/architecture.md names other files: make architecture"
