@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from models.diagnosis import criteria
 from models.diagnosis.criteria import DRAWS, SIGN_UNDETERMINED
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.report.report import Report
+from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.rehearsals import rehearsal
-from tests.models.diagnosis.test_diagnose import of_planted
+from tests.models.diagnosis.test_diagnose import PLANTED, look, of_planted
 
 
 @pytest.fixture(scope="module")
@@ -49,3 +51,18 @@ def test_draws_weigh_one_and_carry_only_what_the_report_names(shifted: Report) -
     sizes = [effect["amplitude"] for draw in shifted.extension.content["draws"] for effect in draw["effects"]]
     assert len(set(sizes)) > DRAWS // 2
     assert np.mean(np.array(sizes) < 0) <= SIGN_UNDETERMINED
+
+
+def test_what_another_form_would_call_a_size_widens_what_is_stated_and_not_what_is_adopted(
+    shifted: Report, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(criteria, "SIZE_FORM", 0.3)
+    wide = look(campaign(7, PLANTED["torque_zero_shift"]))
+    stated, wider = (
+        next(each for each in report.candidates if each.effect == "torque_zero_shift").estimate
+        for report in (shifted, wide)
+    )
+    assert wider.sd > 1.5 * stated.sd
+    assert shifted.extension is not None
+    assert wide.extension is not None
+    assert wide.extension.content == shifted.extension.content
