@@ -1,4 +1,4 @@
-"""The application: its parts put together, nothing made at import."""
+"""Puts the parts of the application together."""
 
 import math
 import shutil

@@ -1,5 +1,5 @@
-"""The channels' columns: public names, units and admissible ranges, and the check of what was sent; and what makes two
-contents the same: their values, whatever notation they were sent in.
+"""The channels of a run: names, units, valid ranges, the check of their values, and when two contents are the same. Contents
+are compared by value, whatever notation they were sent in.
 
 Channels are converted to SI here and nowhere else; what units a file states are brought to the channels' own before
 (`readers.unit_table`). A column that is wrong gives errors that name channel, row and value. 7000, 7000.0 and 7e3 are one

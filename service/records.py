@@ -1,4 +1,4 @@
-"""Rows <-> values: a clutch's state loaded in one sweep, results stored in another; verdicts and inspections as they go out.
+"""Converts between database rows and values: loads the state of a clutch, and stores its results.
 
 A workflow reads a `ClutchState`, computes outside any transaction, and stores with `unchanged` and `store`.
 """

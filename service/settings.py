@@ -1,4 +1,4 @@
-"""What an operator may set, by environment or command line: every field of `Settings` as CLUTCHLIFE_ and its name."""
+"""The settings of the service: each field of `Settings` is an environment variable `CLUTCHLIFE_...`."""
 
 import os
 import re

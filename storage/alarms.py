@@ -1,4 +1,6 @@
-"""Rules of alarms, and what they have raised: once for a rule and a clutch until it is cleared, newest first."""
+"""The tables of alarm rules and of raised alarms. A rule raises an alarm once for each clutch until the alarm is cleared.
+Lists begin with the newest.
+"""
 
 from collections.abc import Collection
 from dataclasses import dataclass

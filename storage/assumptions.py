@@ -1,4 +1,4 @@
-"""What a clutch is tracked under: the models adopted for it with the mean COFs that they correct, and the fleets' priors.
+"""The tables of adopted models and of priors learned from fleets.
 
 Priors are kept by kind of clutch, version, and the clutches that were left out.
 """

@@ -1,4 +1,4 @@
-"""The audit trail: who changed what of a clutch or of one of its runs, when and why. Rows are added, never changed."""
+"""The table of the audit trail: who changed what, when and why. Rows are added, never changed."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The raw channels of a run, kept bit for bit, and beside them the file that they were read from, as it was sent.
+"""The tables of raw channels, kept bit for bit, and of the files from which they were read.
 
 They are written once; only the channels of a run whose file is read again by another rig profile are replaced. A long
 column may lie in a store beside the database (`storage/blobs`): put there before the row that names it, and fetched when

@@ -1,4 +1,4 @@
-"""Clutches: the record in force and the one that was posted, the summary that lists show, and the lists themselves."""
+"""The table of clutches: the current record, the first record, and the summary that lists show."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass

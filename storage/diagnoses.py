@@ -1,4 +1,6 @@
-"""Diagnoses of a clutch: running, then finished or failed; newest first, and the verdict of the newest that has finished."""
+"""The table of diagnoses: running, finished or failed. Lists begin with the newest; a clutch's verdict is that of the newest
+finished diagnosis.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What SQLite and PostgreSQL do not say in the same words: types, and expressions in pairs under one name.
+"""Expressions that SQLite and PostgreSQL write differently, in pairs under one name.
 
 JSON is text in both. Text is ordered by its code points in both, numbers are 64-bit floats, whole numbers have 64 bits.
 """

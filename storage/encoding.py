@@ -1,4 +1,5 @@
-"""Columns of 64-bit floats as bytes, bit for bit: signed zeros, subnormals and the payload of a NaN survive.
+"""Encodes columns of 64-bit floats as bytes, and restores them bit for bit. Signed zeros, subnormals and the payload of a
+NaN survive.
 
 `shuffle-zlib` stores one column. The eight bytes of every little-endian float go to eight planes, so that signs and
 exponents, which hardly change from sample to sample, lie together and deflate well; a plane of noise (the low bytes of a

@@ -1,4 +1,4 @@
-"""Jobs: waiting, running, then finished, failed or cancelled; newest first.
+"""The table of jobs: waiting, running, finished, failed or cancelled. Lists begin with the newest.
 
 A job is claimed by a process, which holds it for a while and prolongs that while it works (a lease). A job whose lease has
 run out may be claimed again: its process was killed. On PostgreSQL rows that another claim has just locked are passed over;

@@ -1,4 +1,4 @@
-"""What was computed of a clutch: the fitted curves of its runs, its predictions, and the filters' states after the last run.
+"""The tables of results: fitted curves, predictions, and the filters' states after the last run.
 
 Curves are a row a run and pressure level, in SI units (Pa, Nm, m/s). Predictions are remaining life as it was predicted
 after each run, a row a clutch, method, pressure (Pa; 0 = the mean) and cycles. A filter's state makes the next run one step:

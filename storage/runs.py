@@ -1,4 +1,4 @@
-"""Runs: the request as it was stored, and the receipt that answered it. Their order is by cycles, then by run_id.
+"""The table of runs: each request as stored, and its receipt. Their order is by cycles, then by run_id.
 
 Only accepted runs are part of a clutch's history; those that are held or were withdrawn stay stored beside them.
 """

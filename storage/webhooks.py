@@ -1,4 +1,4 @@
-"""Receivers of alarms, and the outbox of what they are to be sent.
+"""The tables of receivers and of deliveries that wait.
 
 A delivery waits until it is `due`. Whoever tries it moves that on first (a lease): where its process is killed meanwhile,
 it is due again when the lease has run out. So each is sent at least once.

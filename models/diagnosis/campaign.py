@@ -1,4 +1,4 @@
-"""A campaign as the diagnosis sees it: everything that one life of a clutch has sent, in SI units, ordered by cycles.
+"""A campaign: all runs of one life of a clutch, in SI units, in the order of their cycles.
 
 Cycles count from the beginning of the life (new, or the last rebuild). Moments are seconds on one clock (since 1970) where
 the rig sent when a run was started, else None. A stationary run is its steady plateaus in the order in which they were

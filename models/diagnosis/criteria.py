@@ -1,5 +1,5 @@
-"""Every number on which a diagnosis decides beside those of rows (`design`) and raw records, which have their own
-`criteria.py`, and of single effects, whose priors and shapes stand with them: its meaning, its unit, and where it is from.
+"""The numbers on which a diagnosis decides, each with its meaning, unit and origin. Numbers of rows (`design`) and of raw
+records stand in their own `criteria.py`; priors and shapes of an effect stand with the effect.
 
 The numbers that gate a verdict, with what an ablation of each changes, are the table in docs/appendix/diagnosis.md. A number
 without an origin was chosen, and no record was kept of what else was tried. λ is the expected log-likelihood ratio [nats]

@@ -1,4 +1,4 @@
-"""The diagnosis of a campaign, and its table of contents: one call a chapter, in the order of the folders.
+"""The diagnosis of a campaign: calls one chapter after the other, in the order of the folders.
 
 design -> baseline, noise, pooled_fit -> effects, raw_records -> explanations -> validation -> experiments -> report
 """

@@ -1,4 +1,4 @@
-"""The numerics of an extended model: artefacts are taken off measurements, courses are added along a life.
+"""The numerics of an extended model: subtracts artefacts from measurements, and adds courses along a life.
 
 An *artefact* (oil temperature, a shifted zero, an unsettled dwell ...) is in the measurement and not in the clutch: its
 torque is taken off every plateau before a curve is fitted. A *course* (running-in, oil change, accelerated wear ...) is in

@@ -1,5 +1,4 @@
-"""The outbox: what receivers are to be sent is tried until it is taken, by a thread of the service; and the clock of silent
-rigs.
+"""The outbox: a thread of the service sends alarms until their receivers have taken them, and raises alarms of silent rigs.
 
 At least once: an attempt takes its delivery for some time and ends it afterwards. Where the service is killed between the
 two, the delivery is due again when that time has run out, or at the next start.

@@ -1,5 +1,5 @@
-"""Alarms raised and cleared, in the transaction that stores what a clutch's results are; what receivers are to learn of it
-goes into the outbox with it.
+"""Raises and clears alarms, in the transaction that stores a clutch's results. The outbox gets what receivers are to learn
+in the same transaction.
 
 An alarm is raised once: while it is not cleared, its rule raises no other of the clutch. It is cleared when its value has
 come back by the hysteresis, or when nothing can be said any more: after a rebuild, where the rule is gone. One that ended

@@ -1,4 +1,4 @@
-"""What a clutch's life is tracked under: what ζ counts, the prior before the first test, and what an adopted model adds.
+"""The assumptions of a prediction: what counts as use, the prior, and what an adopted model adds.
 
 Every prediction is made under assumptions, and every answer names its model, its prior and its severity.
 """

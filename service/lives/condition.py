@@ -1,5 +1,4 @@
-"""The condition of a clutch, stored beside it and stated by lists, pages and terminals alike: its remaining life in short,
-what held runs would make of it, its state after NAMUR NE 107 with the reason as a sentence, and what to do about it.
+"""The condition of a clutch, as lists, pages and terminals show it: remaining life in short, state, reason and advice.
 
 `summarised` (in `outlook.py`) makes what is stored; `state_of` is the only place where a state is decided, `top_line` the
 only one where the line above a clutch's page and its action are written.

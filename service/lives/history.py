@@ -1,4 +1,4 @@
-"""A clutch's history as series over duty cycles, ready to be tracked.
+"""A clutch's history as series over duty cycles, for the filters.
 
 Runs may have arrived in any order; the history is ordered by cycles, and at equal cycles by when the runs were started
 (or received, where the rig did not say; a clock that was set back meanwhile does not exchange them). A rebuild starts a

@@ -1,4 +1,4 @@
-"""A run on its way in: what was sent, checked, with its channels bit for bit, and its step into the models' units."""
+"""A new run: the checked request with its unchanged channels, and its conversion to the models' units."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

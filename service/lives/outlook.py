@@ -1,4 +1,4 @@
-"""What a clutch's runs say of its remaining life now: by its own criteria, and as it would be were its held runs accepted.
+"""The remaining life of a clutch as its runs show it, and as it would be with its held runs.
 
 Computed with the results of every run and change, and stored with them as the clutch's summary.
 """

@@ -1,6 +1,4 @@
-"""What goes out of runs and lives, in the public names and units: receipts, predictions, a list's summary; and what a
-prediction and a run in its clutch's history are warned of.
-"""
+"""Receipts, predictions and list summaries as JSON, with their warnings, in public names and units."""
 
 import math
 from collections.abc import Mapping, Sequence

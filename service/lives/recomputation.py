@@ -1,4 +1,4 @@
-"""A clutch's state as one value, and everything that is computed of it again; nothing here reads or writes a database.
+"""The state of a clutch as one value, and all results that are computed from it; nothing here uses a database.
 
 A workflow loads a `ClutchState`, computes `Results` with the functions below, and stores them in one short transaction that
 checks that the state's revision is still the newest. An `Arrival` is a run as it comes in, among the stored ones.

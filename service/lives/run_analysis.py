@@ -1,4 +1,4 @@
-"""A run's own results, before its history is looked at: curves and loops fitted, oddities noticed.
+"""Analyses one run alone: fits its curves and loops, and notes what is odd.
 
 `analyse` is the first step of every run's way in; `mean_cofs` turns a test's curves into mean COF over a protocol's speeds.
 """

@@ -1,4 +1,4 @@
-"""Tracking a life: three filters over a series, the prediction of each after every event, and predictions that are not
+"""Tracks a life: runs the three filters over a series, and predicts after every event. Also makes predictions that are not
 stored.
 
 A run that comes last in order of cycles carries the stored filter states one step on; any other run makes the life be

@@ -1,4 +1,4 @@
-"""Computed answers as JSON or CSV bytes, by what they depend on: bounded, shared between threads, and each made once.
+"""The cache of computed answers: each answer is computed once and shared between threads.
 
 Where several ask for an answer that is not there yet, one computes it and the others wait for it.
 """

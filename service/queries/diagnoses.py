@@ -1,4 +1,4 @@
-"""`/diagnoses`: reports as they are stored, and whether they still hold; `/model`: what was adopted of them."""
+"""`/diagnoses`: stored reports, and whether they are still current; `/model`: the adopted model."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""`/remaining-useful-life`: a stored prediction, or one computed from the clutch's state where none is stored; by other
-criteria than mean COF alone too: any quantity, several limits at once, an earlier life.
-"""
+"""`/remaining-useful-life`: the stored prediction, or one computed for the requested quantity, criterion or earlier life."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""A run as a JSON body -> `IncomingRun`: pydantic checks the shape, `service.columns` the millions of numbers.
+"""Reads a run from a JSON body: pydantic checks its shape, `service.columns` its numbers.
 
 Other bodies that are JSON come in here too. Whatever is sent, memory stays within some ten times its size.
 """

@@ -1,4 +1,4 @@
-"""The clutch record: geometry, oil, end of life. Everything but the name defaults to the reference's clutch."""
+"""The record of a clutch: geometry, oil, end of life. Everything but the name defaults to the reference's clutch."""
 
 from typing import Annotated, Any, Literal, Self
 

@@ -1,4 +1,4 @@
-"""Bodies in, answers out: JSON or CSV with a strong entity tag, 304 where the asker has it already, cursors for pages.
+"""Reads request bodies and writes answers: JSON or CSV, entity tags, 304 for unchanged answers, cursors for pages.
 
 What follows from a clutch's revision alone is made once and kept (`clutch_answer`); what takes long is computed by a worker
 (`computed_answer`); what a job does is waited for (`until_ended`).

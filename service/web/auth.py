@@ -1,4 +1,4 @@
-"""Who may do what: bearer keys with a scope and, where they are bound, the clutches that they are for.
+"""Decides who may do what: keys have a scope, and may be bound to clutches.
 
 Scopes contain each other: `read` looks; `ingest` also adds (clutches, runs, diagnoses); `admin` also changes what stands
 (edits, withdraws, corrects, adopts). A key is shown once; only its sha256 is stored. Once a key was made one is needed for

@@ -1,4 +1,6 @@
-"""Files that come in and go out: kept beside the database meanwhile; chosen by `Accept`, sent piece by piece."""
+"""Receives and sends files, which are kept on disk meanwhile. `Accept` chooses the form of an answer, which is sent piece by
+piece.
+"""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Metrics for Prometheus: requests by route, what waits, and how many clutches stand where.
+"""Metrics for Prometheus: requests by route, waiting work, and clutches by remaining life.
 
 They cost the same however many clutches are stored; series of every clutch are there only where they are asked for.
 """

@@ -1,6 +1,4 @@
-"""What stands before every address: ids, counts, logs, shares, bounds on bodies, compression both ways, safe headers, what
-polls ask again, and the path that a proxy adds.
-"""
+"""Handles what all requests share: ids, logs, limits per caller, body sizes, compression, and headers."""
 
 import asyncio
 import hashlib

@@ -1,4 +1,4 @@
-"""A service's part in the jobs of its database: each in a process of its own, claimed when its turn comes.
+"""Claims the jobs of the database and runs each in a process of its own.
 
 Jobs are rows (`storage.jobs`), so any service on the database does them: who is free claims the next one and prolongs its
 lease while it works. The job of a service that was killed is claimed by another once the lease has run out; one that was

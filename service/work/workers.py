@@ -1,4 +1,4 @@
-"""Work outside the process that answers: calls of `function(database, ...)` in lanes of worker processes.
+"""The worker processes, which compute what would delay the process that answers requests.
 
 A lane holds what may take equally long, so that a file of a million samples or an answer that takes seconds delays nothing
 that is quick. Calls that change the same clutch take turns, since one would be computed in vain; so do a caller's answers,

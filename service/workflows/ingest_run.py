@@ -1,4 +1,4 @@
-"""A run comes in: its curves are fitted, the clutch is tracked on or again, and all is stored in one short transaction.
+"""Takes in a run: fits its curves, tracks the clutch, and stores everything in one short transaction.
 
 Everything is computed before the database is locked; where another run of the clutch was stored meanwhile, what depends on
 the history is computed again. A doubtful run is stored with its curves, held, and changes nothing else.

@@ -1,4 +1,4 @@
-"""A diagnosis is asked for, as a job of the same name, and its end is stored with that of its job."""
+"""Starts a diagnosis as a job, and stores its result."""
 
 import secrets
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""A report of the diagnosis in the public shape: names and units of the edge, every number finite or null."""
+"""A diagnosis report in public names and units; every number is finite or null."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Runs as the joint judgement sees them: what each shows as it was sent, and without each slip of its channels; and channels
-that are dead (unplugged, railed, frozen), which a run shows by itself.
+"""Prepares runs for the plausibility judgement: each as sent, and as it would be without each possible slip. Finds dead
+channels too (unplugged, railed, frozen), which a run shows by itself.
 
 What a run shows of friction is taken from its rows when it comes in (`shown_by`) and stored beside it; all else follows from
 the history.

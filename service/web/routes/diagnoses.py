@@ -1,4 +1,4 @@
-"""Diagnoses: asked for, listed, looked up; and the model that a clutch is tracked under."""
+"""The routes of diagnoses and of the adopted model."""
 
 import asyncio
 from functools import partial

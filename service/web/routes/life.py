@@ -1,4 +1,4 @@
-"""Remaining useful life, degradation, Stribeck curves, loops and flat series."""
+"""The routes of remaining life, degradation, Stribeck curves, loops and series."""
 
 import asyncio
 from dataclasses import replace

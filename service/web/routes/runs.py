@@ -1,4 +1,4 @@
-"""Runs: post, list, look up, and what is changed of them afterwards."""
+"""The routes of runs: post, list, look up and change."""
 
 import asyncio
 import tempfile

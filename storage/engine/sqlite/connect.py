@@ -1,4 +1,4 @@
-"""How the file is opened: its mode, its path from the URL, its journal, the settings of every connection, and its locks.
+"""Opens the SQLite file: its permissions, journal, connection settings and locks.
 
 Files are private from the moment they are made: they hold what keys protect. SQLite gives its log, and the index of its
 log, the mode of the database file; a file that is there keeps its mode. The driver's own transaction control is switched

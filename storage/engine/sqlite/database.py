@@ -1,4 +1,4 @@
-"""A database that is one file: its transactions, how it comes to be and is migrated, what requests ask of it, its health.
+"""The database in one SQLite file: transactions, migration and health.
 
 Readers begin by BEGIN, writers by BEGIN IMMEDIATE, so that a writer either has the lock before its first statement or has
 changed nothing. Writers of all threads and processes queue for the lock of `connect.WriteLock`.
