@@ -17,10 +17,9 @@ from service.errors import InvalidError
 from service.lives.incoming_run import IncomingRun, SampledChannels
 from service.lives.payloads import fit_items, notice_items
 from service.lives.run_analysis import analyse
-from service.readers.column_names import unit_in_title
 from service.readers.read_file import preview_file, read_file
 from service.readers.table import Reading
-from service.readers.unit_table import conversion, spellings
+from service.readers.unit_table import spellings
 from service.run_files.rig_profile import Named, fits, named, pattern_for
 from service.run_files.upload import NEEDED, reading_with, run_of
 from service.schemas.clutch import ClutchIn
@@ -67,7 +66,9 @@ def preview(
         if reading.mapping and (titled := _by_titles(shown)):
             used = used.model_copy(update={"columns": titled.columns})
     kind, cycles = kind or own.kind, own.cycles if cycles is None else cycles
-    evaluated = _evaluated(path, filename, used, kind, geometry, torque_filter)
+    by_titles = profile is None and shown["problem"] is None  # as a push reads it; else with what is open left open
+    read_by = reading_with(None if by_titles else used, reading if by_titles else Reading())
+    evaluated = _evaluated(path, filename, None if used is None else read_by, kind, geometry, torque_filter)
     kind = kind or (evaluated["kinds"][0] if len(evaluated["kinds"]) == 1 else None)
     kept = _first_of_each(shown["columns"])
     columns = [_column(shown["columns"][index], used) for index in kept]
@@ -146,18 +147,10 @@ def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, 
     title = _title(column)
     own = next((item for item in profile.columns if item.title == title), None) if profile else None
     channel = None if own is None else own.channel
-    unit = (
-        None if channel is None or own is None else own.unit or column["unit"] or unit_in_title(channel, column["name"])
-    )
-    understood = channel is not None and unit is not None and conversion(channel, unit) is not None
     return {
         "title": title,
         "stated_unit": column["unit"],
-        "unit": unit
-        if understood
-        else CHANNELS[channel].unit
-        if channel is not None and channel == column["name"]
-        else None,
+        "unit": column["read_in"] if channel == column["channel"] else None,
         "channel": channel,
         "scale": 1.0 if own is None else own.scale,
         "offset": 0.0 if own is None else own.offset,
@@ -186,16 +179,16 @@ def _saveable(
 
 
 def _evaluated(
-    path: Path, filename: str, profile: RigProfile | None, kind: str | None, geometry: Geometry, torque_filter: float
+    path: Path, filename: str, reading: Reading | None, kind: str | None, geometry: Geometry, torque_filter: float
 ) -> dict[str, Any]:
     """The channels, what is cut of them and what is fitted; `problem` says why the file would be refused."""
     answer: dict[str, Any] = {
         "rows": 0, "kinds": [], "missing": [], "channels": {}, "pieces": [], "fits": [], "warnings": [], "problem": None,
     }  # fmt: skip
-    if profile is None:
+    if reading is None:
         return answer | {"missing": list(NEEDED["stationary_stribeck"])}
     try:
-        read = read_file(path, filename=filename, reading=reading_with(profile, Reading()))
+        read = read_file(path, filename=filename, reading=reading)
         columns, samples = read.columns, max(column.size for column in read.columns.values())
         answer |= {
             "rows": samples,

@@ -7,7 +7,7 @@ what stands beside an array under the usual names: attributes of HDF5, fields an
 import contextlib
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -122,16 +122,13 @@ def _sources(tree: Tree, group: str, depth: int, above: Tree) -> Iterator[_Sourc
             lowered = {key.lower(): value for key, value in node.items()}
             data = next((lowered[key] for key in _DATA if isinstance(lowered.get(key), Leaf)), None)
             rest = [
-                key for key, value in lowered.items() if isinstance(value, Leaf) and _rows(value) and value is not data
+                key for key, value in node.items() if isinstance(value, Leaf) and value is not data and _rows(value)
             ]
-            if data is not None and not [key for key in rest if known_channel(key) != "time_s"]:
+            if data is not None and all(known_channel(key) == "time_s" for key in rest):
                 label = next((_text(lowered[key]) for key in _LABELS if _text(lowered.get(key))), name)
-                times = [
-                    _source(key, node[key], path, {**stated, **node}) for key in node if known_channel(key) == "time_s"
-                ]
-                yield from (time for time in times if time is not None)
                 data = replace(data, attributes={**node, **data.attributes})
-                yield from _columns(label, data, path if times else group, {**stated, **node})
+                for title, leaf in [*((key, node[key]) for key in rest), (label, data)]:
+                    yield from _columns(title, leaf, path if rest else group, {**stated, **node})
             elif depth < _DEEPEST:
                 yield from _sources(node, path, depth + 1, stated)
         elif isinstance(node, Leaf):
@@ -139,38 +136,49 @@ def _sources(tree: Tree, group: str, depth: int, above: Tree) -> Iterator[_Sourc
 
 
 def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Source]:
-    """The columns of one array: a vector, the fields of a compound one, or those of a matrix."""
-    if leaf.data.dtype.names:
-        rows, parts = leaf.data.shape[0], leaf.data.dtype.names
-        lists = [texts for texts in map(_texts, leaf.attributes.values()) if len(texts) == len(parts)]
-        units = max(lists, key=_known_units, default=[])
-        for at, part in enumerate(parts):
-            stated = stated_unit(part, leaf.attributes) or stated_unit(f"field_{at}", leaf.attributes)
-            column = column_of(part, units[at] if _known_units(units) else stated, group)
-            yield _Source(replace(column, rows=rows, clock=_clock(leaf, beside, rows)), leaf, part)
-        return
-    source = _source(name, leaf, group, beside)
-    if source is not None:
-        yield source
-        return
-    shape = tuple(size for size in leaf.data.shape if size > 1)
-    if len(shape) != 2 or leaf.data.dtype.kind not in "iuf" or min(shape) > _MAX_MATRIX_COLUMNS:
-        return
-    across = 0 if shape[0] < shape[1] else 1
-    width = shape[across]
-    lists = [texts for texts in map(_texts, {**beside, **leaf.attributes}.values()) if len(texts) == width]
+    """The columns of one array: a vector, the fields of a compound one, or those of a matrix; none of any other."""
+    shape, dtype = tuple(size for size in leaf.data.shape if size > 1), leaf.data.dtype
+    parts: list[tuple[str, Any]] = []
+    if dtype.names:
+        rows, parts = leaf.data.shape[0], [(part, part) for part in dtype.names]
+    elif rows := _rows(leaf):
+        parts = [(name, Ellipsis)]
+    elif len(shape) == 2 and dtype.kind in "iuf" and min(shape) <= _MAX_MATRIX_COLUMNS:
+        across = 0 if shape[0] < shape[1] else 1
+        rows, every = shape[1 - across], slice(None)
+        places = [(at, every) if across == 0 else (every, at) for at in range(shape[across])]
+        parts = [(f"{name}[{number}]", place) for number, place in enumerate(places, 1)]
+    size = len(parts)
+    lists = [texts for texts in map(_texts, {**beside, **leaf.attributes}.values()) if len(texts) == size > 1]
     units = max(lists, key=_known_units, default=[])
-    units = units if 2 * _known_units(units) > width else []
-    names = max((texts for texts in lists if texts is not units), key=lambda texts: recognised(texts, ()), default=[])
-    for index in range(width):
-        title = names[index] if names else f"{name}[{index + 1}]"
-        place = (index, slice(None)) if across == 0 else (slice(None), index)
-        column = (
-            Column(title, None, group, title) if not names else column_of(title, units[index] if units else None, group)
-        )
-        yield _Source(
-            replace(column, rows=shape[1 - across], clock=_clock(leaf, beside, shape[1 - across])), leaf, place
-        )
+    units = units if 2 * _known_units(units) > size else [""] * size
+    matrix = size > 1 and not dtype.names
+    names = max(
+        (texts for texts in lists if matrix and texts is not units), key=lambda own: recognised(own, ()), default=[]
+    )
+    clock = _clock(leaf, beside, rows)
+    for at, (part, place) in enumerate(parts):
+        title = names[at] if names else part
+        stated_as = [title, f"field_{at}"] if dtype.names else [title]
+        unit = units[at] or _unit(stated_as, leaf.attributes, beside, whole=size == 1 and not dtype.names)
+        moments = dtype.kind in "Mm"
+        if matrix and not names:
+            column = Column(part, None, group, part)
+        else:
+            column = column_of(title, None if moments else unit or None, group)
+        yield _Source(replace(column, unit="s" if moments else column.unit, rows=rows, clock=clock), leaf, place)
+
+
+def _unit(names: Sequence[str], attributes: Tree, beside: Tree, *, whole: bool) -> str:
+    """The unit that stands at an array or beside it under one of its names; `whole`: or without any, as it is one column."""
+    at_data = beside if whole and any(key.lower() in _DATA for key in beside) else {}
+    named = (stated_unit(name, held) for held in (attributes, beside) for name in names)
+    return next(filter(None, [_direct(attributes if whole else {}), *named, _direct(at_data)]), "")
+
+
+def _direct(held: Tree) -> str:
+    lowered = {key.lower(): value for key, value in held.items()}
+    return next(filter(None, (_text(lowered.get(key)) for key in UNITS)), "")
 
 
 def _known_units(texts: list[str]) -> int:
@@ -193,21 +201,6 @@ def stated_unit(name: str, beside: Tree) -> str | None:
         if unit := _text(under.get(name.lower())) or _text(lowered.get(f"{name.lower()}_{key}")):
             return unit
     return None
-
-
-def _source(name: str, node: Any, group: str, beside: Tree) -> _Source | None:
-    """A vector as a column; None for any other array."""
-    if not isinstance(node, Leaf) or not (rows := _rows(node)):
-        return None
-    lowered = {key.lower(): value for key, value in node.attributes.items()}
-    stated = next((_text(lowered[key]) for key in UNITS if _text(lowered.get(key))), None)
-    stated = stated or stated_unit(name, beside)
-    if stated is None and any(key.lower() in _DATA for key in beside):
-        stated = next((_text(value) for key, value in beside.items() if key.lower() in UNITS and _text(value)), None)
-    moments = node.data.dtype.kind in "Mm"
-    column = column_of(name, None if moments else stated, group)
-    unit = "s" if moments else column.unit
-    return _Source(replace(column, unit=unit, rows=rows, clock=_clock(node, beside, rows)), node, Ellipsis)
 
 
 def _rows(leaf: Leaf) -> int:

@@ -6,6 +6,7 @@ its recorder's clock, else the one time column of the table.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -103,33 +104,37 @@ def _one_table(columns: dict[str, FloatArray], table: Table, reading: Reading) -
 
 def _clocks(
     columns: Sequence[Column], taken: Sequence[Taken], values: Mapping[int, FloatArray]
-) -> dict[int, int | Clock | None]:
-    """For each column that is taken and is no time, what times it: a column's index, a recorder's clock, or nothing."""
-    times = [column.index for column in taken if column.channel == "time_s"]
-    clocks: dict[int, int | Clock | None] = {}
-    for column in taken:
-        if column.channel == "time_s":
-            continue
-        own = [index for index in times if columns[index].group == columns[column.index].group]
-        before = [index for index in own if index < column.index]
+) -> dict[int, Clock | None]:
+    """The clock of each column that is taken and is no time: a column of times, its recorder's, or none."""
+    times = {column.index: _column_clock(columns, column, values) for column in taken if column.channel == "time_s"}
+    clocks: dict[int, Clock | None] = {}
+    for index in (column.index for column in taken if column.channel != "time_s"):
+        recorder = columns[index].clock
+        own = [at for at in times if columns[at].group == columns[index].group]
         if own:
-            chosen, recorder = before[-1] if before else own[0], columns[column.index].clock
+            chosen = max((at for at in own if at < index), default=own[0])
             coarse = np.unique(values[chosen]).size < values[chosen].size
             finer = recorder if recorder is not None and coarse and _agree(recorder.read(), values[chosen]) else None
-            clocks[column.index] = finer or chosen
+            clocks[index] = finer or times[chosen]
         else:
-            clocks[column.index] = columns[column.index].clock or (times[0] if len(times) == 1 else None)
-    for place, unused in enumerate(times):
-        if len(times) == 1 or unused in clocks.values():
+            clocks[index] = recorder or (next(iter(times.values())) if len(times) == 1 else None)
+    for unused, following in zip_longest(times, [*times][1:]):
+        if len(times) == 1 or times[unused] in clocks.values():
             continue
-        following = times[place + 1] if place + 1 < len(times) else None
         if following is None or not _agree(values[unused], values[following]):
-            shown = " and ".join(columns[index].title or columns[index].shown() for index in times[:_MAX_NAMED])
+            shown = " and ".join(columns[index].title or columns[index].shown() for index in [*times][:_MAX_NAMED])
             message = f"time_s must be one column, got {shown}; time=NAME chooses one"
             raise InvalidError.of(message, code="ambiguous", pointer="/time")
         if np.unique(values[unused]).size > np.unique(values[following]).size:
-            clocks = {index: unused if clock == following else clock for index, clock in clocks.items()}
+            clocks = {at: times[unused] if clock is times[following] else clock for at, clock in clocks.items()}
     return clocks
+
+
+def _column_clock(columns: Sequence[Column], column: Taken, values: Mapping[int, FloatArray]) -> Clock:
+    """A column of times. LabVIEW's text files count where they have no clock, and a clock that was found may be none."""
+    times = values[column.index]
+    counts = column.guessed or (is_counter(columns[column.index]) and np.array_equal(times, np.arange(times.size)))
+    return Clock(column.index, lambda: times, counts=counts)
 
 
 def _agree(times: FloatArray, others: FloatArray) -> bool:
@@ -169,37 +174,27 @@ def _read(
     start = min((moments[~np.isnat(moments)].min() for moments in dated if not np.isnat(moments).all()), default=None)
     for column in taken:
         values[column.index], valid[column.index] = _numbers(column, read.pop(column.index), start)
-        if column.channel == "time_s" and column.assumed:
+        if column.channel == "time_s" and column.unit is None:
             found = _in_seconds(table.columns[column.index], values[column.index], reading)
             table = table if found is None else replace(table, notices=[*table.notices, found])
     taken = [column for column in taken if not column.guessed or _runs_on(values[column.index])]
     clocks = {} if reading.time == NO_TIME else _clocks(table.columns, taken, values)
-    used = [clock for clock in clocks.values() if isinstance(clock, Clock)]
-    times: dict[object, FloatArray] = {}
-    for recorder_clock in used:
-        if recorder_clock.key not in times:
-            times[recorder_clock.key] = recorder_clock.read()
+    used = {clock.key: clock for clock in clocks.values() if clock is not None}
+    times = {key: clock.read() for key, clock in used.items()}
+    marked = [valid_rows(table.columns[index], read[index]) for index in says if index in read]
     series = {}
     for column in taken:
         if column.channel != "time_s":
             clock = clocks.get(column.index)
-            key = clock.key if isinstance(clock, Clock) else clock
-            own = times[key] if isinstance(clock, Clock) else None if clock is None else values[clock]
-            whole = _Series(values[column.index], valid[column.index], key, own)
-            series[column.channel] = _without_gaps(column.channel, whole, table, bool(marks(reading.missing)))
-    marked = [valid_rows(table.columns[index], read[index]) for index in says if index in read]
-    for name, held in series.items():
-        for good in marked:
-            if good is not None and good.size == held.values.size:
-                held = series[name] = replace(held, valid=good if held.valid is None else held.valid & good)
+            key = None if clock is None else clock.key
+            whole = _Series(values[column.index], valid[column.index], key, times.get(key))
+            own = series[column.channel] = _without_gaps(column.channel, whole, table, bool(marks(reading.missing)))
+            for good in marked:
+                if good is not None and good.size == own.values.size:
+                    own.valid = good if own.valid is None else own.valid & good
     if not series:  # a time alone: shown as such, and refused for what it lacks
         series = {"time_s": _Series(values[indices[0]], None, None, None)}
-    counts = bool(used) and len(times) == 1 and used[0].counts
-    for index in {clock for clock in clocks.values() if isinstance(clock, int)}:
-        # LabVIEW's text files count where they have no clock, and a clock that was found may be none
-        counts = is_counter(table.columns[index]) and np.array_equal(values[index], np.arange(values[index].size))
-        counts = counts or any(column.guessed for column in taken if column.index == index)
-    return series, table, taken, counts
+    return series, table, taken, len(used) == 1 and all(clock.counts for clock in used.values())
 
 
 def _without_gaps(name: str, own: _Series, table: Table, leave_out: bool) -> _Series:

@@ -77,14 +77,15 @@ _MAX_NAMED = 10
 class Taken:
     """A column that is taken: the file's `index`-th as `channel`, with its conversion to the channel's unit.
 
-    `assumed`: neither file nor caller states a unit, and the channel's own was taken. `guessed`: a time by its unit and a
-    word in its name, which its values must bear out. `in_part`: words of its name are not known, and no other column fits.
+    `unit`: the one that file or caller states; None: neither does, and the channel's own was taken. `guessed`: a time by its
+    unit and a word in its name, which its values must bear out. `in_part`: words of its name are not known, and no other
+    column fits.
     """
 
     channel: str
     index: int
     conversion: Conversion
-    assumed: bool = False
+    unit: str | None
     guessed: bool = False
     in_part: bool = False
 
@@ -318,6 +319,11 @@ def choices_of(reading: Reading) -> dict[str, Choice]:
     return named
 
 
+def named_columns(reading: Reading) -> list[str]:
+    """The titles that a caller names."""
+    return [choice.column for choice in choices_of(reading).values()]
+
+
 def recognised(titles: Sequence[str], named: Sequence[str]) -> int:
     """How many titles are those of channels or are `named`: by it the row of titles is found."""
     wanted = {_key(name) for name in named} | {_key(column_of(name).name) for name in named}
@@ -336,61 +342,72 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
 
     Raises InvalidError where two columns are the same channel, or a unit is unknown or not stated.
     """
-    named = choices_of(reading)
+    taken, errors = understood(columns, reading)
+    if errors:
+        raise errors[0]
+    if not taken:
+        raise InvalidError(f"the file holds no known channel: it has {_list(columns)}; {remedy(columns)}")
+    return taken
+
+
+def understood(columns: Sequence[Column], reading: Reading) -> tuple[list[Taken], list[InvalidError]]:
+    """The columns that are channels, in the order of the file, and what keeps them from being read."""
+    named, errors = choices_of(reading), []
     if reading.time == NO_TIME:
         named.pop("time_s", None)
-    by_map = {_find(columns, channel, choice.column): channel for channel, choice in named.items()}
-    if len(by_map) < len(named):
-        shown = ",".join(f"{name}:{choice.column}" for name, choice in named.items())
-        raise _wrong_map(shown, "must not name one column for two channels")
-    passed_over = {*named, "time_s"} if reading.time == NO_TIME else {*named}
-    senses = [meaning(column.name, column.unit) for column in columns]
-    indices: dict[str, list[int]] = {}
-    in_part: dict[str, list[int]] = {}
-    for index, (channel, sense) in enumerate(senses):
-        if index in by_map:
-            indices.setdefault(by_map[index], []).append(index)
-        elif channel and channel not in passed_over and not reading.only_named:
-            (indices if sense is Sense.WHOLE else in_part).setdefault(channel, []).append(index)
-    for channel, positions in indices.items():
-        # neither a mean beside the signal itself nor what stands in a group of set points
-        plain = [i for i in positions if not (_MEANS & {*_words(columns[i].name)} or _is_another(columns[i].group))]
-        if len(positions) > len(plain) > 0:
-            positions = indices[channel] = plain
-        if len(positions) > 1 and channel != "time_s":
-            raise _twice(channel, *(columns[index] for index in positions))
+    by_map: dict[int, str] = {}
+    for channel, choice in named.items():
+        try:
+            if (index := _find(columns, channel, choice.column)) in by_map:
+                raise _wrong_map(choice.column, f"must not name one column for {by_map[index]} and {channel}")
+            by_map[index] = channel
+        except InvalidError as error:
+            errors.append(error)
+    free = [] if reading.only_named else [index for index in range(len(columns)) if index not in by_map]
+    senses = {index: meaning(columns[index].name, columns[index].unit) for index in free}
+    chosen = dict(by_map)
     guessed: set[int] = set()
-    if "time_s" not in {*indices, *passed_over} and not reading.only_named:
-        unknown = [] if by_map else [index for index, column in enumerate(columns) if _may_be_time(column)]
-        guessed = {*in_part.pop("time_s", unknown)}
-    for channel, positions in in_part.items():
-        rivals = [
-            index for index, (_, sense) in enumerate(senses)
-            if sense is Sense.UNKNOWN and index not in by_map and _measures(channel, columns[index].unit)
-        ]  # fmt: skip
-        if channel not in indices and len(positions) == 1 and (not rivals or channel not in _MEASURED):
-            indices[channel] = positions
-    if not indices:
-        raise InvalidError(f"the file holds no known channel: it has {_list(columns)}; {remedy(columns)}")
-    if guessed:
-        indices["time_s"] = sorted(guessed)
-    taken, without_unit = [], []
-    for channel, positions in indices.items():
-        for index in positions:
-            choice = named.get(channel) if index in by_map else None
-            unit = _unit(channel, columns[index], choice)
-            public = _key(columns[index].name) == channel
-            if unit is None and choice is None and not public:
-                without_unit.append((channel, columns[index]))
-                if channel != "time_s":
-                    continue
-            converted = _conversion(channel, columns[index], choice, unit)
-            assumed = unit is None and not public
-            in_part_only = senses[index][1] is Sense.PART and index not in by_map
-            taken.append(Taken(channel, index, converted, assumed, index in guessed, in_part_only))
-    if any(channel != "time_s" for channel, _ in without_unit):
-        raise no_unit(without_unit, reading)
-    return sorted(taken, key=lambda column: column.index)
+    in_part: set[int] = set()
+    for channel in CHANNELS:
+        if channel in named or (channel == "time_s" and reading.time == NO_TIME):
+            continue
+        whole, part = (
+            [index for index in free if senses[index] == (channel, sense)] for sense in (Sense.WHOLE, Sense.PART)
+        )
+        # neither a mean beside the signal itself nor what stands in a group of set points
+        plain = [at for at in whole if not (_MEANS & {*_words(columns[at].name)} or _is_another(columns[at].group))]
+        found, rivals = plain or whole or part, [index for index in free if senses[index][1] is Sense.UNKNOWN]
+        rivals = [] if whole else [index for index in rivals if _measures(channel, columns[index].unit)]
+        if channel == "time_s":
+            found = found or ([] if by_map else rivals)
+            guessed = set() if whole else {*found}
+            chosen |= dict.fromkeys(found, channel)
+        elif len(found) == 1 and not (rivals and channel in _MEASURED):
+            chosen[found[0]] = channel
+            in_part |= set() if whole else {*found}
+        elif found and (whole or channel in _MEASURED):
+            errors.append(_twice(channel, *(columns[index] for index in found + rivals)))
+    if not {*chosen} - guessed:
+        return [], errors
+    taken: list[Taken] = []
+    unstated: list[tuple[str, Column]] = []
+    for index, channel in sorted(chosen.items()):
+        own = named.get(channel) if index in by_map else None
+        public = _key(columns[index].name) == channel
+        unit, converted = None, Conversion()
+        try:
+            unit = _unit(channel, columns[index], own)
+            converted = _conversion(channel, columns[index], own, unit)
+        except InvalidError as error:
+            unit = None
+            errors.append(error)
+        else:
+            unstated += [(channel, columns[index])] if unit is None and own is None and not public else []
+        unit = CHANNELS[channel].unit if unit is None and public else unit
+        taken.append(Taken(channel, index, converted, unit, index in guessed, index in in_part))
+    if any(channel != "time_s" for channel, _ in unstated):
+        errors.append(no_unit(unstated, reading))
+    return taken, errors
 
 
 def _may_be_time(column: Column) -> bool:
@@ -478,21 +495,20 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
     """
     public = _key(column.name) == channel
     scaled = None if public else _SCALED.search(column.name[:LONGEST_NAME])
-    ends_in = None if choice is None or public or scaled else unit_in_title(channel, column.name)
-    stated = column.unit or ends_in
     wanted = None if choice is None else choice.unit
     if choice is not None and choice.column != column.title:
         wanted = wanted or column_of(choice.column).unit
     if scaled and wanted is None and (choice is None or choice.factor == 1):
         number = float(re.findall(r"-?\d+(?:[.,]\d+)?", scaled[0])[-1].replace(",", "."))
         number = 10**number if "^" in scaled[0] else number
-        own = stated or CHANNELS[channel].unit
+        own = column.unit or CHANNELS[channel].unit
         factor = number if "/" in scaled[0] else 1 / number
-        named, others = f"map={channel}:{column.name}", f"[x{1 / factor:g} {own}] or [x1 {own}]"
-        rule = f"may be x{factor:g} {own}: {named} [x{factor:g} {own}], {others} says which"
+        mapped, others = f"map={channel}:{column.name}", f"[x{1 / factor:g} {own}] or [x1 {own}]"
+        rule = f"may be x{factor:g} {own}: {mapped} [x{factor:g} {own}], {others} says which"
         raise _wrong_unit(channel, column, "missing_unit", rule, "no clear one")
     if choice is None:
-        return "s" if stated is None and _key(column.name) in _SECONDS else stated
+        return "s" if column.unit is None and _key(column.name) in _SECONDS else column.unit
+    stated = column.unit or (None if public or scaled else unit_in_title(channel, column.name))
     differ = stated not in (None, choice.stated) and wanted and not scaled
     if differ and conversion(channel, stated or "") != conversion(channel, wanted or ""):
         rule = f"must be {wanted}, as its profile or map says"

@@ -6,22 +6,25 @@ name over several columns may stand there too.
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, zip_longest
 from typing import Any
 
 from service.errors import MAX_QUOTED, InvalidError, Notice
-from service.readers.column_names import bare_unit, column_of, known_channel, recognised, with_unit
+from service.readers.clocks import stated_clock
+from service.readers.column_names import bare_unit, column_of, is_counter, known_channel, recognised, with_unit
 from service.readers.limits import LONGEST_TITLE, LONGEST_UNIT
 from service.readers.numerals import NUMBER, is_stamp, with_unit_apart
-from service.readers.table import Column
+from service.readers.table import Column, Table, labels
 from service.readers.unit_table import conversion, is_unit
 
 Row = Sequence[Any]
 
 #: Rows that are looked at for the table's beginning. Chosen: no recorder writes as many lines above it.
 MAX_ROWS = 500
+#: Rows of data that a person is shown.
+_MAX_SHOWN = 20
 #: Rows of a run by which two candidates are compared; longer ones count the same. Chosen: more than header blocks have.
 _LONG_RUN = 8
 #: Rows of text above the data among which titles and units are, at most; others between them do not count. Chosen: recorders
@@ -62,6 +65,81 @@ class Layout:
             else with_unit(column_of(title, unit, group), with_unit_apart(cell)[1])
             for title, unit, group, cell in self.headings
         )
+
+
+class DataRows:
+    """Which rows under a table's titles are its data: none that is blank, is one of those above again, or a footer."""
+
+    def __init__(self, rows: Sequence[Row], layout: Layout) -> None:
+        above = rows[: layout.start]
+        self.titles, self.first = rows[layout.titles], rows[layout.start] if layout.start < len(rows) else []
+        self._above = {tuple(row) for row in above if not all(map(is_value, row))}
+        #: The first row of data of each further table under the same titles.
+        self.breaks: list[int] = []
+        self.notices: list[Notice] = []
+        if layout.labelled:
+            self._leave_out(above[-layout.labelled :], "above the first row of")
+
+    def of(self, rows: Iterable[tuple[int, Row]], before: int, *, last: bool) -> tuple[list[int], list[Any]]:
+        """Numbers and cells of those of the next rows that are data; `before` were found already, `last`: none follow."""
+        held: list[tuple[int, Row]] = []
+        for number, row in rows:
+            if row == self.titles and before + len(held):
+                self._without_footer(held)
+                self.breaks.append(before + len(held))
+            elif not is_blank(row) and tuple(row) not in self._above:
+                held.append((number, row))
+        if last and (footer := self._without_footer(held)):
+            self._leave_out(footer, "below")
+        return [number for number, _ in held], [row for _, row in held]
+
+    def _without_footer(self, held: list[tuple[int, Row]]) -> list[Row]:
+        """The rows at the end that are words, or that a word begins (`Mean;5;100;20`), which are taken out."""
+        end = len(held)
+        while end and is_footer(held[end - 1][1], self.first):
+            end -= 1
+        footer = [row for _, row in held[end:]]
+        del held[end:]
+        return footer
+
+    def _leave_out(self, rows: Sequence[Row], where: str) -> None:
+        first = " ".join(shown(rows[0])).strip()[:MAX_QUOTED]
+        message = f"{len(rows)} lines {where} the table were left out, the first: {first!r}"
+        self.notices.append(Notice(code="lines_left_out", message=message))
+
+
+def table_in(
+    rows: Sequence[Row], layout: Layout, data: DataRows, *, first_line: int, rows_read: Callable[[], int], **others: Any
+) -> Table:
+    """The table of a grid, each column with the clock that the rows above it state, or its own cell in them.
+
+    LabVIEW's column of times may be empty: then it is none. Raises InvalidError where a row above holds factors.
+    """
+    above = [shown(row) for row in rows[max(layout.start - MAX_ROWS, 0) : layout.start]]
+    refuse_factors(above)
+    columns = []
+    for place, column in enumerate(layout.columns()):
+        if is_counter(column) and shown(data.first)[place : place + 1] == ("",):
+            columns.append(Column("", title=column.title))
+            continue
+        own = [row for row in above if len(row) > place and row[place]]
+        beside = [(row[0], row[place]) if place and row in own else row for row in above]
+        clock = stated_clock(labels([*beside, *((row[place],) for row in own)]), rows_read)
+        columns.append(replace(column, clock=clock))
+    return Table(
+        columns=tuple(columns),
+        above=tuple(above[: layout.titles - layout.start]),
+        first_line=first_line,
+        head=tuple(map(shown, rows[layout.start : layout.start + _MAX_SHOWN])),
+        breaks=data.breaks,
+        notices=data.notices,
+        **others,
+    )
+
+
+def shown(row: Row) -> tuple[str, ...]:
+    """The cells of a row as text."""
+    return tuple(str(int(cell)) if isinstance(cell, float) and cell.is_integer() else _text(cell) for cell in row)
 
 
 def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[str]) -> Layout | None:
@@ -326,23 +404,14 @@ def was_turned() -> Notice:
     return Notice(code="turned", message=message)
 
 
-def left_out(number: int, where: str, first: str) -> Notice:
-    """The notice of lines that are no rows of the table."""
-    message = f"{number} lines {where} the table were left out, the first: {first.strip()[:MAX_QUOTED]!r}"
-    return Notice(code="lines_left_out", message=message)
-
-
-def no_table(
-    rows: Sequence[Row], named: Sequence[str], line_of: Callable[[int], int] = lambda row: row + 1
-) -> InvalidError:
+def no_table(rows: Sequence[Row], named: Sequence[str]) -> InvalidError:
     """The error of a text or sheet without a row of titles over numbers: what stands where the one or the others should."""
     filled = [index for index, row in enumerate(rows) if not is_blank(row)] or [0]
     best = max(filled, key=lambda index: recognised(list(map(_text, rows[index])), named) if rows else 0)
     under = next((index for index in filled if index > best), None)
     if under is not None and recognised(list(map(_text, rows[best])), named):
-        place, rule = under, f"a row of numbers, under the titles of line {line_of(best)}"
+        place, rule = under, f"a row of numbers, under the titles of line {best + 1}"
     else:
         place, rule = filled[0], "a header with the channels' names, above rows of numbers"
-    shown = " ".join(map(_text, rows[place] if rows else ())).strip()[:MAX_QUOTED]
-    message = f"line {line_of(place)} must be {rule}, got {shown!r}"
-    return InvalidError.of(message, code="no_header", value=shown)
+    got = " ".join(map(_text, rows[place] if rows else ())).strip()[:MAX_QUOTED]
+    return InvalidError.of(f"line {place + 1} must be {rule}, got {got!r}", code="no_header", value=got)

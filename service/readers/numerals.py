@@ -4,27 +4,24 @@ A file has one decimal sign. Where each of its signs stands before exactly three
 refused, not guessed.
 """
 
-import contextlib
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date, datetime, time, timedelta
 from decimal import Decimal
 from itertools import zip_longest
 from typing import Any
 
 import numpy as np
-import pydantic_core
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
-from service.readers.table import Reading, Table, marks, place
+from service.readers.table import LineOf, Reading, Table, marks, place
 from service.readers.unit_table import is_unit
 
 #: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_arrays` refuses with their row. Digits
 #: are never given back, or a long run of them with a letter behind it would be tried from every digit to every other.
 NUMBER = re.compile(r"[+-]?(\d++(\.\d*+)?|\.\d++)([eE][+-]?\d{1,4})?|[+-]?(nan|inf|infinity)", re.IGNORECASE | re.ASCII)
-_PLAIN = dict.fromkeys(map(ord, "0123456789.eE+-\n"))
 #: Thousands apart by an apostrophe or a blank, at the beginning of a cell.
 _APART = re.compile(r"^[+-]?[1-9]\d{0,2}(?:['’ \u00a0\u202f\u2009]\d{3})+(?![\d'’ \u00a0\u202f\u2009])", re.MULTILINE)
 
@@ -87,7 +84,7 @@ class Numerals:
         self,
         channels: Mapping[int, str],
         columns: Sequence[Sequence[Any]],
-        line_of: Callable[[int], int] | None = None,
+        line_of: LineOf | None = None,
         before: int = 0,
     ) -> list[NDArray[Any]]:
         """Columns [n] by their index, each for a channel: numbers as float64, masked where cells are empty; points in time
@@ -101,29 +98,38 @@ class Numerals:
                 for row, cell in enumerate(cells):
                     if len(_decimals(cell)) > 1:
                         raise _doubtful(name, before + row, with_unit_apart(cell)[0].strip(), line_of)
-        read: dict[int, NDArray[Any]] = {}
+        read: list[NDArray[Any]] = []
         wrong: list[tuple[int, str, str, str]] = []
         total = 0
-        given = zip(channels.items(), columns, strict=True)
-        for (index, name), cells in sorted(given, key=lambda item: item[0][1] == "time_s"):
-            if not name:
-                read[index] = np.empty(len(cells), dtype=object)
-                read[index][:] = cells
-                continue
-            # the time last: a block is read again where another column is wrong
-            values = self._moments(index, cells) if name == "time_s" and not wrong else None
-            values = self._floats(cells) if values is None else values
-            values = self._with_gaps(cells) if values is None else values
-            values = self._without_units(index, cells) if values is None else values
-            for row, rule in self._wrong(index, cells, name == "time_s") if values is None else ():
+        for (index, name), cells in zip(channels.items(), columns, strict=True):
+            values = self._column(index, name, cells)
+            for row, rule in self._wrong(index, name, cells) if values is None else ():
                 total += 1
-                if total <= MAX_ERRORS:
+                if len(wrong) < MAX_ERRORS * len(channels):
                     wrong.append((before + row, name, _shown(cells[row]), rule))
-            if values is not None:
-                read[index] = values
+            read += [] if values is None else [values]
         if wrong:
-            raise _wrong(sorted(wrong), total, line_of, before + len(columns[0]) - 1)
-        return [read[index] for index in channels]
+            raise _wrong(sorted(wrong)[:MAX_ERRORS], total, line_of, before + len(columns[0]) - 1)
+        return read
+
+    def _column(self, index: int, name: str, cells: Sequence[Any]) -> NDArray[Any] | None:
+        """One column; None where a cell is no number, by this file's decimal sign and in the unit behind the first cell."""
+        if not name:
+            held = np.empty(len(cells), dtype=object)
+            held[:] = cells
+            return held
+        values = self._moments(index, cells) if name == "time_s" else None
+        values = self._floats(cells) if values is None else values
+        if values is not None:
+            return values
+        bare = [cell.strip() if isinstance(cell, str) else cell for cell in cells]
+        if unit := self._units.setdefault(index, next((unit for _, unit in map(with_unit_apart, cells) if unit), "")):
+            if not all(cell in (None, "") or (isinstance(cell, str) and cell.endswith(unit)) for cell in bare):
+                return None
+            bare = [(cell or "").removesuffix(unit).rstrip() for cell in bare]
+        gaps = [cell is None or (isinstance(cell, str) and cell.casefold() in self._missing) for cell in bare]
+        values = self._floats(["nan" if gap else cell for cell, gap in zip(bare, gaps, strict=True)])
+        return values if values is None or not any(gaps) else np.ma.MaskedArray(values, mask=gaps)
 
     def _moments(self, index: int, cells: Sequence[Any]) -> NDArray[Any] | None:
         """Dates, times of day, durations or their text; None where they are numbers or of several types."""
@@ -144,16 +150,15 @@ class Numerals:
 
     def _floats(self, cells: Sequence[Any]) -> FloatArray | None:
         """Cells as numbers; None where one is none, or not by this file's decimal sign."""
-        kinds = set(map(type, cells))
-        if kinds != {str}:
-            if kinds <= {int, float, Decimal}:
-                return np.array(cells, dtype=np.float64)
-            parsed = [self._floats([cell]) if type(cell) in (str, int, float, Decimal) else None for cell in cells]
-            arrays = [number for number in parsed if number is not None]
-            return np.concatenate(arrays) if len(arrays) == len(cells) else None
-        text = "\n".join(cells)
-        if " " in text or "\t" in text:
-            text = "\n".join([cell.strip() for cell in cells])
+        texts = [cell for cell in cells if isinstance(cell, str)]
+        if not texts or len(texts) < len(cells):
+            kinds = set(map(type, cells))
+            read = self._floats(texts) if texts and kinds <= {str, int, float, Decimal} else np.empty(0)
+            if read is None or not kinds <= {str, int, float, Decimal}:
+                return None
+            numbers = iter(read.tolist())
+            return np.array([next(numbers) if isinstance(cell, str) else cell for cell in cells], dtype=np.float64)
+        text = "\n".join([cell.strip() for cell in texts])
         if not text.isascii() or "'" in text or " " in text:
             text = _APART.sub(lambda match: re.sub(r"[^\d+-]", "", match[0]), text.replace("−", "-"))
         other = "," if self.decimal == "." else "."
@@ -162,47 +167,23 @@ class Numerals:
                 return None
             text = text.replace(other, "")
         text = text.replace(",", ".")
-        if "+ " in text or "- " in text:
+        if " " in text:
             text = re.sub(r"(?m)^([+-]) +(?=[.\d])", r"\1", text)
-        if not text.translate(_PLAIN):
-            # by jiter, to which +5, .5 and 007 are no numbers
-            with contextlib.suppress(ValueError, OverflowError):
-                numbers = np.array(pydantic_core.from_json(f"[{text.replace(chr(10), ',')}]"), dtype=np.float64)
-                return numbers if numbers.size == len(cells) else None
-        cells = re.sub(r"(?<=[.\d])[dD](?=[+-]?\d)", "e", text).split("\n")
-        return np.array([float(cell) for cell in cells]) if all(map(NUMBER.fullmatch, cells)) else None
+        texts = re.sub(r"(?<=[.\d])[dD](?=[+-]?\d)", "e", text).split("\n")
+        return np.array(list(map(float, texts))) if all(map(NUMBER.fullmatch, texts)) else None
 
-    def _with_gaps(self, cells: Sequence[Any]) -> NDArray[Any] | None:
-        """Cells as numbers, masked where they are empty or marks of a missing value; None where another one is no number."""
-        gaps = [cell is None or (isinstance(cell, str) and cell.strip().casefold() in self._missing) for cell in cells]
-        values = (
-            self._floats(["nan" if gap else cell for cell, gap in zip(cells, gaps, strict=True)]) if any(gaps) else None
-        )
-        return None if values is None else np.ma.MaskedArray(values, mask=gaps)
-
-    def _without_units(self, index: int, cells: Sequence[Any]) -> NDArray[Any] | None:
-        """Cells as numbers that all have behind them the unit of the column's first; None where one has not."""
-        unit = self._units.setdefault(index, next((unit for _, unit in map(with_unit_apart, cells) if unit), ""))
-        held = [cell.strip() if isinstance(cell, str) else cell for cell in cells]
-        if not unit or not all(cell in (None, "") or (isinstance(cell, str) and cell.endswith(unit)) for cell in held):
-            return None
-        bare = [(cell or "").removesuffix(unit).rstrip() for cell in held]
-        values = self._floats(bare)
-        return self._with_gaps(bare) if values is None else values
-
-    def _wrong(self, index: int, cells: Sequence[Any], timed: bool) -> Iterator[tuple[int, str]]:
+    def _wrong(self, index: int, name: str, cells: Sequence[Any]) -> Iterator[tuple[int, str]]:
         """The rows of a column that are no numbers, each with the rule that it breaks."""
         swapped = Numerals(Reading(decimal="," if self.decimal == "." else "."))
+        unit = self._units.get(index, "")
         for row, cell in enumerate(cells):
-            unit = self._units.get(index, "")
-            if (self._without_units(index, [cell]) if unit else self._floats([cell])) is None:
+            if self._column(index, "no time", [cell]) is None:
                 rule = f"must be a number in {unit}, as the first" if unit else "must be a number"
                 if self.decimal and isinstance(cell, str) and swapped._floats([cell]) is not None:
                     rule = f"must have the decimal sign {self.decimal!r} as before"
-                yield (
-                    row,
-                    rule.replace("a number", "a number or a time such as 2026-11-02 07:00:00.5") if timed else rule,
-                )
+                elif name == "time_s":
+                    rule = rule.replace("a number", "a number or a time such as 2026-11-02 07:00:00.5")
+                yield row, rule
 
 
 def read_cells(table: Table, channels: Mapping[int, str], reading: Reading) -> dict[int, NDArray[Any]]:
@@ -228,15 +209,13 @@ def _remedy(shown: str) -> str:
     return "" if any(map(str.isdigit, shown)) or "," in shown else f": missing={shown} leaves such rows out"
 
 
-def empty_cells(name: str, rows: Sequence[int], line_of: Callable[[int], int] | None, last: int) -> InvalidError:
+def empty_cells(name: str, rows: Sequence[int], line_of: LineOf | None, last: int) -> InvalidError:
     """The error of cells that should hold numbers and are empty."""
     wrong = [(row, name, "", "must be a number") for row in rows[:MAX_ERRORS]]
     return _wrong(wrong, len(rows), line_of, last)
 
 
-def _wrong(
-    wrong: Sequence[tuple[int, str, str, str]], total: int, line_of: Callable[[int], int] | None, last: int
-) -> InvalidError:
+def _wrong(wrong: Sequence[tuple[int, str, str, str]], total: int, line_of: LineOf | None, last: int) -> InvalidError:
     """The error of cells that are no numbers: row, channel, text and rule of each; `last` is the last row that was read."""
     errors = [
         FieldError(
@@ -253,7 +232,7 @@ def _wrong(
     return InvalidError(errors[0].message + more, errors=errors, total=total)
 
 
-def _doubtful(name: str, row: int, cell: str, line_of: Callable[[int], int] | None) -> InvalidError:
+def _doubtful(name: str, row: int, cell: str, line_of: LineOf | None) -> InvalidError:
     """The error of a cell that may be read in two ways, with both."""
     sign, other = (",", ".") if "," in cell else (".", ",")
     as_decimal, as_thousands = f"{float(cell.replace(sign, '.')):.9g}", cell.replace(sign, "")

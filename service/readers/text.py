@@ -1,7 +1,7 @@
 """Text of any make -> a table: encoding, separator and titles by what is understood best; then its rows, block by block.
 
-A block of plain rows of numbers is numpy's; one with quotes, comments, dates or missing ends goes through Python's reader of
-CSV and `numerals`. Errors name line, column and value.
+A block of plain rows of numbers is read at once; any other goes through `grid`'s rows and `numerals`. Errors name line,
+column and value.
 """
 
 import codecs
@@ -20,36 +20,26 @@ import pydantic_core
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, Notice, TooLargeError
-from service.readers.clocks import stated_clock
-from service.readers.column_names import choices_of, is_counter, recognised
+from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, TooLargeError
+from service.readers.column_names import named_columns, recognised
 from service.readers.detect import ByteSource, Format, overdue, too_slow
-from service.readers.grid import (
-    MAX_ROWS,
-    Layout,
-    find_table,
-    is_footer,
-    left_out,
-    no_table,
-    refuse_factors,
-    turned,
-    was_turned,
-)
+from service.readers.grid import MAX_ROWS, DataRows, Layout, find_table, no_table, table_in, turned, was_turned
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
 from service.readers.numerals import Numerals, is_stamp
-from service.readers.table import Column, Reading, Table, labels
+from service.readers.table import Reading, Table
 
-#: Bytes of the first block, which must hold the titles, and of each block after it.
-_FIRST_BLOCK, _BLOCK = 1 << 17, 1 << 18
+#: Bytes of a block; the first must hold the titles. Chosen: rows that are no plain numbers take 60 times as much memory.
+_BLOCK = 1 << 17
 _COMMENTS = ("#", "%", "//")
 _NEWLINE, _COMMA = b"\n,"
+_SEPARATOR_LINE = re.compile(r"\s*sep=(.?)\s*", re.IGNORECASE)
 #: Encodings that are tried where text is not UTF-8; of those that read as many titles the first.
 _ENCODINGS = ("cp1252", "cp1250", "cp1254", "gb18030", "shift_jis", "euc_jp", "big5", "euc_kr", "cp1251")
 #: Pairs of bytes as Chinese text has them, and single ones as Western text has them.
 _CHINESE = re.compile(rb"(?:[\x00-\x7f]|[\xa1-\xf7][\xa1-\xfe])*")
 #: Cells of which the last is in quotes and goes on; a quotation mark within a cell is no other (3/4").
 _OPEN = re.compile(r'(?:(?:[ \t]*"(?:[^"]|"")*+"[^;,\t|\n]*|(?![ \t]*")[^;,\t|\n]*)[;,\t|\n])*+[ \t]*"(?:[^"]|"")*+')
-#: Lines that one cell in quotes may go over, in the rows of titles.
+#: Lines that one cell in quotes may go over.
 _MAX_CELL_LINES = 5
 
 #: Opens the file's bytes from their beginning.
@@ -58,85 +48,58 @@ Open = Callable[[], AbstractContextManager[ByteSource]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Form:
-    """How the text is written: encoding, separator (" ": any number of blanks), the table, the lines that are no data."""
+    """How the text is written: encoding, separator (" ", "  ": at least so many blanks), its first rows, their lines from 1,
+    and the table in them."""
 
     encoding: str
     separator: str
     layout: Layout
-    lines: list[str]
-    #: The index in `lines`, and the line, of each row that was looked at.
-    at: list[int]
+    rows: list[list[str]]
+    lines: list[int]
 
     @property
     def first_line(self) -> int:
         """The line of the first row of data, from 1."""
-        return self.at[self.layout.start] + 1 if self.layout.start < len(self.at) else len(self.lines) + 1
+        return self.lines[self.layout.start] if self.layout.start < len(self.lines) else self.lines[-1] + 1
 
 
 def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
     """The table of a text. Raises InvalidError where it has no titles, or its lines are no text."""
     with opened() as source:
-        first = next(_raw_blocks(source), b"")
-    if len(first) == _FIRST_BLOCK and b"\n" in first and b"\0" not in first:
+        first = source.read(_BLOCK)
+    if len(first) == _BLOCK and b"\n" in first and b"\0" not in first:
         first = first[: first.rindex(b"\n") + 1]
     if not first.strip():
         raise wrong_line(1, "is empty, and no header came after it", "no_header")
     try:
         form = _form(first, reading, limits)
     except InvalidError:
-        if len(first) == _FIRST_BLOCK or (on_its_side := _turned(first, reading)) is None:
+        if len(first) == _BLOCK or (on_its_side := _turned(first, reading)) is None:
             raise
         table = read_text(lambda: nullcontext(io.BytesIO(on_its_side)), reading, limits)
         return replace(table, notices=[*table.notices, was_turned()])
     body = _Body(opened, form, reading, limits)
-    cells = tuple(tuple(_cells(line, form.separator)) for line in form.lines[: form.first_line + 19])
-    refuse_factors(cells[: form.first_line - 1])
-    return Table(
-        columns=tuple(_with_clocks(form.layout.columns(), cells[: form.first_line - 1], body)),
-        read=body.read,
-        above=cells[: form.at[form.layout.titles]],
-        first_line=form.first_line,
-        head=cells[form.first_line - 1 :],
+    return table_in(
+        form.rows, form.layout, body.data, first_line=form.first_line, read=body.read, rows_read=body.rows,
         line_of=body.line_of,
-        breaks=body.breaks,
-        notices=body.notices,
-    )
-
-
-def _with_clocks(columns: Sequence[Column], above: Sequence[Sequence[str]], body: "_Body") -> Iterator[Column]:
-    """Columns with the clock that the lines above them state, each with its own where a line has as many cells.
-
-    LabVIEW's column of times may be empty: then it is none.
-    """
-    for place, column in enumerate(columns):
-        if is_counter(column) and body.first[place : place + 1] == [""]:
-            yield Column("", title=column.title)
-        else:
-            own = [row for row in above if len(row) > place and row[place]]
-            beside = [(row[0], row[place]) if place and row in own else row for row in above]
-            stated = labels([*beside, *((row[place],) for row in own)])
-            yield replace(column, clock=stated_clock(stated, body.rows))
+    )  # fmt: skip
 
 
 # --- bytes -> lines ---
 
 
-def _raw_blocks(source: ByteSource) -> Iterator[bytes]:
-    block = source.read(_FIRST_BLOCK)
-    while block:
-        yield block
-        block = source.read(_BLOCK)
-
-
-def _blocks(source: ByteSource, encoding: str) -> Iterator[str]:
-    """A file's text in blocks of whole lines that all end in a line feed; a cell in quotes is not cut.
+def _blocks(source: ByteSource, encoding: str) -> Iterator[tuple[str, bool]]:
+    """A file's text in blocks of whole lines that all end in a line feed, and whether each is the last; a cell in quotes is
+    not cut.
 
     Raises InvalidError on a line that is too long and on text that is not in its encoding.
     """
     decoder = codecs.getincrementaldecoder("utf-8-sig" if encoding == "utf-8" else encoding)()
     lines = io.IncrementalNewlineDecoder(decoder, translate=True)
-    rest, line = "", 1
-    for block, last in _with_last(_raw_blocks(source)):
+    rest, line, block = "", 1, source.read(_BLOCK)
+    while block:
+        following = source.read(_BLOCK)
+        last = not following
         try:
             text = rest + lines.decode(block, last)
         except UnicodeError:
@@ -145,7 +108,7 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[str]:
         end = text.rfind("\n") + 1
         if not last and _is_open(text[:end]):
             end = text.rfind("\n", 0, text.rfind('"', 0, end)) + 1
-        if len(text) - end > LONGEST_LINE_BYTES + _BLOCK * ('"' in text[end:]):
+        if len(text) - end > LONGEST_LINE_BYTES + 2 * _BLOCK * ('"' in text[end:]):
             rule = f"must not be longer than {LONGEST_LINE_BYTES} bytes"
             raise wrong_line(line + text.count("\n", 0, end), rule, "line_too_long", text[end : end + MAX_QUOTED])
         if last:
@@ -155,17 +118,9 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[str]:
         if (nul := whole.find("\0")) >= 0:
             raise wrong_line(line + whole.count("\n", 0, nul), "must be text, got a NUL byte", "not_text")
         if whole:
-            yield whole
+            yield whole, last
         line += whole.count("\n")
-
-
-def _with_last(items: Iterator[Any]) -> Iterator[tuple[Any, bool]]:
-    """Each item, and whether it is the last."""
-    for item in items:
-        for following in items:
-            yield item, False
-            item = following
-        yield item, True
+        block = following
 
 
 def _encodings(head: bytes) -> list[str]:
@@ -197,73 +152,67 @@ def _decodes(head: bytes, encoding: str) -> bool:
 def _form(first: bytes, reading: Reading, limits: Limits) -> _Form:
     """The encoding, the separator and the table by which most titles are known."""
     best: _Form | None = None
-    text: list[str] = []
+    named = named_columns(reading)
+    unfit: list[list[str]] = []
     for encoding in _encodings(first):
-        text = "".join(_blocks(io.BytesIO(first), encoding)).split("\n")[:-1]
-        for separator in _separators(text, reading.skip_rows):
-            form = _with_separator(encoding, separator, text, reading)
-            if form is not None and (best is None or form.layout.score > best.layout.score):
-                best = form
+        text = _lines(first, encoding)[: reading.skip_rows + MAX_ROWS]
+        for separator in _separators(text[reading.skip_rows :]):
+            numbered = [*_rows(text, separator, reading.skip_rows)]
+            comments = frozenset(row for row, (_, _, comment) in enumerate(numbered) if comment)
+            rows = [cells for _, cells, _ in numbered]
+            layout = find_table(rows, comments, named)
+            unfit = unfit or rows
+            if layout is not None and (best is None or layout.score > best.layout.score):
+                lines = [line + 1 for line, _, _ in numbered]
+                best = _Form(encoding=encoding, separator=separator, layout=layout, rows=rows, lines=lines)
         if best is not None and encoding.startswith("utf"):
             break
     if best is None:
-        separator = _separators(text, reading.skip_rows)[0]
-        raise no_table([_cells(line, separator) for line in text[:MAX_ROWS]], _named(reading))
+        raise no_table(unfit, named)
     if len(best.layout.headings) > limits.most_columns:
         rule = f"must not have more than {limits.most_columns} columns, got {len(best.layout.headings)}"
         raise wrong_line(best.first_line, rule, "too_wide")
     return best
 
 
+def _lines(block: bytes, encoding: str) -> list[str]:
+    return "".join(text for text, _ in _blocks(io.BytesIO(block), encoding)).split("\n")[:-1]
+
+
 def _turned(first: bytes, reading: Reading) -> bytes | None:
     """A whole text whose lines are channels with its lines as columns, by the separator by which it is a table then."""
-    text = "".join(_blocks(io.BytesIO(first), _encodings(first)[0])).split("\n")[reading.skip_rows : -1]
-    for separator in _separators(text, 0):
-        if on_its_side := turned([_cells(line, separator) for line in text if line.strip()], _named(reading)):
+    text = _lines(first, _encodings(first)[0])[reading.skip_rows :]
+    for separator in _separators(text):
+        if on_its_side := turned(
+            [cells for _, cells, _ in _rows(text, separator) if any(cells)], named_columns(reading)
+        ):
             return "\n".join("\t".join(row) for row in on_its_side[0]).encode()
     return None
 
 
-def _separators(lines: Sequence[str], skipped: int) -> list[str]:
+def _separators(lines: Sequence[str]) -> list[str]:
     """The separators that are tried: the one that the text names, or all that it holds."""
-    for line in lines[skipped : skipped + MAX_ROWS]:
-        if re.fullmatch(r"sep=.?", line.strip(), re.IGNORECASE):
-            return [line.strip()[4:] or "\t"]
-    held = [separator for separator in "\t;,|" if any(separator in line for line in lines[:MAX_ROWS])]
-    return [*held, "  ", " "] if any(" " in line.strip() for line in lines[:MAX_ROWS]) else held or [","]
+    lines = lines[:MAX_ROWS]
+    if stated := next(filter(None, map(_SEPARATOR_LINE.fullmatch, lines)), None):
+        return [stated[1] or "\t"]
+    held = [separator for separator in "\t;,|" if any(separator in line for line in lines)]
+    return [*held, "  ", " "] if any(" " in line.strip() for line in lines) else held or [","]
 
 
-def _with_separator(encoding: str, separator: str, lines: list[str], reading: Reading) -> _Form | None:
-    rows: list[list[str]] = []
-    at: list[int] = []
-    comments = set()
-    numbered = enumerate(lines[: reading.skip_rows + MAX_ROWS])
+def _rows(lines: Sequence[str], separator: str, skipped: int = 0) -> Iterator[tuple[int, list[str], bool]]:
+    """Rows: the index of the line that each begins with, its cells, and whether it is a comment, without its sign."""
+    numbered = enumerate(lines)
     for index, line in numbered:
-        if index < reading.skip_rows or re.fullmatch(r"sep=.?", line.strip(), re.IGNORECASE):
+        if index < skipped or _SEPARATOR_LINE.fullmatch(line):
             continue
-        whole, begun = line, index
-        while separator.strip() and _is_open(whole) and index - begun < _MAX_CELL_LINES:
-            following = next(numbered, None)
-            if following is None:
-                break
-            index, whole = following[0], whole + "\n" + following[1]
-        if is_comment(whole, separator):
-            comments.add(len(rows))
-            whole = whole.lstrip('#%/;" \t').rstrip('"')
-        rows.append(_cells(whole, separator))
-        at.append(begun)
-    layout = find_table(rows, frozenset(comments), _named(reading))
-    if layout is None:
-        return None
-    return _Form(encoding=encoding, separator=separator, layout=layout, lines=lines, at=at)
+        while '"' in line and separator.strip() and _is_open(line) and line.count("\n") < _MAX_CELL_LINES:
+            line += "\n" + next(numbered, (0, '"'))[1]
+        if comment := _is_comment(line, separator):
+            line = line.lstrip('#%/;" \t').rstrip('"')
+        yield index, _cells(line, separator), comment
 
 
-def _named(reading: Reading) -> list[str]:
-    """The titles that the caller names."""
-    return [choice.column for choice in choices_of(reading).values()]
-
-
-def is_comment(line: str, separator: str) -> bool:
+def _is_comment(line: str, separator: str) -> bool:
     """Whether a line is a comment; a semicolon begins one where it does not separate."""
     if line[:1].isdigit():
         return False
@@ -307,24 +256,17 @@ class _Body:
 
     def __init__(self, opened: Open, form: _Form, reading: Reading, limits: Limits) -> None:
         self._opened, self._form, self._limits = opened, form, limits
-        self._separator = form.separator.strip(" ") or None
-        self._titles = form.lines[form.at[form.layout.titles]].strip()
-        self._above = {line.strip() for line in form.lines[: form.first_line - 1]}
-        self.first = (
-            _cells(form.lines[form.first_line - 1], form.separator) if form.first_line <= len(form.lines) else []
-        )
-        named = len(form.layout.headings)
-        self._width = named if any(self.first[named:]) else max(named, len(self.first))
+        self.data = DataRows(form.rows, form.layout)
+        named, first = len(form.layout.headings), self.data.first
+        self._width = named if any(first[named:]) else max(named, len(first))
+        self._separator = form.separator
+        if form.separator == "  " and len(_cells(" ".join(first), " ")) == self._width:
+            self._separator = " "  # titles are two blanks apart, cells may be one
         self._numerals = Numerals(reading)
         #: Of each block its first row, and the lines of its rows from 1; the line that comes next.
         self._lines: list[tuple[int, Sequence[int]]] = []
         self._line = form.first_line
         self._rows = 0
-        self.breaks: list[int] = []
-        self.notices: list[Notice] = []
-        if labelled := form.layout.labelled:
-            first = form.lines[form.at[form.layout.start - labelled]]
-            self.notices.append(left_out(labelled, "above the first row of", first))
 
     def rows(self) -> int:
         """How many rows were read."""
@@ -338,29 +280,29 @@ class _Body:
     def read(self, channels: Mapping[int, str]) -> list[NDArray[Any]]:
         """The columns [n] by index. Raises InvalidError naming line and value, TooLargeError past the limits."""
         self._settle(channels)
-        dated = any(name == "time_s" and is_stamp("".join(self.first[at : at + 1])) for at, name in channels.items())
+        dated = any(
+            name == "time_s" and is_stamp("".join(self.data.first[at : at + 1])) for at, name in channels.items()
+        )
         parts: list[list[NDArray[Any]]] = [[] for _ in channels]
         most = self._limits.most_values // len(channels)
         end, late = time.thread_time() + self._limits.seconds, time.monotonic() + self._limits.wall_seconds
-        with self._opened() as source:
-            for block, last in _with_last(self._blocks(source)):
-                if time.thread_time() > end:
-                    raise too_slow(Format.TEXT, self._limits)
-                if time.monotonic() > late:
-                    raise overdue(Format.TEXT, self._limits)
-                text = self._without_footer(block) if last else block
-                self._lines.append((self._rows, range(self._line, self._line + text.count("\n"))))
-                numbers = None if dated else self._plain(text)
-                if numbers is None:
-                    columns = self._even(text, channels) or self._careful(text, channels)
-                else:
-                    columns = [numbers[:, index].copy() for index in channels]
-                self._line += block.count("\n")
-                for part, column in zip(parts, columns, strict=True):
-                    part.append(column)
-                self._rows += columns[0].size
-                if self._rows > most:
-                    raise TooLargeError(f"a file of {len(channels)} channels must not have more than {most} rows")
+        for block, last in self._blocks():
+            if time.thread_time() > end:
+                raise too_slow(Format.TEXT, self._limits)
+            if time.monotonic() > late:
+                raise overdue(Format.TEXT, self._limits)
+            numbers = None if dated else self._plain(block)
+            if numbers is None:
+                columns = self._careful(block, channels, last)
+            else:
+                self._lines.append((self._rows, range(self._line, self._line + len(numbers))))
+                columns = [numbers[:, index].copy() for index in channels]
+            self._line += block.count("\n")
+            for part, column in zip(parts, columns, strict=True):
+                part.append(column)
+            self._rows += columns[0].size
+            if self._rows > most:
+                raise TooLargeError(f"a file of {len(channels)} channels must not have more than {most} rows")
         joined = []
         while parts:
             part = parts.pop(0) or [np.empty(0)]
@@ -368,36 +310,36 @@ class _Body:
             joined.append((np.ma.concatenate if masked else np.concatenate)(part))
         return joined
 
-    def _blocks(self, source: ByteSource) -> Iterator[str]:
-        """The blocks from the first row of data on."""
+    def _blocks(self) -> Iterator[tuple[str, bool]]:
+        """The blocks from the first row of data on, and whether each is the last."""
         above = self._form.first_line - 1
-        for block in _blocks(source, self._form.encoding):
-            start = 0
-            while above and start < len(block):
-                start = block.index("\n", start) + 1
-                above -= 1
-            if start < len(block):
-                yield block[start:]
+        with self._opened() as source:
+            for block, last in _blocks(source, self._form.encoding):
+                start = 0
+                while above and start < len(block):
+                    start = block.index("\n", start) + 1
+                    above -= 1
+                if start < len(block):
+                    yield block[start:], last
 
     def _settle(self, channels: Mapping[int, str]) -> None:
         """Learn the decimal sign from the first cell that can be read in one way; a full stop where no cell has a sign."""
         doubtful = False
-        with self._opened() as source:
-            for block in self._blocks(source):
-                if self._numerals.decimal:
-                    return
-                if "." in block or ("," in block and (self._separator != "," or '"' in block)):
-                    rows = [row for _, _, row in self._parsed(block) if len(row) > max(channels)]
-                    doubtful |= self._numerals.settle(
-                        [[row[index] for row in rows] for index, name in channels.items() if name]
-                    )
+        for block, _ in self._blocks():
+            if self._numerals.decimal:
+                return
+            if "." in block or ("," in block and (self._separator != "," or '"' in block)):
+                rows = [cells for _, cells, _ in self._parsed(block) if len(cells) > max(channels)]
+                doubtful |= self._numerals.settle([[row[at] for row in rows] for at, name in channels.items() if name])
         self._numerals.decimal = self._numerals.decimal or ("" if doubtful else ".")
 
     def _plain(self, block: str) -> FloatArray | None:
         """A block of nothing but numbers [rows, columns], by jiter (pydantic-core's reader of JSON); None for any other."""
         separator, decimal = self._separator, self._numerals.decimal
-        if not decimal or separator is None or (separator != "," and decimal == "." and "," in block):
+        if not decimal or (separator != "," and decimal == "." and "," in block):
             return None
+        if not separator.strip(" "):
+            block = re.sub(r" *\n *", "\n", re.sub(r"[ \t]+", " ", block)).lstrip(" ")
         if decimal == ",":
             block = "" if "." in block else block.replace(",", ".")
         plain = block.replace(separator, ",").encode()
@@ -413,100 +355,42 @@ class _Body:
         except (ValueError, OverflowError):
             return None
 
-    def _even(self, block: str, channels: Mapping[int, str]) -> list[NDArray[Any]] | None:
-        """The columns of a block of rows of as many cells, none in quotes; None for any other, and where a cell is wrong."""
-        if '"' in block or any(f"\n{mark}" in "\n" + block for mark in _COMMENTS):
-            return None
-        separator, width, rows = self._separator or " ", self._width, block.count("\n")
-        if separator == " ":
-            block = re.sub(r" ?\n ?", "\n", re.sub(r"[ \t]+", " ", block)).lstrip(" ")
-        cells = block.replace("\n", f"{separator}\n{separator}").split(separator)
-        if len(cells) != (width + 1) * rows + 1 or cells[width :: width + 1].count("\n") != rows:
-            return None
-        columns = [cells[index : -1 : width + 1] for index in channels]
-        try:
-            return self._numerals.values(channels, columns, self.line_of, self._rows)
-        except InvalidError:
-            return None
+    def _parsed(self, block: str) -> Iterator[tuple[int, list[str], bool]]:
+        return _rows(block.split("\n")[:-1], self._separator)
 
-    def _parsed(self, block: str) -> Iterator[tuple[str, int, list[str]]]:
-        """Rows: the line that each begins with, how many it takes, and its cells."""
-        lines, at = block.split("\n")[:-1], 0
-        if self._separator is None or '"' not in block:
-            for line in lines:
-                cells = line.split(self._separator) if self._separator else _cells(line, " ")
-                # titles may be two blanks apart and cells one, or two where one is within a cell
-                even = self._separator or len(cells) == self._width
-                yield line, 1, cells if even else _cells(line, self._form.separator)
-            return
-        reader = csv.reader([f"{line}\n" for line in lines], delimiter=self._separator, skipinitialspace=True)
-        try:
-            for row in reader:
-                yield lines[at], reader.line_num - at, row
-                at = reader.line_num
-        except csv.Error:
-            raise wrong_line(self._line + at, "begins a quotation that does not end", "ragged") from None
-
-    def _careful(self, block: str, channels: Mapping[int, str]) -> list[NDArray[Any]]:
+    def _careful(self, block: str, channels: Mapping[int, str], last: bool) -> list[NDArray[Any]]:
         """The columns of any other block, without comments, blank lines and repeated titles.
 
         Raises InvalidError with every line of it that has too few or too many cells, or cells that are no numbers.
         """
-        rows: list[list[str]] = []
-        lines: list[int] = []
-        separator, line_number = self._form.separator, self._line
-        for line, taken, cells in self._parsed(block):
-            bare = line.strip()
-            if bare and bare not in self._above and not is_comment(bare, separator) and bare.strip(separator):
-                rows.append(cells)
-                lines.append(line_number)
-            elif bare == self._titles and self._rows + len(rows):
-                while rows and is_footer(rows[-1], self.first):
-                    rows.pop(), lines.pop()  # lines above the titles of a further table
-                self.breaks.append(self._rows + len(rows))
-            line_number += taken
-        self._lines[-1] = self._rows, lines
-        errors = []
-        for row, cells in enumerate(rows):
-            if len(cells) != self._width and not self._fit(cells, channels):
-                errors.append(self._ragged(self._rows + row, cells))
+        titles = self.data.titles
+        found = (
+            (self._line + at, cells) for at, cells, comment in self._parsed(block) if not comment or cells == titles
+        )
+        lines, rows = self.data.of(found, self._rows, last=last)
+        self._lines.append((self._rows, lines))
+        errors = [
+            self._ragged(self._rows + row, cells)
+            for row, cells in enumerate(rows)
+            if len(cells) != self._width and not self._fit(cells, channels)
+        ]
         if errors:
-            more = (
-                ""
-                if len(errors) == 1
-                else f"; {len(errors)} errors up to line {self.line_of(self._rows + len(rows) - 1)}"
-            )
+            more = "" if len(errors) == 1 else f"; {len(errors)} errors up to line {lines[-1]}"
             raise InvalidError(errors[0].message + more, errors=errors[:MAX_ERRORS], total=len(errors))
         columns = [[cells[index] for cells in rows] for index in channels]
         return self._numerals.values(channels, columns, self.line_of, self._rows)
 
     def _fit(self, cells: list[str], channels: Mapping[int, str]) -> bool:
         """Whether a row is one with empty cells at its end, or none of those that are not taken; they are added."""
-        while len(cells) > self._width and not cells[-1].strip():
+        while len(cells) > self._width and not cells[-1]:
             cells.pop()
         if len(cells) > max(channels):
             cells += [""] * (self._width - len(cells))
         return len(cells) == self._width
 
     def _ragged(self, row: int, cells: Sequence[str]) -> FieldError:
-        line = (self._separator or " ").join(cells)[:MAX_QUOTED]
+        line = (self._separator.strip() or " ").join(cells)[:MAX_QUOTED]
         message = f"line {self.line_of(row)} must have {self._width} cells, got {len(cells)}: {line!r}"
         if recognised(cells, ()) > 1:
             message += ": another table begins there, send it in a file of its own"
         return FieldError(pointer="", row=row + 1, value=line, code="ragged", message=message)
-
-    def _without_footer(self, block: str) -> str:
-        """The last block without what stands below the table: words, and rows that a word begins (`Mean;5;100;20`)."""
-        lines = block.split("\n")[:-1]
-        kept = end = len(lines)
-        while end:
-            cells = _cells(lines[end - 1], self._form.separator)
-            footer = is_footer(cells, self.first)
-            if not footer and any(cells):
-                break
-            end -= 1
-            if footer and not is_comment(lines[end], self._form.separator):
-                kept = end
-        if kept < len(lines):
-            self.notices.append(left_out(len(lines) - kept, "below", lines[kept]))
-        return "".join(f"{line}\n" for line in lines[:kept])

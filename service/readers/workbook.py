@@ -14,27 +14,11 @@ from numpy.typing import NDArray
 from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
 
 from service.errors import InvalidError
-from service.readers.clocks import stated_clock
-from service.readers.column_names import choices_of, recognised
+from service.readers.column_names import named_columns, recognised
 from service.readers.detect import check_archive
-from service.readers.grid import (
-    MAX_ROWS,
-    Layout,
-    find_table,
-    is_blank,
-    is_footer,
-    is_value,
-    left_out,
-    no_table,
-    refuse_factors,
-    turned,
-    was_turned,
-)
+from service.readers.grid import MAX_ROWS, DataRows, Layout, find_table, no_table, table_in, turned, was_turned
 from service.readers.limits import Limits
-from service.readers.table import Reading, Table, labels, only
-
-#: Rows of data that a person is shown.
-_MAX_SHOWN = 20
+from service.readers.table import Reading, Table, only
 
 
 def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
@@ -45,7 +29,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         check_archive(path, limits)
     book = CalamineWorkbook.from_path(str(path))
     sheets = [sheet.name for sheet in book.sheets_metadata if sheet.typ == SheetTypeEnum.WorkSheet]
-    named = [choice.column for choice in choices_of(reading).values()]
+    named = named_columns(reading)
     if reading.table or len(sheets) == 1:
         sheet, _, number = reading.table.rpartition("/")  # of tables below each other on a sheet
         sheets = [sheets[only(sheets, sheet if sheet in sheets and number.isdecimal() else reading.table, "sheet")]]
@@ -53,10 +37,9 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     refused: list[InvalidError] = []
     on_side: set[str] = set()
     for name in sheets:
-        rows: list[Sequence[Any]] = [
-            _trimmed(row) for row in book.get_sheet_by_name(name).to_python(skip_empty_area=False)
-        ]
-        layout = find_table(rows[reading.skip_rows : reading.skip_rows + MAX_ROWS], frozenset(), named)
+        rows = [_trimmed(row) for row in book.get_sheet_by_name(name).to_python(skip_empty_area=False)]
+        rows[: reading.skip_rows] = [()] * len(rows[: reading.skip_rows])
+        layout = find_table(rows[: reading.skip_rows + MAX_ROWS], frozenset(), named)
         if layout is None and len(rows) <= MAX_ROWS and (on_its_side := turned(rows, named)):
             (rows, layout), on_side = on_its_side, {*on_side, name}
         if layout is None:
@@ -68,7 +51,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     visible = {sheet.name for sheet in book.sheets_metadata if sheet.visible == SheetVisibleEnum.Visible}
     tables = {name: held for name, held in tables.items() if name in visible} or tables
     name = list(tables)[only(list(tables) or sheets, "", "sheet")]
-    table = _table(name, *tables[name], reading, tuple(sheets), limits)
+    table = _table(name, *tables[name], tuple(sheets), limits)
     return replace(table, notices=[*table.notices, was_turned()]) if name in on_side else table
 
 
@@ -80,58 +63,20 @@ def _trimmed(row: Sequence[Any]) -> Sequence[Any]:
     return row[:end]
 
 
-def _shown(cell: Any) -> str:
-    return str(int(cell)) if isinstance(cell, float) and cell.is_integer() else str(cell)
-
-
-def _table(
-    name: str, rows: list[Sequence[Any]], layout: Layout, reading: Reading, sheets: tuple[str, ...], limits: Limits
-) -> Table:
-    start, titles = layout.start + reading.skip_rows, layout.titles + reading.skip_rows
+def _table(name: str, rows: list[Sequence[Any]], layout: Layout, sheets: tuple[str, ...], limits: Limits) -> Table:
     if len(layout.headings) > limits.most_columns:
         raise InvalidError(f"a sheet must not have more than {limits.most_columns} columns, got {len(layout.headings)}")
-    above = {tuple(map(str, row)) for row in rows[:start] if not any(map(is_value, row))}
-    lines: list[int] = []
-    breaks: list[int] = []
-    for index in range(start, len(rows) + 1):
-        row = rows[index] if index < len(rows) else rows[titles]  # below the last table as above a further one
-        if row == rows[titles]:
-            while lines and is_footer(rows[lines[-1]], rows[start]):
-                lines.pop()
-            breaks.append(len(lines))
-        elif not is_blank(row) and tuple(map(str, row)) not in above:
-            lines.append(index)
-    footer = [
-        shown for row in rows[lines[-1] + 1 if lines else start :] if (shown := " ".join(map(_shown, row)).strip())
-    ]
-    notices = [left_out(len(footer), "below", footer[0])] if footer else []
-
-    if layout.labelled:
-        shown = " ".join(map(_shown, rows[start - layout.labelled]))
-        notices.append(left_out(layout.labelled, "above the first row of", shown))
+    data = DataRows(rows, layout)
+    lines, held = data.of(enumerate(rows[layout.start :], layout.start + 1), 0, last=True)
 
     def read(channels: Mapping[int, str]) -> list[NDArray[Any]]:
         columns = []
         for index in channels:
-            columns.append(np.empty(len(lines), dtype=object))
-            columns[-1][:] = [rows[line][index] if index < len(rows[line]) else "" for line in lines]
+            columns.append(np.empty(len(held), dtype=object))
+            columns[-1][:] = [row[index] if index < len(row) else "" for row in held]
         return columns
 
-    def line_of(row: int) -> int:
-        return lines[row] + 1
-
-    refuse_factors([[*map(_shown, row)] for row in rows[max(start - MAX_ROWS, 0) : start]])
-    shown_above = tuple(tuple(map(_shown, row)) for row in rows[max(titles - MAX_ROWS, 0) : titles])
-    clock = stated_clock(labels(shown_above), lambda: len(lines))
-    return Table(
-        columns=tuple(replace(column, clock=clock) for column in layout.columns()),
-        read=read,
-        name=name,
-        others=sheets,
-        above=shown_above,
-        first_line=start + 1,
-        head=tuple(tuple(map(_shown, rows[line])) for line in lines[:_MAX_SHOWN]),
-        line_of=line_of,
-        breaks=breaks[:-1],
-        notices=notices,
-    )
+    return table_in(
+        rows, layout, data, first_line=layout.start + 1, rows_read=lambda: len(held), read=read, line_of=lines.__getitem__,
+        name=name, others=sheets,
+    )  # fmt: skip

@@ -201,6 +201,7 @@ TEXTS: dict[str, tuple[str | bytes, str | None]] = {
     "tribometer-with-a-large-t.csv": ("T,n,M,p\nsec,rpm,N*m,bar\n"
                                       + rows(names=["time_s", "speed_rpm", "torque_nm", "pressure_bar"]), None),
     "rate-above.csv": ("Sample rate [kHz];0,1\nOperator;X\n\np [bar];n [rpm];M [Nm]\n" + rows(";", ",", PLATEAUS), None),
+    "rate-in-a-comment.csv": ("# Sample rate: 100 Hz\np [bar],n [rpm],M [Nm]\n" + rows(names=PLATEAUS), None),
     "interval-above.csv": ("Sampling interval,10ms\n\np [bar],n [rpm],M [Nm]\n" + rows(names=PLATEAUS), None),
     "six-rows-of-titles.csv": ("Kanal;K1;K2;K3\nZeit;Druck;Drehzahl;Moment\ns;bar;1/min;Nm\nFilter;TP 100 Hz;;\n"
                                "Ort;Kolben;Welle;Welle\n"
@@ -365,6 +366,11 @@ REFUSED = {
     ),
     "a-factor-behind-a-unit": ("t;M\ns;Nm*10\n0;2.1\n", None, "'Nm*10'"),
     "two-torques": ("t [s];Torque A1 [Nm];Torque A2 [Nm]\n0;1;2\n", None, "torque_nm must be one column"),
+    "two-torques-understood-in-part": (
+        "t [s];p [bar];n [rpm];Torque FZG [Nm];Torque HBM [Nm]\n0;5;100;1;2\n",
+        None,
+        "torque_nm must be one column, got Torque FZG and Torque HBM; map=torque_nm:NAME chooses one",
+    ),
     "two-times-that-differ": (
         "Timestamp;Time (s);M [Nm]\n" + "".join(f"2026-11-02 08:00:0{s};{2 * s};1\n" for s in range(5)),
         None,

@@ -78,6 +78,16 @@ def test_a_first_file_becomes_a_profile_and_the_second_needs_no_answer(client: T
     assert receipt["fits"][0]["parameters"] == third["fits"][0]["parameters"]
 
 
+def test_a_title_that_is_understood_in_part_is_marked_as_in_a_push(client: TestClient) -> None:
+    file = b"p [bar];n [rpm];Torque FZG [Nm]\n" + b"".join(b"5;%d;20,5\n" % n for n in (20, 120, 520, 1020, 1970))
+    shown = preview(client, file, kind="stationary_stribeck", cycles=0)
+    address = "/v1/clutches/c1/runs/file?kind=stationary_stribeck&cycles=0"
+    pushed = client.post(address, content=file).json()["warnings"]
+    codes = [[warning["code"] for warning in warnings] for warnings in (shown["warnings"], pushed)]
+    assert (shown["problem"], shown["missing"], codes[0]) == (None, [], codes[1])
+    assert "name_in_part" in codes[0]
+
+
 def test_cycles_stand_in_a_cell_above_the_table(client: TestClient) -> None:
     first = preview(client, german(7000))
     profile = chosen(first, "Mz", channel="torque_nm") | {"cycles_cell": "Lastspiele", "kind": "stationary_stribeck"}
