@@ -4,6 +4,7 @@ And the one PostgreSQL server, and the one that speaks S3, of those that need it
 file or one on the server; a place of its own for raw records, a folder or a bucket."""
 
 import gc
+import subprocess
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -11,12 +12,14 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from service.work import process
 from storage.blobs.stores import open_store
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.storage.blobs.stores import new_bucket, s3_server, use_endpoint
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
 from tests.storage.samples import later_step, lay_empty
+from tests.support import FORKING
 
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("untimed")
@@ -56,6 +59,20 @@ def pytest_collection_finish() -> None:
     """What was collected stays: nothing is gained by looking through it again and again for what can go."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _forked_jobs() -> Iterator[None]:
+    """Processes of jobs are forked off one that has loaded the library, here as in services that are forked: most of what
+    a stand-in's job takes is loading. `own_processes` has them begun as a service does."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(process, "subprocess", FORKING)
+        yield
+
+
+@pytest.fixture
+def own_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process, "subprocess", subprocess)
 
 
 @pytest.fixture(scope="session")

@@ -4,23 +4,29 @@ import gc
 import math
 import multiprocessing
 import os
+import runpy
 import signal
 import socket
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from multiprocessing import forkserver
 from multiprocessing.process import BaseProcess
+from multiprocessing.reduction import DupFd
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from types import SimpleNamespace
+from typing import IO, Any
 
 import httpx2
 import numpy as np
 import pytest
 
+from service.work import process
 from tests.storage.samples import lay_empty
 
 
@@ -101,12 +107,14 @@ _LOADED.set_forkserver_preload(
     [
         "filterpy.kalman",
         "tests.support",
+        "models.diagnosis.diagnose",
         "models.rig.campaign",
         "scipy.signal",
         "service.app",
         "service.cli.demo.demo",
         "service.cli.main",
         "service.cli.serving.services",
+        "service.work.diagnosis",
         "service.workflows.replay",
         "uvicorn.protocols.http.httptools_impl",
     ]
@@ -118,6 +126,9 @@ def _run(arguments: list[str], environment: dict[str, str], output: Path | None 
     from service.cli.main import app
 
     gc.freeze()  # what was loaded before the fork is nothing to look through
+    process.subprocess = FORKING  # type: ignore[assignment]
+    forkserver._forkserver.ensure_running = lambda: None  # it is there; this process did not begin it
+    multiprocessing.current_process()._config["daemon"] = False  # else it may have no processes of its own
     engine = environment.get("CLUTCHLIFE_ENGINE")
     if engine is not None:
         from models.diagnosis.extension import Extension
@@ -143,6 +154,67 @@ def clutchlife(*arguments: str | Path, code: int = 0, **environment: str) -> str
         printed = output.read_text(encoding="utf-8")
     assert child.exitcode == code, printed
     return printed
+
+
+class _Passed:
+    """A file's number that is passed to a process as it is begun."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+
+    def __reduce__(self) -> Any:
+        return _received, (DupFd(self.number),)
+
+
+def _received(passed: Any) -> int:
+    number: int = passed.detach()
+    return number
+
+
+class _Forked:
+    """In place of the `Popen` of a job's process: the same modules with the same arguments, forked off what is loaded."""
+
+    def __init__(
+        self, command: list[str], *, stdin: int, stdout: IO[bytes], stderr: IO[bytes], env: dict[str, str]
+    ) -> None:
+        assert stdin == subprocess.PIPE
+        ends, kept = os.pipe()
+        self.stdin = os.fdopen(kept, "wb")
+        files = [_Passed(number) for number in (ends, stdout.fileno(), stderr.fileno())]
+        arguments = command[command.index("-m") + 1 :]
+        self._process = _LOADED.Process(target=_run_module, args=(arguments, env, files))
+        self._process.start()
+        os.close(ends)
+
+    @property
+    def returncode(self) -> int | None:
+        return self._process.exitcode
+
+    def wait(self, timeout: float | None = None) -> None:
+        self._process.join(timeout)
+        if self._process.exitcode is None:
+            raise subprocess.TimeoutExpired("a job", timeout or 0.0)
+
+    def kill(self) -> None:
+        self._process.kill()
+
+
+#: In place of `subprocess` in `service.work.process`.
+FORKING = SimpleNamespace(Popen=_Forked, PIPE=subprocess.PIPE, TimeoutExpired=subprocess.TimeoutExpired)
+
+
+def _run_module(arguments: list[str], environment: dict[str, str], files: list[int]) -> None:
+    for number, file in enumerate(files):
+        os.dup2(file, number)
+    os.environ.clear()
+    os.environ.update(environment)
+    gc.freeze()
+    warnings.simplefilter("ignore")
+    warnings.simplefilter("default", RuntimeWarning)
+    for name in ("service.work.background", "service.work.diagnosis", "service.work.workflow"):
+        sys.modules.pop(name, None)  # it is run as if it had not been loaded
+    sys.argv = arguments
+    runpy.run_module(arguments[0], run_name="__main__", alter_sys=True)
 
 
 class Server:

@@ -81,19 +81,6 @@ def test_wrong_arguments_are_reported_in_a_line(tmp_path: Path) -> None:
     assert not (tmp_path / "mistyped.db").exists()
 
 
-def results(url: str) -> list[object]:
-    """All answers about the clutch, but for the revision."""
-    base = f"{url}/v1/clutches/sim-7"
-    names = (
-        "remaining-useful-life?method=ukf",
-        "remaining-useful-life?at_cycles=5000",
-        "degradation",
-        "series",
-        "runs",
-    )
-    return [ONCE.get(f"{base}/{name}").json() | {"revision": 0} for name in names]
-
-
 def test_keys_open_and_close_the_service(server: Server) -> None:
     database = f"sqlite:///{server.database}"
     keys = {

@@ -4,14 +4,12 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from service.settings import PREFIX, Settings, redacted
 
-OPERATIONS = Path(__file__).parents[2] / "docs" / "reference" / "operations.md"
 #: Names of earlier releases, which services are started with.
 EARLIER = {
     "CLUTCHLIFE_DATABASE": ("sqlite:///other.db", "database", "sqlite:///other.db"),

@@ -17,8 +17,6 @@ from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 from tests.storage.samples import clutch_row, columns, new_run
 
-CLUTCH = "bench3-017"
-
 
 def test_channels_keep_their_order_and_their_bits(database: Database) -> None:
     sent = {"time_s": np.array([0.0, -0.0, 5e-324, 1e308]), **columns(1, 5000), "empty": np.zeros(0)}

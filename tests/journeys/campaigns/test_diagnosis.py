@@ -3,11 +3,11 @@
 import json
 import time
 from pathlib import Path
-from typing import Any
 
 import httpx2
 import pytest
 
+from tests.service.work.replaying import ended, processes, until_none
 from tests.support import Server, clutchlife, serving, stationary
 
 BASE = "/v1/clutches/c1"
@@ -21,23 +21,22 @@ def post_tests(http: httpx2.Client, *cycles: float) -> None:
 
 @pytest.mark.slow
 def test_a_diagnosis_whose_service_is_killed_is_made_by_the_next(tmp_path: Path) -> None:
-    server = Server(tmp_path / "clutchlife.db", loaded=True)
+    server = Server(tmp_path / "clutchlife.db")
     server.start()
     with httpx2.Client(base_url=server.url, timeout=60) as http:
         post_tests(http, 0, 1000, 2000, 3000)
         answer = http.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": "wait=0"})
         assert (answer.status_code, answer.json()["status"]) == (202, "running")
         place = answer.headers["Location"]
-        time.sleep(0.5)
+        while not processes(server.address):
+            time.sleep(0.02)
         server.kill()
-    assert _children_end(server.database)
+    until_none(server.address)
     server.start()
     try:
         with httpx2.Client(base_url=server.url, timeout=300) as http:
-            made = _ended(http, place)
-            assert made["status"] == "finished", made["problem"]
-            (job,) = http.get("/v1/jobs").json()["items"]
-            assert job["attempts"] == 2
+            job = ended(server, place.rpartition("/")[2])
+            assert (job["state"], job["attempts"]) == ("finished", 2), job
             post_tests(http, 4000)
             again = http.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=240"})
             assert (again.status_code, again.json()["status"]) == (201, "finished"), again.json()["problem"]
@@ -46,47 +45,19 @@ def test_a_diagnosis_whose_service_is_killed_is_made_by_the_next(tmp_path: Path)
         assert server.stop() in (0, -15)
 
 
-def _ended(http: httpx2.Client, place: str) -> dict[str, Any]:
-    """The diagnosis as soon as it no longer runs."""
-    deadline = time.monotonic() + 240
-    while time.monotonic() < deadline:
-        diagnosis: dict[str, Any] = http.get(place).json()
-        if diagnosis["status"] != "running":
-            return diagnosis
-        time.sleep(0.2)
-    raise TimeoutError("the diagnosis did not end within 240 s")
-
-
-def _children_end(database: Path) -> bool:
-    """Whether no process that works on the database is left; it runs on idle processors only, so it is given time to end."""
-    deadline = time.monotonic() + 120
-    while time.monotonic() < deadline:
-        commands = [path.read_bytes() for path in Path("/proc").glob("[0-9]*/cmdline") if _readable(path)]
-        if not any(b"service.work.diagnosis" in command and str(database).encode() in command for command in commands):
-            return True
-        time.sleep(0.1)
-    return False
-
-
-def _readable(path: Path) -> bool:
-    try:
-        path.read_bytes()
-    except OSError:
-        return False
-    return True
-
-
 def test_a_stop_does_not_wait_for_a_diagnosis(tmp_path: Path) -> None:
     with (
-        serving(tmp_path / "clutchlife.db", loaded=True) as server,
+        serving(tmp_path / "clutchlife.db") as server,
         httpx2.Client(base_url=server.url, timeout=60) as http,
     ):
         post_tests(http, 0, 1000, 2000)
         http.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=0"})
+        while not processes(server.address):
+            time.sleep(0.02)
         began = time.monotonic()
         assert server.stop() in (0, -15)
         assert time.monotonic() - began < 15
-        assert _children_end(server.database)
+        until_none(server.address)
 
 
 @pytest.fixture(scope="module")

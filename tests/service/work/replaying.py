@@ -80,14 +80,14 @@ def midway(get: Callable[[str], httpx2.Response], job_id: str, url: str) -> None
 
 
 def processes(url: str) -> list[str]:
-    """The processes of replays and refreshes on the database at that address."""
+    """The processes of jobs on the database at that address."""
     found = []
     for path in Path("/proc").glob("[0-9]*"):
         try:
             command, environment = (path / "cmdline").read_bytes(), (path / "environ").read_bytes()
         except OSError:  # it has ended, or is another user's
             continue
-        if b"service.work.workflow" in command and url.encode() in environment:
+        if b"service.work." in command and url.encode() in environment:
             found.append(path.name)
     return found
 

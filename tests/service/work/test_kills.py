@@ -22,6 +22,7 @@ from tests.storage.engine.postgresql.server import postgresql_server
 from tests.support import ONCE, Server, serving
 
 
+@pytest.mark.usefixtures("own_processes")
 def test_a_cancelled_replay_leaves_whole_clutches(in_file: Database) -> None:
     expected = stock(in_file)
     age(in_file)
@@ -45,14 +46,14 @@ def test_the_replay_of_a_killed_service_is_made_again(database: Database) -> Non
     age(database)
     environment = {"CLUTCHLIFE_JOB_LEASE_SECONDS": "2"}
     address = database.url if database.path is None else database.path
-    killed = Server(address, loaded=True, environment=environment)
+    killed = Server(address, environment=environment)
     killed.start()
     asked = ONCE.post(f"{killed.url}/v1/jobs", json={"kind": "replay"}).json()["job_id"]
     midway(lambda path: ONCE.get(f"{killed.url}{path}"), asked, database.url)
     killed.kill()
     until_none(database.url)
     assert 0 < len(aged(database)) < CLUTCHES
-    with serving(address, loaded=True, environment=environment) as server:
+    with serving(address, environment=environment) as server:
         job = ended(server, asked)
     assert (job["state"], job["attempts"], job["result"]["replayed"]) == ("finished", 2, CLUTCHES)
     assert aged(database) == set()
@@ -66,7 +67,7 @@ def test_a_replay_is_made_again_where_postgresql_is_killed() -> None:
         with closing(open_database(url)) as database:
             expected = stock(database)
             age(database)
-        with serving(url, loaded=True, environment={"CLUTCHLIFE_JOB_LEASE_SECONDS": "2"}) as server:
+        with serving(url, environment={"CLUTCHLIFE_JOB_LEASE_SECONDS": "2"}) as server:
             asked = ONCE.post(f"{server.url}/v1/jobs", json={"kind": "replay"}).json()["job_id"]
             midway(lambda path: ONCE.get(f"{server.url}{path}"), asked, database.url)
             postgres.kill()

@@ -24,6 +24,7 @@ class StartedError(Exception):
     """In place of a process."""
 
 
+@pytest.mark.usefixtures("own_processes")
 def test_no_argument_shows_the_address_of_the_database(monkeypatch: pytest.MonkeyPatch) -> None:
     """Other users of the machine see the arguments of a process, but not its environment."""
     started: dict[str, Any] = {}
@@ -52,6 +53,7 @@ def states(database: Database) -> dict[str, str]:
         return {row.job_id: row.state for row in jobs.page(connection, limit=9)}
 
 
+@pytest.mark.usefixtures("own_processes")
 def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
     in_file: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -99,10 +101,8 @@ def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
     ],
 )
 def test_a_job_that_fails_in_any_way_is_marked_failed_and_the_next_one_runs(
-    in_file: Database, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, how: str
+    in_file: Database, caplog: pytest.LogCaptureFixture, how: str
 ) -> None:
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
-
     def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
         problem = ended.get("problem")
         if job.job_id == "bad" and (how == "cannot end" or (how == "cannot be stored" and problem is None)):

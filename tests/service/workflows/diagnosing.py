@@ -23,7 +23,6 @@ def stood_in() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         for name, method in stand_in_engine.METHODS.items():
             patched.setattr(Extension, name, method)
-        patched.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
         yield
 
 
