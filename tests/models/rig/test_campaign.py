@@ -1,12 +1,12 @@
 """Whole simulated campaigns: the order of runs, the same bits of a seed, and ageing by cycles or by energy."""
 
 import itertools
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from models.friction.speed_protocol import RPM
 from models.rig.campaign import end_of_life, simulate, simulated_clutch
 from models.rig.programme import CYCLE_ENERGY, WHOLE, Ageing, Programme
 from models.rig.sampled import RawTest
@@ -14,9 +14,6 @@ from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import NOISELESS, stationary_test
 from models.rig.truth import SimulatedClutch
 from tests.models.rig.noiseless import curves
-
-RPM = 2 * math.pi / 60
-
 
 BAR = 1e5
 

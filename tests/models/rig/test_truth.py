@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from models.clutch import Geometry
+from models.friction.speed_protocol import RPM
 from models.friction.stribeck import torque
+from models.rig.campaign import simulated_clutch
+from models.rig.surface import surface
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, draw
 from tests.models.rig.noiseless import curves
-
-RPM = 2 * math.pi / 60
-
 
 SPEEDS = np.arange(20, 1971, 50) * RPM
 
@@ -82,54 +82,6 @@ class TestFindingsOfTheReference:
         assert steps[1:] / steps[:-1] == pytest.approx(np.full(5, steps[1] / steps[0]))  # towards an asymptote
         assert np.all((fresh.coulomb_ratio > 0) & (fresh.coulomb_ratio < 1))
 
-    def test_at_4_bar_the_fresh_curve_rises_slightly(self, nominal):
-        curve = curves(nominal, 0)[4.0]
-        assert (np.diff(curve) > 0).all()
-        assert 0.02 < curve[-1] / curve[0] - 1 < 0.08
-
-    @pytest.mark.parametrize("pressure", [5.0, 5.5, 6.0, 6.5, 7.0])
-    def test_at_higher_pressure_the_fresh_curve_rises_then_falls(self, nominal, pressure):
-        curve = curves(nominal, 0)[pressure]
-        top = int(curve.argmax())
-        assert 150 * RPM < SPEEDS[top] < 600 * RPM
-        assert (np.diff(curve[: top + 1]) > 0).all()
-        assert (np.diff(curve[top:]) < 0).all()
-        assert curve[-1] < 0.95 * curve.max()
-
-    def test_the_fresh_low_speed_slope_grows_with_pressure(self, nominal):
-        fresh = curves(nominal, 0)
-        slopes = np.array([curve[2] - curve[0] for curve in fresh.values()])  # 20 to 120 rpm
-        assert (slopes > 0).all()
-        assert (np.diff(slopes) > 0).all()
-
-    def test_the_parameters_age_as_in_figs_10_and_11(self, nominal):
-        for pressure in PROTOCOL_PRESSURES:
-            life = nominal.parameters(pressure, np.array([0.0, 1000.0, 7000.0, 15_000.0]))
-            for falling in (life.static_torque, life.coulomb_ratio, life.stribeck_velocity):
-                assert (np.diff(falling) < 0).all()
-                assert falling[-1] > 0
-            assert (np.diff(life.viscous_coefficient) > 0).all()
-
-    def test_the_whole_curve_sinks_at_every_pressure(self, nominal):
-        stages = [curves(nominal, cycles) for cycles in (0, 1000, 7000, 15_000)]
-        for earlier, later in itertools.pairwise(stages):
-            assert all((later[p] < earlier[p]).all() for p in earlier)
-
-    def test_the_anti_shudder_slope_is_lost(self, nominal):
-        # Fig. 7(b), at 5 bar: the slope at low speed, here 20 to 220 rpm, turns and grows ever more negative.
-        slopes = [(c := curves(nominal, cycles)[5.0])[4] - c[0] for cycles in (0, 1000, 7000, 15_000)]
-        assert slopes[0] > 0
-        assert (np.diff(slopes) < 0).all()
-        assert slopes[-1] < -0.1 * curves(nominal, 15_000)[5.0].mean()
-        assert all((c[4] - c[0]) < 0 for c in curves(nominal, 15_000).values())
-        assert (np.diff(curves(nominal, 15_000)[5.0][:10]) < 0).all()
-
-    def test_the_drop_is_drastic_then_saturates(self, nominal):
-        cof = nominal.mean_cofs(np.array([0.0, 3000.0, 12_000.0, 15_000.0, 18_000.0]))
-        assert cof[0] - cof[1] > 0.5 * (cof[0] - cof[3])  # half of the loss in the first fifth of the life
-        assert cof[2] - cof[3] < (cof[0] - cof[1]) / 8  # an eighth of that over the last fifth
-        assert cof[3] - cof[4] < cof[2] - cof[3]
-
     def test_mean_cof_is_halved_near_15_000_cycles(self, nominal):
         assert nominal.end_of_life() == pytest.approx(15_000, rel=0.02)
 
@@ -190,3 +142,33 @@ def test_the_clutch_transfers_what_its_curve_says_and_less_below_its_lowest_pres
     lowest = float(torque(np.array(3.0), CLUTCH.parameters(4e5, 2000.0)))
     assert capacity(6e5, 3.0) == pytest.approx(at)
     assert capacity(1e5, 3.0) == pytest.approx(lowest / 4)
+
+
+# --- The simulated lining wears as figs. 4 and 5 of the reference show: smooth and flat at the end.
+
+CLUTCHES = (SimulatedClutch(), simulated_clutch(1))
+
+
+@pytest.mark.parametrize("clutch", CLUTCHES, ids=["nominal", "drawn"])
+def test_roughness_and_skewness_are_the_references_before_and_after_the_tests(clutch: SimulatedClutch) -> None:
+    end = clutch.end_of_life()
+    assert end is not None
+    fresh, worn = surface(clutch, 0.0), surface(clutch, 2 * end)
+    assert (fresh.roughness, fresh.skewness) == pytest.approx((9.52e-6, -0.87))
+    assert (worn.roughness, worn.skewness) == pytest.approx((1.94e-6, -3.4))
+    halved = surface(clutch, end)
+    assert (halved.roughness, halved.skewness) == pytest.approx((1.94e-6, -3.4), rel=1e-6)
+
+
+@pytest.mark.parametrize("clutch", CLUTCHES, ids=["nominal", "drawn"])
+def test_the_lining_gets_smoother_and_flatter_all_its_life(clutch: SimulatedClutch) -> None:
+    end = clutch.end_of_life()
+    assert end is not None
+    surfaces = [surface(clutch, float(cycles)) for cycles in np.linspace(0.0, 0.99 * end, 20)]
+    assert (np.diff([state.roughness for state in surfaces]) < 0).all()
+    assert (np.diff([state.skewness for state in surfaces]) < 0).all()
+
+
+def test_wear_that_is_none_is_refused() -> None:
+    with pytest.raises(ValueError, match="not negative"):
+        surface(SimulatedClutch(), -1.0)
