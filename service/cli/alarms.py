@@ -13,10 +13,10 @@ from service.client.clutchlife.transport import Service
 @asking
 def alarms(
     service: Service,
-    everything: Annotated[bool, typer.Option("--all", help="Those that are over, too")] = False,
-    clutch: Annotated[str | None, typer.Option(help="Of this clutch only")] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Also those that are over")] = False,
+    clutch: Annotated[str | None, typer.Option(help="Only of this clutch")] = None,
     acknowledge: Annotated[str | None, typer.Option(metavar="EVENT", help="Acknowledge this one")] = None,
-    note: Annotated[str, typer.Option(help="Of an acknowledgement: a remark")] = "",
+    note: Annotated[str, typer.Option(help="A remark on the acknowledgement")] = "",
     rules: Annotated[bool, typer.Option("--rules", help="List the rules instead")] = False,
     as_json: Json = False,
 ) -> None:

@@ -9,17 +9,17 @@ from urllib.parse import urlencode
 import typer
 
 from service.cli.options import EX_USAGE, ClutchId, Json, asking, errors_in_a_line, fail, out, print_line
-from service.cli.tables import coefficient, cycles, number, place, show_table, warn, with_deviation
+from service.cli.tables import chance, coefficient, cycles, number, place, show_table, warn, with_deviation
 from service.cli.tables import pressure as pressure_of
 from service.client.clutchlife.transport import Service
 
 Method = Annotated[str | None, typer.Option(help="The filter: particle, ukf or grid")]
-AtCycles = Annotated[float | None, typer.Option(help="As it would have been answered at these duty cycles")]
+AtCycles = Annotated[float | None, typer.Option(help="Answer as of these duty cycles")]
 Arguments = Annotated[
     list[str] | None,
-    typer.Option("--query", metavar="NAME=VALUE", help="Any other argument of the route; may be repeated"),
+    typer.Option("--query", metavar="NAME=VALUE", help="Another parameter of the API request; may be repeated"),
 ]
-Csv = Annotated[bool, typer.Option("--csv", help="As rows for a spreadsheet")]
+Csv = Annotated[bool, typer.Option("--csv", help="Print CSV for a spreadsheet")]
 
 
 def _arguments(given: list[str] | None, **named: Any) -> dict[str, Any]:
@@ -100,7 +100,7 @@ def life(
         _answer(service, address, arguments, _show_life, as_json=as_json, as_csv=as_csv)
         return
     if as_csv:
-        fail("planned duty is answered as a table or with --json, not as --csv", EX_USAGE)
+        fail("planned duty is printed as a table or with --json, not with --csv", EX_USAGE)
     body = json.dumps(_programme(plan, block or [], pace)).encode()
     answer = service.post(f"{address}/forecast?{urlencode(arguments)}", body)
     if as_json:
@@ -135,9 +135,9 @@ def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
             yield f"mean COF {cof}, {100 * fraction:.0f} % of new{_threshold(criterion)}"
     if answer["at_least_at"] is not None:
         pace = "planned pace" if answer.get("pace_from") == "request" else "pace of the runs"
-        yield f"at the {pace} until {answer['at_least_at'][:10]} at least"
+        yield f"at the {pace}: at least until {answer['at_least_at'][:10]}"
     course = answer.get("course")
-    described = "" if course is None else f", course {course['name']} (probability {number(course['probability'], 2)})"
+    described = "" if course is None else f", {_COURSES[course['name']]} ({chance(course['probability'])} sure)"
     effects = ", ".join(answer["model"]["effects"])
     model = f"{answer['model']['name']} ({effects})" if effects else answer["model"]["name"]
     yield f"{answer['runs_used']} tests, method {answer['method']}, model {model}{described}"
@@ -147,7 +147,11 @@ def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
     severity = [value for value in answer.get("block_severity", ()) if value is not None]
     if severity:
         worth = ", ".join(number(value) for value in severity)
-        yield f"a cycle of each block is worth {worth} cycles of recent duty"
+        yield f"one cycle of each block wears like {worth} cycles of recent duty"
+
+
+#: How a clutch ages, by the name of its course.
+_COURSES = {"eq6": "ages as expected", "slowing": "ages slower and slower", "accelerating": "ages faster and faster"}
 
 
 def _threshold(criterion: Mapping[str, Any]) -> str:
@@ -159,7 +163,7 @@ def _threshold(criterion: Mapping[str, Any]) -> str:
 
 def _criterion(end: Mapping[str, Any]) -> list[str]:
     """A criterion: what it is now, its limit, when that is reached, and how probably it is the first."""
-    first, current = end["probability_first"], end["current"]
+    current = end["current"]
     return [
         end["quantity"],
         pressure_of(end["pressure_bar"]),
@@ -168,7 +172,7 @@ def _criterion(end: Mapping[str, Any]) -> list[str]:
         with_deviation(current["value"], current["sd"]),
         number(end["limit"]),
         *(cycles(end["end_of_life_cycles"][q]) for q in ("0.05", "0.5", "0.95")),
-        "-" if first is None else f"{100 * first:.0f} %",
+        chance(end["probability_first"]),
     ]
 
 

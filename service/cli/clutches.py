@@ -40,13 +40,15 @@ def register(
     clutch: ClutchId,
     set_fields: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="FIELD=VALUE", help="As friction_material=paper or geometry.friction_faces=4"),
+        typer.Option(
+            "--set", metavar="FIELD=VALUE", help="For example friction_material=paper or geometry.friction_faces=4"
+        ),
     ] = None,
     record: Annotated[
         Path | None, typer.Option(exists=True, dir_okay=False, help="A JSON file with the clutch's record")
     ] = None,
 ) -> None:
-    """Register a clutch, so that runs of it can be sent; what you leave out is as in the reference paper."""
+    """Register a clutch, so that runs of it can be sent. What you leave out is taken from the reference paper's clutch."""
     fields: dict[str, Any] = {} if record is None else json.loads(record.read_bytes())
     if not isinstance(fields, dict):
         raise ValueError(f"{record} must hold a JSON object")  # noqa: TRY004  (a wrong file, not a wrong call)
@@ -59,20 +61,22 @@ def register(
 @asking
 def list_clutches(
     service: Service,
-    state: Annotated[str | None, typer.Option(help="Of this state only, as maintenance")] = None,
-    find: Annotated[str | None, typer.Option(help="Whose name, friction material or fluid holds this")] = None,
-    archived: Annotated[bool, typer.Option("--archived", help="The archived ones")] = False,
+    state: Annotated[str | None, typer.Option(help="Only those in this state, for example maintenance")] = None,
+    find: Annotated[
+        str | None, typer.Option(help="Only those whose name, friction material or fluid contains this")
+    ] = None,
+    archived: Annotated[bool, typer.Option("--archived", help="List the archived clutches")] = False,
     as_json: Json = False,
 ) -> None:
     """List clutches, worst first, with their state and the cycles that remain."""
     chosen = {"state": state, "find": find, "archived": "true" if archived else None}
     items = service.pages("/v1/clutches", **{name: value for name, value in chosen.items() if value is not None})
-    columns = ("clutch", "state", "at", "at least", "most likely", "held")
+    columns = ("clutch", "state", "at", "at least", "median", "held")
     listed(
         items,
         as_json,
         lambda items: show_table(columns, map(_row, items)),
-        "no clutch; register one with: clutchlife register ID",
+        "no clutch is registered; register one with: clutchlife register ID",
     )
 
 
@@ -107,10 +111,12 @@ def status(clutch: ClutchId, as_json: Json = False, url: Url = URL, key: Key = N
 def watch(
     service: Service,
     clutch: ClutchId,
-    every: Annotated[float, typer.Option(min=0.1, help="Seconds between two looks")] = 5.0,
-    looks: Annotated[int | None, typer.Option(min=1, help="End after so many looks; left out, at Ctrl-C")] = None,
+    every: Annotated[float, typer.Option(min=0.1, help="Seconds between two requests")] = 5.0,
+    looks: Annotated[
+        int | None, typer.Option(min=1, help="End after this many requests; without it, at Ctrl-C")
+    ] = None,
 ) -> None:
-    """Print a clutch's line whenever it changes, until Ctrl-C."""
+    """Print a clutch's state whenever it changes, until Ctrl-C."""
     before, count = "", 0
     while looks is None or count < looks:
         if count:
@@ -152,7 +158,7 @@ def archive(
     undo: Annotated[bool, typer.Option("--undo", help="Bring it back")] = False,
     reason: Reason = "",
 ) -> None:
-    """Leave a finished clutch out of lists; it takes in no more runs, and fleets still learn from it."""
+    """Hide a finished clutch from lists. It accepts no more runs, and fleets still learn from it."""
     body = json.dumps({"archived": not undo, "reason": reason}).encode()
     changed = service.patch(f"/v1/clutches/{clutch}", body)
     print_line(f"{clutch} is {'archived' if changed['archived'] else 'in use'}")

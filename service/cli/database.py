@@ -26,7 +26,7 @@ from storage.engine.errors import DatabaseTooOld
 
 
 def backup(path: Path, database: Database = DATABASE) -> None:
-    """A consistent copy of the database at PATH, as it is, while the service runs."""
+    """Write a consistent copy of the database to PATH. The service may run meanwhile."""
     from storage.engine.sqlite.database import back_up  # start-up time
 
     with errors_in_a_line():
@@ -57,7 +57,7 @@ def restore(
     backup: Annotated[Path, typer.Argument(metavar="BACKUP", help="A backup, made by clutchlife backup")],
     database: Database = DATABASE,
 ) -> None:
-    """Put the file BACKUP in the place of the database, which is kept beside it.
+    """Replace the database by the file BACKUP. The replaced database is kept beside it.
 
     No service may use the database meanwhile. A backup of an earlier release is migrated when the service starts.
     """
@@ -110,7 +110,7 @@ def replay(
 def verify(
     database: Database = DATABASE,
     sample: Annotated[
-        int | None, typer.Option(min=0, help="Recompute this many clutches only, drawn again each time; left out, all")
+        int | None, typer.Option(min=0, help="Recompute only this many clutches, chosen at random; without it, all")
     ] = None,
 ) -> None:
     """Check pages, references and schema, the hashes of every run, inspection and photograph, and that all results follow.
@@ -170,10 +170,10 @@ def verify(
 
 
 def migrate(
-    source: Annotated[str, typer.Option("--from", help="The database that is copied, and stays as it is")],
-    target: Annotated[str, typer.Option("--to", help="An empty database, or a file that is yet to be made")],
+    source: Annotated[str, typer.Option("--from", help="The database to copy; it is not changed")],
+    target: Annotated[str, typer.Option("--to", help="An empty database, or a file that does not exist yet")],
 ) -> None:
-    """Copy a database into another, SQLite's or PostgreSQL's, and compare all of it; no service may run on either.
+    """Copy a database into another one, SQLite or PostgreSQL, and compare all rows. No service may run on either.
 
     If it was interrupted, give the same command again: it goes on where it stopped. The target is used by no service until
     all tables are the same on both sides, and every run is as it was sent.
@@ -239,7 +239,7 @@ def list_stores(database: Database = DATABASE) -> None:
 
 @app.command()
 def move(to: Address, database: Database = DATABASE) -> None:
-    """Have new long raw records go to an address, and take those that are stored there too.
+    """Store new long raw records at an address, and move the stored ones there.
 
     May run beside the service, and be interrupted and repeated. What is left in the former place `collect` removes.
     """
@@ -272,7 +272,7 @@ def relocate(
 def collect(
     database: Database = DATABASE,
     grace_hours: Annotated[
-        float, typer.Option(min=_MIN_GRACE_HOURS, help="What was put within so many hours is left")
+        float, typer.Option(min=_MIN_GRACE_HOURS, help="Keep blobs that are younger than this many hours")
     ] = _GRACE_HOURS,
 ) -> None:
     """Remove blobs that no run names, as interrupted posts and moves leave them. Safe while services run."""

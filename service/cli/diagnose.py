@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from service.cli.options import ClutchId, asking, err, fail, out, print_line
-from service.cli.tables import cycles, number
+from service.cli.tables import chance, cycles, number
 from service.client.clutchlife.client import diagnosed
 from service.client.clutchlife.transport import Service
 
@@ -59,7 +59,7 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
         yield _maps(report["maps"])
     axes = [_spelt(item["axis"]) for item in report["baseline"]["where"] if item["p_value"] < _SHOWN_P]
     if axes:
-        yield Text(f"The model without an effect errs along: {', '.join(axes)}")
+        yield Text(f"The baseline's error depends on: {', '.join(axes)}")
     yield from _gain(report)
     tests = report["advice"]
     if len(tests) > 1:
@@ -97,21 +97,21 @@ def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
         estimate = candidate["estimate"]
         size = f"{number(estimate['value'])} ± {number(estimate['sd'], 2)}"
         amount = f"{_in_unit(size, estimate['unit'])} {estimate['name']}"
-        table.add_row(Text(candidate["effect"]), number(candidate["probability"]), Text(amount))
+        table.add_row(Text(_spelt(candidate["effect"])), chance(candidate["probability"]), Text(amount))
     return table
 
 
 def _visible(visible: Sequence[Mapping[str, Any]]) -> Table:
     """From which size on an effect would be seen: in any of its forms, and in the one that shows best."""
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("would be seen", "in any form from", "in its best from"):
-        table.add_column(name, justify="left" if name == "would be seen" else "right")
+    for name in ("smallest visible size", "for every shape", "for the most visible"):
+        table.add_column(name, justify="left" if name == "smallest visible size" else "right")
     for item in visible:
         sizes = (
             "at no size" if size is None else _in_unit(number(size), item["unit"])
             for size in (item["amplitude"], item["least"])
         )
-        table.add_row(Text(item["effect"]), *sizes)
+        table.add_row(Text(_spelt(item["effect"])), *sizes)
     return table
 
 
@@ -119,20 +119,20 @@ def _isolability(isolability: Mapping[str, Any]) -> Iterator[RenderableType]:
     """The pairs that these tests could not tell apart for sure, hardest first, and what they cannot show."""
     hard = [pair for pair in isolability["pairs"] if not pair["apart"]]
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("could be mistaken", "told apart", "by this test", "then"):
+    for name in ("causes", "distinguished", "better by this test", "then"):
         table.add_column(name)
     for pair in hard:
         before, then = (f"{100 * pair[name]:.0f} %" for name in ("probability", "with_test"))
         table.add_row(
             Text(" and ".join(map(_spelt, pair["effects"]))),
             before,
-            Text(pair["test"] or "no single test parts them"),
+            Text(pair["test"] or "no single test distinguishes them"),
             then,
         )
     if hard:
         yield table
     sure = len(isolability["pairs"]) - len(hard)
-    yield Text(f"Of {len(isolability['pairs'])} pairs of causes these tests would tell {sure} apart.")
+    yield Text(f"These tests would distinguish {sure} of {len(isolability['pairs'])} pairs of causes.")
     if isolability["unseen"]:
         yield Text(f"These tests cannot show: {', '.join(map(_spelt, isolability['unseen']))}.")
 
@@ -158,8 +158,8 @@ def _maps(maps: Mapping[str, Any]) -> Group:
             for (name, columns), table, most in over
         ]
         drawn.append(Group(*grids))
-    legend = Text("Mean residual, share of the baseline's largest ")
-    legend.append(f"({number(largest[0], 2)} and {number(largest[1], 2)} deviations): ")
+    legend = Text("Mean residual as a share of the baseline's largest ")
+    legend.append(f"({number(largest[0], 2)} and {number(largest[1], 2)} standard deviations): ")
     for least, mark, above, below in reversed(_MARKS):
         legend.append(mark, style=f"black on color({above})")
         legend.append(_below(mark), style=f"black on color({below})")
@@ -217,9 +217,9 @@ def _gain(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     if gain["rmse_before_nm"] is not None:
         spread = "" if gain["reduction_percent_sd"] is None else f" ± {number(gain['reduction_percent_sd'], 2)}"
         yield Text(
-            f"Held out ({len(gain['held_out_runs'])} runs): error {number(gain['rmse_before_nm'])} Nm before, "
-            f"{number(gain['rmse_after_nm'])} Nm after, {number(gain['reduction_percent'])}{spread} % less; "
-            f"evidence for the extended model there: {_evidence(gain['log_score_gain'])}"
+            f"On {len(gain['held_out_runs'])} held-out runs: error {number(gain['rmse_before_nm'])} Nm before, "
+            f"{number(gain['rmse_after_nm'])} Nm after ({number(gain['reduction_percent'])}{spread} % less); "
+            f"evidence for the extended model: {_evidence(gain['log_score_gain'])}"
         )
     life = gain["remaining_useful_life"]
     for when, title in (("before", "baseline"), ("after", "extended")):
@@ -242,14 +242,15 @@ def _remaining(life: Mapping[str, Any]) -> str:
 def diagnose(
     service: Service,
     clutch: ClutchId,
-    adopt: Annotated[bool, typer.Option("--adopt", help="Track under the extended model, if there is one")] = False,
+    adopt: Annotated[bool, typer.Option("--adopt", help="Adopt the extended model, if there is one")] = False,
     plan: Annotated[
-        Path | None, typer.Option(help="Save the advised tests here as a protocol for the rig, a CSV with a row a step")
+        Path | None, typer.Option(help="Save the advised tests here as a protocol for the rig: CSV, one row per step")
     ] = None,
     isolability: Annotated[
         bool,
         typer.Option(
-            "--isolability", help="Show which causes these tests could tell apart, and which test parts the rest"
+            "--isolability",
+            help="Show which causes these tests could distinguish, and which test would distinguish the rest",
         ),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON")] = False,
@@ -265,7 +266,7 @@ def diagnose(
         for part in shown(report):
             out.print(part)
         if report["adoptable"] and not report["adopted"]:
-            print_line(f"To track under it: clutchlife model {clutch} --adopt {report['diagnosis_id']}")
+            print_line(f"To adopt the extended model: clutchlife model {clutch} --adopt {report['diagnosis_id']}")
     if report["status"] == "finished" and plan is not None:
         plan.write_text(service.table(f"/v1/clutches/{clutch}/diagnoses/{report['diagnosis_id']}/plan.csv"), "utf-8")
     if report["status"] != "finished":

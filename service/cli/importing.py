@@ -28,7 +28,7 @@ def import_file(
     ],
     clutch: Annotated[str, typer.Option(help="The clutch that was tested")],
     rig: Annotated[
-        str | None, typer.Option(help="The rig by whose profile it is read; left out, the one that fits")
+        str | None, typer.Option(help="The rig profile that reads it; without it, the one that fits")
     ] = None,
     kind: Annotated[str | None, typer.Option(help=f"The kind of run: {' or '.join(_KINDS)}")] = None,
     cycles: Annotated[float | None, typer.Option(min=0, help="Duty cycles since new")] = None,
@@ -38,7 +38,7 @@ def import_file(
     save: Annotated[
         str | None, typer.Option("--save", help="Keep how it is read as a rig profile of this name")
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Ask nothing; end where something is missing")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Ask nothing; end if something is missing")] = False,
 ) -> None:
     """Show how a file is read, ask for what is missing, send it, and keep the answers as a rig profile.
 
@@ -56,7 +56,7 @@ def import_file(
     if shown["problem"] is not None:
         fail(shown["problem"], EX_DATAERR)
     if shown["missing"]:
-        fail(f"still to be given: {', '.join(shown['missing'])}", EX_DATAERR)
+        fail(f"still missing: {', '.join(shown['missing'])}", EX_DATAERR)
     if not yes and not typer.confirm(f"Send it to {clutch}?", default=True):
         raise typer.Exit(0)
     if shown["rig"] is None and save is None and not yes:
@@ -176,5 +176,5 @@ def _save(service: Service, name: str, shown: dict[str, Any]) -> None:
     body = shown["profile"] | {"name": name, "kind": shown["profile"]["kind"] or shown["kind"]}
     service.post("/v1/rigs", json.dumps(body).encode())
     pattern = body["file_name"]
-    cycles = f"file names such as {pattern} give the cycles" if pattern else "the cycles are to be given with each file"
-    print_line(f"saved as rig {name}; {cycles}")
+    cycles = f"file names such as {pattern} give the cycles" if pattern else "give the cycles with each file"
+    print_line(f"saved as rig profile {name}; {cycles}")

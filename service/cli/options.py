@@ -46,11 +46,13 @@ ChannelMap = Annotated[str | None, typer.Option("--map", help="Channels by name:
 Decimal = Annotated[str | None, typer.Option(help="The decimal sign of text files, . or , ; left out, it is found")]
 Missing = Annotated[
     str | None,
-    typer.Option(help="Marks of missing values, as -9999,n/a, whose rows are left out; none: all numbers are measured"),
+    typer.Option(
+        help="Marks of missing values, as -9999,n/a; their rows are left out. none: every number is a measurement"
+    ),
 ]
 
-Reason = Annotated[str, typer.Option("--reason", help="Why; the audit trail keeps it")]
-Json = Annotated[bool, typer.Option("--json", help="As the service answers it")]
+Reason = Annotated[str, typer.Option("--reason", help="The reason, for the audit trail")]
+Json = Annotated[bool, typer.Option("--json", help="Print the service's answer as JSON")]
 
 Scheduler = Annotated[str, typer.Option("--scheduler", help=f"Where it is computed: {SCHEDULERS}")]
 

@@ -31,7 +31,7 @@ def withdraw(
     clutch: ClutchId,
     run: RunId,
     reason: Reason,
-    undo: Annotated[bool, typer.Option("--undo", help="Take the withdrawal back")] = False,
+    undo: Annotated[bool, typer.Option("--undo", help="Undo the withdrawal: the run counts again")] = False,
 ) -> None:
     """Take a run out of a clutch's history; it stays stored."""
     _post(service, f"/v1/clutches/{clutch}/runs/{run}/{'restore' if undo else 'withdraw'}", {"reason": reason})
@@ -42,14 +42,12 @@ def end(
     service: Service,
     clutch: ClutchId,
     cycles: Annotated[
-        float | None, typer.Option(min=0, help="Duty cycles since new at the end; left out, those of the last run")
+        float | None, typer.Option(min=0, help="Duty cycles since new at the end; without it, those of the last run")
     ] = None,
-    reason: Annotated[
-        str, typer.Option(help="worn, or other: taken out before its end, which would have come later")
-    ] = "worn",
+    reason: Annotated[str, typer.Option(help="worn, or other: taken out before it was worn")] = "worn",
     note: Annotated[str, typer.Option(help="A remark")] = "",
 ) -> None:
-    """Declare that a clutch's life has ended: no more duty or tests until a rebuild, and its fleet learns from it."""
+    """Declare that a clutch's life has ended. It accepts no duty or tests until a rebuild, and its fleet learns from it."""
     if reason not in ("worn", "other"):
         fail(f"--reason must be worn or other, got {reason!r}", EX_USAGE)
     if cycles is None:
@@ -61,7 +59,7 @@ def end(
     receipt = _post(service, f"/v1/clutches/{clutch}/runs", declared)
     if receipt["state"] == "accepted":
         undo = f"clutchlife withdraw {clutch} {receipt['run_id']} --reason ..."
-        print_line(f"{clutch}: ended at {receipt['cycles']:,.0f} cycles ({reason}); taken back by: {undo}")
+        print_line(f"{clutch}: ended at {receipt['cycles']:,.0f} cycles ({reason}); to undo this: {undo}")
 
 
 @asking
@@ -70,7 +68,9 @@ def confirm(
     clutch: ClutchId,
     runs: Annotated[list[str] | None, typer.Argument(metavar="[RUN]...", help="The names of the runs")] = None,
     every: Annotated[bool, typer.Option("--all", help="All runs that are held")] = False,
-    doubt: Annotated[str, typer.Option(help="All runs that are held for this code, as cycles_off_pace")] = "",
+    doubt: Annotated[
+        str, typer.Option(help="All runs that are held for this reason, for example cycles_off_pace")
+    ] = "",
     reason: Reason = "",
 ) -> None:
     """Accept held runs as they were sent: one, or several in one step."""
@@ -96,7 +96,7 @@ def correct(
     cycles: Annotated[float | None, typer.Option(min=0, help="Duty cycles since new when the run was made")] = None,
     rig: Annotated[str | None, typer.Option(help="Read the run's file again, by this rig profile")] = None,
 ) -> None:
-    """Correct the cycles of a run that was sent with others, or read its file again by the right rig profile."""
+    """Correct the cycles of a run, or read its file again by the right rig profile."""
     if (cycles is None) == (rig is None):
         raise typer.BadParameter("give --cycles, or --rig")
     change = {"rig": rig} if cycles is None else {"cycles": cycles}

@@ -70,12 +70,13 @@ def simulate(
         int, typer.Option(min=1, help="Which test of the plan: its tests are alternatives, the best first")
     ] = 1,
 ) -> None:
-    """Simulate a clutch's life on the rig and write it, a file a run; `clutchlife push` sends it.
+    """Simulate a clutch's life on the rig, and write one file per run for `clutchlife push`.
 
     The lining's roughness and skewness at each stationary test are written too, into a folder of inspections.
 
-    Friction lags speed as in the service's own model, so that a diagnosis finds nothing. The true end of life, what --hide
-    hides, and the film of --film are in answer.json beside the runs, which push does not send. An unknown effect lists all.
+    Friction lags speed as in the service's own model, so that a diagnosis finds nothing. The true end of life, and what
+    --hide and --film add, are in answer.json beside the runs, which push does not send. To list all effects, name an unknown
+    one.
 
     Run-in and duty blocks are JSON whatever the format. Tests in another format are listed in runs.json, which push reads.
     """

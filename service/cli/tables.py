@@ -30,6 +30,13 @@ def number(value: float | None, digits: int = 3) -> str:
     return f"{value:,.0f}" if 100 <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
+def chance(value: float | None) -> str:
+    """A probability in per cent, never rounded to certainty; "-" where there is none."""
+    if value is None:
+        return "-"
+    return "> 99 %" if 0.995 < value < 1.0 else "< 1 %" if 0.0 < value < 0.005 else f"{100 * value:.0f} %"
+
+
 def with_deviation(value: float | None, deviation: float | None) -> str:
     """A value with its standard deviation, to the deviation's second digit; "-" where there is none."""
     if value is None:
@@ -63,4 +70,4 @@ def place(value: float | None) -> str:
 def warn(warnings: Iterable[Mapping[str, Any]]) -> None:
     """The warnings of an answer, a line each."""
     for notice in warnings:
-        print_line(f"{notice['code']}: {notice['message']}")
+        print_line(f"warning: {notice['message']}")

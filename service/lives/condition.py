@@ -193,17 +193,17 @@ def _numbers_in_words(
     `among`: the prediction with the held runs; where they lower the bound, both are said."""
     own = summary["at_least"]
     if own is not None and own >= 1.0 and among is not None and at_least is not None and at_least < own:
-        runs = "the held run" if summary.get("held") == 1 else "the held runs"
+        runs = "the held run counts" if summary.get("held") == 1 else "the held runs count"
         if at_least < 1.0:
-            return f"with {runs} no cycles are left for certain, without at least {rounded_down(own)} (95 %)"
-        return f"at least {rounded_down(at_least)} more cycles (95 %), without {runs} {rounded_down(own)}"
+            return f"if {runs}, no further cycle is certain; if not, at least {rounded_down(own)} (95 %)"
+        return f"at least {rounded_down(at_least)} more cycles (95 %) if {runs}, at least {rounded_down(own)} if not"
     if summary["status"] in (REACHED, INSUFFICIENT, ENDED) or at_least is None or at_least < 1.0:
         return statement_of(summary, at_least)
-    bound = f"at least {rounded_down(at_least)} more cycles (95 %)"
-    until = "" if date is None else f", that is until {date} at this pace"
+    until = "" if date is None else f", until {date} at this pace"
+    bound = f"at least {rounded_down(at_least)} more cycles (95 %){until}"
     if summary["status"] == PassageStatus.MAY_NEVER_REACH.value:
-        return _left_open(f"{bound}{until}", summary)
-    return f"{bound}, most likely {_two_digits(summary['remaining_cycles']['0.5'])}{until}"
+        return _left_open(bound, summary)
+    return f"{bound}; half of such clutches last another {_two_digits(summary['remaining_cycles']['0.5'])} or more"
 
 
 def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: Mapping[str, Any] | None) -> str:
@@ -216,7 +216,7 @@ def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: 
     if name == CHECK and held:
         return "Confirm, correct or withdraw " + ("one held run." if held == 1 else f"{held} held runs.")
     if name == CHECK and summary.get("status", INSUFFICIENT) != INSUFFICIENT:
-        return "See why the rig sends nothing."
+        return "Find out why the rig sends nothing."
     if name == CHECK:
         missing = FEWEST_TESTS - summary.get("runs_used", 0)
         tests = "one more stationary test" if missing == 1 else f"{missing} more stationary tests, at different cycles"
@@ -250,7 +250,7 @@ def _day_in_words(moment: str) -> str:
 
 
 def _tests(count: int) -> str:
-    return f"{count} of the {FEWEST_TESTS} tests that a prognosis needs"
+    return f"{count} of the {FEWEST_TESTS} tests that a prediction needs"
 
 
 def _near_end(summary: Mapping[str, Any]) -> str | None:
@@ -275,21 +275,21 @@ def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
     if payload["status"] == REACHED:
         return f"the end of life is reached: {limit_in_words(payload['criterion'])}"
     if payload["status"] == INSUFFICIENT:
-        return "the tests cannot tell yet" + (f": {bound}" if payload["runs_used"] else "")
+        return "the remaining life is not known yet" + (f": {bound}" if payload["runs_used"] else "")
     return _left_open(bound, payload) if payload["status"] == PassageStatus.MAY_NEVER_REACH.value else bound
 
 
 def _left_open(bound: str, payload: Mapping[str, Any]) -> str:
     """An interval that reaches the horizon: its safe bound is the number that counts, and how probable an end is."""
     chance = chance_in_words(payload["probability_of_reaching"])
-    within = f"the end comes within {HORIZON:,.0f} with a probability of {chance}"
-    return f"{bound}; how many more, the tests cannot tell yet ({within})"
+    within = f"the end comes within {HORIZON:,.0f} cycles with a probability of {chance}"
+    return f"{bound}; the tests do not yet show how many more ({within})"
 
 
 def bound_in_words(at_least: float | None) -> str:
     """The safe bound of the remaining cycles, rounded down to two digits."""
     if at_least is None or at_least < 1.0:
-        return "no cycles are left for certain"
+        return "no further cycle is certain"
     return f"at least {rounded_down(at_least)} cycles are left with 95 %"
 
 

@@ -45,8 +45,8 @@ def not_eq_6(courses: Sequence[CourseShare]) -> list[Notice]:
     named = [share for share in courses if share.name is not CourseName.EQ_6]
     others = ", ".join(f"{share.name.value}: {share.probability:.0%}" for share in named)
     message = (
-        f"the tests follow a course that eq. 6 cannot take ({others}); the forecast is that of such courses "
-        "and of whatever may come beside them"
+        f"the clutch does not age as the usual law says ({others}). The forecast follows the course of the tests "
+        "and allows for further changes"
     )
     return [Notice(code=NOT_EQ_6, message=message)]
 
@@ -56,8 +56,9 @@ def missed(back_cast: BackCast) -> list[Notice]:
     if not back_cast.surprising:
         return []
     message = (
-        f"earlier forecasts of this clutch held {back_cast.held} of the {back_cast.misses.size} tests since, where nine in "
-        f"ten are meant to be: remaining life is stated wider (ratios to its median, to the power {back_cast.widening:.2g})"
+        f"the 90 % intervals of earlier forecasts contained only {back_cast.held} of {back_cast.misses.size} later tests. "
+        "So the interval of the remaining life is wider (distances from its median, on a log scale, times "
+        f"{back_cast.widening:.2g})"
     )
     return [Notice(code=MISSED_FORECASTS, message=message)]
 
@@ -95,8 +96,8 @@ def off_track(posterior: Posterior, measurements: Sequence[Measurement], prior: 
     side = "below" if deviations < 0 else "above"
     size = f"{abs(deviations):.1f}" if math.isfinite(deviations) else "very many"
     message = (
-        f"the last test's mean COF of {measurements[-1].value:.4g} lies {size} deviations {side} what the tests before it "
-        "predict: an outlying run, or the clutch has left its course"
+        f"the last test's mean COF of {measurements[-1].value:.4g} is {size} standard deviations {side} its prediction from "
+        "the earlier tests. Either the run is an outlier, or the clutch has changed"
     )
     return [Notice(code=OFF_TRACK, message=message)]
 
@@ -105,7 +106,9 @@ def late_arrival(cycles: float, latest: float) -> list[Notice]:
     """A run that arrived after another of more cycles; `latest` are the most of those that were there."""
     if cycles >= latest:
         return []
-    message = f"the run's {cycles:g} cycles lie before the latest known {latest:g}: all was tracked again"
+    message = (
+        f"the run is at {cycles:g} cycles, before the latest known run at {latest:g}: the whole life was tracked again"
+    )
     return [Notice(code=LATE, message=message)]
 
 
@@ -114,7 +117,7 @@ def other_pressures(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
     if not cofs or any(nearest(level, cofs) is not None for level in reference):
         return []
     measured = ", ".join(f"{bar(level):g}" for level in sorted(reference))
-    message = f"none of its pressures is one of the first stationary test's ({measured} bar): no track uses it"
+    message = f"it shares no pressure with the first stationary test ({measured} bar): tracking does not use it"
     return [Notice(code=OTHER_PRESSURES, message=message)]
 
 
@@ -125,7 +128,7 @@ def other_oil(life: Life, event: Event) -> list[Notice]:
     oil, reference = (kelvin - ZERO_CELSIUS for kelvin in (event.oil_temperature, life.reference_oil))
     message = (
         f"its oil was at {oil:.0f} °C on average, that of the first stationary test at {reference:.0f} °C, more than "
-        f"{OTHER_OIL:g} °C apart: no track uses it but under an adopted model that corrects for oil temperature"
+        f"{OTHER_OIL:g} °C apart: tracking uses it only under an adopted model that corrects for oil temperature"
     )
     return [Notice(code=OTHER_OIL_TEMPERATURE, message=message)]
 

@@ -138,7 +138,7 @@ def _analyse_stationary(
         *(notice for level in levels for notice in _fit_warnings(level.fit)),
     ]
     if not has_mean:
-        message = "no pressure of this test gives a mean COF: it sets no reference and no track uses it"
+        message = "no pressure of this test gives a mean COF: it is not used as a reference or for tracking"
         warnings.append(Notice(code="no_mean_cof", message=message))
     return Analysis(
         fits=levels,
@@ -180,9 +180,7 @@ def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Notice]:
 def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:
     below = f"below {UNLOADED / PASCALS_PER_BAR:g} bar"
     if under_load is None:
-        message = (
-            f"the clutch was open, all pressures lie {below}: no curve is fitted, no track uses it; a diagnosis does"
-        )
+        message = f"the clutch was open, all pressures lie {below}: no curve is fitted, and only a diagnosis uses it"
         return [Notice(code="open_clutch", message=message)]
     left_out = plateaus.torque.size - under_load.torque.size
     message = f"{left_out} plateaus {below} were left out of the fits"

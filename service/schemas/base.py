@@ -33,7 +33,7 @@ MIN_LENGTH_MM, MAX_LENGTH_MM = 0.1, 1e5
 MIN_WIDTH_MM = 0.1
 #: Friction faces of one clutch.
 MAX_FRICTION_FACES = 1000
-#: Lining pressure over line pressure.
+#: Lining pressure divided by line pressure.
 MIN_PRESSURE_FACTOR, MAX_PRESSURE_FACTOR = 1e-6, 1e6
 #: Time constant of the torque channel's own low-pass, ms: a slower one would hide the swing of a dynamic test (0.1 Hz).
 MAX_TORQUE_FILTER_MS = 1000

@@ -62,7 +62,7 @@ class GeometryIn(Schema):
     mean_radius_mm: Length | None = Field(
         default=None, description="Mean radius, mm; left out, a quarter of both diameters' sum"
     )
-    pressure_factor: PressureFactor = Field(default=1.0, description="Lining pressure over line pressure")
+    pressure_factor: PressureFactor = Field(default=1.0, description="Lining pressure divided by line pressure")
 
     @model_validator(mode="after")
     def _has_width(self) -> Self:

@@ -103,7 +103,7 @@ _OWN: dict[str, Any] = {
     "draws": 200, "find": "bench3", "limit": 100, "offset": 80, "revision": 17, "scale_cycles": 50000,
     "status": "predicted", "why": "at least 3,400 cycles are left with 95 %",
     "ClutchOut.action": "Replace before 3 Dec 2026.",
-    "ClutchOut.headline": "Normal: at least 3,400 more cycles (95 %), most likely 5,200",
+    "ClutchOut.headline": "Normal: at least 3,400 more cycles (95 %); half of such clutches last another 5,200 or more",
     "AsymptoticLaw.covariance": [[0.01, 0.0, 0.0], [0.0, 0.04, 0.0], [0.0, 0.0, 0.1]],
     "LinearLaw.covariance": [[0.01, -0.001], [-0.001, 0.0002]], "CandidateOut.fit": "converged",
     "CoefficientDraws.initial": [22.1, 22.4], "CoefficientDraws.change": [-14.2, -14.9],

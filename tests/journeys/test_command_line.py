@@ -127,7 +127,7 @@ def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops
     assert "simulated clutch" in life
     assert "The truth: it halved at" in life
     assert rows[-1][-2] == "reached"
-    assert "Hidden was oil_temperature: found." in diagnosis
+    assert "The hidden cause, oil temperature, was found." in diagnosis
     assert len({loop["cycles"] for loop in loops}) == len({loop["pressure_bar"] for loop in loops}) == 3
     assert all(loop["loop_area_nm_m_s"] is not None for loop in loops)
     roughness = [inspection["roughness_um"] for inspection in inspections]

@@ -242,7 +242,7 @@ def _ambiguous(report: Report) -> list[Sentence]:
             if (estimate := sized.pop(slug, None)) is not None
         ]
         listed.append(f"{' together with '.join(names)} ({'; '.join([probability(item.probability), *sizes])})")
-    first = "Something is wrong that the model does not explain, and these data cannot distinguish which of these it is"
+    first = "Something is wrong that the model does not explain"
     if (
         sum(len(alternative.split()) for alternative in listed) > criteria.MAX_WORDS // 2
     ):  # the sizes are in the report's fields
@@ -253,7 +253,10 @@ def _ambiguous(report: Report) -> list[Sentence]:
         listed = short[:_ALTERNATIVES]
         names = [effect_name(slug) for slug in report.causes if slug != UNCATALOGUED]
         listed += [name for name in names if not any(name in alternative for alternative in listed)]
-    alternatives = listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])}, or {listed[-1]}"
+    alternatives = listed[0]
+    if len(listed) > 1:
+        first += ", and these data cannot distinguish which of these it is"
+        alternatives = f"{', '.join(listed[:-1])}, or {listed[-1]}"
     sentences = [Sentence(f"{first} (with its probability): {alternatives}."), Sentence(_error(report), MAY)]
     return [*sentences, *_gained(report), *_next(report)]
 

@@ -83,8 +83,8 @@ def _life(service: Service, seed: int) -> float:
                 inside += _inside(prediction, end)
     halved = "it never halves" if end is None else f"it halved at {end:.0f} cycles"
     out.print(
-        f"The truth: {halved}.\nIt lay inside the 90 % interval {sum(inside)} times out of {len(inside)}.\n"
-        "'-' means that there are too few tests yet, or that the end may never come."
+        f"The truth: {halved}.\nThe 90 % interval contained it {sum(inside)} times out of {len(inside)}.\n"
+        "'-' means: too few tests yet, or the end may never come."
     )
     _diagnosed(service, clutch_id, end)
     return run.cycles
@@ -124,7 +124,11 @@ def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:
         out.print(part)
     after = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life", **halfway)
     named = HIDDEN_EFFECT in report["causes"]
-    out.print(f"\nHidden was {HIDDEN_EFFECT}: {'found' if named else 'not named'}.", style="bold", markup=False)
+    out.print(
+        f"\nThe hidden cause, {HIDDEN_EFFECT.replace('_', ' ')}, was {'found' if named else 'not found'}.",
+        style="bold",
+        markup=False,
+    )
     if end is not None:
         out.print(f"Halfway, under either model:\n{'':8} {_HEADER}")
         for name, prediction in (("before", before), ("after", after)):

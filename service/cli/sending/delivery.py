@@ -137,7 +137,9 @@ def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Repo
         _refused(spool, entry, error, report)
         return
     if not {_NAMES[entry.resource], "duplicate"} <= receipt.keys():
-        raise ServiceAwayError(f"{service.http.base_url}: the answer is no receipt, so it is not the service's")
+        raise ServiceAwayError(
+            f"{service.http.base_url}: the answer is not a receipt: is this the address of Clutchlife?"
+        )
     sent.unanswered = 0
     sent.duplicates += bool(receipt["duplicate"])
     sent.stored += not receipt["duplicate"]

@@ -57,7 +57,7 @@ def push(
     kind: Annotated[str | None, typer.Option(help="For files that are not JSON: the kind of run")] = None,
     cycles: Annotated[float | None, typer.Option(help="For files that are not JSON: duty cycles since new")] = None,
     rig: Annotated[
-        str | None, typer.Option(help="For files that are not JSON: the rig by whose profile they are read")
+        str | None, typer.Option(help="For files that are not JSON: the rig profile that reads them")
     ] = None,
     channel_map: ChannelMap = None,
     decimal: Decimal = None,
@@ -81,7 +81,7 @@ def push(
             files += [manifest.RunFile(path=record) for record in unlisted]
         elif unlisted:
             names = ", ".join(str(record) for record in unlisted)
-            say(f"not sent, for their kind and cycles are not known: {names}. {_REMEDY}")
+            say(f"not sent, because their kind and cycles are not known: {names}. {_REMEDY}")
         if _record(paths) is None:
             _require_known(url, key, clutch)
         waiting = Spool.of(spool, url, clutch)
@@ -166,7 +166,7 @@ def _register(service: Service, clutch_id: str, paths: list[Path]) -> None:
 
 app = typer.Typer(help="Runs that wait to be sent, or were refused.", no_args_is_help=True)
 
-Clutch = Annotated[str | None, typer.Option("--clutch", help="Of this clutch only")]
+Clutch = Annotated[str | None, typer.Option("--clutch", help="Only of this clutch")]
 
 
 @app.command(name="list")
@@ -233,7 +233,7 @@ def empty(
                 with Spool.of(spool, *owner).sending(0.0):
                     Spool.of(spool, *owner).discard(entries)
         except HeldError:
-            fail("a process is sending from the spool: try again when it has ended", EX_TEMPFAIL)
+            fail("another process is sending from the spool: try again when it has ended", EX_TEMPFAIL)
         print_line(f"{len(kept)} deleted, {waiting} of them never stored")
 
 
@@ -286,7 +286,7 @@ def _line(entry: Entry) -> str:
         "not tried yet" if not entry.tries else f"tried {entry.tries} times, last {entry.last_try}: {entry.last_answer}"
     )
     if entry.state == REFUSED:
-        tried = str(entry.problem.get("detail") or entry.problem.get("title") or "the reason is not there")
+        tried = str(entry.problem.get("detail") or entry.problem.get("title") or "no reason is stored")
     elif entry.state == REPLACED:
         tried = "a newer version was pushed"
     return f"{entry.state:<8}  {entry.label}  {kind}  {cycles}  since {entry.since}  {tried}"

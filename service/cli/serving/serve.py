@@ -21,7 +21,7 @@ LOG_LEVELS = get_args(LogLevel)
 
 
 def serve(
-    host: Annotated[str, typer.Option(help="The address to listen at; without keys, this machine only")] = LOOPBACK,
+    host: Annotated[str, typer.Option(help="The address to listen at; without keys only this machine")] = LOOPBACK,
     port: Annotated[int, typer.Option(min=0, max=65535)] = 8000,
     database: Database = DATABASE,
     processes: Annotated[

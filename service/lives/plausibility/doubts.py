@@ -44,7 +44,7 @@ def doubt(verdict: Verdict, sent: Reading, shown: Shown) -> Notice:
 def negative(cof: float) -> Notice:
     """The doubt of a torque that pushes."""
     message = (
-        f"torque acts with the sliding, a COF of {cof:.3g}: is the sign of torque or speed the wrong way round? "
+        f"torque drives the clutch instead of braking it (COF {cof:.3g}): is the sign of torque or speed wrong? "
         "Send it with a positive torque, or confirm it."
     )
     return Notice(code=BEYOND_PHYSICS, message=message)
@@ -53,11 +53,11 @@ def negative(cof: float) -> Notice:
 def _of_cycles(verdict: Verdict, sent: Reading) -> Notice:
     sentences = [_gap(verdict, sent.cycles)]
     if verdict.against_time:
-        sentences.append("By its started_at it is out of order with runs of other cycles.")
+        sentences.append("Its started_at does not fit the order of the cycles.")
     if verdict.expected is not None and sent.log_cof is not None:
         (low, high), cof = verdict.expected, math.exp(sent.log_cof)
         if not low <= cof <= high:
-            sentences.append(f"Its mean COF of {cof:.3g} is not that of those cycles, {low:.3g} to {high:.3g}.")
+            sentences.append(f"Its mean COF is {cof:.3g}; {low:.3g} to {high:.3g} is expected at these cycles.")
     guessed = verdict.slip.name != OTHER_CYCLES and verdict.latest is not None
     ask = f"Is it {_number(verdict.slip.likely.cycles)}? " if guessed else ""
     message = " ".join([*sentences, f"{ask}Confirm or correct it."])
@@ -67,9 +67,11 @@ def _of_cycles(verdict: Verdict, sent: Reading) -> Notice:
 
 def _gap(verdict: Verdict, cycles: float) -> str:
     if verdict.latest is None:
-        return f"{_number(cycles)} cycles are more than clutches last."
+        return f"{_number(cycles)} cycles are more than any clutch lasts."
     if verdict.before is None or cycles <= verdict.latest + 0.5:
-        return f"{_number(cycles)} cycles lie among those of other runs, the last of which was at {_number(verdict.latest)}."
+        return (
+            f"{_number(cycles)} cycles lie between those of other runs; the last run was at {_number(verdict.latest)}."
+        )
     gap = f"{_number(cycles)} cycles are {_number(cycles - verdict.before)} after the run before"
     usual = verdict.usual_gap
     return f"{gap}." if usual is None else f"{gap}; earlier runs were about {_number(usual)} cycles apart."

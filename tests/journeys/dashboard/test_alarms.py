@@ -39,7 +39,7 @@ def test_a_rule_is_made_an_alarm_raised_and_acknowledged(browser: Browser, bench
     with httpx2.Client(base_url=bench.url, timeout=60) as http:
         post(http, "bench", stationary(3000, pressures=(5.0,)))
     events = page.get_by_role("table", name="Alarms, the newest first")
-    expect(events).to_contain_text("Waits for someone")
+    expect(events).to_contain_text("Not acknowledged")
     assert violations(page) == []
     events.get_by_role("button", name="Acknowledge").click()
     expect(events).to_contain_text("Acknowledged by")

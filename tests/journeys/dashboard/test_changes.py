@@ -225,7 +225,7 @@ def test_warnings_of_a_life_stand_on_its_page(watched: Watched, server: Server) 
     with httpx2.Client(base_url=server.url, timeout=60) as http:
         assert [warning["code"] for warning in post(http, "bench", odd)["warnings"]] == ["off_track"]
     warning = page.locator("#warnings li").filter(has_text="Off its course")
-    warning.get_by_text(re.compile("its mean COF of .* lies .* deviations below")).wait_for()
+    warning.get_by_text(re.compile("its mean COF of .* is .* standard deviations below")).wait_for()
     link = warning.get_by_role("link", name="Stationary Stribeck test at 7,000 cycles")
     link.focus()
     page.keyboard.press("Enter")

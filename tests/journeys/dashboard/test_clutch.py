@@ -157,7 +157,7 @@ def test_a_run_opens_to_its_curve_what_the_fit_leaves_and_its_record(watched: Wa
     runs = ONCE.get(f"{watched.url}/v1/clutches/sim-1/runs?kind=stationary_stribeck&limit=1").json()["items"]
     page.goto(f"{watched.url}/clutches/sim-1#/runs/{runs[0]['run_id']}")
     details = page.locator(f"#runs details[data-run='{runs[0]['run_id']}']")
-    for title in ("Curve and fit", "What the fit leaves", "The record as it was sent"):
+    for title in ("Curve and fit", "Residuals of the fit", "The record as it was sent"):
         chart = details.locator("figure.chart").filter(has=page.get_by_role("heading", name=title))
         chart.scroll_into_view_if_needed()
         expect(chart.locator(".plot svg").first).to_be_visible()

@@ -85,6 +85,7 @@ def adopt(page: Page, *, agree: bool) -> None:
 
 
 def maps_are_drawn(browser: Browser, page: Page) -> None:
+    page.locator("#chart-map-speed").get_by_role("button", name="Draw it").click()
     for name in ("map-speed", "map-cycles", "diagnosis-loops"):
         page.locator(f"#chart-{name}").scroll_into_view_if_needed()
         page.locator(f"#chart-{name}[data-drawn]").wait_for()
@@ -107,7 +108,7 @@ def test_a_rebuild_ends_what_a_diagnosis_said(browser: Browser, url: str) -> Non
     expect(row).to_contain_text("Normal")
     expect(row.locator("td[data-label='Diagnosis']")).to_contain_text("before the rebuild")
     watched.open("/clutches/bench#/diagnosis")
-    page.locator("#diagnosis").get_by_text("this is of its earlier life").wait_for()
+    page.locator("#diagnosis").get_by_text("this diagnosis is of its earlier life").wait_for()
     expect(page.locator("#head .verdict")).to_contain_text("Normal")
     expect(page.get_by_role("button", name="Adopt the extended model")).to_have_count(0)
     watched.close()

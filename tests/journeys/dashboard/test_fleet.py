@@ -78,7 +78,8 @@ def test_the_worst_comes_first_with_all_that_is_asked_of_a_row(watched: Watched)
     assert f"{100 * said['summary']['current']['health']:.0f} %" in ageing.inner_text()
     assert " to " in ageing.locator("td[data-label='Remaining']").inner_text()
     assert re.search(
-        r"at least [\d,]+\s+with 95 %; most likely", ageing.locator("td[data-label='Remaining']").inner_text()
+        r"at least [\d,]+\s+with 95 %; half of such clutches: [\d,]+ or more",
+        ageing.locator("td[data-label='Remaining']").inner_text(),
     )
     for drawing in (".spark polyline", ".interval .median", ".health .fill"):
         assert ageing.locator(drawing).count() == 1, drawing

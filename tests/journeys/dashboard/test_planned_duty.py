@@ -81,7 +81,7 @@ def test_what_is_wrong_is_said_at_its_field_and_can_be_mended(page: Page) -> Non
         expect(wrong).to_have_accessible_description(re.compile("^Write a number as 25.5 or 25,5"))
     # a standard deviation without an energy is an error of the block
     wrong.fill("1000")
-    second.get_by_label("Its standard deviation, kJ").fill("3")
+    second.get_by_label("Standard deviation of this energy, kJ").fill("3")
     page.get_by_role("button", name="Predict", exact=True).click()
     expect(second).to_contain_text("which is missing")
     page.get_by_role("button", name="Remove block 2").click()

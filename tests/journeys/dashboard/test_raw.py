@@ -23,13 +23,6 @@ TESTS, SAMPLES = 10, 200_000
 MOST_BYTES = 1_500_000
 #: Rows of a chart's table that are shown.
 MOST_ROWS = 400
-#: 3D needs the library, which would come with the first chart in 3D on the screen.
-_WITHOUT_3D = """
-const getContext = HTMLCanvasElement.prototype.getContext;
-HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
-  return kind.startsWith("webgl") ? null : getContext.call(this, kind, ...more);
-};
-"""
 #: A peak that only one sample of a record has, Nm.
 PEAK = 61.8
 
@@ -108,10 +101,9 @@ def runs_read(page: Page, wire: Wire, count: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tab", ["overview", "curves", "loops", "runs", "history"])
-def test_a_tab_of_a_clutch_of_raw_runs_is_light(browser: Browser, life: Server, tab: str) -> None:
-    watched = Watched(browser, life.url)
+def test_a_tab_of_a_clutch_of_raw_runs_is_light(browser_3d: Browser, life: Server, tab: str) -> None:
+    watched = Watched(browser_3d, life.url)
     page, wire = watched.page, Wire(watched.page)
-    page.add_init_script(_WITHOUT_3D)
     watched.open(f"/clutches/bench#/{tab}")
     runs_read(page, wire, {"curves": 6, "loops": 6}.get(tab, 0))
     page.get_by_text("Live, as of").wait_for()

@@ -46,7 +46,7 @@ def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
         "What to test next: read the unloaded zero (distinguishes torque zero shift from no effect at all;",
         "torque_zero_shift            0.2 Nm            0.1 Nm",
         "Note: left out",
-        "The model without an effect errs along: oil temperature",
+        "The baseline's error depends on: oil temperature",
     ):
         assert words in shown_text, words
     assert report["maps"]["axes"]["cycles"] == [500.0, 1500.0, 2500.0]

@@ -62,7 +62,7 @@ def test_two_tests_say_at_least_how_many_cycles_are_left(bench: Bench) -> None:
         bench.send(body("test", f"n{cycles:g}", cycles, wear=cycles / 28_000))
     life = now(bench)
     assert life["at_least"] > 100.0
-    assert life["statement"] == f"the tests cannot tell yet: {bound_in_words(life['at_least'])}"
+    assert life["statement"] == f"the remaining life is not known yet: {bound_in_words(life['at_least'])}"
     assert life["statement"] in item(bench)["state"]["why"]
 
 
@@ -115,7 +115,7 @@ def summary(left: float | None, **other: Any) -> dict[str, Any]:
         (summary(9000.0, status="may_never_reach", current={"health": 0.27}), False, "normal", "probability of 94 %"),
         (
             summary(9000.0, status="may_never_reach"), False, "normal",
-            "at least 9,000 cycles are left with 95 %; how many more, the tests cannot tell yet (the end comes",
+            "at least 9,000 cycles are left with 95 %; the tests do not yet show how many more (the end",
         ),
         ({}, False, "check", "no run yet"),
     ],
@@ -144,35 +144,37 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
     [
         (
             summary(9450.0, pace=PACE), None,
-            "Normal: at least 9,400 more cycles (95 %), most likely 9,400, that is until 10 Dec 2026 at this pace",
+            "Normal: at least 9,400 more cycles (95 %), until 10 Dec 2026 at this pace; half of such clutches last "
+            "another 9,400 or more",
             "Nothing to do: carry on testing.",
         ),
         (
             summary(2000.0, pace=PACE), None,
             "Maintenance required: less than 20 % of its life may be left; at least 2,000 more cycles (95 %), "
-            "most likely 2,000, that is until 3 Dec 2026 at this pace",
+            "until 3 Dec 2026 at this pace; half of such clutches last another 2,000 or more",
             "Replace before 3 Dec 2026.",
         ),
         (summary(2000.0), None, "Maintenance required: ", "Replace it soon."),
         (
             summary(9450.0, status="may_never_reach", pace=PACE), None,
-            "Normal: at least 9,400 more cycles (95 %), that is until 10 Dec 2026 at this pace; how many more, the tests",
+            "Normal: at least 9,400 more cycles (95 %), until 10 Dec 2026 at this pace; the tests do not yet show",
             "Nothing to do: carry on testing.",
         ),
         (summary(0.0, status="reached"), None, "Failure: the end of life is reached: slope", "Replace the clutch."),
         (
             summary(9000.0, **HELD), None,
-            "Function check: 1 run is held and does not count; at least 3,100 more cycles (95 %), without the held run 9",
+            "Function check: 1 run is held and does not count; at least 3,100 more cycles (95 %) if the held run "
+            "counts, at least 9,000 if not",
             "Confirm, correct or withdraw one held run.",
         ),
         (
             summary(9000.0, held=2, with_held={"particle": HELD["with_held"]["particle"] | {"at_least": 0.0}}), None,
-            "Function check: 2 runs are held and do not count; with the held runs no cycles are left for certain, ",
+            "Function check: 2 runs are held and do not count; if the held runs count, no further cycle is ",
             "Confirm, correct or withdraw 2 held runs.",
         ),
         (
             summary(800.0, status="insufficient_data", runs_used=2), None,
-            "Function check: 2 of the 3 tests that a prognosis needs; the tests cannot tell yet: at least 800 cycles",
+            "Function check: 2 of the 3 tests that a prediction needs; the remaining life is not known yet: at least",
             "Run one more stationary test: then the remaining life is predicted.",
         ),
         ({}, None, "Function check: no run yet", "Run 3 more stationary tests, at different cycles: then "),

@@ -16,7 +16,7 @@ import { ruleText } from "./words.js";
 /** Events that are shown; the list of the API holds all. */
 const SHOWN = 50;
 /** @type {Record<EventOut["state"], string>} */
-const STATES = { raised: "Waits for someone", acknowledged: "Acknowledged", cleared: "Over" };
+const STATES = { raised: "Not acknowledged", acknowledged: "Acknowledged", cleared: "Over" };
 
 export class Alarms {
   /**
@@ -110,7 +110,7 @@ export class Alarms {
     this.receivers.replaceChildren(
       h("h2", {}, "Receivers"),
       rows.length === 0
-        ? h("p", { class: "quiet" }, "Nobody is called: alarms stand on this page alone.")
+        ? h("p", { class: "quiet" }, "No receiver yet: alarms appear on this page only.")
         : h(
             "div",
             { class: "panel" },

@@ -72,7 +72,7 @@ export function askRule(rule, clutchId) {
     limits.hidden = side === null;
     limits.replaceChildren(
       field(limit, `${side === "above" ? "Above" : "Below"}${unit && `, ${unit}`}`),
-      field(share, "Over when it is back by, % of the limit"),
+      field(share, "Hysteresis, % of the limit: the alarm ends when the value is back by this much"),
     );
   };
   quantity.addEventListener("change", () => {
@@ -83,8 +83,8 @@ export function askRule(rule, clutchId) {
   const fields = [
     field(quantity, "An alarm when"),
     limits,
-    field(clutch, "Clutch (left out: all)"),
-    field(name, "Name (may be left out)"),
+    field(clutch, "Clutch (empty: all clutches)"),
+    field(name, "Name (optional)"),
     h("label", { class: "switch" }, enabled, "In use"),
   ];
   return question(rule === null ? "New rule" : "Change the rule", fields, () => {
@@ -111,7 +111,7 @@ export function askReceiver(clutchId) {
   const about = "https:// for a signed webhook; with the extra notify also mailtos://, msteams://, slack://, ntfys://";
   return question(
     "New receiver",
-    [field(url, "Address", h("small", {}, about)), field(name, "Name (may be left out)")],
+    [field(url, "Address", h("small", {}, about)), field(name, "Name (optional)")],
     () => ({
       url: url.value.trim(),
       name: name.value.trim(),

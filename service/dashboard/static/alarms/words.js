@@ -14,7 +14,7 @@ export const WATCHED = {
   health: { title: "Health", side: "below", unit: "", limit: "0.2" },
   shudder_margin: { title: "Shudder margin dμ/dv", side: "below", unit: "s/m", limit: "0" },
   held_runs: { title: "Held runs", side: "above", unit: "", limit: "0" },
-  off_course: { title: "A test off its course", side: null, unit: "", limit: "" },
+  off_course: { title: "A test that does not fit the earlier ones", side: null, unit: "", limit: "" },
   verdict: { title: "A new verdict: data and model disagree", side: null, unit: "", limit: "" },
   state: { title: "Any state but normal", side: null, unit: "", limit: "" },
   silent_hours: { title: "Hours since the last run", side: "above", unit: "h", limit: "24" },

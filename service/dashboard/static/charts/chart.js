@@ -58,6 +58,11 @@ export class Chart {
     this.turn = 0;
     this.note = h("p", { class: "note" }, "Being computed …");
     this.controls = h("div", { class: "controls" });
+    this.ask = h(
+      "button",
+      { type: "button", class: "small", hidden: true, onclick: want },
+      "Draw it (loads 1.4 MB once)",
+    );
     const style = { "min-height": `${height}px` };
     const watched = { onpointerenter: pointed, onclick: want };
     this.plot = h("div", { class: "plot", role: "img", "aria-label": title, style, ...watched });
@@ -76,6 +81,7 @@ export class Chart {
       { class: `chart panel${wide ? " wide" : ""}`, id: `chart-${id}` },
       h("figcaption", {}, heading, this.tools, this.note),
       this.controls,
+      this.ask,
       this.plot,
       this.details,
     );
@@ -101,6 +107,7 @@ export class Chart {
     const nothing = spec.empty ?? (this.spatial && !has3d() ? NO_WEBGL : null);
     this.element.classList.toggle("empty", nothing !== null);
     if (nothing !== null) {
+      this.ask.hidden = true;
       this.clear();
       this.plot.replaceChildren(h("p", { class: "nothing" }, nothing));
     } else if (this.plot.querySelector(".nothing")) this.plot.replaceChildren();
@@ -126,7 +133,7 @@ export class Chart {
     this.turn += 1;
     const { turn } = this;
     if (!this.element.dataset.drawn) this.sketch();
-    if (this.element.dataset.sketched) await wanted;
+    await wanted;
     if (turn !== this.turn) return;
     let library;
     try {
@@ -142,6 +149,7 @@ export class Chart {
       this.stale = true; // its tab was left meanwhile: drawn when it is next looked at
       return;
     }
+    this.ask.hidden = true;
     await library.react(this.plot, figure.data, figure.layout, config(this.spatial));
     this.plot.querySelector(".sketch, .nothing")?.remove();
     this.element.dataset.drawn = "yes";
@@ -162,9 +170,10 @@ export class Chart {
     return settled(whole, { width, height }) ?? whole;
   }
 
-  /** What can be drawn without the library is drawn at once. */
+  /** What can be drawn without the library is drawn at once; for the rest someone asks, so that a page stays light. */
   sketch() {
     const figure = this.figure();
+    this.ask.hidden = !figure || Boolean(figure.ticks) || Boolean(globalThis.Plotly);
     if (!figure?.ticks) return;
     this.plot.querySelector(".sketch, .nothing")?.remove();
     this.plot.append(sketch(figure, { width: this.plot.clientWidth, height: this.height }));

@@ -19,7 +19,7 @@ export function remainingCycles({ life, predictions, events }) {
   const made = predictions.flatMap(({ at, remaining: { value, lower, upper } }) => {
     return value === null ? [] : [{ at, value, lower, upper }];
   });
-  if (made.length === 0) return { empty: "From the third stationary test on the remaining cycles are predicted." };
+  if (made.length === 0) return { empty: "The remaining cycles are predicted from the third stationary test on." };
   const end = life.end_of_life_cycles["0.5"];
   // the scale is that of the later half: a first forecast that was far off leaves the paper and does not flatten the rest
   const later = made.slice(Math.floor(made.length / 2));
@@ -29,9 +29,9 @@ export function remainingCycles({ life, predictions, events }) {
   const beyond =
     above > 0 ? ` ${above} early ${above === 1 ? "prediction lies" : "predictions lie"} above the chart.` : "";
   const comparison =
-    end === null ? "" : "A perfect prediction would have followed the dashed line down to today's end of life.";
+    end === null ? "" : "A perfect prediction would lie on the dashed line, which ends at today's end of life.";
   return {
-    note: `The median and its 90 % interval, as predicted then. ${comparison}${beyond}`,
+    note: `The median and the 90 % interval as predicted at that time. ${comparison}${beyond}`,
     columns: [CYCLES, column("remaining cycles"), column("lower, 5 %"), column("upper, 95 %")],
     rows: predictions.map(({ at, remaining: r }) => [at, r.value, r.lower, r.upper]),
     figure: (c) => ({

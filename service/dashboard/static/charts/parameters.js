@@ -63,7 +63,7 @@ function rangeOf({ measured, trajectory }) {
 export function parameter({ items, name, pressure, events }) {
   const item = items.find(({ quantity, pressure_bar: level }) => quantity === name && level === pressure);
   if (!item?.coefficients)
-    return { empty: "The tests at this pressure do not determine its course: three at different cycles are needed." };
+    return { empty: "Too few tests at this pressure to track it: three at different cycles are needed." };
   const { measured, trajectory, coefficients: k } = item;
   const { unit } = PARAMETERS[name];
   const inUnit = unit && ` ${unit.replace("^0.3", "⁰·³")}`;

@@ -131,7 +131,9 @@ export function flat(answers) {
  * @param {number} drawn
  */
 const leftOut = (tests, drawn) =>
-  drawn < tests.length ? ` ${drawn} of ${tests.length} tests are drawn; coloured by pressure, any one of them.` : "";
+  drawn < tests.length
+    ? ` ${drawn} of ${tests.length} tests are drawn; choose “Colour by pressure” to see any of them.`
+    : "";
 
 /**
  * @param {Drawn} curve
@@ -173,7 +175,7 @@ export function surface(answers) {
   const states = distinct(drawn.map(({ cycles }) => cycles));
   const after = `After ${states.map((cycles) => fixed(cycles)).join(", ")} cycles`;
   const place = byPressure ? after : `At ${pressureText(pressure)} over the life`;
-  const drawing = over === "states" ? "the fitted surface, a colour a state" : "points measured, surface fitted";
+  const drawing = over === "states" ? "the fitted surface, one colour per state" : "points measured, surface fitted";
   return {
     note: `${place}: ${drawing}. Drag to turn.`,
     columns: columnsOf(),

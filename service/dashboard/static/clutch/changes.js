@@ -183,8 +183,8 @@ async function rereading(run) {
   return {
     title: "Read its file again",
     lines: [
-      "For a column that was read as the wrong channel, unit or factor: mend the rig profile, or choose another. The file " +
-        "is read as it was sent, and everything is computed again.",
+      "Use this if a column was read as the wrong channel or in the wrong unit. First correct the rig profile, or choose " +
+        "another one here. Then the stored file is read again, and all results are recomputed.",
     ],
     action: "Read again",
     choice: { label: "Rig profile", options: rigs.map(({ name }) => [name, name]) },
@@ -199,7 +199,7 @@ async function rereading(run) {
 const QUESTIONS = {
   confirm: (run) => ({
     title: "Confirm this run",
-    lines: [doubtList(run), "The run is right all the same: from now on it counts like any other."],
+    lines: [doubtList(run), "The run is right. From now on it counts like every other run."],
     action: "Confirm",
     optional: true,
     send: async (reason) => {
@@ -211,7 +211,7 @@ const QUESTIONS = {
     title: "Correct the cycles",
     lines: [
       isCorrected(run) ? `It was sent as ${fixed(run.sent_cycles)} cycles.` : "",
-      "The measured data stay as they were sent. Everything is computed again with the cycles that you give here.",
+      "The measured data do not change. All results are recomputed with the cycles that you enter here.",
     ],
     action: "Correct",
     cycles: likelyCycles(run) ?? run.cycles,
@@ -221,14 +221,14 @@ const QUESTIONS = {
   withdraw: (run) => ({
     title: "Withdraw this run",
     lines: [
-      "It no longer counts, and everything is computed again without it. Nothing is deleted: it can be restored.",
+      "The run no longer counts, and all results are recomputed without it. Nothing is deleted: you can restore the run.",
     ],
     action: "Withdraw",
     send: (reason) => withdraw(run, reason),
   }),
   restore: (run) => ({
     title: "Restore this run",
-    lines: ["It gets the state back that it had before it was withdrawn, and everything is computed again."],
+    lines: ["The run returns to the state before its withdrawal, and all results are recomputed."],
     action: "Restore",
     send: (reason) => restore(run, reason),
   }),
@@ -274,8 +274,8 @@ export function askInspection(inspection) {
     lines: [
       h("p", {}, h("b", {}, `Inspection at ${fixed(inspection.cycles)} cycles`)),
       action === "withdraw"
-        ? "It leaves the charts and stays in the table. Nothing is deleted: it can be restored."
-        : "It is in the charts again, with its photographs.",
+        ? "It disappears from the charts and stays in the table. Nothing is deleted: you can restore it."
+        : "It appears in the charts again, with its photographs.",
     ],
     action: action === "withdraw" ? "Withdraw" : "Restore",
     send: (reason) => changeInspection(inspection, action, reason),
@@ -308,8 +308,8 @@ export const askArchive = (id, archived) =>
     title: archived ? `Archive ${id}` : `Bring ${id} back`,
     lines: [
       archived
-        ? "It leaves the list of clutches and takes no new runs. Nothing is deleted: it can be brought back."
-        : "It is in the list of clutches again and takes new runs.",
+        ? "It disappears from the list of clutches and accepts no new runs. Nothing is deleted: you can bring it back."
+        : "It appears in the list of clutches again and accepts new runs.",
     ],
     action: archived ? "Archive" : "Bring back",
     optional: true,
@@ -337,7 +337,9 @@ async function archive(id, archived, reason) {
 export const askEnd = (id, cycles) =>
   ask({
     title: `End of life of ${id}`,
-    lines: ["It takes no more duty or tests at later cycles until a rebuild, and its fleet learns from it."],
+    lines: [
+      "The clutch then accepts no duty or tests at later cycles until it is rebuilt. Predictions of similar clutches learn from its life.",
+    ],
     action: "Declare the end",
     optional: true,
     cycles,
@@ -345,10 +347,10 @@ export const askEnd = (id, cycles) =>
       label: "Why it has ended",
       options: [
         ["worn", "It is worn"],
-        ["other", "Another reason: it would have lasted longer"],
+        ["other", "Another reason, before it was worn"],
       ],
     },
-    note: "Note (may be left out)",
+    note: "Note (optional)",
     send: async (note, at, reason) => {
       const end = { kind: "maintenance", event: "end_of_life", cycles: at, reason, note };
       /** @type {{ body: Receipt }} */
@@ -367,7 +369,7 @@ export const askEnd = (id, cycles) =>
 export const askTakeBack = (id, end) =>
   ask({
     title: "Take the end back",
-    lines: [`The life goes on after ${fixed(end.cycles)} cycles, and everything is computed again.`],
+    lines: [`The life continues after ${fixed(end.cycles)} cycles, and all results are recomputed.`],
     action: "Take it back",
     send: async (reason) => {
       const address = `${clutchPath(id)}/runs/${encodeURIComponent(end.run_id)}/withdraw`;
@@ -417,7 +419,7 @@ function ask({ title, lines, action, optional = false, cycles, choice, note, sen
         { class: "fields" },
         cycles === undefined ? null : field(number, "Duty cycles since new"),
         choice ? field(chosen, choice.label) : null,
-        field(reason, note ?? (optional ? "Reason (may be left out)" : "Reason")),
+        field(reason, note ?? (optional ? "Reason (optional)" : "Reason")),
       ),
       answer,
       h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"), go),

@@ -30,8 +30,8 @@ export function heldView(runs, { store }) {
     h(
       "p",
       {},
-      "A held run is stored but does not count: something about it is odd. Say what it is; runs that agree with later ones " +
-        "are accepted by themselves.",
+      "A held run is stored but does not count, because something about it looks wrong. Choose an answer for each run. If " +
+        "later tests agree with a run, it is accepted automatically.",
     ),
     together(runs, say),
     h(
@@ -57,7 +57,7 @@ function together(runs, say) {
       h(
         "div",
         { class: "buttons start" },
-        h("span", {}, `${alike.length} of one cause:`),
+        h("span", {}, `${alike.length} runs for the same reason:`),
         h("button", { type: "button", onclick: () => say("right", alike) }, `All ${alike.length} are right`),
         h("button", { type: "button", onclick: () => say("other", alike) }, `All ${alike.length} are another clutch’s`),
       ),

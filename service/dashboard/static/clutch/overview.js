@@ -14,7 +14,6 @@ import { read } from "../shared/api.js";
 import { h } from "../shared/dom.js";
 import { aboutCycles, atLeast, estimate, fixed, interval, percent, probability } from "../shared/format.js";
 import { healthBar } from "../shared/sparkline.js";
-import { heldText } from "../shared/state.js";
 import { firstRun } from "../shared/welcome.js";
 import { heldView } from "./held.js";
 import { PlannedDuty } from "./planned_duty.js";
@@ -164,16 +163,16 @@ const COURSES = { eq6: "As expected", slowing: "Slower and slower", accelerating
  */
 function remainingNotes(life, status) {
   const { held_runs: held, back_cast: cast, ended_lives: lives, probability_of_reaching: chance } = life;
-  const open = status === "may_never_reach" ? "the tests cannot tell yet" : atLeast(life.at_least);
+  const open = status === "may_never_reach" ? "the tests do not show the end yet" : atLeast(life.at_least);
   const lasts = status === "reached" ? "the end of life is reached" : open;
   const never = chance !== null && chance < 0.995 && status !== "insufficient_data";
   return [
     ["insufficient_data", "reached", "ended"].includes(status) ? null : `90 %: ${interval(life.remaining_cycles)}`,
     life.ended ? `ended at ${fixed(life.ended.cycles)} cycles` : lasts,
-    never ? `reached within ${fixed(life.horizon_cycles)} cycles with ${probability(chance)}` : null,
-    held ? `${aboutCycles(held.remaining_cycles)} with ${heldText(held.count)}` : null,
-    cast && cast.of > 0 ? `earlier forecasts held ${cast.held} of ${cast.of} tests` : null,
-    lives > 0 ? `calibrated by ${lives} lives that ended` : null,
+    never ? `${probability(chance)} chance of an end within ${fixed(life.horizon_cycles)} cycles` : null,
+    held ? `${aboutCycles(held.remaining_cycles)} if the held ${held.count === 1 ? "run counts" : "runs count"}` : null,
+    cast && cast.of > 0 ? `${cast.held} of ${cast.of} later tests lay inside their forecast` : null,
+    lives > 0 ? `calibrated on ${lives} ended lives` : null,
   ]
     .filter((note) => note !== null)
     .join("; ");

@@ -14,10 +14,10 @@ import { problemView } from "../shared/problem_view.js";
 const OF_BLOCK = [
   { name: "energy_per_cycle_kj", label: "Energy per cycle, kJ" },
   { name: "cycles", label: "Duty cycles", value: "1000" },
-  { name: "sd", label: "Its standard deviation, kJ" },
+  { name: "sd", label: "Standard deviation of this energy, kJ" },
 ];
 /** @type {Entry} */
-const PACE = { name: "pace_cycles_per_hour", label: "Pace, duty cycles an hour, idle hours included" };
+const PACE = { name: "pace_cycles_per_hour", label: "Pace, duty cycles per hour (idle hours included)" };
 /** What is shown of the answer's quantiles. */
 const SHOWN = ["0.05", "0.5", "0.95"];
 
@@ -37,8 +37,7 @@ export class PlannedDuty {
     const more = h("button", { type: "button", onclick: () => this.add() }, "Add a block");
     const buttons = h("div", { class: "buttons" }, more, this.go);
     this.form = h("form", { novalidate: true, onsubmit: this.submit }, this.blocks, this.pace, buttons, this.answer);
-    const about =
-      "Blocks are run one after the other, over and over until the end of life. An empty field is left open.";
+    const about = "The blocks run one after the other and repeat until the end of life. Fields may stay empty.";
     place.append(
       h(
         "details",
@@ -122,7 +121,7 @@ export class PlannedDuty {
       if (!(problem instanceof Problem)) throw problem;
       const elsewhere = problem.errors.filter((error) => !this.mark(error));
       const all = problem.errors.length > 0 && elsewhere.length === 0;
-      const marked = h("p", { class: "notice bad", role: "alert" }, "The plan is not complete: see the marked fields.");
+      const marked = h("p", { class: "notice bad", role: "alert" }, "The plan is incomplete: see the marked fields.");
       this.answer.replaceChildren(all ? marked : problemView(problem, "No prediction. "));
       focus(this.form, "[aria-invalid]");
     } finally {

@@ -43,7 +43,7 @@ export async function runCharts(run, reader) {
   if (run.fits.length === 0) return h("div", { class: "charts" }, record.element);
   const test = { ...run, pressure_laws: null };
   const curves = new Chart({ name, id: `${id}-curve`, title: "Curve and fit", height: 300 });
-  const residuals = new Chart({ name, id: `${id}-residuals`, title: "What the fit leaves", height: 300 });
+  const residuals = new Chart({ name, id: `${id}-residuals`, title: "Residuals of the fit", height: 300 });
   const clutch = reader.present();
   curves.show(
     flat({
@@ -74,9 +74,9 @@ function residualsOf({ fits }, channels, clutch) {
       left: torque.of(measured - torqueAtSpeed(speed, fit, clutch), fit.pressure_bar, clutch),
     })),
   }));
-  const titles = ["sliding speed, rpm", named({ ...torque, name: "measured less fitted" })];
+  const titles = ["sliding speed, rpm", named({ ...torque, name: "measured minus fitted" })];
   return {
-    note: "Measured less fitted, a colour a pressure: a good fit leaves no pattern.",
+    note: "Measured minus fitted torque, one colour per pressure. A good fit leaves no pattern.",
     columns: [
       column("pressure, bar", 2),
       column("speed, rpm"),
@@ -107,7 +107,9 @@ function recordOf(channels, channel) {
   const x = time ?? values.map((_, index) => index + 1);
   const along = time ? "time, s" : "row";
   const long =
-    values.length >= 2000 ? " Long records are thinned to their extremes; CSV and Parquet of the API hold all." : "";
+    values.length >= 2000
+      ? " Of a long record only the extremes are drawn; CSV and Parquet from the API contain all values."
+      : "";
   return {
     note: `${fixed(values.length)} values.${long}`,
     columns: [column(along, time ? 3 : 0), column(quantity(channel), 3)],

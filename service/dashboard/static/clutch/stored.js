@@ -48,7 +48,7 @@ export class Stored {
   /** @param {ClutchOut} clutch */
   showArchived(clutch) {
     const back = h("button", { type: "button", onclick: () => this.archive(false) }, "Bring it back …");
-    const text = "This clutch is archived: it is not in the list of clutches and takes no new runs.";
+    const text = "This clutch is archived: it is not in the list of clutches and accepts no new runs.";
     byId("archived").replaceChildren(clutch.archived ? h("div", { class: "notice" }, h("p", {}, text), back) : "");
   }
 }

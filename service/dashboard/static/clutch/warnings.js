@@ -13,24 +13,24 @@ const OFF_TRACK = "off_track";
 /** @type {Record<string, { title: string, help: string }>} */
 const CODES = {
   [OFF_TRACK]: {
-    title: "Off its course",
+    title: "The last test does not fit the earlier ones",
     help: "Check the run's cycles, its clutch and the sensors. If all is right, the next test shows whether the clutch has changed.",
   },
   not_eq6: {
     title: "It does not age as expected",
-    help: "The forecast follows the tests. If another course is not what you expect, check cycles and sensors, or run a diagnosis.",
+    help: "The forecast follows the tests. If you did not expect this, check the cycles and the sensors, or run a diagnosis.",
   },
   missed_forecasts: {
     title: "Earlier forecasts missed",
-    help: "The clutch does not keep to one course. Remaining life is stated wider until it does.",
+    help: "The clutch does not age along one curve. Until it does, the interval of the remaining life is wider.",
   },
   held_runs: {
     title: "Runs are held",
-    help: "They do not count until someone confirms, corrects or withdraws them. Cycles that are certain are the fewer of both.",
+    help: "They do not count until someone confirms, corrects or withdraws them. The safe bound is the lower one of both cases.",
   },
   filters_disagree: {
     title: "Two filters disagree",
-    help: "The same tests give different remaining lives by two methods. Plan with the lowest bound, and test again soon.",
+    help: "Two methods compute different remaining lives from the same tests. Plan with the lowest bound, and test again soon.",
   },
   tracks_disagree: {
     title: "Two predictions disagree",

@@ -121,13 +121,13 @@ function overLifeOf(lives, quantity, share) {
       { label, points: scaled(measured.cycles, measured.value), line: scaled(trajectory.cycles, trajectory.median) },
     ];
   });
-  if (drawn.length === 0) return { empty: "No life that is compared has a stationary test yet." };
+  if (drawn.length === 0) return { empty: "None of the compared lives has a stationary test yet." };
   const { title, unit } = QUANTITIES[quantity];
   const axis = share ? `${title}, share of new` : `${title}${unit && `, ${unit}`}`;
   return {
     note: share
-      ? "Each life from its own first test on: 1 is new."
-      : "As measured; cycles count from the begin of each life.",
+      ? "Each life relative to its own first test: 1 is new."
+      : "As measured. Cycles count from the start of each life.",
     columns: [{ name: "life" }, KIND, CYCLES, column(axis, 4)],
     rows: drawn.flatMap(({ label, points, line }) => [
       ...points.x.map((at, index) => [label, "measured", at, points.y[index]]),
@@ -175,10 +175,10 @@ function curvesOf(lives, share) {
       })),
     }));
   });
-  if (drawn.length === 0) return { empty: "No life that is compared has a stationary test yet." };
+  if (drawn.length === 0) return { empty: "None of the compared lives has a stationary test yet." };
   const axis = share ? "torque, share of the static torque when new" : named(torque);
   return {
-    note: "Fitted curves; a colour a life, solid the first test, dashed the middle one, dotted the last.",
+    note: "Fitted curves, one colour per life: solid for the first test, dashed for the middle one, dotted for the last.",
     columns: [{ name: "curve" }, column("speed, rpm"), column(axis, 4)],
     rows: drawn.flatMap((curve) => curve.points.map(({ speed, value }) => [curve.name, speed, value])),
     figure: (c) => ({
@@ -218,7 +218,7 @@ function drawForm(lives) {
       numbers.length > 1 && choice("Life", numbers, `${id}:${life.answer.life.number}`, replace),
       h(
         "button",
-        { type: "button", class: "small", "aria-label": `Leave ${life.label} out`, onclick: () => replace(null) },
+        { type: "button", class: "small", "aria-label": `Remove ${life.label}`, onclick: () => replace(null) },
         "Leave out",
       ),
     );

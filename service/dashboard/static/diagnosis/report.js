@@ -62,7 +62,7 @@ export function report(diagnosis) {
 
 /** @param {DiagnosisOut} diagnosis */
 function outdated({ earlier_life: earlier, stale }) {
-  if (earlier) return h("b", {}, " The clutch has been rebuilt since: this is of its earlier life.");
+  if (earlier) return h("b", {}, " The clutch has been rebuilt since: this diagnosis is of its earlier life.");
   return stale ? h("b", {}, " Runs have been added since: run it again.") : null;
 }
 
@@ -189,7 +189,7 @@ function where({ baseline }) {
   const rows = axes.slice(0, MOST_ROWS).map(({ axis, strength, p_value: p }) => {
     return [quantity(axis), evidence(strength), p !== null && p < 0.001 ? "< 0.001" : significant(p, 2)];
   });
-  return part("Where the baseline falls short", table("Where", ["Along", "Evidence", "p"], rows));
+  return part("Where the model without an effect falls short", table("Where", ["Along", "Evidence", "p"], rows));
 }
 
 /** @param {DiagnosisOut} diagnosis */
@@ -219,8 +219,8 @@ function notes({ notes: all = [] }) {
 }
 
 const VISIBLE =
-  "The smallest amplitude that would have been detected, for each effect in whatever of its shapes, and in the one that shows " +
-  "best. Without a number: one of its shapes would be absorbed at any size.";
+  "The smallest size of each effect that these runs would have shown: for every shape that the effect can have, and for its " +
+  "most visible shape. No number means that at least one shape would stay hidden at any size.";
 
 /** @param {DiagnosisOut} diagnosis */
 function visible({ visible: all = [] }) {
@@ -231,12 +231,12 @@ function visible({ visible: all = [] }) {
     significant(least, 3),
     unit ?? "",
   ]);
-  const label = "Smallest visible amplitudes";
+  const label = "Smallest visible sizes";
   return h(
     "details",
     { class: "part" },
     h("summary", {}, "What these runs would show"),
     h("p", { class: "quiet" }, VISIBLE),
-    scrolling(label, table(label, ["Effect", "In any shape", "In its best", "Unit"], rows)),
+    scrolling(label, table(label, ["Effect", "For every shape", "For the most visible", "Unit"], rows)),
   );
 }

@@ -23,7 +23,7 @@ export const CHANNELS = {
 const NO_ENGAGEMENT =
   "No measured engagement yet. Send one with a block of duty: time_s, pressure_bar, speed_rpm and torque_nm of one engagement.";
 const NO_VALUE = "None of the engagements determines this indicator.";
-const NO_COMPARISON = "A model's engagement needs a stationary test and an engagement of the present life.";
+const NO_COMPARISON = "To simulate an engagement, the present life needs a stationary test and a measured engagement.";
 
 /** @param {[string, string] | string[]} named */
 const titleOf = ([title, unit]) => (unit === "" ? title : `${title}, ${unit}`);
@@ -120,7 +120,8 @@ function lineOf(kind, trace, name, c) {
  * @param {ComparedEngagement} compared
  */
 function discrepancyOf({ model }) {
-  if (model === null) return "The record does not show what drove the shaft: there is no model's engagement beside it.";
+  if (model === null)
+    return "The record does not show what drove the shaft, so no simulated engagement is drawn beside it.";
   const torque = `Model discrepancy: ${percent(model.torque_discrepancy, 1)} of torque (RMS, while both slip)`;
   const { stop_time_difference_s: difference, stop_time_difference_sd_s: sd } = model;
   if (difference === null) return `${torque}; the model's clutch does not stop the shaft.`;

@@ -145,8 +145,8 @@ async function archive(ids) {
     title: archived ? `Archive ${count}?` : `Bring ${count} back?`,
     points: [
       archived
-        ? "They leave the list and take no new runs. Nothing is deleted: they can be brought back."
-        : "They are in the list again and take new runs.",
+        ? "They disappear from the list and accept no new runs. Nothing is deleted: you can bring them back."
+        : "They appear in the list again and accept new runs.",
       ids.join(", "),
     ],
     action: archived ? "Archive" : "Bring back",

@@ -89,7 +89,7 @@ function remaining(summary, scale) {
   if (summary.status === "insufficient_data") return ["–", small(atLeast(summary.at_least))];
   if (summary.status === "reached") return [number("0"), small("reached")];
   const q = summary.remaining_cycles;
-  const likely = `${odds ? `${odds}; ` : ""}most likely ${aboutCycles(q)} (90 %: ${interval(q)})`;
+  const likely = `${odds ? `${odds}; ` : ""}half of such clutches: ${aboutCycles(q)} or more (90 %: ${interval(q)})`;
   return [number(certain), intervalBar(q, scale), small(likely)];
 }
 

@@ -56,7 +56,7 @@ export function reachedText({
   probability_of_reaching: chance,
 }) {
   const level = `the limit ${significant(limit, 3)}`;
-  if (chance === null) return "there are too few tests to predict when it is reached";
+  if (chance === null) return "too few tests to predict when it is reached";
   const reaches = `it is reached with a probability of ${probability(chance)}`;
   if (end["0.95"] === 0) return `${level} was passed when new`;
   if (end["0.5"] === null) return `${level} may never be reached: ${reaches}`;

@@ -48,7 +48,7 @@ export class Lazy {
       this.done = wanted;
     } catch (problem) {
       if (!(problem instanceof Problem)) throw problem;
-      this.say(`Not known: ${problem.message}. It is asked for again.`);
+      this.say(`Not known: ${problem.message}. The page asks again.`);
       setTimeout(() => this.check(), (problem.retryAfter ?? AGAIN) * 1000);
       return;
     } finally {

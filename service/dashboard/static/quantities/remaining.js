@@ -16,8 +16,8 @@ import { QUANTITIES } from "./names.js";
 const OF_CURVES = ["static_torque_nm", "coulomb_ratio", "stribeck_velocity_m_s", "viscous_coefficient", "slope"];
 const OF_LOOPS = ["attractor", "film_time", "loop_area"];
 const ABOUT =
-  "When a quantity will have changed as much as the clutch's criteria say, or where they do not name it, when it will have " +
-  "fallen to the fraction of its initial value that ends a life by mean COF; of a slope, when it falls below 0 at 100 rpm.";
+  "When another quantity reaches its limit. The limit is the clutch's own criterion for this quantity. If there is none, the " +
+  "limit is the same share of the initial value as for mean COF; for a slope it is 0 at 100 rpm.";
 const ALL = "all";
 
 /**

@@ -21,7 +21,7 @@ const COLUMNS = [
   digitsColumn("upper, 95 %", 3),
 ];
 
-const NO_SLOPES = "The slope is known from the first stationary test on whose curves determine all four parameters.";
+const NO_SLOPES = "The slope needs a stationary test whose curves determine all four parameters.";
 
 /**
  * The slopes at one pressure, a colour a speed.
@@ -33,7 +33,7 @@ const NO_SLOPES = "The slope is known from the first stationary test on whose cu
  */
 export function shudderMargin({ items, limits, events }) {
   if (items.length === 0) return { empty: NO_SLOPES };
-  const when = limits === null ? "When the margin is used up is being computed …" : limits.map(limitText).join(" ");
+  const when = limits === null ? "Computing when the margin is used up …" : limits.map(limitText).join(" ");
   return {
     note: `At ${pressureText(items[0].pressure_bar)}. Below the dashed line friction falls with speed, and the driveline may shudder. ${when}`,
     columns: COLUMNS,

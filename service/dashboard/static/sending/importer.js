@@ -95,7 +95,7 @@ export class Importer {
     }
     const focused = document.activeElement?.id;
     const left = shown.missing.map(quantity).join(", ");
-    const state = shown.problem ?? (left ? `Still to be given: ${left}.` : "Can be sent.");
+    const state = shown.problem ?? (left ? `Still missing: ${left}.` : "Ready to send.");
     this.lead.replaceChildren(this.rig === null ? "" : h("b", {}, `Read by the rig profile ${this.rig}. `), state);
     this.element.open ||= shown.problem !== null || this.channelsLack();
     this.content.replaceChildren(this.columns(shown), this.options(shown), drawing(shown) ?? "");
@@ -254,7 +254,11 @@ export class Importer {
       "div",
       { class: "fields" },
       field(decimal, "Decimal mark"),
-      field(missing, "Missing values", h("small", {}, "such as -9999, n/a; none: every number is measured")),
+      field(
+        missing,
+        "Missing values",
+        h("small", {}, "for example -9999, n/a; “none” if every number is a measurement"),
+      ),
       tables.length > 1 && field(table, "Sheet or test"),
     );
   }
@@ -301,7 +305,7 @@ export class Importer {
         "div",
         { class: "fields" },
         field(name, "Name of the rig"),
-        field(pattern, "File names", h("small", {}, "{cycles} stands for the duty cycles, * for what differs")),
+        field(pattern, "File names", h("small", {}, "{cycles} stands for the duty cycles, * for any other text")),
       ),
       h("button", { type: "button", onclick: save, disabled: !ready }, "Save as rig profile"),
       answer,

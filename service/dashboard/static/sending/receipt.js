@@ -12,7 +12,7 @@ import { cycles, fixed, kindName, sentence, significant, withSd, words } from ".
 /** What is said of a run that does not count, by its state: that, and where on the clutch's page it is made to count. */
 const UNCOUNTED = {
   held: ["It does not count yet. ", "#/overview", "Confirm, correct or withdraw it"],
-  withdrawn: ["It was withdrawn since, and stays so. ", "#/runs", "Restore it in the list of runs"],
+  withdrawn: ["It was withdrawn later and stays withdrawn. ", "#/runs", "Restore it in the list of runs"],
 };
 
 /**
@@ -22,7 +22,7 @@ const UNCOUNTED = {
 export function outcomeOf(receipt) {
   const { clutch_id: clutchId, cycles: at, duplicate, kind, run_id: runId, state } = receipt;
   const held = state === "held";
-  const result = duplicate ? "Stored before: this repeat changed nothing" : held ? "Stored and held" : "Stored";
+  const result = duplicate ? "Stored before; nothing has changed" : held ? "Stored and held" : "Stored";
   const run = ` · ${kindName(kind)} at ${cycles(at, 0, 20)} cycles · `;
   const name = h("p", {}, h("b", {}, result), run, h("code", {}, runId));
   if (state === "accepted") return h("div", { class: "notice good" }, name);

@@ -48,7 +48,7 @@ const SECTIONS = [
       { group: "geometry", name: "outer_diameter_mm", label: "Outer diameter, mm" },
       { group: "geometry", name: "friction_faces", label: "Friction faces", integer: true },
       { group: "geometry", name: "mean_radius_mm", label: "Mean radius, mm", optional: "from the diameters" },
-      { group: "geometry", name: "pressure_factor", label: "Lining pressure over line pressure" },
+      { group: "geometry", name: "pressure_factor", label: "Lining pressure divided by line pressure" },
     ],
   ],
   [
@@ -66,7 +66,10 @@ const SECTIONS = [
       { group: null, name: "reaction_plate", label: "Reaction plate", text: true },
     ],
   ],
-  ["End of life", [{ group: "end_of_life", name: "cof_fraction", label: "Mean COF over its value when new, 0 to 1" }]],
+  [
+    "End of life",
+    [{ group: "end_of_life", name: "cof_fraction", label: "Mean COF as a share of its value when new, 0 to 1" }],
+  ],
 ];
 
 /**
@@ -99,7 +102,7 @@ export function register(id, options = {}) {
     h("h2", { id: "registration-title" }, "Register a clutch"),
     options.lead ? h("p", { class: "notice" }, options.lead) : "",
     others.length > 0 ? h("p", { class: "buttons start" }, others) : "",
-    h("p", { class: "quiet" }, "These are the values of the reference's clutch. Change what is different on yours."),
+    h("p", { class: "quiet" }, "These are the values of the reference clutch. Change those that differ on yours."),
     form(id, options.record ?? null, end, () => dialog.close()),
   );
   return answered(dialog, () => result);

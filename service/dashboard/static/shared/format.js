@@ -112,7 +112,7 @@ export const aboutCycles = (quantiles) =>
  * @param {number | null} bound
  */
 export function atLeast(bound) {
-  if (bound === null || bound < 1) return "none is certain";
+  if (bound === null || bound < 1) return "no further cycle is certain";
   return `at least ${roundedDown(bound)} with 95 %`;
 }
 

@@ -50,7 +50,7 @@ def test_swapped_digits_among_earlier_runs_are_seen_by_the_cof() -> None:
     bench = bench_after()
     answer = bench.answer(next_test(cycles=700))
     assert answer.codes == ("cycles_off_pace",)
-    assert "is not that of those cycles" in answer.message
+    assert "is expected at these cycles" in answer.message
     assert bench.answer(stationary(700, run_id="late")).codes == ()
 
 

@@ -58,7 +58,7 @@ def test_a_criterion_names_its_quantity_its_place_and_its_limit(
             (9000, None, None), {"probability_of_reaching": 0.3},
             "the limit 0 may never be reached: it is reached with a probability of 30 %",
         ),
-        ((None, None, None), {"probability_of_reaching": None}, "there are too few tests to predict when it is reached"),
+        ((None, None, None), {"probability_of_reaching": None}, "too few tests to predict when it is reached"),
     ],
 )  # fmt: skip
 def test_when_a_limit_is_reached_is_said_in_words(
