@@ -75,8 +75,7 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
         )
         message = f"the file holds no array of numbers that could be a channel{hint}"
         raise InvalidError.of(message, code="no_arrays")
-    if len(sources) > limits.most_columns:
-        raise InvalidError(f"a file must not have more than {limits.most_columns} arrays, got {len(sources)}")
+    limits.require_columns(len(sources))
     if len({source.column.group for source in sources}) == 1:
         sources = [replace(source, column=replace(source.column, group="")) for source in sources]
 
@@ -161,22 +160,22 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
         title = names[at] if names else part
         stated_as = [title, f"field_{at}"] if dtype.names else [title]
         unit = units[at] or _unit(stated_as, leaf.attributes, beside, whole=size == 1 and not dtype.names)
-        moments = dtype.kind in "Mm"
         if matrix and not names:
             column = Column(part, None, group, part)
         else:
-            column = column_of(title, None if moments else unit or None, group)
-        yield _Source(replace(column, unit="s" if moments else column.unit, rows=rows, clock=clock), leaf, place)
+            column = column_of(title, unit or None, group, moments=dtype.kind in "Mm")
+        yield _Source(replace(column, rows=rows, clock=clock), leaf, place)
 
 
 def _unit(names: Sequence[str], attributes: Tree, beside: Tree, *, whole: bool) -> str:
     """The unit that stands at an array or beside it under one of its names; `whole`: or without any, as it is one column."""
     at_data = beside if whole and any(key.lower() in _DATA for key in beside) else {}
     named = (stated_unit(name, held) for held in (attributes, beside) for name in names)
-    return next(filter(None, [_direct(attributes if whole else {}), *named, _direct(at_data)]), "")
+    return next(filter(None, [own_unit(attributes if whole else {}), *named, own_unit(at_data)]), "")
 
 
-def _direct(held: Tree) -> str:
+def own_unit(held: Tree) -> str:
+    """The unit among what is stated of one array."""
     lowered = {key.lower(): value for key, value in held.items()}
     return next(filter(None, (_text(lowered.get(key)) for key in UNITS)), "")
 

@@ -15,11 +15,20 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from service.columns import LineOf, check_arrays
 from service.errors import MAX_QUOTED, InvalidError, Notice, TooLargeError
-from service.readers.column_names import Taken, choices_of, choose, is_counter, known_channel, no_unit
+from service.readers.column_names import (
+    Taken,
+    choices_of,
+    choose,
+    is_counter,
+    known_channel,
+    no_unit,
+    part_of_second,
+    several_times,
+)
 from service.readers.limits import Limits
 from service.readers.long_table import says_valid, valid_rows, widened
 from service.readers.no_values import refuse_stand_ins, without_stated, without_totals
-from service.readers.numerals import empty_cells, read_cells
+from service.readers.numerals import empty_cells, plain, read_cells
 from service.readers.table import NO_MISSING, NO_TIME, Clock, Column, Reading, Table, labels, marks, only
 
 #: The code of the notice that lists unused columns.
@@ -35,6 +44,8 @@ _SECOND_OF_DAY = 1.2e-5
 _OUR_TIME = (6.3e8, 4.1e9)
 #: Empty cells that show a channel of a lower rate. Chosen: fewer may have been left empty by hand.
 _MIN_GAPS = 4
+#: The share of a clock's steps that go on. Chosen: times that are rounded to half a step stand still at every second.
+_MOST_OF = 0.9
 #: Columns that one notice names.
 _MAX_NAMED = 20
 
@@ -82,7 +93,21 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
             raise
         detail = f"{error.detail}: missing=nan leaves such rows out"
         raise InvalidError(detail, errors=error.errors, total=error.total) from None
+    _refuse_standing(columns)
     return Channels(columns=columns, notices=tuple(notices), counts=counts, line_of=line_of, labels=labels(table.above))
+
+
+def _refuse_standing(columns: Mapping[str, FloatArray]) -> None:
+    """Raise InvalidError where the time stays as it is from row to row: a clock that is coarser than the rows is none."""
+    time_s = columns.get("time_s")
+    if time_s is None or len(columns) == 1 or not _stands(time_s):
+        return
+    still = np.count_nonzero(np.diff(time_s) == 0)
+    message = (
+        f"time_s stands still in {still} of {time_s.size - 1} steps: the clock is coarser than the rows; time=NAME takes a "
+        f"column of finer times, time={NO_TIME} none, where each row is a plateau"
+    )
+    raise InvalidError.of(message, code="time_stands", pointer="/channels/time_s")
 
 
 def _one_table(columns: dict[str, FloatArray], table: Table, reading: Reading) -> tuple[dict[str, FloatArray], int]:
@@ -123,8 +148,7 @@ def _clocks(
             continue
         if following is None or not _agree(values[unused], values[following]):
             shown = " and ".join(columns[index].title or columns[index].shown() for index in [*times][:_MAX_NAMED])
-            message = f"time_s must be one column, got {shown}; time=NAME chooses one"
-            raise InvalidError.of(message, code="ambiguous", pointer="/time")
+            raise several_times(shown)
         if np.unique(values[unused]).size > np.unique(values[following]).size:
             clocks = {at: times[unused] if clock is times[following] else clock for at, clock in clocks.items()}
     return clocks
@@ -149,7 +173,23 @@ def _agree(times: FloatArray, others: FloatArray) -> bool:
 def _runs_on(times: FloatArray) -> bool:
     """Whether a column may be a clock: nine of ten of its steps go on. Chosen: of durations in any order half do."""
     steps = np.diff(times[~np.isnan(times)])
-    return bool(steps.size > 0 and np.count_nonzero(steps > 0) >= 0.9 * steps.size)
+    return bool(steps.size > 0 and np.count_nonzero(steps > 0) >= _MOST_OF * steps.size)
+
+
+def _stands(times: FloatArray) -> bool:
+    """Whether more than one in ten steps of a clock is none."""
+    steps = np.diff(times)
+    return bool(np.count_nonzero(steps == 0) > (1 - _MOST_OF) * steps.size)
+
+
+def _add_parts(times: FloatArray, parts: Mapping[str, tuple[FloatArray, float]]) -> Notice | None:
+    """Add to times in whole seconds, in place, the part of the second that stands in a column of its own, and say so."""
+    for name, (values, factor) in parts.items() if _stands(times) else ():
+        seconds = factor * values
+        if ((seconds >= 0) & (seconds < 1)).all() and (np.diff(times + seconds) > 0).all():
+            times += seconds - seconds[0]
+            return Notice(code="parts_of_seconds", message=f"the part of the second was added to time_s from {name}")
+    return None
 
 
 def _read(
@@ -163,7 +203,11 @@ def _read(
         raise TooLargeError(f"a file must not hold more than {limits.most_values} values, got {stated}")
     channels = {column.index: column.channel for column in taken}
     says = [] if reading.missing == NO_MISSING else [i for i, own in enumerate(table.columns) if says_valid(own)]
-    read = read_cells(table, dict.fromkeys(says, "") | channels, reading)
+    parts = {
+        at: factor for at, own in enumerate(table.columns) if at not in indices and (factor := part_of_second(own))
+    }
+    parts = {} if reading.time == NO_TIME or "time_s" not in channels.values() else parts
+    read = read_cells(table, dict.fromkeys(says, "") | dict.fromkeys(parts, "time_s") | channels, reading)
     read, table = without_totals(read, [column.index for column in taken if column.channel != "time_s"], table)
     for column in taken:
         read[column.index] = without_stated(read[column.index], reading)
@@ -177,6 +221,10 @@ def _read(
         if column.channel == "time_s" and column.unit is None:
             found = _in_seconds(table.columns[column.index], values[column.index], reading)
             table = table if found is None else replace(table, notices=[*table.notices, found])
+    beside = {table.columns[at].shown(): (plain(read.pop(at)), factor) for at, factor in parts.items()}
+    for column in taken:
+        if column.channel == "time_s" and (found := _add_parts(values[column.index], beside)):
+            table = replace(table, notices=[*table.notices, found])
     taken = [column for column in taken if not column.guessed or _runs_on(values[column.index])]
     clocks = {} if reading.time == NO_TIME else _clocks(table.columns, taken, values)
     used = {clock.key: clock for clock in clocks.values() if clock is not None}

@@ -4,7 +4,7 @@ A clock is used or refused, never passed over: one whose unit is not known raise
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
@@ -27,30 +27,70 @@ _RATES = (
     "|frecuencia_de_muestreo|frequenza_di_campionamento|частота_дискретизации"
     "|fréquence_d['’]échantillonnage|サンプリング周波数|采样(?:频)?率"
 )
+#: What else is a rate, where it is stated in hertz; what says which of several rates that of the rows is.
+_ANY_RATE = (
+    r"(?:[^\W_]+_)*(?:stor(?:age|ed|ing)|sav(?:e|ed|ing)|output|export|speicher|ausgabe)_?(?:rate|frequency|frequenz)"
+)
+_STORED = re.compile("stor|sav|record|log|output|export|speicher|ausgabe|aufzeichn")
+#: What says that not every sample is a row.
+_DECIMATION = re.compile(
+    r"(?:decim|dezim|thinn|down_?sampl|sub_?sampl|data_?reduc|datenreduk|間引|抽取)\D{0,30}(?:1/)?(\d+)"
+)
+_COUNTS = "(?:number_of_|no\\._of_|num_)?(?:samples|points)|(?:anzahl_)?(?:messwerte|messpunkte)"
+_DURATIONS = r"(?:\w+_)?(?:duration|dauer|durée|duración|durata)|messzeit|(?:test|recording|measurement)_time"
 _STARTS = "t0|x0|wf_start_offset|start_value|hoffset"
 #: Names of a unit, beside a value or as an end of its name.
-UNITS = ("unit", "units", "unit_string", "yunit", "einheit")
+UNITS = ("unit", "units", "unit_string", "ni_unitdescription", "yunit", "einheit")
 #: The units of the abscissa, where they stand by themselves.
 _X_UNITS = ("hunit", "x_unit", "xunit", "wf_xunit_string")
-_HERTZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "1/s": 1.0, "s/s": 1.0, "sps": 1.0, "samples/s": 1.0, "s-1": 1.0}
+_HERTZ = dict.fromkeys(["", "hz", "1/s", "s-1", "s/s", "sps", "samples/s"], 1.0) | {"khz": 1e3, "ks/s": 1e3, "mhz": 1e6}
 _VALUE = re.compile(r"\s*(\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?)\s*(\D*)")
 
 
-def stated_clock(held: Mapping[str, float | str], rows: Callable[[], int]) -> Clock | None:
-    """The clock among names and what they hold: start + k · step [s] for each of the rows; None where none is stated."""
+def stated_clock(held: Mapping[str, float | str], rows: Callable[[], int], counted: str = "") -> Clock | None:
+    """The clock among names and what they hold: start + k · step [s] for each of the rows; None where none is stated.
+
+    Of several rates that of what was stored is meant. Reading the clock raises InvalidError where rates differ otherwise, or
+    something else says that not every sample is a row: `counted` (how a column counts samples), a decimation, a duration.
+    """
     named = {"_".join(key.strip(" :=").lower().split()): value for key, value in held.items()}
-    step, rate, start = (_stated(named, kind) for kind in (_STEPS, _RATES, _STARTS))
-    spacing = step or rate
-    if spacing is None or not spacing[0] > 0:
+    steps, rates, starts = (list(_stated(named, kind)) for kind in (_STEPS, _RATES, _STARTS))
+    steps = [one for one in steps if not re.fullmatch(_COUNTED, one[2])] or ([] if rates else steps)
+    if not steps + rates or not (steps + rates)[0][0] > 0:
         return None
-    first = start or (0.0, "", "")
+    others = [one for one in _stated(named, _ANY_RATE) if one[1].lower() not in ("", "s-1")]
+    first, ways = starts[0] if starts else (0.0, "", ""), [*steps, *rates, *others]
 
     def read() -> FloatArray:
-        seconds = _in_seconds(*step) if step else 1 / _in_hertz(*spacing)
-        return evenly(_in_seconds(*first), seconds, rows())
+        seconds = {one[2]: in_seconds(*one) if one in steps else 1 / _in_hertz(*one) for one in ways if one[0] > 0}
+        stored = {key: step for key, step in seconds.items() if _STORED.search(key)} or seconds
+        step, against = next(iter(stored.values())), [key for key, own in stored.items() if not _alike(own, stored)]
+        against += [f"{key} = {value}" for key, value in named.items() if _is_decimation(key, value)]
+        samples = next((one[0] for one in _stated(named, _COUNTS)), None)
+        lasts = next((in_seconds(*one) for one in _stated(named, _DURATIONS) if one[1]), None)
+        if samples == rows() and lasts and not 0.5 < lasts / (samples * step) < 2:
+            against.append(f"{lasts:g} s for {samples:g} samples")
+        if against or counted:
+            shown = ", ".join([f"one every {step:g} s", *against, *filter(None, [counted])])[: 3 * MAX_QUOTED]
+            message = (
+                f"what stands beside the rows does not say their times clearly: {shown}; a column of times says them"
+            )
+            raise InvalidError.of(message, code="ambiguous", pointer="/time")
+        return evenly(in_seconds(*first), step, rows())
 
-    counts = step is not None and step[:2] in ((1.0, ""), (1.0, "s")) and first[0] == 0
-    return Clock((first, step, rate), read, counts=counts)
+    counts = bool(steps) and steps[0][:2] in ((1.0, ""), (1.0, "s")) and first[0] == 0
+    return Clock((first, *ways, counted), read, counts=counts)
+
+
+def _alike(step: float, others: Mapping[str, float]) -> bool:
+    """Whether a step is that of all others, but for rounding."""
+    return all(abs(step - other) <= 1e-3 * step for other in others.values())
+
+
+def _is_decimation(key: str, value: float | str) -> bool:
+    """Whether a name says that fewer samples were kept than were taken."""
+    match = _DECIMATION.search(f"{key} {value}")
+    return match is not None and float(match[1]) != 1
 
 
 def evenly(start: float, step: float, rows: int) -> FloatArray:
@@ -58,28 +98,28 @@ def evenly(start: float, step: float, rows: int) -> FloatArray:
     return start + step * np.arange(rows, dtype=np.float64)
 
 
-def _stated(named: Mapping[str, float | str], names: str) -> tuple[float, str, str] | None:
-    """The number under one of the names, its unit ("" where none is stated), and the name."""
+def _stated(named: Mapping[str, float | str], names: str) -> Iterator[tuple[float, str, str]]:
+    """The numbers under any of the names, each with its unit ("" where none is stated) and its name."""
     for key, value in named.items():
         match = re.fullmatch(rf"(?:{names})(?:[_\[(]+(?P<unit>[^\W_]+/?[^\W_]*)[\])]?)?", key)
         text = _VALUE.fullmatch(value) if isinstance(value, str) else None
         if match is None or (isinstance(value, str) and text is None):
             continue
-        unit = match["unit"]
+        unit, of_rates = match["unit"], names in (_RATES, _ANY_RATE)
         if not unit and re.fullmatch(_COUNTED, key) and not (text and text[2].strip()):
             continue
-        if unit and (_HERTZ.get(unit) if names == _RATES else conversion("time_s", unit)) is None:
+        if unit and (_HERTZ.get(unit) if of_rates else conversion("time_s", unit)) is None:
             continue
         number = float(text[1].replace(",", ".")) if text else float(value)
-        beside = [f"{key}_{name}" for name in UNITS] + ([] if names == _RATES else [*_X_UNITS])
+        beside = [f"{key}_{name}" for name in UNITS] + ([] if of_rates else [*_X_UNITS])
         stated = (
             unit or (text[2].strip() if text else "") or next((named[name] for name in beside if named.get(name)), "")
         )
-        return number, str(stated), key
-    return None
+        yield number, str(stated), key
 
 
-def _in_seconds(number: float, unit: str, key: str) -> float:
+def in_seconds(number: float, unit: str, key: str) -> float:
+    """A time [s]. Raises InvalidError where its unit is not known."""
     converted = conversion("time_s", unit or "s")
     if converted is None:
         raise _unknown(unit, key)

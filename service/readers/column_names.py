@@ -19,16 +19,17 @@ _LETTERS = {"M": "torque_nm", "n": "speed_rpm", "p": "pressure_bar", "t": "time_
 _NAMES = {name: name for name in CHANNELS} | {"x_value": "time_s", "rpm": "speed_rpm"}
 #: Quantity -> the words that name it. One with a dash may also end a compound (Anpressdruck, 油压, Messzeit).
 _NOUNS = {
-    "time_s": "time -zeit temps tiempo tempo tout -stamp timestamps -stempel date datum datetime fecha elapsed čas czas "
+    "time_s": "time -zeit temps tiempo tempo tout -stamp ts timestamps -stempel date datum datetime fecha elapsed čas czas "
     "tijd tid zaman -时间 -時間 -時刻 -日時 время 시간",
     "pressure_bar": "pressure press -druck pression presión presion pressione pressão ciśnienie tlak tryck basınç druk "
     "-压力 -油压 -壓力 -油壓 -圧力 -油圧 давление -압력",
     "speed_rpm": "speed spd velocity -drehzahl -geschwindigkeit omega vitesse velocidad velocità velocidade rotação "
-    "prędkość otáčky toerental varvtal devir hız -회전수 -转速 -轉速 -回転数 -回転速度 обороты -frequenz frequency "
+    "prędkość otáčky toerental varvtal devir hız régime -회전수 -转速 -轉速 -回転数 -回転速度 обороты -frequenz frequency "
     "frecuencia fréquence частота",
     "torque_nm": "torque trq tq md -moment couple par coppia binário koppel vridmoment tork -扭矩 -转矩 -轉矩 -トルク "
     "момент -토크",
-    "temperature": "temperature -temp oiltemp oiltemperature -temperatur température temperatura theta -温 -溫 температура",
+    "temperature": "temperature -temp toil oiltemp oiltemperature -temperatur température temperatura teplota sıcaklığı "
+    "theta -温 -溫 -온 температура",
 }
 #: Letters that stand for a quantity beside another word or a unit, which decides between several.
 _SYMBOLS = {
@@ -42,16 +43,17 @@ _PLAIN = (
     "the de del der des di du d"
 )
 _PLAIN_OF = {
-    "time_s": "standardmessrate time zeit mess uhr date datum elapsed hora y und and",
+    "time_s": "standardmessrate default sample rate time zeit mess uhr date datum elapsed hora y und and",
     "pressure_bar": "line leitung leitungs anpress kolben piston",
-    "speed_rpm": "rotational rotation shaft differential diff slip motor relative rel dreh winkel angular differenz schlupf "
+    "speed_rpm": "rotational rotation shaft differential diff slip relative rel dreh winkel angular differenz schlupf "
     "giro obrotowa drum trommel welle вращения",
     "torque_nm": "friction reib frottement fricción dreh obrotowy kroutící 摩擦 r",
     "temperature": "",
 }
 #: Whose temperature it is.
 _OIL = {
-    "oil", "oiltemp", "oiltemperature", "öl", "sump", "sumpf", "huile", "aceite", "olio", "óleo", "oleju", "масла", "油",
+    "oil", "toil", "oiltemp", "oiltemperature", "öl", "olje", "oleje", "yağ", "유", "sump", "sumpf", "huile", "aceite",
+    "olio", "óleo", "oleju", "масла", "油",
 }  # fmt: skip
 _PLATE, _REAR = {"plate", "platte", "platten", "lamelle", "lamellen"}, {"rear", "hinten"}
 _SPREAD = {"sd", "std", "deviation", "standard", "standardabweichung"}
@@ -64,6 +66,10 @@ _OTHER = re.compile(
 )
 #: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports, Simulink's.
 _SECONDS = frozenset({"x_value", "timestamps", "tout"})
+#: A column that holds what of a time is less than a second.
+_PART_OF_SECOND = re.compile(r"fraction|bruchteil|sub_?second", re.IGNORECASE)
+#: What makes a name that of another quantity: a sign, a power, a half.
+_COMPUTED = re.compile(r"^[-−][^\W\d]|\^ ?[2-9]|[²³√]|/ ?[2-9](?![\d^.,/])")
 #: Words that are a speed only beside one of what turns.
 _FREQUENCY = re.compile("fr[eé]qu?[eu]|frecu|частота")
 #: Channels in whose unit another column may be the one that is meant.
@@ -96,7 +102,7 @@ def _key(name: str) -> str:
     Composing letters takes time with the square of the length where accents are piled up: only short names are composed.
     """
     plain = (unicodedata.normalize("NFKC", name) if len(name) <= LONGEST_NAME else name).strip().casefold()
-    plain = plain.replace("oel", "öl").replace("ϑ", "theta").replace("ω", "omega")
+    plain = plain.replace("oel", "öl").replace("θ", "theta").replace("ϑ", "theta").replace("ω", "omega")
     return re.sub(r"[\s._\-]+", "_", plain).strip("_")
 
 
@@ -145,6 +151,8 @@ def meaning(name: str, unit: str | None = None) -> tuple[str | None, Sense]:
     if known := _LETTERS.get(bare) or _NAMES.get(key):
         return known, Sense.WHOLE
     words = _words(bare) if key else []
+    if _COMPUTED.search(bare):
+        return None, Sense.OTHER
     parts = [(word, next((end for end in _ENDS if word.endswith(end)), word)) for word in words]
     parts = [(word, word if word in _QUANTITIES else noun) for word, noun in parts]
     quantities = {_QUANTITIES[noun] for _, noun in parts if noun in _QUANTITIES}
@@ -153,7 +161,8 @@ def meaning(name: str, unit: str | None = None) -> tuple[str | None, Sense]:
     if not by_noun:
         symbol = next((word for word in words if word in _SYMBOLS), "")
         quantities = {q for q in _SYMBOLS.get(symbol, ()) if (len(words) > 1 and unit is None) or _measures(q, unit)}
-        quantities = {"temperature"} & quantities if rest & (_OIL | _PLATE) else quantities - {"temperature"}
+        if len(quantities) > 1:
+            quantities = {"temperature"} & quantities if rest & (_OIL | _PLATE) else quantities - {"temperature"}
     if len(quantities) != 1:
         return None, Sense.UNKNOWN
     (quantity,) = quantities
@@ -204,16 +213,22 @@ def is_time(column: Column) -> bool:
     return meaning(column.name, column.unit)[0] == "time_s" or _may_be_time(column)
 
 
+def part_of_second(column: Column) -> float | None:
+    """The factor to s of a column beside the time that may hold the part of the second: its title is a unit, or says so."""
+    unit = conversion("time_s", column.unit or column.name)
+    return unit.factor if unit and unit.factor < 1 else 1.0 if _PART_OF_SECOND.search(column.name) else None
+
+
 def is_counter(column: Column) -> bool:
     """Whether a time column's title is LabVIEW's, which may count samples."""
     return _key(column.name) == "x_value"
 
 
-def column_of(text: str, unit: str | None = None, group: str = "") -> Column:
+def column_of(text: str, unit: str | None = None, group: str = "", *, moments: bool = False) -> Column:
     """A column's title -> name and unit: `torque [Nm]`, `torque (Nm)`, `M / Nm`, `Druck in bar`, `Time, ms`, `speed_rad_s`.
 
-    `unit` is what the file states beside the title. Raises InvalidError on a text that is too long for a title, and where
-    the title states another unit.
+    `unit` is what the file states beside the title; points in time (`moments`) need none. Raises InvalidError on a text
+    that is too long for a title, and where the title states another unit.
     """
     title = text.strip()
     if len(title) > LONGEST_TITLE:
@@ -223,8 +238,8 @@ def column_of(text: str, unit: str | None = None, group: str = "") -> Column:
         )
         raise InvalidError.of(message, code="title_too_long", value=shown)
     name, own = _taken_apart(" ".join(title.translate(_WIDE).split()))
-    column = Column(name, own, group, title)
-    return column if unit is None else with_unit(column, unit)
+    column = Column(name, "s" if moments else own, group, title)
+    return column if unit is None or moments else with_unit(column, unit)
 
 
 def _taken_apart(title: str) -> tuple[str, str | None]:
@@ -462,6 +477,12 @@ def _twice(channel: str, *columns: Column) -> InvalidError:
     way = f"map={channel}:NAME chooses one" if distinct else "their names must differ"
     message = f"{channel} must be one column, got {shown}; {way}"
     return InvalidError.of(message, code="ambiguous", pointer=f"/channels/{channel}", value=shown)
+
+
+def several_times(shown: str) -> InvalidError:
+    """The error of times in several columns."""
+    message = f"time_s must be one column, got {shown}; time=NAME chooses one"
+    return InvalidError.of(message, code="ambiguous", pointer="/time")
 
 
 def _list(columns: Sequence[Column]) -> str:

@@ -34,6 +34,12 @@ _MAX_TITLE_ROWS = 12
 _UNIT_LABELS = re.compile(
     r"[a-z]{0,2}_?unit[éàs]*(_label)?s?:?|einheit(en)?:?|unidad(es)?:?|单位|單位|単位", re.IGNORECASE
 )
+#: What a row of a table says that is made of the rows about it.
+_SUMMARY = re.compile(
+    r"(?:\d+[ _.:-]+)?[øØ∅⌀]?(?:mean|average|avg|mittel(?:werte?)?|moy(?:enne)?|media|promedio|medel(?:värde)?|"
+    r"max(?:im(?:um|a))?|min(?:im(?:um|a))?|sum(?:me)?|total|median|range|std(?:ev)?|stabw|standardabweichung|平均[値值]?|最[大小][値值]?|合[計计])\.?:?",
+    re.IGNORECASE,
+)
 #: What a row begins with that holds a factor for each column.
 _FACTORS = re.compile(r"\w*[ _]?(?:fa[ck]tor|gain|s[ck]al|slope|mult)", re.IGNORECASE)
 NUMERIC = re.compile(
@@ -60,7 +66,7 @@ class Layout:
     def columns(self) -> tuple[Column, ...]:
         """The columns. Raises InvalidError on a title that is too long, or beside whose unit another is stated."""
         return tuple(
-            replace(column_of(title, group=group), unit="s")
+            column_of(title, group=group, moments=True)
             if _is_moment(cell) or _is_word(title, cell)
             else with_unit(column_of(title, unit, group), with_unit_apart(cell)[1])
             for title, unit, group, cell in self.headings
@@ -77,6 +83,8 @@ class DataRows:
         #: The first row of data of each further table under the same titles.
         self.breaks: list[int] = []
         self.notices: list[Notice] = []
+        self._summaries: list[Row] = []
+        self._summarised = _is_summary(self.first)
         if layout.labelled:
             self._leave_out(above[-layout.labelled :], "above the first row of")
 
@@ -88,7 +96,11 @@ class DataRows:
                 self._without_footer(held)
                 self.breaks.append(before + len(held))
             elif not is_blank(row) and tuple(row) not in self._above:
-                held.append((number, row))
+                summary = not self._summarised and _is_summary(row) and any(map(is_value, row))
+                self._summaries += [row] if summary else []
+                held += [] if summary else [(number, row)]
+        if last and self._summaries:
+            self._leave_out(self._summaries, "of means, extremes or sums in")
         if last and (footer := self._without_footer(held)):
             self._leave_out(footer, "below")
         return [number for number, _ in held], [row for _, row in held]
@@ -108,6 +120,10 @@ class DataRows:
         self.notices.append(Notice(code="lines_left_out", message=message))
 
 
+def _is_summary(row: Row) -> bool:
+    return any(isinstance(cell, str) and _SUMMARY.fullmatch(cell) is not None for cell in row)
+
+
 def table_in(
     rows: Sequence[Row], layout: Layout, data: DataRows, *, first_line: int, rows_read: Callable[[], int], **others: Any
 ) -> Table:
@@ -117,24 +133,37 @@ def table_in(
     """
     above = [shown(row) for row in rows[max(layout.start - MAX_ROWS, 0) : layout.start]]
     refuse_factors(above)
-    columns = []
+    head = [shown(row) for row in rows[layout.start : layout.start + _MAX_SHOWN]]
+    columns, counted = [], _counted(layout.columns(), head)
     for place, column in enumerate(layout.columns()):
         if is_counter(column) and shown(data.first)[place : place + 1] == ("",):
             columns.append(Column("", title=column.title))
             continue
         own = [row for row in above if len(row) > place and row[place]]
         beside = [(row[0], row[place]) if place and row in own else row for row in above]
-        clock = stated_clock(labels([*beside, *((row[place],) for row in own)]), rows_read)
+        clock = stated_clock(labels([*beside, *((row[place],) for row in own)]), rows_read, counted)
         columns.append(replace(column, clock=clock))
     return Table(
         columns=tuple(columns),
         above=tuple(above[: layout.titles - layout.start]),
         first_line=first_line,
-        head=tuple(map(shown, rows[layout.start : layout.start + _MAX_SHOWN])),
+        head=tuple(head),
         breaks=data.breaks,
         notices=data.notices,
         **others,
     )
+
+
+def _counted(columns: Sequence[Column], head: Sequence[Sequence[str]]) -> str:
+    """Which column of whole numbers that is no channel counts samples in steps of several; "" where none does."""
+    for place, column in enumerate(columns):
+        cells = [row[place] for row in head if len(row) > place]
+        if column.unit or len(cells) < _LONG_RUN or known_channel(column.name) or not all(map(str.isdecimal, cells)):
+            continue
+        steps = {int(b) - int(a) for a, b in pairwise(cell[:15] for cell in cells)}
+        if len(steps) == 1 and max(steps) > 1:
+            return f"{column.shown()} counts in steps of {max(steps)}"
+    return ""
 
 
 def shown(row: Row) -> tuple[str, ...]:
@@ -215,7 +244,13 @@ def _has_values(row: Row) -> bool:
 
 def refuse_factors(above: Sequence[Sequence[str]]) -> None:
     """Raise InvalidError where a line above the data has factors of the columns, which may be applied to them or not."""
-    for row in above:
+    for index, row in enumerate(above):
+        for place, cell in enumerate(row[1:], 1):
+            under = [
+                other[place] for other in above[index + 1 :] if len(other) > place and NUMBER.fullmatch(other[place])
+            ]
+            if _FACTORS.match(cell) and len(under) > 1 and {*map(float, under)} != {1.0}:
+                row = (cell, *under)
         numbers = [cell for cell in row[1:] if NUMBER.fullmatch(cell.replace(",", "."))]
         others = [cell for cell in numbers if float(cell.replace(",", ".")) != 1]
         if len(numbers) > 1 and others and _FACTORS.match(row[0]):

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from service.errors import InvalidError
+
 #: Bytes of one line of CSV. Chosen; 1,000 columns of 60 characters fit.
 LONGEST_LINE_BYTES = 1 << 16
 #: Characters of a column's title, of a name that may be a channel's, and of a unit that may be known; longer names and units
@@ -32,6 +34,11 @@ class Limits:
     wall_seconds: int = 120
     #: Address space of the process that reads a TDMS, MDF4 or Parquet file, bytes: 1.5 GiB. Chosen; no table.
     memory_bytes: int = 3 << 29
+
+    def require_columns(self, number: int) -> None:
+        """Raise InvalidError where a file has too many columns."""
+        if number > self.most_columns:
+            raise InvalidError(f"a file must not have more than {self.most_columns} columns, got {number}")
 
 
 LIMITS = Limits()

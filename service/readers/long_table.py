@@ -14,36 +14,61 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.errors import MAX_QUOTED, InvalidError, Notice
-from service.readers.column_names import choices_of, choose, column_of, is_time, known_channel, recognised
+from service.readers.column_names import (
+    choices_of,
+    choose,
+    column_of,
+    is_time,
+    known_channel,
+    recognised,
+    several_times,
+)
 from service.readers.grid import is_value
 from service.readers.limits import LIMITS
-from service.readers.numerals import read_cells
+from service.readers.numerals import plain, read_cells
 from service.readers.table import NO_TIME, Clock, Column, Reading, Table
 from service.readers.unit_table import is_unit
 
 #: Rows of a table without lines by which its columns are judged, as many as others show.
 _MAX_LOOKED_AT = 20
 _VALUES = re.compile(r"val(?!id)|wert|reading|messung|数值|値|^y$", re.IGNORECASE)
-#: A column that says which values are valid, and what it says of those that are: in words, as a flag, by OPC's code.
-_QUALITY = re.compile(r"quality|valid|qualit|gültig", re.IGNORECASE)
-_GOOD, _BAD = (
-    {"good", "ok", "valid", "192", "192.0", "gut", "gültig"},
-    {"bad", "nok", "invalid", "schlecht", "ungültig"},
+#: A column that says which values are valid, and what it says of those that are: in words, by OPC's code, as a flag, which
+#: of a status may also be that of an error.
+_QUALITY, _STATUS = (
+    re.compile(r"quality|valid|qualit|gültig", re.IGNORECASE),
+    re.compile("status|zustand", re.IGNORECASE),
 )
+_GOOD = {"good", "ok", "valid", "192", "192.0", "gut", "gültig", "i.o.", "io", "pass", "passed"}
+_BAD = {
+    "bad",
+    "nok",
+    "invalid",
+    "schlecht",
+    "ungültig",
+    "n.i.o.",
+    "nio",
+    "fail",
+    "failed",
+    "fault",
+    "error",
+    "fehler",
+    "alarm",
+}
 _ON, _OFF = {"true", "1", "1.0"}, {"false", "0", "0.0"}
 _SECOND = np.timedelta64(1, "s")
 
 
 def says_valid(column: Column) -> bool:
     """Whether a column says which rows are valid, by its title."""
-    return _QUALITY.search(column.name) is not None
+    return _QUALITY.search(column.name) is not None or _STATUS.search(column.name) is not None
 
 
 def valid_rows(column: Column, cells: NDArray[Any]) -> NDArray[np.bool_] | None:
     """Which rows a column says to be valid [n]; None where it does not say so in words or flags that are known."""
     words = np.array([str(cell).strip().casefold() for cell in cells.tolist()], dtype=object)
-    good = _GOOD | (_OFF if re.search("invalid|ungültig", column.name, re.IGNORECASE) else _ON)
-    return np.isin(words, list(good)) if set(words) <= good | _BAD | _ON | _OFF else None
+    flags = _ON | _OFF if _QUALITY.search(column.name) else set()
+    good = _GOOD | (flags & (_OFF if re.search("invalid|ungültig", column.name, re.IGNORECASE) else _ON))
+    return np.isin(words, list(good)) if set(words) <= good | _BAD | flags else None
 
 
 def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
@@ -80,8 +105,7 @@ def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
         cells[value] = np.ma.MaskedArray(cells[value], mask=np.ma.getmaskarray(cells[value]) | ~good)
     times = None if timed is None else _seconds(cells[timed[0]], timed[1])
     rows = {name: np.flatnonzero(names == name) for name in dict.fromkeys(names.tolist()) if name}
-    if len(rows) > LIMITS.most_columns:
-        raise InvalidError(f"a file must not have more than {LIMITS.most_columns} channels, got {len(rows)}")
+    LIMITS.require_columns(len(rows))
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
         return [cells[value][list(rows.values())[index]] for index in taken]
@@ -123,8 +147,7 @@ def _time(columns: Sequence[Column], reading: Reading) -> tuple[int, Any] | None
     places = range(len(columns)) if named else [index for index, column in enumerate(columns) if is_time(column)]
     if len(places) > 1 and not named:
         shown = " and ".join(columns[index].shown() for index in places)
-        message = f"time_s must be one column, got {shown}; time=NAME chooses one"
-        raise InvalidError.of(message, code="ambiguous", pointer="/time")
+        raise several_times(shown)
     if not places:
         return None
     mapping = {} if named is None else {"time_s": named}
@@ -161,7 +184,7 @@ def _seconds(times: NDArray[Any], conversion: Any) -> NDArray[np.float64]:
     if times.dtype.kind in "Mm":
         since = times - times[:1] if times.dtype.kind == "M" else times
         return np.asarray(since / _SECOND, dtype=np.float64)
-    seconds = np.array(np.ma.filled(times, np.nan), dtype=np.float64)
+    seconds = plain(times)
     conversion.apply(seconds)
     return seconds
 

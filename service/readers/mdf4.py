@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from service.errors import MAX_QUOTED, InvalidError, Notice
+from service.readers.clocks import in_seconds
 from service.readers.column_names import choices_of, column_of
 from service.readers.limits import Limits
 from service.readers.table import Clock, Column, Reading, Table, cut_short
-from service.readers.unit_table import conversion
 
 #: Conversions that refer to each other, at most. Chosen: recorders refer once.
 _DEEPEST_CONVERSION = 8
@@ -33,13 +33,12 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         head = opened.read(16)
     version = head[8:].decode("latin-1").strip("\0 ")
     if not version.startswith("4"):
-        raise InvalidError(f"an MDF file must be of version 4, got {version!r}")
+        raise InvalidError(f"an MDF file must be of version 4, got {version!r}: asammdf converts it (MDF.convert)")
     shutil.copy = shutil.copyfile  # asammdf's copy for finalising also sets the mode, which this process may not
     file = MDF(path)
     masters = "time_s" in choices_of(reading)  # a map may name a master channel for the time
     places = list(_places(file, masters=masters, table=reading.table))
-    if len(places) > limits.most_columns:
-        raise InvalidError(f"a file must not have more than {limits.most_columns} channels, got {len(places)}")
+    limits.require_columns(len(places))
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
         return [_values(file, places[index], channel) for index, channel in taken.items()]
@@ -86,13 +85,8 @@ def _times(file: Any, group: int) -> FloatArray:
     master = file.masters_db[group]
     _refuse_formula(file, group, master)
     unit = str(file.get_channel_unit(group=group, index=master) or "s")
-    converted = conversion("time_s", unit)
-    if converted is None:
-        message = f"the unit of the time of {_name(file, group)!r} must be known, got {unit[:MAX_QUOTED]!r}"
-        raise InvalidError.of(message, code="unknown_unit")
-    times = np.array(file.get_master(group), dtype=np.float64)
-    converted.apply(times)
-    return times
+    factor = in_seconds(1.0, unit, f"the times of {_name(file, group)}")
+    return factor * np.array(file.get_master(group), dtype=np.float64)
 
 
 def _values(file: Any, place: tuple[int, int], channel: str) -> NDArray[Any]:

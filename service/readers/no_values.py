@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from service.errors import InvalidError, Notice
-from service.readers.numerals import NUMBER
+from service.readers.numerals import NUMBER, plain
 from service.readers.table import NO_MISSING, LineOf, Reading, Table, marks, place
 
 #: A value that is so many times as large as all others stands for none, a common one (more than a tenth of the rows) only
@@ -70,7 +70,7 @@ def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, re
     """Raise InvalidError naming the first number of a column [n] that may stand for no value, and what settles it."""
     if reading.missing == NO_MISSING or values.dtype.kind not in "iuf":
         return
-    column = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
+    column = plain(values)
     with np.errstate(over="ignore"):  # 1e308 less -1e308 is far enough
         value = _stand_in(column, steady=name == "time_s")
     if value is None:
@@ -160,9 +160,7 @@ def without_totals(
     kept = np.ones(max(sizes), dtype=np.bool_)
     notices = []
     for start, end in pairwise(starts):
-        made_of = _totals(
-            [np.ma.filled(np.ma.asarray(column[start:end], dtype=np.float64), np.nan) for column in taken]
-        )
+        made_of = _totals([plain(column[start:end]) for column in taken])
         if made_of:
             kept[end - len(made_of) : end] = False
             line = end - len(made_of)

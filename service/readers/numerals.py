@@ -66,7 +66,7 @@ class Numerals:
         self._missing = {"", *marks(reading.missing)}
         self._stamps: dict[int, Stamps] = {}
         self._units: dict[int, str] = {}
-        self._origin: list[int] = []
+        self._origin: dict[bool, int] = {}
         self._zones: set[str] = set()
 
     def settle(self, columns: Sequence[Sequence[Any]]) -> bool:
@@ -194,6 +194,13 @@ def read_cells(table: Table, channels: Mapping[int, str], reading: Reading) -> d
     return read | dict(zip(cells, Numerals(reading).values(named, list(cells.values()), table.line_of), strict=True))
 
 
+def plain(values: NDArray[Any]) -> FloatArray:
+    """Numbers [n], NaN where they are masked, or all where they are none."""
+    if values.dtype.kind not in "iuf":
+        return np.full(values.size, np.nan)
+    return np.array(np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan))
+
+
 def _cells(column: NDArray[Any]) -> list[Any]:
     return [cell.decode("utf-8", "replace") if isinstance(cell, bytes) else cell for cell in column.tolist()]
 
@@ -274,26 +281,21 @@ _DURATION = re.compile(
 )
 _SECONDS = {"seconds": 1, "minutes": 60, "hours": 3600, "days": 86_400}
 #: Orders of a date's parts, but for those with slashes.
-_ORDERS = (
-    "%Y-%m-%d",
-    "%Y/%m/%d",
-    "%Y.%m.%d",
-    "%Y年%m月%d日",
-    "%d.%m.%Y",
-    "%d-%m-%Y",
-    "%d.%m.%y",
-)
+_ORDERS = ["%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y年%m月%d日", "%d.%m.%Y", "%d-%m-%Y", "%d.%m.%y"]
 #: The day from which days are counted, so that nanoseconds fit 64 bits.
 _EPOCH = datetime(2000, 1, 1)
 _DAY = 86_400 * 10**9
 
 
+#: The time before the date, as LabVIEW writes both in some languages.
+_TIME_FIRST = re.compile(r"(\d{1,2}:\d\d:[\d:.,]+) (\d{1,4}[-./]\d{1,2}[-./]\d{2,4})$")
 #: The order of C's ctime: `Fri Nov 27 07:00:00 2026`.
 _CTIME = re.compile(r"[^\W\d]{2,3} ([^\W\d]{3}) +(\d{1,2}) ([\d:.]{5,15}) (\d{4})")
 
 
 def _in_numbers(cell: str) -> str:
     """A text with the month's name at its beginning as a number: `27. Nov. 2026 07:00` as `27.11.2026 07:00`."""
+    cell = _TIME_FIRST.sub(r"\2 \1", cell)
     cell = _CTIME.sub(r"\2 \1 \4 \3", cell) if cell[:1].isalpha() else cell
     match = _NAMED.match(cell) if cell[:1].isalnum() else None
     name = match["month"].casefold() if match else ""
@@ -312,13 +314,15 @@ def is_stamp(cell: str) -> bool:
 
 
 class Stamps:
-    """Points in time as text -> nanoseconds since `origin`, the first moment of a file's columns: dates of every usual
+    """Points in time as text -> nanoseconds since `origin`, the first moment of a file's columns with a date, or of those
+    without one: dates of every usual
     order, times of day, durations. A zone's name (`CET`) is one for all `zones` of the file, and shifts nothing."""
 
-    def __init__(self, origin: list[int], zones: set[str]) -> None:
+    def __init__(self, origin: dict[bool, int], zones: set[str]) -> None:
         self._origin, self._zones = origin, zones
         self._last: int | None = None
         self._days = 0
+        self._has_date = True
         self._dates: dict[str, int | None] = {}
         self._orders: set[str] = {"%d/%m/%Y", "%m/%d/%Y"}
 
@@ -331,11 +335,11 @@ class Stamps:
             if any(moment is None or abs(moment) >= 2**62 for moment in parsed):
                 return None
             nanoseconds = np.array(parsed, dtype=np.int64)
-            if not self._dates:
+            self._has_date = bool(self._dates)
+            if not self._has_date:
                 nanoseconds = self._past_midnight(nanoseconds)
-        if not self._origin:
-            self._origin.append(int(nanoseconds[0]))
-        return (nanoseconds - self._origin[0]).astype("timedelta64[ns]")
+        origin = self._origin.setdefault(self._has_date, int(nanoseconds[0]))
+        return (nanoseconds - origin).astype("timedelta64[ns]")
 
     def _past_midnight(self, times: NDArray[np.int64]) -> NDArray[np.int64]:
         """Times of day that go on where they step back by more than half a day."""

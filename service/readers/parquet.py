@@ -14,22 +14,19 @@ import pyarrow.parquet as parquet  # type: ignore[import-untyped]
 import pyarrow.types as kinds  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from service.errors import MAX_QUOTED, InvalidError
-from service.readers.arrays import parsed, refuse_counts, stated_unit
+from service.errors import MAX_QUOTED
+from service.readers.arrays import own_unit, parsed, refuse_counts, stated_unit
 from service.readers.column_names import column_of, known_channel
 from service.readers.limits import Limits
 from service.readers.numerals import is_stamp
 from service.readers.table import Column, Reading, Table
-
-_UNITS = (b"unit", b"units", b"Unit")
 
 
 def read_table(path: Path, _: Reading, limits: Limits) -> Table:
     """The columns of the file. A null is NaN, which is refused."""
     file = parquet.ParquetFile(path, memory_map=True)
     fields = list(file.schema_arrow)
-    if len(fields) > limits.most_columns:
-        raise InvalidError(f"a file must not have more than {limits.most_columns} columns, got {len(fields)}")
+    limits.require_columns(len(fields))
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
         # one at a time: memory is that of a column
@@ -56,13 +53,11 @@ def _stated(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
 
 
 def _column(field: Any, file: Any, beside: Mapping[str, Any]) -> Column:
-    metadata = field.metadata or {}
-    unit = next((metadata[key].decode("utf-8", "replace") for key in _UNITS if key in metadata), None)
     moment = kinds.is_temporal(field.type)
     if known_channel(field.name) == "time_s" and kinds.is_large_string(field.type) | kinds.is_string(field.type):
         moment = any(is_stamp(str(batch[0][0])) for batch in islice(file.iter_batches(1, columns=[field.name]), 1))
-    column = column_of(field.name, None if moment else unit or stated_unit(field.name, beside))
-    return replace(column, unit="s" if moment else column.unit, rows=file.metadata.num_rows)
+    unit = own_unit(_stated(field.metadata)) or stated_unit(field.name, beside)
+    return replace(column_of(field.name, unit, moments=moment), rows=file.metadata.num_rows)
 
 
 def _values(column: Any) -> NDArray[Any]:

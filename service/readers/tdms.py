@@ -15,15 +15,14 @@ from nptdms import TdmsFile  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from service.errors import MAX_QUOTED, InvalidError
-from service.readers.arrays import refuse_counts
-from service.readers.clocks import evenly, stated_clock
+from service.readers.arrays import own_unit, refuse_counts
+from service.readers.clocks import evenly, in_seconds, stated_clock
 from service.readers.column_names import column_of
 from service.readers.limits import Limits
 from service.readers.numerals import is_stamp
 from service.readers.table import Clock, Column, Reading, Table, cut_short
 from service.readers.unit_table import conversion
 
-_UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")
 #: Kinds of scales that npTDMS computes.
 _SCALES = {
     "Linear", "Polynomial", "Table", "RTD", "Strain", "Thermistor", "Thermocouple", "Add", "Subtract", "AdvancedAPI",
@@ -38,8 +37,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         raise cut_short("its last TDMS segment is not complete")
     groups = [group for group in file.groups() if not reading.table or group.name == reading.table]
     channels = [channel for group in groups for channel in group.channels() if len(channel)]
-    if len(channels) > limits.most_columns:
-        raise InvalidError(f"a file must not have more than {limits.most_columns} channels, got {len(channels)}")
+    limits.require_columns(len(channels))
     scales = [_scales(channel) for channel in channels]
     beside = {group.name: _stated({**file.properties, **group.properties}) for group in groups}
     clocks = [
@@ -97,11 +95,11 @@ def _stated(properties: Mapping[str, Any]) -> dict[str, float | str]:
 
 
 def _column(channel: Any, grouped: bool, clock: Clock | None) -> Column:
-    stated = next((str(channel.properties[name]) for name in _UNITS if channel.properties.get(name)), None)
     kind = "" if channel.dtype is None else channel.dtype.kind
     moments = kind == "M" or (kind in "OSU" and is_stamp(str(channel[0])))
-    column = column_of(channel.name, None if moments else stated, channel.group_name if grouped else "")
-    return replace(column, unit="s" if moments else column.unit, rows=len(channel), clock=clock)
+    group = channel.group_name if grouped else ""
+    column = column_of(channel.name, own_unit(channel.properties) or None, group, moments=moments)
+    return replace(column, rows=len(channel), clock=clock)
 
 
 def _clocks(channels: list[Any]) -> list[Clock | None]:
@@ -120,15 +118,12 @@ def _clock(channel: Any, start: Any, earliest: Any) -> Clock | None:
     if not step > 0 or (properties.get("wf_samples") == 1 and step == 1.0) or channel.dtype is None:
         return None
     unit = str(properties.get("wf_xunit_string") or "s").strip()
-    converted = conversion("time_s", unit)
-    if converted is None:
-        if str(properties.get("wf_xname") or "").strip().lower() in ("", "time"):
-            name, shown = channel.name[:MAX_QUOTED], unit[:MAX_QUOTED]
-            message = f"{name}: the unit of the waveform's time must be known, got {shown!r}"
-            raise InvalidError.of(message, code="unknown_unit")
+    axis = str(properties.get("wf_xname") or "").strip().lower()
+    if axis not in ("", "time") and conversion("time_s", unit) is None:
         return None
+    factor = in_seconds(1.0, unit, f"the times of {channel.name}")
     shift = 0.0 if start is None else float((np.datetime64(start) - np.datetime64(earliest)) / _SECOND)
-    rows, factor = len(channel), converted.factor
+    rows = len(channel)
     # a waveform without a start cannot be told from the others' start: its own key keeps it from passing for theirs
     key = (None if start is None and earliest is not None else shift, offset * factor, step * factor, rows)
     return Clock(

@@ -64,8 +64,7 @@ def _trimmed(row: Sequence[Any]) -> Sequence[Any]:
 
 
 def _table(name: str, rows: list[Sequence[Any]], layout: Layout, sheets: tuple[str, ...], limits: Limits) -> Table:
-    if len(layout.headings) > limits.most_columns:
-        raise InvalidError(f"a sheet must not have more than {limits.most_columns} columns, got {len(layout.headings)}")
+    limits.require_columns(len(layout.headings))
     data = DataRows(rows, layout)
     lines, held = data.of(enumerate(rows[layout.start :], layout.start + 1), 0, last=True)
 

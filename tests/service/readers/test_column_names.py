@@ -21,6 +21,7 @@ from service.readers.table import Choice, Column, Reading
         ("Lamellentemperatur hinten", "plate_temperature_rear_c"), ("plate", None),
         ("t", "time_s"), ("Zeit", "time_s"),
         ("N", None), ("P", None), ("T", None), ("m", None), ("Mz", None), ("", None), ("Temperatur", None),
+        ("-Torque", None), ("Torque/2", None), ("Torque^2", None), ("Motordrehzahl", None),
     ],
 )  # fmt: skip
 def test_names_are_known(name: str, channel: str | None) -> None:

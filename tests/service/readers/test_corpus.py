@@ -202,6 +202,17 @@ TEXTS: dict[str, tuple[str | bytes, str | None]] = {
                                       + rows(names=["time_s", "speed_rpm", "torque_nm", "pressure_bar"]), None),
     "rate-above.csv": ("Sample rate [kHz];0,1\nOperator;X\n\np [bar];n [rpm];M [Nm]\n" + rows(";", ",", PLATEAUS), None),
     "rate-in-a-comment.csv": ("# Sample rate: 100 Hz\np [bar],n [rpm],M [Nm]\n" + rows(names=PLATEAUS), None),
+    "parts-of-seconds-beside.csv": ("Datum;Uhrzeit;ms;p [bar];n [rpm];M [Nm]\n" + "".join(
+        f"02.11.2026;08:00:0{int(k > 5)};{(940 + 10 * k) % 1000};{line}\n"
+        for k, line in enumerate(rows(";", ",", PLATEAUS).splitlines())), None),
+    "the-stored-rate-of-two.csv": ("Sample rate [Hz],1000\nStorage rate [Hz],100\n\np [bar],n [rpm],M [Nm]\n"
+                                   + rows(names=PLATEAUS), None),
+    "means-among-rows.csv": (HEAD + ",Remark\n" + rows().replace("\n", ",\n")
+                             .replace("0.0600,", "0.03,5,600,20.5,average\n0.0600,")
+                             .replace("0.1100,", "1 Mean,5,1500,19.5,\n0.1100,"), None),
+    "a-status-in-words.csv": (HEAD + ",Status\n" + rows().replace("\n", ",OK\n") + "0.12,5,1000,0.0,FAULT\n", None),
+    "the-time-before-its-date.csv": (stamps('"%H:%M:%S.%f 02.11.2026"'), None),
+    "an-oil-pressure.asc": ("Time  1 - default sample rate;p_Oel;n;Md\ns;bar;U/min;Nm\n" + rows(";"), None),
     "interval-above.csv": ("Sampling interval,10ms\n\np [bar],n [rpm],M [Nm]\n" + rows(names=PLATEAUS), None),
     "six-rows-of-titles.csv": ("Kanal;K1;K2;K3\nZeit;Druck;Drehzahl;Moment\ns;bar;1/min;Nm\nFilter;TP 100 Hz;;\n"
                                "Ort;Kolben;Welle;Welle\n"
@@ -370,6 +381,34 @@ REFUSED = {
         "t [s];p [bar];n [rpm];Torque FZG [Nm];Torque HBM [Nm]\n0;5;100;1;2\n",
         None,
         "torque_nm must be one column, got Torque FZG and Torque HBM; map=torque_nm:NAME chooses one",
+    ),
+    "a-clock-in-whole-seconds": (
+        "Time,p [bar],n [rpm],M [Nm]\n" + "".join(f"08:00:0{k // 10},5,{k},20\n" for k in range(40)),
+        None,
+        "time_s stands still in 36 of 39 steps: the clock is coarser than the rows",
+    ),
+    "a-rate-of-more-samples-than-rows": (
+        "Sampling rate,1000 Hz\nThinning,1/20\n\n" + ",".join(PLATEAUS) + "\n" + rows(names=PLATEAUS),
+        None,
+        "one every 0.001 s, thinning = 1/20; a column of times says them",
+    ),
+    "a-counter-of-samples": (
+        "fs = 250 Hz\nIndex,"
+        + ",".join(PLATEAUS)
+        + "\n"
+        + "".join(f"{5 * k},{line}\n" for k, line in enumerate(rows(names=PLATEAUS).splitlines())),
+        None,
+        "Index counts in steps of 5",
+    ),
+    "a-duration-that-contradicts-the-rate": (
+        "Sample rate,1000 Hz\nDuration,8 s\nSamples,12\n\n" + ",".join(PLATEAUS) + "\n" + rows(names=PLATEAUS),
+        None,
+        "one every 0.001 s, 8 s for 12 samples",
+    ),
+    "gains-above-a-table": (
+        "Channel,Gain,Offset\nPressure,0.001,0\nTorque,0.01,0\n\np [bar],M [Nm]\n3995,1731\n",
+        None,
+        "the line 'Gain' holds factors",
     ),
     "two-times-that-differ": (
         "Timestamp;Time (s);M [Nm]\n" + "".join(f"2026-11-02 08:00:0{s};{2 * s};1\n" for s in range(5)),
