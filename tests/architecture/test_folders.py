@@ -7,10 +7,7 @@ import pytest
 
 from tests.architecture.source import PACKAGES, ROOT, modules, none_of
 
-#: An introduction says what goes in, what comes out, and which file of the folder to open first, as in "In: arrays. Out:
-#: bytes. Open `codec.py` first." or "Arrays go in, bytes come out: `codec` first, then the others."
-GOES_IN = re.compile(r"\bin:|\bgo(?:es)?\s+in\b|\bin\s+go(?:es)?\b|\bin,.*\bout\b", flags=re.IGNORECASE | re.DOTALL)
-COMES_OUT = re.compile(r"\bout:|\bcomes?\s+out\b|\bout\s+comes?\b|\bin,.*\bout\b", flags=re.IGNORECASE | re.DOTALL)
+#: An introduction says which file of the folder to open first.
 OPEN_FIRST = re.compile(
     r"\bOpen\s+`?([\w/]+)"
     r"|`([\w/]+)(?:\.py)?`(?:\s+\([^)]*\))?\s+first\b"
@@ -25,8 +22,6 @@ def lacks(introduction: str, files: set[str]) -> list[str]:
     first = "" if opened is None else next(filter(None, opened.groups())).split("/")[0]
     lacking = [
         (len(SENTENCE.findall(introduction)) >= 2, "two sentences"),
-        (GOES_IN.search(introduction) is not None, '"In: ..."'),
-        (COMES_OUT.search(introduction) is not None, '"Out: ..."'),
         (opened is not None, '"Open `file.py` first"'),
         (opened is None or first in files, f"the file {first!r} that it names"),
     ]

@@ -1,6 +1,9 @@
 """The examples for larger installations hold together: what one part refers to is there, and its commands are ours."""
 
+import hashlib
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -11,6 +14,7 @@ import typer
 import yaml
 
 from service.cli.main import app
+from tests.architecture.source import ROOT
 
 DOCKER = Path(__file__).parents[2] / "docker"
 COMPOSE = sorted(DOCKER.glob("compose*.yaml"))
@@ -163,3 +167,36 @@ def test_services_are_told_of_the_database_the_store_and_how_to_reach_it() -> No
         == (compose["objects"]["environment"]["GARAGE_DEFAULT_BUCKET"])
     )
     assert f'"{compose["clutchlife"]["environment"]["AWS_REGION"]}"' in (DOCKER / "scale" / "garage.toml").read_text()
+
+
+# --- What filterpy declares for its plots, and no part of the product imports, is installed for the tests alone.
+
+LOCKS = sorted(
+    [
+        *(ROOT / "docker").glob("requirements*.txt"),
+        *(ROOT / "docs").glob("*.txt"),
+        *(ROOT / "tests").glob("requirements-*.txt"),
+    ]
+)
+UNUSED = ("matplotlib", "contourpy", "cycler", "fonttools", "kiwisolver", "pillow")
+
+
+@pytest.mark.parametrize("lock", LOCKS, ids=lambda path: path.name)
+def test_no_lock_installs_what_draws_plots(lock: Path) -> None:
+    lines = lock.read_text(encoding="utf-8").splitlines()
+    assert any("==" in line for line in lines), "nothing is locked"
+    assert [line for line in lines if line.startswith(tuple(f"{name}==" for name in UNUSED))] == []
+
+
+def test_the_oldest_releases_were_tried() -> None:
+    """`make lowest` notes which lock it has passed on; another asks for another run of it."""
+    tried = (ROOT / "tests" / "lowest.tried").read_text(encoding="utf-8").split()[0]
+    lock = (ROOT / "tests" / "requirements-lowest.txt").read_bytes()
+    assert tried == hashlib.sha256(lock).hexdigest(), "run make lowest"
+
+
+def test_the_unscented_filter_is_imported_without_them() -> None:
+    blocked = (
+        f"import sys; sys.modules.update(dict.fromkeys({UNUSED!r} + ('PIL',))); import models.tracking.filters.ukf"
+    )
+    subprocess.run([sys.executable, "-c", blocked], cwd=ROOT, check=True)

@@ -146,10 +146,7 @@ def commands() -> str:
     parts = []
     for name, command in walk():
         rows = [
-            [
-                ", ".join(f"`{each}`" for each in _names(option)),
-                _meaning(option),
-            ]
+            [", ".join(f"`{each}`" for each in _names(option)), _meaning(option)]
             for option in command.params
             if not getattr(option, "hidden", False)
         ]

@@ -75,10 +75,7 @@ def branches() -> str:
                 title="mean of 200 sweeps",
                 x_label="sliding speed [mm/s]",
                 y_label="traction [-]",
-                series=[
-                    Series(x=grid, y=down.mean(axis=0), name="down"),
-                    Series(x=grid, y=up.mean(axis=0), name="up"),
-                ],
+                series=[Series(x=grid, y=down.mean(axis=0), name="down"), Series(x=grid, y=up.mean(axis=0), name="up")],
             ),
             Panel(
                 title="up less down, by sweeps",

@@ -16,7 +16,7 @@ from tests.support import ONCE, Server, clutchlife, serving
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated campaign as files."""
     folder = tmp_path_factory.mktemp("campaign")
-    output = clutchlife("simulate", "--seed", "7", "--no-dynamic", "--tests", "8", "--out", folder)
+    output = clutchlife("simulate", "--seed", "7", "--no-dynamic", "--tests", "4", "--out", folder)
     assert "simulated" in output
     return folder
 

@@ -71,12 +71,7 @@ class Options:
 def run(options: Options, folder: Path) -> Loaded:
     """The load, and what is left of it."""
     lives = [
-        life(
-            options.seed + number,
-            raw=folder if options.raw else None,
-            tests=options.tests,
-            samples=options.samples,
-        )
+        life(options.seed + number, raw=folder if options.raw else None, tests=options.tests, samples=options.samples)
         for number in range(options.rigs)
     ]
     with ExitStack() as stack:

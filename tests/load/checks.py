@@ -93,15 +93,7 @@ def replay_differences(loaded: Server, clutch_ids: Sequence[str]) -> list[str]:
     line = Blocking(loaded.port)
     before = {clutch_id: answered(line, clutch_id) for clutch_id in clutch_ids}
     line.close()
-    command = [
-        sys.executable,
-        "-m",
-        "service.cli.main",
-        "replay",
-        *clutch_ids,
-        "--database",
-        loaded.address,
-    ]
+    command = [sys.executable, "-m", "service.cli.main", "replay", *clutch_ids, "--database", loaded.address]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         return [f"replay ended with {done.returncode}: {done.stderr[-160:]}"]

@@ -102,10 +102,7 @@ UNPLUGGED: dict[str, Slip] = {
     "temperature at -273": _dead("oil_temperature_c", lambda _, values: 0.0 * values - 273.0),
     "temperature railed": _dead("oil_temperature_c", _about(850.0, 0.1)),
 }
-CYCLES: dict[str, Slip] = {
-    "cycles x 10": zero_too_many,
-    "swapped digits": swapped_digits,
-}
+CYCLES: dict[str, Slip] = {"cycles x 10": zero_too_many, "swapped digits": swapped_digits}
 #: Slips that nobody demanded.
 OTHERS: dict[str, Slip] = {"cycles / 10": zero_lost, "a wrong digit": wrong_digit, "torque at a wrong gain": wrong_gain}
 

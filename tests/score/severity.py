@@ -5,7 +5,7 @@ import numpy as np
 from service.lives.assumptions import Assumptions
 from service.lives.criteria import SEVERITY_EXPONENTS
 from service.lives.severity_estimate import severity_estimate
-from tests.service.lives.test_severity_estimate import SCATTER, TESTS, life
+from tests.service.lives.test_assumptions import SCATTER, TESTS, life
 
 #: The energy of a cycle by stage of life [J]: what is said of large steps, and of small ones.
 STEPS = {"10, 20, 40 kJ": (10e3, 20e3, 40e3), "20, 24 kJ": (20e3, 24e3)}

@@ -112,9 +112,7 @@ def sampled(
     """`count` draws of equal weight out of weighted points, with their linear terms drawn given each."""
     weight = np.exp(log_weight - log_weight.max())
     index = sampling.systematic(weight, count, 0.5)
-    kept = Points(
-        **{name: getattr(points, name)[..., index] for name in Points.__slots__},
-    )
+    kept = Points(**{name: getattr(points, name)[..., index] for name in Points.__slots__})
     history = History.of(measurements, prior)
     rng = np.random.default_rng(1)
     solved, weight = linear_model.pointwise(history, prior, kept), np.full(count, 1.0 / count)
@@ -202,11 +200,7 @@ def exact(
     form, group = rng.choice(FORM_SIZE.size, size=count, p=forms), rng.choice(chances.size, size=count, p=chances)
     back = proposed @ np.linalg.inv(TURN)
     points = Points(
-        log_scale=back[:, 0],
-        log_exponent=back[:, 1],
-        log_scatter=back[:, 2],
-        form=form,
-        outlying=sets[group].T,
+        log_scale=back[:, 0], log_exponent=back[:, 1], log_scatter=back[:, 2], form=form, outlying=sets[group].T
     )
     log_weight, effective_count = weighted(
         prior, measurements, points, near + np.log(forms)[form] + np.log(chances)[group]

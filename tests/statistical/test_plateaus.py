@@ -43,15 +43,7 @@ def _assert_calibrated(misses: FloatArray) -> None:
 
 @pytest.mark.parametrize(
     ("rate", "memory"),
-    [
-        (10.0, 0.0),
-        (10.0, 0.5),
-        (100.0, 0.0),
-        (100.0, 0.9),
-        (1000.0, 0.0),
-        (1000.0, 0.95),
-        (2000.0, 0.9),
-    ],
+    [(10.0, 0.0), (10.0, 0.5), (100.0, 0.0), (100.0, 0.9), (1000.0, 0.0), (1000.0, 0.95), (2000.0, 0.9)],
 )
 def test_deviations_cover_under_white_and_coloured_noise(rate: float, memory: float) -> None:
     rng = np.random.default_rng([SEED, int(rate), int(100 * memory)])

@@ -35,12 +35,7 @@ SLUGS = tuple(slug for slug in CATALOGUED if slug not in {"shaft_ripple", "stick
 #: Effects that only loops show.
 LOOPS = {"channel_delay", "inertia_torque", "squeeze_film"}
 _MIDDLE, _AREA = 0.5 * 1970 * RPM * 0.058, 2 * np.pi / 4 * (0.133**2 - 0.099**2)
-_PER_UNIT = {
-    "oil_change": 100.0,
-    "running_in": 100.0,
-    "rest_recovery": 100.0,
-    "channel_delay": 1000.0,
-}
+_PER_UNIT = {"oil_change": 100.0, "running_in": 100.0, "rest_recovery": 100.0, "channel_delay": 1000.0}
 
 
 @dataclass(frozen=True)

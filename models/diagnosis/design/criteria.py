@@ -43,7 +43,7 @@ REVERSES = 0.03
 #: A loop is in its periodic state after this share of a period [-] and at least this time [s], less where no whole period
 #: would follow. The time: friction lags by S/C; where C is a tenth of the nominal clutch's that is 0.6 s, and after a second
 #: what was left of a start at rest passed for a C that is 4 % too small and a channel that is 6 ms early. Of 1, 2, 3, 4 and
-#: 5 s the shortest that leaves a tenth of the noise of a rig of 0.1 % (tests/models/diagnosis/design/test_loop_bins.py).
+#: 5 s the shortest that leaves a tenth of the noise of a rig of 0.1 % (tests/models/diagnosis/design/test_points.py).
 SETTLING_SHARE = 0.06
 SETTLING_TIME = 3.0
 #: Filled bins that a loop must have.

@@ -46,10 +46,7 @@ def test_a_diagnosis_whose_service_is_killed_is_made_by_the_next(tmp_path: Path)
 
 
 def test_a_stop_does_not_wait_for_a_diagnosis(tmp_path: Path) -> None:
-    with (
-        serving(tmp_path / "clutchlife.db") as server,
-        httpx2.Client(base_url=server.url, timeout=60) as http,
-    ):
+    with serving(tmp_path / "clutchlife.db") as server, httpx2.Client(base_url=server.url, timeout=60) as http:
         post_tests(http, 0, 1000, 2000)
         http.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=0"})
         while not processes(server.address):

@@ -51,8 +51,7 @@ class Watched:
         parameters = {"kind": "dynamic_stribeck", "cycles": "0", "filename": name} | query
         answers: list[httpx2.Response] = []
         grown = added(
-            self._pid,
-            lambda: answers.append(self.http.post(f"{CLUTCH}/runs/file", params=parameters, content=content)),
+            self._pid, lambda: answers.append(self.http.post(f"{CLUTCH}/runs/file", params=parameters, content=content))
         )
         return answers[0], grown
 

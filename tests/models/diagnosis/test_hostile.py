@@ -118,12 +118,7 @@ def _dynamic(rng: np.random.Generator, number: int, rows: int, scale: float, sha
     return DynamicRun(
         run_id=f"d{number}",
         cycles=float(rng.choice([0.0, 100.0])),
-        record=Record(
-            time=time,
-            pressure=np.full(rows, 5e5),
-            speed=speed,
-            torque=_torque(rng, speed, scale, shape),
-        ),
+        record=Record(time=time, pressure=np.full(rows, 5e5), speed=speed, torque=_torque(rng, speed, scale, shape)),
     )
 
 

@@ -140,13 +140,7 @@ def test_a_drift_over_periods_is_no_area():
     assert loop.area == pytest.approx(closed_form(), rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"duration": 9.5}, "No whole period"),
-        ({"frequency": 0.001}, ""),
-    ],
-)
+@pytest.mark.parametrize(("change", "words"), [({"duration": 9.5}, "No whole period"), ({"frequency": 0.001}, "")])
 def test_nothing_closed_is_said(change, words):
     loop = only(evaluate_loops(record([lambda t: 20 + 0 * t], [5e5], **change), GEOMETRY, None))
     assert loop.status is LoopStatus.NO_PERIOD

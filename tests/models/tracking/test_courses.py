@@ -1,13 +1,16 @@
-"""Courses of either sign of φ and ε: the kinetics that they obey, their coordinates, and their prior probabilities."""
+"""Courses and their knees, the model's discrepancy, and both as one linear model."""
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from models.degradation.general_order import Degradation, first_passage, progress_fraction, value
+from models.prognosis.first_passage import ends_of_life, predict_first_passage, weighted_quantiles
+from models.tracking import linear_model, sampling
 from models.tracking.courses import (
     FORM_COURSE,
     FORM_PROPORTIONAL,
@@ -24,8 +27,20 @@ from models.tracking.courses import (
     place_of,
     unit_of_change,
 )
+from models.tracking.criteria import KNEE_HAZARD
+from models.tracking.discrepancy import PAST, Discrepancy, drawn, smooth
+from models.tracking.filters.grid import Grid
+from models.tracking.filters.particle import Particle
+from models.tracking.filters.ukf import Ukf
+from models.tracking.history import History
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
-from tests.models.tracking.tracked_series import CAMPAIGN, PRIOR
+from tests import dense
+from tests.models.tracking.tracked_series import CAMPAIGN, NAMES, PRIOR, TYPICAL, followed, series
+
+# --- Courses of either sign of φ and ε: the kinetics that they obey, their coordinates, and their prior
+# probabilities.
 
 SIGNED = [(3_000.0, 0.7), (-9_000.0, -0.5), (-9_000.0, -2.0), (3_000.0, -2.0), (-9_000.0, 0.8)]
 
@@ -98,3 +113,253 @@ def test_what_may_rise_or_fall_is_tracked_by_eq_6_alone() -> None:
     """The Stribeck parameters, whose law the paper states."""
     assert weak(CAMPAIGN[0], falling=False).eq_6_share == 1.0
     assert weak(CAMPAIGN[0], falling=True).eq_6_share < 1.0
+
+
+# --- The discrepancy beside eq. 6: its size, lives of another law, and steps at events.
+
+
+def test_a_course_has_the_deviation_that_its_size_says() -> None:
+    """q · size at the end of what was measured (but for the corners of its stretches, 1/72 of it), (ζ/T)^1.5 of it
+    later on, up to ten times as far."""
+    variance = np.square(smooth(np.array([1.0, 4.0, 9.0, 500.0]) * 7e3, 7e3)).sum(axis=1)
+    np.testing.assert_allclose(np.sqrt(variance), [1.0, 8.0, 27.0, 10.0**1.5], rtol=0.015)
+    assert not smooth(np.array([0.0]), 7e3).any()
+
+
+def test_what_was_measured_bends_as_the_course_beyond_it_does() -> None:
+    """Up to T each draw's own time is ζ, and its δ a sum of terms; beyond, it is led on from stretch to stretch. Where both
+    hold they are the same, on both sides of a step of the level."""
+    rng, progress = np.random.default_rng(1), np.array([0.0, 900.0, 4_000.0, 4_001.0, 7_000.0])
+    beside = Discrepancy(
+        span=7_000.0,
+        size=np.full(50, 0.1),
+        curvature=rng.standard_normal((50, 22)),
+        at=np.array([4_000.5]),
+        height=rng.standard_normal((50, 1)),
+        knee=np.full(50, np.inf),
+        steepening=np.ones(50),
+    )
+    own = np.repeat(progress[:, None], 50, axis=1)
+    np.testing.assert_allclose(beside.measured(progress), beside(own, progress[:, None]), rtol=0, atol=1e-13)
+    assert np.abs(beside.measured(progress) - replace(beside, height=-beside.height).measured(progress)).max() > 1.0
+
+
+def test_a_straight_line_is_no_eq_6_and_the_data_say_so() -> None:
+    """COF falls on a line to 40 % of its loss, where eq. 6 would bend: the end of life is held, and is not by filters
+    that are sure of eq. 6."""
+    progress = np.linspace(0.0, 6_000.0, 20)
+    rng = np.random.default_rng(4)
+    values = 0.1 * (1.0 - 5e-5 * progress) * (1.0 + 0.002 * rng.standard_normal(20))
+    line = [Measurement(progress=z, value=y, variance=1e-9) for z, y in zip(progress, values, strict=True)]
+    prior = weak(line[0], falling=True)
+    for tracker in (Grid(), Particle(), Ukf()):
+        posterior = tracker.posterior(followed(tracker, prior, line), 1_000, np.random.default_rng(2))  # type: ignore[arg-type]
+        found = predict_first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life
+        assert found[0.05] is not None
+        assert found[0.05] < 10_000.0 < (found[0.95] or math.inf)
+    sure = Grid().from_history(replace(prior, law_share=1.0, eq_6_share=1.0), line)
+    told = predict_first_passage(Grid().posterior(sure, 1_000, np.random.default_rng(2)), fraction=0.5, as_of=6_000.0)
+    assert told.end_of_life[0.05] is not None
+    assert told.end_of_life[0.05] > 10_000.0
+
+
+@pytest.mark.parametrize("tracker", [Grid(), Particle(), Ukf()], ids=NAMES)
+def test_after_an_event_the_forecast_widens_and_then_settles(tracker: Any) -> None:
+    """The level has stepped by 6 % at an oil change, after 12 runs: one run later the forecast is at least half as wide
+    again as it would be without an event, and narrows with the runs that follow. The step is found."""
+    progress = np.linspace(0.0, 12_000.0, 25)
+    before = series(TYPICAL, progress, 3e-4)
+    after = [m if i < 12 else replace(m, value=m.value + 0.06 * 0.134, epoch=1) for i, m in enumerate(before)]
+
+    def width(measurements: list[Measurement]) -> float:
+        posterior = tracker.posterior(followed(tracker, PRIOR, measurements), 2_000, np.random.default_rng(1))
+        ends = predict_first_passage(posterior, fraction=0.5, as_of=measurements[-1].progress).end_of_life
+        assert ends[0.05] is not None
+        return (ends[0.95] or 1e6) - ends[0.05]
+
+    assert width(after[:13]) > 1.5 * width(before[:13])
+    assert width(after) < 0.5 * width(after[:13])
+    posterior = tracker.posterior(followed(tracker, PRIOR, after), 2_000, np.random.default_rng(1))
+    step = posterior.moments(posterior.discrepancy.height.sum(axis=1))
+    assert step[0] == pytest.approx(0.06 * 0.134, abs=3.0 * step[1])
+    assert step[1] < 0.3 * 0.06 * 0.134
+
+
+def test_a_course_goes_on_along_its_knee_from_there_on() -> None:
+    """From ζ = 1,500 on at four times the mean pace until then, which is a line's own; before, nothing changes."""
+    line = Posterior(
+        weight=np.full(2, 0.5),
+        initial=np.full(2, 0.1),
+        change=np.full(2, -0.1),
+        scale=np.full(2, -10_000.0),
+        exponent=np.full(2, -1.0),
+        scatter=np.full(2, 0.001),
+        discrepancy=Discrepancy(
+            span=1_000.0,
+            size=np.full(2, 0.01),
+            curvature=np.zeros((2, 22)),
+            at=np.zeros(0),
+            height=np.zeros((2, 0)),
+            knee=np.array([1_500.0, np.inf]),
+            steepening=np.full(2, 4.0),
+        ),
+    )
+    at = np.array([0.0, 1_000.0, 1_500.0, 2_000.0])
+    np.testing.assert_allclose(line.values(at).T, [[0.1, 0.09, 0.085, 0.06], [0.1, 0.09, 0.085, 0.08]], atol=1e-12)
+    assert ends_of_life(line, 0.5) == pytest.approx([2_200.0, 5_000.0], rel=2e-3)
+
+
+def test_knees_come_as_their_hazard_has_it_and_eq_6_alone_has_none() -> None:
+    prior = weak(Measurement(progress=0.0, value=0.1, variance=0.0), falling=True)
+    history = History.of([Measurement(progress=x, value=0.1, variance=0.0) for x in (0.0, 2_000.0)], prior)
+    sizes = np.repeat([0.0, 0.03], 20_000)
+    beside = drawn(history, prior, sizes, np.zeros((sizes.size, PAST)), np.random.default_rng(4))
+    assert np.isinf(beside.knee[:20_000]).all()
+    for ahead in (1.5, 3.0):
+        assert (beside.knee[20_000:] > ahead * 2_000.0).mean() == pytest.approx(ahead**-KNEE_HAZARD, abs=0.015)
+    assert beside.knee.min() >= 2_000.0
+    parameter = weak(Measurement(progress=0.0, value=0.1, variance=0.0), falling=False)
+    assert np.isinf(drawn(history, parameter, sizes, np.zeros((sizes.size, PAST)), np.random.default_rng(4)).knee).all()
+
+
+def test_the_first_signs_of_a_knee_move_the_answer_within_two_tests() -> None:
+    """An even course that goes six times as fast from 7,000 cycles on and ends at 10,000, a test every 400."""
+    rng = np.random.default_rng(1)
+    at = np.arange(0.0, 8_000.1, 400.0)
+    share = np.where(at < 7_000.0, 0.4e-4 * at, 0.28 + 2.4e-4 * (at - 7_000.0))
+    values = 0.1 * (1.0 - 0.5 * share) * (1.0 + 0.003 * rng.standard_normal(at.size))
+    tests = [Measurement(progress=x, value=y, variance=1e-9) for x, y in zip(at.tolist(), values.tolist(), strict=True)]
+    said = []
+    for count in (18, 20):
+        posterior = Grid().posterior(Grid().from_history(weak(tests[0], falling=True), tests[:count]), 1_000, rng)
+        said.append(weighted_quantiles(np.minimum(ends_of_life(posterior, 0.5), 1e6), posterior.weight, (0.05, 0.5)))
+    (_, before), (low, after) = said
+    assert before > 15_000.0
+    assert low < 10_000.0
+    assert after < 12_000.0
+
+
+# --- The closed form of ξ0, Δ and the further terms, against the whole normal distribution of the data.
+
+PROGRESS = np.linspace(0.0, 12_000.0, 13)
+
+
+VALUES = value(PROGRESS, Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7))
+
+
+CAMPAIGN_here = [
+    Measurement(progress=float(z), value=float(y), variance=1e-8) for z, y in zip(PROGRESS, VALUES, strict=True)
+]
+
+
+PRIOR_here = weak(CAMPAIGN_here[0], falling=True)
+
+
+#: Three of eq. 6, with q of 0, 0.03 and 0.1, and one of every other course; of two the scatter is a share of the value.
+POINTS = linear_model.Points(
+    log_scale=np.array([8.5, 7.0, 10.0, 9.6, 8.0, 9.9, 8.5, 7.5]),
+    log_exponent=np.array([-0.3, 0.4, -1.0, -0.7, 0.5, 0.1, 0.0, 0.0]),
+    log_scatter=np.array([-8.0, -6.5, -9.0, -8.0, -7.5, -8.5, -8.0, -8.0]),
+    form=np.array([0, 2, 3, 5, 10 + 24, 12, 19 + 24, 21]),
+    outlying=np.eye(13)[:, [4, 4, 12, 4, 5, 4, 3, 6]] * [0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0],
+)
+COUNT = POINTS.form.size
+
+
+#: The last four runs come after an event.
+EPOCHS = [replace(each, epoch=int(index > 8)) for index, each in enumerate(CAMPAIGN_here)]
+
+
+def normal(point: int, measurements: list[Measurement]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and covariance of the measurements at one of POINTS, all linear terms integrated out."""
+    means, covariances = dense.normal(PRIOR_here, measurements, POINTS)
+    return means[point], covariances[point]
+
+
+@pytest.mark.parametrize("measurements", [CAMPAIGN_here, EPOCHS], ids=["one epoch", "two epochs"])
+def test_evidence_is_that_of_the_whole_normal(measurements: list[Measurement]) -> None:
+    """All linear terms integrated out, the data are normal; δ's covariance comes from quadrature here."""
+    history = History.of(measurements, PRIOR_here)
+    found = linear_model.evidence(linear_model.pointwise(history, PRIOR_here, POINTS)[0], PRIOR_here)
+    for point, log_probability in enumerate(found):
+        mean, covariance = normal(point, measurements)
+        expected = multivariate_normal(mean, covariance).logpdf(history.value)
+        assert log_probability == pytest.approx(expected, abs=2e-3)
+
+
+def test_conditional_is_that_of_the_whole_normal() -> None:
+    """(ξ0, Δ) and the data are jointly normal: condition on the data."""
+    history = History.of(EPOCHS, PRIOR_here)
+    given = linear_model.conditional(linear_model.pointwise(history, PRIOR_here, POINTS)[0], PRIOR_here)
+    for point in range(COUNT):
+        mean, covariance = normal(point, EPOCHS)
+        b = (mean - PRIOR_here.initial_mean) / PRIOR_here.change_mean
+        prior = np.diag([PRIOR_here.initial_sd**2, PRIOR_here.change_sd**2])
+        cross = prior @ np.stack([np.ones_like(b), b])
+        gain = np.linalg.solve(covariance, cross.T).T
+        expected = np.array([PRIOR_here.initial_mean, PRIOR_here.change_mean]) + gain @ (history.value - mean)
+        spread = prior - gain @ cross.T
+        np.testing.assert_allclose([given.initial[point], given.change[point]], expected, rtol=1e-4)
+        found = [given.initial_variance[point], given.covariance[point], given.change_variance[point]]
+        np.testing.assert_allclose(found, spread[[0, 0, 1], [0, 1, 1]], rtol=2e-3)
+
+
+def test_the_table_and_the_points_are_one_sum() -> None:
+    history = History.of(EPOCHS, PRIOR_here)
+    table = basis(history.progress[:, None], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
+    levels = np.array([-8.0, -7.0])
+    forms, outlying = np.array([0, 2 + 24]), np.eye(13)[:, [0, 5]]
+    tabled = linear_model.evidence(
+        linear_model.tabulated(history, PRIOR_here, table, np.stack([levels, levels]), forms, outlying), PRIOR_here
+    )
+    for kind, level in np.ndindex(2, 2):
+        points = replace(
+            POINTS,
+            log_scatter=np.full(COUNT, levels[level]),
+            form=np.full(COUNT, forms[kind]),
+            outlying=np.repeat(outlying[:, kind : kind + 1], COUNT, axis=1),
+        )
+        pointed = linear_model.evidence(linear_model.pointwise(history, PRIOR_here, points, table)[0], PRIOR_here)
+        np.testing.assert_allclose(tabled[kind, level], pointed, rtol=1e-9)
+
+
+@pytest.mark.parametrize("measurements", [CAMPAIGN_here, EPOCHS], ids=["one epoch", "two epochs"])
+def test_the_last_run_turned_outlying_is_that_of_all_sums_anew(measurements: list[Measurement]) -> None:
+    """With one epoch the first point has no further terms, with two all have."""
+    history = History.of(measurements, PRIOR_here)
+    sound = replace(POINTS, outlying=POINTS.outlying * (np.arange(13) < 12)[:, None])
+    outlying = replace(sound, outlying=sound.outlying + (np.arange(13) == 12)[:, None])
+    sums, terms = linear_model.pointwise(history, PRIOR_here, sound)
+    last = basis(history.progress[-1], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
+    turned = linear_model.last_outlying(history, PRIOR_here, sound, sums, terms, last)
+    anew = linear_model.pointwise(history, PRIOR_here, outlying)[0]
+    for name, found in asdict(turned).items():
+        np.testing.assert_allclose(found, getattr(anew, name), rtol=1e-9, err_msg=name)
+
+
+def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
+    """Mean and variance of δ at the last run given the data, from 20,000 draws, against conditioning the joint normal."""
+    history = History.of(CAMPAIGN_here, PRIOR_here)
+    count = 20_000
+    points = linear_model.Points(
+        log_scale=np.full(count, 7.0),
+        log_exponent=np.full(count, 0.4),
+        log_scatter=np.full(count, -6.5),
+        form=np.full(count, 2),
+        outlying=np.repeat(POINTS.outlying[:, 1:2], count, axis=1),
+    )
+    sums, terms = linear_model.pointwise(history, PRIOR_here, points)
+    given = linear_model.conditional(sums, PRIOR_here)
+    rng = np.random.default_rng(0)
+    pair = sampling.correlated_pair(
+        rng.standard_normal((count, 2)), given.initial_variance, given.change_variance, given.covariance
+    )
+    initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
+    drawn = linear_model.drawn_terms(terms, initial - PRIOR_here.initial_mean, change, rng.standard_normal((count, 6)))
+    at_end = drawn @ smooth(history.progress, history.span, 6)[-1]
+    mean, covariance = normal(1, CAMPAIGN_here)
+    cross = (0.03 * 0.134) ** 2 * dense.integrated(PROGRESS)[-1]
+    gain = np.linalg.solve(covariance, cross)
+    sd = math.sqrt((0.03 * 0.134) ** 2 * dense.integrated(PROGRESS)[-1, -1] - gain @ cross)
+    assert at_end.mean() == pytest.approx(gain @ (history.value - mean), abs=4.0 * sd / math.sqrt(count))
+    assert at_end.std() == pytest.approx(sd, rel=0.03)

@@ -1,4 +1,4 @@
-"""The prior as numbers, and what the weak one covers."""
+"""Priors, measurements and histories check themselves; draws are even and as correlated as they should be."""
 
 import math
 from dataclasses import replace
@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 
 from models.prognosis.first_passage import predict_first_passage
+from models.tracking import sampling
 from models.tracking.filters.grid import Grid
+from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior, weak
-from tests.models.tracking.tracked_series import (
-    CAMPAIGN,
-    PRIOR,
-    TYPICAL,
-    series,
-)
+from tests.models.tracking.tracked_series import CAMPAIGN, PRIOR, TYPICAL, series
+
+# --- The prior as numbers, and what the weak one covers.
 
 
 def test_a_prior_survives_its_array_and_checks_itself() -> None:
@@ -62,3 +61,52 @@ def test_the_weak_prior_is_what_it_says() -> None:
     assert (math.exp(prior.log_scatter_mean), prior.log_scatter_sd) == (pytest.approx(6e-4), 0.8)
     rising = weak(Measurement(progress=0.0, value=0.2, variance=0.0), falling=False)
     assert (rising.change_mean, rising.change_sd) == (0.0, pytest.approx(0.2))
+
+
+# --- Measurements check themselves.
+
+
+@pytest.mark.parametrize("numbers", [(-1.0, 0.1, 0.0), (0.0, math.nan, 0.0), (0.0, 0.1, -1e-9), (math.inf, 0.1, 0.0)])
+def test_measurements_check_themselves(numbers: tuple[float, float, float]) -> None:
+    with pytest.raises(ValueError, match="must"):
+        Measurement(progress=numbers[0], value=numbers[1], variance=numbers[2])
+
+
+# --- The resolution of values.
+
+
+def test_values_are_resolved_to_their_resolution_and_no_finer() -> None:
+    history = History.of(CAMPAIGN[:1], PRIOR)
+    resolution = 1e-6 * math.hypot(PRIOR.initial_sd, PRIOR.change_sd)
+    assert history.variance[0] == pytest.approx(1e-8 + resolution**2, rel=1e-12)
+    assert history.variance[0] > 1e-8
+
+
+# --- Draws with less noise than independent ones.
+
+
+def test_systematic_draws_share_out_the_weights() -> None:
+    weight = np.array([0.5, 0.0, 0.3, 0.2])
+    for offset in (0.0, 0.5, 0.999):
+        assert np.bincount(sampling.systematic(weight, 10, offset), minlength=4).tolist() == [5, 0, 3, 2]
+
+
+def test_spread_points_are_more_even_than_chance() -> None:
+    """The share of 200 corners of the cube: these points err by less than half of what independent ones do."""
+    rng = np.random.default_rng(0)
+    edges = rng.random((200, 3))
+    points = sampling.spread_points(1_000, np.full(3, 0.5))
+    assert points.min() > 0.0
+    assert points.max() < 1.0
+
+    def error(sample: np.ndarray) -> float:
+        shares = (sample[None] < edges[:, None]).all(axis=2).mean(axis=1)
+        return float(np.sqrt(np.mean((shares - edges.prod(axis=1)) ** 2)))
+
+    assert error(points) < 0.5 * error(rng.random((1_000, 3)))
+
+
+def test_correlated_pairs_have_their_covariance() -> None:
+    normals = sampling.spread_normals(20_000, np.full(2, 0.5))
+    pair = sampling.correlated_pair(normals, np.full(20_000, 4.0), np.full(20_000, 1.0), np.full(20_000, -1.5))
+    np.testing.assert_allclose(np.cov(pair, rowvar=False), [[4.0, -1.5], [-1.5, 1.0]], atol=0.02)

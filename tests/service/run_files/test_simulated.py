@@ -20,9 +20,11 @@ from models.rig.sampled import DynamicTest, RawTest
 from models.rig.simulated_runs import SimulatedRun
 from models.rig.stationary import SHARP
 from service.lives.incoming_run import sampled_record, stationary_plateaus
+from service.readers import sandbox
+from service.readers.detect import Format
 from service.run_files import manifest
 from service.run_files.json_run import read_run
-from service.run_files.record_writer import RecordFormat, write_record
+from service.run_files.record_writer import RecordFormat, require_writer, write_record
 from service.run_files.simulated import simulated_body, simulated_channels, simulated_head
 from service.run_files.upload import read_file_run
 from tests.support import clutchlife, one_quick
@@ -125,3 +127,20 @@ def test_options_leave_out_and_put_in(tmp_path: Path) -> None:
     bodies = {path.stem: json.loads(path.read_bytes()) for path in tmp_path.glob("sim-*.json")}
     assert set(bodies) == {"sim-7-run-in-00000", "sim-7-stationary-00000"}
     assert len(bodies["sim-7-stationary-00000"]["channels"]["time_s"]) == 28_000
+
+
+# --- Writing a record file without the package that its format needs.
+
+
+@pytest.mark.parametrize(("form", "kind"), [(RecordFormat.TDMS, Format.TDMS), (RecordFormat.MDF4, Format.MDF4)])
+def test_a_missing_package_is_named_with_its_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form: RecordFormat, kind: Format
+) -> None:
+    module, _, extra = sandbox.READERS[kind]
+    monkeypatch.setitem(sandbox.READERS, kind, (module, "no_such_package", extra))
+    with pytest.raises(ValueError, match="pip install -e"):
+        require_writer(form)
+    with pytest.raises(ValueError, match="is not written here"):
+        write_record(tmp_path / "a", form, {"torque_nm": np.ones(2)}, {})
+    assert list(tmp_path.iterdir()) == []
+    require_writer(RecordFormat.CSV)

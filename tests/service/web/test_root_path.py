@@ -43,8 +43,7 @@ def test_the_next_page_is_named_as_the_proxy_finds_it(proxied: tuple[TestClient,
 
 
 @pytest.mark.parametrize(
-    ("asked", "leads_to"),
-    [("/v1/clutches/", "/v1/clutches"), ("/clutches/c1/", "/clutches/c1"), ("/docs/", "/docs")],
+    ("asked", "leads_to"), [("/v1/clutches/", "/v1/clutches"), ("/clutches/c1/", "/clutches/c1"), ("/docs/", "/docs")]
 )
 def test_a_redirect_keeps_the_path_and_names_no_host(
     proxied: tuple[TestClient, str], asked: str, leads_to: str

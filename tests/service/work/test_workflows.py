@@ -1,4 +1,4 @@
-"""Replays and fleet refreshes as jobs: asked for, done in a process of their own, and seen."""
+"""Replays and fleet refreshes as jobs: asked for, done in a process of their own, cancelled, killed and made again."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -23,7 +23,11 @@ from storage.engine.sqlite.database import back_up
 from storage.tables import fleet_prior
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import granted
-from tests.service.work.replaying import AT, WAIT, age, aged, stock, stored
+from tests.service.work.replaying import AT, CLUTCHES, WAIT, age, aged, ended, midway, stock, stored, until_none
+from tests.storage.engine.postgresql.server import postgresql_server
+from tests.support import ONCE, Server, serving
+
+# --- Replays and fleet refreshes as jobs: asked for, done in a process of their own, and seen.
 
 LIFE = "/v1/clutches/{}/remaining-useful-life"
 
@@ -168,3 +172,64 @@ def test_a_bound_key_has_its_own_clutches_replayed_and_no_others(in_file: Databa
         own = client.post("/v1/jobs", json={"kind": "replay", "clutch_id": "c1"}, headers={**bound, **WAIT}).json()
         assert (own["state"], own["result"]["replayed"]) == ("finished", 1)
         assert client.get("/v1/jobs", headers=bound).json()["items"] == [own]
+
+
+# --- A replay that is cancelled, or loses its service or its database, leaves whole clutches, and is made again.
+
+
+@pytest.mark.usefixtures("own_processes")
+def test_a_cancelled_replay_leaves_whole_clutches(in_file: Database) -> None:
+    expected = stock(in_file)
+    age(in_file)
+    with client_on(in_file.url, job_lease_seconds=1) as client:
+        asked = client.post("/v1/jobs", json={"kind": "replay"}).json()["job_id"]
+        midway(client.get, asked, in_file.url)
+        cancelled = client.delete(f"/v1/jobs/{asked}").json()
+        assert (cancelled["state"], cancelled["problem"]) == ("cancelled", "cancelled by local")
+        assert cancelled["result"] is None
+        until_none(in_file.url)
+        assert 0 < len(aged(in_file)) < CLUTCHES
+        again = client.post("/v1/jobs", json={"kind": "replay"}, headers=WAIT).json()
+        assert (again["state"], again["job_id"] == asked) == ("finished", False)
+    assert aged(in_file) == set()
+    assert stored(in_file) == expected
+
+
+@pytest.mark.slow
+def test_the_replay_of_a_killed_service_is_made_again(database: Database) -> None:
+    expected = stock(database)
+    age(database)
+    environment = {"CLUTCHLIFE_JOB_LEASE_SECONDS": "2"}
+    address = database.url if database.path is None else database.path
+    killed = Server(address, environment=environment)
+    killed.start()
+    asked = ONCE.post(f"{killed.url}/v1/jobs", json={"kind": "replay"}).json()["job_id"]
+    midway(lambda path: ONCE.get(f"{killed.url}{path}"), asked, database.url)
+    killed.kill()
+    until_none(database.url)
+    assert 0 < len(aged(database)) < CLUTCHES
+    with serving(address, environment=environment) as server:
+        job = ended(server, asked)
+    assert (job["state"], job["attempts"], job["result"]["replayed"]) == ("finished", 2, CLUTCHES)
+    assert aged(database) == set()
+    assert stored(database) == expected
+
+
+@pytest.mark.slow
+def test_a_replay_is_made_again_where_postgresql_is_killed() -> None:
+    with postgresql_server() as postgres:
+        url = postgres.fresh()
+        with closing(open_database(url)) as database:
+            expected = stock(database)
+            age(database)
+        with serving(url, environment={"CLUTCHLIFE_JOB_LEASE_SECONDS": "2"}) as server:
+            asked = ONCE.post(f"{server.url}/v1/jobs", json={"kind": "replay"}).json()["job_id"]
+            midway(lambda path: ONCE.get(f"{server.url}{path}"), asked, database.url)
+            postgres.kill()
+            until_none(database.url)
+            postgres.start()
+            job = ended(server, asked)
+        with closing(open_database(url)) as database:
+            assert (job["state"], job["attempts"], job["result"]["replayed"]) == ("finished", 2, CLUTCHES), job
+            assert aged(database) == set()
+            assert stored(database) == expected

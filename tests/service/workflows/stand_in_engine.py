@@ -53,10 +53,7 @@ METHODS = {
 def _report(campaign: Campaign, extension: Extension | None) -> Report:
     tests = len(campaign.stationary)
     misfit = Misfit(
-        rmse=0.3,
-        noise=0.25,
-        unexplained_share=0.3,
-        where=(Where(axis="oil_temperature_c", strength=30.0),),
+        rmse=0.3, noise=0.25, unexplained_share=0.3, where=(Where(axis="oil_temperature_c", strength=30.0),)
     )
     table = np.arange(6.0).reshape(2, 3)
     table[0, 0] = np.nan

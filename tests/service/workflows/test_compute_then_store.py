@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import text
+from sqlalchemy import Connection, text
 from typer.testing import CliRunner
 
 from models.diagnosis.extension import Extension
@@ -16,6 +16,7 @@ from service import stored_runs
 from service.cli.main import app
 from service.lives import model_correction, recomputation, run_analysis, tracks
 from service.lives.criteria import MAX_ATTEMPTS
+from service.lives.incoming_run import IncomingRun, name_run
 from service.queries import degradation
 from service.queries.cache import to_json
 from service.run_files.json_run import read_run
@@ -31,6 +32,7 @@ from storage.engine.errors import DamagedData
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import FileDatabase
 from storage.jobs import NewJob
+from storage.runs import RunRow
 from tests.service.workflows import stand_in_engine
 from tests.support import stationary
 
@@ -260,3 +262,49 @@ def test_only_a_run_that_carries_on_damaged_filters_is_stopped_by_them(database:
     assert replay_clutch(database, "c1") == 2
     assert stored(database) == before
     assert post(database, 2000.0)["run_id"] == "r2000"
+
+
+# --- The same run comes in more than once at a time: it is stored once, and every other answer is its receipt.
+
+
+def oil_change() -> IncomingRun:
+    details = {"event": "oil_change", "note": ""}
+    return name_run(IncomingRun(kind="maintenance", cycles=5.0, run_id="oil", details=details))
+
+
+def test_the_same_run_of_two_threads_is_stored_once(database: Database) -> None:
+    answers: list[bool] = []
+
+    def send() -> None:
+        answers.append(ingest(database, "c1", oil_change(), received_at=AT)[1])
+
+    senders = [threading.Thread(target=send) for _ in range(4)]
+    for thread in senders:
+        thread.start()
+    for thread in senders:
+        thread.join(120)
+    assert sorted(answers) == [False, False, False, True]
+
+
+def test_a_run_that_another_process_stores_after_it_was_not_found_is_a_repeat(
+    database: Database, url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is looked for twice, before and after its curves are fitted; it comes when it has just not been found again."""
+    get, calls = runs.get, []
+
+    def overtaken(connection: Connection, clutch_id: str, run_id: str) -> RunRow | None:
+        found = get(connection, clutch_id, run_id)
+        calls.append(found)
+        if len(calls) == 2:
+            other = open_database(url)
+            assert ingest(other, "c1", oil_change(), received_at=AT)[1]
+            other.close()
+        return found
+
+    monkeypatch.setattr(runs, "get", overtaken)
+    receipt, new = ingest(database, "c1", oil_change(), received_at=AT)
+    assert receipt["duplicate"]
+    assert not new
+    assert calls[:2] == [None, None]
+    with database.reading() as connection:
+        assert clutches.revision(connection, "c1") == 1

@@ -62,8 +62,7 @@ def collect(database: Database, *, later: float = 0.0) -> raw_records.Collected:
 
 
 def test_what_no_run_names_is_removed_after_the_grace_period_and_nothing_else(
-    database: Database,
-    raw_address: str,
+    database: Database, raw_address: str
 ) -> None:
     raw_records.use(database, raw_address)
     keys = store(database, 1, 2)
@@ -92,9 +91,7 @@ def test_a_run_whose_blobs_are_removed_meanwhile_is_refused_not_lost(database: D
 
 
 def test_a_removal_that_is_still_going_on_refuses_runs_that_begin_after_it(
-    database: Database,
-    in_folder: str,
-    monkeypatch: pytest.MonkeyPatch,
+    database: Database, in_folder: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     raw_records.use(database, in_folder)
     put(database, 1)
@@ -122,11 +119,7 @@ def test_a_blob_that_two_runs_name_stays_while_one_does(database: Database, in_f
     assert all_there(database, {1: second})
 
 
-def test_columns_move_between_places_and_back_bit_for_bit(
-    database: Database,
-    in_folder: str,
-    in_bucket: str,
-) -> None:
+def test_columns_move_between_places_and_back_bit_for_bit(database: Database, in_folder: str, in_bucket: str) -> None:
     keys = store(database, 1, 2)  # in the database, as an earlier release left them
     for place, moved in ((in_folder, 6), (in_bucket, 6), (DATABASE, 6)):
         assert raw_records.move(database, place, tell=lambda _: None) == moved
@@ -180,9 +173,7 @@ def test_a_store_belongs_to_one_database(database: Database, tmp_path: Path, raw
 
 
 def test_a_start_that_is_cut_off_between_row_and_mark_can_be_repeated(
-    database: Database,
-    in_folder: str,
-    monkeypatch: pytest.MonkeyPatch,
+    database: Database, in_folder: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def crash(*_: object) -> None:
         raise KeyboardInterrupt

@@ -15,14 +15,7 @@ from models.diagnosis.design.design import build_design
 from models.diagnosis.design.facts import facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.history import STATIC, WHOLE
-from models.diagnosis.effects.moving import (
-    FILM,
-    FIRST_ORDER,
-    LEAST_TIME,
-    MOST_POWER,
-    THICKNESS,
-    usual_slope,
-)
+from models.diagnosis.effects.moving import FILM, FIRST_ORDER, LEAST_TIME, MOST_POWER, THICKNESS, usual_slope
 from models.diagnosis.pooled_fit.baseline_fit import starting_laws
 from tests.models.diagnosis.campaigns import campaign
 

@@ -1,5 +1,6 @@
 """What swings with a test's clock is found where noise goes with torque, noise alone is not; a sensor's waves too."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import cast
 
@@ -8,16 +9,18 @@ import pytest
 
 from models.arrays import FloatArray
 from models.diagnosis.design.autocorrelation import Correlation
-from models.diagnosis.design.design import TORQUE, Design, build_design
+from models.diagnosis.design.design import TORQUE, Design, Points, build_design
 from models.diagnosis.explanations import contrasts
+from models.diagnosis.explanations.contrasts import contrasts_of
 from models.diagnosis.explanations.evidence import evidence_of
 from models.diagnosis.explanations.shapeless import HighestLine, lines
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.noise.estimate import first_noise
 from models.diagnosis.pooled_fit.problem import FitProblem, Priors
+from models.diagnosis.pooled_fit.projection import gram_of, project
 from models.friction.stribeck import torque
 from tests.models.diagnosis.campaigns import Where, campaign
-from tests.models.diagnosis.fitted import study
+from tests.models.diagnosis.fitted import Study, study
 
 #: A sensor's wave [Nm].
 WAVE = 2.5
@@ -135,3 +138,62 @@ def test_a_sensor_that_is_wavy_over_its_range_is_structure_on_its_reading(monkey
         found[most] = evidence_of(given.problem, given.baseline.fit).structure[TORQUE]
     assert found[20] > 20.0
     assert found[4] < 0.2 * found[20], found  # the control: few waves hardly show it
+
+
+# --- Structure that nobody wrote down is seen by some smooth contrast, wherever in the speeds it lies.
+
+#: Where bands of speed lie, as shares of the highest: the worst of them counts.
+PLACES, WIDE = np.linspace(0.25, 0.75, 21), 0.05
+
+
+@pytest.fixture(scope="module")
+def plain() -> Study:
+    return study(campaign(4))
+
+
+def off(rows: Points, at: float) -> FloatArray:
+    return np.asarray((rows.velocity / rows.velocity.max() - at) / WIDE, dtype=np.float64)
+
+
+def bump(rows: Points, at: float) -> FloatArray:
+    return np.asarray(np.exp(-0.5 * off(rows, at) ** 2), dtype=np.float64)
+
+
+def resonance(rows: Points, at: float) -> FloatArray:
+    return np.asarray(off(rows, at) / (1 + off(rows, at) ** 2), dtype=np.float64)
+
+
+def slowing(rows: Points, at: float) -> FloatArray:
+    return np.asarray((rows.acceleration < 0) * np.exp(-(off(rows, at) ** 4)), dtype=np.float64)
+
+
+@pytest.mark.parametrize(("shape", "least"), [(bump, 0.6), (resonance, 0.55), (slowing, 0.45)])
+def test_a_contrast_sees_its_share_of_what_is_visible(
+    plain: Study, shape: Callable[[Points, float], FloatArray], least: float
+) -> None:
+    """Of λ that is left of the structure beside the baseline, the best single contrast sees so much wherever it lies."""
+    known, rows = plain.baseline, plain.design.rows
+    contrasts = contrasts_of(plain.design, known.fit.prediction)
+    structures = np.stack([shape(rows, at) for at in PLACES], axis=1) * known.fit.torque[:, None]
+    columns = np.column_stack([structures, contrasts.columns])
+    info = project(gram_of(plain.problem, known.fit, columns), plain.problem.noise.run_gain, 0.0).info
+    scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
+    shares = (info / scale[:, None] / scale)[: PLACES.size, PLACES.size :] ** 2
+    assert shares.max(axis=1).min() > least
+
+
+@pytest.mark.parametrize("waves", [5.3, 8.4, 13.7])
+def test_ripples_over_speed_are_seen_through_the_lag_of_loops(plain: Study, waves: float) -> None:
+    """Half waves over the range of speeds, in between those that are looked for, and of any phase."""
+    known, points = plain.baseline, plain.design.points
+    contrasts = contrasts_of(plain.design, known.fit.prediction)
+    unit = points.velocity / points.velocity.max()
+    ripples = np.stack([np.cos(np.pi * waves * unit + phase) for phase in (0.0, 0.8, 1.6, 2.4)], axis=1)
+    prediction = known.fit.prediction
+    friction = prediction.scene.curve[:, None] * ripples
+    structures = prediction.change_at_rows(plain.design, friction, before_lag=True)
+    columns = np.column_stack([structures, contrasts.columns])
+    info = project(gram_of(plain.problem, known.fit, columns), plain.problem.noise.run_gain, 0.0).info
+    scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
+    shares = (info / scale[:, None] / scale)[:4, 4:] ** 2
+    assert shares.max(axis=1).min() > 0.45

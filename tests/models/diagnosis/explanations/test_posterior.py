@@ -1,20 +1,36 @@
-"""The posterior: the same data, the same answer; what is planted leads, what nobody planted does not; ends of the list."""
+"""The posterior over explanations, and what is decided by it."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from models.diagnosis.campaign import Campaign
+from models.diagnosis.campaign import Campaign, EventKind, MaintenanceEvent, StationaryRun
 from models.diagnosis.criteria import ANYTHING_WRONG
 from models.diagnosis.design.design import build_design
+from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.explanations.decide import decide, explanations_of
 from models.diagnosis.explanations.posterior import Posterior, Prior, posterior_of
-from models.diagnosis.explanations.verdict import LINE, NOTHING, UNCATALOGUED, Alternative, Verdict, axis_of, is_axis
+from models.diagnosis.explanations.shapeless import outlying_run, temperature_evidence
+from models.diagnosis.explanations.verdict import (
+    LINE,
+    NOTHING,
+    UNCATALOGUED,
+    Alternative,
+    Explanation,
+    Verdict,
+    axis_of,
+    is_axis,
+)
 from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline
 from models.diagnosis.raw_records.evidence import FIXED_LINE, RawEvidence
 from tests.models.diagnosis.campaigns import Where, campaign
+from tests.models.diagnosis.fitted import study, warmth
+from tests.models.diagnosis.test_diagnose import warm
+
+# --- The posterior: the same data, the same answer; what is planted leads, what nobody planted does not; ends of the
+# list.
 
 
 def shift(at: Where) -> np.ndarray:
@@ -105,3 +121,117 @@ def named(found: Posterior) -> frozenset[str]:
 def test_an_empty_catalogue_names_nothing(zero: Baseline) -> None:
     everything = named(posterior_of(zero, ()))
     assert not named(posterior_of(zero, (), everything))
+
+
+# --- The verdict as it is read off lists of explanations.
+
+U = UNCATALOGUED
+
+
+def listed(shares: dict[tuple[str, ...], float]) -> tuple[Explanation, ...]:
+    assert sum(shares.values()) == pytest.approx(1.0)
+    return tuple(Explanation(effects=effects, probability=share) for effects, share in shares.items())
+
+
+@pytest.mark.parametrize(
+    ("shares", "verdict", "causes"),
+    [
+        ({(): 1.0}, Verdict.MODEL_ADEQUATE, ()),
+        ({(): 0.51, ("a",): 0.49}, Verdict.MODEL_ADEQUATE, ()),
+        ({("a",): 0.95, (): 0.05}, Verdict.CAUSE_NAMED, ("a",)),
+        ({("a",): 0.6, ("a", "b"): 0.4}, Verdict.CAUSE_NAMED, ("a",)),
+        ({("a", "b"): 0.95, ("a",): 0.05}, Verdict.CAUSE_NAMED, ("a", "b")),
+        ({("a",): 0.45, ("a", "b"): 0.3, ("a", "c"): 0.25}, Verdict.CAUSE_AMBIGUOUS, ("a", "b", "c")),
+        ({("a",): 0.6, ("b",): 0.35, (): 0.05}, Verdict.CAUSE_AMBIGUOUS, ("a", "b")),
+        ({("a",): 0.85, (U,): 0.15}, Verdict.CAUSE_AMBIGUOUS, ("a", U)),
+        ({("a",): 0.8, ("a", U): 0.2}, Verdict.CAUSE_AMBIGUOUS, ("a", U)),
+        ({(U,): 0.5, ("a",): 0.3, (): 0.2}, Verdict.UNEXPLAINED_STRUCTURE, ()),
+        ({("a", U): 0.92, (U,): 0.08}, Verdict.CAUSE_AMBIGUOUS, ("a", U)),
+        ({("a", U): 0.8, (U,): 0.2}, Verdict.UNEXPLAINED_STRUCTURE, ()),
+        ({(): 0.4, (U,): 0.35, ("a",): 0.25}, Verdict.UNEXPLAINED_STRUCTURE, ()),
+        ({(): 0.4, (U,): 0.2, ("a",): 0.4}, Verdict.CAUSE_AMBIGUOUS, ("a", U)),
+    ],
+)
+def test_verdict(shares: dict[tuple[str, ...], float], verdict: Verdict, causes: tuple[str, ...]) -> None:
+    found = decide(listed(shares))
+    assert found[0] is verdict
+    assert set(found[1]) == set(causes)
+
+
+# --- An outlying run is named; an effect that all runs show makes none of them an outlier.
+
+
+def other(given: Campaign, place: int, run: StationaryRun) -> Campaign:
+    """With one stationary run changed."""
+    runs = list(given.stationary)
+    runs[place] = run
+    return replace(given, stationary=tuple(sorted(runs, key=lambda each: each.cycles)))
+
+
+def reversed_torque(run: StationaryRun) -> StationaryRun:
+    return replace(run, plateaus=replace(run.plateaus, torque=-run.plateaus.torque))
+
+
+def too_low(run: StationaryRun) -> StationaryRun:
+    """Another clutch: a third less at low speed than at high speed."""
+    fastest = run.plateaus.speed.max()
+    return replace(
+        run, plateaus=replace(run.plateaus, torque=run.plateaus.torque * (2 + run.plateaus.speed / fastest) / 3)
+    )
+
+
+SEVEN = (0.0, 1000.0, 3000.0, 6000.0, 10000.0, 15000.0, 21000.0)
+
+
+@pytest.mark.slow
+def test_a_run_that_is_not_like_the_others_is_named_in_the_summary() -> None:
+    given = campaign(2, loops=False, cycles=SEVEN)
+    report = diagnose(other(given, 4, too_low(given.stationary[4])), rng=np.random.default_rng(1))
+    assert report.verdict in {Verdict.UNEXPLAINED_STRUCTURE, Verdict.CAUSE_AMBIGUOUS}
+    assert f"The run {given.stationary[4].run_id} at" in report.summary
+
+
+@pytest.mark.parametrize(("changed", "place"), [(reversed_torque, 2), (too_low, 4)])
+def test_a_run_that_is_not_like_the_others_is_named(changed, place: int) -> None:
+    given = campaign(2, loops=False, cycles=SEVEN)
+    known = baseline(other(given, place, changed(given.stationary[place])))
+    assert f"The run {given.stationary[place].run_id} at" in outlying_run(known.problem, known.fit)
+
+
+@pytest.mark.parametrize("planted", [None, warm])
+def test_no_run_is_odd_where_all_are_alike(planted) -> None:
+    known = baseline(campaign(2, planted, loops=False))
+    assert outlying_run(known.problem, known.fit) == ""
+
+
+# --- What an oil temperature that nobody measured may account for: its own doing, and not what gains do as well.
+
+
+def fresh(at: Where) -> np.ndarray:
+    """From cycle 4000 on the viscous term is a fifth less."""
+    return -0.2 * (at.cycles > 4000.0) * at.parameters.viscous_coefficient * at.velocity**0.3
+
+
+def logged(given: Campaign) -> Campaign:
+    return replace(given, maintenance=(MaintenanceEvent(run_id="oil", cycles=4000.0, event=EventKind.OIL_CHANGE),))
+
+
+@pytest.mark.slow
+def test_a_logged_oil_change_is_likelier_than_a_temperature_that_nobody_measured() -> None:
+    """One step at the cycle of the log against a course of its own for every test: each is possible, one is simple."""
+    report = diagnose(logged(campaign(5, fresh, temperature=False)), rng=np.random.default_rng(0))
+    assert "oil_change" in report.causes
+    gained = {each.effect: each.log_evidence_gain for each in report.candidates}
+    assert gained["oil_change"] > gained.get("oil_temperature", 0.0) + 5.0
+    assert report.candidates[0].effect == "oil_change"
+    assert report.candidates[0].probability > 0.6
+
+
+def test_gains_that_scatter_are_no_evidence_of_a_temperature() -> None:
+    """Whatever size of them the noise was given; the control: a temperature is."""
+    given = study(campaign(5, temperature=False, gain=0.005))
+    for size in (2e-4, given.problem.noise.run_gain):
+        problem = given.problem.with_noise(replace(given.problem.noise, run_gain=size))
+        assert temperature_evidence(problem, given.baseline.fit) < 3.0
+    warm = study(campaign(5, warmth, temperature=False, gain=0.005))
+    assert temperature_evidence(warm.problem, warm.baseline.fit) > 10.0

@@ -19,10 +19,7 @@ MISFIT = Misfit(
     rmse=0.15234,
     noise=0.1012,
     unexplained_share=0.123,
-    where=(
-        Where(axis="oil_temperature_c", strength=31.0),
-        Where(axis="cycles", strength=4.0),
-    ),
+    where=(Where(axis="oil_temperature_c", strength=31.0), Where(axis="cycles", strength=4.0)),
 )
 GAIN = Gain(
     held_out_runs=("a",),

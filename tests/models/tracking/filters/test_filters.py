@@ -1,26 +1,41 @@
-"""What each of the three filters must do on any series, and where they must agree. Large comparisons: tests/statistical."""
+"""Each filter against others, closed forms and dense grids."""
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from models.prognosis.first_passage import predict_first_passage
-from models.tracking.criteria import EQ_6_SHARE, KNEE_HAZARD, PROPORTIONAL_SHARE
+from models.tracking import linear_model
+from models.tracking.courses import WITHOUT_EXPONENT, log_form_weight
+from models.tracking.criteria import COURSE_SHARES, EQ_6_SHARE, KNEE_HAZARD, PROPORTIONAL_SHARE
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState
 from models.tracking.filters.ukf import Ukf, UkfState
+from models.tracking.history import History
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import SampleStatus
 from models.tracking.prior import weak
 from tests.models.tracking.tracked_series import (
     CAMPAIGN,
     COLUMNS,
     FILTERS,
     NAMES,
+    PLAIN,
     PRIOR,
+    TYPICAL,
     WEIRD,
     followed,
+    measured,
     same,
+    series,
 )
+
+# --- What each of the three filters must do on any series, and where they must agree. Large comparisons:
+# tests/statistical.
 
 
 @pytest.mark.parametrize(("tracker", "state_type"), FILTERS, ids=NAMES)
@@ -111,3 +126,109 @@ def test_the_flags_of_outlying_runs_are_read_from_their_stored_name() -> None:
     state = followed(Particle(particles=50), PRIOR, CAMPAIGN)
     arrays = state.to_arrays() | {"spoiled": np.ones_like(state.cloud.outlying)}
     assert (ParticleState.from_arrays(arrays).cloud.outlying == 1.0).all()
+
+
+# --- The grid against plain quadrature, the prior and itself.
+
+
+def test_a_whole_history_at_once_is_what_updates_fold_to() -> None:
+    grid = Grid(nodes=13, rows=13, levels=7)
+    whole = grid.from_history(PRIOR, CAMPAIGN)
+    assert same(whole, followed(grid, PRIOR, CAMPAIGN))
+    assert not same(whole, grid.from_history(PRIOR, CAMPAIGN[::-1]))
+
+
+def test_the_order_of_runs_does_not_matter_to_the_grid() -> None:
+    """Only the order of sums differs."""
+    grid = Grid()
+    there, back = (grid.laid(grid.from_history(PRIOR, each)).mass for each in (CAMPAIGN, CAMPAIGN[::-1]))
+    np.testing.assert_allclose(there, back, atol=1e-9)
+
+
+def test_the_grid_without_data_is_the_prior() -> None:
+    """Draws from four deviations of the prior: its means and deviations to within the 0.1 % cut off and the draws."""
+    drawn = Grid().posterior(Grid().start(PRIOR), 4_000, np.random.default_rng(0))
+    share = np.bincount(drawn.course, weights=drawn.weight)
+    np.testing.assert_allclose(share, [EQ_6_SHARE, *(1.0 - EQ_6_SHARE) * COURSE_SHARES], atol=0.01)
+    kept = np.flatnonzero(~WITHOUT_EXPONENT[drawn.course])
+    posterior = drawn.taken(kept, drawn.weight[kept] / drawn.weight[kept].sum())
+    for sample, mean, sd in (
+        (posterior.initial, PRIOR.initial_mean, PRIOR.initial_sd),
+        (posterior.change, PRIOR.change_mean, PRIOR.change_sd),
+        (posterior.log_scale, PRIOR.log_scale_mean, PRIOR.log_scale_sd),
+        (posterior.log_exponent, PRIOR.log_exponent_mean, PRIOR.log_exponent_sd),
+        (np.log(posterior.scatter), PRIOR.log_scatter_mean, PRIOR.log_scatter_sd),
+    ):
+        found = posterior.moments(sample)
+        assert found[0] == pytest.approx(mean, abs=0.05 * sd)
+        assert found[1] == pytest.approx(sd, rel=0.05)
+
+
+def test_every_draw_carries_its_exact_density() -> None:
+    """Log weights of grid draws differ from the log posterior by the draws' own density: no draw is far out of line."""
+    grid = Grid()
+    long = series(TYPICAL, np.linspace(0.0, 15_000.0, 40), 4e-4)
+    posterior = grid.posterior(grid.from_history(PRIOR, long), 2_000, np.random.default_rng(0))
+    assert 1.0 / np.square(posterior.weight).sum() > 0.4 * 2_000
+
+
+def test_the_marginal_of_log_scale_against_plain_quadrature() -> None:
+    """ε and s held nearly fixed by their prior, the posterior of log φ is a one-dimensional integral."""
+    prior = replace(PLAIN, log_exponent_sd=1e-3, log_scatter_sd=1e-3, log_exponent_mean=-0.36, log_scatter_mean=-7.8)
+    log_scale = np.linspace(7.5, 9.5, 4_001)
+    history = History.of(CAMPAIGN, prior)
+    points = linear_model.Points(
+        log_scale=log_scale,
+        log_exponent=np.full(4_001, -0.36),
+        log_scatter=np.full(4_001, -7.8),
+        form=np.zeros(4_001, dtype=np.intp),
+        outlying=np.zeros((len(CAMPAIGN), 4_001)),
+    )
+    sums, _ = linear_model.pointwise(history, prior, points)
+    density = linear_model.evidence(sums, prior) - 0.5 * ((log_scale - prior.log_scale_mean) / prior.log_scale_sd) ** 2
+    density = np.exp(density - density.max())
+    density /= trapezoid(density, log_scale)
+    mean = trapezoid(density * log_scale, log_scale)
+    sd = math.sqrt(trapezoid(density * (log_scale - mean) ** 2, log_scale))
+    posterior = Grid().posterior(Grid().from_history(prior, CAMPAIGN), 4_000, np.random.default_rng(0))
+    found = posterior.moments(np.log(posterior.scale))
+    assert found[0] == pytest.approx(mean, abs=0.05 * sd)
+    assert found[1] == pytest.approx(sd, rel=0.05)
+
+
+# --- The particles stay apart, and a measurement counts once however it is introduced.
+
+
+def test_particles_stay_apart_because_they_move() -> None:
+    measurements = series(TYPICAL, np.linspace(0.0, 12_000.0, 25), 4e-4)
+    distinct = {
+        moves: np.unique(
+            followed(Particle(particles=400, moves=moves), PRIOR, measurements).cloud.points, axis=0
+        ).shape[0]
+        for moves in (0, 8)
+    }
+    assert distinct[8] > 0.9 * 400
+    assert distinct[0] < 0.2 * 400
+
+
+def test_a_measurement_let_in_by_degrees_still_counts_once() -> None:
+    """After starving measurements every particle's target is that of the whole history, taken at once."""
+    state = followed(Particle(particles=200), PRIOR, measured([0.0, 1e3, 7e3, 15e3], [0.13, 0.115, 0.085, 0.068]))
+    placed = state.cloud.placed()
+    target = linear_model.evidence(linear_model.pointwise(state.history, PRIOR, placed)[0], PRIOR)
+    target += PRIOR.log_density(*state.cloud.points.T) + linear_model.log_outlying(PRIOR, placed.outlying)
+    target += log_form_weight(PRIOR)[state.cloud.form.astype(int)]
+    np.testing.assert_allclose(state.cloud.log_target, target, rtol=1e-7, atol=1e-7)
+
+
+def test_a_test_that_the_particles_cannot_follow_is_said_to_be_forced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run far ahead and far off is taken in by two degrees; where only one is allowed the sample says so."""
+    state, last = followed(Particle(particles=200), PRIOR, CAMPAIGN), CAMPAIGN[-1]
+    odd = Measurement(progress=3.0 * last.progress, value=2.0 * last.value, variance=0.0)
+    statuses = []
+    for degrees in (1, 30):
+        monkeypatch.setattr("models.tracking.filters.particle._DEGREES", degrees)
+        updated = Particle(particles=200).update(state, odd, np.random.default_rng(0))
+        again = ParticleState.from_arrays(updated.to_arrays())
+        statuses.append(Particle().posterior(again, 200, np.random.default_rng(1)).status)
+    assert statuses == [SampleStatus.FORCED, SampleStatus.SOUND]

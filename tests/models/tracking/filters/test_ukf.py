@@ -17,13 +17,7 @@ from models.tracking.filters.ukf import Ukf, UkfState
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
-from tests.models.tracking.tracked_series import (
-    CAMPAIGN,
-    PRIOR,
-    WEIRD,
-    followed,
-    same,
-)
+from tests.models.tracking.tracked_series import CAMPAIGN, PRIOR, WEIRD, followed, same
 
 
 def test_the_ukf_stays_in_its_domain_and_definite() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from fastapi.testclient import TestClient
 
-from storage import diagnoses, keys
+from storage import diagnoses
 from tests.architecture.source import ROOT
 from tests.service.web.routes.granting import context_of, granted, revoke_all
 from tests.storage.samples import new_diagnosis
@@ -66,24 +66,6 @@ def test_api3_properties_that_are_the_services_own_cannot_be_set(client: TestCli
         assert client.patch(f"{CLUTCHES}/c1", json={field: 1, "reason": "x"}).status_code == 422
     run = stationary(0.0) | {field: 1}
     assert client.post(f"{CLUTCHES}/c1/runs", json=run).status_code == 422
-
-
-def test_api6_a_life_is_not_changed_by_asking_often(client: TestClient) -> None:
-    """What would be abused here is history: it is changed by admin alone, who is named, and nothing is deleted."""
-    headers = granted(client, "admin")
-    for number in range(3):
-        run = stationary(0.0, run_id="a")
-        assert client.post(f"{CLUTCHES}/c1/runs", json=run, headers=headers).status_code == (200 if number else 201)
-    for change in ("withdraw", "restore"):
-        client.post(f"{CLUTCHES}/c1/runs/a/{change}", json={"reason": "x"}, headers=headers)
-    items = client.get(f"{CLUTCHES}/c1/changes", headers=headers).json()["items"]
-    with context_of(client).database.reading() as connection:
-        (key,) = keys.all_keys(connection)
-    assert [(item["action"], item["by"]) for item in items] == [
-        ("restore", f"key:{key.key_id} admin"),
-        ("withdraw", f"key:{key.key_id} admin"),
-    ]
-    assert client.delete(f"{CLUTCHES}/c1/runs/a", headers=headers).status_code == 405
 
 
 #: What opens connections to others.

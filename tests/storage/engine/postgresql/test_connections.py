@@ -1,20 +1,27 @@
-"""The connections of a service to a server: what they say of it, and what becomes of them when the server comes back."""
+"""Connections to a server: what they share, keep and say."""
 
 import asyncio
+import threading
 import time
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from dataclasses import replace
 
 import pytest
-from sqlalchemy import make_url, text
+from sqlalchemy import create_engine, make_url, text
 
 from storage import clutches
-from storage.engine.database import Database, Question, SharedAnswer
+from storage.engine.database import Database, Question, SharedAnswer, SharedAnswers, Snapshot
 from storage.engine.errors import ServiceRuns, StorageUnavailable
 from storage.engine.opening import open_database
-from storage.engine.postgresql.connect import SERVICE_KEY, migration_lock
+from storage.engine.postgresql.connect import SERVICE_KEY, SingleStatements, migration_lock
+from storage.engine.postgresql.database import ServerWatch
 from tests.storage.engine.postgresql.server import postgresql_server
 from tests.storage.samples import clutch_row
+
+# --- The connections of a service to a server: what they say of it, and what becomes of them when the server comes
+# back.
 
 ANSWER = SharedAnswer(clutch_id="c1", name="degradation", release="1.0", revision=0, body=b"kept")
 _HELD = text("""
@@ -117,3 +124,140 @@ def test_who_asks_a_database_that_was_closed_is_told_so(on_server: Database) -> 
     ):
         with pytest.raises(StorageUnavailable, match="has been closed"):
             ask()
+
+
+# --- What every request asks of a server: one statement for all who ask at the same time.
+
+
+class Slow(ServerWatch):
+    """A server that answers when it is let: the number of the statement is the version."""
+
+    def __init__(self) -> None:
+        super().__init__(SingleStatements(create_engine("postgresql+psycopg://"), "slow"))
+        self.statements: list[list[Question]] = []
+        self.may_answer = threading.Semaphore(0)
+        self.fails = False
+
+    def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
+        self.statements.append(list(questions))
+        number = len(self.statements)
+        assert self.may_answer.acquire(timeout=30)
+        if self.fails:
+            raise StorageUnavailable("away")
+        return [Snapshot(number, False, None, None if each.clutch_id is None else number) for each in questions]
+
+
+@pytest.fixture
+def slow() -> Iterator[Slow]:
+    with closing(Slow()) as watch:
+        yield watch
+
+
+async def sent(watch: Slow, statements: int) -> None:
+    """Until so many statements are under way or done."""
+    async with asyncio.timeout(30):
+        while len(watch.statements) < statements:
+            await asyncio.sleep(0.001)
+
+
+def test_who_asks_while_a_statement_is_under_way_shares_the_next(slow: Slow) -> None:
+    async def ask() -> list[Snapshot]:
+        first = asyncio.create_task(slow.look(Question("c0")))
+        await sent(slow, 1)
+        later = [asyncio.create_task(slow.look(Question(f"c{number}"))) for number in range(1, 21)]
+        gone = asyncio.create_task(slow.look(Question("gone")))
+        await asyncio.sleep(0)
+        gone.cancel()
+        slow.may_answer.release(2)
+        return await asyncio.gather(first, *later)
+
+    found = asyncio.run(ask())
+    # no answer is of a statement that began before its question
+    assert [each.version for each in found] == [1] + [2] * 20
+    assert [len(each) for each in slow.statements] == [1, 21]
+
+
+def test_what_fails_fails_for_those_who_asked_and_not_for_the_next(slow: Slow) -> None:
+    async def ask() -> None:
+        slow.fails = True
+        slow.may_answer.release(1)
+        together = await asyncio.gather(slow.look(Question("a")), slow.look(Question("b")), return_exceptions=True)
+        assert [type(each) for each in together] == [StorageUnavailable] * 2
+        slow.fails = False
+        slow.may_answer.release(1)
+        assert (await slow.look(Question("a"))).revision == 2
+
+    asyncio.run(ask())
+
+
+def test_who_waits_when_it_is_closed_is_told_so(slow: Slow) -> None:
+    async def ask() -> list[Snapshot | BaseException]:
+        first = asyncio.create_task(slow.look(Question("a")))
+        await sent(slow, 1)
+        second = asyncio.create_task(slow.look(Question("b")))
+        await asyncio.sleep(0)
+        slow.may_answer.release()
+        slow.close()
+        return await asyncio.gather(first, second, return_exceptions=True)
+
+    first, second = asyncio.run(ask())
+    assert isinstance(first, Snapshot)
+    assert isinstance(second, StorageUnavailable)
+
+
+def test_a_database_answers_each_what_it_asked(database: Database) -> None:
+    with database.writing() as connection:
+        for name in ("a", "b"):
+            clutches.insert(connection, clutch_row(name))
+        clutches.bump_revision(connection, "b")
+
+    async def ask() -> list[Snapshot]:
+        names = ("b", "a", "b", None, "unknown", "a\0b")
+        return await asyncio.gather(*(database.watch.look(Question(name)) for name in names))
+
+    found = asyncio.run(ask())
+    assert [each.revision for each in found] == [1, 0, 1, None, None, None]
+    assert len({each.version for each in found}) == 1
+    assert not any(each.keys_are_needed for each in found)
+
+
+# --- The last computed answers, which the services on a server share.
+
+FIRST = SharedAnswer(clutch_id="c1", name="degradation", release="1.0", revision=3, body=b"\x00first")
+
+
+@pytest.fixture
+def shared(on_server: Database) -> SharedAnswers:
+    assert on_server.answers is not None
+    return on_server.answers
+
+
+def test_the_last_of_each_clutch_and_name_is_kept(shared: SharedAnswers) -> None:
+    assert shared.newest("c1", "degradation", "1.0") is None
+    for kept in (FIRST, replace(FIRST, clutch_id="c2"), replace(FIRST, name="surface", body=b"other")):
+        shared.keep(kept)
+        assert shared.newest(kept.clutch_id, kept.name, "1.0") == kept
+    later = replace(FIRST, revision=4, body=b"later")
+    shared.keep(later)
+    shared.keep(FIRST)  # of one that was slower
+    assert shared.newest("c1", "degradation", "1.0") == later
+
+
+def test_another_release_computes_its_own_and_replaces_it(shared: SharedAnswers) -> None:
+    shared.keep(FIRST)
+    assert shared.newest("c1", "degradation", "2.0") is None
+    shared.keep(replace(FIRST, release="2.0", revision=2))
+    assert shared.newest("c1", "degradation", "1.0") is None
+    assert shared.newest("c1", "degradation", "2.0") == replace(FIRST, release="2.0", revision=2)
+
+
+def test_a_database_of_before_gets_the_table_and_counts_its_commits_on(on_server: Database) -> None:
+    with on_server.writing() as connection:
+        clutches.insert(connection, clutch_row("c1"))
+    with on_server.writing() as connection:
+        connection.execute(text("DROP TABLE shared_answer"))
+    counted = on_server.watch.snapshot().version
+    with closing(open_database(on_server.url)) as opened:
+        assert opened.answers is not None
+        opened.answers.keep(FIRST)
+        assert opened.watch.snapshot().version == counted + 1  # of the commit that made the table

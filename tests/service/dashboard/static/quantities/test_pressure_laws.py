@@ -20,10 +20,7 @@ FALLING = {
 
 @pytest.mark.parametrize(
     ("drawn", "law"),
-    [
-        (LINEAR, LinearLaw(intercept=2.0, slope=3.0)),
-        (FALLING, AsymptoticLaw(asymptote=0.6, excess=4.0, decay=1.6)),
-    ],
+    [(LINEAR, LinearLaw(intercept=2.0, slope=3.0)), (FALLING, AsymptoticLaw(asymptote=0.6, excess=4.0, decay=1.6))],
     ids=["linear", "falling"],
 )
 def test_a_law_is_drawn_with_the_band_of_its_covariance(

@@ -1,4 +1,4 @@
-"""The lock beside the file: one writer among all threads and processes, and commits that pass readers by."""
+"""The two locks beside a file: of its writers, and of its service."""
 
 import multiprocessing
 import multiprocessing.connection
@@ -13,11 +13,12 @@ from pathlib import Path
 import pytest
 
 from storage import clutches
-from storage.engine.database import Database
-from storage.engine.errors import DatabaseBusy, StorageUnavailable
+from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageUnavailable
 from storage.engine.opening import open_database
-from storage.engine.sqlite.connect import WriteLock
-from tests.storage.samples import clutch_row
+from storage.engine.sqlite.connect import WriteLock, service_lock
+from tests.storage.samples import OLD, child, integrity, old_database, revision
+
+# --- The lock beside the file: one writer among all threads and processes, and commits that pass readers by.
 
 IN_TIME = 60.0
 _SPAWN = multiprocessing.get_context("spawn")
@@ -109,16 +110,47 @@ def test_a_file_that_is_up_to_date_is_opened_while_another_writes(tmp_path: Path
         open_database(url, lock_timeout=0.05)
 
 
-def test_a_commit_waits_for_no_reader_and_no_reader_for_a_commit(database: Database) -> None:
-    other = open_database(f"sqlite:///{database.path}", lock_timeout=0.05)
-    count = "SELECT count(*) FROM clutch"
-    with other.reading() as reader:  # open all the while
-        assert reader.exec_driver_sql(count).scalar_one() == 0
-        with database.writing() as connection:
-            clutches.insert(connection, clutch_row())
-            with other.reading() as second:  # begun while the transaction is
-                assert second.exec_driver_sql(count).scalar_one() == 0
-        assert reader.exec_driver_sql(count).scalar_one() == 0
-        with other.reading() as third:
-            assert third.exec_driver_sql(count).scalar_one() == 1
-    other.close()
+# --- One service of a database at a time: a second one is refused, and a dead one is in nobody's way.
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from storage.engine.sqlite.connect import service_lock
+with service_lock(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(600)
+"""
+
+
+def test_a_second_service_is_refused_until_the_first_has_ended_however_it_ends(tmp_path: Path) -> None:
+    path = tmp_path / "a.db"
+    with child(HOLDER, path) as (holder, _, says):
+        assert says.readline() == "held\n"
+        with (
+            pytest.raises(ServiceRuns, match=rf"a\.db: a service uses .* \(process {holder.pid}\)"),
+            service_lock(path),
+        ):
+            pass
+        os.kill(holder.pid, signal.SIGKILL)
+        holder.wait()
+        for _ in range(2):
+            with service_lock(path):
+                pass
+
+
+def test_where_no_lock_can_be_made_no_service_starts(tmp_path: Path) -> None:
+    with pytest.raises(StorageUnavailable, match="lock of the database"), service_lock(tmp_path / "none" / "a.db"):
+        pass
+
+
+@pytest.mark.usefixtures("later_step")
+def test_a_file_is_not_migrated_under_a_running_service(tmp_path: Path) -> None:
+    path = old_database(tmp_path)
+    with service_lock(path):
+        with pytest.raises(ServiceRuns):
+            open_database(f"sqlite:///{path}")
+        assert revision(path) == OLD
+        with closing(open_database(f"sqlite:///{path}", serving=True)) as own:  # the service itself
+            assert not own.faults(least_free=0)
+            open_database(f"sqlite:///{path}").close()  # a command beside it: nothing is left to migrate
+    assert integrity(path) == ["ok"]
