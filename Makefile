@@ -1,5 +1,5 @@
 # make demo    a simulated clutch's life, posted run by run, with its prognosis      (ARGS=--exit to end by itself)
-# make shell   a shell in which clutchlife is a command
+# make shell   a shell in which clutchlife is a command, and CLUTCHLIFE_URL is set
 # make test    all tests but those of `make slow`
 # make quick   those that need no browser and no server and take no time, in one process: 1,900 tests within a minute
 # make slow    what takes long and rarely fails: what intervals promise, counted over many lives; further ways to the same
@@ -64,7 +64,8 @@ demo: $(VENV)/.runs
 
 shell: $(VENV)/.runs
 	@echo "clutchlife is a command in this shell; exit leaves it"
-	@PATH="$(abspath $(BIN)):$$PATH" VIRTUAL_ENV="$(abspath $(VENV))" $${SHELL:-/bin/sh} || true
+	@PATH="$(abspath $(BIN)):$$PATH" VIRTUAL_ENV="$(abspath $(VENV))" CLUTCHLIFE_URL="$${CLUTCHLIFE_URL:-http://127.0.0.1:8000}" \
+		$${SHELL:-/bin/sh} || true
 
 # what each target is for, as it stands above
 help:

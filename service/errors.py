@@ -60,7 +60,7 @@ class InvalidError(ServiceError, status=422, slug="invalid-content", title="The 
 
 
 class NotFoundError(ServiceError, status=404, slug="not-found", title="Not found"):
-    """No object has that name."""
+    """There is no object with this name."""
 
 
 Found = TypeVar("Found")
@@ -69,31 +69,31 @@ Found = TypeVar("Found")
 def found(row: Found | None, what: str, name: str, *, only: Collection[str] | None = None) -> Found:
     """What was looked up by its name. Raises NotFoundError where there is none, or it is of no clutch among `only` these."""
     if row is None or (only is not None and getattr(row, "clutch_id", None) not in only):
-        raise NotFoundError(f"no {what} is known as {name[:80]!r}")
+        raise NotFoundError(f"there is no {what} {name[:80]!r}")
     return row
 
 
 def unknown_clutch(clutch_id: str) -> NotFoundError:
     """What is answered of a clutch that nobody has registered."""
     return NotFoundError(
-        f"no clutch is known as {clutch_id!r}: register it with POST /v1/clutches, or clutchlife register {clutch_id}"
+        f"there is no clutch {clutch_id!r}: register it with POST /v1/clutches, or clutchlife register {clutch_id}"
     )
 
 
 class ConflictError(ServiceError, status=409, slug="conflict", title="This name is taken by other content"):
-    """That name is taken by other content."""
+    """An object of that name exists and has other content."""
 
 
 class ArchivedError(ConflictError, slug="archived", title="The clutch is archived"):
-    """The clutch is archived: it takes in no more runs."""
+    """The clutch is archived: it takes no more runs."""
 
 
 class LifeEndedError(ConflictError, slug="life-ended", title="The life has ended"):
-    """The life was declared ended: it takes in no later duty or tests, and no other end."""
+    """The life was declared ended: later duty and tests are refused, and so is another end."""
 
 
 class NotPossibleNowError(ConflictError, slug="not-possible-now", title="This is not possible now"):
-    """What is asked for makes no sense in the state that the thing is in."""
+    """The request does not fit the present state of the object."""
 
 
 class NothingToAdoptError(ConflictError, slug="nothing-to-adopt", title="There is nothing to adopt"):
@@ -105,19 +105,17 @@ class TooLargeError(ServiceError, status=413, slug="too-large", title="The reque
 
 
 class NoRoomError(ServiceError, status=507, slug="no-room", title="There is no room on the disk"):
-    """The disk has no room for what was sent; after room was made, the same request may succeed."""
+    """The disk has no room for the data. Make room, then repeat the request."""
 
 
 class UnsupportedMediaTypeError(
-    ServiceError, status=415, slug="unsupported-media-type", title="The body has a type that is not accepted here"
+    ServiceError, status=415, slug="unsupported-media-type", title="This type of body is not accepted here"
 ):
     """The body is not of a type that this address accepts."""
 
 
-class NotAcceptableError(
-    ServiceError, status=406, slug="not-acceptable", title="The answer is not given in this format here"
-):
-    """The answer cannot be given in the format that was asked for."""
+class NotAcceptableError(ServiceError, status=406, slug="not-acceptable", title="This format is not available here"):
+    """The answer is not available in the requested format."""
 
 
 class TooSlowError(ServiceError, status=408, slug="too-slow", title="The request took too long to arrive"):
@@ -125,11 +123,11 @@ class TooSlowError(ServiceError, status=408, slug="too-slow", title="The request
 
 
 class TooManyError(ServiceError, status=429, slug="too-many-requests", title="Too many requests"):
-    """The caller asks more often, or for more at once, than one caller may."""
+    """The caller sends too many requests per second or at the same time."""
 
 
 class BusyError(ServiceError, status=503, slug="busy", title="Busy"):
-    """Too many requests of this kind are waiting; the same request may succeed a little later."""
+    """Too many requests of this kind wait. Repeat the request later."""
 
 
 class UnauthorizedError(ServiceError, status=401, slug="unauthorized", title="A valid key is needed"):
@@ -137,4 +135,4 @@ class UnauthorizedError(ServiceError, status=401, slug="unauthorized", title="A 
 
 
 class ForbiddenError(ServiceError, status=403, slug="forbidden", title="Not allowed"):
-    """The caller's key, or its address where no keys are configured, does not allow this."""
+    """The caller's key, or its address where no key exists, does not allow this."""

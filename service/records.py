@@ -72,7 +72,7 @@ def rig(connection: Connection, name: str) -> RigOut:
     row = rigs.get(connection, name)
     if row is None:
         names = ", ".join(repr(profile.name) for profile in rigs.page(connection, limit=10))
-        raise NotFoundError(f"no rig is known as {name!r}; known: {names or 'none yet'}")
+        raise NotFoundError(f"there is no rig {name!r}; the rigs are: {names or 'none yet'}")
     return rig_out(row)
 
 
@@ -251,7 +251,7 @@ def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:
 def attempts(clutch_id: str) -> Iterator[int]:
     """The numbers of the attempts to compute and store, from 1; raises BusyError where the clutch has changed at each."""
     yield from range(1, MAX_ATTEMPTS + 1)
-    raise BusyError(f"clutch {clutch_id!r} was changed by others {MAX_ATTEMPTS} times meanwhile: ask again in a while")
+    raise BusyError(f"clutch {clutch_id!r} was changed by others {MAX_ATTEMPTS} times meanwhile: try again later")
 
 
 def store(connection: Connection, clutch_id: str, computed: Results) -> None:

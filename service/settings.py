@@ -54,89 +54,89 @@ class Settings(BaseSettings):
     )
     raw: str | None = Field(
         default=None,
-        description="where long raw records go: `database`, `folder:///path` or `s3://bucket/prefix`; left out, where they "
-        "went before, at first the database",
+        description="where new long raw records are stored: `database`, `folder:///path` or `s3://bucket/prefix`; "
+        "if not set, the place last chosen, at first the database",
     )
     # as `make load` has it, on two cores
     workers: int = Field(
-        default=2, ge=0, description="processes that take in runs; 0: no workers, all in the service's own process"
+        default=2, ge=0, description="number of processes that take in runs; 0: no worker processes at all"
     )
     max_body_mb: int = Field(
         default=64,
         ge=1,
-        description="the largest run that is accepted as JSON [MiB]; longer records are posted as files",
+        description="largest run that is accepted as JSON [MiB]; send longer records as files",
     )
-    max_file_mb: int = Field(default=1024, ge=1, description="the largest file that is accepted [MiB]")
+    max_file_mb: int = Field(default=1024, ge=1, description="largest file that is accepted [MiB]")
     # a rig's run arrives within one second, over a bad line within ten
     body_seconds: int = Field(
         default=30,
         ge=1,
-        description="how long a body may take to arrive, and a second longer for every 64 KiB that have arrived; then 408",
+        description="time in which a body must arrive [s], plus one second for each 64 KiB; else 408",
     )
     # eight rigs and twenty pages behind one address ask 100 times a second (`make load`), 30 at once
     requests_per_second: int = Field(
         default=1000,
         ge=1,
-        description="how often one key may ask, or one address without a key; two seconds' worth may be saved up; then 429",
+        description="requests per second of one key, or of one address without a key; bursts of twice as many; else 429",
     )
-    requests_at_once: int = Field(default=128, ge=1, description="how many of its requests may be on their way at once")
+    requests_at_once: int = Field(
+        default=128, ge=1, description="requests of one key or address at the same time; else 429"
+    )
     # twice the requests of one caller at once; four such addresses fit in the 1,024 files that a system gives a process
     connections_at_once: int = Field(
         default=256,
         ge=1,
-        description="how many connections one address may have open; further ones are answered 429 and closed",
+        description="open connections of one address; further ones get 429 and are closed",
     )
     # docs/appendix/benchmarks.md: the longest diagnosis takes 11 s
     diagnosis_seconds: int = Field(
         default=300,
         ge=1,
-        description="how much processor time a diagnosis may take; by the clock, beside other work, six times as long",
+        description="processor time that a diagnosis may take [s]; it may take six times as long by the clock",
     )
     diagnosis_memory_mb: int = Field(
-        default=4096, ge=1, description="how much address space the process of a diagnosis may have [MiB]"
+        default=4096, ge=1, description="address space of the process of a diagnosis [MiB]"
     )
     # an operator's restart of the database takes some seconds, and a lease is prolonged ten times before it runs out
     job_lease_seconds: int = Field(
         default=30,
         ge=1,
-        description="how long after its service was killed a job is begun again by another, or by the next on a file",
+        description="time after which the job of a killed service is started again [s]",
     )
-    most_diagnoses: int = Field(default=16, ge=1, description="diagnoses that wait or run; further ones get a 503")
+    most_diagnoses: int = Field(default=16, ge=1, description="diagnoses that may wait or run; further ones get 503")
     # docs/appendix/scale.md: 10,000 clutches of 16 tests take four hours of a core, of 200 tests over twelve times that
     replay_hours: int = Field(
-        default=72, ge=1, description="how long a replay or a fleet refresh that is a job may take, by the clock [h]"
+        default=72, ge=1, description="time that a job of a replay or a fleet refresh may take [h]"
     )
     most_replays: int = Field(
-        default=16, ge=1, description="replays of clutches that wait or run as jobs; further ones get a 503"
+        default=16, ge=1, description="replays that may wait or run as jobs; further ones get 503"
     )
     least_free_mb: int = Field(
-        default=64, ge=0, description="free space on the database's disk [MiB] below which `/readyz` says 503"
+        default=64, ge=0, description="free space on the database's disk below which `/readyz` answers 503 [MiB]"
     )
-    least_memory_mb: int = Field(
-        default=64, ge=0, description="memory that is left [MiB] below which `/readyz` says 503"
-    )
+    least_memory_mb: int = Field(default=64, ge=0, description="free memory below which `/readyz` answers 503 [MiB]")
     clutch_metrics: bool = Field(
-        default=False, description="whether `/metrics` has series of every clutch, as Grafana's dashboard needs them"
+        default=False, description="whether `/metrics` has series of every clutch; Grafana's dashboard needs them"
     )
     log_format: Annotated[LogFormat, BeforeValidator(str.lower)] = Field(
-        default="auto", description="`json`, `text`, or `auto`: text on a terminal and JSON elsewhere"
+        default="auto", description="`json`, `text`, or `auto` (text on a terminal, JSON elsewhere)"
     )
     log_level: Annotated[LogLevel, BeforeValidator(str.lower)] = Field(
-        default="info", description="the least that is logged: `debug`, `info`, `warning`, `error` or `critical`"
+        default="info", description="lowest level that is logged: `debug`, `info`, `warning`, `error` or `critical`"
     )
     root_path: Annotated[str, AfterValidator(_below)] = Field(
-        default="", description="the path that a proxy adds before the service's own addresses, as `/clutch`"
+        default="", description="path that a proxy adds before all addresses of the service, such as `/clutch`"
     )
     private_receivers: bool | None = Field(
         default=None,
-        description="whether alarms may be sent to this machine and to private networks; left out, while no key was made",
+        description="whether alarms may go to this machine and to private networks; if not set, until the first key is made",
     )
     insecure_local: bool = Field(
-        default=False, description="without keys, answer also what a proxy on this machine passes on"
+        default=False, description="accept requests through a proxy on this machine although no key exists"
     )
     engine: str = Field(
         default="models.diagnosis.diagnose:diagnose",
-        description="the function that makes diagnoses, `module:function`; for tests",
+        description="function that makes diagnoses, as `module:function`; for tests",
     )
 
     @classmethod

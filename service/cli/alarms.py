@@ -13,14 +13,14 @@ from service.client.clutchlife.transport import Service
 @asking
 def alarms(
     service: Service,
-    everything: Annotated[bool, typer.Option("--all", help="Also those that are over")] = False,
-    clutch: Annotated[str | None, typer.Option(help="Only of this clutch")] = None,
-    acknowledge: Annotated[str | None, typer.Option(metavar="EVENT", help="Acknowledge this one")] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Include alarms that are over")] = False,
+    clutch: Annotated[str | None, typer.Option(help="Only this clutch")] = None,
+    acknowledge: Annotated[str | None, typer.Option(metavar="EVENT", help="Acknowledge this alarm")] = None,
     note: Annotated[str, typer.Option(help="A remark on the acknowledgement")] = "",
     rules: Annotated[bool, typer.Option("--rules", help="List the rules instead")] = False,
     as_json: Json = False,
 ) -> None:
-    """List the alarms that are raised, newest first, or acknowledge one."""
+    """List raised alarms, newest first, or acknowledge one."""
     if acknowledge is not None:
         body = json.dumps({"note": note}).encode()
         items = iter([service.post(f"/v1/alarms/events/{acknowledge}/acknowledge", body)])

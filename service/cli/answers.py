@@ -14,12 +14,14 @@ from service.cli.tables import pressure as pressure_of
 from service.client.clutchlife.transport import Service
 
 Method = Annotated[str | None, typer.Option(help="The filter: particle, ukf or grid")]
-AtCycles = Annotated[float | None, typer.Option(help="Answer as of these duty cycles")]
+AtCycles = Annotated[float | None, typer.Option(help="Answer with the runs up to these duty cycles only")]
 Arguments = Annotated[
     list[str] | None,
-    typer.Option("--query", metavar="NAME=VALUE", help="Another parameter of the API request; may be repeated"),
+    typer.Option(
+        "--query", metavar="NAME=VALUE", help="Any other argument of the route, as NAME=VALUE; may be repeated"
+    ),
 ]
-Csv = Annotated[bool, typer.Option("--csv", help="Print CSV for a spreadsheet")]
+Csv = Annotated[bool, typer.Option("--csv", help="Print the answer as CSV")]
 
 
 def _arguments(given: list[str] | None, **named: Any) -> dict[str, Any]:
@@ -65,42 +67,45 @@ def life(
     clutch: ClutchId,
     method: Method = None,
     pressure: Annotated[
-        float | None, typer.Option(help="Line pressure, bar; left out, the mean over the pressures")
+        float | None, typer.Option(help="Line pressure, bar; default: the mean over the pressures")
     ] = None,
     at_cycles: AtCycles = None,
     quantity: Annotated[
-        str | None, typer.Option(help="By this quantity, as `slope`; left out, by what ends the clutch's life")
+        str | None,
+        typer.Option(help="Remaining life by this quantity, such as `slope`; default: by the clutch's own criteria"),
     ] = None,
     life_number: Annotated[
-        int | None, typer.Option("--life", help="Of an earlier life of a clutch that was rebuilt: 1 is the first")
+        int | None, typer.Option("--life", help="An earlier life of a rebuilt clutch: 1 is the first")
     ] = None,
     query: Arguments = None,
-    plan: Annotated[Path | None, typer.Option(help="Planned duty: the forecast's request body as a JSON file")] = None,
+    plan: Annotated[
+        Path | None, typer.Option(help="Planned duty: a JSON file with the body of the forecast request")
+    ] = None,
     block: Annotated[
         list[str] | None,
         typer.Option(
             metavar=_BLOCK,
-            help="Planned duty: cycles, energy of each in kJ, its deviation; may be repeated",
+            help="Planned duty: cycles, energy per cycle in kJ, standard deviation of the energy; may be repeated",
         ),
     ] = None,
     pace: Annotated[
-        float | None, typer.Option(help="Duty cycles an hour of the planned duty, idle hours included, for dates")
+        float | None, typer.Option(help="Planned duty cycles per hour, idle hours included; gives dates")
     ] = None,
     as_json: Json = False,
     as_csv: Csv = False,
 ) -> None:
-    """Show the duty cycles that remain until the end of life; with --plan or --block those under planned duty."""
+    """Show the remaining duty cycles until the end of life; with --plan or --block under planned duty."""
     arguments = _arguments(
         query, method=method, pressure_bar=pressure, at_cycles=at_cycles, quantity=quantity, life=life_number
     )
     address = f"/v1/clutches/{clutch}/remaining-useful-life"
     if plan is None and not block:
         if pace is not None:
-            fail("--pace goes with --plan or --block", EX_USAGE)
+            fail("use --pace only with --plan or --block", EX_USAGE)
         _answer(service, address, arguments, _show_life, as_json=as_json, as_csv=as_csv)
         return
     if as_csv:
-        fail("planned duty is printed as a table or with --json, not with --csv", EX_USAGE)
+        fail("--csv is not available for planned duty; use --json", EX_USAGE)
     body = json.dumps(_programme(plan, block or [], pace)).encode()
     answer = service.post(f"{address}/forecast?{urlencode(arguments)}", body)
     if as_json:
@@ -227,14 +232,14 @@ _COEFFICIENTS = ("initial", "change", "scale_cycles", "exponent")
 def degradation(
     service: Service,
     clutch: ClutchId,
-    quantity: Annotated[str | None, typer.Option(help="Only this quantity, as `slope`")] = None,
+    quantity: Annotated[str | None, typer.Option(help="Only this quantity, such as `slope`")] = None,
     method: Method = None,
     at_cycles: AtCycles = None,
     query: Arguments = None,
     as_json: Json = False,
     as_csv: Csv = False,
 ) -> None:
-    """Show how mean COF and the Stribeck parameters change along a life: the coefficients of eq. 6."""
+    """Show how mean COF and the Stribeck parameters change over life: the coefficients of eq. 6."""
     arguments = _arguments(query, quantity=quantity, method=method, at_cycles=at_cycles)
 
     def show(answer: Mapping[str, Any]) -> None:
@@ -282,7 +287,7 @@ def loops(
     as_json: Json = False,
     as_csv: Csv = False,
 ) -> None:
-    """Show the friction loops of the dynamic tests: their area and both laws of the lag."""
+    """Show the friction loops of the dynamic tests: area, attractor and film time."""
 
     def show(answer: Mapping[str, Any]) -> None:
         if answer["items"]:
@@ -318,7 +323,8 @@ _INDICATORS = (
 def engagement(
     service: Service, clutch: ClutchId, at_cycles: AtCycles = None, query: Arguments = None, as_json: Json = False
 ) -> None:
-    """Show an engagement simulated with the tracked Stribeck parameters, now or at any cycles, and the measured ones."""
+    """Show a simulated engagement, with the Stribeck parameters of now or of --at-cycles, and the measured
+    engagements."""
     arguments = _arguments(query, at_cycles=at_cycles)
     _answer(service, f"/v1/clutches/{clutch}/engagement", arguments, _show_engagement, as_json=as_json)
 

@@ -41,14 +41,16 @@ def register(
     set_fields: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="FIELD=VALUE", help="For example friction_material=paper or geometry.friction_faces=4"
+            "--set",
+            metavar="FIELD=VALUE",
+            help="A field, such as friction_material=paper or geometry.friction_faces=4; may be repeated",
         ),
     ] = None,
     record: Annotated[
         Path | None, typer.Option(exists=True, dir_okay=False, help="A JSON file with the clutch's record")
     ] = None,
 ) -> None:
-    """Register a clutch, so that runs of it can be sent. What you leave out is taken from the reference paper's clutch."""
+    """Register a clutch, so that you can send its runs. Fields that you omit have the values of the reference paper."""
     fields: dict[str, Any] = {} if record is None else json.loads(record.read_bytes())
     if not isinstance(fields, dict):
         raise ValueError(f"{record} must hold a JSON object")  # noqa: TRY004  (a wrong file, not a wrong call)
@@ -61,14 +63,14 @@ def register(
 @asking
 def list_clutches(
     service: Service,
-    state: Annotated[str | None, typer.Option(help="Only those in this state, for example maintenance")] = None,
+    state: Annotated[str | None, typer.Option(help="Only clutches in this state, such as maintenance")] = None,
     find: Annotated[
-        str | None, typer.Option(help="Only those whose name, friction material or fluid contains this")
+        str | None, typer.Option(help="Only clutches with this text in their name, friction material or fluid")
     ] = None,
-    archived: Annotated[bool, typer.Option("--archived", help="List the archived clutches")] = False,
+    archived: Annotated[bool, typer.Option("--archived", help="Only archived clutches")] = False,
     as_json: Json = False,
 ) -> None:
-    """List clutches, worst first, with their state and the cycles that remain."""
+    """List clutches, worst first, with their state and remaining cycles."""
     chosen = {"state": state, "find": find, "archived": "true" if archived else None}
     items = service.pages("/v1/clutches", **{name: value for name, value in chosen.items() if value is not None})
     columns = ("clutch", "state", "at", "at least", "median", "held")
@@ -91,8 +93,8 @@ def _row(item: dict[str, Any]) -> list[str]:
 
 
 def status(clutch: ClutchId, as_json: Json = False, url: Url = URL, key: Key = None, patience: Patience = 10.0) -> None:
-    """Print how a clutch is and what to do about it. Ends with 0 where it is normal, 1 check, maintenance or out of
-    specification, 2 failure, 3 unknown, unreachable or misused."""
+    """Print a clutch's state and what to do. The exit code is 0 for normal, 1 for check, maintenance or out of
+    specification, 2 for failure, 3 if the state is unknown."""
     try:
         with Client(url, key, patience=patience) as client:
             item = client.clutch(clutch)
@@ -113,7 +115,7 @@ def watch(
     clutch: ClutchId,
     every: Annotated[float, typer.Option(min=0.1, help="Seconds between two requests")] = 5.0,
     looks: Annotated[
-        int | None, typer.Option(min=1, help="End after this many requests; without it, at Ctrl-C")
+        int | None, typer.Option(min=1, help="End after this number of requests; default: at Ctrl-C")
     ] = None,
 ) -> None:
     """Print a clutch's state whenever it changes, until Ctrl-C."""
@@ -137,7 +139,10 @@ def edit(
     clutch: ClutchId,
     reason: Reason,
     set_fields: Annotated[
-        list[str], typer.Option("--set", metavar="FIELD=VALUE", help="As end_of_life.cof_fraction=0.4; may be repeated")
+        list[str],
+        typer.Option(
+            "--set", metavar="FIELD=VALUE", help="A field, such as end_of_life.cof_fraction=0.4; may be repeated"
+        ),
     ],
 ) -> None:
     """Change fields of a clutch's record; all results are computed again."""
@@ -158,7 +163,7 @@ def archive(
     undo: Annotated[bool, typer.Option("--undo", help="Bring it back")] = False,
     reason: Reason = "",
 ) -> None:
-    """Hide a finished clutch from lists. It accepts no more runs, and fleets still learn from it."""
+    """Archive a finished clutch: lists omit it, it takes no more runs, and its fleet still learns from it."""
     body = json.dumps({"archived": not undo, "reason": reason}).encode()
     changed = service.patch(f"/v1/clutches/{clutch}", body)
     print_line(f"{clutch} is {'archived' if changed['archived'] else 'in use'}")
@@ -187,10 +192,12 @@ def _assign(fields: dict[str, Any], record: dict[str, Any], assignment: str) -> 
 def model(
     service: Service,
     clutch: ClutchId,
-    adopt: Annotated[str | None, typer.Option(metavar="DIAGNOSIS", help="Adopt this diagnosis' extended model")] = None,
+    adopt: Annotated[
+        str | None, typer.Option(metavar="DIAGNOSIS", help="Adopt the extended model of this diagnosis")
+    ] = None,
     baseline: Annotated[bool, typer.Option("--baseline", help="Return to the baseline")] = False,
 ) -> None:
-    """Show the model that a clutch is tracked under, adopt an extended one, or return to the baseline."""
+    """Show a clutch's model, adopt an extended model, or return to the baseline."""
     if adopt is not None and baseline:
         fail("use --adopt or --baseline, not both", EX_USAGE)
     address = f"/v1/clutches/{clutch}/model"

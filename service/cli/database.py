@@ -26,7 +26,7 @@ from storage.engine.errors import DatabaseTooOld
 
 
 def backup(path: Path, database: Database = DATABASE) -> None:
-    """Write a consistent copy of the database to PATH. The service may run meanwhile."""
+    """Make a consistent copy of the database, also while the service runs."""
     from storage.engine.sqlite.database import back_up  # start-up time
 
     with errors_in_a_line():
@@ -57,9 +57,9 @@ def restore(
     backup: Annotated[Path, typer.Argument(metavar="BACKUP", help="A backup, made by clutchlife backup")],
     database: Database = DATABASE,
 ) -> None:
-    """Replace the database by the file BACKUP. The replaced database is kept beside it.
+    """Replace the database by the file BACKUP. The old database stays beside it as FILE-replaced.
 
-    No service may use the database meanwhile. A backup of an earlier release is migrated when the service starts.
+    Stop the service first. The next start migrates a backup of an earlier release.
     """
     from storage.engine.sqlite.backup import restore as put_back  # start-up time
 
@@ -76,13 +76,15 @@ if TYPE_CHECKING:
 
 
 def replay(
-    clutch_ids_given: Annotated[list[str] | None, typer.Argument(metavar="[ID...]", help="Left out: all")] = None,
+    clutch_ids_given: Annotated[
+        list[str] | None, typer.Argument(metavar="[ID...]", help="The clutches; default: all")
+    ] = None,
     database: Database = DATABASE,
     scheduler: Scheduler = "local",
 ) -> None:
-    """Recompute all results from the raw runs, with the code that is installed now.
+    """Compute all results again from the raw runs, with the installed code.
 
-    A clutch with a run that this code cannot evaluate keeps the results that it has; the others are gone on with.
+    A clutch with a run that this code cannot evaluate keeps its results; the command goes on with the others.
     """
     from service.work.background import in_background  # start-up time: only this command needs it
     from service.work.progress import progress  # start-up time: only this command needs it
@@ -104,18 +106,18 @@ def replay(
     with existing(database) as opened, executor(scheduler) as computing, progress(err, "replaying") as advance:
         left = in_background(replay_all)
     if left:
-        fail(f"{len(left)} clutches keep the results that they had: {', '.join(left)}")
+        fail(f"{len(left)} clutches keep their previous results: {', '.join(left)}")
 
 
 def verify(
     database: Database = DATABASE,
     sample: Annotated[
-        int | None, typer.Option(min=0, help="Recompute only this many clutches, chosen at random; without it, all")
+        int | None, typer.Option(min=0, help="Recompute only this many clutches, chosen at random; default: all")
     ] = None,
 ) -> None:
-    """Check pages, references and schema, the hashes of every run, inspection and photograph, and that all results follow.
+    """Check the database: its pages and schema, the hash of every run, inspection and photograph, and all results.
 
-    Prints what is wrong, a line each; ends with 1 where anything is. Also while the service runs, and for a backup.
+    Prints one line for each fault, and ends with 1 if there is any. Works beside a running service and on a backup.
     """
     from service.queries.verification import (  # start-up time
         check_inspections,  # start-up time
@@ -139,7 +141,7 @@ def verify(
         with opened.reading() as connection:
             damaged = tell(opened.damage(connection))
             if damaged:  # what is read of a damaged file is not to be trusted: neither runs nor what follows from them
-                fail(f"{damaged} findings: the file is damaged. Put a backup back: clutchlife restore BACKUP")
+                fail(f"{damaged} findings: the file is damaged. Restore a backup: clutchlife restore BACKUP")
             findings += tell(other_schema(connection))
             ids = clutches.all_ids(connection)
         chosen = set(ids if sample is None else random.sample(ids, min(sample, len(ids))))
@@ -170,13 +172,13 @@ def verify(
 
 
 def migrate(
-    source: Annotated[str, typer.Option("--from", help="The database to copy; it is not changed")],
+    source: Annotated[str, typer.Option("--from", help="The database to copy; it stays unchanged")],
     target: Annotated[str, typer.Option("--to", help="An empty database, or a file that does not exist yet")],
 ) -> None:
-    """Copy a database into another one, SQLite or PostgreSQL, and compare all rows. No service may run on either.
+    """Copy a database into another (SQLite or PostgreSQL), and compare the two. Stop all services of both first.
 
-    If it was interrupted, give the same command again: it goes on where it stopped. The target is used by no service until
-    all tables are the same on both sides, and every run is as it was sent.
+    If it was interrupted, repeat the command: it goes on where it stopped. No service uses the target until all tables
+    are the same on both sides.
     """
     from service.queries.verification import (  # start-up time
         check_inspections,  # start-up time
@@ -207,7 +209,7 @@ def migrate(
             for finding in findings:
                 print_line(finding)
             if findings:
-                fail(f"{len(findings)} findings: the target is not used. Remove it, and migrate again")
+                fail(f"{len(findings)} findings: do not use the target. Delete it, and migrate again")
             moving.release()
     print_line(f"{rows} rows of {len(ids)} clutches are the same in both databases")
 

@@ -72,6 +72,8 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
         yield _visible(report["visible"])
     for note in report["notes"]:
         yield Text(f"Note: {note}", style="dim")
+    if report["adopted"]:
+        yield Text("The extended model is adopted: tracking and remaining life use it from now on.", style="bold")
 
 
 def _use(advice: Mapping[str, Any]) -> str:
@@ -225,8 +227,6 @@ def _gain(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     for when, title in (("before", "baseline"), ("after", "extended")):
         if life[when] and (when == "before" or report["adoptable"]):
             yield Text(f"Remaining life, {title}: {_remaining(life[when])}")
-    if report["adopted"]:
-        yield Text("The extended model is adopted: tracking and remaining life use it from now on.", style="bold")
 
 
 def _remaining(life: Mapping[str, Any]) -> str:

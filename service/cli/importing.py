@@ -27,22 +27,20 @@ def import_file(
         Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False, help="A file of the rig's recorder")
     ],
     clutch: Annotated[str, typer.Option(help="The clutch that was tested")],
-    rig: Annotated[
-        str | None, typer.Option(help="The rig profile that reads it; without it, the one that fits")
-    ] = None,
+    rig: Annotated[str | None, typer.Option(help="The rig profile to read it with; default: the one that fits")] = None,
     kind: Annotated[str | None, typer.Option(help=f"The kind of run: {' or '.join(_KINDS)}")] = None,
     cycles: Annotated[float | None, typer.Option(min=0, help="Duty cycles since new")] = None,
     channel_map: ChannelMap = None,
     decimal: Decimal = None,
     missing: Missing = None,
     save: Annotated[
-        str | None, typer.Option("--save", help="Keep how it is read as a rig profile of this name")
+        str | None, typer.Option("--save", help="Save how the file is read as a rig profile of this name")
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Ask nothing; end if something is missing")] = False,
 ) -> None:
-    """Show how a file is read, ask for what is missing, send it, and keep the answers as a rig profile.
+    """Show how a file is read, ask for what is missing, send the file, and save the answers as a rig profile.
 
-    The next file of the rig needs no answer: `clutchlife push --rig NAME`, or import again.
+    For the next file of the rig use `clutchlife push --rig NAME`, or import again.
     """
     given: dict[str, Any] = {"kind": kind, "cycles": cycles, "rig": rig}
     given |= {"map": channel_map, "decimal": decimal, "missing": missing}
@@ -60,7 +58,7 @@ def import_file(
     if not yes and not typer.confirm(f"Send it to {clutch}?", default=True):
         raise typer.Exit(0)
     if shown["rig"] is None and save is None and not yes:
-        save = typer.prompt("Keep this as the rig profile (a name, or nothing)", default="", show_default=False) or None
+        save = typer.prompt("Save this as a rig profile (its name, or nothing)", default="", show_default=False) or None
     if save is not None:
         _save(service, save, shown)
         given, profile = given | {"rig": save, "map": None}, None

@@ -33,7 +33,7 @@ def inspect(
         list[Path] | None, typer.Option("--photo", help="A photograph, PNG, JPEG or WebP; may be repeated")
     ] = None,
 ) -> None:
-    """Send what was found on a clutch's friction surface: roughness, skewness, a note, photographs. Safe to repeat."""
+    """Send an inspection of a clutch's friction surface: roughness, skewness, a note, photographs. You may repeat it."""
     photographs = {path: _media_type(path) for path in photo or []}
     if not note and photographs and ra is None and rsk is None:
         note = _PHOTOGRAPHS_ONLY
@@ -61,9 +61,9 @@ def inspections(service: Service, clutch: ClutchId, as_json: Json = False) -> No
 
 def _media_type(path: Path) -> str:
     if path.suffix.lower() not in MEDIA_TYPES:
-        fail(f"a photograph ends in {', '.join(MEDIA_TYPES)}, got {path.name!r}", EX_USAGE)
+        fail(f"the name of a photograph must end in {', '.join(MEDIA_TYPES)}, got {path.name!r}", EX_USAGE)
     if not path.is_file():
-        fail(f"the photograph {path} is not there", EX_USAGE)
+        fail(f"the photograph {path} does not exist", EX_USAGE)
     return MEDIA_TYPES[path.suffix.lower()]
 
 

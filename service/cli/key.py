@@ -23,13 +23,11 @@ def create(
     scope: Annotated[
         str, typer.Option(help="read, ingest (may add too: runs, clutches, diagnoses) or admin (may change)")
     ],
-    note: Annotated[str, typer.Option(help="Who or what it is for")] = "",
+    note: Annotated[str, typer.Option(help="Who or what the key is for")] = "",
     clutch: Annotated[
-        list[str] | None, typer.Option(help="A clutch that it is bound to; may be repeated. Left out: all")
+        list[str] | None, typer.Option(help="A clutch that the key may use; may be repeated; default: all")
     ] = None,
-    expires: Annotated[
-        float | None, typer.Option(min=0, help="Days after which it opens nothing. Left out: never")
-    ] = None,
+    expires: Annotated[float | None, typer.Option(min=0, help="Days until the key expires; default: never")] = None,
     database: Database = DATABASE,
 ) -> None:
     """Print a new key, once; only its hash is stored."""
@@ -47,7 +45,7 @@ def create(
 
 @app.command(name="list")
 def list_keys(database: Database = DATABASE) -> None:
-    """All keys: name, scope, when made, whether they open, when they were last used (to the hour), their clutches."""
+    """List all keys: name, scope, creation, validity, last use (to the hour), and clutches."""
     from storage import keys  # start-up time
 
     with read_only(database) as opened, opened.reading() as connection:

@@ -38,16 +38,18 @@ Database = Annotated[
 ]
 ClutchId = Annotated[str, typer.Argument(metavar="ID")]
 Url = Annotated[str, typer.Option("--url", envvar="CLUTCHLIFE_URL", help="The address of the service")]
-Key = Annotated[str | None, typer.Option("--key", envvar="CLUTCHLIFE_KEY", help="A key, where the service needs one")]
+Key = Annotated[str | None, typer.Option("--key", envvar="CLUTCHLIFE_KEY", help="Your key, if the service needs one")]
 Patience = Annotated[float, typer.Option(min=0, help="Seconds to keep trying while the service is away")]
-Seed = Annotated[int, typer.Option(min=0, help="The simulated clutch and its noise; the same seed, the same bits")]
+Seed = Annotated[
+    int, typer.Option(min=0, help="Seed of the simulated clutch and its noise; the same seed gives the same data")
+]
 
 ChannelMap = Annotated[str | None, typer.Option("--map", help="Channels by name: torque_nm:Mz,speed_rpm:n")]
-Decimal = Annotated[str | None, typer.Option(help="The decimal sign of text files, . or , ; left out, it is found")]
+Decimal = Annotated[str | None, typer.Option(help="Decimal sign of text files, . or , ; default: detected")]
 Missing = Annotated[
     str | None,
     typer.Option(
-        help="Marks of missing values, as -9999,n/a; their rows are left out. none: every number is a measurement"
+        help="Marks of missing values, such as -9999,n/a: their rows are left out; none: all numbers are measurements"
     ),
 ]
 

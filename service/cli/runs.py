@@ -31,9 +31,9 @@ def withdraw(
     clutch: ClutchId,
     run: RunId,
     reason: Reason,
-    undo: Annotated[bool, typer.Option("--undo", help="Undo the withdrawal: the run counts again")] = False,
+    undo: Annotated[bool, typer.Option("--undo", help="Undo the withdrawal")] = False,
 ) -> None:
-    """Take a run out of a clutch's history; it stays stored."""
+    """Withdraw a run: it no longer counts, but stays stored."""
     _post(service, f"/v1/clutches/{clutch}/runs/{run}/{'restore' if undo else 'withdraw'}", {"reason": reason})
 
 
@@ -42,19 +42,20 @@ def end(
     service: Service,
     clutch: ClutchId,
     cycles: Annotated[
-        float | None, typer.Option(min=0, help="Duty cycles since new at the end; without it, those of the last run")
+        float | None, typer.Option(min=0, help="Duty cycles since new at the end; default: those of the last run")
     ] = None,
-    reason: Annotated[str, typer.Option(help="worn, or other: taken out before it was worn")] = "worn",
+    reason: Annotated[str, typer.Option(help="worn, or other if the clutch was taken out before its end")] = "worn",
     note: Annotated[str, typer.Option(help="A remark")] = "",
 ) -> None:
-    """Declare that a clutch's life has ended. It accepts no duty or tests until a rebuild, and its fleet learns from it."""
+    """Declare the end of a clutch's life. The service then refuses duty and tests until a rebuild, and the fleet
+    learns from the end."""
     if reason not in ("worn", "other"):
         fail(f"--reason must be worn or other, got {reason!r}", EX_USAGE)
     if cycles is None:
         summary = service.get(f"/v1/clutches/{clutch}")["summary"]
         cycles = None if summary is None else summary["as_of_cycles"]
     if cycles is None:
-        fail(f"{clutch} has no run yet: give --cycles", EX_USAGE)
+        fail(f"{clutch} has no run yet: state --cycles", EX_USAGE)
     declared = {"kind": "maintenance", "event": "end_of_life", "cycles": cycles, "reason": reason, "note": note}
     receipt = _post(service, f"/v1/clutches/{clutch}/runs", declared)
     if receipt["state"] == "accepted":
@@ -67,15 +68,13 @@ def confirm(
     service: Service,
     clutch: ClutchId,
     runs: Annotated[list[str] | None, typer.Argument(metavar="[RUN]...", help="The names of the runs")] = None,
-    every: Annotated[bool, typer.Option("--all", help="All runs that are held")] = False,
-    doubt: Annotated[
-        str, typer.Option(help="All runs that are held for this reason, for example cycles_off_pace")
-    ] = "",
+    every: Annotated[bool, typer.Option("--all", help="All held runs")] = False,
+    doubt: Annotated[str, typer.Option(help="All held runs for this code, as cycles_off_pace")] = "",
     reason: Reason = "",
 ) -> None:
-    """Accept held runs as they were sent: one, or several in one step."""
+    """Accept one or more held runs as they were sent."""
     if bool(runs) + every + bool(doubt) != 1:
-        fail("give the runs, or --all, or --doubt CODE", EX_USAGE)
+        fail("name the runs, or use --all or --doubt CODE", EX_USAGE)
     if not runs:
         held = service.pages(f"/v1/clutches/{clutch}/runs", state="held")
         runs = [run["run_id"] for run in held if every or doubt in {question["code"] for question in run["doubts"]}]
@@ -94,11 +93,11 @@ def correct(
     run: RunId,
     reason: Reason,
     cycles: Annotated[float | None, typer.Option(min=0, help="Duty cycles since new when the run was made")] = None,
-    rig: Annotated[str | None, typer.Option(help="Read the run's file again, by this rig profile")] = None,
+    rig: Annotated[str | None, typer.Option(help="Read the run's file again with this rig profile")] = None,
 ) -> None:
-    """Correct the cycles of a run, or read its file again by the right rig profile."""
+    """Correct the cycles of a run, or read its file again with another rig profile."""
     if (cycles is None) == (rig is None):
-        raise typer.BadParameter("give --cycles, or --rig")
+        raise typer.BadParameter("use --cycles or --rig")
     change = {"rig": rig} if cycles is None else {"cycles": cycles}
     _show(service.patch(f"/v1/clutches/{clutch}/runs/{run}", json.dumps(change | {"reason": reason}).encode()))
 

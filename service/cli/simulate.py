@@ -33,52 +33,57 @@ def simulate(
     ageing: Annotated[Literal["cycles", "energy"], typer.Option(help="What ages the clutch")] = "cycles",
     noise: Annotated[
         float | None,
-        typer.Option(min=0, max=0.2, help="Deviation of a plateau's torque, a share of it; left out, the reference's"),
+        typer.Option(
+            min=0,
+            max=0.2,
+            help="Standard deviation of a plateau's torque, as a share of it; default: that of the reference",
+        ),
     ] = None,
-    tests: Annotated[int, typer.Option(min=1, help="End after so many stationary tests, if not before")] = 40,
+    tests: Annotated[
+        int, typer.Option(min=1, help="End after this number of stationary tests, or earlier if the clutch is worn")
+    ] = 40,
     hide: Annotated[
         list[str] | None,
         typer.Option(metavar="EFFECT[:SIZE]", help="Hide an effect, to rehearse a diagnosis; may be repeated"),
     ] = None,
     film: Annotated[
         bool,
-        typer.Option("--film", help="Friction lags by the reference's ageing film as well; answer.json says so"),
+        typer.Option("--film", help="Add the lag of the reference's ageing film to friction; answer.json says so"),
     ] = False,
     plate_rise: Annotated[
         float | None,
         typer.Option(
-            min=0, max=500, help="Write the plate's temperature: so many K above the oil at 0.32 W/mm²; left out, none"
+            min=0,
+            max=500,
+            help="Write the plate's temperature: this many K above the oil at 0.32 W/mm²; default: not written",
         ),
     ] = None,
     frequency: Annotated[
         list[float] | None,
         typer.Option(
-            min=0.01, max=5, help="Frequency of the speed in dynamic tests, in Hz; given twice, each is tested at both"
+            min=0.01, max=5, help="Frequency of the speed in dynamic tests, in Hz; repeat it to test at several"
         ),
     ] = None,
     pressures: Annotated[
         list[float] | None,
-        typer.Option(min=4, max=8, help="A pressure of the tests in bar; repeat it for more of them"),
+        typer.Option(min=4, max=8, help="Pressure of the tests in bar; repeat it for several"),
     ] = None,
     plan: Annotated[
         Path | None,
         typer.Option(
-            help="Run a diagnosis' plan (CSV or JSON) on the clutch that is in --out already; no other option"
+            help="Run this plan of a diagnosis (CSV or JSON) on the clutch in --out; only --alternative goes with it"
         ),
     ] = None,
-    alternative: Annotated[
-        int, typer.Option(min=1, help="Which test of the plan: its tests are alternatives, the best first")
-    ] = 1,
+    alternative: Annotated[int, typer.Option(min=1, help="Number of the alternative to run; 1 is the best")] = 1,
 ) -> None:
-    """Simulate a clutch's life on the rig, and write one file per run for `clutchlife push`.
+    """Simulate a clutch's life on the rig, and write one file per run. `clutchlife push` sends the files.
 
-    The lining's roughness and skewness at each stationary test are written too, into a folder of inspections.
+    The folder `inspections` gets the lining's roughness and skewness at each stationary test.
 
-    Friction lags speed as in the service's own model, so that a diagnosis finds nothing. The true end of life, and what
-    --hide and --film add, are in answer.json beside the runs, which push does not send. To list all effects, name an unknown
-    one.
+    Without --hide a diagnosis finds nothing. `answer.json` beside the runs has the true end of life, the hidden
+    effects and the film; push does not send it. To see all effects, give --hide a wrong name.
 
-    Run-in and duty blocks are JSON whatever the format. Tests in another format are listed in runs.json, which push reads.
+    Run-in and duty blocks are always JSON. Tests in another format are listed in runs.json, which push reads.
     """
     from models.rig import campaign, hidden, stationary, surface, temperatures  # start-up time
     from models.rig.simulated_runs import RunKind  # start-up time
@@ -99,6 +104,7 @@ def simulate(
         clutch = hidden.clutch_for(clutch, sizes)
         manifest.write(out_folder / manifest.CLUTCH_FILE, simulated.simulated_clutch_body(clutch_id))
         wear_and_cycles: list[tuple[float, float]] = []
+        inspections = 0
         listed: list[dict[str, Any]] = []
         with _progress() as progress:
             task = progress.add_task("run-in", total=clutch.end_of_life(_STOP))
@@ -115,11 +121,12 @@ def simulate(
                 listed += _write(out_folder, made, record_format)
                 if run.kind is RunKind.STATIONARY_STRIBECK:
                     _inspect(out_folder, surface.surface(clutch, run.wear), run.cycles)
+                    inspections += 1
                 wear_and_cycles.append((run.wear, run.cycles))
         if listed:
             manifest.write(out_folder / manifest.MANIFEST, listed)
         end = campaign.end_of_life(wear_and_cycles, clutch)
-        truth = "has not halved in this campaign" if end is None else f"has halved after {end:.0f} cycles"
+        truth = "does not halve in this campaign" if end is None else f"halves after {end:.0f} cycles"
         wear, last = wear_and_cycles[-1]
         answer = {
             "seed": seed,
@@ -133,8 +140,9 @@ def simulate(
             "planned_tests": 0,
         }
         manifest.write(out_folder / manifest.ANSWER, answer)
-        out.print(f"{len(wear_and_cycles)} simulated runs of {clutch_id} in {out_folder}", soft_wrap=True)
-        out.print(f"the truth: its mean COF {truth}")
+        made_so_far = f"{len(wear_and_cycles)} simulated runs and {inspections} inspections"
+        out.print(f"{made_so_far} of {clutch_id} in {out_folder}", soft_wrap=True)
+        out.print(f"the true mean COF {truth}")
 
 
 def _run_plan(folder: Path, plan: Path, alternative: int) -> None:

@@ -226,7 +226,7 @@ def _disagreements(payload: Mapping[str, Any] | None) -> list[Notice]:
     return [
         Notice(
             code="tracks_disagree",
-            message=f"{words[name]} from the Stribeck parameters is {value:+.1f} deviations off the direct track's",
+            message=f"{words[name]} from the Stribeck parameters is {value:+.1f} standard deviations off the direct track",
         )
         for name, value in payload["disagreement"].items()
         if far_apart(value)

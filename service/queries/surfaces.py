@@ -54,7 +54,7 @@ def surfaces(
     history = lives_of(events)
     speed_range = history[-1].speed_range if history else None
     if speed_range is None:
-        raise NotFoundError("there is no stationary test, and so no surfaces")
+        raise NotFoundError("there are no surfaces without a stationary test")
     life = history[-1]
     tracks = parameter_tracks(life, assumptions, tests_of(life, fits))
     levels = sorted(level for level in life.reference if all((name, level) in tracks for name in PARAMETER_NAMES))

@@ -66,7 +66,7 @@ EventState = Literal["raised", "acknowledged", "cleared"]
 
 
 class KindIn(Schema):
-    """A kind of clutch: what is left out may be any."""
+    """A kind of clutch. Omitted fields match everything."""
 
     friction_material: Material | None = Field(default=None, description="The friction material")
     reaction_plate: Material | None = Field(default=None, description="The reaction plate's material")
@@ -76,31 +76,31 @@ class KindIn(Schema):
 class AlarmIn(Schema):
     """A rule: when an alarm is raised, of which clutches."""
 
-    name: Annotated[str, StringConstraints(max_length=LONGEST_NAME)] = Field(
-        default="", description="What people call it"
-    )
-    clutch_id: Identifier | None = Field(default=None, description="The clutch; left out, all of them")
-    kind: KindIn | None = Field(default=None, description="Clutches of this kind only")
+    name: Annotated[str, StringConstraints(max_length=LONGEST_NAME)] = Field(default="", description="Name for people")
+    clutch_id: Identifier | None = Field(default=None, description="The clutch; default: all clutches")
+    kind: KindIn | None = Field(default=None, description="Only clutches of this kind")
     quantity: WatchedQuantity = Field(
-        description="What is watched: `remaining_cycles` (to the first criterion that ends the life), `remaining_days` at "
+        description="The watched quantity: `remaining_cycles` (to the first criterion that ends the life), "
+        "`remaining_days` at "
         "the pace of the runs, `health`, `shudder_margin` (slope of the newest test's curves, s/m), `held_runs`, "
         "`off_course`, `verdict` of the newest diagnosis, `state`, `silent_hours` since the last run arrived"
     )
     probability: Probability = Field(
-        default=0.05, description="The quantile that is compared: 0.05 is the safe bound, of the shudder margin too"
+        default=0.05,
+        description="Quantile that is compared with the limit; 0.05 is the safe bound, also for the shudder margin",
     )
-    below: Limit | None = Field(default=None, description="It is raised where the value is below this")
-    above: Limit | None = Field(default=None, description="It is raised where the value is above this")
+    below: Limit | None = Field(default=None, description="The alarm is raised if the value is below this limit")
+    above: Limit | None = Field(default=None, description="The alarm is raised if the value is above this limit")
     any_of: tuple[StateName | VerdictName, ...] | None = Field(
         default=None,
-        description="States or verdicts that raise it; left out: every state but `normal`, every verdict by which data and "
-        "model disagree",
+        description="States or verdicts that raise the alarm; default: every state but `normal`, or every verdict"
+        " with a disagreement of data and model",
     )
     speed_rpm: Annotated[PositiveNumber, Field(le=MAX_SPEED_RPM)] = Field(
         default=100.0, description="Speed at which the shudder margin is taken, rpm"
     )
     hysteresis: Annotated[NotNegativeNumber, Field(le=1.0)] = Field(
-        default=0.1, description="By which share of the limit the value must come back before the alarm is cleared"
+        default=0.1, description="How far the value must come back before the alarm is cleared, as a share of the limit"
     )
     enabled: bool = Field(default=True, strict=True, description="Whether the rule is in use")
 
@@ -120,7 +120,7 @@ class AlarmIn(Schema):
         if self.quantity == "silent_hours" and not (self.above or 0.0) > 0.0:
             raise ValueError(f"silent_hours needs a limit above 0, got {self.above}")
         if self.any_of is not None and self.quantity not in ("state", "verdict"):
-            raise ValueError(f"any_of is of the quantities state and verdict, not of {self.quantity}")
+            raise ValueError(f"any_of is for the quantities state and verdict, not for {self.quantity}")
         if self.clutch_id is not None and self.kind is not None:
             raise ValueError("give clutch_id or kind, not both")
         return self
@@ -146,20 +146,20 @@ class EventOut(Answer):
     """An alarm that was raised."""
 
     event_id: str = Field(description="The alarm's name")
-    alarm_id: str = Field(description="The rule that raised it; it may be deleted since")
-    name: str = Field(description="What the rule was called")
+    alarm_id: str = Field(description="The rule that raised it; it may have been deleted since")
+    name: str = Field(description="The rule's name at that time")
     clutch_id: str = Field(description="The clutch")
     quantity: WatchedQuantity = Field(description="What is watched")
-    value: float | None = Field(description="The value that raised it; null where it is none")
-    limit: float | None = Field(description="The limit that it passed; null where there is none")
-    message: str = Field(description="What is so, in a sentence")
-    as_of_cycles: float | None = Field(description="Duty cycles since new of the clutch's latest run by then")
-    state: EventState = Field(description="Whether it waits for somebody, was acknowledged, or is over")
+    value: float | None = Field(description="The value that raised it; null if it is not a number")
+    limit: float | None = Field(description="The limit that it passed; null if the rule has none")
+    message: str = Field(description="The alarm in a sentence")
+    as_of_cycles: float | None = Field(description="Duty cycles since new of the clutch's latest run at that time")
+    state: EventState = Field(description="`raised`, `acknowledged` or `cleared`")
     raised_at: str = Field(description="When it was raised")
     acknowledged_at: str | None = Field(description="When it was acknowledged")
     acknowledged_by: str | None = Field(description="Who acknowledged it")
-    note: str = Field(description="What they remarked")
-    cleared_at: str | None = Field(description="When what raised it was over")
+    note: str = Field(description="Remark of the person who acknowledged it")
+    cleared_at: str | None = Field(description="When the alarm was cleared")
 
 
 EventPage = page_of("EventPage", EventOut, "Alarms, newest first.", "The alarms")
@@ -179,13 +179,14 @@ class WebhookIn(Schema):
         "`msteams://...`, `slack://...`, `ntfys://...`"
     )
     secret: Annotated[str, StringConstraints(max_length=LONGEST_SECRET, pattern=r"^[^\x00]*$")] | None = Field(
-        default=None, description="What signs the requests; left out, one is made and answered this once"
+        default=None,
+        description="Secret that signs the requests; default: the service makes one and shows it once, in this answer",
     )
-    name: Annotated[str, StringConstraints(max_length=LONGEST_NAME)] = Field(
-        default="", description="What people call it"
+    name: Annotated[str, StringConstraints(max_length=LONGEST_NAME)] = Field(default="", description="Name for people")
+    clutch_id: Identifier | None = Field(default=None, description="Only alarms of this clutch")
+    cleared: bool = Field(
+        default=False, strict=True, description="Whether the receiver also gets a message when an alarm is cleared"
     )
-    clutch_id: Identifier | None = Field(default=None, description="Alarms of this clutch only")
-    cleared: bool = Field(default=False, strict=True, description="Whether it is also sent that an alarm is over")
 
     @model_validator(mode="after")
     def _long_enough(self) -> Self:
@@ -198,13 +199,11 @@ class WebhookOut(Answer):
     """A receiver; its address without passwords."""
 
     webhook_id: str = Field(description="The receiver's name")
-    url: str = Field(description="Its address, without what may be secret in it")
-    secret: str | None = Field(
-        description="The secret, where it was made by the service and only when it was; else null"
-    )
-    name: str = Field(description="What people call it")
-    clutch_id: str | None = Field(description="Alarms of this clutch only; null: of all")
-    cleared: bool = Field(description="Whether it is also sent that an alarm is over")
+    url: str = Field(description="Its address, without passwords, tokens and queries")
+    secret: str | None = Field(description="The secret, only if the service has just made it; else null")
+    name: str = Field(description="Name for people")
+    clutch_id: str | None = Field(description="Only alarms of this clutch; null: all")
+    cleared: bool = Field(description="Whether the receiver also gets a message when an alarm is cleared")
     created_at: str = Field(description="When it was made")
     created_by: str = Field(description="Who made it")
 
@@ -213,31 +212,33 @@ WebhookPage = page_of("WebhookPage", WebhookOut, "Receivers by name.", "The rece
 
 
 class DeliveryOut(Answer):
-    """What a receiver was sent, or is to be sent."""
+    """A message to a receiver, sent or waiting."""
 
     delivery_id: str = Field(description="Its name, the header `Clutchlife-Delivery`; the same at each attempt")
     webhook_id: str = Field(description="The receiver")
     event_id: str | None = Field(description="The alarm; null: a test")
     state: Literal["waiting", "delivered", "failed"] = Field(
-        description="Whether it is to be tried, was taken, or was given up"
+        description="`waiting` for an attempt, `delivered`, or `failed` for good"
     )
-    attempts: int = Field(description="How often it was tried")
+    attempts: int = Field(description="Number of attempts")
     status: int | None = Field(description="The HTTP status of the last attempt")
     problem: str | None = Field(description="Why the last attempt failed")
     created_at: str = Field(description="When it was put into the outbox")
-    last_attempt_at: str | None = Field(description="When it was tried last")
-    delivered_at: str | None = Field(description="When it was taken")
-    next_attempt_at: str | None = Field(description="When it is tried again; null where it is not")
+    last_attempt_at: str | None = Field(description="Time of the last attempt")
+    delivered_at: str | None = Field(description="Time of the delivery")
+    next_attempt_at: str | None = Field(description="Time of the next attempt; null if there is none")
 
 
 DeliveryPage = page_of("DeliveryPage", DeliveryOut, "Deliveries, newest first.", "The deliveries")
 
 
 class TestedOut(Answer):
-    """What a test sent to each receiver."""
+    """The result of a test at each receiver."""
 
-    deliveries: list[DeliveryOut] = Field(description="A delivery a receiver; `waiting` where it is tried again")
-    message: str = Field(description="How it went, in a sentence")
+    deliveries: list[DeliveryOut] = Field(
+        description="One delivery per receiver; `waiting`: there will be another attempt"
+    )
+    message: str = Field(description="The result in a sentence")
 
 
 EXAMPLE: dict[str, Any] = {

@@ -43,8 +43,8 @@ Name = Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_NA
 TorqueFilter = Annotated[
     Annotated[NotNegativeNumber, Field(le=base.MAX_TORQUE_FILTER_MS)] | None,
     Field(
-        description="Time constant of the torque channel's own first-order low-pass, ms; null: not declared. Sampled tests "
-        "are evaluated with pressure and speed behind the same filter"
+        description="Time constant of the torque channel's first-order low-pass, ms; null: not known. In sampled "
+        "tests, pressure and speed are filtered in the same way"
     ),
 ]
 Length = Annotated[PositiveNumber, Field(ge=base.MIN_LENGTH_MM, le=base.MAX_LENGTH_MM)]
@@ -60,7 +60,7 @@ class GeometryIn(Schema):
         default=2, description="Number of friction faces"
     )
     mean_radius_mm: Length | None = Field(
-        default=None, description="Mean radius, mm; left out, a quarter of both diameters' sum"
+        default=None, description="Mean radius, mm; default: a quarter of the sum of both diameters"
     )
     pressure_factor: PressureFactor = Field(default=1.0, description="Lining pressure divided by line pressure")
 
@@ -109,7 +109,7 @@ class EndOfLifeIn(Schema):
 
     criteria: Annotated[tuple[CriterionIn, ...], Field(max_length=base.MAX_CRITERIA)] = Field(
         default=(),
-        description="What ends the life in place of `cof_fraction` alone: several limits, the first to be reached counts",
+        description="Limits that end the life, in place of `cof_fraction`: the one that is reached first counts",
     )
 
 
@@ -117,7 +117,7 @@ class SeverityIn(Schema):
     """How much a duty cycle ages the clutch: the argument of eq. 6."""
 
     basis: Literal["cycles", "sliding_distance", "dissipated_energy"] = Field(
-        default="cycles", description="What eq. 6 counts: duty cycles, or their sliding distance or dissipated energy"
+        default="cycles", description="What eq. 6 counts: duty cycles, sliding distance or dissipated energy"
     )
     exponent: Annotated[NotNegativeNumber, Field(le=base.MAX_SEVERITY_EXPONENT)] = Field(
         default=1.0, description="Exponent of a duty cycle's distance or energy"
@@ -153,10 +153,10 @@ _STAYS: Any = None
 
 
 class ClutchEdit(Schema):
-    """Fields of a clutch's record that change, each replaced as a whole; what is left out stays."""
+    """The fields of a clutch's record to change. Each is replaced as a whole; omitted fields stay."""
 
-    reason: Reason = Field(default="", description="Why; needed where the record changes")
-    archived: bool = Field(default=_STAYS, strict=True, description="Whether lists leave the clutch out")
+    reason: Reason = Field(default="", description="Reason; required if the record changes")
+    archived: bool = Field(default=_STAYS, strict=True, description="Whether the clutch is archived: lists omit it")
     geometry: GeometryIn = Field(default=_STAYS, description="The friction disc")
     oil: OilIn = Field(default=_STAYS, description="The oil")
     end_of_life: EndOfLifeIn = Field(default=_STAYS, description="The end-of-life criterion")
@@ -186,7 +186,7 @@ class ClutchSummary(Answer):
     as_of_cycles: float | None = Field(description="Duty cycles since new of the latest run")
     runs_used: int = Field(description="Number of stationary tests that the prediction uses")
     current: Current = Field(description="The clutch's present state")
-    criterion: Criterion = Field(description="The end-of-life criterion that is reached first, most probably")
+    criterion: Criterion = Field(description="The end-of-life criterion that will most probably be reached first")
     remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
     at_least: AtLeast
     at_least_at: AtLeastAt
@@ -205,18 +205,18 @@ class LastRun(Answer):
     run_id: RunName
     kind: str = Field(description="The kind of run")
     cycles: RunCycles
-    at: str = Field(description="When it was made, else received; UTC, ISO 8601")
+    at: str = Field(description="When it was made, or received if that is unknown; UTC, ISO 8601")
 
 
 class Recent(Answer):
-    """The latest past of a clutch."""
+    """The recent history of a clutch."""
 
     last_run: LastRun = Field(description="The run that was made last")
     mean_cof: list[float] = Field(description="Mean COF of the present life, thinned to at most 32 values")
 
 
 class AdvisedTest(Answer):
-    """The test that would say most."""
+    """The most informative next test."""
 
     test: str = Field(description="The test in a sentence")
     separates: list[str] = Field(description="The two effects that it distinguishes; `baseline` stands for none")
@@ -228,9 +228,9 @@ class LatestDiagnosis(Answer):
     diagnosis_id: str = Field(description="The diagnosis' name")
     verdict: str | None = Field(description="Its verdict")
     causes: list[str] = Field(description="The causes it names, by their slugs")
-    advice: AdvisedTest | None = Field(description="The test that would say most; null where none is advised")
+    advice: AdvisedTest | None = Field(description="The most informative next test; null if none is advised")
     adoptable: bool = Field(description="Whether it has an extended model to adopt")
-    adopted: bool = Field(description="Whether its model is in force")
+    adopted: bool = Field(description="Whether its model is the current one")
     earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
 
 
@@ -238,9 +238,10 @@ class ClutchState(Answer):
     """The state of a clutch after NAMUR NE 107."""
 
     name: Literal["failure", "maintenance", "check", "out_of_specification", "normal"] = Field(
-        description="The first that holds: a criterion is reached; less than a fifth of the life may be left, at its safe "
-        "bound, or a quantity is near its limit; runs are held, or there are too few tests for a prediction; data and model "
-        "disagree; none of these"
+        description="`failure`: a criterion is reached. `maintenance`: at the safe bound less than a fifth of the"
+        " life is left, or a quantity is near its limit. `check`: runs are held, or there are too few"
+        " tests. `out_of_specification`: data and model disagree. `normal`: none of these. If several"
+        " apply, the first counts"
     )
     why: str = Field(description="The reason as a sentence, with the safe bound")
 
@@ -258,18 +259,18 @@ class ClutchOut(Answer):
     severity: SeverityIn = Field(description="How much a duty cycle ages the clutch")
     torque_filter_ms: TorqueFilter
     origin: Origin
-    archived: bool = Field(description="Whether lists leave the clutch out and it takes in no more runs")
+    archived: bool = Field(description="Whether the clutch is archived: lists omit it, and it takes no more runs")
     created_at: str = Field(description="When it was registered; UTC, ISO 8601")
     revision: Revision
-    state: ClutchState = Field(description="What it asks for")
+    state: ClutchState = Field(description="What the state demands")
     headline: str = Field(
         description="One line: the state in words, the safe bound with its date at this pace, and the median"
     )
     action: str = Field(description="One sentence: what to do now")
-    runs: int = Field(description="Number of runs that count; those that are held or were withdrawn do not")
-    held: int = Field(description="Number of runs that are held: they wait to be confirmed, corrected or withdrawn")
+    runs: int = Field(description="Number of runs that count, without held and withdrawn ones")
+    held: int = Field(description="Number of held runs, which wait to be confirmed, corrected or withdrawn")
     summary: ClutchSummary | None = Field(description="Health and remaining life; null before the first run")
-    recent: Recent | None = Field(description="The latest past; null before the first run")
+    recent: Recent | None = Field(description="The recent history; null before the first run")
     diagnosis: LatestDiagnosis | None = Field(description="The newest finished diagnosis; null without one")
 
 

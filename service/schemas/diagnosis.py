@@ -21,7 +21,7 @@ class DiagnosisIn(Schema):
         default=False, description="Whether to adopt the extended model, if there is one"
     )
     isolability: Annotated[bool, Field(strict=True)] = Field(
-        default=False, description="Whether to say which causes these tests could tell apart"
+        default=False, description="Whether the report should say which causes these tests could distinguish"
     )
 
 
@@ -44,15 +44,15 @@ class Amplitude(Answer):
 
 
 class ExplanationOut(Answer):
-    """What may be at work, all of it: explanations exclude each other, and their probabilities sum to one."""
+    """A possible explanation of the data. Explanations exclude each other, and their probabilities sum to one."""
 
     effects: list[str] = Field(
-        description="Slugs of the effects; `uncatalogued` for something that no effect of the catalogue is; empty: nothing"
+        description="Slugs of the effects; `uncatalogued`: something that is not in the catalogue; empty: no effect"
     )
-    probability: Number = Field(description="Probability that these and no others are at work")
+    probability: Number = Field(description="Probability that exactly these are at work")
     sign_probability: Number = Field(
         default=None,
-        description="Probability that the signs of the estimated amplitudes are right; null where there is none",
+        description="Probability that the signs of the estimated amplitudes are right; null without amplitudes",
     )
 
 
@@ -66,7 +66,7 @@ class CandidateOut(Answer):
     estimate: Amplitude = Field(description="Its amplitude")
     beside: list[str] = Field(
         default_factory=list,
-        description="Effects fitted together with it; evidence and estimate are of that fit",
+        description="Effects that were fitted together with it; evidence and estimate belong to this fit",
     )
     fit: str | None = Field(
         default=None,
@@ -75,20 +75,20 @@ class CandidateOut(Answer):
 
 
 class WhereOut(Answer):
-    """An axis over which residuals have structure."""
+    """An axis on which the residuals depend."""
 
     axis: str = Field(description="A channel, or `test_clock_s`, `cycles` or `loop_phase`")
-    strength: Number = Field(description="Log evidence for structure over this axis, nats")
-    p_value: Number = Field(description="Probability of as much structure by chance")
+    strength: Number = Field(description="Log evidence for a dependence on this axis, nats")
+    p_value: Number = Field(description="Probability of such a dependence by chance")
 
 
 class MisfitOut(Answer):
     """The error of a model."""
 
     rmse_nm: Number = Field(description="Root mean square of the residuals, Nm")
-    noise_nm: Number = Field(description="What noise and run-to-run scatter alone would give, Nm")
+    noise_nm: Number = Field(description="The error that noise and run-to-run scatter alone would give, Nm")
     unexplained_share: Number = Field(description="Share of the residuals' variance beyond noise")
-    where: list[WhereOut] = Field(description="The axes over which residuals have structure, strongest first")
+    where: list[WhereOut] = Field(description="The axes on which the residuals depend, strongest first")
 
 
 class BeforeAndAfter(Answer):
@@ -120,17 +120,19 @@ class GainOut(Answer):
 class AdviceOut(Answer):
     """A test that would distinguish two effects, or an effect from the baseline."""
 
-    key: str = Field(description="The test in a word for programs")
+    key: str = Field(description="Code of the test, for programs")
     test: str = Field(description="The test in a sentence")
     separates: list[str] = Field(description="The two effects that it distinguishes; `baseline` stands for none")
     nats: Number = Field(description="Expected gain in log evidence, nats")
-    probability: Number = Field(default=None, description="Probability that it leaves one explanation alone")
+    probability: Number = Field(
+        default=None, description="Probability that only one explanation remains after the test"
+    )
     narrows: Number = Field(
         default=None,
-        description="Of a named cause, the standard deviation of its size after the test as a share of today's; else null",
+        description="For a named cause: standard deviation of its size after the test, as a share of today's; else null",
     )
-    minutes: Number = Field(default=None, description="Minutes on the rig, those of the duty cycles before it included")
-    steps: list["PlanStep"] = Field(default_factory=list, description="What the rig is to do, in order")
+    minutes: Number = Field(default=None, description="Minutes on the rig, including the duty cycles before the test")
+    steps: list["PlanStep"] = Field(default_factory=list, description="The steps for the rig, in order")
 
 
 class PlanStep(Answer):
@@ -139,13 +141,13 @@ class PlanStep(Answer):
     kind: str = Field(description="`stationary_stribeck` or `dynamic_stribeck`")
     pressures_bar: list[float] = Field(description="Line pressures in the order in which they are set, bar")
     speeds_rpm: list[float] = Field(
-        description="Speeds in the order in which they are set, rpm; of a dynamic test the lowest and the highest"
+        description="Speeds in the order in which they are set, rpm; for a dynamic test the lowest and the highest"
     )
     frequency_hz: Number = Field(description="Frequency of the speed of a dynamic test, Hz; else null")
     periods: int | None = Field(description="Periods at each pressure of a dynamic test; else null")
     oil_temperature_c: Number = Field(description="Oil temperature, °C; null: as usual")
     repeats: int = Field(description="How often the test is made")
-    cycles: Number = Field(description="Duty cycles since new at which it is made")
+    cycles: Number = Field(description="Duty cycles since new at the test")
     pause_hours: Number = Field(description="Rest before it, hours")
     minutes: Number = Field(description="Minutes on the rig")
 
@@ -155,38 +157,39 @@ class PlanOut(Answer):
 
     clutch_id: ClutchName
     diagnosis_id: DiagnosisName
-    relation: Literal["alternatives"] = Field(description="How the tests are meant: one of them is enough")
+    relation: Literal["alternatives"] = Field(description="How to use the tests: one of them is enough")
     tests: list[AdviceOut] = Field(description="The tests, best first: alternatives, each with its steps in order")
 
 
 class VisibleOut(Answer):
-    """The smallest amplitude of an effect that would be detected in these data with 90 % power."""
+    """The smallest amplitude of an effect that these data would show with 90 % probability."""
 
     effect: str = Field(description="The effect's slug")
     amplitude: Number = Field(
-        description="The amplitude, in whatever of the effect's shapes; null where one of them would be absorbed whole"
+        description="The amplitude that is visible in every shape of the effect; null if the model would absorb "
+        "one shape completely"
     )
-    least: Number = Field(default=None, description="The same in the shape that shows best")
+    least: Number = Field(default=None, description="The amplitude that is visible in the most visible shape")
     unit: str = Field(description="Its unit")
 
 
 class PairOut(Answer):
-    """Two effects: whether these tests could tell them apart, and the test that would."""
+    """Two effects: whether these tests could distinguish them, and the test that would."""
 
     effects: list[str] = Field(description="Their slugs")
     probability: Number = Field(
-        description="The probability that either, at twice its visible amplitude, is told from the other"
+        description="The probability that these tests distinguish the two, each at twice its visible amplitude"
     )
     apart: bool = Field(description="Whether that is sure enough")
     key: str | None = Field(
-        description="The shortest test that is sure to part them, or the one that helps most; null: none"
+        description="The shortest test that surely distinguishes them, or the one that helps most; null: none"
     )
     test: str | None = Field(description="The same in words")
-    with_test: Number = Field(description="The probability with that test beside these")
+    with_test: Number = Field(description="The probability with that test added")
 
 
 class IsolabilityOut(Answer):
-    """Which causes these tests could tell apart, from their design alone: before anything is hidden in them."""
+    """Which causes these tests could distinguish. This depends on the design of the tests only, not on their results."""
 
     pairs: list[PairOut] = Field(description="The pairs of effects that these tests can show, hardest first")
     unseen: list[str] = Field(description="The slugs of the effects that these tests cannot show at all")
@@ -203,8 +206,8 @@ class Axes(Answer):
 class ResidualMap(Answer):
     """Mean residuals, in standard deviations."""
 
-    speed_pressure: Table = Field(description="A row a pressure, a column a speed")
-    pressure_cycles: Table = Field(description="A row a count of cycles, a column a pressure")
+    speed_pressure: Table = Field(description="One row per pressure, one column per speed")
+    pressure_cycles: Table = Field(description="One row per count of cycles, one column per pressure")
 
 
 class MapsOut(Answer):
@@ -228,7 +231,7 @@ class LoopTraceOut(Answer):
 
 
 class DiagnosisListed(Answer):
-    """A diagnosis without its maps and loops. While it runs, and where it failed, it has no verdict."""
+    """A diagnosis without its maps and loops. It has no verdict while it runs, or if it failed."""
 
     diagnosis_id: DiagnosisName
     clutch_id: ClutchName
@@ -244,28 +247,29 @@ class DiagnosisListed(Answer):
     adoptable: bool = Field(description="Whether it has an extended model to adopt")
     not_adoptable: str | None = Field(
         default=None,
-        description="Why a cause that was fitted gives nothing to adopt; null where it does, or none was fitted",
+        description="Why a fitted cause cannot be adopted; null if it can, or if none was fitted",
     )
-    adopted: bool = Field(description="Whether its model is in force")
+    adopted: bool = Field(description="Whether its model is the current one")
     problem: str | None = Field(description="Why it failed")
-    code_version: str = Field(description="The release that made it")
+    code_version: str = Field(description="The release that computed it")
     verdict: (
         Literal["model_adequate", "cause_named", "cause_ambiguous", "unexplained_structure", "insufficient_data"] | None
-    ) = Field(description="The result in a word")
+    ) = Field(description="The verdict")
     causes: list[str] = Field(
-        description="The named causes, or those that these data cannot distinguish, by their slugs; `uncatalogued` among "
-        "the latter stands for something that no effect of the catalogue is"
+        description="Slugs of the named causes, or of those that these data cannot distinguish; `uncatalogued`: "
+        "something that is not in the catalogue"
     )
     summary: str = Field(description="The result in a paragraph")
     explanations: list[ExplanationOut] = Field(
-        default_factory=list, description="What may be at work, most probable first; verdict and causes are read off it"
+        default_factory=list,
+        description="The possible explanations, most probable first; verdict and causes follow from them",
     )
     candidates: list[CandidateOut] = Field(description="The effects that competed, most probable first")
     baseline: MisfitOut = Field(description="The baseline's error")
     extended: MisfitOut = Field(description="The extended model's error")
     gain: GainOut = Field(description="What the extended model gains on held-out runs")
-    advice: list[AdviceOut] = Field(description="Tests that would distinguish what these data do not")
-    visible: list[VisibleOut] = Field(description="The smallest amplitude of each effect that would be detected")
+    advice: list[AdviceOut] = Field(description="Tests that would distinguish the remaining explanations")
+    visible: list[VisibleOut] = Field(description="The smallest amplitude of each effect that these data would show")
     notes: list[str] = Field(description="Assumptions and omissions")
     statistics: dict[str, Number] = Field(description="Numbers of the computation, by name")
 
@@ -276,7 +280,7 @@ class DiagnosisOut(DiagnosisListed):
     maps: MapsOut | None = Field(description="Residual maps; null without a verdict")
     loops: list[LoopTraceOut] = Field(description="Measured friction loops beside both models'")
     isolability: IsolabilityOut | None = Field(
-        default=None, description="Which causes these tests could tell apart; null where it was not asked for"
+        default=None, description="Which causes these tests could distinguish; null if not requested"
     )
 
 
@@ -287,85 +291,83 @@ class ModelVersion(Answer):
     """A model that was adopted."""
 
     version: int = Field(description="Its number, from 1")
-    diagnosis_id: str | None = Field(description="The diagnosis that it comes from; null is the baseline")
+    diagnosis_id: str | None = Field(description="The diagnosis that it comes from; null: the baseline")
     adopted_at: str = Field(description="When it was adopted; UTC, ISO 8601")
     model: ModelName = Field(description="The model")
 
 
 class ModelOut(Answer):
-    """The model that tracking and remaining life use now, and all that were adopted.
-
-    A rebuild ends the life that was diagnosed: from then on the baseline is in force, whatever version is the last.
+    """The current model of tracking and remaining life, and all adopted versions. After a rebuild the baseline is the
+    current model again.
     """
 
     clutch_id: ClutchName
     model: ModelName = Field(description="The model in force")
-    version: int = Field(description="Its number; 0 where none was adopted")
-    diagnosis_id: str | None = Field(description="The diagnosis that it comes from; null is the baseline")
+    version: int = Field(description="Its number; 0 if none was adopted")
+    diagnosis_id: str | None = Field(description="The diagnosis that it comes from; null: the baseline")
     versions: list[ModelVersion] = Field(description="All adopted models, newest first")
 
 
 class JobIn(Schema):
-    """A job that is asked for."""
+    """A job to start."""
 
     kind: Literal["replay", "fleet_refresh"] = Field(
-        description="`replay`: results are recomputed from the raw runs; `fleet_refresh`: what clutches of a kind share"
+        description="`replay`: compute results again from the raw runs; `fleet_refresh`: learn the priors that "
+        "clutches of a kind share"
     )
     clutch_id: Identifier | None = Field(
-        default=None, description="The clutch that is replayed; null or left out, all. A fleet refresh is of all"
+        default=None, description="The clutch to replay; default: all. A fleet refresh always concerns all"
     )
 
     @model_validator(mode="after")
     def _of_all(self) -> Self:
         if self.kind == "fleet_refresh" and self.clutch_id is not None:
-            raise ValueError("a fleet_refresh is of all clutches: leave clutch_id out")
+            raise ValueError("a fleet_refresh concerns all clutches: omit clutch_id")
         return self
 
 
 class JobProgress(Answer):
-    """How far a job has come."""
+    """The progress of a job."""
 
     step: str = Field(description="What it does")
-    done: int | None = Field(
-        default=None, description="How many of the things that this takes are done; null: not counted"
-    )
-    of: int | None = Field(default=None, description="How many there are")
+    done: int | None = Field(default=None, description="Number of steps done; null: not counted")
+    of: int | None = Field(default=None, description="Total number of steps")
 
 
 class LeftClutch(Answer):
-    """A clutch that keeps what it had."""
+    """A clutch that keeps its former results."""
 
     clutch_id: ClutchName
     reason: str = Field(description="Why")
 
 
 class JobResult(Answer):
-    """What a replay or a fleet refresh did."""
+    """The result of a replay or a fleet refresh."""
 
     replayed: int | None = Field(default=None, description="Clutches whose results were recomputed, of a replay")
     kinds: int | None = Field(default=None, description="Kinds that have a new version of their prior, of a refresh")
     changed: int | None = Field(default=None, description="Clutches whose predictions have changed, of a refresh")
-    left: int = Field(description="Clutches that keep what they had")
-    reasons: list[LeftClutch] = Field(description="Why, of the first 20 of them")
+    left: int = Field(description="Clutches that keep their former results")
+    reasons: list[LeftClutch] = Field(description="The reasons, for the first 20 of them")
 
 
 class JobOut(Answer):
-    """What was asked for and is computed by a service when its turn comes. That of a diagnosis has the diagnosis' name."""
+    """A job, which a service computes when its turn comes. The job of a diagnosis has the diagnosis' name."""
 
     job_id: str = Field(description="The job's name")
     kind: Literal["diagnosis", "replay", "fleet_refresh"] = Field(description="What it computes")
-    clutch_id: str | None = Field(description="The clutch that it is of; null where it is of no single one")
+    clutch_id: str | None = Field(description="The clutch that it concerns; null if it concerns several")
     state: JobState = Field(
         description="`waiting` for its turn, `running`, or how it ended: `finished`, `failed` or `cancelled`"
     )
     asked_at: str = Field(description="When it was asked for; UTC, ISO 8601")
     asked_by: str = Field(description="Who asked: `key:ID NOTE`, or `local`")
-    started_at: str | None = Field(description="When it was begun, the last time; null before")
+    started_at: str | None = Field(description="When it last started; null before")
     finished_at: str | None = Field(description="When it ended; null before")
-    attempts: int = Field(description="How often it was begun: again where the service that had it was killed")
-    progress: JobProgress | None = Field(description="How far it has come; null before it says so")
+    attempts: int = Field(description="Number of starts; a job starts again if its service was killed")
+    progress: JobProgress | None = Field(description="Its progress; null before the first report")
     problem: str | None = Field(description="Why it failed, or who cancelled it")
-    result: JobResult | None = Field(description="What it did; null before its end, and of a diagnosis")
+    result: JobResult | None = Field(description="Its result; null before its end, and for a diagnosis")
 
 
 JobPage = page_of("JobPage", JobOut, "A page of jobs, newest first.", "The jobs")

@@ -7,7 +7,7 @@ from service.schemas.life import Method, Model, Prior, Quantiles, SeverityUsed
 
 
 class Kind(Answer):
-    """What clutches have in common that share a prior."""
+    """The fields that clutches with a common prior share."""
 
     friction_material: str = Field(description="The friction material")
     reaction_plate: str = Field(description="The reaction plate's material")
@@ -47,7 +47,7 @@ class SeverityEstimate(Answer):
 
 
 class FleetPriorOut(Answer):
-    """The prior learned from clutches of one kind; each of its members is tracked under what the others have in common."""
+    """The prior learned from clutches of one kind. Each member is tracked under the prior of the others."""
 
     kind: Kind = Field(description="The kind of clutch")
     version: int = Field(description="Increases whenever the prior changes")
@@ -55,12 +55,10 @@ class FleetPriorOut(Answer):
     clutches: int = Field(description="Number of clutches that it was learned from")
     members: list[str] = Field(description="Their names")
     population: Population = Field(description="The coefficients among them")
-    ended_lives: int = Field(description="Lives of theirs that have ended: they calibrate what is stated of the next")
-    censored_lives: int = Field(
-        description="Lives of theirs that were taken out before their end, which was later then"
-    )
+    ended_lives: int = Field(description="Number of their lives that have ended; these calibrate later predictions")
+    censored_lives: int = Field(description="Number of their lives that were taken out before their end")
     severity_exponent: SeverityEstimate | None = Field(
-        description="By which power of a duty cycle's energy these lives were shorter; null where they cannot tell"
+        description="Exponent by which the energy of a duty cycle shortened these lives; null if they do not determine it"
     )
 
 
@@ -85,13 +83,13 @@ class ScoredPrediction(Answer):
     cycles: float = Field(description="Duty cycles since new at the test")
     runs_used: int = Field(description="Number of stationary tests that the prediction uses")
     share_of_life: float = Field(description="Share of the whole life at the test")
-    true_remaining_cycles: float = Field(description="Duty cycles that did remain")
+    true_remaining_cycles: float = Field(description="True remaining duty cycles")
     remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles as predicted")
     crps_cycles: float = Field(description="Continuous ranked probability score, duty cycles")
     crps_share: float = Field(description="The same as a share of the whole life")
     interval_share: float = Field(description="Width of the 5 to 95 % interval, as a share of the whole life")
     covered: bool = Field(description="Whether the 5 to 95 % interval holds the truth")
-    pit: float = Field(description="Predicted probability of a life as short as the true one or shorter")
+    pit: float = Field(description="Predicted probability that the life is at most as long as it was")
     alpha_lambda: bool = Field(description="Whether the median is within 20 % of the true remaining life")
 
 
@@ -101,7 +99,7 @@ class ScoredLife(Answer):
     origin_cycles: float = Field(description="Duty cycles since new at its start")
     end_of_life_cycles: float = Field(description="Duty cycles since new at its end")
     prognostic_horizon_cycles: float | None = Field(
-        description="Remaining life from which on all medians were within 10 % of the whole life; null where none was"
+        description="Remaining life from which on all medians were within 10 % of the whole life; null if none was"
     )
     summary: ScoreSummary = Field(description="Means over its predictions")
     pit_histogram: list[float] = Field(description="Shares of predictions in ten equal bins of `pit`")
@@ -150,7 +148,7 @@ class StateCounts(Answer):
 
     failure: int = Field(description="At their end of life")
     maintenance: int = Field(description="Near the end of their lives")
-    check: int = Field(description="With held runs, or without a prognosis yet")
+    check: int = Field(description="Clutches with held runs, or without a prognosis yet")
     out_of_specification: int = Field(description="Data and model disagree")
     normal: int = Field(description="None of these")
 
@@ -158,11 +156,11 @@ class StateCounts(Answer):
 class FleetTotals(Answer):
     """How many clutches a list holds."""
 
-    all: int = Field(description="Clutches in use, or archived ones where these were asked for")
+    all: int = Field(description="Clutches in use, or archived ones if requested")
     archived: int = Field(description="Archived clutches")
     held: int = Field(description="Those of `all` that have runs that are held")
     states: StateCounts = Field(description="Those of `all` by their states")
     scale_cycles: float = Field(
-        description="Where bars of remaining cycles may end: 1, 2 or 5 times a power of ten, above the interval of the "
-        "clutch that nine in ten of those with a prediction have fewer cycles left than"
+        description="End of the common scale for bars of remaining cycles (1, 2 or 5 times a power of ten). Nine "
+        "of ten clutches with a prediction lie below it"
     )

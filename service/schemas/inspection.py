@@ -23,20 +23,20 @@ MediaType = Literal["image/png", "image/jpeg", "image/webp"]
 
 
 class InspectionIn(Schema):
-    """What was found on the friction surface after so many cycles; at least one of roughness, skewness and note."""
+    """An inspection of the friction surface. At least one of roughness, skewness and note is required."""
 
     cycles: Cycles = Field(description="Duty cycles since new when the surface was inspected")
     performed_at: Annotated[StartedAt, Field(strict=True)] | None = Field(
         default=None, description="When it was inspected: ISO 8601 with a time zone"
     )
     lining: Annotated[str, StringConstraints(max_length=LONGEST_NAME, strip_whitespace=True)] = Field(
-        default="", description="The disc, its side, or the place on its lining; empty where the clutch has one"
+        default="", description="The disc, its side, or the place on its lining; empty if the clutch has only one"
     )
     roughness_um: PositiveNumber | None = Field(
         default=None, description="Arithmetic mean roughness R_a of the surface profile, µm"
     )
     skewness: Skewness | None = Field(
-        default=None, description="Skewness R_sk of the surface profile; negative where valleys outweigh peaks"
+        default=None, description="Skewness R_sk of the surface profile; negative if valleys outweigh peaks"
     )
     note: Annotated[str, StringConstraints(max_length=LONGEST_NOTE, strip_whitespace=True)] = Field(
         default="", description="A remark"
@@ -68,16 +68,16 @@ class InspectionOut(Answer):
     clutch_id: ClutchName
     inspection_id: str = Field(description="The inspection's name; it derives from its content")
     cycles: float = Field(description="Duty cycles since new when the surface was inspected")
-    performed_at: str | None = Field(description="When it was inspected, ISO 8601; null where it was not said")
-    lining: str = Field(description="The disc, its side, or the place on its lining; empty where it was not said")
-    roughness_um: float | None = Field(description="Arithmetic mean roughness R_a, µm; null where not measured")
-    skewness: float | None = Field(description="Skewness R_sk of the surface profile; null where not measured")
+    performed_at: str | None = Field(description="When it was inspected, ISO 8601; null if not stated")
+    lining: str = Field(description="The disc, its side, or the place on its lining; empty if not stated")
+    roughness_um: float | None = Field(description="Arithmetic mean roughness R_a, µm; null if not measured")
+    skewness: float | None = Field(description="Skewness R_sk of the surface profile; null if not measured")
     note: str = Field(description="The remark")
     origin: Origin
     content_sha256: str = Field(description="Hash of what was posted")
     received_at: str = Field(description="When it was stored; UTC, ISO 8601")
     received_by: str = Field(description="Who posted it: `key:` with the key's id and note, or `local`")
-    state: Literal["accepted", "withdrawn"] = Field(description="Whether it holds: `withdrawn` until it is restored")
+    state: Literal["accepted", "withdrawn"] = Field(description="`accepted`, or `withdrawn` until it is restored")
     duplicate: bool = Field(description="Whether the inspection was stored before this request")
     photographs: list[PhotographOut] = Field(description="Its photographs, in the order in which they came")
 

@@ -66,18 +66,19 @@ _Value = Annotated[float, Field(ge=-LARGEST_LIMIT, le=LARGEST_LIMIT, allow_inf_n
 
 
 class CriterionIn(Schema):
-    """A quantity that ends the life where it reaches a limit: a share of its initial value, or a value."""
+    """A quantity that ends the life when it reaches a limit: a share of its initial value, or a value."""
 
     quantity: QuantityName = Field(description="The quantity, as in `/degradation`")
     fraction: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False, strict=True)] | None = Field(
         default=None, description="The life ends when the quantity has fallen to this share of its initial value"
     )
     below: _Value | None = Field(
-        default=None, description="The life ends when it falls below this value; of a slope 0 where no limit is given"
+        default=None, description="The life ends when it falls below this value; the default for a slope is 0"
     )
     above: _Value | None = Field(default=None, description="The life ends when it rises above this value")
     pressure_bar: Annotated[PositiveNumber, Field(le=MAX_CRITERION_PRESSURE_BAR)] | None = Field(
-        default=None, description="Line pressure, bar: that of all but mean COF, which left out is the mean over all"
+        default=None,
+        description="Line pressure, bar; required, except for mean COF: there the default is the mean over all pressures",
     )
     speed_rpm: Annotated[PositiveNumber, Field(le=MAX_SPEED_RPM)] | None = Field(
         default=None, description="Speed of a slope, rpm"
@@ -125,7 +126,7 @@ Quantiles = dict[str, float | None]
 
 
 class CriterionPlace(Answer):
-    """A quantity at a place, and the limit that ends the life."""
+    """A quantity, where it applies, and its limit."""
 
     quantity: QuantityName = Field(description="The quantity that is compared with the limit")
     fraction: float | None = Field(description="Limit over initial value; null where the limit is a value")
@@ -139,32 +140,32 @@ class CriterionPlace(Answer):
 
 
 class Criterion(CriterionPlace):
-    """The criterion that ends the life, most probably; null before the first measurement."""
+    """The criterion that will most probably end the life; null before the first measurement."""
 
-    initial_mean_cof: float | None = Field(description="Mean COF when new, as tracked; null of another quantity")
-    threshold_mean_cof: float | None = Field(description="Mean COF at the end of life; null of another quantity")
+    initial_mean_cof: float | None = Field(description="Mean COF when new, as tracked; null for other quantities")
+    threshold_mean_cof: float | None = Field(description="Mean COF at the end of life; null for other quantities")
 
 
 class CriterionValue(Answer):
-    """A quantity as it is now; with too few tests as it was measured last, null before."""
+    """The present value of a quantity; with too few tests the last measured value, or null."""
 
     value: float | None = Field(description="Its mean, as tracked")
     sd: float | None = Field(description="Its standard deviation")
 
 
 class CriterionOutcome(CriterionPlace):
-    """One of the criteria: when it would end the life by itself, and how probably it is the first."""
+    """One of the criteria: when it would end the life by itself, and the probability that it is reached first."""
 
-    current: CriterionValue = Field(description="The quantity as it is now")
+    current: CriterionValue = Field(description="The present value of the quantity")
     remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
     end_of_life_cycles: Quantiles = Field(description="Quantiles of the duty cycles since new at its limit")
     probability_of_reaching: float | None = Field(description="Probability that the limit is reached by the horizon")
     probability_first: float = Field(description="Probability that this limit is reached before the others")
-    tests: int = Field(description="How many tests measured the quantity there")
+    tests: int = Field(description="Number of tests that measured the quantity there")
 
 
 class LifeNumber(Answer):
-    """The life that an answer is about; a rebuild begins a new one."""
+    """The life that an answer concerns. A rebuild begins a new life."""
 
     number: int = Field(description="Its number, from 1 on")
     of: int = Field(description="How many lives the clutch has had")
@@ -173,16 +174,16 @@ class LifeNumber(Answer):
 
 
 class Current(Answer):
-    """The clutch's present state; null before the first measurement. With too few tests for a prediction mean COF is the
-    last one as it was measured, and the others are null."""
+    """The clutch's present state; null before the first measurement. With too few tests, it holds only the last
+    measured mean COF.
+    """
 
     mean_cof: float | None = Field(description="Mean COF, as tracked")
     mean_cof_sd: float | None = Field(description="Its standard deviation")
     measured_at_cycles: float | None = Field(description="Duty cycles since new at which it was measured last")
     fraction_of_initial: float | None = Field(description="Mean COF over its value when new")
     health: float | None = Field(
-        description="1 when new, 0 at the end of life: the share that is left of the way to the limit, the least by any "
-        "criterion"
+        description="Remaining share of the way to the limit, for the worst criterion: 1 when new, 0 at the end of life"
     )
 
 
@@ -207,7 +208,7 @@ class SeverityName(Answer):
     """The argument of eq. 6."""
 
     basis: Literal["cycles", "sliding_distance", "dissipated_energy"] = Field(
-        description="What eq. 6 counts: duty cycles, or their sliding distance or dissipated energy"
+        description="What eq. 6 counts: duty cycles, sliding distance or dissipated energy"
     )
     exponent: float = Field(description="Exponent of a duty cycle's distance or energy")
 
@@ -221,41 +222,42 @@ class CourseShare(Answer):
     """A kind of course that mean COF may take, by the order n of its kinetics dD/dζ = ∓k Dⁿ."""
 
     name: Literal["eq6", "slowing", "accelerating"] = Field(
-        description="As eq. 6, whose order is above 1; slowing down otherwise; accelerating"
+        description="`eq6` (order above 1), `slowing` in another way, or `accelerating`"
     )
     probability: float = Field(description="Its probability")
     order: float | None = Field(description="The median of its order n; null for a logarithm alone")
 
 
 class BackCastCount(Answer):
-    """How earlier forecasts of a clutch fared with the tests since, and what follows for this one."""
+    """How well earlier forecasts predicted the later tests, and what follows for this forecast."""
 
-    held: int = Field(description="Tests that lay within the 90 % interval forecast for them")
-    of: int = Field(description="Tests that a forecast was kept for")
+    held: int = Field(description="Number of tests within the 90 % interval of their forecast")
+    of: int = Field(description="Number of tests with an earlier forecast")
     widening: float = Field(
-        description="The power to which remaining life was raised, as a multiple of its median; 1: not widened"
+        description="How much the interval was widened because earlier forecasts missed (exponent of remaining "
+        "life over its median); 1: not at all"
     )
 
 
 class SampleQuality(Answer):
     """The weighted draws that a prediction is made of."""
 
-    effective_draws: float = Field(description="How many draws of equal weight would be worth as much")
+    effective_draws: float = Field(description="Effective number of draws")
     status: Literal["sound", "few_draws", "forced"] = Field(
-        description="`forced`: the last test came as more of a surprise than the particles could follow; ask `grid`"
+        description="`forced`: the last test was so unexpected that the particles could not follow it; use `grid`"
     )
 
 
 class Course(CourseShare):
     """The most probable kind of course, and the others."""
 
-    alternatives: list[CourseShare] = Field(description="The other kinds, the more probable first")
+    alternatives: list[CourseShare] = Field(description="The other kinds, most probable first")
 
 
 class HeldRuns(Answer):
-    """What the runs that are held would make of the remaining life."""
+    """The remaining life with the held runs."""
 
-    count: int = Field(description="How many runs of the clutch are held")
+    count: int = Field(description="Number of held runs of the clutch")
     status: str = Field(description="The status of the prediction with them")
     remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles with them, by probability")
 
@@ -264,49 +266,46 @@ class HeldRuns(Answer):
 AtLeast = Annotated[
     float | None,
     Field(
-        description="Duty cycles that are left with a probability of 95 %, the lower of those with and without held runs; "
-        "up to the horizon where the end of life lies beyond it; null before the first test"
+        description="Safe bound: at least this number of duty cycles is left with a probability of 95 %. The "
+        "lower of the values with and without held runs, at most up to the horizon; null before the "
+        "first test"
     ),
 ]
 AtLeastAt = Annotated[
     str | None,
     Field(
-        description="When these have been run, at the pace that was asked for, else that the `started_at` of the present "
-        "life's runs show; UTC, ISO 8601; null where they show none, or for an earlier time"
+        description="Date of the safe bound at the requested pace, or at the pace that `started_at` of the "
+        "present life's runs shows; UTC, ISO 8601; null without a pace, or for an earlier time"
     ),
 ]
 Held = Annotated[
     HeldRuns | None,
-    Field(
-        description="What held runs would make of the remaining life; null where none is held, or for an earlier time"
-    ),
+    Field(description="The remaining life with the held runs; null if no run is held, or for an earlier time"),
 ]
 
 
-Statement = Annotated[str, Field(description="What is known of the remaining life, as a sentence")]
+Statement = Annotated[str, Field(description="The remaining life in a sentence")]
 
 
 class DeclaredEnd(Answer):
-    """The end of a life as it was declared, by maintenance with the event `end_of_life`."""
+    """The declared end of a life (maintenance with the event `end_of_life`)."""
 
     cycles: float = Field(description="Duty cycles since new at the end")
-    reason: EndReason = Field(
-        description="`worn`: nothing remains; `other`: it was taken out before, and would have ended later"
-    )
-    run_id: str = Field(description="The run that declares it: withdrawn, the life goes on")
+    reason: EndReason = Field(description="`worn`: nothing remains; `other`: it was taken out before its end")
+    run_id: str = Field(description="The run that declares it; if you withdraw this run, the life goes on")
 
 
 class RemainingLife(Answer):
-    """The duty cycles that remain until mean COF has fallen to the criterion's fraction of its initial value."""
+    """The remaining duty cycles until mean COF has fallen to the criterion's fraction of its initial value."""
 
     clutch_id: ClutchName
     method: Method
-    as_of_cycles: float | None = Field(description="Duty cycles since new from which the remaining ones count")
+    as_of_cycles: float | None = Field(description="Duty cycles since new at which the remaining cycles begin")
     runs_used: int = Field(description="Number of stationary tests that the prediction uses")
     revision: Revision
     status: Literal["predicted", "reached", "may_never_reach", "insufficient_data", "ended"] = Field(
-        description="Predicted; reached already, more likely than not; some quantile is beyond the horizon; too few tests; "
-        "declared ended"
+        description="`predicted`; `reached` (more likely than not); `may_never_reach` (a quantile lies beyond the"
+        " horizon); `insufficient_data`; `ended` (declared)"
     )
     ended: DeclaredEnd | None = Field(default=None, description="The declared end of the life; null while it goes on")
     criterion: Criterion = Field(description="The end-of-life criterion")
@@ -322,23 +321,23 @@ class RemainingLife(Answer):
     )
     course: Course | None = Field(
         default=None,
-        description="The course of mean COF that the tests speak for; null without a prediction or a criterion on it",
+        description="The most probable course of mean COF; null without a prediction or a criterion on mean COF",
     )
     back_cast: BackCastCount | None = Field(
-        default=None, description="What earlier forecasts of this clutch said about the tests since"
+        default=None, description="How well earlier forecasts of this clutch predicted the later tests"
     )
     ended_lives: int = Field(
         default=0,
-        description="Lives of the same kind that have ended, by whose ends and courses the end was calibrated",
+        description="Number of ended lives of the same kind that calibrated the predicted end",
     )
     sample: SampleQuality | None = Field(
-        default=None, description="The draws behind the prediction; null where nothing is predicted"
+        default=None, description="The draws behind the prediction; null without a prediction"
     )
     criteria: list[CriterionOutcome] = Field(
         default=[], description="All criteria, each with its own end and the probability of being reached first"
     )
     life: LifeNumber | None = Field(
-        default=None, description="The life that the answer is about, where one or other criteria were asked for"
+        default=None, description="The life that the answer concerns, if a life or criterion was requested"
     )
     horizon_cycles: float = Field(description="The prediction goes no further than this many duty cycles")
     model: Model
@@ -349,7 +348,7 @@ class RemainingLife(Answer):
 
 
 class PlannedBlock(Schema):
-    """Duty cycles that are planned alike. What states no severity is as severe as recent duty."""
+    """A block of planned duty cycles. Without a stated severity it counts as recent duty."""
 
     cycles: Annotated[PositiveNumber, Field(ge=MIN_BLOCK_CYCLES, le=MAX_CYCLES)] = Field(
         description="Duty cycles in the block"
@@ -373,47 +372,48 @@ class PlannedBlock(Schema):
     def _complete(self) -> "PlannedBlock":
         """What says nothing without another field is refused with a reason, rather than left out in silence."""
         if self.sd > 0.0 and self.energy_per_cycle_kj is None:
-            raise ValueError("sd is the deviation of energy_per_cycle_kj, which is missing")
+            raise ValueError("sd needs energy_per_cycle_kj, whose standard deviation it is")
         if self.sd > (self.energy_per_cycle_kj or 0.0):
-            raise ValueError("sd is larger than energy_per_cycle_kj: a plan that open predicts nothing")
+            raise ValueError("sd must not be larger than energy_per_cycle_kj")
         if self.initial_speed_rpm is None and (self.engagement_duration_s or self.maximum_pressure_bar):
-            raise ValueError("engagement_duration_s and maximum_pressure_bar say nothing without initial_speed_rpm")
+            raise ValueError("engagement_duration_s and maximum_pressure_bar need initial_speed_rpm")
         return self
 
 
 class ProgrammeIn(Schema):
-    """Blocks that are run one after the other, and from the first one again until the end of life."""
+    """Blocks of duty, which are repeated until the end of life."""
 
     programme: Annotated[tuple[PlannedBlock, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = Field(
         description="The blocks of duty"
     )
     pace_cycles_per_hour: PositiveNumber | None = Field(
-        default=None, description="Duty cycles an hour, idle hours included; left out, that of the dated runs"
+        default=None, description="Duty cycles per hour, idle hours included; default: the pace of the dated runs"
     )
     counted_by: Literal["dissipated_energy", "cycles"] | None = Field(
         default=None,
-        description="On a clutch whose record counts cycles: whether a planned cycle counts by its energy beside that of "
-        "recent duty, or as one cycle; left out, by its energy where blocks and duty runs state one",
+        description="For a clutch whose record counts cycles: whether a planned cycle counts by its energy "
+        "relative to recent duty, or as one cycle; default: by energy if blocks and duty runs state "
+        "it",
     )
 
 
 class PlannedLife(RemainingLife):
     """Remaining life under planned duty: `remaining_cycles` and `end_of_life_cycles` are those of the programme."""
 
-    recent_duty_cycles: Quantiles = Field(description="Quantiles of the remaining cycles were recent duty to go on")
+    recent_duty_cycles: Quantiles = Field(description="Quantiles of the remaining cycles if recent duty goes on")
     remaining_blocks: Quantiles = Field(
         description="Quantiles of the blocks until the end, the last one in part; the programme begins again after its last"
     )
     block_severity: list[float | None] = Field(
-        description="How many cycles of recent duty a cycle of each block is worth, the median; null without a prediction"
+        description="Cycles of recent duty that one cycle of each block is worth (median); null without a prediction"
     )
     end_of_life_at: dict[str, str | None] | None = Field(
-        description="Quantiles of the date of the end, UTC, ISO 8601; null where no pace is known"
+        description="Quantiles of the date of the end, UTC, ISO 8601; null if no pace is known"
     )
     counted_by: Literal["cycles", "sliding_distance", "dissipated_energy"] = Field(
         description="What a planned cycle was counted by"
     )
-    pace_cycles_per_hour: float | None = Field(description="Duty cycles an hour that dates were computed with")
+    pace_cycles_per_hour: float | None = Field(description="Duty cycles per hour, from which the dates were computed")
     pace_from: Literal["request", "runs"] | None = Field(
-        description="Whose pace it is: the request's, or that of the present life's dated runs"
+        description="Origin of the pace: the request, or the dated runs of the present life"
     )

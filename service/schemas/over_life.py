@@ -12,7 +12,7 @@ from service.schemas.run import Fit, IndicatorEstimate, Indicators, Loop, Warned
 class LinearLaw(Answer):
     """value = intercept + slope · pressure_bar."""
 
-    intercept: float = Field(description="Value at no pressure")
+    intercept: float = Field(description="Value at zero pressure")
     slope_per_bar: float = Field(description="Change per bar")
     covariance: list[list[float]] = Field(description="Covariance of `intercept` and `slope_per_bar`, in this order")
 
@@ -21,7 +21,7 @@ class AsymptoticLaw(Answer):
     """value = asymptote + excess · exp(-pressure_bar / decay_bar)."""
 
     asymptote: float = Field(description="Value at high pressure")
-    excess: float = Field(description="Value at no pressure less the asymptote")
+    excess: float = Field(description="Value at zero pressure minus the asymptote")
     decay_bar: float = Field(description="Pressure over which the excess falls to 1/e, bar")
     covariance: list[list[float]] = Field(
         description="Covariance of `asymptote`, `excess` and `decay_bar`, in this order; 0 of what is held at 0"
@@ -63,7 +63,9 @@ class SeriesItem(Answer):
     """One value of one quantity."""
 
     cycles: float = Field(description="Duty cycles since new")
-    time: str | None = Field(description="When the run was started, else received, ISO 8601; null for predictions")
+    time: str | None = Field(
+        description="When the run was started, or received if that is unknown, ISO 8601; null for predictions"
+    )
     run_id: str | None = Field(description="The run's name; null for predictions")
     quantity: str = Field(
         description="A fitted quantity, the slope dμ/dv of a curve, one of a friction loop, an indicator of an "
@@ -79,7 +81,7 @@ class SeriesItem(Answer):
     frequency_hz: float | None = Field(description="Frequency of a friction loop, Hz, to two digits; null for all else")
     speed_rpm: float | None = Field(description="Speed of a slope, rpm; null for all else")
     source: Literal["run", "track"] = Field(
-        description="`run`: fitted or measured in one run alone; `track`: what all runs up to these cycles say"
+        description="`run`: from one run alone; `track`: from all runs up to these cycles"
     )
 
 
@@ -104,7 +106,7 @@ class Coefficients(Answer):
 
 
 class CoefficientDraws(Answer):
-    """Joint draws of the coefficients of eq. 6, of equal weight: the same place of all four columns is one draw."""
+    """Joint draws of the coefficients of eq. 6, of equal weight. The same row of all four columns is one draw."""
 
     initial: list[float] = Field(description="Initial value ξ0, in the quantity's unit")
     change: list[float] = Field(description="Change Δ, in the quantity's unit")
@@ -138,25 +140,25 @@ class DegradationItem(Answer):
     speed_rpm: float | None = Field(description="Speed of a slope, rpm; null for all else")
     frequency_hz: float | None = Field(description="Frequency of a friction loop, Hz; null for all else")
     coefficients: Coefficients | None = Field(
-        description="The coefficients of eq. 6, where the quantity follows it; null where it surely does not, with too few "
-        "tests, and of a slope, which follows from the parameters"
+        description="The coefficients of eq. 6; null if the quantity surely does not follow eq. 6, with too few "
+        "tests, and for a slope, which follows from the parameters"
     )
     correlations: list[list[float]] | None = Field(
-        description="Correlations of ξ0, Δ, log φ and log ε, in this order; null where there are no coefficients"
+        description="Correlations of ξ0, Δ, log φ and log ε, in this order; null without coefficients"
     )
     eq6_probability: float | None = Field(
-        description="How probable it is that the quantity follows eq. 6; null of a slope and with too few tests"
+        description="Probability that the quantity follows eq. 6; null for a slope and with too few tests"
     )
-    draws: CoefficientDraws | None = Field(description="Joint draws of the coefficients, where `draws` asked for them")
+    draws: CoefficientDraws | None = Field(description="Joint draws of the coefficients, if `draws` requested them")
     measured: Measured = Field(description="The fitted values of the tests")
     trajectory: Trajectory = Field(description="The course as tracked, with its 90 % band; empty with too few tests")
 
 
 class Disagreement(Answer):
-    """COF from the parameters less the direct track, in standard deviations of the difference."""
+    """COF from the parameters minus the direct track, in standard deviations of the difference."""
 
-    now_sd: float | None = Field(description="Of the present value; null where it has no uncertainty")
-    end_of_life_sd: float | None = Field(description="Of the median end of life; null beyond the horizon")
+    now_sd: float | None = Field(description="For the present value; null if it has no uncertainty")
+    end_of_life_sd: float | None = Field(description="For the median end of life; null beyond the horizon")
 
 
 class Rebuilt(Answer):
@@ -168,13 +170,11 @@ class Rebuilt(Answer):
 
 
 class SeverityWeighed(Answer):
-    """By which power of its work a duty cycle ages this clutch, by the tests of one life whose duty varies."""
+    """Exponent by which the work of a duty cycle ages this clutch, estimated from the tests of a life with varying duty."""
 
     basis: str = Field(description="The work: `dissipated_energy` or `sliding_distance`")
-    exponents: list[float] = Field(
-        description="The exponents that were weighed; 0: cycles age alike whatever their work"
-    )
-    probabilities: list[float] = Field(description="How probable each of them is")
+    exponents: list[float] = Field(description="The compared exponents; 0: every cycle ages the clutch equally")
+    probabilities: list[float] = Field(description="Probability of each exponent")
     value: float = Field(description="Their mean")
     sd: float = Field(description="Their standard deviation")
 
@@ -185,13 +185,13 @@ class Degradation(Answer):
     clutch_id: ClutchName
     revision: Revision
     method: MethodName = Field(description="The filter")
-    life: LifeNumber = Field(description="The life that the tracks are of")
+    life: LifeNumber = Field(description="The life that the tracks belong to")
     items: list[DegradationItem] = Field(description="The quantities of this page, by pressure")
-    held_runs: int = Field(description="Number of runs that are held: the tracks are without them")
+    held_runs: int = Field(description="Number of held runs, which the tracks do not use")
     rebuilt: Rebuilt | None = Field(description="COF from the parameters; null with too few tests")
     severity_estimate: SeverityWeighed | None = Field(
-        description="The exponent of severity as the tests of this life have it; null where its duty states no work or "
-        "hardly varies, with too few tests, and where one quantity was asked for"
+        description="The exponent of severity, estimated from the tests of this life; null if its duty states no "
+        "work or hardly varies, with too few tests, or if one quantity was requested"
     )
     warnings: list[Warned] = Field(description="Warnings, such as tracks that disagree or runs that are held")
     model: Model
@@ -201,7 +201,7 @@ class Degradation(Answer):
 
 
 class SurfaceParameters(Answer):
-    """The Stribeck parameters, a row a count of cycles, a column a pressure."""
+    """The Stribeck parameters, one row per count of cycles, one column per pressure."""
 
     static_torque_nm: list[list[float]] = Field(description="Static torque M_s, Nm")
     coulomb_ratio: list[list[float]] = Field(description="Coulomb torque over static torque, M̄_c")
@@ -214,7 +214,7 @@ class Surfaces(Answer):
 
     clutch_id: ClutchName
     revision: Revision
-    held_runs: int = Field(description="Number of runs that are held: the surfaces are without them")
+    held_runs: int = Field(description="Number of held runs, which the surfaces do not use")
     cycles: list[float] = Field(description="The axis of duty cycles since new")
     pressure_bar: list[float] = Field(description="The axis of line pressure, bar")
     speed_rpm: list[float] = Field(description="The axis of speed, rpm")
@@ -226,7 +226,7 @@ class Surfaces(Answer):
 
 
 class EngagementChannels(Answer):
-    """The course of an engagement, a column each."""
+    """The time course of an engagement, one column per quantity."""
 
     time_s: list[float] = Field(description="Time, s")
     pressure_bar: list[float] = Field(description="Line pressure, bar")
@@ -236,15 +236,17 @@ class EngagementChannels(Answer):
 
 
 class AllIndicators(Indicators):
-    """The indicators of one engagement, and those against the first ones of its life (null: of another duty)."""
+    """The indicators of one engagement, and its comparison with the first ones of the life (null: they had other duty)."""
 
     normalised_duration: IndicatorEstimate | None = Field(
         description="Duration of slip over that of the first engagements"
     )
     euclidean_distance: IndicatorEstimate | None = Field(
-        description="Distance of the speed's course from that of the first ones"
+        description="Distance of the speed curve from that of the first engagements"
     )
-    spectral_angle_rad: IndicatorEstimate | None = Field(description="Angle between the speed's course and theirs, rad")
+    spectral_angle_rad: IndicatorEstimate | None = Field(
+        description="Angle between the speed curve and that of the first engagements, rad"
+    )
 
 
 class MeasuredEngagement(Answer):
@@ -253,33 +255,37 @@ class MeasuredEngagement(Answer):
     run_id: RunName
     cycles: RunCycles
     kind: str = Field(description="The kind of run")
-    time: str = Field(description="When the run was started, else received, ISO 8601")
+    time: str = Field(description="When the run was started, or received if that is unknown, ISO 8601")
     initial_speed_rpm: float = Field(description="Sliding speed at contact, rpm")
     maximum_pressure_bar: float = Field(description="Highest pressure of the slip, bar")
     indicators: AllIndicators = Field(description="The indicators, each with its standard error")
 
 
 class EngagementTrace(Answer):
-    """The course of an engagement, a column each; time counts from contact."""
+    """The time course of an engagement, one column per quantity. Time counts from contact."""
 
     time_s: list[float] = Field(description="Time since contact, s")
     pressure_bar: list[float] = Field(description="Line pressure, bar")
-    speed_rpm: list[float] = Field(description="Sliding speed less what the sensor reads at standstill, rpm")
-    torque_nm: list[float] = Field(description="Friction torque less what the sensor reads before contact, Nm")
+    speed_rpm: list[float] = Field(description="Sliding speed minus the sensor's reading at standstill, rpm")
+    torque_nm: list[float] = Field(description="Friction torque minus the sensor's reading before contact, Nm")
 
 
 class ModelledEngagement(Answer):
-    """What the tracked model gives for a measured engagement's pressure, initial speed and drive."""
+    """The tracked model's engagement, for the pressure, initial speed and drive of a measured one."""
 
     channels: EngagementTrace = Field(description="The course of the simulated engagement")
-    inertia_kg_m2: float = Field(description="The shaft's inertia, by what slowed it in the record, kg m²")
-    motor_torque_limit_nm: float = Field(description="The drive's torque, by what the clutch carries at standstill, Nm")
-    stop_time_s: float | None = Field(description="Simulated stop time, s; null where the simulated clutch slips on")
-    torque_discrepancy: float = Field(
-        description="Root mean square of measured less simulated torque over the measured one"
+    inertia_kg_m2: float = Field(
+        description="The shaft's inertia, estimated from its deceleration in the record, kg m²"
     )
-    stop_time_difference_s: float | None = Field(description="Measured less simulated stop time, s")
-    stop_time_difference_sd_s: float | None = Field(description="Its standard error, of the measurement, s")
+    motor_torque_limit_nm: float = Field(
+        description="The drive's torque, estimated from the clutch's torque at standstill, Nm"
+    )
+    stop_time_s: float | None = Field(description="Simulated stop time, s; null if the simulated clutch does not stop")
+    torque_discrepancy: float = Field(
+        description="Root mean square of measured minus simulated torque, over that of the measured torque"
+    )
+    stop_time_difference_s: float | None = Field(description="Measured minus simulated stop time, s")
+    stop_time_difference_sd_s: float | None = Field(description="Standard error of the measured stop time, s")
 
 
 class ComparedEngagement(Answer):
@@ -288,7 +294,9 @@ class ComparedEngagement(Answer):
     run_id: RunName
     cycles: RunCycles
     channels: EngagementTrace = Field(description="The measured course, averaged over equal steps of time")
-    model: ModelledEngagement | None = Field(description="The model's; null where the record does not show its drive")
+    model: ModelledEngagement | None = Field(
+        description="The simulated time course; null if the record does not show the drive"
+    )
 
 
 class EngagementOut(Answer):
@@ -310,5 +318,5 @@ class EngagementOut(Answer):
     channels: EngagementChannels = Field(description="The course of the engagement")
     measured: list[MeasuredEngagement] = Field(description="The measured engagements that were evaluated, by cycles")
     compared: ComparedEngagement | None = Field(
-        description="One measured engagement beside the tracked model's; null where there is none in this life"
+        description="One measured engagement beside the tracked model's; null if this life has none"
     )

@@ -28,21 +28,21 @@ Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER, allow_inf
 
 
 class RigColumn(Schema):
-    """One column of the rig's files: a channel's, or one that is left out."""
+    """One column of the rig's files: a channel, or a column to ignore."""
 
     title: Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_TITLE)] = Field(
         description="Its title in the file, without the unit; `group/title` in files with groups"
     )
-    channel: ChannelName | None = Field(default=None, description="The channel; null: the column is left out")
-    unit: Text | None = Field(default=None, description="Its unit; null: the one that the file states")
+    channel: ChannelName | None = Field(default=None, description="The channel; null: ignore the column")
+    unit: Text | None = Field(default=None, description="Its unit; null: the unit in the file")
     stated: Text | None = Field(
         default=None,
-        description="What the file states in place of `unit`; a file that states a third one is refused",
+        description="What the file writes instead of `unit`; any other unit in the file is refused",
     )
     scale: Number = Field(
         default=1.0, description="Channel = `scale` · value + `offset`, all in the channel's unit; not 0"
     )
-    offset: Number = Field(default=0.0, description="Added after scaling, in the channel's unit: a zero that is off")
+    offset: Number = Field(default=0.0, description="Added after scaling, in the channel's unit; corrects a zero shift")
 
     @model_validator(mode="after")
     def _scaled(self) -> Self:
@@ -52,36 +52,39 @@ class RigColumn(Schema):
 
 
 class RigProfile(Schema):
-    """How the files of a rig are read. What a request states itself comes before it."""
+    """How the files of a rig are read. Arguments of a request override it."""
 
     columns: list[RigColumn] = Field(
-        min_length=1, max_length=MAX_COLUMNS, description="The columns by their titles; others are left out"
+        min_length=1, max_length=MAX_COLUMNS, description="The columns by their titles; others are ignored"
     )
     decimal: Literal[".", ","] | None = Field(
-        default=None, description="The decimal mark of text files, the other one then separates thousands; null: found"
+        default=None,
+        description="The decimal sign of text files; the other sign then separates thousands; null: detected",
     )
     table: Text | None = Field(
         default=None,
-        description="The sheet, group or test of a file with several, by its name or its number from 1 on; null: the only",
+        description="The sheet, group or test of a file with several, by name or number from 1; null: the only one",
     )
     skip_rows: Annotated[int, Field(ge=0, le=MAX_SKIPPED)] = Field(
-        default=0, description="Lines above the titles that are not looked at"
+        default=0, description="Number of lines above the titles to skip"
     )
     missing: Text | None = Field(
         default=None,
-        description="Marks of missing values, as `-9999,n/a`: rows with one, or with an empty cell, are left out; `none`: "
-        "all numbers are measured; null: a file with numbers that may be such marks is refused",
+        description="Marks of missing values, such as `-9999,n/a`: rows with one, or with an empty cell, are left"
+        " out; `none`: all numbers are measurements; null: a file with suspicious numbers is refused",
     )
-    kind: FileKindName | None = Field(default=None, description="The kind of run; null: by `file_name`, or asked for")
+    kind: FileKindName | None = Field(
+        default=None, description="The kind of run; null: from `file_name` or from the request"
+    )
     file_name: Text | None = Field(
         default=None,
-        description="What the file's name says: `{cycles}`, `{kind}`, `{run_id}` and `*` stand for what differs",
+        description="Pattern of the file's name: `{cycles}`, `{kind}`, `{run_id}` and `*` stand for the parts that change",
     )
     kinds: dict[Text, FileKindName] = Field(
         default_factory=dict, max_length=MAX_WORDS, description="The words that stand for `{kind}` in the name"
     )
     cycles_cell: Text | None = Field(
-        default=None, description="The words above the table beside which the cycles stand, such as `Lastspiele`"
+        default=None, description="Label above the table that stands beside the number of cycles, such as `Lastspiele`"
     )
 
     @model_validator(mode="after")
@@ -97,15 +100,15 @@ class RigProfile(Schema):
 
 
 class RigIn(RigProfile):
-    """A rig profile as it is posted."""
+    """A rig profile in a request."""
 
     name: Identifier = Field(description="The rig's name")
 
 
 class RigOut(RigIn):
-    """A rig profile as it is in force."""
+    """A saved rig profile."""
 
-    version: int = Field(description="1 for a new profile, and one more each time it was replaced")
+    version: int = Field(description="1 for a new profile; increases with each replacement")
     saved_at: str = Field(description="When; UTC, ISO 8601")
     saved_by: str = Field(description="Who: `key:` with the key's id and note, or `local`")
 
@@ -118,14 +121,14 @@ class PreviewColumn(Answer):
 
     title: str = Field(description="Its title, as a profile names it")
     stated_unit: str | None = Field(description="The unit that the file states; null: none")
-    unit: str | None = Field(description="The unit in which it is understood; null: none, or the column is left out")
-    channel: ChannelName | None = Field(description="The channel that it is read as; null: it is left out")
-    scale: float = Field(description="The scale that is applied, in the channel's unit")
-    offset: float = Field(description="The offset that is applied, in the channel's unit")
+    unit: str | None = Field(description="The unit that is used; null: none, or the column is ignored")
+    channel: ChannelName | None = Field(description="The channel; null: the column is ignored")
+    scale: float = Field(description="The scale, in the channel's unit")
+    offset: float = Field(description="The offset, in the channel's unit")
 
 
 class PreviewPiece(Answer):
-    """What is cut out of a sampled record: a plateau, or the stretch of a dynamic test at one pressure."""
+    """A part of a sampled record: a plateau, or the part of a dynamic test at one pressure."""
 
     start_s: float = Field(description="Its start, s")
     stop_s: float = Field(description="Its end, s")
@@ -138,24 +141,26 @@ class Preview(Answer):
 
     filename: str = Field(description="The sender's name for it")
     above: list[list[str]] = Field(description="The lines above the table, cell by cell")
-    tables: list[str] = Field(description="The sheets, groups or tests of the file, where there are several")
+    tables: list[str] = Field(description="The sheets, groups or tests of the file, if there are several")
     columns: list[PreviewColumn] = Field(description="Every column of the file")
-    first_rows: list[list[str]] = Field(description="The first rows as the file has them, a text a column")
+    first_rows: list[list[str]] = Field(description="The first rows of the file, one text per column")
     units: dict[str, list[str]] = Field(description="Units that a column of each channel may be in")
-    rig: str | None = Field(description="The profile that was applied: the one asked for, or the one that fits")
-    profile: RigProfile = Field(description="How it was read, as a profile that could be saved")
+    rig: str | None = Field(description="The applied profile: the requested one, or the one that fits")
+    profile: RigProfile = Field(description="How the file was read, as a profile that you can save")
     kind: FileKindName | None = Field(
-        description="The kind of run: asked for, by the profile, or the only one that fits"
+        description="The kind of run: from the request or the profile, or the only one that fits"
     )
-    cycles: float | None = Field(description="Cycles: asked for, or by the profile from the file's name or a cell")
-    run_id: str | None = Field(description="The run's name, where the profile finds one in the file's name")
+    cycles: float | None = Field(
+        description="Cycles: from the request, or through the profile from the file's name or a cell"
+    )
+    run_id: str | None = Field(description="The run's name, if the profile finds one in the file's name")
     kinds: list[FileKindName] = Field(description="The kinds of run that the channels allow")
-    missing: list[str] = Field(description="What must still be given before it can be sent: channels, `kind`, `cycles`")
+    missing: list[str] = Field(
+        description="What is still missing before the file can be sent: channels, `kind`, `cycles`"
+    )
     rows: int = Field(description="Samples of each channel")
     channels: dict[str, list[float]] = Field(description="The channels as they are read, thinned for a plot")
-    pieces: list[PreviewPiece] = Field(description="What is cut from a sampled record")
-    fits: list[Fit] = Field(description="The curves that are fitted, as a receipt has them")
-    warnings: list[Warned] = Field(
-        description="Warnings of reading, cutting and fitting; what was left out is among them"
-    )
-    problem: str | None = Field(description="Why the file would be refused as it is; null: it would be taken")
+    pieces: list[PreviewPiece] = Field(description="The parts of a sampled record")
+    fits: list[Fit] = Field(description="The fitted curves, as in a receipt")
+    warnings: list[Warned] = Field(description="Warnings of reading, cutting and fitting, including what was left out")
+    problem: str | None = Field(description="Why the file would be refused; null: it would be accepted")

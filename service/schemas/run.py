@@ -26,14 +26,14 @@ from service.schemas.base import (
 
 
 class IndicatorEstimate(Answer):
-    """A value with its standard error, which counts noise."""
+    """A value with its standard error from noise."""
 
     value: float = Field(description="The value")
     sd: float = Field(description="Its standard error")
 
 
 class Indicators(Answer):
-    """The indicators of one engagement; null is what the record does not determine."""
+    """The indicators of one engagement; null if the record does not determine one."""
 
     stop_time_s: IndicatorEstimate | None = Field(description="From 10 % of the highest torque to standstill, s")
     engagement_energy_kj: IndicatorEstimate | None = Field(description="Dissipated from contact to standstill, kJ")
@@ -46,12 +46,12 @@ class Indicators(Answer):
     endpoint_cof_ratio: IndicatorEstimate | None = Field(description="Endpoint over midpoint COF")
     breakaway_cof_ratio: IndicatorEstimate | None = Field(description="Breakaway over midpoint COF")
     torque_rise: IndicatorEstimate | None = Field(
-        description="Torque at the end of slip over that at half speed, less 1"
+        description="Torque at the end of slip over torque at half speed, minus 1"
     )
 
 
 class ReceivedEngagement(Answer):
-    """The engagement that a block of duty carries; null where it was not evaluated."""
+    """The measured engagement of a block of duty; null if it was not evaluated."""
 
     status: str = Field(
         description="`determined`, or why not: `no_slip`, `slip_never_ends`, `no_torque`, `no_pressure`, "
@@ -70,7 +70,8 @@ Speed = Annotated[Column, Field(description="Sliding speed, rpm")]
 Torque = Annotated[Column, Field(description="Friction torque, Nm")]
 OilTemperature = Annotated[Column | None, Field(description="Oil temperature, °C")]
 FrontTemperature = Annotated[
-    Column | None, Field(description="Temperature of the reaction plate at its front, or at the one place measured, °C")
+    Column | None,
+    Field(description="Temperature of the reaction plate at its front, or at the only measured place, °C"),
 ]
 RearTemperature = Annotated[Column | None, Field(description="Temperature of the reaction plate at its rear, °C")]
 
@@ -80,7 +81,7 @@ GivenReason = Annotated[Reason, StringConstraints(min_length=1)]
 
 
 class StationaryChannels(Schema):
-    """The channels of a stationary test: one value a plateau, or with `time_s` the raw record."""
+    """The channels of a stationary test: one value per plateau, or with `time_s` the raw record."""
 
     pressure_bar: Pressure
     speed_rpm: Speed
@@ -91,7 +92,7 @@ class StationaryChannels(Schema):
     oil_temperature_c: OilTemperature = None
     plate_temperature_front_c: FrontTemperature = None
     plate_temperature_rear_c: RearTemperature = None
-    time_s: Column | None = Field(default=None, description="Time of each sample, s; left out, rows are plateaus")
+    time_s: Column | None = Field(default=None, description="Time of each sample, s; without it, rows are plateaus")
 
 
 class DynamicChannels(Schema):
@@ -127,7 +128,7 @@ class Duty(Schema):
 class RunBase(Schema):
     """Fields of every run."""
 
-    run_id: Identifier | None = Field(default=None, description="The run's name; left out, it derives from the content")
+    run_id: Identifier | None = Field(default=None, description="The run's name; default: derived from the content")
     cycles: Cycles = Field(description="Duty cycles since new when the run is made")
     started_at: Annotated[StartedAt, Field(strict=True)] | None = Field(
         default=None, description="When it was started: ISO 8601 with a time zone"
@@ -162,18 +163,18 @@ class MaintenanceRunIn(RunBase):
 
     kind: Literal["maintenance"] = Field(description="The kind of run")
     event: Literal["oil_change", "rest", "sensor_zero", "rebuild", "other", "end_of_life"] = Field(
-        description="What was done; `end_of_life`: the life has ended, and takes in no later duty or tests until a rebuild"
+        description="What was done; `end_of_life`: the life has ended, and later duty and tests are refused until a rebuild"
     )
     reason: EndReason | None = Field(
         default=None,
-        description="Why a life has ended: `worn` (also where it is left out), or `other`: taken out before its end",
+        description="Why a life has ended: `worn` (default), or `other` (taken out before its end)",
     )
     note: Annotated[str, StringConstraints(max_length=LONGEST_NOTE)] = Field(default="", description="A remark")
 
     @model_validator(mode="after")
     def _reason_is_of_an_end(self) -> Self:
         if self.reason is not None and self.event != "end_of_life":
-            raise ValueError(f"reason goes with the event end_of_life only, not with {self.event}")
+            raise ValueError(f"reason is only for the event end_of_life, not for {self.event}")
         return self
 
 
@@ -185,7 +186,7 @@ RUN_IN: TypeAdapter[StationaryRunIn | DynamicRunIn | DutyRunIn | MaintenanceRunI
 class Warned(Answer):
     """A warning; it does not stop the run."""
 
-    code: str = Field(description="The warning in a word for programs")
+    code: str = Field(description="Code of the warning, for programs")
     message: str = Field(description="The warning in a sentence")
 
 
@@ -193,7 +194,7 @@ class Doubt(Warned):
     """Why a run is held."""
 
     likely_cycles: float | None = Field(
-        default=None, description="The cycles that the doubt asks about; left out where it asks about none"
+        default=None, description="The cycles that the doubt suggests; absent if it suggests none"
     )
 
 
@@ -210,17 +211,17 @@ class Confirmation(Schema):
 
 
 class Confirmations(Schema):
-    """Held runs of a clutch that are accepted together, and why."""
+    """Held runs to accept together, and the reason."""
 
     run_ids: list[Identifier] = Field(min_length=1, max_length=MAX_CONFIRMED, description="The runs")
     reason: Reason = Field(default="", description="Why")
 
 
 class Correction(Schema):
-    """The cycles at which a run was made, or the rig by whose profile its file is read again; and why."""
+    """A correction: the true cycles of a run, or the rig profile to read its file again, and the reason."""
 
     cycles: Cycles | None = Field(default=None, description="Duty cycles since new when the run was made")
-    rig: Identifier | None = Field(default=None, description="The rig profile that the kept file is read by")
+    rig: Identifier | None = Field(default=None, description="The rig profile to read the kept file with")
     reason: GivenReason = Field(description="Why")
 
     @model_validator(mode="after")
@@ -245,26 +246,26 @@ class Fit(Answer):
     pressure_bar: float = Field(description="Line pressure, bar")
     parameters: Parameters = Field(description="The fitted parameters")
     standard_errors: Parameters = Field(description="Their standard errors")
-    mse_percent: float | None = Field(description="Eq. 5, %; null where the torque does not vary")
+    mse_percent: float | None = Field(description="Eq. 5, %; null if the torque does not vary")
     rmse_nm: float = Field(description="Root mean square of the residuals, Nm")
     noise_nm: float = Field(description="Standard deviation of one point, Nm")
     acceptable: bool = Field(description="Whether `mse_percent` is below 5")
-    mean_cof: float | None = Field(description="Mean COF of the curve; null where the data do not determine it")
+    mean_cof: float | None = Field(description="Mean COF of the curve; null if the data do not determine it")
     mean_cof_sd: float | None = Field(description="Its standard deviation")
     points: int = Field(description="Number of points")
     status: Literal["determined", "at_bound", "undetermined"] = Field(
-        description="Whether the data determine all parameters, put one at zero, or leave some undetermined"
+        description="Whether the data determine all parameters, set one to zero, or leave some undetermined"
     )
     undetermined: list[str] = Field(description="The parameters that the data do not determine")
     message: str = Field(description="The fit in a sentence")
 
 
 class Loop(Answer):
-    """A friction loop at one pressure; null where the record does not determine a value."""
+    """A friction loop at one pressure; a value is null if the record does not determine it."""
 
     pressure_bar: float = Field(description="Line pressure, bar")
     loop_area_nm_m_s: float | None = Field(
-        description="Area (eq. 8), Nm·m/s; positive where torque is higher in acceleration"
+        description="Area (eq. 8), Nm·m/s; positive if torque is higher while the speed rises"
     )
     loop_area_sd_nm_m_s: float | None = Field(description="Its standard deviation")
     attractor_nm_s: float | None = Field(description="The attractor's rate C of the GMS model, Nm/s")
@@ -288,18 +289,18 @@ class Loop(Answer):
 State = Annotated[
     Literal["accepted", "held", "withdrawn"],
     Field(
-        description="Whether the run counts: `held` until it is confirmed or corrected, `withdrawn` until it is restored"
+        description="`accepted` (it counts), `held` until it is confirmed or corrected, or `withdrawn` until it is restored"
     ),
 ]
 
 
 class ReceivedFile(Answer):
-    """The file that a run was read from; it is kept, and `/runs/{run_id}/file` gives it out."""
+    """The file of a run, which is kept: `/runs/{run_id}/file` returns it."""
 
     filename: str = Field(description="The sender's name for it")
     sha256: str = Field(description="Hash of the file as it was sent")
     bytes: int = Field(description="Its length as it was sent")
-    rig: str | None = Field(description="The rig profile that it was read by; null: by none that is stored")
+    rig: str | None = Field(description="The rig profile that was used; null: no saved profile")
 
 
 class Receipt(Answer):
@@ -312,14 +313,14 @@ class Receipt(Answer):
     started_at: str | None = Field(description="When it was started, ISO 8601")
     origin: Origin
     received_at: str = Field(description="When it was stored; UTC, ISO 8601")
-    content_sha256: str = Field(description="Hash of everything but the name")
+    content_sha256: str = Field(description="Hash of the content without the name")
     duplicate: bool = Field(description="Whether the run was stored before this request")
     file: ReceivedFile | None = Field(description="The file that it was read from; null for a run sent as JSON")
     warnings: list[Warned] = Field(description="Warnings")
     fits: list[Fit] = Field(description="The fitted curves of a stationary test, by pressure")
     loops: list[Loop] = Field(description="The friction loops of a dynamic test, by pressure")
     engagement: ReceivedEngagement | None = Field(
-        default=None, description="The engagement that a block of duty carries; null for a run without one"
+        default=None, description="The measured engagement of a block of duty; null for a run without one"
     )
     duty: Duty | None = Field(description="The block of engagements; null for other kinds")
     event: str | None = Field(description="The maintenance event; null for other kinds")
@@ -327,8 +328,8 @@ class Receipt(Answer):
     note: str | None = Field(description="The maintenance note; null for other kinds")
     code_version: str = Field(description="The release that evaluated the run")
     state: State
-    doubts: list[Doubt] = Field(description="Why the run is, or was, held; empty where nothing was odd")
-    sent_cycles: float = Field(description="Cycles as they were sent; `cycles` is what holds now")
+    doubts: list[Doubt] = Field(description="Why the run is, or was, held; empty if nothing was odd")
+    sent_cycles: float = Field(description="Cycles as sent; `cycles` has the present value")
     received_by: str | None = Field(description="Who posted it: `key:` with the key's id and note, or `local`")
 
 
@@ -349,28 +350,28 @@ class Change(Answer):
         description="What was done; `accept` and `doubt`: other runs agree with a held run, or contradict an accepted one"
     )
     run_id: str | None = Field(
-        description="The run; null where the clutch's record was changed, or an inspection, which `after` names"
+        description="The run; null for a change of the clutch's record or of an inspection, which `after` names"
     )
     reason: str = Field(description="Why")
-    before: dict[str, Any] = Field(description="What changed, as it was")
-    after: dict[str, Any] = Field(description="What changed, as it is from then on")
+    before: dict[str, Any] = Field(description="The changed fields before")
+    after: dict[str, Any] = Field(description="The changed fields after")
 
 
 ChangePage = page_of("ChangePage", Change, "The audit trail, newest first.", "The entries of this page")
 
 
 class RunOut(Receipt):
-    """A receipt with the run's channels: as they were sent, or with `points` fewer samples of them for a plot."""
+    """A receipt with the run's channels: as sent, or with `points` thinned for a plot."""
 
     reading: dict[str, Any] | None = Field(
-        description="How its file was read: the profile in all that applied; null for a run sent as JSON"
+        description="How its file was read: the complete profile; null for a run sent as JSON"
     )
     changes: list[Change] = Field(description="The run's entries of the audit trail, newest first")
-    samples: int = Field(description="Samples of each channel as they were sent; 0 for a run without channels")
+    samples: int = Field(description="Number of samples of each channel as sent; 0 for a run without channels")
     channels: dict[str, list[float]] = Field(
-        description="The channels by name, bit for bit as they were sent and of equal length. With `points`, row k of all "
-        "channels is one sample as it was measured: kept are the lowest and the highest of every channel in each of equal "
-        "bins, the first and the last"
+        description="The channels by name, bit for bit as sent and of equal length. With `points`, row k of all "
+        "channels is one measured sample: the answer keeps the lowest and highest of every channel in"
+        " equal bins, the first and the last"
     )
 
 

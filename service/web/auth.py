@@ -27,7 +27,7 @@ Scope = Literal["read", "ingest", "admin"]
 SCOPES: tuple[Scope, ...] = get_args(Scope)
 #: What a request is called that no route answers.
 UNMATCHED = "unmatched"
-#: The caller's name where no keys are configured.
+#: The caller's name where no key exists.
 LOCAL = "local"
 #: Headers by which proxies say that a request is another's; those whose names hold or end in one of the others, too. And the
 #: version in which a proxy asks that adds no header: nginx, where it is not told otherwise; no browser has it.
@@ -49,7 +49,7 @@ class Caller:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grant:
-    """Who asks, and what they may: `clutches` None where all, `key_id` None where no keys are configured."""
+    """Who asks, and what they may: `clutches` None where all, `key_id` None where no key exists."""
 
     name: str
     scope: Scope
@@ -90,7 +90,7 @@ def authorise(snapshot: Snapshot, caller: Caller, scope: Scope, clutch_id: str |
 
 
 def identify(snapshot: Snapshot, caller: Caller) -> Grant:
-    """Who asks; raises UnauthorizedError, or ForbiddenError where no keys are configured and the caller is not local."""
+    """Who asks; raises UnauthorizedError, or ForbiddenError where no key exists and the caller is not local."""
     if not snapshot.keys_are_needed:
         _require_loopback(caller)
         return _LOCAL_GRANT
@@ -143,7 +143,7 @@ def require_scope(grant: Grant, scope: Scope) -> None:
 def _require_own(grant: Grant, clutch_id: str | None) -> None:
     if grant.clutches is not None and clutch_id not in grant.clutches:
         subject = "all clutches" if clutch_id is None else f"clutch {clutch_id[:80]!r}"
-        raise ForbiddenError(f"the key is bound to some clutches, and this is of {subject}")
+        raise ForbiddenError(f"the key is bound to some clutches, and this concerns {subject}")
 
 
 def _stamp(moment: datetime) -> str:
@@ -157,16 +157,16 @@ def _digest(text: str) -> str:
 def _require_loopback(caller: Caller) -> None:
     if caller.proxy is not None:
         raise ForbiddenError(
-            f"no keys are configured: a request with {caller.proxy} came through a proxy and may be anybody's; make a key, "
+            f"no key exists: a request with {caller.proxy} came through a proxy. Make a key, "
             "or serve with --insecure-local"
         )
     if caller.address is not None and not is_loopback(caller.address):
-        raise ForbiddenError(f"no keys are configured: only this machine may ask, not {caller.address}")
+        raise ForbiddenError(f"no key exists: only this machine has access, not {caller.address}")
     host = (caller.host or "").strip()
     if not is_loopback(_name(host)):
-        raise ForbiddenError(f"no keys are configured: the service answers as localhost only, not as {host[:80]!r}")
+        raise ForbiddenError(f"no key exists: the service answers as localhost only, not as {host[:80]!r}")
     if caller.origin is not None and caller.origin.partition("://")[2] != host:
-        raise ForbiddenError(f"no keys are configured: a page of {caller.origin[:80]!r} may not ask")
+        raise ForbiddenError(f"no key exists: a page of {caller.origin[:80]!r} has no access")
 
 
 def _name(host: str) -> str:

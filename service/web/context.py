@@ -75,9 +75,9 @@ class Context:
     key_uses: KeyUses = field(default_factory=KeyUses)
 
 
-Limit = Annotated[int, SHORT, Query(ge=1, le=MAX_ITEMS, description="Items a page")]
-Whole = Annotated[int, SHORT, Query(ge=1, le=ALL_ITEMS, description="Items a page; left out, all of them")]
-Cursor = Annotated[str | None, Query(max_length=LONGEST_CURSOR, description="Where an earlier page ended: its `next`")]
+Limit = Annotated[int, SHORT, Query(ge=1, le=MAX_ITEMS, description="Items per page")]
+Whole = Annotated[int, SHORT, Query(ge=1, le=ALL_ITEMS, description="Items per page; default: all")]
+Cursor = Annotated[str | None, Query(max_length=LONGEST_CURSOR, description="`next` of the previous page")]
 PressureBar = Annotated[
     float | None,
     SHORT,
@@ -85,23 +85,28 @@ PressureBar = Annotated[
         ge=0,
         le=MAX_PRESSURE_BAR,
         allow_inf_nan=False,
-        description="A pressure of the first stationary test; left out, their mean",
+        description="A pressure of the first stationary test; default: the mean over its pressures",
     ),
 ]
 Until = Annotated[
     float | None,
     SHORT,
-    Query(gt=0, le=HORIZON * MAX_HORIZONS, allow_inf_nan=False, description="Trajectories go up to these cycles"),
+    Query(gt=0, le=HORIZON * MAX_HORIZONS, allow_inf_nan=False, description="Trajectories end at these cycles"),
 ]
 AtCycles = Annotated[
     float | None,
     SHORT,
-    Query(ge=0, le=HORIZON * MAX_HORIZONS, allow_inf_nan=False, description="As it would have been predicted then"),
+    Query(
+        ge=0,
+        le=HORIZON * MAX_HORIZONS,
+        allow_inf_nan=False,
+        description="The prediction with the runs up to these cycles only",
+    ),
 ]
 Prefer = Annotated[
     str | None,
     Header(
         max_length=200,
-        description="`wait=SECONDS`: how long to wait for the newest answer where others wait for theirs",
+        description="`wait=SECONDS`: how long to wait for the newest answer while the service is busy",
     ),
 ]

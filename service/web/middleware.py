@@ -201,9 +201,7 @@ class BodyLimit:
                 if has_room:
                     return message
                 if whole:
-                    raise BusyError(
-                        "the bodies of other requests take all room that there is: send it again in a while"
-                    )
+                    raise BusyError("the bodies of other requests use all available room: try again later")
 
         try:
             await self.app(scope, counted, send)
@@ -436,13 +434,13 @@ class Unpacked:
         try:
             piece = self._unpacker.decompress(self._packed, _PIECE)
         except zlib.error as error:
-            raise InvalidError(f"the body is said to be packed by gzip and is not: {error}") from error
+            raise InvalidError(f"the body is not the gzip data that Content-Encoding announces: {error}") from error
         self._packed = self._unpacker.unconsumed_tail
         if self._unpacker.unused_data:
-            raise InvalidError("the body goes on after the end of what was packed by gzip")
+            raise InvalidError("the body has more bytes after the end of its gzip data")
         if not piece and not self._packed and not self._more:
             if not self._unpacker.eof:
-                raise InvalidError("the body was packed by gzip and is cut off")
+                raise InvalidError("the gzip data of the body is cut off")
             self._ended = True
         return piece
 

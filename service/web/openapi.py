@@ -18,7 +18,7 @@ Json = dict[str, Any]
 _SECURITY = {
     "type": "http",
     "scheme": "bearer",
-    "description": "A key, made by `clutchlife key create`. Where no keys are configured none is needed, and only this "
+    "description": "A key, made by `clutchlife key create`. Where no key exists none is needed, and only this "
     "machine may ask.",
 }
 #: Addresses that answer without a key.

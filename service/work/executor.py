@@ -261,7 +261,7 @@ class Processes(_Elsewhere):
         try:
             answer: tuple[Any, Exception | None] = future.result()
         except BrokenExecutor as error:
-            raise WorkerLostError("the process that worked on this ended, and at each repetition again") from error
+            raise WorkerLostError("the process that computed this ended, and so did each repetition") from error
         except Exception as error:  # noqa: BLE001  (an input or a result that cannot be pickled)
             return None, error
         return answer
@@ -374,7 +374,7 @@ class Cluster(_Elsewhere):
             except TimeoutError:  # it is no error of the function's: those are returned
                 self._require_any_worker()
             except KilledWorker as error:
-                raise WorkerLostError(f"the processes that worked on this have ended ({error})") from error
+                raise WorkerLostError(f"the processes that computed this have ended ({error})") from error
             except ExecutorUnavailableError:
                 raise
             except Exception as error:  # noqa: BLE001  (an input or a result that cannot be pickled)

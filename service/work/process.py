@@ -97,8 +97,8 @@ class Child:
         except (ValueError, IndexError):
             written = None
         if not isinstance(written, dict):
-            _log.error("%s: its process gave no answer that can be read", name)
-            raise FailedError("its process gave no answer that can be read")
+            _log.error("%s: its process gave no readable answer", name)
+            raise FailedError("its process gave no readable answer")
         return written
 
     def _lines(self) -> list[bytes]:

@@ -188,7 +188,7 @@ class Workers:
         with self._lock:
             most = _MAX_WAITING_LONG if lane in _LONG else _MAX_WAITING
             if self._closing or self._calls[lane] >= most:
-                raise BusyError(f"{self._calls[lane]} requests of this kind wait already: ask again in a little while")
+                raise BusyError(f"{self._calls[lane]} requests of this kind already wait: try again later")
             self._count(lane, 1)
             if turn is not None and turn in self._turns:
                 self._turns[turn].append(call)

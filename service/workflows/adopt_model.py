@@ -151,4 +151,4 @@ def _of_present_life(database: Database, clutch_id: str, adoption: Adoption) -> 
 
 def _require_present(adoption: Adoption, life: str) -> None:
     if adoption.life != life:
-        raise NothingToAdoptError(f"diagnosis {adoption.diagnosis_id!r} is of a life that a rebuild has ended")
+        raise NothingToAdoptError(f"diagnosis {adoption.diagnosis_id!r} belongs to a life that a rebuild has ended")

@@ -29,7 +29,7 @@ def ask(
             return row
         waiting = jobs.count_open(connection, kind)
         if waiting >= most:
-            raise BusyError(f"{waiting} jobs of the kind {kind} wait already: ask again in a little while")
+            raise BusyError(f"{waiting} jobs of the kind {kind} already wait: try again later")
         job_id = secrets.token_hex(8)
         new = NewJob(
             job_id=job_id,

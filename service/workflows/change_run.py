@@ -176,7 +176,7 @@ def read_again(
         profile = records.rig(connection, rig)
         stored = channels.file_of(connection, row.run_key)
     if stored is None:
-        raise NotPossibleNowError(f"run {run_id!r} was not sent as a file: there is none to read again")
+        raise NotPossibleNowError(f"run {run_id!r} was not sent as a file: there is no file to read again")
     file, sent_cycles = row.details["file"], row.cycles if row.sent_cycles is None else row.sent_cycles
     with tempfile.TemporaryDirectory(dir=folder) as place:
         path = Path(place) / "run"

@@ -149,6 +149,6 @@ def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:
         content_of(ClutchIn.model_validate(record).model_dump(mode="json")) for record in stored_records
     ]:
         raise ConflictError(
-            f"clutch {stored.clutch_id!r} is known with another record; records are not changed by posting"
+            f"clutch {stored.clutch_id!r} is already registered with another record; use PATCH to change it"
         )
     return False

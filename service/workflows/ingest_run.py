@@ -148,7 +148,7 @@ def ingest(
             archived = records.clutch(connection, clutch_id).archived
             before = records.state(connection, clutch_id, carried=True)
         if archived:
-            raise ArchivedError(f"clutch {clutch_id!r} is archived and takes in no more runs")
+            raise ArchivedError(f"clutch {clutch_id!r} is archived and takes no more runs")
         outcome = _computed(database, before, arrival, (geometry, torque_filter))
         with database.writing(of=clutch_id) as connection:  # another process's run of the same name moves the revision
             if records.unchanged(connection, clutch_id, outcome.revision):

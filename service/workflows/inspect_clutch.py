@@ -70,7 +70,7 @@ def add_photograph(
                 return photograph_answer(photograph), False
         if len(stored) >= MAX_PHOTOGRAPHS:
             raise NotPossibleNowError(
-                f"inspection {inspection_id!r} has {MAX_PHOTOGRAPHS} photographs, the most it may"
+                f"inspection {inspection_id!r} has {MAX_PHOTOGRAPHS} photographs, which is the maximum"
             )
         inspections.attach(connection, key, row, content, position=len(stored))
         return photograph_answer(row), True

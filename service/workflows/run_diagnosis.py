@@ -46,7 +46,7 @@ def ask(
             return job.job_id, False
         waiting = jobs.count_open(connection, DIAGNOSIS)
         if waiting >= most:
-            raise BusyError(f"{waiting} diagnoses wait already: ask again in a little while")
+            raise BusyError(f"{waiting} diagnoses already wait: try again later")
         lives = lives_of(records.events(connection, clutch_id))
         row = NewDiagnosis(
             clutch_id=clutch_id,

@@ -28,6 +28,6 @@ def save(database: Database, rig: RigIn, *, by: str, at: str, replacing: bool = 
             rigs.insert(connection, row)
             return records.rig(connection, rig.name), True
         if not replacing:
-            raise ConflictError(f"rig {rig.name!r} has another profile: PUT replaces it")
+            raise ConflictError(f"rig {rig.name!r} already has another profile; replace it with PUT")
         rigs.put(connection, replace(row, version=stored.version + 1))
         return records.rig(connection, rig.name), False

@@ -25,7 +25,7 @@ def draw(url: str, folder: Path) -> list[Path]:
     import matplotlib as mpl  # 0.4 s for whoever draws, not for every collection
 
     mpl.use("svg")
-    mpl.rcParams |= {"svg.hashsalt": "clutchlife", "figure.constrained_layout.use": True}
+    mpl.rcParams["svg.hashsalt"] = "clutchlife"
     preamble, *figures = blocks()
     names: dict[str, Any] = {"URL": url}
     exec(compile(preamble, "the first block", "exec"), names)  # noqa: S102  (the page's own lines)

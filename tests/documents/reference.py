@@ -30,6 +30,8 @@ ANYWHERE = (401, 403, 422, 429, 503)
 #: Arguments that need no help in the terminal.
 PLAIN = {"clutch": "The clutch's name", "run": "The run's name", "key_id": "The key's id, as `key list` shows it"}
 PLAIN |= {"path": "The file to write", "port": "The port to listen at"}
+#: Options of all commands that ask a service, described once.
+ASKING = ("--url", "--key", "--patience")
 WRITTEN = "This page is made from the code by `make reference`."
 Json = Mapping[str, Any]
 
@@ -98,7 +100,7 @@ def settings() -> str:
     ]
     parts = [
         "## The service",
-        "A wrong value ends the start with a line that names it. A name that is nearly a setting's is warned of.",
+        "A wrong value ends the start with a line that names it. A misspelt name causes a warning.",
         table(["environment", "default", "meaning"], rows),
         "## The commands",
         "Commands that talk to a service read two more.",
@@ -148,14 +150,14 @@ def commands() -> str:
         rows = [
             [", ".join(f"`{each}`" for each in _names(option)), _meaning(option)]
             for option in command.params
-            if not getattr(option, "hidden", False)
+            if not getattr(option, "hidden", False) and not set(_names(option)) & set(ASKING)
         ]
         text = re.sub(r"\n\n\s*", "\n\n", (command.help or "").strip())
         parts += [f"## {name}", text, table(["argument or option", "meaning"], rows)] if rows else [f"## {name}", text]
-    introduction = (
-        "`clutchlife COMMAND --help` says the same. A command ends with 0 where it did what it was asked for."
-    )
-    return page("Commands", introduction, parts)
+    introduction = "`clutchlife COMMAND --help` says the same. [Exit codes](operations.md#exit-codes)."
+    every = {name: _meaning(option) for _, command in walk() for option in command.params for name in _names(option)}
+    shared = table(["option", "meaning"], [[f"`{name}`", every[name]] for name in ASKING])
+    return page("Commands", introduction, ["Commands that ask a service have three more options:", shared, *parts])
 
 
 def _meaning(option: click.Parameter) -> str:

@@ -25,8 +25,8 @@ def test_a_campaign_is_pushed_exported_and_pushed_again(campaign: Path, server: 
     runs = len({path.name for path in campaign.glob("*.json")} - {"answer.json", "clutch.json"})
     inspections = len(list(campaign.glob("inspections/*.json")))
     push = ("push", campaign, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
-    assert f"{runs + inspections} stored, 0 known already, 0 refused" in clutchlife(*push)
-    assert f"0 stored, {runs + inspections} known already, 0 refused" in clutchlife(*push)
+    assert f"{runs + inspections} stored now, 0 stored before, 0 refused" in clutchlife(*push)
+    assert f"0 stored now, {runs + inspections} stored before, 0 refused" in clutchlife(*push)
     inspected = ONCE.get(f"{server.url}/v1/clutches/sim-7/inspections").json()["items"]
     tests = ONCE.get(f"{server.url}/v1/clutches/sim-7/stribeck?limit=1000").json()["items"]
     assert [item["cycles"] for item in inspected] == [item["cycles"] for item in tests]

@@ -67,7 +67,7 @@ def _life(service: Service, seed: int) -> float:
     service.post("/v1/clutches", json.dumps(simulated.simulated_clutch_body(clutch_id)).encode())
     out.print(f"\nA simulated clutch, {clutch_id}: 7 pressures x 40 speeds a test, 1 % noise.")
     out.print(f"Hidden in its torque: {HIDDEN}. The service does not know it.", markup=False)
-    out.print("Duty cycles that remain until its mean COF has halved:\n")
+    out.print("Remaining duty cycles until its mean COF has halved:\n")
     out.print(_HEADER, style="bold")
     inside: list[bool] = []
     with _progress() as progress:
@@ -130,7 +130,7 @@ def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:
         markup=False,
     )
     if end is not None:
-        out.print(f"Halfway, under either model:\n{'':8} {_HEADER}")
+        out.print(f"The forecast at half of the life, with each model:\n{'':8} {_HEADER}")
         for name, prediction in (("before", before), ("after", after)):
             out.print(f"{name:8} {_row(prediction, end)}", markup=False)
 

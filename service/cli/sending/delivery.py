@@ -47,14 +47,14 @@ def transmit(
             except HeldError:
                 fail(f"another process is sending from the spool; {_left(spools)}", EX_TEMPFAIL)
             except ServiceAwayError as error:
-                fail(f"{error}; {_left(spools)}: push again, or clutchlife spool send, to send them", EX_TEMPFAIL)
+                fail(f"{error}; {_left(spools)}. Send them with: clutchlife spool send", EX_TEMPFAIL)
             except RefusedError as error:
                 fail(f"{error}; {_left(spools)}", EX_DATAERR)
     out.print(str(sent))
     if sent.failed:
-        fail(f"{sent.failed} runs were not taken and stay in the spool; {_left(spools)}", EX_TEMPFAIL)
+        fail(f"the service did not take {sent.failed} runs; {_left(spools)}", EX_TEMPFAIL)
     if sent.refused:
-        fail(f"refused runs stay in {spools[0].folder}; clutchlife spool list has the reasons", EX_DATAERR)
+        fail(f"the service refused runs, which stay in {spools[0].folder}. Reasons: clutchlife spool list", EX_DATAERR)
 
 
 def _left(spools: Sequence[Spool]) -> str:
@@ -84,7 +84,7 @@ class Sent:
     unanswered: int = 0
 
     def __str__(self) -> str:
-        return f"{self.stored} stored, {self.duplicates} known already, {self.refused} refused"
+        return f"{self.stored} stored now, {self.duplicates} stored before, {self.refused} refused"
 
 
 def deliver(service: Service, spool: Spool, sent: Sent, report: Report, on_run: Callable[[], None]) -> None:
@@ -138,7 +138,7 @@ def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Repo
         return
     if not {_NAMES[entry.resource], "duplicate"} <= receipt.keys():
         raise ServiceAwayError(
-            f"{service.http.base_url}: the answer is not a receipt: is this the address of Clutchlife?"
+            f"{service.http.base_url}: the answer is not a receipt, so it does not come from the service"
         )
     sent.unanswered = 0
     sent.duplicates += bool(receipt["duplicate"])

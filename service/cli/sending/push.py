@@ -41,8 +41,8 @@ from service.run_files import manifest
 
 SPOOL = default_folder()
 _REMEDY = (
-    "Push a file with --kind and --cycles, or with --rig where a profile finds them; list it in a "
-    f"{manifest.MANIFEST} beside it; or use clutchlife import, which asks"
+    "Use --kind and --cycles, or --rig with a profile that finds them, or list the file in a "
+    f"{manifest.MANIFEST} beside it, or use clutchlife import, which asks"
 )
 SpoolFolder = Annotated[Path, typer.Option("--spool", help="Where runs wait until the service has stored them")]
 
@@ -57,18 +57,19 @@ def push(
     kind: Annotated[str | None, typer.Option(help="For files that are not JSON: the kind of run")] = None,
     cycles: Annotated[float | None, typer.Option(help="For files that are not JSON: duty cycles since new")] = None,
     rig: Annotated[
-        str | None, typer.Option(help="For files that are not JSON: the rig profile that reads them")
+        str | None, typer.Option(help="For files that are not JSON: the rig profile to read them with")
     ] = None,
     channel_map: ChannelMap = None,
     decimal: Decimal = None,
     missing: Missing = None,
 ) -> None:
-    """Send run files: JSON, or CSV, TDMS, MDF4 and Parquet, with their kind and cycles in a runs.json or in options.
+    """Send run files to the service.
 
-    JSON files in a folder named inspections are sent as inspections.
+    A JSON run is complete. For other files (CSV, workbooks, TDMS, MDF4, MATLAB, HDF5, Parquet), state kind and cycles
+    in the options or in a `runs.json`. JSON files in a folder named inspections are sent as inspections.
 
-    Runs that the service cannot store now wait in the spool and are sent first next time. A file that is pushed again with
-    other content takes the place of the version that waits.
+    While the service is away, runs wait in the spool; the next call sends them first. A corrected file replaces the
+    version that waits.
     """
     reading = {"map": channel_map, "decimal": decimal, "missing": missing}
     with errors_in_a_line():
@@ -81,7 +82,7 @@ def push(
             files += [manifest.RunFile(path=record) for record in unlisted]
         elif unlisted:
             names = ", ".join(str(record) for record in unlisted)
-            say(f"not sent, because their kind and cycles are not known: {names}. {_REMEDY}")
+            say(f"not sent, because kind and cycles are not known: {names}. {_REMEDY}")
         if _record(paths) is None:
             _require_known(url, key, clutch)
         waiting = Spool.of(spool, url, clutch)
@@ -108,9 +109,9 @@ def _request(
 
 
 def _replacement(spool: Spool, entry: Entry) -> str:
-    stored = "; a try got no answer, so it may be stored: withdraw it then" if entry.perhaps_stored else ""
+    stored = "; an attempt got no answer, so it may be stored: if it is, withdraw it" if entry.perhaps_stored else ""
     place = spool.body(entry)
-    return f"{entry.label}: the version that waited since {entry.since} is replaced and not sent, see {place}{stored}"
+    return f"{entry.label}: replaces the version that waited since {entry.since} and is kept in {place}{stored}"
 
 
 def _warn_of_others(spool: Spool, digests: set[str]) -> None:
@@ -166,7 +167,7 @@ def _register(service: Service, clutch_id: str, paths: list[Path]) -> None:
 
 app = typer.Typer(help="Runs that wait to be sent, or were refused.", no_args_is_help=True)
 
-Clutch = Annotated[str | None, typer.Option("--clutch", help="Only of this clutch")]
+Clutch = Annotated[str | None, typer.Option("--clutch", help="Only this clutch")]
 
 
 @app.command(name="list")
@@ -175,7 +176,7 @@ def list_runs(
     spool: SpoolFolder = SPOOL,
     as_json: Annotated[bool, typer.Option("--json", help="Print the runs as JSON")] = False,
 ) -> None:
-    """What waits, since when, how often it was tried and what was answered; what was refused and why; what was replaced."""
+    """List the runs that wait, with the last answer; the refused runs, with the reason; and the replaced versions."""
     with errors_in_a_line():
         kept = _kept(spool, clutch)
         if as_json:
@@ -194,7 +195,8 @@ def send(
     spool: SpoolFolder = SPOOL,
     patience: Patience = 60.0,
 ) -> None:
-    """Send what waits for the service at --url; no other address is asked, for the key is this service's."""
+    """Send the runs that wait for the service at --url. Runs for other addresses stay, because the key belongs to this
+    service."""
     with errors_in_a_line():
         spools = [kept for kept in Spool.every(spool) if kept.waiting()]
         if clutch is not None:
@@ -203,7 +205,7 @@ def send(
         for kept in spools:
             if kept not in here:
                 whose = f"{kept.clutch_id} at {kept.url}"
-                say(f"{len(kept.waiting())} runs in {kept.folder} are not sent: they are of {whose}")
+                say(f"{len(kept.waiting())} runs in {kept.folder} are not sent: they belong to {whose}")
         if not here:
             print_line(f"nothing waits for {url}")
             return
@@ -217,7 +219,7 @@ def empty(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask")] = False,
     spool: SpoolFolder = SPOOL,
 ) -> None:
-    """Delete what is in the spool, for good, after showing it and asking; runs that were never sent are counted."""
+    """Show what is in the spool, ask, and delete it for good."""
     with errors_in_a_line():
         kept = [entry for entry in _kept(spool, clutch) if entry.state != WAITING or not refused]
         if not kept:
@@ -225,7 +227,7 @@ def empty(
             return
         _print(spool, kept)
         waiting = sum(entry.state == WAITING for entry in kept)
-        question = f"Delete these {len(kept)} for good? {waiting} of them wait and were never stored."
+        question = f"Delete these {len(kept)} for good? {waiting} of them were never stored by the service."
         if not yes and not typer.confirm(question, err=True):
             fail("nothing was deleted")
         try:
@@ -233,8 +235,8 @@ def empty(
                 with Spool.of(spool, *owner).sending(0.0):
                     Spool.of(spool, *owner).discard(entries)
         except HeldError:
-            fail("another process is sending from the spool: try again when it has ended", EX_TEMPFAIL)
-        print_line(f"{len(kept)} deleted, {waiting} of them never stored")
+            fail("a process is sending from the spool: try again when it has ended", EX_TEMPFAIL)
+        print_line(f"{len(kept)} deleted; the service never stored {waiting} of them")
 
 
 def _kept(folder: Path, clutch: str | None) -> list[Entry]:

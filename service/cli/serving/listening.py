@@ -51,7 +51,7 @@ def _addresses(host: str, port: int) -> list[tuple[int, int, int, str, tuple[str
             host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )
     except OSError as error:
-        raise OSError(f"--host {host}: no address of that name is known ({error.strerror})") from None
+        raise OSError(f"--host {host}: this name has no known address ({error.strerror})") from None
     return list(dict.fromkeys(addresses))
 
 

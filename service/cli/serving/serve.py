@@ -25,26 +25,27 @@ def serve(
     port: Annotated[int, typer.Option(min=0, max=65535)] = 8000,
     database: Database = DATABASE,
     processes: Annotated[
-        int, typer.Option(min=1, help="How many services answer at the port, of one database on a PostgreSQL server")
+        int, typer.Option(min=1, help="Number of services behind this port; needs a PostgreSQL database")
     ] = 1,
     raw: Annotated[
         str | None,
         typer.Option(
             envvar="CLUTCHLIFE_RAW",
-            help="Where long raw records go: database, folder:///path or s3://bucket/prefix; else where they went before",
+            help="Where new raw records go: database, folder:///path or s3://bucket/prefix; default: the last choice",
         ),
     ] = None,
     root_path: Annotated[
         str | None,
         typer.Option(
-            envvar="CLUTCHLIFE_ROOT_PATH", help="The path that a proxy adds before the service's own, as /clutch"
+            envvar="CLUTCHLIFE_ROOT_PATH", help="Path that a proxy adds before all addresses, such as /clutch"
         ),
     ] = None,
     insecure_local: Annotated[
-        bool, typer.Option("--insecure-local", help="Without keys, answer also what a proxy on this machine passes on")
+        bool,
+        typer.Option("--insecure-local", help="Accept requests through a proxy on this machine although no key exists"),
     ] = False,
     log_level: Annotated[
-        str | None, typer.Option(help="critical, error, warning, info or debug; else CLUTCHLIFE_LOG_LEVEL, or info")
+        str | None, typer.Option(help="critical, error, warning, info or debug; default: CLUTCHLIFE_LOG_LEVEL, or info")
     ] = None,
 ) -> None:
     """Run the service."""
@@ -64,8 +65,8 @@ def serve(
         configure(settings.log_format, settings.log_level)
         if processes > 1 and not is_on_server(settings.database):
             raise ValueError(
-                f"--processes {processes} needs a database on a PostgreSQL server: one service uses a file at a time, which "
-                "CLUTCHLIFE_WORKERS gives more processes that take in runs"
+                f"--processes {processes} needs a database on a PostgreSQL server: only one service can use "
+                "an SQLite file, and CLUTCHLIFE_WORKERS gives it more processes"
             )
         # a port that is not free ends the start before anything is made; without a database there are no keys
         first = host if is_loopback(host) or database_exists(settings.database) else LOOPBACK
@@ -126,15 +127,19 @@ def _allowed(host: str, settings: "Settings") -> str:
         with opened.reading() as connection:
             has_keys = keys.any_ever(connection)
             opens = keys.any_active(connection, datetime.now(UTC).isoformat(timespec="seconds"))
-    make = "make one with: clutchlife key create --scope admin"
+    make = "Make one: clutchlife key create --scope admin"
     if has_keys and not opens:
-        start.warning("all keys are revoked or expired, so every request is refused; %s", make)
+        start.warning("all keys are revoked or expired, so the service refuses every request. %s", make)
     elif not has_keys and not is_loopback(host):
-        start.warning("no keys are configured, so the service listens at %s and not at %s; %s", LOOPBACK, host, make)
+        start.warning("no key exists, so the service listens at %s and not at %s. %s", LOOPBACK, host, make)
         host = LOOPBACK
     elif not has_keys:
-        passed = "also what a proxy passes on" if settings.insecure_local else "and nothing that a proxy passes on"
-        start.warning("no keys are configured: everybody on this machine may do everything, %s; %s", passed, make)
+        through = "accepted" if settings.insecure_local else "refused"
+        start.warning(
+            "no key exists: everybody on this machine may do everything, and requests through a proxy are %s. %s",
+            through,
+            make,
+        )
     if open_to_readers := missing():
         unkept = " and ".join(open_to_readers)
         start.warning("this system cannot keep a process that reads a file from outside from %s", unkept)

@@ -32,13 +32,13 @@ EventId = Annotated[str, Field(description="The alarm's name")]
 WebhookId = Annotated[str, Field(description="The receiver's name")]
 OfEventState = Annotated[
     Literal["open", "raised", "acknowledged", "cleared"] | None,
-    Query(description="Alarms in this state only; `open`: those that are not cleared. Left out, all"),
+    Query(description="Only alarms in this state; `open`: not cleared; default: all"),
 ]
 OfAlarm = Annotated[
-    str | None, Query(max_length=LONGEST_IDENTIFIER, description="Alarms of this rule only; left out, of all")
+    str | None, Query(max_length=LONGEST_IDENTIFIER, description="Only alarms of this rule; default: all")
 ]
 OfClutch = Annotated[
-    str | None, Query(pattern=IDENTIFIER_PATTERN, description="Alarms of this clutch only; left out, of all")
+    str | None, Query(pattern=IDENTIFIER_PATTERN, description="Only alarms of this clutch; default: all")
 ]
 
 
@@ -46,7 +46,7 @@ OfClutch = Annotated[
 async def list_alarms(
     request: Request, context: auth.OwnReader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
-    """Rules by name; of a key that is bound to clutches, those of these clutches."""
+    """Rules by name. A key that is bound to clutches gets the rules of these clutches."""
     after, own = from_cursor(cursor), auth.own_clutches(request)
     return await answer(request, lambda: alarms.page(context.database, limit=limit, after=after, only=own))
 
@@ -57,7 +57,7 @@ async def list_alarms(
     **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE, SENDING, {200: "The rule is there already"}),
 )
 async def post_alarm(request: Request, context: auth.OwnIngester) -> Response:
-    """Make a rule; what it raises of the clutches as they are is raised at once."""
+    """Create a rule. Clutches that already pass its limit raise an alarm at once."""
     return await _saved(request, context, None)
 
 
@@ -71,7 +71,7 @@ async def list_events(
     limit: Limit = USUAL_ITEMS,
     cursor: Cursor = None,
 ) -> Response:
-    """What rules have raised, newest first; of a key that is bound to clutches, of these."""
+    """Alarms, newest first. A key that is bound to clutches gets those of these clutches."""
     after, own = from_cursor(cursor), auth.own_clutches(request)
     if clutch_id is not None:
         auth.require_clutch(request, clutch_id)
@@ -94,7 +94,7 @@ async def read_event(request: Request, context: auth.OwnReader, event_id: EventI
     **taking(schemas.AcknowledgeIn, schemas.EventOut, {"note": "ordered"}, required=False),
 )
 async def acknowledge_event(request: Request, context: auth.OwnIngester, event_id: EventId) -> Response:
-    """Say that somebody has seen an alarm; the body may be left out."""
+    """Acknowledge an alarm: somebody has seen it. The body is optional."""
     body = await json_body(request) if await request.body() else b"{}"
     remark = checked(schemas.AcknowledgeIn, body)
     await run_in_threadpool(alarms.event, context.database, event_id, only=auth.own_clutches(request))
@@ -111,14 +111,14 @@ async def read_alarm(request: Request, context: auth.OwnReader, alarm_id: AlarmI
 
 @router.put("/{alarm_id}", **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE))
 async def put_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
-    """Replace a rule; what it has raised is cleared where the new one would not keep it."""
+    """Replace a rule. Alarms that the new rule would not raise are cleared."""
     await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.own_clutches(request))
     return await _saved(request, context, alarm_id)
 
 
 @router.delete("/{alarm_id}", status_code=204, response_class=Response, responses=READING)
 async def delete_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
-    """Delete a rule; what it has raised is cleared and stays listed."""
+    """Delete a rule. Its alarms are cleared and stay listed."""
     await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.own_clutches(request))
     await run_in_threadpool(change_alarms.remove, context.database, alarm_id)
     return Response(status_code=204)
@@ -126,7 +126,7 @@ async def delete_alarm(request: Request, context: auth.OwnAdmin, alarm_id: Alarm
 
 @router.post("/{alarm_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
 async def test_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
-    """Send a test to each of the rule's receivers, and say how it went."""
+    """Send a test to each of the rule's receivers, and report the results."""
     await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.own_clutches(request))
     names = await run_in_threadpool(change_alarms.test, context.database, alarm_id)
     return await _tested(context, names)
@@ -136,7 +136,7 @@ async def test_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId
 async def list_webhooks(
     request: Request, context: auth.Reader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
-    """Receivers, without what is secret in their addresses."""
+    """Receivers; the addresses are shown without secrets."""
     after = from_cursor(cursor)
     return await answer(request, lambda: alarms.receiver_page(context.database, limit=limit, after=after))
 
@@ -149,7 +149,7 @@ async def list_webhooks(
     ),
 )
 async def post_webhook(request: Request, context: auth.Admin) -> Response:
-    """Add a receiver. Where no secret is given one is made, and answered this once."""
+    """Add a receiver. Without a secret, the service makes one and shows it once."""
     receiver = checked(schemas.WebhookIn, await json_body(request))
     private = await run_in_threadpool(
         change_webhooks.inside_allowed, context.database, context.settings.private_receivers
@@ -163,13 +163,13 @@ async def post_webhook(request: Request, context: auth.Admin) -> Response:
 
 @webhook_router.get("/{webhook_id}", response_model=schemas.WebhookOut, responses=READING)
 async def read_webhook(request: Request, context: auth.Reader, webhook_id: WebhookId) -> Response:
-    """A receiver, without what is secret in its address."""
+    """A receiver; its address is shown without secrets."""
     return await answer(request, lambda: alarms.receiver(context.database, webhook_id))
 
 
 @webhook_router.delete("/{webhook_id}", status_code=204, response_class=Response, responses=READING)
 async def delete_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
-    """Delete a receiver, its secret and its deliveries; what waits for it is not sent."""
+    """Delete a receiver, its secret and its deliveries. Waiting deliveries are not sent."""
     await run_in_threadpool(change_webhooks.remove, context.database, webhook_id)
     return Response(status_code=204)
 
@@ -178,14 +178,14 @@ async def delete_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response
 async def list_deliveries(
     request: Request, context: auth.Reader, webhook_id: WebhookId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
-    """What a receiver was sent or is to be sent, newest first."""
+    """The deliveries of a receiver, sent or waiting, newest first."""
     after = from_cursor(cursor)
     return await answer(request, lambda: alarms.deliveries(context.database, webhook_id, limit=limit, after=after))
 
 
 @webhook_router.post("/{webhook_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
 async def test_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
-    """Send a test to a receiver, and say how it went."""
+    """Send a test to a receiver, and report the result."""
     names = await run_in_threadpool(change_webhooks.test, context.database, webhook_id, at=now())
     return await _tested(context, names)
 

@@ -76,9 +76,8 @@ async def list_clutches(
     limit: Limit = USUAL_ITEMS,
     cursor: Cursor = None,
 ) -> Response:
-    """The clutches that the key is for, with health and remaining life: the lowest safe bound first, or by name.
-
-    Whoever reads all of them sorts by name: then none is missed or repeated however they change meanwhile.
+    """The clutches of the key, with health and remaining life: the lowest safe bound first, or by name. To read all
+    of them, sort by name: then none is missed or repeated.
     """
     choice = Choice(archived=archived, only=auth.own_clutches(request), state=state, held=held, find=find)
     after = from_cursor(cursor)
@@ -93,7 +92,7 @@ async def list_clutches(
 
 @fleet_router.get("/totals", response_model=FleetTotals, responses=READING)
 async def totals(request: Request, context: auth.OwnReader, archived: Archived = False, find: Find = "") -> Response:
-    """How many clutches that the key is for there are, by their states: what a page shows beside a part of their list."""
+    """The number of the key's clutches, by state."""
     choice = Choice(archived=archived, only=auth.own_clutches(request), find=find)
     return await _of_all(
         request, context, ("totals", choice), lambda: to_json(clutch_list.totals(context.database, choice))
@@ -124,7 +123,9 @@ async def read_clutch(request: Request, context: auth.Reader, clutch_id: ClutchI
     ),
 )
 async def edit_clutch(request: Request, context: auth.Admin, clutch_id: ClutchId) -> Response:
-    """Edit a clutch's record, each given field as a whole, and archive it or bring it back; results are computed again."""
+    """Edit a clutch's record (each field in the request replaces the whole field), archive the clutch or bring it
+    back. Results are computed again.
+    """
     wanted = checked(ClutchEdit, await answers.json_body(request))
     made = partial(
         edit, archived=wanted.archived, reason=wanted.reason, by=auth.name_of_caller(request), at=answers.now()
@@ -138,7 +139,7 @@ async def edit_clutch(request: Request, context: auth.Admin, clutch_id: ClutchId
 
 @router.get("/{clutch_id}/changes", response_model=ChangePage, responses=READING)
 async def list_changes(of: answers.PageOf) -> Response:
-    """Who changed what of the clutch and its runs, when and why: the newest first."""
+    """The audit trail of the clutch and its runs: who changed what, when and why, newest first."""
 
     def make() -> bytes:
         return to_json(page(*runs.trail(of.database, of.clutch_id, limit=of.limit, after=of.after)))

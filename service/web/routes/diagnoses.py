@@ -37,7 +37,7 @@ Prefer = Annotated[
     ),
 )
 async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
-    """Have all runs of the clutch's present life diagnosed. A question while the same runs are being diagnosed joins in."""
+    """Diagnose all runs of the clutch's present life. A request during a diagnosis of the same runs gets that diagnosis."""
     question = checked(DiagnosisIn, await answers.json_body(request))
     if question.adopt:
         require(request, "admin")
@@ -84,13 +84,13 @@ async def read_plan(of: answers.Of, diagnosis_id: DiagnosisId) -> Response:
 
 @router.get("/model", response_model=ModelOut, responses=READING)
 async def read_model(of: answers.Of) -> Response:
-    """The model that tracking and remaining life use, and all that were adopted."""
+    """The current model of tracking and remaining life, and all adopted versions."""
     return await answers.answer(of.request, partial(diagnoses.model, of.database, of.clutch_id))
 
 
 @router.put("/model", **answers.taking(ModelIn, ModelOut, {"diagnosis_id": "3f9a1c0b7d2e4f56"}, SENDING))
 async def put_model(request: Request, context: Admin, clutch_id: ClutchId) -> Response:
-    """Adopt what a diagnosis found, or return to the baseline; all is tracked again before this is answered."""
+    """Adopt the extended model of a diagnosis, or return to the baseline. The clutch is tracked again before the answer."""
     wanted = checked(ModelIn, await answers.json_body(request))
     arguments = (clutch_id, wanted.diagnosis_id, answers.now(), name_of_caller(request))
     adopting = context.workers.submit(Lane.RUNS, adopt_model.adopt, *arguments, turn=clutch_id, seconds=CHANGE_SECONDS)

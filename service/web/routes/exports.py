@@ -71,7 +71,7 @@ async def list_inspections_csv(of: answers.WholeOf) -> Response:
 
 @router.get("/diagnoses/{diagnosis_id}/plan.csv", response_class=Response)
 async def diagnosis_plan_csv(of: answers.WholeOf, diagnosis_id: DiagnosisId) -> Response:
-    """The tests that a diagnosis advises as CSV, a row a step."""
+    """The tests that a diagnosis advises as CSV, one row per step."""
     return await answers.table(
         of.request,
         diagnoses.PLAN_COLUMNS,
@@ -87,7 +87,7 @@ async def remaining_useful_life_csv(
     at_cycles: AtCycles = None,
     prefer: Prefer = None,
 ) -> Response:
-    """Quantiles of remaining and end-of-life cycles, a row each."""
+    """Quantiles of remaining and end-of-life cycles, one row each."""
     query, arguments = remaining_life.remaining_life, (method, pressure_bar, at_cycles)
     return await answers.computed_table(
         of, query, remaining_life.rows, remaining_life.COLUMNS, *arguments, prefer=prefer
@@ -103,14 +103,14 @@ async def degradation_csv(
     life: LifeNumber = None,
     prefer: Prefer = None,
 ) -> Response:
-    """Eq. 6's coefficients, a row a quantity and pressure."""
+    """Coefficients of eq. 6, one row per quantity and pressure."""
     query, arguments = degradation.degradation, degradation.arguments(method, quantity, at_cycles, life)
     return await answers.computed_table(of, query, degradation.rows, degradation.COLUMNS, *arguments, prefer=prefer)
 
 
 @router.get("/stribeck.csv", response_class=Response)
 async def stribeck_csv(of: answers.WholeOf, prefer: Prefer = None) -> Response:
-    """The fits, a row a test and pressure; `limit` counts tests."""
+    """The fits, one row per test and pressure; `limit` counts tests."""
     return await answers.computed_table(
         of, stribeck.curves, lambda payload: stribeck.rows(_items(payload)), ("run_id", "cycles"), prefer=prefer,
         paged_by_query=True,
@@ -119,13 +119,13 @@ async def stribeck_csv(of: answers.WholeOf, prefer: Prefer = None) -> Response:
 
 @router.get("/surfaces.csv", response_class=Response)
 async def surfaces_csv(of: answers.WholeOf, prefer: Prefer = None) -> Response:
-    """The surfaces, a row a count of cycles, a pressure and a speed."""
+    """The surfaces, one row per count of cycles, pressure and speed."""
     return await answers.computed_table(of, surfaces.surface, surfaces.rows, ("cycles", "pressure_bar"), prefer=prefer)
 
 
 @router.get("/scores.csv", response_class=Response)
 async def clutch_scores_csv(of: answers.WholeOf, method: Method = "particle", prefer: Prefer = None) -> Response:
-    """The scored predictions, a row each."""
+    """The scored predictions, one row each."""
     columns = ("end_of_life_cycles", "cycles")
     return await answers.computed_table(
         of, scores.of_clutch, lambda payload: scores.rows(_items(payload)), columns, method, prefer=prefer
@@ -134,7 +134,7 @@ async def clutch_scores_csv(of: answers.WholeOf, method: Method = "particle", pr
 
 @router.get("/loops.csv", response_class=Response)
 async def loops_csv(of: answers.WholeOf) -> Response:
-    """Friction loops, a row each."""
+    """Friction loops, one row each."""
     return await answers.clutch_table(
         of,
         "loops",
@@ -159,7 +159,7 @@ async def series_csv(of: answers.WholeOf, quantity: Quantity = None) -> Response
 async def fleet_scores_csv(
     request: Request, context: Reader, method: Method = "particle", limit: Whole = ALL_ITEMS, cursor: Cursor = None
 ) -> Response:
-    """How right the predictions of all were, a row a stage of life, the last one all of them."""
+    """Scores of all predictions, one row per stage of life; the last row has all."""
     after = from_cursor(cursor)
     scored = await answers.computed_of_each(request, context, scores.of_clutch, method)
 
@@ -172,7 +172,7 @@ async def fleet_scores_csv(
 
 @fleet_router.get("/priors.csv", response_class=Response)
 async def priors_csv(request: Request, context: Reader, limit: Whole = ALL_ITEMS, cursor: Cursor = None) -> Response:
-    """The fleet's priors, a row each."""
+    """The fleet's priors, one row each."""
     after = from_cursor(cursor)
     return await answers.table(
         request,

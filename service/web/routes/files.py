@@ -55,9 +55,8 @@ async def post_run_file(
     started_at: parameters.FileStartedAt = None,
     origin: Origin = "measured",
 ) -> Response:
-    """Post a run as CSV, XLSX, ODS, TDMS, MDF4, MATLAB, HDF5 or Parquet, plain, gzipped or in a ZIP archive.
-
-    The file is kept as it was sent. A form may hold a `profile` beside it, as a rig's, by which this one file is read.
+    """Post a run as CSV, XLSX, ODS, TDMS, MDF4, MATLAB, HDF5 or Parquet, plain, gzipped or in a ZIP archive. The file
+    is kept as sent. A form may also hold a `profile` to read this file with.
     """
     profile = None if rig is None else await run_in_threadpool(rigs.of_name, context.database, rig)
     with tempfile.TemporaryDirectory(dir=context.folder) as folder:

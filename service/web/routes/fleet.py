@@ -17,13 +17,13 @@ router = APIRouter(prefix="/v1/fleet", tags=["fleet"])
 
 @router.get("/priors", response_model=FleetPriorPage, responses=READING)
 async def priors(request: Request, context: Reader, limit: Whole = ALL_ITEMS, cursor: Cursor = None) -> Response:
-    """What the clutches of every kind have taught, for the next of their kind."""
+    """The priors learned from the clutches of each kind."""
     after = from_cursor(cursor)
     return await answer(request, lambda: sliced(fleet_priors.newest(context.database), limit, after))
 
 
 @router.get("/scores", response_model=FleetScores, responses=READING)
 async def fleet_scores(request: Request, context: Reader, method: Method = "particle") -> Response:
-    """How right the predictions of all lives were that came to their end."""
+    """Scores of the predictions of all ended lives."""
     scored = await computed_of_each(request, context, scores.of_clutch, method)
     return await answer(request, lambda: scores.of_fleet(scored, method=method))

@@ -24,9 +24,8 @@ async def livez() -> dict[str, str]:
 
 @router.get("/readyz", responses={503: {"description": "The service cannot work: `checks` says why"}})
 async def readyz(request: Request) -> Response:
-    """The database can be read and written, its disk and the machine have room, and the workers work.
-
-    `oldest_call`: the call of a worker that has run longest.
+    """Whether the service can work: database, disk, memory and workers. `oldest_call`: the worker call that has run
+    longest.
     """
     context = context_of(request)
     faults, oldest = await context.readiness.faults(), context.workers.oldest()

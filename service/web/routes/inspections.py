@@ -62,7 +62,7 @@ EXAMPLE = {
     ),
 )
 async def post_inspection(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
-    """Post what was found on the friction surface after so many cycles: roughness R_a, skewness R_sk, a note."""
+    """Post an inspection of the friction surface: roughness R_a, skewness R_sk, a note."""
     sent = checked(InspectionIn, await answers.json_body(request))
     store = partial(inspect_clutch.inspect, context.database, clutch_id, sent)
     inspection, new = await run_in_threadpool(store, by=name_of_caller(request), at=answers.now())
@@ -96,7 +96,7 @@ async def withdraw_inspection(of: answers.ChangeOf, inspection_id: InspectionId)
     "/{inspection_id}/restore", **answers.taking(Withdrawal, InspectionOut, {"reason": "it was this disc after all"})
 )
 async def restore_inspection(of: answers.ChangeOf, inspection_id: InspectionId) -> Response:
-    """Take a withdrawal back."""
+    """Undo a withdrawal."""
     return await _changed(inspect_clutch.restore, of, inspection_id)
 
 

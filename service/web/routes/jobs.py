@@ -25,7 +25,7 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 Prefer = Annotated[
     str | None,
-    Header(max_length=200, description="`wait=SECONDS`: how long to wait for the job's end; left out, not at all"),
+    Header(max_length=200, description="`wait=SECONDS`: how long to wait for the job's end; default: not at all"),
 ]
 
 
@@ -41,7 +41,7 @@ Prefer = Annotated[
     ),
 )
 async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -> Response:
-    """Ask for a replay or a fleet refresh. Where the same waits or runs already it is that one which is answered."""
+    """Start a replay or a fleet refresh. If the same job already waits or runs, the answer is that job."""
     wanted = checked(JobIn, await json_body(request))
     require_clutch(request, wanted.clutch_id)
     ask = partial(
@@ -67,7 +67,7 @@ async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -
 async def list_jobs(
     request: Request, context: OwnReader, state: OfState = None, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
-    """Jobs of the clutches that the key is for, newest first."""
+    """Jobs of the key's clutches, newest first."""
     after, own = from_cursor(cursor), own_clutches(request)
     listed = partial(jobs.page, context.database, limit=limit, after=after, state=state, only=own)
     return await answer(request, lambda: page(*listed()))
@@ -75,14 +75,14 @@ async def list_jobs(
 
 @router.get("/{job_id}", response_model=JobOut, responses=READING)
 async def read_job(request: Request, context: OwnReader, job_id: JobId) -> Response:
-    """One job, how far it has come and how it ended."""
+    """One job, with its progress and result."""
     own = own_clutches(request)
     return await answer(request, lambda: jobs.shown(jobs.find(context.database, job_id, only=own)))
 
 
 @router.delete("/{job_id}", response_model=JobOut, responses=READING)
 async def delete_job(request: Request, context: OwnAdmin, job_id: JobId) -> Response:
-    """Cancel a job: one that waits is not begun, one that runs is ended in seconds. One that has ended stays as it is."""
+    """Cancel a job. A waiting job does not start, a running job ends within seconds, an ended job stays unchanged."""
     row = await run_in_threadpool(jobs.find, context.database, job_id, only=own_clutches(request))
     cancel = partial(ask_job.cancel, context.database, row, by=name_of_caller(request), at=now())
     return json_answer(jobs.shown(await run_in_threadpool(cancel)))

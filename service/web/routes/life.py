@@ -42,9 +42,8 @@ async def remaining_useful_life(
     life: LifeNumber = None,
     prefer: Prefer = None,
 ) -> Response:
-    """The duty cycles that remain until the first of the clutch's criteria is reached, with their uncertainty.
-
-    That is mean COF, which has fallen to a fraction, unless the clutch's record names others.
+    """The remaining duty cycles until the first of the clutch's criteria is reached, with their uncertainty. The
+    default criterion is a fraction of mean COF.
     """
     own = await answers.clutch_bytes(of, "criteria", lambda: criteria_of(of.database, of.clutch_id))
     if own != NO_CRITERIA or (quantity, criterion, life) != (None, None, None):
@@ -74,7 +73,7 @@ async def remaining_useful_life(
     ),
 )
 async def planned_remaining_life(of: answers.Of, method: Method = "particle") -> Response:
-    """The same under planned duty: blocks that are run one after the other, over and over. Nothing is stored."""
+    """Remaining life under planned duty: blocks that are repeated until the end of life. Nothing is stored."""
     planned = checked(ProgrammeIn, await answers.json_body(of.request))
     answer = of.context.workers.submit(Lane.SIMULATIONS, planned_life, of.clutch_id, method, planned)
     return answers.json_answer(await asyncio.wrap_future(answer))
@@ -91,9 +90,8 @@ async def degradation(
     until: Until = None,
     prefer: Prefer = None,
 ) -> Response:
-    """Tracks along a life by any filter: coefficients of eq. 6, measurements, trajectory with its 90 % band.
-
-    Of one quantity wherever it was measured, or of mean COF and every Stribeck parameter.
+    """Tracks of a life by any filter: coefficients of eq. 6, measurements, trajectory with its 90 % band. For one
+    quantity, or for mean COF and every Stribeck parameter.
     """
     arguments = degradation_arguments(method, quantity, at_cycles, life, draws, until)
     return await answers.computed_answer(of, degradation_of, *arguments, prefer=prefer)
@@ -110,20 +108,21 @@ async def stribeck(of: answers.PageOf, prefer: Prefer = None) -> Response:
 async def engagement(
     of: answers.Of, at_cycles: AtCycles = None, run_id: EngagementRun = None, prefer: Prefer = None
 ) -> Response:
-    """A simulated engagement of the tracked clutch (fig. 3's pressure against the motor's 20 Nm), the indicators of measured
-    ones, and one of these beside what the tracked model gives for its pressure and drive."""
+    """A simulated engagement of the tracked clutch (pressure of fig. 3, motor of 20 Nm), the indicators of measured
+    engagements, and one of these beside the tracked model.
+    """
     return await answers.computed_answer(of, engaged, at_cycles, run_id, prefer=prefer, lane=Lane.SIMULATIONS)
 
 
 @router.get("/surfaces", response_model=Surfaces, responses=READING)
 async def surfaces(of: answers.Of, prefer: Prefer = None) -> Response:
-    """The tracked Stribeck parameters over pressure and cycles (figs. 10, 11), and torque over speed besides."""
+    """The tracked Stribeck parameters over pressure and cycles (figs. 10, 11), and torque over speed."""
     return await answers.computed_answer(of, surface, prefer=prefer)
 
 
 @router.get("/scores", response_model=Scores, responses=READING)
 async def clutch_scores(of: answers.WholeOf, method: Method = "particle", prefer: Prefer = None) -> Response:
-    """How right the predictions were of those of its lives that came to their end."""
+    """Scores of the predictions of its ended lives."""
     return await answers.computed_answer(of, scores.of_clutch, method, prefer=prefer)
 
 

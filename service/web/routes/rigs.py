@@ -66,7 +66,7 @@ async def list_rigs(
 
 @router.get("/{name}", response_model=RigOut, responses=READING)
 async def read_rig(request: Request, context: OwnReader, name: RigName) -> Response:
-    """A rig profile in force."""
+    """A saved rig profile."""
     return await answer(request, lambda: rigs.look_up(context.database, name))
 
 
@@ -78,7 +78,7 @@ async def post_rig(request: Request, context: Ingester) -> Response:
 
 @router.put("/{name}", **taking(RigIn, RigOut, EXAMPLE, CHANGING, {201: "The profile is new"}))
 async def put_rig(request: Request, context: Admin, name: RigName) -> Response:
-    """Replace a rig profile. Runs that were read by the former one stay as they are until they are read again."""
+    """Replace a rig profile. Runs that were read with the former profile stay unchanged until they are read again."""
     return await _saved(request, context, name)
 
 
@@ -108,9 +108,10 @@ async def preview_file(
     decimal: FileDecimal = "",
     missing: FileMissing = "",
 ) -> Response:
-    """What would be made of a file: its first rows, each column's channel and unit, what would be cut and fitted. Nothing is
-    stored. Without `rig`, and without a `profile` beside the file in a form, the profile that has the file's columns is
-    taken, else the columns' titles."""
+    """A preview of a file: its first rows, the channel and unit of each column, what would be cut and fitted. Nothing
+    is stored. Without `rig` or a `profile` in the form, the saved profile that has the file's columns is used, else
+    the titles of the columns.
+    """
     if clutch_id is not None:
         require_clutch(request, clutch_id)
     with tempfile.TemporaryDirectory(dir=context.folder) as folder:

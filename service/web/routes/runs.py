@@ -55,7 +55,7 @@ EXAMPLE = {
     **answers.taking(RUN_IN.json_schema(), Receipt, EXAMPLE, SENDING, {200: "The same run again: the same receipt"}),
 )
 async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
-    """Post a run, in any order of cycles. The receipt says what was made of it; by then it is stored for good."""
+    """Post a run, in any order of cycles. The receipt has the results. When you get it, the run is stored for good."""
     answers.require_json(request)
     by = name_of_caller(request)
     async with kept_body(request, context.folder) as body:
@@ -90,7 +90,7 @@ async def list_runs(of: answers.PageOf, state: State = None, kind: RunKind = Non
 async def read_run_with_channels(
     request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId, points: Points = None
 ) -> Response:
-    """One receipt with the run's channels: as they were sent or thinned for a plot, as Parquet where `Accept` prefers it."""
+    """One receipt with the run's channels: as sent, or thinned for a plot, or as Parquet if `Accept` prefers it."""
     media_type = preferred(request, (answers.JSON_TYPE, PARQUET_TYPE))
     kind: Kind = "parquet" if media_type == PARQUET_TYPE else "json"
     packed = kind == "json" and points is not None and "gzip" in request.headers.get("accept-encoding", "")
@@ -111,8 +111,9 @@ async def read_run_with_channels(
 
 @router.patch("/{run_id}", **answers.taking(Correction, Receipt, {"cycles": 7000, "reason": "typed a zero too many"}))
 async def correct_run(of: answers.ChangeOf, run_id: RunId) -> Response:
-    """Correct a run's cycles, or read its file again by a rig's profile; it counts where it is plausible so. What was sent
-    stays stored."""
+    """Correct a run's cycles, or read its file again with a rig profile. If it is plausible then, it counts. What was
+    sent stays stored.
+    """
     wanted = checked(Correction, await answers.json_body(of.request))
     if wanted.rig is not None:
         again = partial(change_run.read_again, rig=wanted.rig, folder=of.context.folder)
@@ -122,14 +123,14 @@ async def correct_run(of: answers.ChangeOf, run_id: RunId) -> Response:
 
 @router.post("/{run_id}/withdraw", **answers.taking(Withdrawal, Receipt, {"reason": "the torque sensor was unplugged"}))
 async def withdraw_run(of: answers.ChangeOf, run_id: RunId) -> Response:
-    """Take a run out of the clutch's history. It stays stored and listed."""
+    """Withdraw a run: it no longer counts, but stays stored and listed."""
     reason = checked(Withdrawal, await answers.json_body(of.request)).reason
     return await _changed(change_run.withdraw, of, run_id, reason)
 
 
 @router.post("/{run_id}/restore", **answers.taking(Withdrawal, Receipt, {"reason": "it was the other sensor"}))
 async def restore_run(of: answers.ChangeOf, run_id: RunId) -> Response:
-    """Take a withdrawal back: the run is accepted or held as it was before."""
+    """Undo a withdrawal: the run is accepted or held again, as before."""
     reason = checked(Withdrawal, await answers.json_body(of.request)).reason
     return await _changed(change_run.restore, of, run_id, reason)
 
@@ -141,8 +142,9 @@ async def restore_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     ),
 )
 async def confirm_runs(of: answers.ChangeOf) -> Response:
-    """Accept several held runs as they were sent, in one step: all of them, or none where one is not there. Those that are
-    not held stay as they are."""
+    """Accept several held runs as they were sent, in one step. If one does not exist, none is accepted. Runs that are
+    not held stay unchanged.
+    """
     wanted = checked(Confirmations, await answers.json_body(of.request))
     return await _changed(_confirmed, of, wanted.run_ids, wanted.reason)
 

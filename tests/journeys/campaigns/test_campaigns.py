@@ -22,8 +22,8 @@ def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(serve
         folder = tmp_path / form
         assert "3 simulated runs" in clutchlife("simulate", "--film", "--out", folder, "--format", form, "--tests", "1")
         push = ("push", folder, "--clutch", form, "--url", server.url, "--spool", tmp_path / "spool")
-        assert "4 stored, 0 known already, 0 refused" in clutchlife(*push)
-        assert "0 stored, 4 known already, 0 refused" in clutchlife(*push)
+        assert "4 stored now, 0 stored before, 0 refused" in clutchlife(*push)
+        assert "0 stored now, 4 stored before, 0 refused" in clutchlife(*push)
         (inspection,) = ONCE.get(f"{server.url}/v1/clutches/{form}/inspections").json()["items"]
         assert (inspection["cycles"], inspection["roughness_um"], inspection["skewness"]) == (0, 9.52, -0.87)
         items = ONCE.get(f"{server.url}/v1/clutches/{form}/runs").json()["items"]
@@ -43,7 +43,7 @@ def test_a_record_that_no_manifest_lists_is_named(server: Server, tmp_path: Path
     (folder / "lonely.csv").write_text("torque_nm\n1\n", encoding="utf-8")
     push = ("push", folder, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
     output = clutchlife(*push)
-    assert "not sent, for their kind and cycles are not known: " in output
+    assert "not sent, because kind and cycles are not known: " in output
     assert "lonely.csv" in output
     assert "3 stored" in output
 

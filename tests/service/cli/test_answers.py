@@ -90,11 +90,11 @@ def test_what_cannot_be_answered_is_refused_in_a_line(terminal: Terminal) -> Non
         (("life", "c1", "--query", "quantitty=slope"), 65, "quantitty is no argument here"),
         (("life", "c1", "--query", "slope"), 64, "--query takes NAME=VALUE"),
         (("life", "c1", "--json", "--csv"), 64, "use --json or --csv"),
-        (("life", "c1", "--pace", "120"), 64, "--pace goes with"),
+        (("life", "c1", "--pace", "120"), 64, "use --pace only with"),
         (("life", "c1", "--block", "5000"), 64, "--block takes CYCLES:KJ[:SD]"),
-        (("life", "c1", "--block", "5000:20:30"), 65, "sd is larger than energy_per_cycle_kj"),
+        (("life", "c1", "--block", "5000:20:30"), 65, "sd must not be larger than energy_per_cycle_kj"),
         (("life", "c1", "--plan", "nowhere.json"), 64, "nowhere.json"),
-        (("life", "c1", "--block", "5000:20", "--csv"), 64, "not as --csv"),
+        (("life", "c1", "--block", "5000:20", "--csv"), 64, "--csv is not available for planned duty"),
         (("engagement", "c1", "--query", "points=5"), 65, "points is no argument here"),
     ]
     for arguments, code, words in refused:

@@ -109,7 +109,7 @@ def test_replay_goes_on_after_a_clutch_that_it_refuses_and_names_it_at_the_end(p
     assert "a: not replayed: channel" in output
     assert "b: 1 runs" in output
     assert "c: 1 runs" in output
-    assert output.strip().endswith("1 clutches keep the results that they had: a")
+    assert output.strip().endswith("1 clutches keep their previous results: a")
     assert "c: " not in clutchlife("verify", *url, code=1)
 
 

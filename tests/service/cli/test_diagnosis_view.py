@@ -37,14 +37,14 @@ def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
     for words in (
         "The model is adequate",
         "A stand-in looked at 0 tests.",
-        "torque_zero_shift",
+        "torque zero shift",
         "1.5 ± - Nm zero shift",
-        "0.3 Nm before, 0.25 Nm after, 16.7 ± 2 % less",
+        "0.3 Nm before, 0.25 Nm after (16.7 ± 2 % less)",
         "Remaining life, baseline: 12,346 cycles (90 %: 4,000 to over 1,000,000)",
         "Remaining life, extended: the end of life is reached",
         "The extended model is adopted",
         "What to test next: read the unloaded zero (distinguishes torque zero shift from no effect at all;",
-        "torque_zero_shift            0.2 Nm            0.1 Nm",
+        "torque zero shift               0.2 Nm                0.1 Nm",
         "Note: left out",
         "The baseline's error depends on: oil temperature",
     ):
@@ -82,10 +82,10 @@ def test_what_could_be_told_apart_is_shown_where_it_was_asked_for(report: dict[s
         "with_test": 0.98,
     }
     pairs = [pair | {"key": "open_sweep", "test": "stationary test with the clutch open"}, sure | {"key": None}]
-    assert "told apart" not in printed(report)
+    assert "better by this test" not in printed(report)
     text = printed(report | {"isolability": {"pairs": pairs, "unseen": ["channel_delay"]}})
     row = next(line for line in text.splitlines() if "hydrodynamic drag and torque zero shift" in line)
     assert row.split()[-7:-1] == ["test", "with", "the", "clutch", "open", "98"]
     assert "oil change and running in" not in text
-    assert "Of 2 pairs of causes these tests would tell 1 apart." in text
+    assert "These tests would distinguish 1 of 2 pairs of causes." in text
     assert "These tests cannot show: channel delay." in text

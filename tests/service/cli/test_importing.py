@@ -68,7 +68,7 @@ def test_what_is_missing_ends_it_where_nothing_may_be_asked(
     file = tmp_path / "Stat_7000.csv"
     file.write_bytes(german(7000))
     shown = terminal("import", file, "--clutch", "c1", "--yes", "--cycles", "7000", code=EX_DATAERR)
-    assert "still to be given: torque_nm, kind" in shown
+    assert "still missing: torque_nm, kind" in shown
     assert client.get("/v1/clutches/c1/runs").json()["items"] == []
 
 

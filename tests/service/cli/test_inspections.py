@@ -63,8 +63,8 @@ def test_what_is_no_photograph_is_said_before_anything_is_sent(
 ) -> None:
     (tmp_path / "a.gif").write_bytes(b"GIF89a")
     inspect = ("inspect", "c1", "--cycles", 0, "--ra", 9.5, "--photo")
-    assert "a photograph ends in .png" in terminal(*inspect, tmp_path / "a.gif", code=64)
-    assert "is not there" in terminal(*inspect, tmp_path / "b.png", code=64)
+    assert "the name of a photograph must end in .png" in terminal(*inspect, tmp_path / "a.gif", code=64)
+    assert "does not exist" in terminal(*inspect, tmp_path / "b.png", code=64)
     assert "give roughness_um" in terminal("inspect", "c1", "--cycles", 0, code=65)
     assert client.get(LIST).json()["items"] == []
 

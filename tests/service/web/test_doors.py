@@ -106,7 +106,7 @@ def test_bodies_for_which_there_is_no_room_are_refused_with_503_and_room_comes_b
     for _ in range(5):
         refused = small.post("/v1/clutches", content=b"{}".ljust(150_000), headers=sent)
         assert (refused.status_code, refused.headers["Retry-After"]) == (503, "1")
-        assert "all room" in refused.json()["detail"]
+        assert "all available room" in refused.json()["detail"]
     for number in range(5):
         body = to_text({"clutch_id": f"d{number}"}).encode().ljust(90_000)
         assert small.post("/v1/clutches", content=body, headers=sent).status_code == 201

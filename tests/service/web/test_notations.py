@@ -166,7 +166,7 @@ def test_what_is_not_packed_as_it_says_is_refused(client: TestClient) -> None:
         (json.dumps(stationary(0)).encode(), "is not"),
         (packed[:-20], "cut off"),
         (b"", "cut off"),
-        (packed + packed, "goes on after the end"),
+        (packed + packed, "more bytes after the end"),
     ):
         status, answer = post(client, body)
         assert (status, answer["type"]) == (422, "urn:clutchlife:problem:invalid-content")

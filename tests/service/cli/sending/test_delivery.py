@@ -61,7 +61,7 @@ def test_a_run_that_the_service_refuses_is_set_aside_with_the_reason(sender: Sen
     sender.service.instead = of_run(b'"bad"', lambda: problem(*slug))
     sender.push(body(1, "bad"), "1.json")
     sender.push(body(2, "good"), "2.json")
-    assert str(sender.send()) == "1 stored, 0 known already, 1 refused"
+    assert str(sender.send()) == "1 stored now, 0 stored before, 1 refused"
     assert sender.counts == (1, 0, 1)
     assert sender.spool.refused()[0].problem["detail"] == "because"
     assert "because" in sender.lines[0]
@@ -151,7 +151,7 @@ def test_an_inspection_waits_while_the_service_is_away_and_is_sent_to_its_own_ad
         sender.send()
     assert sender.counts == (0, 1, 0)
     sender.service.instead = lambda request: asked.append(request.url.path)
-    assert str(sender.send()) == "1 stored, 0 known already, 0 refused"
+    assert str(sender.send()) == "1 stored now, 0 stored before, 0 refused"
     assert (sender.counts, asked) == ((1, 0, 0), ["/v1/clutches/c1/inspections"])
     (name,) = sender.service.stored
     sender.service.states[name] = {"state": "withdrawn"}

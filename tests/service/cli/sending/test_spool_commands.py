@@ -99,10 +99,10 @@ def test_a_run_that_was_corrected_while_the_service_was_away_is_delivered_correc
     terminal.service.instead = away
     assert "1 runs wait" in terminal.push(body(70000), code=75)
     output = terminal.push(body(7000), code=75)
-    assert "is replaced and not sent, see " in output
+    assert "and is kept in " in output
     assert "may be stored" not in output
     terminal.service.instead = present
-    assert "1 stored, 0 known already, 0 refused" in terminal("spool", "send", "--url", URL)
+    assert "1 stored now, 0 stored before, 0 refused" in terminal("spool", "send", "--url", URL)
     assert list(terminal.service.stored.values()) == [body(7000)]
 
 
@@ -110,7 +110,7 @@ def test_a_replaced_version_that_may_be_stored_is_named(terminal: Terminal) -> N
     terminal.service.instead = lambda request: None if request.method == "GET" else httpx2.Response(504)
     terminal.push(body(70000), code=75)
     terminal.service.instead = present
-    assert "it may be stored: withdraw it" in terminal.push(body(7000))
+    assert "it may be stored: if it is, withdraw it" in terminal.push(body(7000))
 
 
 def test_push_names_other_runs_that_wait_in_one_line(terminal: Terminal) -> None:
@@ -133,9 +133,9 @@ def test_the_spool_is_emptied_after_a_question(terminal: Terminal) -> None:
     terminal.push(body(2), "2.json", code=75, clutch="c2")
     for answer in ("n\n", ""):
         output = terminal("spool", "empty", answer=answer, code=1)
-        assert "Delete these 3 for good? 2 of them wait and were never stored." in output
+        assert "Delete these 3 for good? 2 of them were never stored by the service." in output
         assert len(terminal.listed()) == 3
-    assert "1 deleted, 0 of them never stored" in terminal("spool", "empty", "--refused", answer="y\n")
+    assert "1 deleted; the service never stored 0 of them" in terminal("spool", "empty", "--refused", answer="y\n")
     assert [item["state"] for item in terminal.listed()] == ["waiting", "waiting"]
     output = terminal("spool", "empty", "--clutch", "c2", "--yes")
     assert "2.json" in output
@@ -163,7 +163,7 @@ def test_only_runs_for_the_address_are_sent_there(terminal: Terminal) -> None:
     output = terminal("spool", "send", "--url", URL + "/", "--clutch", "c2")
     assert (list(terminal.service.stored.values()), "1 stored" in output) == ([body(2)], True)
     output = terminal("spool", "send", "--url", URL)
-    assert "are not sent: they are of c1 at http://other.test" in output
+    assert "are not sent: they belong to c1 at http://other.test" in output
     assert sorted(terminal.service.stored.values()) == [body(1), body(2)]
     assert "http://other.test" not in terminal.asked
     assert "nothing waits for" in terminal("spool", "send", "--url", URL)
@@ -173,7 +173,7 @@ def test_refusals_end_the_command_as_data_errors_and_absence_as_a_failure_for_no
     terminal.service.instead = lambda _request: problem(401, "unauthorized", "a key [is] needed")
     assert "a key [is] needed; 1 runs wait in" in terminal.push(body(1), code=65)
     terminal.service.instead = lambda request: None if request.method == "GET" else httpx2.Response(500)
-    assert "1 runs were not taken and stay" in terminal.push(body(1), code=75)
+    assert "the service did not take 1 runs" in terminal.push(body(1), code=75)
     terminal.service.instead = lambda _request: httpx2.Response(200, html="<p>log in</p>")
     assert "a login page or a proxy?" in terminal.push(body(1), code=75)
     assert len(terminal.listed()) == 1
@@ -225,7 +225,7 @@ def test_a_push_that_is_killed_while_the_service_answers_is_known_to_have_been_s
             (entry,) = spool.waiting()
             assert (entry.tries, entry.perhaps_stored) == (1, True)
             done = CliRunner().invoke(app, arguments)
-            assert "0 stored, 1 known already, 0 refused" in done.output
+            assert "0 stored now, 1 stored before, 0 refused" in done.output
             assert spool.waiting() == []
         finally:
             server.shutdown()
@@ -267,9 +267,7 @@ def test_a_rigs_files_are_sent_with_its_name_and_what_else_is_given(terminal: Te
 
 def test_without_a_rig_a_record_needs_its_kind_and_cycles(terminal: Terminal) -> None:
     record = written(terminal.folder / "a.csv", b"1,2")
-    assert "Push a file with --kind and --cycles, or with --rig" in terminal(
-        "push", record, "--clutch", "c1", "--url", URL, code=64
-    )
+    assert "Use --kind and --cycles, or --rig" in terminal("push", record, "--clutch", "c1", "--url", URL, code=64)
 
 
 def test_a_file_whose_reader_cannot_start_waits_in_the_spool(terminal: Terminal) -> None:

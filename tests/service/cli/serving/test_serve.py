@@ -49,7 +49,7 @@ def test_every_line_of_a_service_is_json_from_its_start_to_its_stop(tmp_path: Pa
     assert [answer.headers["X-Request-ID"] for answer in answers.values()] == ["rig-7"] * 3
     assert not any(line.get("route") == "/readyz" for line in lines), "probes are not logged"
     assert "forged" not in said
-    assert any("no keys are configured" in line["message"] for line in lines)
+    assert any("no key exists" in line["message"] for line in lines)
 
 
 @pytest.mark.slow
@@ -63,7 +63,7 @@ def test_the_level_is_that_of_the_option_or_else_of_the_environment_and_a_start_
     misspelt, open_to_all = said.splitlines()
     assert " WARNING clutchlife.start: CLUTCHLIFE_MAX_BODY is no setting" in misspelt
     assert misspelt.endswith("is CLUTCHLIFE_MAX_BODY_MB meant?")
-    assert " WARNING clutchlife.start: no keys are configured" in open_to_all
+    assert " WARNING clutchlife.start: no key exists" in open_to_all
 
 
 @pytest.mark.slow

@@ -83,7 +83,7 @@ def test_a_refusal_carries_the_problem(client: Client) -> None:
         client.post_run("e", stationary(-1.0))
     assert refused.value.status == 422
     assert refused.value.problem["errors"][0]["pointer"] == "/cycles"
-    with pytest.raises(ClutchlifeError, match="no clutch is known as 'nobody'") as unknown:
+    with pytest.raises(ClutchlifeError, match="there is no clutch 'nobody'") as unknown:
         client.remaining_useful_life("nobody")
     assert unknown.value.problem["type"] == "urn:clutchlife:problem:not-found"
 
