@@ -66,13 +66,14 @@ class Block:
     def work(self, basis: SeverityBasis) -> float | None:
         """The energy [J] or the slid angle [rad] of one cycle; None where the block does not state it.
 
-        The speed falls evenly to rest, so the angle is ω t/2, with t = ω/DECELERATION where it is not stated.
+        The speed falls evenly to rest, so the angle is ω t/2, with t = ω/(200 rad/s²) where it is not stated.
         """
         if basis is SeverityBasis.DISSIPATED_ENERGY:
             return self.energy
         if self.speed is None:
             return None
-        return 0.5 * self.speed * (self.speed / criteria.DECELERATION if self.duration is None else self.duration)
+        # where a block does not say how long: 200 rad/s², 2,000 rpm in about one second
+        return 0.5 * self.speed * (self.speed / 200.0 if self.duration is None else self.duration)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,7 +147,8 @@ def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
 
 def counted(work: Number, reference: float, exponent: float) -> FloatArray:
     """How often a cycle of so much work >= 0 counts beside one of the reference's > 0, any shape."""
-    return np.clip((np.asarray(work, dtype=np.float64) / reference) ** exponent, criteria.MILDEST, criteria.HARSHEST)
+    # a mistyped energy must not end or stop a life
+    return np.clip((np.asarray(work, dtype=np.float64) / reference) ** exponent, 1e-3, 1e3)
 
 
 def _pieces(ordered: Sequence[Block], works: Sequence[float | None]) -> list[tuple[float, float | None]]:
@@ -166,7 +168,7 @@ def _pieces(ordered: Sequence[Block], works: Sequence[float | None]) -> list[tup
 def _recent(lengths: FloatArray, rates: FloatArray) -> float:
     """The mean rate over the cycles that count as recent."""
     total = float(lengths.sum())
-    window = min(total, max(criteria.RECENT_SHARE * total, criteria.RECENT_CYCLES))
+    window = min(total, max(0.1 * total, 1_000.0))  # the last tenth of the cycles, a thousand at least
     ends = np.cumsum(lengths)
     kept = np.clip(ends - (total - window), 0.0, lengths)
     return float(kept @ rates / kept.sum())

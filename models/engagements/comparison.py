@@ -22,7 +22,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.engagements.criteria import MOMENTS, SAME_DUTY
 from models.engagements.local_fit import Estimate
 
 #: Points of a kept course of speed. Chosen: a course that is kept is some 600 bytes.
@@ -76,7 +75,7 @@ def reference_of(courses: Sequence[SpeedCourse]) -> Reference:
         value=sum(course.duration.value for course in courses) / count,
         sd=math.hypot(*(course.duration.sd for course in courses)) / count,
     )
-    time = np.linspace(0.0, mean.value, MOMENTS)
+    time = np.linspace(0.0, mean.value, 50)
     return Reference(
         duration=mean,
         speed=np.mean([course.at(time) for course in courses], axis=0),
@@ -102,7 +101,7 @@ def compared(course: SpeedCourse, reference: Reference) -> Comparison:
 
 def same_duty(value: float, reference: float) -> bool:
     """Whether an initial speed or a highest pressure is that of the reference, nearly."""
-    return abs(value - reference) <= SAME_DUTY * abs(reference)
+    return abs(value - reference) <= 0.1 * abs(reference)  # beyond it an engagement is of another duty
 
 
 def bin_means(time: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.engagements.capacity import Capacity
 from models.engagements.comparison import bin_means
-from models.engagements.criteria import ENDPOINT, INITIAL, LEAD, LONGEST_SLIP, TORQUES, TRACE_SAMPLES
+from models.engagements.criteria import ENDPOINT, INITIAL, TORQUES
 from models.engagements.local_fit import Estimate
 from models.engagements.measured import MeasuredEngagement
 from models.engagements.refusal import Refusal
@@ -62,15 +62,16 @@ def discrepancy(engagement: MeasuredEngagement, capacity: Capacity, mean_radius:
     if drive is None:
         return None
     duration = slip.end.value - slip.contact
-    origin = slip.contact - LEAD * duration
+    # it begins a tenth of the slip before contact, and may last four times the measured one
+    origin = slip.contact - 0.1 * duration
     profile = _profile_of(slip, engagement.maximum_pressure, origin, duration)
-    rate = TRACE_SAMPLES / duration
+    rate = 400 / duration
     trace = engage(
         capacity,
         mean_radius,
         profile=profile,
         drive=drive,
-        longest=profile.contact + LONGEST_SLIP * duration,
+        longest=profile.contact + 4.0 * duration,
         rate=rate,
     )
     simulated = slip_of(Record(time=trace.time, pressure=profile(trace.time), speed=trace.speed, torque=trace.torque))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.engagements.criteria import CURVED, FEWEST_LOCAL, WIDEST
+from models.engagements.criteria import FEWEST_LOCAL
 
 #: Windows into which a channel is cut to see how its noise is autocorrelated.
 _WINDOWS = 8
@@ -62,7 +62,7 @@ class Channel:
         if distance.size < FEWEST_LOCAL:
             return None
         width = max(width, float(np.partition(distance, FEWEST_LOCAL - 1)[FEWEST_LOCAL - 1]))
-        if width > max(half_width, WIDEST * (self.high - self.low)):
+        if width > max(half_width, 0.25 * (self.high - self.low)):
             return None
         rows = distance <= width * (1 + 1e-9)
         return _fitted((self.time[rows] - moment) / width, self.values[rows], self.inflation)
@@ -86,7 +86,7 @@ def _fitted(moment: FloatArray, values: FloatArray, inflation: float) -> Estimat
     """The value at 0 by a parabola through the samples at `moment` [n], or by a line where that serves."""
     design = np.stack([np.ones_like(moment), moment, moment**2], axis=1)
     estimate, curvature = _least_squares(design, values, inflation)
-    if abs(curvature.value) > CURVED * curvature.sd:
+    if abs(curvature.value) > 2.0 * curvature.sd:
         return estimate
     return _least_squares(design[:, :2], values, inflation)[0]
 

@@ -9,19 +9,11 @@ Z90 = 1.6448536269514722
 
 #: A fit with an error of eq. 5 below this is acceptable [%]. Chosen: the reference calls its fits of some percent good.
 ACCEPTABLE_MSE = 5.0
-#: M_s is not taken below this share of the torque: M̄_c = b/M_s must exist where the optimum has M_s = 0. Chosen; no table:
-#: the curve is right to that share.
-LEAST_STATIC = 1e-6
 
 # The uncertainty of a fit (`fit_uncertainty`)
 
 #: Noise where it cannot be estimated, as a share of the root mean square torque. Chosen; no table.
 ASSUMED_NOISE = 0.05
-#: The least noise that is assumed, as a share of the root mean square torque. Chosen; no table.
-LEAST_NOISE = 1e-6
-#: Prior deviations: of each term of the torque in root mean square torques, and of log V_S. Chosen: so weak that they matter
-#: only to what the data do not determine.
-PRIOR_TERM, PRIOR_LOG_VELOCITY = 3.0, 5.0
 #: A parameter with a standard error above this share of its scale is undetermined. Chosen; no table.
 UNDETERMINED_SHARE = 0.5
 #: V_S is undetermined where values this far from the optimum in log V_S are as likely as the 90 % interval allows. Chosen: a

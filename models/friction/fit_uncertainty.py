@@ -69,7 +69,7 @@ def estimate_noise(residual: FloatArray, freedom: FloatArray, given_sd: FloatArr
     estimated = (estimable & ~given) | inflated
     sd = np.where(estimated, np.sqrt(residual / spare), np.where(given, given_sd, criteria.ASSUMED_NOISE * level))
     return Noise(
-        sd=np.maximum(sd, criteria.LEAST_NOISE * level),
+        sd=np.maximum(sd, 1e-6 * level),  # some noise there is
         widening=np.where(estimated, stdtrit(spare, 0.95) / criteria.Z90, 1.0),
         inflated=inflated,
         assumed=~estimated & ~given,
@@ -92,8 +92,9 @@ def uncertainty(problem: Problem, optimum: Profile, scan: Profile, noise: Noise,
     columns = jacobian(problem, optimum)
     points = (problem.weight**2).sum(axis=1)
     size = np.sqrt((columns**2).sum(axis=1) / points[:, None])
-    prior = criteria.PRIOR_TERM * level[:, None] / np.where(size > 0, size, 1.0)
-    prior[:, 3] = criteria.PRIOR_LOG_VELOCITY
+    # so weak that they matter only to what the data do not determine
+    prior = 3.0 * level[:, None] / np.where(size > 0, size, 1.0)
+    prior[:, 3] = 5.0
     stray = _stray(optimum, scan, noise)
     transform = _transform(problem, optimum)
     covariance, unbiased = (

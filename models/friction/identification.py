@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.friction.criteria import ACCEPTABLE_MSE, ASSUMED_NOISE, LEAST_STATIC
+from models.friction.criteria import ACCEPTABLE_MSE, ASSUMED_NOISE
 from models.friction.fit_uncertainty import Noise, Uncertainty, estimate_noise, uncertainty
 from models.friction.stribeck import GAMMA, PARAMETER_NAMES, STANDSTILL, StribeckParameters, gradient, torque
 from models.friction.variable_projection import Problem, Profile, make_problem, minimise
@@ -194,7 +194,7 @@ def _constant(problem: Problem, optimum: Profile, single: NDArray[np.bool_]) -> 
 def _at_bound(optimum: Profile, level: FloatArray) -> tuple[Profile, NDArray[np.bool_]]:
     """The optimum with M_s lifted off zero, and which of M_s, M̄_c, C_v are zero [P, 3]."""
     coefficients = optimum.coefficients[:, 0]
-    least = LEAST_STATIC * level
+    least = 1e-6 * level  # M̄_c = b/M_s must exist where the optimum has M_s = 0
     bound = coefficients <= np.stack([least, 0 * least, 0 * least], axis=1)
     lifted = np.hstack([np.maximum(coefficients[:, :1], least[:, None]), coefficients[:, 1:]])
     return replace(optimum, coefficients=lifted[:, None]), bound

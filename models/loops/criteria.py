@@ -2,8 +2,6 @@
 
 # The loop and its area (`loop_area`)
 
-#: Harmonics of the torque, where there are samples for them. Chosen; no table.
-TORQUE_HARMONICS = 16
 #: Fewer samples give no loop. Chosen; no table.
 FEWEST_SAMPLES = 32
 #: A speed whose lowest is below this share of its swing comes near zero. Chosen; no table.
@@ -15,8 +13,6 @@ NOT_WHITE = 2.5
 
 #: The gain's prior deviation [-]. Chosen: what a torque sensor's gain differs by from day to day.
 GAIN_SD = 0.05
-#: Speeds below this share of the highest are sticking or next to it, and no stationary test reaches them. Chosen; no table.
-LEAST_SPEED = 0.01
 #: Fewer sliding samples give no lag. Chosen; no table.
 FEWEST_SLIDING = 20
 #: A lag is against the law where it is this many deviations below none. Chosen; no table.
@@ -24,9 +20,5 @@ AGAINST = 3.0
 
 # A dynamic test (`loops`)
 
-#: A speed whose lowest is below minus this share of its swing reverses. Chosen; no table.
-REVERSES = 0.02
 #: One law is said to describe a loop better where the log likelihoods differ by this much. Chosen; no table.
 TELLING = 5.0
-#: Torque lags no stationary curve that is below this share of the measured torque. Chosen; no table.
-LEAST_CURVE = 0.01

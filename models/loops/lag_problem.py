@@ -13,7 +13,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.friction.stribeck import StribeckParameters, torque
-from models.loops.criteria import FEWEST_SLIDING, GAIN_SD, LEAST_SPEED, NOT_WHITE
+from models.loops.criteria import FEWEST_SLIDING, GAIN_SD, NOT_WHITE
 from models.records.periods import Cycle
 
 _SHAPES = 6
@@ -124,7 +124,7 @@ def _spread(phase: FloatArray) -> FloatArray:
 def make_lag_problem(cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters) -> LagProblem:
     speed = cycle.value(phase)
     highest = float(speed.max())
-    rows = speed > LEAST_SPEED * highest
+    rows = speed > 0.01 * highest  # slower it sticks or is next to it, and no stationary test goes there
     if rows.sum() < FEWEST_SLIDING:
         raise ValueError(f"at least {FEWEST_SLIDING} samples must slide, got {int(rows.sum())}")
     phase, speed, measured = phase[rows], speed[rows], measured[rows]

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.friction.criteria import Z90
 from models.friction.stribeck import GAMMA
-from models.loops.criteria import FEWEST_SAMPLES, NEAR_ZERO, NOT_WHITE, TORQUE_HARMONICS
+from models.loops.criteria import FEWEST_SAMPLES, NEAR_ZERO, NOT_WHITE
 from models.records.outliers import inliers
 from models.records.periods import Cycle, harmonics
 
@@ -116,7 +116,7 @@ def _harmonics_for(phase: FloatArray) -> int:
     """As many as a third of a period's samples and its widest gap allow."""
     turn = np.sort(np.mod(phase, 2 * math.pi))
     gap = max(float(np.diff(turn).max(initial=0.0)), float(turn[0] + 2 * math.pi - turn[-1]))
-    return max(2, min(TORQUE_HARMONICS, phase.size // 6, int(0.8 * math.pi / gap)))
+    return max(2, min(16, phase.size // 6, int(0.8 * math.pi / gap)))
 
 
 def _design(cycle: Cycle, phase: FloatArray, count: int) -> FloatArray:

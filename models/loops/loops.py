@@ -18,7 +18,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.stribeck import torque as stationary_torque
-from models.loops.criteria import FEWEST_SAMPLES, LEAST_CURVE, REVERSES, TELLING
+from models.loops.criteria import FEWEST_SAMPLES, TELLING
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
 from models.loops.loop_area import Area, Direction, Samples, area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
@@ -141,10 +141,10 @@ def _lags(
     cycle: Cycle, samples: Samples, curve: StationaryCurve | None
 ) -> tuple[LoopStatus, tuple[LagFit, LagFit] | None]:
     turn = cycle.value(np.linspace(0.0, 2 * np.pi, 361))
-    least = LEAST_CURVE * float(np.abs(samples.torque).max())
+    least = 0.01 * float(np.abs(samples.torque).max())  # torque lags no stationary curve that is below 1 % of it
     if curve is None or float(stationary_torque(np.maximum(turn, 0.0), curve.parameters).min()) < least:
         return LoopStatus.NO_CURVE, None
-    if float(turn.min()) < -REVERSES * cycle.amplitude:
+    if float(turn.min()) < -0.02 * cycle.amplitude:  # of the swing
         return LoopStatus.REVERSES, None
     attractor = fit_lag(ATTRACTOR, cycle, samples.phase, samples.torque, curve)
     film = fit_lag(SQUEEZE_FILM, cycle, samples.phase, samples.torque, curve)

@@ -90,7 +90,7 @@ def plan_cleaning(record: Sampled) -> Cleaning:
         if channel is None:
             continue
         _require_measurements(name, channel)
-        where = _spikes(ordered.of(channel), max(3, min(12, round(criteria.SPIKE_DURATION / period))))
+        where = _spikes(ordered.of(channel), max(3, min(12, round(0.006 / period))))  # a spike lasts 6 ms at most
         if where.size:
             removed.append(f"{where.size} of {name}")
             spikes[where] = True
@@ -122,7 +122,8 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
     if swapped:
         fallback = np.maximum.accumulate(time) - time
         worst = int(fallback.argmax())
-        if fallback[worst] > max(criteria.LARGEST_SWAP, 10 * period):
+        # neighbours written in the wrong order are no clock that falls back
+        if fallback[worst] > max(0.1, 10 * period):
             raise UnusableRecordError(
                 f"time must run forwards, but time[{worst}] = {time[worst]} s lies {fallback[worst]:.6g} s before an "
                 "earlier sample of the record"
@@ -135,7 +136,7 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
     if regular.any():
         period = float(steps.mean(where=regular))
         scatter = float(steps.std(where=regular, mean=period)) / period
-        if scatter > criteria.JITTER or swapped or repeated:
+        if scatter > 0.01 or swapped or repeated:
             sentence = f"Sampling intervals scatter by {scatter:.1%}; {repeated} repeated and {swapped} swapped times."
             notes.append(("clock_jitter", sentence))
     lost = round((time[-1] - time[0]) / period) + 1 - time.size
@@ -155,7 +156,7 @@ def _spikes(channel: FloatArray, longest: int) -> NDArray[np.intp]:
     moved = np.abs(channel[1::stride] - channel[:-1:stride])
     if scale == 0.0 and moved.any():  # a coarse recorder: its count
         scale = float(moved[moved > 0].min())
-    edges = _jumps(channel, criteria.SPIKE_EDGE * scale)
+    edges = _jumps(channel, 6.0 * scale)
     if edges.size > channel.size // 20:  # more than spikes: a signal that moves by itself
         edges = _jumps(channel, float(np.quantile(moved, 0.95)))
     if edges.size == 0:
@@ -166,7 +167,7 @@ def _spikes(channel: FloatArray, longest: int) -> NDArray[np.intp]:
     window = channel[around]
     middle = np.median(window, axis=1)
     spread = 1.4826 * np.median(np.abs(window - middle[:, np.newaxis]), axis=1)
-    return suspects[np.abs(channel[suspects] - middle) > criteria.SPIKE * np.maximum(spread, scale)]
+    return suspects[np.abs(channel[suspects] - middle) > 10.0 * np.maximum(spread, scale)]
 
 
 def _jumps(channel: FloatArray, most: float) -> NDArray[np.intp]:

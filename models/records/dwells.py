@@ -46,7 +46,7 @@ class Dwell:
 def average(record: Sampled, cleaning: Cleaning) -> Blocks:
     """Means over blocks of about 10 ms of the kept rows of a record; a remainder at its end is left out."""
     period = cleaning.period
-    size = max(1, round(criteria.BLOCK_DURATION / period))
+    size = max(1, round(0.01 / period))  # blocks of 10 ms
     time = cleaning.of(record.time)
     count = time.size // size
     share = np.full(size, 1.0 / size)
@@ -61,7 +61,7 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
         off = blocks_of(channel) - mean(channel)[:, np.newaxis]
         return np.asarray(np.einsum("ij,ij->i", off, off) / size, dtype=np.float64)
 
-    late = np.flatnonzero(np.diff(time) > max(criteria.GAP_DURATION, criteria.GAP_BLOCKS * size * period)) + 1
+    late = np.flatnonzero(np.diff(time) > max(0.25, 6 * size * period)) + 1
     gap: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
     gap[np.minimum(late // size, count - 1)] = True
     oil, plate = record.oil_temperature, record.plate_temperature
@@ -83,11 +83,12 @@ def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
     """The dwells in motion, and under pressure where there is any, in the order of time, and notes on those left out."""
     if blocks.time.size < criteria.SHORTEST_DWELL:
         return [], []
-    window = max(criteria.FEWEST_WINDOW_BLOCKS, round(criteria.WINDOW_DURATION / blocks.duration))
+    window = max(4, round(0.2 / blocks.duration))  # 0.2 s before and after, four blocks at least
     pressure, speed = _Channel(blocks.pressure, window), _Channel(blocks.speed, window)
     idle = _highest(blocks.pressure, window) < criteria.UNLOADED
     channels, least = (
-        ((speed,), -math.inf) if idle else ((pressure, speed), criteria.NO_PRESSURE_SHARE * pressure.highest)
+        # no lining is loaded below 2 % of the highest pressure
+        ((speed,), -math.inf) if idle else ((pressure, speed), 0.02 * pressure.highest)
     )
     active = (np.abs(blocks.pressure) > least) & (np.abs(blocks.speed) > criteria.STANDSTILL_SHARE * speed.highest)
     steady = ~blocks.gap
@@ -114,7 +115,7 @@ class _Channel:
         self.values = values
         self.highest = float(np.quantile(np.abs(values), 0.995))
         self.steady: NDArray[np.bool_] = np.ones(values.size, dtype=np.bool_)
-        self.threshold = criteria.NO_STEP_SHARE * self.highest
+        self.threshold = 5e-4 * self.highest
         self.window = window
         self._levels: dict[tuple[int, int], tuple[float, float]] = {}
 
@@ -128,7 +129,9 @@ class _Channel:
         # A quarter of a normal variable's absolute values lies below 0.3186 deviations: ramps are above that.
         deviation = float(np.quantile(apart[active] if active.any() else apart, 0.25)) / 0.3186
         self.threshold = max(
-            self.threshold, min(criteria.STEP_DEVIATIONS * deviation, criteria.PLAIN_STEP_SHARE * self.highest)
+            # changes above 2 % of the highest are always steps, below 0.05 % never
+            self.threshold,
+            min(6.0 * deviation, 0.02 * self.highest),
         )
         self.steady = apart <= self.threshold
 
@@ -197,11 +200,7 @@ def _sorted_out(
     settled: Dwell | None = None
     for row, dwell in enumerate(dwells):
         where = slice(dwell.start, dwell.stop)
-        following = [
-            later
-            for later in dwells[row + 1 : row + 1 + criteria.MOST_CRESTS]
-            if not blocks.gap[dwell.stop : later.start].any()
-        ]
+        following = [later for later in dwells[row + 1 : row + 1 + 4] if not blocks.gap[dwell.stop : later.start].any()]
         if settled is not None and _crest(channels, settled, dwell, following):
             left["overshoot"].append(float(blocks.time[dwell.start]))
             continue
@@ -226,16 +225,15 @@ def _sorted_out(
 def _crest(channels: tuple[_Channel, ...], before: Dwell, dwell: Dwell, following: list[Dwell]) -> bool:
     """Whether a dwell is only a crest of an overshoot, or the trough after it, between the dwell before and the first long
     dwell that follows: speed or pressure went beyond the latter's level."""
-    long = (
-        later for later in following if dwell.stop - dwell.start < criteria.CREST_SHARE * (later.stop - later.start)
-    )
+    long = (later for later in following if dwell.stop - dwell.start < 0.25 * (later.stop - later.start))
     after = next(long, None)
     if after is None:
         return False
     beyond = False
     for channel in channels:
         first, here, last = (float(channel.values[part.start : part.stop].mean()) for part in (before, dwell, after))
-        if abs(here - last) > criteria.OVERSHOOT_SHARE * abs(last - first) + channel.threshold:
+        # off its level by 30 % of the step at most
+        if abs(here - last) > 0.3 * abs(last - first) + channel.threshold:
             return False
         on_the_way = np.copysign(1.0, last - first) * (channel.values[before.stop : dwell.stop] - last)
         beyond |= abs(last - first) > 2 * channel.threshold and bool(on_the_way.max() > channel.threshold)
@@ -253,10 +251,10 @@ _SENTENCES = {
 
 def _ramps(channel: _Channel, where: slice) -> bool:
     part = channel.values[where]
-    pieces = min(criteria.RAMP_PIECES, part.size // 2)
+    pieces = min(6, part.size // 2)
     means = part[: part.size // pieces * pieces].reshape(pieces, -1).mean(axis=1)
     noise = criteria.LEAVING_DEVIATIONS * float(np.diff(part).std()) * np.sqrt(pieces / part.size)
-    return bool(np.ptp(means) > max(2 * channel.threshold, noise, criteria.RAMP_SHARE * abs(float(part.mean()))))
+    return bool(np.ptp(means) > max(2 * channel.threshold, noise, 0.01 * abs(float(part.mean()))))  # 1 % over a dwell
 
 
 def listed(times: FloatArray) -> str:

@@ -36,13 +36,14 @@ class Correlation:
     def factor(self, count: int) -> float:
         """The variance of a mean over `count` values over that of as many independent ones."""
         lag = np.arange(1, self.lags.size + 1)
-        return max(float(1 + 2 * (np.maximum(1 - lag / count, 0.0) * self.lags).sum()), criteria.LEAST_FACTOR)
+        # anticorrelated noise averages out faster, but no further than this
+        return max(float(1 + 2 * (np.maximum(1 - lag / count, 0.0) * self.lags).sum()), 0.2)
 
 
 def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correlation:
     """ρ of all residuals together, each of which `removed` coefficients of low frequency were fitted to."""
     length = float(np.median([residual.size for residual in residuals]))
-    longest = max(1, min(criteria.LONGEST_LAG, int(criteria.LOST_SHARE * length / (2 * removed))))
+    longest = max(1, min(400, int(criteria.LOST_SHARE * length / (2 * removed))))  # averages
     total, count = np.zeros(longest + 1), np.zeros(longest + 1)
     for residual in residuals:
         power = float(residual @ residual)
@@ -61,10 +62,10 @@ def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correla
     long_run = raw / np.maximum(1 - (1 + 2 * lag) * removed / length, 0.5 * (1 - criteria.LOST_SHARE))
     lost = removed * long_run / length
     times = np.maximum(long_run / (covariance[0] + lost), 1.0)
-    enough = lag >= criteria.SOKAL * times
+    enough = lag >= 2.5 * times
     window = int(enough.argmax()) if enough.any() else longest
     lags = (covariance[1 : window + 1] + lost[window]) / (covariance[0] + lost[window])
-    if enough.any() or abs(float(lags[-1])) < criteria.FADED:
+    if enough.any() or abs(float(lags[-1])) < 0.1:
         return Correlation(lags=lags)
     return Correlation(lags=slow_correlation(residuals), resolved=False)
 
@@ -115,7 +116,7 @@ def _moments(residual: FloatArray, correlation: Correlation) -> tuple[float, flo
     size = residual.size
     factor = correlation.factor(size)
     variance = float(residual @ residual) / max(size - 2 * factor, 0.5 * size)
-    length = max(1, size // criteria.BATCHES, int(np.ceil(criteria.BATCH_TIMES * factor)))
+    length = max(1, size // 16, int(np.ceil(3.0 * factor)))
     batches = size // length
     if batches < 4 or variance == 0.0:
         return variance, factor, 1.0, 1.0
@@ -126,7 +127,7 @@ def _moments(residual: FloatArray, correlation: Correlation) -> tuple[float, flo
 
 def _moderated(ratio: FloatArray, freedom: FloatArray) -> FloatArray:
     """Each dwell's own ratio [n], shrunk towards 1 by as much as ratios scatter by chance (G. Smyth 2004)."""
-    if ratio.size < criteria.FEWEST_FOR_MODERATION:
+    if ratio.size < 8:
         return np.ones_like(ratio)
     log_ratio = np.log(np.maximum(ratio, 1e-6)) - digamma(freedom / 2) + np.log(freedom / 2)
     excess = float(log_ratio.var(ddof=1) - polygamma(1, freedom / 2).mean())

@@ -106,7 +106,7 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
         fitted = _without_ends(t, y, fitted.frequency, criteria.SPEED_HARMONICS)
     if isinstance(fitted, str):
         return fitted
-    if not (fitted.noise < criteria.PERIODIC * fitted.amplitude and fitted.outliers <= 0.2 * t.size):
+    if not (fitted.noise < 0.15 * fitted.amplitude and fitted.outliers <= 0.2 * t.size):
         miss = fitted.noise / max(fitted.amplitude, 1e-3 * fitted.noise, 1e-300)
         return f"The speed does not swing periodically: the error of its best fit is {miss:.0%} of its swing (RMS)."
     return _with_corners(t, y, fitted)
@@ -135,7 +135,7 @@ def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
     most = t.size / (3 * max((t[-1] - t[0]) * cycle.frequency, 1.0))
     richer = cycle
     for count in criteria.CORNERS:
-        if richer.noise < criteria.FOLLOWED * cycle.amplitude or count > most or t.size < 4 * (2 * count + 2):
+        if richer.noise < 0.002 * cycle.amplitude or count > most or t.size < 4 * (2 * count + 2):
             break
         again = _refine(t, y, richer.frequency, count, _EXACT)
         if isinstance(again, str) or again.noise > criteria.TAKEN * richer.noise:
@@ -155,7 +155,7 @@ def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
     residual = value - cycle.value(cycle.phase(time))
     usual = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
     smooth = median_filter(residual, size=min(criteria.NEIGHBOURS, residual.size), mode="nearest")
-    off = np.abs(smooth) > max(criteria.OUTLIER * usual, criteria.OFF_SWING * cycle.amplitude)
+    off = np.abs(smooth) > max(criteria.OUTLIER * usual, 0.02 * cycle.amplitude)  # it does not swing yet, or no more
     before, after = leading(off), leading(off[::-1])
     return slice(before, off.size - after) if before + after < off.size else slice(0, off.size)
 
@@ -166,17 +166,18 @@ def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
 
     smooth = median_filter(value, size=min(3, value.size), mode="nearest")
     swing, noise = float(np.ptp(smooth)), float(np.median(np.abs(value - smooth)))
-    least = min(criteria.SWING_SHARE * swing + 4 * noise, criteria.MOST_SWING_SHARE * swing)
+    least = min(0.02 * swing + 4 * noise, 0.05 * swing)
     # the share of a period that a sine spends so near an end of its swing, where the record begins or stops there
-    lingers = criteria.LINGERS * math.acos(1 - 2 * least / swing) / (2 * math.pi) if swing > 0 else criteria.REST_SHARE
-    lowest, still = float(smooth.min()), max(4 * noise, criteria.STILL_SHARE * swing)
+    lingers = 1.6 * math.acos(1 - 2 * least / swing) / (2 * math.pi) if swing > 0 else criteria.REST_SHARE
+    lowest, still = float(smooth.min()), max(4 * noise, 1e-3 * swing)
 
     def rest(course: FloatArray, passed: FloatArray) -> int:
         """Samples of the course that stand still at its beginning, `passed` [n] s being its clock."""
         off = np.abs(course - course[0])
         inside = criteria.INSIDE[0] * swing < course[0] - lowest < criteria.INSIDE[1] * swing
         moved = np.flatnonzero(off > least)
-        longest = criteria.REST_INSIDE * (time[-1] - time[0]) if inside else min(criteria.REST_SHARE, lingers) * period
+        # away from the swing's ends 2 % of the record
+        longest = 0.02 * (time[-1] - time[0]) if inside else min(criteria.REST_SHARE, lingers) * period
         if not moved.size or passed[moved[0]] <= longest:
             return 0
         return int(moved[0]) if inside else int(np.flatnonzero(off[: moved[0]] <= still)[-1]) + 1
@@ -265,7 +266,7 @@ def _cycle(
     """The swing with its whole periods counted."""
     interval = sample_interval(time)
     sampled = (float(time[-1] - time[0]) + interval) * frequency
-    periods = math.floor(sampled + 1 - criteria.WHOLE)
+    periods = math.floor(sampled + 1 - 0.99)  # a fit of harmonics bridges the last 1 %
     if periods < 1:
         return f"No whole period: {sampled:.2f} periods of {1 / frequency:.4g} s were recorded."
     count = coefficients.size // 2

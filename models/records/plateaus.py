@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.records.cleaning import SCALE_SAMPLES, Note, Sampled, UnusableRecordError, plan_cleaning
-from models.records.criteria import DRIFTING, SETTLING
 from models.records.dwells import Blocks, Dwell, average, find_dwells, listed
 from models.records.mean_deviation import Stretch, deviations
 from models.records.runs import Plateaus
@@ -97,7 +96,7 @@ def cut_plateaus(record: Sampled, torque_filter: float = 0.0) -> PlateauCut:
         count=np.array([(dwell.stop - dwell.start) * blocks.size for dwell in used]),
         drift=moments.drift,
         drift_sd=moments.drift_sd,
-        settling_time=SETTLING * transients.time_constant,
+        settling_time=4.0 * transients.time_constant,  # e^-4 = 1.8 % of the transient is left then
         time_constant=transients.time_constant,
         settled=settled,
         noise=noise,
@@ -155,7 +154,7 @@ def _notes(cut: PlateauCut, drop: FloatArray) -> list[Note]:
         ("unsettled", ~cut.settled, "{n} of {all} dwells ended before their torque had settled, from {at} s."),
         (
             "drifting",
-            cut.settled & (np.abs(cut.drift) > DRIFTING * cut.drift_sd),
+            cut.settled & (np.abs(cut.drift) > 4.0 * cut.drift_sd),
             "Torque drifts on {n} of {all} settled dwells, from {at} s.",
         ),
     ):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE, LEVEL_SNAP, LEVEL_STEP
+from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE, LEVEL_STEP
 
 
 def level_width(pressure: float) -> float:
@@ -33,4 +33,4 @@ def levels_of(pressure: FloatArray) -> FloatArray:
 
 def _rounded_level(median: float) -> float:
     snapped = round(median / LEVEL_STEP) * LEVEL_STEP
-    return snapped if snapped > 0 and abs(median - snapped) <= LEVEL_SNAP else round(median, 1)
+    return snapped if snapped > 0 and abs(median - snapped) <= 0.02e5 else round(median, 1)

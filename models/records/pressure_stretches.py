@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.records.criteria import MEDIAN_DURATION, OFF_LEVEL, OFF_LEVEL_SHARE, RAMP_WIDTHS, SHORTEST_STRETCH, STRAIGHT
+from models.records.criteria import MEDIAN_DURATION, SHORTEST_STRETCH
 from models.records.outliers import leading
 from models.records.periods import sample_interval
 from models.records.pressure_levels import level_width
@@ -73,9 +73,9 @@ def _block_medians(values: FloatArray, block: NDArray[np.int64], edges: NDArray[
 
 def _ramps(medians: FloatArray, gap: float) -> bool:
     """Whether medians [b] over equal times are a straight line across the gap."""
-    if float(np.ptp(medians)) < RAMP_WIDTHS * gap:
+    if float(np.ptp(medians)) < 1.5 * gap:
         return False
-    return abs(float(np.corrcoef(np.arange(medians.size), medians)[0, 1])) > STRAIGHT
+    return abs(float(np.corrcoef(np.arange(medians.size), medians)[0, 1])) > 0.98
 
 
 def _without_ramps(smooth: FloatArray, start: int, stop: int, gap: float) -> tuple[int, int]:
@@ -89,7 +89,7 @@ def _without_ramps(smooth: FloatArray, start: int, stop: int, gap: float) -> tup
         middle = smooth[start + quarter : stop - quarter]
         level = float(np.median(middle))
         wander = 1.4826 * float(np.median(np.abs(middle - level)))
-        off = np.abs(smooth[start:stop] - level) > max(OFF_LEVEL * wander, OFF_LEVEL_SHARE * gap)
+        off = np.abs(smooth[start:stop] - level) > max(4.0 * wander, 0.05 * gap)
         before, after = leading(off), leading(off[::-1])
         if before + after == 0 or before + after >= off.size:
             break

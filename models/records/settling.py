@@ -49,7 +49,7 @@ def fit_transients(stretches: Sequence[Stretch], shortest: float) -> Transients:
     longest = max(float(stretch.time[-1]) for stretch in stretches)
     taus = np.geomspace(
         shortest,
-        max(min(criteria.SLOWEST_TRANSIENT_SHARE * longest, criteria.SLOWEST_TRANSIENT), 4 * shortest),
+        max(min(2.0 * longest, 6.0), 4 * shortest),  # no longer than two dwells or 6 s
         _SCANNED,
     )
     basis = _Bases(taus)
@@ -132,19 +132,17 @@ def _common(worth: FloatArray, gain: FloatArray, place: FloatArray) -> _Common |
     share = np.minimum(criteria.GAIN_CAP / np.maximum(worth.max(axis=1), criteria.GAIN_CAP), 1.0)
     together = share @ worth
     dwells = worth.shape[0]
-    if share @ gain[:, together.argmax()] - dwells <= criteria.POOLED_GAIN * np.sqrt(2.0 * dwells):
+    if share @ gain[:, together.argmax()] - dwells <= 5.0 * np.sqrt(2.0 * dwells):
         return None
     own = np.array([_peak(row, place) for row in worth])
     visible = gain[np.arange(dwells), worth.argmax(axis=1)] > criteria.OWN_GAIN
     determined = own[visible & (own[:, 1] < criteria.MOST_SPREAD)]
     centre = _peak(together, place)[0]
-    if determined.shape[0] < criteria.FEWEST_FOR_SPREAD:
+    if determined.shape[0] < 8:
         return _Common(place=centre, spread=criteria.MOST_SPREAD)
     # The median of a squared normal variable is 0.455 of its variance.
     beyond = float(np.median((determined[:, 0] - centre) ** 2)) / 0.455 - float(np.median(determined[:, 1] ** 2))
-    return _Common(
-        place=centre, spread=min(max(float(np.sqrt(max(beyond, 0.0))), criteria.LEAST_SPREAD), criteria.MOST_SPREAD)
-    )
+    return _Common(place=centre, spread=min(max(float(np.sqrt(max(beyond, 0.0))), 0.1), criteria.MOST_SPREAD))
 
 
 def _peak(worth: FloatArray, place: FloatArray) -> tuple[float, float]:
@@ -179,13 +177,13 @@ def dropped(transients: Transients, duration: FloatArray, deviation: FloatArray)
 
     duration [n] s of the dwells, deviation [n] Nm of a mean over the whole of each. At most three quarters are dropped.
     """
-    share = np.linspace(criteria.LEAST_DROPPED, criteria.MOST_DROPPED, 71)
+    share = np.linspace(0.05, criteria.MOST_DROPPED, 71)  # shares of a dwell
     size, wide = np.abs(transients.amplitude), criteria.LATE * transients.amplitude_sd
     shift = np.zeros((duration.size, share.size))
     for amplitude, tau in ((size + wide, transients.time_constant), (size, transients.slowest)):
         left = mean_decay(tau[:, np.newaxis], share * duration[:, np.newaxis], duration[:, np.newaxis])
         shift = np.maximum(shift, amplitude[:, np.newaxis] * left)
-    small = shift <= criteria.LEFT_IN_MEAN * deviation[:, np.newaxis] / np.sqrt(1 - share)
+    small = shift <= 0.1 * deviation[:, np.newaxis] / np.sqrt(1 - share)
     small[np.isnan(transients.time_constant)] = True
     return np.asarray(np.where(small.any(axis=1), share[small.argmax(axis=1)], criteria.MOST_DROPPED) * duration)
 

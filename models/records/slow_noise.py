@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular, toeplitz
 
 from models.arrays import FloatArray
-from models.records.criteria import LONGEST_SLOW_TIME, SLOW_SHARES
 
 #: Averages of a dwell that are used, at most, and number of correlation times on the grid.
 _MOST_AVERAGES, _TIMES = 64, 16
@@ -35,8 +34,9 @@ def slow_correlation(residuals: Sequence[FloatArray]) -> FloatArray:
     table = np.zeros((int(size.max()), len(kept)))
     for column, k in enumerate(kept):
         table[: size[column], column] = means[k]
-    times = np.geomspace(0.5 * group, LONGEST_SLOW_TIME * longest, _TIMES)
-    places = [(float(time), share) for time in times for share in SLOW_SHARES]
+    # of correlation times and of shares of the variance all are equally probable
+    times = np.geomspace(0.5 * group, 2.0 * longest, _TIMES)
+    places = [(float(time), share) for time in times for share in (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 1.0)]
     restricted = [_restricted(table, size, _averaged(time, group, table.shape[0]), share) for time, share in places]
     fit = np.array([row[0] for row in restricted])
     weight = np.exp(fit - fit.max())

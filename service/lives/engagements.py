@@ -13,7 +13,6 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.engagements.comparison import Comparison, Reference, SpeedCourse, compared, reference_of, same_duty
-from models.engagements.criteria import REFERENCES
 from models.engagements.local_fit import Estimate
 from models.engagements.measured import MeasuredEngagement, measured_engagement
 from models.engagements.refusal import Refusal
@@ -184,7 +183,7 @@ def engagements_over_life(stored: Sequence[StoredEngagement], lives: Sequence[Co
     for life in lives:
         own = [engagement for engagement in stored if engagement.run_id in life and engagement.course is not None]
         first = [engagement for engagement in own if engagement.receipt["kind"] == DUTY_KINDS[0]]
-        first = [engagement for engagement in first if engagement.of_duty(first[0])][:REFERENCES]
+        first = [engagement for engagement in first if engagement.of_duty(first[0])][:3]  # three make the reference
         courses = [engagement.course for engagement in first if engagement.course is not None]
         reference = reference_of(courses) if courses else None
         for engagement in own:

@@ -1,9 +1,9 @@
 """Evidence that only raw records hold: lines at the shaft's orders, stick-slip, dwells that end before torque has settled.
 
 - `shaft_ripple`: torque swings k times a revolution (a wobbling shaft, a disc out of true, teeth of a coupling). Its
-  frequency goes with the speed, so one order k is looked for in all records together (`shaft_orders`).
+  frequency goes with the speed, so one order k is looked for in all records together (`swing`).
 - `stick_slip`: at low speed, where torque falls with speed, the shaft's torsional mode is excited: a line of one
-  frequency, whatever the speed, that is there below some speed and not above it (`fixed_frequency`). A line of
+  frequency, whatever the speed, that is there below some speed and not above it (`swing`). A line of
   one frequency at all speeds alike (mains, a pump, structure) is neither; it is reported in a note.
 - `unsettled_dwell`: the exponential approach on a dwell is too slow for the dwell's length (`settling_transient`).
 
@@ -22,16 +22,16 @@ from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
 from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.effects.moving import SHAFT_RIPPLE, STICK_SLIP
 from models.diagnosis.effects.readings import UNSETTLED_DWELL
-from models.diagnosis.raw_records import criteria
-from models.diagnosis.raw_records.fixed_frequency import best_line, best_slow_line
 from models.diagnosis.raw_records.settling_transient import settling_evidence
-from models.diagnosis.raw_records.shaft_orders import best_order
-from models.diagnosis.raw_records.swing import Line
+from models.diagnosis.raw_records.swing import Line, best_line, best_order, best_slow_line
 from models.diagnosis.raw_records.whitened_torque import WhitenedRecord, whitened_record
 from models.records.cleaning import UnusableRecordError
 from models.records.plateaus import PlateauCut, cut_plateaus
 from models.records.runs import Record
 
+#: Log likelihood ratio [nats] from which a line or a settling transient counts as evidence. Noise alone reaches it in one
+#: campaign of a thousand or fewer (chosen; no table).
+LEAST_EVIDENCE = 4.5
 #: A line of one frequency at all speeds: structure that is no effect of the catalogue.
 FIXED_LINE = "fixed_line"
 
@@ -61,7 +61,7 @@ def raw_evidence(campaign: Campaign) -> tuple[RawEvidence, ...]:
 def _evenly(runs: Sequence[tuple[Run, Record]]) -> Sequence[tuple[Run, Record]]:
     """Runs evenly over life, as many as hold few enough samples."""
     usual = float(np.median([record.time.size for _, record in runs])) if runs else 1.0
-    most = max(criteria.FEW_RECORDS, int(criteria.MANY_SAMPLES / usual))
+    most = max(8, int(300_000 / usual))  # eight at least, more where they hold fewer than 300,000 samples in all
     if len(runs) <= most:
         return runs
     return [runs[i] for i in np.linspace(0, len(runs) - 1, most).round().astype(int)]
@@ -79,15 +79,15 @@ def _lines(records: list[WhitenedRecord]) -> list[RawEvidence]:
     if not records:
         return []
     order, (line, slow) = best_order(records), _fixed_line(records, None)
-    if order.evidence >= line.evidence > criteria.LEAST_EVIDENCE:
+    if order.evidence >= line.evidence > LEAST_EVIDENCE:
         line, slow = _fixed_line(records, order)
-    elif line.evidence > order.evidence > criteria.LEAST_EVIDENCE:
+    elif line.evidence > order.evidence > LEAST_EVIDENCE:
         order = best_order(records, line)
     lines = []
-    if order.evidence > criteria.LEAST_EVIDENCE and order.amplitude > 0:
+    if order.evidence > LEAST_EVIDENCE and order.amplitude > 0:
         note = f"torque swings {order.position:g} times a revolution at every speed"
         lines.append(_line_evidence(SHAFT_RIPPLE.slug, order, "ripple amplitude", note))
-    if line.evidence > criteria.LEAST_EVIDENCE and line.amplitude > 0:
+    if line.evidence > LEAST_EVIDENCE and line.amplitude > 0:
         low = f"below {100 * line.speed_share:.0f} % of the highest speed and not above"
         note = f"torque swings at {line.position:.3g} Hz {low if slow else 'at all speeds alike'}"
         lines.append(_line_evidence(STICK_SLIP.slug if slow else FIXED_LINE, line, "line amplitude", note))
@@ -97,10 +97,11 @@ def _lines(records: list[WhitenedRecord]) -> list[RawEvidence]:
 def _fixed_line(records: list[WhitenedRecord], order: Line | None) -> tuple[Line, bool]:
     """The best line, and whether it is at low speed only: there, and not where the shaft is much faster."""
     slow = best_slow_line(records, order)
-    if slow.evidence <= criteria.LEAST_EVIDENCE:
+    if slow.evidence <= LEAST_EVIDENCE:
         return best_line(records, order), False
-    fast = best_line(records, order, above=criteria.FASTER_SHAFT * slow.speed_share)
-    if fast.evidence > criteria.LEAST_EVIDENCE and abs(fast.position - slow.position) < criteria.SAME_LINE:
+    # no stick-slip where the same line, within 1 Hz, is seen at more than twice the speed below which it was found
+    fast = best_line(records, order, above=2.0 * slow.speed_share)
+    if fast.evidence > LEAST_EVIDENCE and abs(fast.position - slow.position) < 1.0:
         return best_line(records, order), False
     return slow, True
 
@@ -116,7 +117,7 @@ def _unsettled(dwells: list[tuple[Record, PlateauCut]]) -> list[RawEvidence]:
     """Dwells that ended before torque had settled, by the evidence of all their transients together: one that looks late
     without it adds nothing."""
     settling = settling_evidence(dwells)
-    if settling.evidence <= criteria.LEAST_EVIDENCE:
+    if settling.evidence <= LEAST_EVIDENCE:
         return []
     seconds = f"{settling.time_constant:.2g} s"
     note = f"after each step torque settles from the side of the last level, with a time constant of {seconds}"

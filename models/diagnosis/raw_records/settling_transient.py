@@ -16,10 +16,14 @@ import numpy as np
 from scipy.special import logsumexp
 
 from models.arrays import FloatArray
-from models.diagnosis.raw_records import criteria
 from models.gaussian_evidence import log_gain_alone, log_positive
 from models.records.plateaus import PlateauCut
 from models.records.runs import Record
+
+#: Time constants [s] of friction's own lag and of filters, whose share of a step may have any size; those that are tried.
+_FAST_TIMES, _SLOW_TIMES = (0.1, 0.25), (0.8, 1.3, 2.0, 3.2, 5.0)
+#: Usual share [-] of a step that remains after it.
+_USUAL_SHARE = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +37,7 @@ class SettlingEvidence:
 
 def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> SettlingEvidence:
     """Of all dwells together."""
-    times = np.array([*criteria.FAST_TIMES, *criteria.SLOW_TIMES])
+    times = np.array([*_FAST_TIMES, *_SLOW_TIMES])
     gram, along = np.zeros((times.size, times.size)), np.zeros(times.size)
     for record, cut in dwells:
         transients = list(_transients(record, cut))
@@ -48,17 +52,17 @@ def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> SettlingEv
             variance = max(float(residual @ residual) / (residual.size - 1), 1e-300)
             gram += decays.T @ decays / variance
             along += decays.T @ residual / variance
-    fast = len(criteria.FAST_TIMES)
+    fast = len(_FAST_TIMES)
     corner = gram[:fast, :fast] + 1e-9 * np.diag(np.diag(gram)[:fast]) + 1e-300 * np.eye(fast)
     by_fast = np.linalg.solve(corner, np.column_stack([gram[:fast, fast:], along[:fast]]))
     info = np.maximum(np.diag(gram[fast:, fast:] - gram[fast:, :fast] @ by_fast[:, :-1]), 0.0)
     score = along[fast:] - gram[fast:, :fast] @ by_fast[:, -1]
-    logs = log_gain_alone(info, score, criteria.USUAL_SHARE) + log_positive(info, score, criteria.USUAL_SHARE)
-    weights, log_times = np.exp(logs - logsumexp(logs)), np.log(criteria.SLOW_TIMES)
+    logs = log_gain_alone(info, score, _USUAL_SHARE) + log_positive(info, score, _USUAL_SHARE)
+    weights, log_times = np.exp(logs - logsumexp(logs)), np.log(_SLOW_TIMES)
     middle = float(weights @ log_times)
     within = np.ptp(log_times) / (log_times.size - 1) / np.sqrt(12)  # the grid cannot tell τ closer than its spacing
     return SettlingEvidence(
-        evidence=float(logsumexp(logs) - np.log(len(criteria.SLOW_TIMES))),
+        evidence=float(logsumexp(logs) - np.log(len(_SLOW_TIMES))),
         time_constant=float(np.exp(middle)),
         deviation=float(np.exp(middle) * np.sqrt(weights @ (log_times - middle) ** 2 + within**2)),
     )
@@ -70,13 +74,13 @@ def _transients(record: Record, cut: PlateauCut) -> Iterator[tuple[FloatArray, F
     for i in range(1, means.size):
         rows = np.flatnonzero((record.time > cut.stop[i - 1]) & (record.time <= cut.stop[i]))
         distance = np.abs(record.speed[rows] - speeds[i])
-        arrived = distance < criteria.SPEED_SHARE * abs(speeds[i]) + criteria.SPEED_DISTANCE
+        arrived = distance < 0.01 * abs(speeds[i]) + 0.2
         if not arrived.any():
             continue
         begin = record.time[rows[int(np.argmax(arrived))]]
-        used = rows[arrived & (record.time[rows] >= begin + criteria.FIRST_USED)]
+        used = rows[arrived & (record.time[rows] >= begin + 0.3)]  # before, the rig's ramp is not over
         torque = record.torque[used]
-        if torque.size >= criteria.FEWEST_DWELL_SAMPLES and np.isfinite(torque).all():
+        if torque.size >= 20 and np.isfinite(torque).all():
             yield record.time[used] - begin, torque - torque.mean(), float(means[i - 1] - means[i])
 
 

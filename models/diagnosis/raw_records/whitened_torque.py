@@ -22,11 +22,17 @@ from scipy.linalg import solve_toeplitz
 from scipy.ndimage import uniform_filter1d
 
 from models.arrays import FloatArray
-from models.diagnosis.raw_records import criteria
 from models.records.cleaning import UnusableRecordError, clean
 from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.records.pressure_stretches import pressure_stretches
 from models.records.runs import Record
+
+#: A piece holds at least so many samples, means of several where the record is fast.
+FEWEST_SAMPLES = 48
+#: The lowest frequency that the spline leaves untouched [cycles between knots]; the highest, as a share [-] of the rate.
+LOWEST_CYCLES, HIGHEST_SHARE = 1.25, 0.45
+#: A speed that goes this share [-] of its highest the other way reverses.
+REVERSES = 0.03
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,18 +47,18 @@ class Piece:
 def pieces_of(record: Record, spans: FloatArray | None, period: float, count: int) -> list[Piece]:
     """The pieces of a record with a sample every `period` [s], means of `count` samples each; within spans [k, 2] s where
     they are given, else where its pressure is constant."""
-    turned = round(criteria.SETTLED_AFTER_REVERSAL / period)
+    turned = round(1.0 / period)  # torque has settled 1 s after
     return [
         _averaged(record, first, stop, count)
         for begin, end in _without_gaps(record, spans, period)
         for first, stop in _one_direction(record.speed, begin, end, turned)
-        if (stop - first) * period >= criteria.SHORTEST_PIECE and stop - first >= criteria.FEWEST_SAMPLES * count
+        if (stop - first) * period >= 1.0 and stop - first >= FEWEST_SAMPLES * count
     ]
 
 
 def _without_gaps(record: Record, spans: FloatArray | None, period: float) -> Iterator[tuple[int, int]]:
     """Rows [first, stop) without gaps."""
-    gaps = (np.flatnonzero(np.diff(record.time) > criteria.LONGEST_GAP * period) + 1).tolist()
+    gaps = (np.flatnonzero(np.diff(record.time) > 5 * period) + 1).tolist()  # samples that may be missing in a row
     if spans is None:
         for first, stop in itertools.pairwise([0, *gaps, record.time.size]):
             yield from _at_one_pressure(record, first, stop)
@@ -64,7 +70,7 @@ def _without_gaps(record: Record, spans: FloatArray | None, period: float) -> It
 
 def _at_one_pressure(record: Record, first: int, stop: int) -> Iterator[tuple[int, int]]:
     """Rows of [first, stop), which have no gaps, at which the pressure is constant."""
-    if stop - first < criteria.FEWEST_SAMPLES:
+    if stop - first < FEWEST_SAMPLES:
         return
     pressure = record.pressure[first:stop]
     usual = float(np.median(pressure))
@@ -80,7 +86,7 @@ def _one_direction(speed: FloatArray, first: int, stop: int, turned: int) -> Ite
     """Rows of [first, stop) between reversals of the speed, from `turned` rows after each on: where the clutch reverses the
     torque jumps, at the same angle of the shaft each time, which would pass for a ripple."""
     part = speed[first:stop]
-    if min(part.max(initial=0.0), -part.min(initial=0.0)) <= criteria.REVERSES * np.abs(part).max(initial=0.0):
+    if min(part.max(initial=0.0), -part.min(initial=0.0)) <= REVERSES * np.abs(part).max(initial=0.0):
         yield first, stop
         return
     turns = np.flatnonzero(np.diff(np.signbit(part))) + 1
@@ -123,7 +129,7 @@ class WhitenedRecord:
 
     @property
     def highest(self) -> float:
-        return criteria.HIGHEST_SHARE / self.step
+        return HIGHEST_SHARE / self.step
 
     def response(self, frequency: FloatArray) -> FloatArray:
         """|A|² at frequencies [Hz] up to half the rate; beyond, the last value."""
@@ -138,27 +144,32 @@ def whitened_record(record: Record, spans: FloatArray | None = None) -> Whitened
         cleaned, period, _ = clean(record)
     except UnusableRecordError:
         return None
-    count = max(1, int(1.0 / (criteria.RATE * period)))
+    count = max(1, int(1.0 / (250.0 * period)))  # averaged down to about 250 Hz
     step = count * period
     pieces = pieces_of(cleaned, spans, period, count)
     if not pieces:
         return None
-    spacing = min(criteria.KNOT_SPACING, *(criteria.KNOT_SHARE * _speed_period(piece.speed, step) for piece in pieces))
+    # knots are closer than 0.25 s and a fortieth of the speed's own period
+    spacing = min(0.25, *((1 / 40) * _speed_period(piece.speed, step) for piece in pieces))
     between = round(spacing / step)
     if (
-        between < criteria.FEWEST_BETWEEN_KNOTS
-        or not criteria.LOWEST_CYCLES / (between * step) < criteria.HIGHEST_SHARE / step
+        between < 5  # with fewer samples between knots the spline leaves nothing
+        or not LOWEST_CYCLES / (between * step) < HIGHEST_SHARE / step
     ):
         return None
     averaged_out = cleaned.torque[: cleaned.torque.size // count * count].reshape(-1, count).var(axis=1).mean()
     return _whitened(
-        pieces, step, between, (criteria.BLURRED * _recorder_count(cleaned.torque)) ** 2 - float(averaged_out)
+        # noise of less than 0.45 counts does not blur the recorder's steps, which then look like a swing
+        pieces,
+        step,
+        between,
+        (0.45 * _recorder_count(cleaned.torque)) ** 2 - float(averaged_out),
     )
 
 
 def _recorder_count(torque: FloatArray) -> float:
     """The least step [Nm] between recorded values."""
-    steps = np.abs(np.diff(torque[: criteria.COUNT_SAMPLES]))
+    steps = np.abs(np.diff(torque[:5000]))
     steps = steps[steps > 1e-9 * float(np.abs(torque).max())]
     return float(steps.min()) if steps.size else 0.0
 
@@ -167,9 +178,7 @@ def _speed_period(speed: FloatArray, step: float) -> float:
     """The period [s] of the strongest oscillation of a speed; infinite where it is constant."""
     window = np.hanning(speed.size)
     power = np.abs(np.fft.rfft((speed - speed.mean()) * window))
-    if (
-        2 * power.max() <= criteria.CONSTANT_SPEED * np.abs(speed).max() * window.sum()
-    ):  # an encoder's noise is no oscillation
+    if 2 * power.max() <= 0.05 * np.abs(speed).max() * window.sum():  # an encoder's noise is no oscillation
         return np.inf
     return float(speed.size * step / max(1, int(power.argmax())))
 
@@ -188,10 +197,11 @@ def _whitened(pieces: Sequence[Piece], step: float, between: int, least_variance
     polynomial = _autoregression(scaled, 1.0 / between)
     innovations = [lfilter(polynomial, 1.0, series) for series in fast]
     usual = float(np.median([np.square(series[polynomial.size :]).mean() for series in innovations]))
-    least = criteria.LEAST_VARIANCE_SHARE * usual
+    least = 0.25 * usual  # a coarse recorder may write one value for long
     if not least > 0:
         return None
-    weights = [_weight(series, polynomial.size, round(criteria.LOCAL_TIME / step), least) for series in innovations]
+    # the local deviation is that of 2 s
+    weights = [_weight(series, polynomial.size, round(2.0 / step), least) for series in innovations]
     matched = [
         lfilter(polynomial, 1.0, (series * weight)[::-1])[::-1]
         for series, weight in zip(innovations, weights, strict=True)
@@ -204,7 +214,7 @@ def _whitened(pieces: Sequence[Piece], step: float, between: int, least_variance
         weight=np.concatenate(weights),
         starts=tuple(np.cumsum([0, *(series.size for series in fast)]).tolist()),
         step=step,
-        lowest=criteria.LOWEST_CYCLES / (between * step),
+        lowest=LOWEST_CYCLES / (between * step),
         gain=np.asarray(np.abs(np.fft.rfft(polynomial, 2 * _GAINS)) ** 2, dtype=np.float64),
     )
 
@@ -213,7 +223,7 @@ def _weight(innovations: FloatArray, order: int, local: int, least: float) -> Fl
     """1/σ² [n] of innovations [n], 0 for the first `order`, which lack their past."""
     squares = innovations**2
     squares[:order] = squares[order:].mean()
-    squares = np.minimum(squares, criteria.LARGEST_SQUARE * squares.mean())
+    squares = np.minimum(squares, 12.0 * squares.mean())
     weight = 1.0 / np.maximum(uniform_filter1d(squares, min(local, innovations.size), mode="reflect"), least)
     weight[:order] = 0.0
     return np.asarray(weight, dtype=np.float64)
@@ -229,12 +239,12 @@ def _spline(torque: FloatArray, between: int) -> FloatArray:
 
 def _autoregression(series: Sequence[FloatArray], lowest: float) -> FloatArray:
     """A [p + 1] (Yule-Walker) for series whose spectrum below `lowest` [cycles a sample] goes on flat as it is above."""
-    size = min(criteria.SEGMENT, min(part.size for part in series))
+    size = min(256, min(part.size for part in series))
     window = np.hanning(size)
     segments = [part[first : first + size] for part in series for first in range(0, part.size - size + 1, size // 2)]
     power = np.mean(np.abs(np.fft.rfft(np.array(segments) * window, axis=1)) ** 2, axis=0)
     edge = max(1, int(np.ceil(lowest * size)))
     power[:edge] = power[edge : max(edge + 2, round(1.6 * edge))].mean()
-    covariance = np.fft.irfft(power)[: criteria.AUTOREGRESSION_ORDER + 1]
+    covariance = np.fft.irfft(power)[: 6 + 1]
     covariance[0] *= 1 + 1e-9
     return np.concatenate([[1.0], -solve_toeplitz(covariance[:-1], covariance[1:])])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.raw_records import criteria
+from models.diagnosis.raw_records import whitened_torque
 from models.diagnosis.raw_records.evidence import raw_evidence
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Record
@@ -119,7 +119,7 @@ def test_torque_that_turns_with_the_clutch_is_no_ripple(
     rng = np.random.default_rng(1)
     given = campaign([], [reversing(rng, frequency=frequency, rate=rate) for _ in range(4)])
     assert found(given) == {}
-    monkeypatch.setattr(criteria, "REVERSES", 2.0)
+    monkeypatch.setattr(whitened_torque, "REVERSES", 2.0)
     assert "shaft_ripple" in found(given)
 
 
