@@ -28,8 +28,6 @@ BELOW = 0.6
 ASSUMED = 0.01
 #: Free squares (residuals beyond the smooth terms) needed to estimate noise.
 FEWEST = 12
-#: Run-to-run scatter of the gain [-] until it is estimated. Chosen: some tenths of a percent are usual.
-FIRST_GAIN = 0.002
 #: What is taken for smooth along a curve: polynomials up to this degree; along a loop: so many harmonics.
 SMOOTH_DEGREE = 4
 SMOOTH_HARMONICS = 5
@@ -37,21 +35,10 @@ SMOOTH_HARMONICS = 5
 #: ones beyond so many times the typical one. Noise with neighbours correlated by .97 brings 7 along 120 rows; the traction
 #: sweeps' drop at rest brings 80, with which their noise was taken for 0.13 Nm instead of 0.01 and drag was named (.93).
 SHARP = 10.0
-#: Bins that a period must share with the periods before it to be compared with them.
-LEAST_COMPARED_BINS = 8
-#: A row is a spike where it is off its fit and off both its neighbours by more than this many deviations [-] ...
+#: A row is a spike where it is off its fit and off both its neighbours by more than this many deviations [-].
 SPIKE = 5.5
-#: ... while fewer than this share [-] of all rows are.
-MOST_SPIKES = 0.02
 #: Log likelihood [nats] that an autocorrelation must gain over none.
 CORRELATION_PRICE = 2.0
-#: ... over the one that samples show, where they do: they are more than bins are.
-CORRELATION_PRICE_FROM_SAMPLES = 5.0
-#: Log likelihood [nats] that an autocorrelation loses per unit of the log of its variance inflation: slow noise was taken
-#: off with everything smooth, so the data say little about it.
-INFLATION_PRICE = 2.0
-#: Kinds of curves or loops (by length and phases), at most, with which an autocorrelation is estimated.
-MOST_KINDS = 40
 
 # --- effects -------------------------------------------------------------------------------------------------------------
 
@@ -63,14 +50,10 @@ DISCREPANCY_SD = 0.25
 #: Fewest plateaus of stationary tests under pressure for a baseline (a Stribeck curve has four parameters and the laws over
 #: pressure and life multiply them), and the fewest distinct speeds among them that determine a curve.
 FEWEST_ROWS, CURVE_SPEEDS = 24, 4
-#: Torques [Nm] outside this range are no clutch's.
-LEAST_TORQUE, MOST_TORQUE = 1e-6, 1e7
 #: Noise of plateaus or of loops [-], a share of the usual torque, below which there is none to weigh anything by. Derived:
 #: with gains of MOST_GAIN over 1,000 rows (2e-2/1e-6)² · 1e3 is 4e11, a ten-thousandth of what 64 bits can tell from 1; a
 #: 16-bit channel rounds at 1.5e-5.
 LEAST_NOISE_SHARE = 1e-6
-#: From so many plateaus on every curve is determined and one start is enough.
-MANY_PLATEAUS = 8000
 #: Deviation of the difference of the two shares of one law, which are expected to drift alike [-]; the open clutch's
 #: drag as a share of the usual torque [-].
 ALIKE_SD, DRAG_SD = 0.1, 0.3
@@ -82,9 +65,8 @@ USUAL_GAIN, GAIN_SD_BELOW, GAIN_SD_ABOVE = 2.5e-3, 1.0, 0.6
 #: What the data must say of the runs' scatter beyond its prior [nats] for the estimate to be theirs (derived: a deviation of
 #: ln σ_g half the prior's, about the same mean, is ln 2 - 3/8 = 0.32).
 LEAST_SCATTER_INFORMATION = 0.32
-#: Scatter of the curves' gains within a run, and the size from which its prior falls [-] (chosen; a controller that
-#: comes back to 0.005 bar makes 0.1 %).
-CURVE_GAINS, SMALL_CURVE_GAIN = (0.0, 4e-4, 1e-3, 2.5e-3, 6e-3), 1e-3
+#: Scatter of the curves' gains within a run [-].
+CURVE_GAINS = (0.0, 4e-4, 1e-3, 2.5e-3, 6e-3)
 #: Curves' gains up to this multiple of the noise's own are considered: its own and the next above (derived: CURVE_GAINS'
 #: steps).
 MORE_CURVE_GAIN = 2.6
@@ -117,16 +99,13 @@ RELATIVE = 0.8
 VIBRATION_TRACE = 0.1
 #: An extension whose held-out error is more than this times the baseline's is withheld; it changes no verdict.
 MOST_WORSE = 1.02
-#: Deviation of ln ν in a test whose oil temperature varies by some 3 K (derived: about what ASTM D341 gives near 85 °C),
-#: and the factors on it that are averaged over from test to test and within a test.
-USUAL_VISCOSITY_CHANGE = 0.06
+#: Factors on what is usual, by which an unmeasured viscosity changes from test to test and within a test.
 CHANGES_BETWEEN_TESTS, CHANGES_WITHIN_TESTS = (0.5, 1.5, 4.0), (0.0, 0.5, 1.5, 4.0)
 
 # --- explanations: sizes -----------------------------------------------------------------------------------------------
 
-#: Gauss-Newton steps of a refit under another course at most, from the fit under its neighbour (it bounds
-#: the time), and nats behind the best from which a course, and those beyond it, do not count (derived: e^-10).
-COURSE_STEPS, COURSE_NEGLIGIBLE = 12, 10.0
+#: Gauss-Newton steps of a refit under another course at most, from the fit under its neighbour (it bounds the time).
+COURSE_STEPS = 12
 #: Degrees of freedom of a size's prior once its effect is held to be at work [-]: p ∝ 1/|a| but for the smallest. Chosen:
 #: with the search's 2, eight of eight offsets of 0.7 to 1.5 bar came out small, by 15 % in the mean.
 SIZE_TAILS = 0.1
@@ -142,52 +121,19 @@ SIGN_UNDETERMINED = 0.02
 
 #: Folds of states and of pressures, and the share of the states that is predicted from those before.
 STATE_FOLDS, PRESSURE_FOLDS, FORWARD_SHARE = 3, 2, 1 / 3
-#: Fewest states and pressures of which some can be left out, and fewest states of which the last can be predicted.
-FEWEST_STATES_HELD_OUT, FEWEST_PRESSURES_HELD_OUT, FEWEST_STATES_AHEAD = 3, 4, 4
-#: A smooth correction: cosines along an axis, harmonics of a loop, axes at most.
-CORRECTION_COSINES, CORRECTION_HARMONICS, MOST_CORRECTION_AXES = 10, 5, 2
-#: Its deviations τ that are tried, shares of the torque.
+#: A smooth correction's deviations τ that are tried, shares of the torque.
 CORRECTION_SIZES = (0.001, 0.003, 0.01, 0.03, 0.1)
 
 # --- experiments ---------------------------------------------------------------------------------------------------------
 
-#: Tests advised at most; λ [nats] that one must bring to be worth its time, and that the best one must bring to be listed
-#: where none is worth it.
-MOST_ADVISED, WORTHWHILE, LEAST_ADVISED = 3, 3.0, 0.1
-#: Rivals that are compared at most, unless the credible set is larger (it bounds the time).
-MOST_RIVALS = 4
-#: Hypotheses so much [nats] behind the best may become rivals again after another test.
-RIVAL_MARGIN = 8.0
-#: Probability that a run must add for the work that it is.
-COST_OF_RUN = 0.005
-#: Relative deviation of a predicted λ.
-PREDICTION_ERROR = 0.4
-#: Noise at zero torque is at least this share of the usual: data under torque hardly determine it.
-LEAST_NOISE = 0.2
+#: λ [nats] that a test must bring to be worth its time.
+WORTHWHILE = 3.0
 
 # --- report --------------------------------------------------------------------------------------------------------------
 
-#: A change of which less than this share is left after the baseline took up the rest is invisible (derived: rounding).
-LEAST_VISIBLE_SHARE = 1e-6
 #: Probability with which a stated visible amplitude is seen (chosen; `make visible` counts it at twice that).
 VISIBLE_POWER = 0.9
-#: Candidates below this probability are not listed.
-LEAST_LISTED = 1e-3
-#: A run is outlying that makes this share of all error beyond noise, among at least so many runs, with an RMS error beyond
-#: noise of so many deviations.
-OUTLYING_SHARE, OUTLYING_FEWEST_RUNS, OUTLYING_DEVIATIONS = 0.6, 4, 2.0
-#: Evidence [nats] from which a test is said to add any (derived: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773,
-#: natural log of the Bayes factor: "positive" from 1).
-WEAK_EVIDENCE = 1.0
 #: Effects at most whose detectable amplitude the paragraph gives.
 VISIBLE_MENTIONED = 3
-#: Probability from which an effect that was fitted beside a cause and is not named is mentioned.
-COMPANION_FROM = 0.3
 #: Words of the paragraph at most (chosen: with what is said of the remaining life 120, which are read once).
 MAX_WORDS = 105
-#: Held-out errors of so many times the fit's are explained in the paragraph (chosen: less is what gains make).
-FAR_FROM_FIT = 5.0
-#: An amplitude beyond so many prior deviations is larger than expected.
-LARGE_AMPLITUDE = 2.0
-#: Fewer states of use say little of a course over life.
-FEW_STATES = 3

@@ -23,8 +23,6 @@ from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 
 #: The decay p_0 is sought between these multiples of the pressures' range.
 _DECAYS = np.geomspace(0.05, 20.0, 41)
-#: Directions of coefficients that are resolved by less than this share of the best are held. Chosen: far above rounding.
-_RESOLVED = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +105,7 @@ def law_covariance(
     size = np.linalg.norm(columns, axis=0)
     size[size == 0.0] = 1.0  # the coefficient is held
     _, singular, turned = np.linalg.svd(columns / size, full_matrices=False)
-    free = singular > _RESOLVED * singular[0]
+    free = singular > 1e-9 * singular[0]  # far above rounding
     root = turned[free] / singular[free, None] / size
     freedom = pressure.size - int(free.sum())
     misfit = float(np.sum(((value - law(pressure)) / deviation) ** 2))

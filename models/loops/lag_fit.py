@@ -35,7 +35,6 @@ from models.loops.squeeze_film import squeeze_film_torque
 from models.records.periods import Cycle
 
 _GRID = 1000  # steps of a period
-_RUN_IN = 5.0  # s before the periodic state, half a period at least and 12 at most
 #: A parameter is moved by this share of its deviation.
 _MOVED = 0.01
 
@@ -249,7 +248,7 @@ class _Course:
 
     def __init__(self, law: Law, cycle: Cycle, curve: StribeckParameters) -> None:
         self._law, self._curve = law, curve
-        self._start = round(_GRID * min(max(0.5, _RUN_IN * cycle.frequency), 12.0))
+        self._start = round(_GRID * min(max(0.5, 5.0 * cycle.frequency), 12.0))
         self._grid = 2 * math.pi * np.arange(-self._start, _GRID + 1) / _GRID
         self._time = self._grid / (2 * math.pi * cycle.frequency)
         self._velocity = np.maximum(cycle.value(self._grid), 0.0)

@@ -31,10 +31,7 @@ from models.relaxation import relax
 FILM_EXPONENT = 1 - GAMMA
 #: The pressure [Pa] at which film times are compared.
 FILM_PRESSURE = 5e5
-#: Speeds below this share of the highest [-] are lifted to it where a film's thickness is taken.
-_LEAST_SPEED = 1e-6
 _POWER = 2 * FILM_EXPONENT - 1  # z = w^-0.4 makes the film's equation convex
-_NEWTON_STEPS = 60
 
 
 def squeeze_film_torque(
@@ -78,10 +75,10 @@ def film_speed(
     speed = np.abs(velocity)
     fastest = max(float(speed.max()), 0.0 if start is None else abs(start), 1e-12)
     rate = _POWER / np.asarray(film_time, dtype=np.float64)
-    first = max(abs(float(speed[0]) if start is None else start), _LEAST_SPEED * fastest) ** -_POWER
+    first = max(abs(float(speed[0]) if start is None else start), 1e-6 * fastest) ** -_POWER
     least = fastest**-_POWER
     course = np.maximum(speed, 0.2 * fastest) ** -_POWER * np.ones_like(rate)
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(60):
         flow = course ** (-1 / _POWER)
         fall = rate / _POWER * flow / course
         after = np.maximum(relax(time, fall, course + rate * (flow - speed) / fall, first), least)

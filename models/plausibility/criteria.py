@@ -46,10 +46,6 @@ STEP_SD = 0.05
 #: A new level from some test on: how often after an event that was declared (or a pause or gap of PAUSE times the usual),
 #: how often without one, and the deviation of log COF that it steps by. Chosen: an oil change may move COF by a fifth.
 LEVEL_AFTER_EVENT, LEVEL_UNDECLARED, LEVEL_SD = 0.3, 3e-3, 0.3
-#: Deviation of the first level of a rebuilt clutch from that of the life before. Chosen.
-REBUILT_SD = 0.3
-#: So many tests and so many runs are looked at, those nearest to the runs in question. Chosen: what they cost, 2 ms.
-MAX_TESTS, MAX_RUNS = 40, 80
 
 # Cycles (`pace`): weights of how a run comes to its cycles. Chosen; only their orders of magnitude matter.
 
@@ -60,14 +56,12 @@ JOINS, TILES, STARTS, EQUALS = 0.5, 0.5, 0.05, 0.25
 SAME_GAP, LIKE_GAP, SIMILAR_GAP = 0.3, 0.3, 0.2
 #: Share of the gaps like an earlier one that grow, or shrink, as the last one did.
 GROWING = 0.2
-#: Deviation of log gap about an earlier one, and of one of their order [-]; how many gaps back.
-LIKE_GAP_SD, SIMILAR_GAP_SD, MEMORY = 0.3, 1.5, 5
-#: A life's first run is made at its start; a run repeats another of its kind at the same cycles.
-AT_START, REPEATS = 0.5, 0.02
+#: Deviation of log gap about an earlier one [-]; how many gaps back.
+LIKE_GAP_SD, MEMORY = 0.3, 5
+#: A life's first run is made at its start.
+AT_START = 0.5
 #: Maintenance, or one of equal blocks, within the cycles that are known, and within as many again.
 WITHIN, BEYOND = 0.5, 0.4
 #: The most cycles that clutches see, with the deviation of the logarithm beyond, and the logarithm of their range: a life
 #: may be counted in kilometres or in slips. Chosen: 10 to 1e8; a test of 3·10⁹ cycles is none.
 MAX_CYCLES, BEYOND_SD, LOG_CYCLES = 1e8, 0.7, math.log(1e8 / 1e1)
-#: Prior of runs out of order with their dates: so many wrong among so many right. Chosen: clocks are set wrongly at times.
-OUT_OF_ORDER = (2e-3, 1.0)

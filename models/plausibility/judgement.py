@@ -34,10 +34,6 @@ from models.plausibility.slips import OF_CLUTCH, OTHER_CLUTCH, OTHER_CYCLES, Rea
 _LEAST = math.log(1e-250)
 #: A change of belief that gains less is none.
 _WORTH = 1e-6
-#: Changes that a search makes at most, and suspects among accepted runs that it looks at.
-_MOVES, _SUSPECTS = 16, 4
-#: An accepted run is a suspect where its COF or its cycles are less probable than this, log density.
-_SUSPICIOUS_COF, _SUSPICIOUS_CYCLES = 0.0, -9.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +96,7 @@ def judge(runs: Sequence[Run], in_question: Collection[int], doubted: Collection
 def _searched(clutch: "_Clutch", start: Belief) -> "_Weighed":
     """The belief that no single change improves, from a first one."""
     now, tried = _Weighed(clutch=clutch, belief=start), {start}
-    for _ in range(_MOVES):
+    for _ in range(16):  # changes at most
         moves = sorted(
             ((gain, moved) for moved, gain in now.moves() if gain > _WORTH and moved not in tried),
             key=lambda move: -move[0],
@@ -153,12 +149,12 @@ class _Clutch:
     @cached_property
     def near(self) -> list[int]:
         """The runs whose cycles are looked at, in the order of the history."""
-        return self._nearest(range(len(self.runs)), criteria.MAX_RUNS)
+        return self._nearest(range(len(self.runs)), 80)
 
     @cached_property
     def tests(self) -> list[int]:
         """The tests that are looked at."""
-        return self._nearest([i for i, run in enumerate(self.runs) if run.tests], criteria.MAX_TESTS)
+        return self._nearest([i for i, run in enumerate(self.runs) if run.tests], 40)
 
     @cached_property
     def compared(self) -> frozenset[int]:
@@ -251,7 +247,8 @@ class _Weighed:
             fit = self._fit(own, life, level, level_sd)
             fits.append((fit, own))
             if own:
-                level, level_sd = float(fit.tests.log_cof[np.argmin(fit.tests.cycles)]), criteria.REBUILT_SD
+                # of a rebuilt clutch from the life before
+                level, level_sd = float(fit.tests.log_cof[np.argmin(fit.tests.cycles)]), 0.3
         return fits
 
     def _fit(self, own: Sequence[int], life: int, level: float, level_sd: float) -> Fit:
@@ -426,12 +423,12 @@ class _Weighed:
                 mean, variance, log_weight = fit.without
                 of_cof = log_outlying(fit.tests.log_cof - mean, variance, log_weight)
                 for i, value in zip(own, of_cof.tolist(), strict=True):
-                    surprise[i] = min(value - _SUSPICIOUS_COF, 0.0)
+                    surprise[i] = min(value - 0.0, 0.0)
         for i, value in zip(self.clutch.near, self.clutch.surprise(self._sets([])[0]).tolist(), strict=True):
-            surprise[i] = surprise.get(i, 0.0) + min(value - _SUSPICIOUS_CYCLES, 0.0)
+            surprise[i] = surprise.get(i, 0.0) + min(value - (-9.0), 0.0)
         odd = [i for i, value in sorted(surprise.items(), key=lambda item: item[1]) if value < 0.0]
         odd = [i for i in odd if i in self.clutch.compared]
-        return self.clutch.in_question.union(odd[:_SUSPECTS])
+        return self.clutch.in_question.union(odd[:4])
 
     @property
     def doubts(self) -> bool:

@@ -142,12 +142,12 @@ def _of_gaps(gaps: FloatArray) -> FloatArray:
     grown = 2.0 * log_before[:, :, 0] - log_before[:, :, 1]
     further = _log_normal(log_gap, grown, criteria.LIKE_GAP_SD)
     like = np.where(growing, (1.0 - criteria.GROWING) * like + criteria.GROWING * further, like)
-    similar = _log_normal(log_gap, (weight * log_before).sum(axis=2), criteria.SIMILAR_GAP_SD)
+    similar = _log_normal(log_gap, (weight * log_before).sum(axis=2), 1.5)  # of their order
     anything = np.exp(log_anywhere(gaps))
     by_earlier = criteria.SAME_GAP * same + criteria.LIKE_GAP * like + criteria.SIMILAR_GAP * similar
     rest = 1.0 - criteria.SAME_GAP - criteria.LIKE_GAP - criteria.SIMILAR_GAP
     law = np.where(total[:, :, 0] > 0, by_earlier + rest * anything, anything)
-    return np.where(gaps < 0.5, criteria.REPEATS, law)
+    return np.where(gaps < 0.5, 0.02, law)  # it repeats another of its kind
 
 
 def _log_normal(log_gap: FloatArray, centre: FloatArray, deviation: float) -> FloatArray:
@@ -170,7 +170,7 @@ def log_order(start: FloatArray, moment: FloatArray) -> FloatArray:
     last = _last_seen(begun)
     wrong = (there[:, 1:] & (begun[:, 1:] < last[:, :-1] - 0.5)).sum(axis=1)
     count = there.sum(axis=1)
-    a, b = criteria.OUT_OF_ORDER
+    a, b = (2e-3, 1.0)  # so many wrong among so many right: clocks are set wrongly at times
     return np.asarray(betaln(a + wrong, b + np.maximum(count - wrong, 0)) - betaln(a, b))
 
 

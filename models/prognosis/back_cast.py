@@ -22,7 +22,7 @@ import numpy as np
 from scipy.special import bdtr, ndtri
 
 from models.arrays import FloatArray
-from models.prognosis.criteria import AHEAD, BAND, COVERAGE, MOST_MISSED, SURPRISING, UNTIL
+from models.prognosis.criteria import AHEAD, BAND, COVERAGE
 from models.prognosis.first_passage import bands
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -53,7 +53,7 @@ class BackCast:
     @property
     def surprising(self) -> bool:
         """Whether so few tests are improbable, had each been within with 90 %."""
-        return bool(bdtr(self.held, self.misses.size, COVERAGE) < SURPRISING)
+        return bool(bdtr(self.held, self.misses.size, COVERAGE) < 0.05)
 
     @property
     def widening(self) -> float:
@@ -69,7 +69,7 @@ class BackCast:
         progress, epoch = self.forecasts[:, 0], self.forecasts[:, 1]
         usable = (
             (progress > 0.0)
-            & (progress <= UNTIL * test.progress)
+            & (progress <= 0.8 * test.progress)  # made at 80 % of the test's progress or before
             & (epoch == test.epoch)
             & (test.progress <= AHEAD[-1] * progress)
         )
@@ -81,7 +81,7 @@ class BackCast:
         )
         half = math.hypot(median - low if test.value < median else high - median, HALF_WIDTH * math.sqrt(test.variance))
         miss = abs(test.value - median) / half if half > 0.0 else 0.0
-        return replace(self, misses=np.append(self.misses, min(miss, MOST_MISSED)))
+        return replace(self, misses=np.append(self.misses, min(miss, 3.0)))  # it may be outlying
 
     def forecast(self, posterior: Posterior, newest: Measurement, prior: Prior) -> "BackCast":
         """With the forecast of a posterior that knows all tests up to the newest."""

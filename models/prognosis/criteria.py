@@ -13,22 +13,13 @@ FEWEST_TESTS = 3
 
 # What earlier forecasts said about the tests since (`back_cast`)
 
-#: Multiples of its progress at which a forecast is kept, and the share of a test's progress until which it must have been
-#: made. Chosen; no table.
-AHEAD, UNTIL = (1.0, 1.25, 1.5, 2.0, 3.0), 0.8
-#: A test counts as missed by so many half widths at most: it may be outlying. Chosen; no table.
-MOST_MISSED = 3.0
+#: Multiples of its progress at which a forecast is kept. Chosen; no table.
+AHEAD = (1.0, 1.25, 1.5, 2.0, 3.0)
 #: The share of the tests that intervals are to hold. Fixed: they are those of 90 %.
 COVERAGE = 0.9
-#: Earlier forecasts fared badly where so few tests were within, with a smaller probability than this. Chosen; no table.
-SURPRISING = 0.05
 
 # Mean COF from the parameters' tracks (`joint_draws`, `from_parameters`)
 
-#: Prior deviations of ξ0 and Δ, in sizes of the quantity. Chosen: as weak as the prior of a single track.
-INITIAL_SD, CHANGE_SD = 0.5, 1.0
-#: No correlation is worth this many tests beside the correlation that is observed from test to test. Chosen; no table.
-NONE_WORTH = 5.0
 #: Mean COF from the parameters and its direct track disagree where they are further apart than this many deviations. Chosen;
 #: no table.
 FAR_APART = 3.0
@@ -47,17 +38,12 @@ HYPER_CLUTCHES, HYPER_CENTRE = 6.0, 0.03
 #: A fleet of n has the share TRUST n/(n + DOUBT) of the mixture: most of it stays weak, for the evidence soon speaks for a
 #: fleet that is right, and slowly against one that is wrong. Chosen: `make score PARTS=fleets` shows what it achieves.
 TRUST, DOUBT = 0.25, 3.0
-#: A filter runs under a normal that is wider than the population by this factor: a clutch at the edge of its fleet must not
-#: lie at the edge of what the filter covers. Chosen; no table.
-WIDER = 1.5
 
 # What ended lives say of one that has not (`ended_lives`): what it achieves: docs/appendix/prognosis.md, A fleet's prior
 
 #: More ended lives than this say no more: their predictive is within 3 % of the normal's width, and each costs every answer
 #: 0.1 ms. Chosen; no table.
 MOST_ENDED = 40
-#: Fewer ended lives than this say nothing. Chosen: from two on they score better than a life alone (`make real`).
-FEWEST_ENDED = 2
 #: And fewer lives than this tell no exponent of their work. Derived: two lie on any power.
 FEWEST_SEVERITIES = 3
 #: Of a course that an ended life has taken: the deviation q of δ at the end and that of the scatter, in shares of the way

@@ -52,19 +52,15 @@ from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
 
-_GRID, _DRAWS = Grid(), 500
+_GRID = Grid()
 #: Ends T that are tried, and places of the density that is stated.
-_ENDS, _PLACES = 50, 400
-#: Of the nodes (life, T, q, s) those that hold this share of the evidence are led on.
-_HELD = 0.999
+_ENDS = 50
 #: How far beyond the latest end, and before the present age, the end of a course is looked for, in logarithms.
-_BEYOND, _BEFORE = 0.7, 0.2
+_BEYOND = 0.7
 #: How far beyond the present age a clutch of another kind may end, in logarithms: a thousandfold.
 _ANYWHERE = 7.0
 #: A course crosses the threshold at most so much later than its end [T].
 _FARTHEST = 3.0
-#: What remains of an ended life's course is straight, and never flatter than this share of its mean pace.
-_FLATTEST = 0.3
 #: Deviation of x: tests may begin when half of the way is behind.
 _LEVEL_SD = 0.5
 #: Means, and deviations, that a predictive with censored values is averaged over.
@@ -93,7 +89,7 @@ class EndedLife:
     @property
     def final_pace(self) -> float:
         """The slope of its course over the last tenth of its life, in shares of the way over shares of the life."""
-        return max(10.0 * (1.0 - self._inside(np.array(0.9)).item()), _FLATTEST)
+        return max(10.0 * (1.0 - self._inside(np.array(0.9)).item()), 0.3)  # never flatter than 0.3 of its mean pace
 
     def course(self, share: FloatArray) -> FloatArray:
         """b at shares of its life >= 0, any shape: straight between its tests, and beyond its end."""
@@ -149,7 +145,7 @@ def new_and_lawful(history: Sequence[Measurement]) -> tuple[float, float]:
 
 def _drawn(history: Sequence[Measurement]) -> Posterior:
     prior = weak(history[0], falling=True)
-    return _GRID.posterior(_GRID.from_history(prior, history), _DRAWS, np.random.default_rng(0))
+    return _GRID.posterior(_GRID.from_history(prior, history), 500, np.random.default_rng(0))
 
 
 def declared_end(
@@ -225,7 +221,7 @@ def as_its_kind(
 ) -> Kin | None:
     """The end of life of a clutch that is alive at ζ = `as_of` > 0, given its tests and lives that have ended.
 
-    `offset` [t] is added to the tests' values. None of fewer than FEWEST_ENDED lives that are not censored, of fewer than
+    `offset` [t] is added to the tests' values. None of fewer than two lives that are not censored, of fewer than
     FEWEST_TESTS tests at different ζ, or where the first value is not positive. Kept for the next filter, which asks it of
     the same tests.
     """
@@ -238,7 +234,7 @@ def _as_its_kind(
 ) -> Kin | None:
     exact = np.array([not life.censored for life in lives], dtype=bool)
     if (
-        np.count_nonzero(exact) < criteria.FEWEST_ENDED
+        np.count_nonzero(exact) < 2  # two say more than none (`make real`)
         or len({test.progress for test in tests}) < criteria.FEWEST_TESTS
     ):
         return None
@@ -249,7 +245,7 @@ def _as_its_kind(
     variance = np.array([life.deviation**2 for life in lives])
     centre = float(np.median(log_ends[exact]))
     of_ends = _predictive(log_ends - centre, variance, exact, criteria.VAGUE, criteria.END_WORTH)
-    now, earliest = math.log(as_of), math.log(decline.span) - _BEFORE
+    now, earliest = math.log(as_of), math.log(decline.span) - 0.2
     latest = max(float(log_ends.max()), now) + _BEYOND
     log_end = np.linspace(earliest, latest, _ENDS)
     clock = decline.progress / np.exp(log_end)[:, None]
@@ -258,7 +254,7 @@ def _as_its_kind(
     pace = np.array([*(life.final_pace for life in courses), *_PLAIN_PACES])
     wander = np.repeat(criteria.COURSE_STRETCH_SD, criteria.COURSE_SCATTERS.size) * math.sqrt(1.0 + 2.0 / len(courses))
     middle, deviation, share = kin.crossings(decline, log_end, pace, as_of, wander)
-    places = now + (latest + _BEYOND - now) * np.linspace(0.0, 1.0, _PLACES + 1)[1:] ** 1.5
+    places = now + (latest + _BEYOND - now) * np.linspace(0.0, 1.0, 400 + 1)[1:] ** 1.5
     density = np.exp(-0.5 * np.square((places[:, None] - middle) / deviation)) @ (share / deviation)
     log_prior = of_ends.log_density(places - centre)
     stated = density * np.exp(log_prior - log_prior.max()) * np.gradient(places)
@@ -374,7 +370,8 @@ class _Nodes:
         share = np.exp(self.log_evidence - self.log_evidence.max()).ravel()
         order = np.argsort(share)[::-1]
         within = np.cumsum(share[order])
-        held = order[: int(np.searchsorted(within, _HELD * within[-1])) + 1]
+        # those that hold nearly all of it are led on
+        held = order[: int(np.searchsorted(within, 0.999 * within[-1])) + 1]
         e, k, j = np.unravel_index(held, self.log_evidence.shape)
         end, weight, variance = np.exp(log_end[e]), self.weight[e, k], np.square(self.size[e, k])
         ahead = np.maximum(end / decline.span, 1.0)

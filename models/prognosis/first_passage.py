@@ -21,8 +21,6 @@ from models.prognosis.criteria import BAND, HORIZON, QUANTILES
 from models.tracking.discrepancy import Discrepancy
 from models.tracking.posterior import Posterior
 
-#: Places of a path: evenly over what was measured, and then in equal ratios up to the horizon.
-_BEHIND, _AHEAD = 40, 240
 #: Of these every so many'th is looked at first. A dip below the threshold and back between two of them is not seen: the
 #: course beside eq. 6 bends some twenty times, and steps are looked at by themselves.
 _STRIDE = 6
@@ -177,7 +175,7 @@ def _places(beside: Discrepancy | None, horizon: float) -> tuple[FloatArray, NDA
     span = 1.0 if beside is None else beside.span
     at = np.zeros(0) if beside is None else beside.at[(beside.at > 0.0) & (beside.at <= horizon)]
     end = min(span, horizon)
-    places = np.union1d(path_places(end, horizon, _BEHIND, _AHEAD), at)
+    places = np.union1d(path_places(end, horizon, 40, 240), at)
     return places, np.searchsorted(places, at)
 
 

@@ -35,9 +35,6 @@ from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior, joined
 from models.tracking.prior import Prior, weak
 
-#: The logarithm of a vanishing density: the filter has no draws beyond REACH deviations of its prior.
-_NEVER = -700.0
-_DRAWS, _ROUNDS = 2000, 40
 _GRID = Grid()
 
 
@@ -63,10 +60,11 @@ class FleetPrior:
         return replace(self, mean=self.mean - np.array([0.0, math.log(cycles), 0.0, 0.0]))
 
     def prior_for(self, first: Measurement) -> Prior:
-        """The normal nearest to the population, WIDER than it, for a filter of a series that begins with `first`."""
+        """The normal nearest to the population, half as wide again, for a filter of a series that begins with `first`."""
         believed = weak(first, falling=True)
         size = believed.size
-        deviation = (criteria.WIDER * np.sqrt(np.diag(self.scale) * self.freedom / (self.freedom - 2.0))).tolist()
+        # a clutch at the edge of its fleet must not lie at the edge of what the filter covers
+        deviation = (1.5 * np.sqrt(np.diag(self.scale) * self.freedom / (self.freedom - 2.0))).tolist()
         mean = self.mean.tolist()
         return replace(
             believed,
@@ -94,7 +92,8 @@ class FleetPrior:
         drawn = pooled(under_weak, under_fleet)
         ours, theirs = weak(first, falling=True), self.prior_for(first)
         log_weak = _log_prior(drawn, ours)
-        lean = np.where(_within(drawn, theirs), _log_prior(drawn, theirs) - log_weak, _NEVER)
+        # a vanishing density: no draws beyond REACH deviations of the prior
+        lean = np.where(_within(drawn, theirs), _log_prior(drawn, theirs) - log_weak, (-700.0))
         split = under_weak.weight.size
         ratio = _log_evidence_ratio(lean[:split], under_weak.weight, lean[split:], under_fleet.weight)
         learned = self.log_density(_coordinates(drawn)) - np.log(np.abs(drawn.initial)) - log_weak
@@ -132,7 +131,7 @@ def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
             f"a clutch needs {criteria.FEWEST_TESTS_TO_LEARN} tests to teach a fleet's prior, got {len(history)}"
         )
     prior = replace(weak(history[0], falling=True), eq_6_share=1.0)
-    drawn = _GRID.posterior(_GRID.from_history(prior, history), _DRAWS, np.random.default_rng(seed))
+    drawn = _GRID.posterior(_GRID.from_history(prior, history), 2000, np.random.default_rng(seed))
     sound = drawn.initial > 0.0
     with np.errstate(divide="ignore"):
         log_weight = np.log(drawn.weight) - np.log(np.abs(drawn.initial)) - _log_prior(drawn, prior)
@@ -148,7 +147,7 @@ def learn(histories: Sequence[Sequence[Measurement]]) -> FleetPrior:
     return population([taught(history) for history in histories if len(history) >= criteria.FEWEST_TESTS_TO_LEARN])
 
 
-def population(fleet: Sequence[Taught], rounds: int = _ROUNDS) -> FleetPrior:
+def population(fleet: Sequence[Taught], rounds: int = 40) -> FleetPrior:
     """The population behind the samples of clutches, after so many rounds. Raises ValueError where there are none."""
     if not fleet:
         raise ValueError(f"a fleet needs a clutch with {criteria.FEWEST_TESTS_TO_LEARN} tests or more")

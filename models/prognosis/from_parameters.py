@@ -25,14 +25,13 @@ from models.prognosis.joint_draws import draw_jointly, paired, shrunk_correlatio
 from models.tracking.posterior import Posterior
 
 #: Draws, and places of the paths: evenly up to now, and in equal ratios beyond.
-_DRAWS, _BEHIND, _AHEAD = 200, 24, 49
+_BEHIND = 24
 #: Tests before and after, over which a fit's covariance is averaged: each is estimated from the residuals of its own test
 #: and errs as that test does, so that tests that happen to scatter less count for too much. Tried on 100 lives as those of
 #: `make score PARTS=shudder`, held at 40/60/80/120 % of life: none 86/87/83/72 %, one 91/92/89/83, two 93/97/93/87, three
 #: 91/97/91/90, five 93/96/94/91, all tests 93/99/96/98 (the early ones of which know V_S least); on 300 more two
 #: 93/94/90/86, three 93/93/92/88, four 93/94/90/89.
 _BESIDE = 3
-_COVERED = 3.29  # deviations of a normal between its 5 and 95 % quantiles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +107,7 @@ def mean_cof_paths(
     fewer than FEWEST_TESTS tests at different progress take no part.
     """
     start = max(now, 1.0)
-    progress = path_places(start, max(horizon, 2.0 * start), _BEHIND, _AHEAD)
+    progress = path_places(start, max(horizon, 2.0 * start), _BEHIND, 49)
     parts, at_levels = [], []
     for level in levels:
         if np.unique(level.progress).size >= FEWEST_TESTS:
@@ -143,7 +142,8 @@ def disagreement(
         )
     ]
     beyond = any(math.exp(median) > HORIZON for _, median, _ in logarithms)
-    spread = math.sqrt(0.5 * sum(((high - low) / _COVERED) ** 2 for low, _, high in logarithms))
+    # of a normal's 90 % interval, in deviations
+    spread = math.sqrt(0.5 * sum(((high - low) / 3.29) ** 2 for low, _, high in logarithms))
     return Disagreement(
         now=(float(now.mean()) - mean) / both if both > 0.0 else None,
         end_of_life=None if beyond or spread == 0.0 else float(logarithms[0][1] - logarithms[1][1]) / spread,
@@ -162,7 +162,7 @@ def parameter_draws(level: PressureLevel, rng: np.random.Generator) -> list[Post
     further = usual / np.outer(deviation, deviation) * np.sqrt(np.outer(scatter, scatter))
     floor = np.diag((1e-5 * np.abs(values).max(axis=0)) ** 2 + 1e-300)
     total = covariance + further + np.outer(common, common) + floor
-    return draw_jointly(level.progress, values, total, level.parameter_tracks, _DRAWS, rng)
+    return draw_jointly(level.progress, values, total, level.parameter_tracks, 200, rng)
 
 
 def _averaged(covariance: FloatArray) -> FloatArray:

@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.prognosis.criteria import CHANGE_SD, INITIAL_SD, NONE_WORTH
 from models.tracking.courses import Course, basis
 from models.tracking.posterior import Posterior
 from models.tracking.sampling import systematic
@@ -82,7 +81,7 @@ def _solved(b: FloatArray, values: FloatArray, weight: FloatArray) -> tuple[Floa
     precision[:, :q, q:] = np.einsum("tjk,tkn->njk", weight, b)
     precision[:, q:, :q] = np.swapaxes(precision[:, :q, q:], 1, 2)
     precision[:, q:, q:] = np.einsum("tjn,tjk,tkn->njk", b, weight, b, optimize=True)
-    precision += np.diag(np.repeat([INITIAL_SD**-2, CHANGE_SD**-2], q))
+    precision += np.diag(np.repeat([0.5**-2, 1.0**-2], q))  # of ξ0 and Δ, as weak as the prior of a single track
     pulled = np.einsum("tjk,tk->tj", weight, values - around)
     right = np.empty((n, 2 * q))
     right[:, :q] = pulled.sum(axis=0)
@@ -113,7 +112,7 @@ def shrunk_correlation(residuals: FloatArray) -> FloatArray:
     if not (spread > 0.0).all():
         return np.eye(size)
     scaled = (residuals - residuals.mean(axis=0)) / spread
-    share = count / (count + NONE_WORTH)
+    share = count / (count + 5.0)  # no correlation is worth five tests
     return np.asarray(share * scaled.T @ scaled / count + (1.0 - share) * np.eye(size))
 
 

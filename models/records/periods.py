@@ -22,10 +22,9 @@ from models.records import criteria
 from models.records.outliers import beside, leading, near
 
 #: Cuts of ends that do not swing, and steps of a fit, at most.
-_CUTS, _STEPS = 6, 25
+_STEPS = 25
 #: The frequency is refined to so much of 1/duration: with the first harmonic alone, and at last.
-_NEAR, _EXACT = 1e-3, 1e-10
-_MOST_WITH_CORNERS = 8000  # samples, evenly taken
+_EXACT = 1e-10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +98,7 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
         return f"The speed moves for {t.size} samples only: too few for a period."
     if not (np.ptp(y) > 0 and np.isfinite(np.ptp(y))):
         return "The speed does not move."
-    fitted = _refine(t, y, _coarse_frequency(t, y), 1, _NEAR)
+    fitted = _refine(t, y, _coarse_frequency(t, y), 1, 1e-3)
     if not isinstance(fitted, str):
         moving = _without_rest(t, y, min(1 / fitted.frequency, float(t[-1] - t[0])))
         t, y = t[moving], y[moving]
@@ -115,7 +114,7 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
 def _without_ends(time: FloatArray, value: FloatArray, frequency: float, count: int) -> Cycle | str:
     """A fit of `count` harmonics to the part of the record that follows the swing."""
     fitted: Cycle | str = ""
-    for _ in range(_CUTS):
+    for _ in range(6):  # ends that do not swing
         fitted = _refine(time, value, frequency, count, _EXACT)
         if isinstance(fitted, str):
             return fitted
@@ -128,7 +127,7 @@ def _without_ends(time: FloatArray, value: FloatArray, frequency: float, count: 
 
 def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
     """With more harmonics while they take away much of what is missed: ramps have corners, a sine has none."""
-    step = max(1, time.size // _MOST_WITH_CORNERS)
+    step = max(1, time.size // 8000)
     time, value = time[::step], value[::step]
     inside = (time >= cycle.begin) & (time < cycle.stop)
     t, y = time[inside], value[inside]

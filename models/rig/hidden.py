@@ -27,8 +27,6 @@ from models.rig.stationary import PLATEAU_DURATION
 from models.rig.temperatures import REFERENCE_FLUX, heat_flux, warmed
 from models.rig.truth import OPEN, SimulatedClutch
 
-#: Cycles in which drifts come to half of their size, and a new lining's excess to a quarter.
-_DRIFT, _RUN_IN = 4_000.0, 400.0
 #: Cycles at which late wear begins, and in which it then grows to its size.
 _LATE, _LATE_SPAN = 6_000.0, 9_000.0
 #: Middle of the protocol's velocities [m/s].
@@ -142,7 +140,7 @@ def _oil_temperature(size: float, rows: Rows) -> FloatArray:
 
 def _drift(cycles: float) -> float:
     """A course over a life, from 0 towards 1."""
-    return cycles / (cycles + _DRIFT)
+    return cycles / (cycles + 4_000.0)
 
 
 def _interface_heating(size: float, rows: Rows) -> FloatArray:
@@ -210,7 +208,7 @@ def _stick_slip(size: float, rows: Rows) -> FloatArray:
 
 def _running_in(size: float, rows: Rows) -> FloatArray:
     """An excess of the new lining that goes as 1/(1 + ζ/ζ_r)²."""
-    return np.asarray(0.01 * size * rows.held.torque / (1 + rows.cycles / _RUN_IN) ** 2, dtype=np.float64)
+    return np.asarray(0.01 * size * rows.held.torque / (1 + rows.cycles / 400.0) ** 2, dtype=np.float64)
 
 
 def _accelerated_wear(size: float, rows: Rows) -> FloatArray:

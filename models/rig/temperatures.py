@@ -32,8 +32,6 @@ from models.rig.truth import OPEN, SimulatedClutch
 _B, _C = 880.0, 170.0
 #: The flux [W/m²] at which a plate's rise and a loss by heating have their sizes.
 REFERENCE_FLUX = 0.32e6
-#: Of the thermometer [1/K].
-_COUNTS = 10.0
 
 Held = TypeVar("Held", Plateaus, Record)
 
@@ -61,7 +59,7 @@ def with_plate(run: SimulatedRun, geometry: Geometry, rise: float) -> SimulatedR
 
     def temperature(held: Plateaus | Record) -> FloatArray:
         oil = OIL_TEMPERATURE if held.oil_temperature is None else held.oil_temperature
-        return oil + rounded(rise * heat_flux(held, geometry) / REFERENCE_FLUX, _COUNTS)
+        return oil + rounded(rise * heat_flux(held, geometry) / REFERENCE_FLUX, 10.0)
 
     if run.record is not None:
         return replace(run, record=replace(run.record, plate_temperature=temperature(run.record)))

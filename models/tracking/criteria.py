@@ -13,26 +13,10 @@ LAW_SHARE = 0.95
 #: The deviation of the level's step at an event, as a share of the size of the quantity. Chosen: `make score PARTS=events`
 #: shows what it achieves, and no table compares it with others.
 STEP_SIZE = 0.05
-#: The weak prior's deviation of ξ0, in sizes of the quantity: the first run need not be at ζ = 0. Chosen; no table.
-INITIAL_SD = 0.5
-#: Mean and deviation of Δ in sizes of the quantity: where it is known to fall (7 % remains for a rise), and where it may go
-#: either way. Chosen; no table.
-FALLING_CHANGE, EITHER_CHANGE = (-0.6, 0.4), (0.0, 1.0)
-#: Median of φ [cycles] and deviation of its logarithm: two deviations cover 40 to 400,000. Chosen: with ε, lives of 10² to
-#: 10⁶ cycles.
-SCALE_MEDIAN, LOG_SCALE_SD = 4_000.0, 2.3
-#: Median of ε [-] and deviation of its logarithm: two deviations cover 0.2 to 3.2. Chosen: with φ, as above.
-EXPONENT_MEDIAN, LOG_EXPONENT_SD = 0.8, 0.7
-#: Median of the run-to-run scatter in sizes of the quantity and deviation of its logarithm: two deviations cover 0.06 % to
-#: 1.5 %. Chosen; no table.
-SCATTER_MEDIAN, LOG_SCATTER_SD = 0.003, 0.8
 
 #: The probability that the scatter is a share of the value, as that of a gain is, and not the same at every value. Chosen:
 #: as probable as not; no table.
 PROPORTIONAL_SHARE = 0.5
-#: The least square of a value over the quantity's size that such scatter grows with: values may cross zero. Chosen; no
-#: table.
-LEAST_RELATIVE = 0.01
 
 # The discrepancy beside eq. 6 (`discrepancy`)
 
@@ -69,9 +53,6 @@ FAR = 4.0
 #: Tests that must have been before anything is off their track. Chosen; no table.
 FEWEST_BEFORE = 4
 
-#: A sample that is worth fewer draws of equal weight than this is said to be. Chosen: a 5 % quantile then rests on five; no
-#: table.
-FEWEST_EFFECTIVE = 100.0
 
 # What the filters neglect (`outlying_runs`, `filters`)
 
@@ -79,34 +60,16 @@ FEWEST_EFFECTIVE = 100.0
 REACH = 4.0
 #: A node belongs to the mass where its log density is less than this below the highest. Derived: 4.2 deviations of a normal.
 DEPTH = 9.0
-#: A kind of history is dropped where its log mass is by so much below the best kind's: on the first coarse lattice, which is
-#: blurred, and once the lattice has closed in. Chosen; no table.
-NEGLIGIBLE, SLIGHT = 10.0, 6.0
-#: Sets of outlying runs are kept where their log probability is less than NEAR below the best, and MOST of them. Chosen; no
-#: table.
-NEAR, MOST = 4.5, 6
-#: Neighbours of a set are searched where it may come within LOOK of the best, of EXPANSIONS sets at most. Chosen; no table.
-LOOK, EXPANSIONS = 1.5, 24
-#: Once the lattices have closed in, sets that were overlooked are sought about so many leading kinds, and count where their
-#: log probability is less than WORTH below the best's. Chosen; no table.
-LEADING, WORTH = 3, 3.0
-#: The particle filter resamples below the first share of effective particles, and no single step may bring them below the
-#: second. Chosen; no table.
-HEALTHY, STARVED = 0.5, 0.25
+#: Sets of outlying runs that are kept, at most. Chosen; no table.
+MOST = 6
 #: The share of the particles that every course keeps where the particle filter resamples. Chosen; no table.
 KEPT = 0.05
 #: Steps of a move, at most, and the share of particles after which they end. Chosen: on 60 lives, and on 60 with an outlying
 #: run in ten, 0.9, 0.8 and 0.7 have a CRPS of the end's logarithm of 1.03, 0.97 and 0.98, and 0.93, 0.92 and 0.90 times the
 #: exact filter's, and take 15, 12 and 10 ms a test.
 MOVES, MOVED = 8, 0.7
-#: The unscented filters' running mean of squared innovations forgets at this rate; above LOST they start again. Chosen; no
-#: table.
-FORGET, LOST = 0.3, 4.0
-#: They also start again when progress has grown by this factor. Chosen: with 2, 2.5 and 3 they hold 5, 1 and 3 of 6 ends of
-#: logarithms at 60 % of life, and as many of other laws.
-GROWN = 2.0
-#: A size of the discrepancy with a smaller share of the probability gets no unscented filter. Chosen; no table.
-FEW = 0.02
+#: The unscented filters' running mean of squared innovations forgets at this rate. Chosen; no table.
+FORGET = 0.3
 #: Deviations from the prior mean that an unscented filter's state may reach. Chosen; no table.
 DOMAIN = 6.0
 #: An innovation counts at most as one of this many deviations in an unscented filter. Chosen; no table.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.tracking.criteria import EXPANSIONS, LOOK, MOST, NEAR
+from models.tracking.criteria import MOST
 from models.tracking.discrepancy import column_sds, columns
 from models.tracking.history import History
 from models.tracking.linear_model import log_outlying
@@ -20,8 +20,6 @@ from models.tracking.prior import Prior
 
 #: Nodes of each level of s at which turning a run is weighed up, and the power of their mass by which they are drawn.
 NODES, TEMPER = 16, 0.25
-#: How often a node turns all the runs that it would turn.
-_ROUNDS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +90,7 @@ def at_once(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) 
     """
     start = verdicts(prior, history, outlying, nodes)
     sets, verdict = np.tile(outlying, (nodes.b.shape[0], 1)), start
-    for _ in range(_ROUNDS):
+    for _ in range(4):
         if not (verdict.gain > 0.0).any():
             break
         sets = np.where(verdict.gain > 0.0, 1.0 - sets, sets)
@@ -119,13 +117,8 @@ class Search:
     def next(self) -> FloatArray | None:
         """The most promising set not yet expanded, or None where nothing is left to gain."""
         best = max(self.log_probability.values())
-        left = [key for key, value in self.log_probability.items() if key not in self.expanded and value > best - LOOK]
-        if (
-            not left
-            or len(self.expanded) >= EXPANSIONS
-            or self.prior.outlying_share == 0.0
-            or self.history.value.size < 2
-        ):
+        left = [key for key, value in self.log_probability.items() if key not in self.expanded and value > best - 1.5]
+        if not left or len(self.expanded) >= 24 or self.prior.outlying_share == 0.0 or self.history.value.size < 2:
             return None
         return np.frombuffer(max(left, key=self.log_probability.__getitem__))
 
@@ -148,7 +141,7 @@ class Search:
         """The sets that hold nearly all of the mass, [c, t]."""
         best = max(self.log_probability.values())
         keys = sorted(
-            (k for k, v in self.log_probability.items() if v > best - NEAR),
+            (k for k, v in self.log_probability.items() if v > best - 4.5),
             key=self.log_probability.__getitem__,
             reverse=True,
         )

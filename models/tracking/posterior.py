@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.degradation.general_order import Degradation
 from models.tracking.courses import basis, coordinates_of, course_of, unit_of_change
-from models.tracking.criteria import FEWEST_EFFECTIVE
 from models.tracking.discrepancy import BY_DRAW, Discrepancy
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
@@ -72,7 +71,8 @@ class Posterior:
         """Whether the sample stands for the posterior."""
         if self.forced:
             return SampleStatus.FORCED
-        return SampleStatus.SOUND if self.effective_draws >= FEWEST_EFFECTIVE else SampleStatus.FEW_DRAWS
+        # a 5 % quantile rests on five draws then
+        return SampleStatus.SOUND if self.effective_draws >= 100.0 else SampleStatus.FEW_DRAWS
 
     @property
     def degradation(self) -> Degradation:

@@ -69,7 +69,7 @@ class Prior:
 
     def relative(self, value: FloatArray | float) -> FloatArray:
         """The square of a value over the size, any shape: what the variance of scatter that is a share of it grows with."""
-        return np.maximum(np.square(np.asarray(value) / self.size), criteria.LEAST_RELATIVE)
+        return np.maximum(np.square(np.asarray(value) / self.size), 0.01)  # values may cross zero
 
     def to_array(self) -> FloatArray:
         """The numbers in the order of the fields [17]."""
@@ -104,18 +104,19 @@ def weak(first: Measurement, *, falling: bool) -> Prior:
     a, two deviations covering 0.06 % to 1.5 %.
     """
     size = math.hypot(first.value, math.sqrt(first.variance)) or 1.0
-    change_mean, change_sd = criteria.FALLING_CHANGE if falling else criteria.EITHER_CHANGE
+    # of a quantity known to fall 7 % remains for a rise
+    change_mean, change_sd = (-0.6, 0.4) if falling else (0.0, 1.0)
     return Prior(
         initial_mean=first.value,
-        initial_sd=criteria.INITIAL_SD * size,
+        initial_sd=0.5 * size,  # the first run need not be at ζ = 0
         change_mean=change_mean * size,
         change_sd=change_sd * size,
-        log_scale_mean=math.log(criteria.SCALE_MEDIAN),
-        log_scale_sd=criteria.LOG_SCALE_SD,
-        log_exponent_mean=math.log(criteria.EXPONENT_MEDIAN),
-        log_exponent_sd=criteria.LOG_EXPONENT_SD,
-        log_scatter_mean=math.log(criteria.SCATTER_MEDIAN * size),
-        log_scatter_sd=criteria.LOG_SCATTER_SD,
+        log_scale_mean=math.log(4_000.0),  # φ and ε: lives of 10² to 10⁶ cycles within two deviations
+        log_scale_sd=2.3,
+        log_exponent_mean=math.log(0.8),
+        log_exponent_sd=0.7,
+        log_scatter_mean=math.log(0.003 * size),  # 0.06 to 1.5 % within two deviations
+        log_scatter_sd=0.8,
         eq_6_share=criteria.EQ_6_SHARE if falling else 1.0,
         proportional_share=criteria.PROPORTIONAL_SHARE if falling else 0.0,
         knee_hazard=criteria.KNEE_HAZARD if falling else 0.0,

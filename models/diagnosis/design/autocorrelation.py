@@ -22,9 +22,6 @@ from models.arrays import FloatArray
 from models.diagnosis.design import criteria
 from models.records.periods import harmonics
 
-#: Bounds that keep the process stationary and its covariance positive definite.
-_LEAST_DECAY, _MOST_DECAY, _HALF = 1e-3, 0.99, 0.49
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Correlation:
@@ -39,10 +36,10 @@ class Correlation:
     def of_neighbours(first: float, second: float) -> "Correlation":
         """With these correlations [-] of the first and the second neighbour, as far as there is such a process: no spectrum
         is negative anywhere, so w ρ is at most (1 + ρ)/2."""
-        if first < criteria.LEAST_CORRELATION:
+        if first < 0.02:
             return Correlation()
-        decay = min(max(second / first, _LEAST_DECAY), _MOST_DECAY)
-        return Correlation(share=min(first / decay, _HALF * (1.0 + decay) / decay), decay=decay)
+        decay = min(max(second / first, 1e-3), 0.99)  # stationary and positive definite
+        return Correlation(share=min(first / decay, 0.49 * (1.0 + decay) / decay), decay=decay)
 
     @property
     def variance_inflation(self) -> float:
@@ -87,7 +84,8 @@ def sample_autocorrelation(
     torque: FloatArray, phase: FloatArray, used: NDArray[np.bool_], per_bin: float
 ) -> SampleAutocorrelation | None:
     """Of torque [n] Nm at phase [n] rad, where samples are `used` [n]; None where they are too few or all alike."""
-    if per_bin < criteria.FEWEST_PER_BIN or np.count_nonzero(used) < 8 * (2 * criteria.SIGNAL_HARMONICS + 1):
+    # with fewer the bins themselves say as much
+    if per_bin < 4.0 or np.count_nonzero(used) < 8 * (2 * criteria.SIGNAL_HARMONICS + 1):
         return None
     basis = np.column_stack([np.ones(int(used.sum())), harmonics(phase[used], criteria.SIGNAL_HARMONICS)])
     ridge = 1e-9 * used.sum() * np.eye(basis.shape[1])
@@ -111,7 +109,7 @@ def bin_autocorrelation(loops: Sequence[SampleAutocorrelation | None]) -> tuple[
         return None
     groups: dict[int, list[SampleAutocorrelation]] = {}
     for loop in estimated:
-        groups.setdefault(round(np.log(loop.per_bin) / np.log(criteria.ALIKE_SAMPLING)), []).append(loop)
+        groups.setdefault(round(np.log(loop.per_bin) / np.log(1.2)), []).append(loop)  # within a factor of 1.2
     correlations = []
     for alike in groups.values():
         first, second, per_bin = (

@@ -110,16 +110,12 @@ def concatenate(blocks: list[Points]) -> Points:
     return Points(**{name: np.concatenate(parts) for name, parts in columns.items()}) if blocks else points_of(0)
 
 
-#: Pressures that a dynamic test is taken to have when its rows are counted beforehand.
-_LOOPS_PER_TEST = 8
-
-
 def thinned(campaign: Campaign, notes: list[str]) -> Campaign:
     """The campaign with states left out evenly where it is too large; `notes` gets a sentence on what was left out."""
     campaign = _with_fewer_loops(campaign, notes)
     states = np.unique([*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)])
     size = sum(min(run.plateaus.torque.size, criteria.MOST_PLATEAUS) for run in campaign.stationary)
-    size += sum(_LOOPS_PER_TEST * BINS for _ in campaign.dynamic)
+    size += sum(8 * BINS for _ in campaign.dynamic)  # some eight pressures each
     if size <= criteria.MOST_ROWS or states.size < 3:
         return campaign
     kept = _evenly(states, max(2, int(states.size * criteria.MOST_ROWS / size)))

@@ -114,7 +114,7 @@ def facts_of(campaign: Campaign) -> Facts:
 
 def _plate_warming(campaign: Campaign) -> tuple[float, float] | None:
     """The line of the plate's rise [K] over the flux |M| ω/A of friction [W/m²]: by plateaus, which have time to warm, or by
-    loops where no plateau has the channel. Its slope is LEAST_PLATE_RISE at least."""
+    loops where no plateau has the channel. Its slope has a least value."""
     plateaus, records = [run.plateaus for run in campaign.stationary], [run.record for run in campaign.dynamic]
     area = campaign.geometry.friction_faces * campaign.geometry.lining_area
     for tables in (plateaus, records):
@@ -123,7 +123,8 @@ def _plate_warming(campaign: Campaign) -> tuple[float, float] | None:
             flux = np.concatenate([np.abs(table.torque * table.speed) for table, _ in measured]) / area
             rise = np.concatenate([rise for _, rise in measured])
             off = flux - flux.mean()
-            slope = max(float(off @ rise) / max(float(off @ off), 1e-300), criteria.LEAST_PLATE_RISE)
+            # 1 K at 0.32 W/mm² at least, above what thermometers drift with speed; friction heats by tens of K
+            slope = max(float(off @ rise) / max(float(off @ off), 1e-300), (1.0 / 0.32e6))
             return float(rise.mean() - slope * flux.mean()), slope
     return None
 
@@ -161,13 +162,13 @@ def _long_gaps(campaign: Campaign) -> list[tuple[float, float, float]]:
     runs: list[Run] = [*campaign.stationary, *campaign.dynamic, *campaign.duty]
     timed = [(run.moment, run) for run in runs if run.moment is not None]
     timed.sort(key=lambda moment_and_run: (moment_and_run[0], moment_and_run[1].cycles))
-    if len(timed) < criteria.FEWEST_TIMED:
+    if len(timed) < 4:
         return []
     gaps = np.diff(np.array([moment for moment, _ in timed]))
     # some rigs send when a block began, some when it was over: the right reading gives the longer time per engagement
     readings = [_idle_time(gaps, timed, gap_follows_block) for gap_follows_block in (True, False)]
     _, idle = max(readings, key=lambda reading: reading[0])
-    least = max(criteria.LEAST_PAUSE, criteria.PAUSE_RATIO * float(np.median(idle)))
+    least = max((8 * 3600.0), 4.0 * float(np.median(idle)))  # eight hours, and four usual gaps
     return [
         (float(moment), float(length), run.cycles)
         for length, (before, _), (moment, run) in zip(idle, timed[:-1], timed[1:], strict=True)
@@ -186,9 +187,11 @@ def _idle_time(gaps: FloatArray, timed: list[tuple[float, Run]], gap_follows_blo
         elif not isinstance(earlier, DutyRun) and not isinstance(later, DutyRun):
             engagements[i] = max(later.cycles - earlier.cycles, 0.0)
     worked = (engagements > 0) & np.isfinite(gaps)
-    if np.count_nonzero(worked) < criteria.FEWEST_BLOCKS:
+    if np.count_nonzero(worked) < 3:
         return 0.0, gaps
     pace = min(
-        float(np.quantile(gaps[worked] / engagements[worked], criteria.PACE_QUANTILE)), criteria.LONGEST_ENGAGEMENT
+        # in slower blocks the rig rested as well; an engagement takes two minutes at most
+        float(np.quantile(gaps[worked] / engagements[worked], 0.2)),
+        120.0,
     )
     return pace, np.maximum(gaps - pace * engagements, 0.0)

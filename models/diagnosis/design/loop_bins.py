@@ -30,13 +30,14 @@ from models.records.runs import Record, plate_rise
 
 def period_differences(torque: FloatArray, bins: NDArray[np.intp], turns: FloatArray, count: int) -> FloatArray:
     """d [p - 1, count] Nm of torque [n] Nm in its bins [n] (0 ... count - 1) and turns since its start [n]; p is how many
-    turns were begun. NaN where no earlier period holds samples in the bin, or this period too few (FULL_BIN)."""
+    turns were begun. NaN where no earlier period holds samples in the bin, or this period too few."""
     turn = np.floor(turns).astype(np.intp)
     periods = int(turn.max(initial=0)) + 1
     cell = turn * count + bins
     samples = np.bincount(cell, minlength=periods * count).reshape(periods, count).astype(np.float64)
     sums = np.bincount(cell, weights=torque, minlength=periods * count).reshape(periods, count)
-    full = samples >= criteria.FULL_BIN * samples.max(axis=0)
+    # where the record begins or ends, samples lie elsewhere in the bin
+    full = samples >= (2 / 3) * samples.max(axis=0)
     samples, sums = np.where(full, samples, 0.0), np.where(full, sums, 0.0)
     before, sum_before = np.cumsum(samples, axis=0)[:-1], np.cumsum(sums, axis=0)[:-1]
     here, sum_here = samples[1:], sums[1:]
@@ -50,8 +51,6 @@ def period_differences(torque: FloatArray, bins: NDArray[np.intp], turns: FloatA
 PHASES, BINS = 180, 60
 #: Phases over which v^γ is averaged about each phase.
 _FINE = 6
-#: Speeds below this share of the highest are taken for this share, lest v^γ meets 0.
-_STANDSTILL = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +107,7 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
     notes: list[str] = []
     before: Cycle | None = None
     for stretch in pressure_stretches(time, pressure):
-        step = max(1, (stretch.stop - stretch.start) // criteria.MOST_SAMPLES)
+        step = max(1, (stretch.stop - stretch.start) // 4000)
         rows = slice(stretch.start, stretch.stop, step)
         sign = -1.0 if np.median(velocity[rows]) < 0 else 1.0
         samples = _Stretch(
@@ -138,7 +137,7 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
 def _speed_cycle(time: FloatArray, velocity: FloatArray, before: Cycle | None) -> Cycle | str:
     """The stretch's speed cycle: with the frequency of the stretch before where that fits here too, else fitted again."""
     count = SPEED_HARMONICS if before is None else before.cosine.size
-    step = 1 if count > SPEED_HARMONICS else max(1, time.size // criteria.CYCLE_SAMPLES)
+    step = 1 if count > SPEED_HARMONICS else max(1, time.size // 400)  # corners need every sample
     t, v = time[::step], velocity[::step]
     if before is not None and t.size > 4 * count:
         origin = 0.5 * float(t[0] + t[-1])
@@ -148,7 +147,8 @@ def _speed_cycle(time: FloatArray, velocity: FloatArray, before: Cycle | None) -
         noise = float(np.sqrt(((v - columns @ coefficients) ** 2).mean()))
         duration = float(time[-1] - time[0]) + float(time[-1] - time[0]) / max(time.size - 1, 1)
         periods = math.floor(duration * before.frequency + 0.01)
-        if periods >= 1 and noise <= criteria.SAME_CYCLE_RESIDUAL * before.noise + 1e-3 * before.amplitude:
+        # the same cycle serves this pressure
+        if periods >= 1 and noise <= 1.3 * before.noise + 1e-3 * before.amplitude:
             stop = float(time[0]) + duration
             return replace(
                 before,
@@ -189,7 +189,7 @@ def _binned(stretch: _Stretch, cycle: Cycle) -> BinnedLoop | str:
     phase = np.asarray(width * (np.arange(PHASES) + 0.5), dtype=np.float64)
     speed = cycle.value(phase)
     fastest = float(speed.max())
-    if not fastest > 0 or float(speed.min()) < -criteria.REVERSES * fastest:
+    if not fastest > 0 or float(speed.min()) < -0.03 * fastest:
         return "the speed changes sign; the loop was left out."
     settling = min(criteria.SETTLING_TIME, cycle.stop - cycle.begin - 1 / cycle.frequency)
     settled = cycle.begin + max(settling, criteria.SETTLING_SHARE / cycle.frequency)
@@ -199,9 +199,10 @@ def _binned(stretch: _Stretch, cycle: Cycle) -> BinnedLoop | str:
     position = sample_phase[inside] * (BINS / (2 * math.pi))
     number = np.minimum(position.astype(np.intp), BINS - 1)
     count = np.bincount(number, minlength=BINS).astype(np.float64)
-    slowest = criteria.LEAST_SPEED if cycle.cosine.size <= SPEED_HARMONICS else criteria.LEAST_SPEED_WITH_CORNERS
+    # slower it sticks; with corners bins cannot resolve how fast the cusp of S at rest is passed
+    slowest = 0.004 if cycle.cosine.size <= SPEED_HARMONICS else 0.012
     count[speed.reshape(BINS, -1).min(axis=1) < slowest * fastest] = 0.0
-    if np.count_nonzero(count) < criteria.FEWEST_BINS:
+    if np.count_nonzero(count) < 24:
         return "too few samples lie in whole periods."
     # a bin's samples are of several periods: its clock is their mean
     turns = np.floor(cycle.phase(time[inside]) / (2 * math.pi))
@@ -209,7 +210,7 @@ def _binned(stretch: _Stretch, cycle: Cycle) -> BinnedLoop | str:
     passed = phase / (2 * math.pi) + np.repeat(mean_turn, PHASES // BINS)
     duration = float(time[inside][-1] - time[inside][0])
     per_bin = np.count_nonzero(inside) / (max(duration * cycle.frequency, 0.1) * BINS)
-    moving = inside & (cycle.value(sample_phase) > criteria.LEAST_NOISE_SPEED * fastest)
+    moving = inside & (cycle.value(sample_phase) > 0.08 * fastest)  # slower a loop turns sharply, which is not noise
     angular = 2 * math.pi * cycle.frequency
     return BinnedLoop(
         pressure=stretch.pressure,
@@ -217,7 +218,7 @@ def _binned(stretch: _Stretch, cycle: Cycle) -> BinnedLoop | str:
         temperature=stretch.temperature,
         angular_frequency=angular,
         phase=phase,
-        velocity=_effective_velocity(cycle, time, stretch.velocity, _STANDSTILL * fastest),
+        velocity=_effective_velocity(cycle, time, stretch.velocity, 1e-5 * fastest),  # lest v^γ meets 0
         acceleration=angular * cycle.gradient(phase),
         plate_rise=_plate_rise(stretch, inside, number, phase),
         clock=np.asarray(cycle.origin + passed / cycle.frequency - stretch.test_start, dtype=np.float64),

@@ -17,15 +17,6 @@ from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried, life_of
 from models.friction.stribeck import PARAMETER_NAMES
 
-#: Usual size of all of them [-].
-USUAL_SIZE = 0.02
-#: A pressure or speed that differs from the one before by less than this share [-] was held.
-HELD_SHARE = 0.01
-#: Least share [-] of the plateaus that must have been reached from above, and from below: with fewer the direction is only
-#: another name for the level.
-LEAST_EACH_WAY = 0.1
-#: Time constants of a gain that settles [s], 0 for one that grows evenly, by its size in DRIFT_TIME [s].
-SETTLING_TIMES, DRIFT_TIME = (0.0, 60.0, 150.0, 400.0), 1800.0
 #: Powers of the cycles in which a gain creeps [-].
 CREEP_POWERS = (0.5, 1.0, 2.0)
 #: The first shape of a gain over life says whether it steps (at the cycle that follows) or creeps (by the power).
@@ -37,7 +28,7 @@ def last_direction(values: FloatArray, previous: IntArray) -> FloatArray:
     is the plateau before it, -1 where there is none; plateaus of a run follow each other."""
     has_previous = previous >= 0
     change = np.where(has_previous, values - values[np.maximum(previous, 0)], 0.0)
-    changed = ~has_previous | (np.abs(change) > HELD_SHARE * np.abs(values))
+    changed = ~has_previous | (np.abs(change) > 0.01 * np.abs(values))  # less than 1 % is the same level
     last_change = np.maximum.accumulate(np.where(changed, np.arange(values.size), 0))
     return np.asarray(np.sign(change)[last_change], dtype=np.float64)
 
@@ -45,7 +36,7 @@ def last_direction(values: FloatArray, previous: IntArray) -> FloatArray:
 def direction_if_both(scene: Scene, values: FloatArray) -> FloatArray:
     """`last_direction` [P] of values at the scene's points, or 0 where nearly all changes go one way."""
     direction = last_direction(values, scene.points.previous)
-    least = LEAST_EACH_WAY * np.count_nonzero(scene.points.steady)
+    least = 0.1 * np.count_nonzero(scene.points.steady)  # with fewer the direction is only another name for the level
     each_way = min(np.count_nonzero(direction > 0), np.count_nonzero(direction < 0))
     return direction if each_way >= max(least, 1.0) else np.zeros_like(direction)
 
@@ -64,7 +55,7 @@ def _gains_with_life(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _gains_with_clock(_facts: Facts) -> tuple[Tried, ...]:
-    return tuple(Tried(shape=(time, in_loops)) for time in SETTLING_TIMES for in_loops in (0.0, 1.0))
+    return tuple(Tried(shape=(time, in_loops)) for time in (0.0, 60.0, 150.0, 400.0) for in_loops in (0.0, 1.0))
 
 
 def _gain_with_life(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
@@ -76,7 +67,7 @@ def _gain_with_life(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
 def _gain_with_clock(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     time, in_loops = shape
     clock = np.maximum(scene.points.clock, 0.0)
-    share = -np.expm1(-clock / time) if time > 0 else clock / DRIFT_TIME
+    share = -np.expm1(-clock / time) if time > 0 else clock / 1800.0
     shown = scene.points.steady | (in_loops > 0)
     return np.asarray(amplitude * np.where(shown, share, 0.0) * scene.curve, dtype=np.float64)
 
@@ -125,8 +116,8 @@ def _fault(
         kind=Kind.ARTEFACT,
         amplitude="size",
         unit="-",
-        prior_sd=USUAL_SIZE,
-        shapes=tuple(ShapeParameter(name="course", unit="-", lowest=-np.inf, highest=np.inf) for _ in range(shapes)),
+        prior_sd=0.02,  # of all of them
+        shapes=tuple(ShapeParameter(name="course", unit="-") for _ in range(shapes)),
         grid=grid,
         change=change,
         before_lag=False,

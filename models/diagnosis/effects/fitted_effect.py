@@ -34,8 +34,6 @@ from models.diagnosis.effects.effect import (
 
 #: Steps of the differences: shares of the prior deviation and of a shape's range.
 _STEP = 1e-3
-#: A shape within this share of its range of a bound counts as at the bound (numerical: fits stop exactly there).
-_AT_BOUND = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +92,7 @@ def free_shapes(fitted: FittedEffect) -> NDArray[np.bool_]:
         min(value - shape.lowest, shape.highest - value) / (shape.highest - shape.lowest)
         for value, shape in fitted.effect.smooth(fitted.shape)
     ]
-    return np.array([True, *(margin > _AT_BOUND for margin in margins)])
+    return np.array([True, *(margin > 0.01 for margin in margins)])  # fits stop exactly there
 
 
 #: Along what φ is uncertain: the lowest value and the range in a campaign.
@@ -103,7 +101,6 @@ Ranges: TypeAlias = Mapping[Discrepancy, tuple[float, float]]
 #: and the harmonics of a loop of the latter.
 _ORDERS = {Discrepancy.SPEED: (1, 2), Discrepancy.LIFE: (1,), Discrepancy.CLOCK: (1,), Discrepancy.MOTION: (1,)}
 _SMALL = {Discrepancy.SPEED: 4, Discrepancy.PRESSURE: 2, Discrepancy.LIFE: 3, Discrepancy.CLOCK: 3}
-_HARMONICS = 2
 
 
 def drawn_change(drawn: FittedEffect, scene: Scene, ranges: Ranges) -> FloatArray:
@@ -144,7 +141,7 @@ def small_factors_at(points: Points, ranges: Ranges) -> FloatArray:
             unit = np.clip((values[along] - low) / width, 0.0, 1.0)
             factors.append(np.cos(np.pi * unit[:, None] * np.arange(1, orders + 1)))
     if ranges[Discrepancy.MOTION][1] > 0:
-        turns = points.phase[:, None] * np.arange(1, _HARMONICS + 1)
+        turns = points.phase[:, None] * np.arange(1, 2 + 1)
         waves = np.where(points.steady[:, None], 0.0, np.concatenate([np.cos(turns), np.sin(turns)], axis=1))
         factors += [np.where(points.steady, 1.0, 0.0)[:, None], waves]
     return np.concatenate(factors, axis=1)

@@ -50,7 +50,7 @@ RUNNING_IN = Effect(
     scale=100.0,
     shapes=(
         ShapeParameter(name="log of the length ζ_r", unit="ln cycles", lowest=3.0, highest=8.6, smooth=True),
-        ShapeParameter(name="what is changed", unit="-", lowest=0.0, highest=1.0),
+        ShapeParameter(name="what is changed", unit="-"),
     ),
     grid=_running_in_grid,
     change=_running_in_change,
@@ -95,7 +95,7 @@ OIL_CHANGE = Effect(
     prior_sd=0.15,
     scale=100.0,
     shapes=(
-        ShapeParameter(name="cycle ζ_k", unit="cycles", lowest=0.0, highest=float("inf")),
+        ShapeParameter(name="cycle ζ_k", unit="cycles"),
         ShapeParameter(name="share of M̄_c k", unit="-", lowest=-0.5, highest=0.5, smooth=True),
         ShapeParameter(name="share lost again as the oil ages", unit="-", lowest=0.0, highest=1.0, smooth=True),
     ),
@@ -136,8 +136,8 @@ ACCELERATED_WEAR = Effect(
     positive=True,
     scale=100.0,
     shapes=(
-        ShapeParameter(name="onset ζ_k", unit="cycles", lowest=0.0, highest=float("inf")),
-        ShapeParameter(name="power q", unit="-", lowest=0.5, highest=3.0),
+        ShapeParameter(name="onset ζ_k", unit="cycles"),
+        ShapeParameter(name="power q", unit="-"),
     ),
     grid=_accelerated_wear_grid,
     change=_accelerated_wear_change,
@@ -146,12 +146,9 @@ ACCELERATED_WEAR = Effect(
 )
 
 
-#: Blocks whose log energies differ by less than this cannot show a severity.
-_LEAST_SPREAD = 0.03
-
-
 def _load_severity_grid(facts: Facts) -> tuple[Tried, ...]:
-    if facts.duty_energies.size > 1 and np.ptp(np.log(facts.duty_energies)) > _LEAST_SPREAD:
+    # blocks that differ by less than 3 % cannot show a severity
+    if facts.duty_energies.size > 1 and np.ptp(np.log(facts.duty_energies)) > 0.03:
         return (Tried(shape=()),)
     return ()
 
@@ -193,9 +190,6 @@ LOAD_SEVERITY = Effect(
 )
 
 
-_HOUR, _MINUTE = 3600.0, 60.0
-
-
 def _rest_recovery_grid(facts: Facts) -> tuple[Tried, ...]:
     if not facts.rests or facts.states.size < 2:
         return ()
@@ -219,7 +213,7 @@ def _rest_recovery_change(scene: Scene, amplitude: float, shape: Shape) -> Float
         left = np.where(since >= 0, strength * np.exp(-np.maximum(since, 0.0) / length), 0.0)
         if seconds > 0 and np.isfinite(moment):
             waited = np.where(np.isfinite(points.moment), points.moment - moment, points.clock)
-            left = np.where(waited < -_MINUTE, 0.0, left)  # tested at the same cycles, but before the pause
+            left = np.where(waited < -60.0, 0.0, left)  # tested at the same cycles, but before the pause
             left = left * np.exp(-np.clip(waited, 0.0, 50 * seconds) / seconds)
         share = np.maximum(share, left)
     return np.asarray(amplitude * _carried(scene, part) * share, dtype=np.float64)
@@ -227,7 +221,7 @@ def _rest_recovery_change(scene: Scene, amplitude: float, shape: Shape) -> Float
 
 def _strengths(facts: Facts) -> FloatArray:
     """[r] What settles grows with the logarithm of the pause; 1 after the longest, and where the length is not known."""
-    grown = np.log1p(np.maximum(np.array(facts.rest_lengths, dtype=np.float64), 60.0) / _HOUR)
+    grown = np.log1p(np.maximum(np.array(facts.rest_lengths, dtype=np.float64), 60.0) / 3600.0)
     timed = np.isfinite(grown)
     return np.where(timed, grown / max(float(grown[timed].max(initial=0.0)), 1e-9), 1.0)
 
@@ -248,10 +242,10 @@ REST_RECOVERY = Effect(
     prior_sd=0.04,
     scale=100.0,
     shapes=(
-        ShapeParameter(name="length ζ_c", unit="cycles", lowest=1.0, highest=float("inf")),
-        ShapeParameter(name="settling time τ", unit="s", lowest=0.0, highest=float("inf")),
+        ShapeParameter(name="length ζ_c", unit="cycles"),
+        ShapeParameter(name="settling time τ", unit="s"),
         ShapeParameter(name="power of the rest's length r", unit="-", lowest=0.0, highest=2.0, smooth=True),
-        ShapeParameter(name="what is changed", unit="-", lowest=STATIC, highest=WHOLE),
+        ShapeParameter(name="what is changed", unit="-"),
     ),
     grid=_rest_recovery_grid,
     change=_rest_recovery_change,

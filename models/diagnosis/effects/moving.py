@@ -59,11 +59,6 @@ REFERENCE_PRESSURE = 5e5
 FIRST_ORDER, FILM, THICKNESS = 0.0, 1.0, 2.0
 #: The least time of such a thickness [s], and the power of speed that it stays below: with more it would be inertia.
 LEAST_TIME, MOST_POWER = 0.15, 0.55
-#: The log of the prior weight of such a thickness [nats]: eq. 7 ties strength and time together.
-UNTIED = -1.0
-#: To first order torque falls faster with speed than the film's lag does, for fewer asperities touch: by this power more. A
-#: film of any other kind would be the same at all speeds, as inertia is.
-FEWER = 0.5
 #: A film is followed for this share of a period before its course is taken: it no longer depends on where it began.
 _BEFORE = 1 / 3
 #: Points of a swing from which a film's usual slope is computed.
@@ -82,7 +77,7 @@ def _squeeze_film_grid(_facts: Facts) -> tuple[Tried, ...]:
     layers = [(-0.2, y, f, time, THICKNESS, 0.0) for y in (0.5, 1.2) for f in (0.03, 0.15) for time in (0.2, 0.8)]
     return tuple(
         Tried(shape=shape, log_weight=weight - float(np.log(len(shapes))))
-        for shapes, weight in ((powers, 0.0), (films, 0.0), (layers, UNTIED))
+        for shapes, weight in ((powers, 0.0), (films, 0.0), (layers, (-1.0)))  # eq. 7 ties strength and time together
         for shape in shapes
     )
 
@@ -102,7 +97,9 @@ def _squeeze_film_changes(scene: Scene, settings: Sequence[tuple[float, Shape]])
     for i, (amplitude, (power, thin, least, _, form, _)) in enumerate(settings):
         if form == FIRST_ORDER:
             strength = amplitude * points.engaged * (points.pressure / REFERENCE_PRESSURE) ** power
-            out[:, i] = strength * points.acceleration / (speed + least) ** (thin + FEWER)
+            # torque falls faster with speed by 1/2, for fewer asperities touch; else a film would be the same at all
+            # speeds, as inertia is
+            out[:, i] = strength * points.acceleration / (speed + least) ** (thin + 0.5)
         elif form == THICKNESS and looping.size:
             out[looping, i] = _over_thickness(scene, looping, amplitude, settings[i][1])
     if films:
@@ -193,8 +190,8 @@ SQUEEZE_FILM = Effect(
         ShapeParameter(name="power of speed y", unit="-", lowest=0.4, highest=1.8, smooth=True),
         ShapeParameter(name="least film f", unit="-", lowest=0.003, highest=0.3, smooth=True),
         ShapeParameter(name="power of shear s, or log10 of τ/0.15 s", unit="-", lowest=0.0, highest=1.2, smooth=True),
-        ShapeParameter(name="how the film is followed", unit="-", lowest=0.0, highest=2.0),
-        ShapeParameter(name="whether friction lags behind it", unit="-", lowest=0.0, highest=1.0),
+        ShapeParameter(name="how the film is followed", unit="-"),
+        ShapeParameter(name="whether friction lags behind it", unit="-"),
     ),
     grid=_squeeze_film_grid,
     change=_squeeze_film_change,

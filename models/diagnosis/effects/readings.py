@@ -34,7 +34,6 @@ STEP, CLOCK, SETTLING, LIFE, DAYS = 0.0, 1.0, 2.0, 3.0, 4.0
 #: or by days; their powers q, and s (chosen: so close that the size moves by about its own deviation from one to the next).
 EVEN, EVEN_DAYS, FLATTENING, FLATTENING_DAYS = 5.0, 6.0, 7.0, 8.0
 POWERS, FLATTENED = (0.5, 0.7, 1.0, 1.4, 2.0), (0.1, 0.3, 1.0)
-_HOUR = 3600.0
 #: Times [s] after which a zero has settled to 1/e, each refined by the factor e^x, x the first of the knots below.
 TIMES = (120.0, 400.0)
 #: Knots over life at which a zero may be off its straight course, in amplitudes; on a straight course it is off by none.
@@ -78,7 +77,7 @@ def _torque_zero_shift_change(scene: Scene, amplitude: float, shape: Shape) -> F
     if course == STEP:
         share = np.where(cycles > value, 1.0, 0.0)
     elif course == CLOCK:
-        share = clock / _HOUR * 2.0
+        share = clock / 3600.0 * 2.0
     elif course == SETTLING:
         share = -np.expm1(-np.maximum(clock, 0.0) / (value * np.exp(off[0])))
     else:
@@ -113,8 +112,8 @@ TORQUE_ZERO_SHIFT = Effect(
     unit="Nm",
     prior_sd=0.5,
     shapes=(
-        ShapeParameter(name="course", unit="-", lowest=0.0, highest=8.0),
-        ShapeParameter(name="onset or settling time", unit="cycles or s", lowest=-1.0, highest=float("inf")),
+        ShapeParameter(name="course", unit="-"),
+        ShapeParameter(name="onset or settling time", unit="cycles or s"),
         *(
             ShapeParameter(
                 name=f"off its course at {share:.0%} of life, or log of the settling time's factor",
@@ -191,8 +190,8 @@ PRESSURE_OFFSET = Effect(
     prior_sd=0.15e5,
     scale=1e-5,
     shapes=(
-        ShapeParameter(name="course", unit="-", lowest=0.0, highest=3.0),
-        ShapeParameter(name="onset or s", unit="cycles or -", lowest=0.0, highest=float("inf")),
+        ShapeParameter(name="course", unit="-"),
+        ShapeParameter(name="onset or s", unit="cycles or -"),
         ShapeParameter(
             name="log of the power q", unit="-", lowest=math.log(0.3), highest=math.log(3.0), smooth=True, held=True
         ),
@@ -209,12 +208,10 @@ PRESSURE_OFFSET = Effect(
 #: What a plateau starts from: the torque before, or the speed before (the film's), at the same pressure or across a change
 #: too.
 TORQUE, TORQUE_WITHIN, SPEED = 0.0, 1.0, 2.0
-#: Of the share that is read, this much is still there at the dwell's end, to be carried on: all where only that is read.
-CARRIED = 0.5
 
 
 def _unsettled_dwell_grid(_facts: Facts) -> tuple[Tried, ...]:
-    return tuple(Tried(shape=(start, CARRIED)) for start in (TORQUE, TORQUE_WITHIN, SPEED))
+    return tuple(Tried(shape=(start, 0.5)) for start in (TORQUE, TORQUE_WITHIN, SPEED))
 
 
 def _unsettled_dwell_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
@@ -253,7 +250,7 @@ UNSETTLED_DWELL = Effect(
     positive=True,
     scale=100.0,
     shapes=(
-        ShapeParameter(name="what a plateau starts from", unit="-", lowest=0.0, highest=2.0),
+        ShapeParameter(name="what a plateau starts from", unit="-"),
         ShapeParameter(name="of the share, what is carried on, k", unit="-", lowest=0.0, highest=1.0, smooth=True),
     ),
     grid=_unsettled_dwell_grid,

@@ -176,8 +176,8 @@ INTERFACE_HEATING = Effect(
     scale=100.0,
     shapes=(
         ShapeParameter(name="log of the settling time τ", unit="ln s", lowest=-5.0, highest=6.0, smooth=True),
-        ShapeParameter(name="what weakens", unit="-", lowest=0.0, highest=1.0),
-        ShapeParameter(name="saturation s", unit="-", lowest=0.0, highest=6.0),
+        ShapeParameter(name="what weakens", unit="-"),
+        ShapeParameter(name="saturation s", unit="-"),
     ),
     grid=_interface_heating_grid,
     change=_interface_heating_change,
@@ -210,15 +210,12 @@ VISCOUS_EXPONENT = Effect(
 )
 
 
-#: Log prior odds [nats] against a film that ruptures or a drag independent of viscosity: Newton's has neither.
-_UNUSUAL = 1.5
-
-
 def _hydrodynamic_drag_grid(facts: Facts) -> tuple[Tried, ...]:
     thinning = (0.0, 1.0) if facts.temperature_measured else (0.0,)
     courses = ((0.6, 0.0), (1.0, 0.0), (1.5, 0.0), (1.0, 0.5), (1.0, 2.0))
     return tuple(
-        Tried(shape=(power, rupture, t, lags), log_weight=-_UNUSUAL * ((rupture > 0.0) + (t < max(thinning))))
+        # Newton's has neither rupture nor an independence of viscosity
+        Tried(shape=(power, rupture, t, lags), log_weight=-1.5 * ((rupture > 0.0) + (t < max(thinning))))
         for power, rupture in courses
         for t in thinning
         for lags in (0.0, 1.0)
@@ -248,9 +245,9 @@ HYDRODYNAMIC_DRAG = Effect(
     positive=True,
     shapes=(
         ShapeParameter(name="power m", unit="-", lowest=0.5, highest=1.8, smooth=True),
-        ShapeParameter(name="rupture of the film r", unit="-", lowest=0.0, highest=5.0),
-        ShapeParameter(name="viscosity's exponent t", unit="-", lowest=0.0, highest=1.0),
-        ShapeParameter(name="whether friction lags behind it", unit="-", lowest=0.0, highest=1.0),
+        ShapeParameter(name="rupture of the film r", unit="-"),
+        ShapeParameter(name="viscosity's exponent t", unit="-"),
+        ShapeParameter(name="whether friction lags behind it", unit="-"),
     ),
     grid=_hydrodynamic_drag_grid,
     change=_hydrodynamic_drag_change,

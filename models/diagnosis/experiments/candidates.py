@@ -22,14 +22,12 @@ from models.records.runs import Plateaus, Record
 
 #: The dynamic test of the reference (section 2.3.4): a swing of 1000 rpm about 1000 rpm, sampled at 200 a period.
 SWING = 1000 * 2 * np.pi / 60
-_SAMPLES, _PERIODS = 200, 10
+_SAMPLES = 200
 _HOUR = 3600.0
 #: Light pressures of loops, as multiples: far enough apart to be distinguished.
 LIGHT = (1.0, 1.5, 2.0)
 #: Sweeps over the speeds in a run with the clutch open: there is one pressure only, none.
 PASSES = 5
-#: Pressures of at least this share of the highest are the usual ones.
-USUAL = 0.75
 
 Run = TypeVar("Run", StationaryRun, DynamicRun)
 
@@ -185,7 +183,7 @@ def _usual(runs: Sequence[tuple[Run, Plateaus | Record]], trial: Trial) -> Run |
     """The last run under the usual pressures, not one of those that a trial at light pressures or none has added; none where
     the trial's share of its lowest pressure would leave the clutch open."""
     highest = max((float(table.pressure.max()) for _, table in runs), default=0.0)
-    usual = [pattern for pattern in runs if max(USUAL * highest, UNLOADED) <= float(pattern[1].pressure.max())]
+    usual = [pattern for pattern in runs if max(0.75 * highest, UNLOADED) <= float(pattern[1].pressure.max())]
     if not usual:
         return None
     run, table = usual[-1]
@@ -233,7 +231,7 @@ def _loops(pattern: DynamicRun, trial: Trial, cycles: float) -> DynamicRun:
     levels = levels[levels >= UNLOADED]
     if trial.pressure != 1.0:
         levels = trial.pressure * float(levels[0]) * np.array(LIGHT if trial.pressure > 0.0 else LIGHT[:1])
-    count = _SAMPLES * _PERIODS + 1
+    count = _SAMPLES * 10 + 1
     step = 1.0 / (trial.frequency * _SAMPLES)
     phase = 2 * np.pi * np.arange(count) / _SAMPLES
     speed = np.tile(SWING * (1 - np.cos(phase)), levels.size)

@@ -139,7 +139,7 @@ def _joined(first: Gram, second: Gram) -> Gram:
 
 def _noise_law(problem: FitProblem, torque: FloatArray) -> FloatArray:
     """(a², b²) [2, 2] of plateaus and of loops, σ² = (a² + b² M²)/n as `noise.estimate` has it; a² is no less than
-    LEAST_NOISE has it."""
+    for noise at no torque of a fifth of the usual."""
     design = problem.design
     steady = np.arange(design.torque.size) < design.plateaus
     variance = problem.noise.deviation**2 * design.samples
@@ -149,7 +149,8 @@ def _noise_law(problem: FitProblem, torque: FloatArray) -> FloatArray:
         columns = np.stack([np.ones(int(part.sum())), torque[part] ** 2], axis=1) / variance[part, None]
         scale = columns.mean(axis=0)
         law = nnls(columns / scale, np.ones(columns.shape[0]))[0] / scale
-        laws.append([max(law[0], criteria.LEAST_NOISE**2 * float(np.median(variance[part]))), law[1]])
+        # data under torque hardly determine the noise at zero
+        laws.append([max(law[0], 0.2**2 * float(np.median(variance[part]))), law[1]])
     return np.array(laws)
 
 

@@ -2,8 +2,8 @@
 
 With Δ_ab what a trial adds to λ_ab (`experiments.information`), evidence for a against b would, if a is true, be about
 normal afterwards: its mean what it is now, and Δ, and the change of what the freedom of both is worth; its variance 1 + 2Δ
-+ (PREDICTION_ERROR Δ)². a is left alone where the odds are those of SURE, for every b. Trials are ranked by the probability
-of that, over the candidates by their evidence, less COST_OF_RUN a run; of those that are sure to decide (SURE) the shortest
++ (0.4 Δ)². a is left alone where the odds are those of SURE, for every b. Trials are ranked by the probability
+of that, over the candidates by their evidence, less 0.005 a run; of those that are sure to decide (SURE) the shortest
 comes first. Of a cause without a rival the size is what is left to learn: the trial that narrows it most, less the same a
 run.
 """
@@ -39,7 +39,7 @@ def rivals_of(judgement: Judgement) -> tuple[tuple[Fitted, ...], tuple[Fitted, .
     nearby = [
         other
         for other in judgement.others
-        if len(other.slugs) == len(best.slugs) and other.evidence > best.evidence - criteria.RIVAL_MARGIN
+        if len(other.slugs) == len(best.slugs) and other.evidence > best.evidence - 8.0
     ]
     return judgement.stand, tuple(nearby)
 
@@ -82,7 +82,7 @@ def advise(
     race = [rival for rival in credible if rival.fit.effects]
     if not race:
         return ()
-    rivals = [*race, *nearby][: max(len(race), criteria.MOST_RIVALS)]
+    rivals = [*race, *nearby][: max(len(race), 4)]  # more take too long
     fits = [rival.fit for rival in rivals]
     evidences = np.array([rival.evidence for rival in rivals], dtype=np.float64)
     distances = CandidateDistances(problem, (*fits, bare(fits[0])))
@@ -90,7 +90,7 @@ def advise(
     ranked = []
     for key, rows in trials_of(campaign, problem.design, distances).items():
         chance, other, nats = _brought(before, distances.with_freedom(rows), evidences, len(race))
-        if np.isfinite(chance) and nats > criteria.LEAST_ADVISED:
+        if np.isfinite(chance) and nats > 0.1:
             effect, rival = _names(fits[0], fits[other] if len(race) > 1 else None)
             narrows = distances.size_left(rows) if len(race) == 1 else 0.0
             advice = Advice(
@@ -105,7 +105,8 @@ def advise(
             )
             # alone in the race, a cause is sure: what is left to learn is its size
             worth = chance if len(race) > 1 else -narrows
-            ranked.append(((worth - criteria.COST_OF_RUN * runs_of(key), nats), advice))
+            # probability that a run must add for the work that it is
+            ranked.append(((worth - 0.005 * runs_of(key), nats), advice))
     first = _thermometer(campaign, problem, fits)
     ranked.sort(key=lambda trial: trial[0], reverse=True)
     worthy = [advice for i, (_, advice) in enumerate(ranked) if i == 0 or advice.nats >= criteria.WORTHWHILE]
@@ -114,7 +115,7 @@ def advise(
             (advice for advice in worthy if advice.probability >= criteria.SURE), key=lambda advice: advice.minutes
         )
         worthy = [*sure, *(advice for advice in worthy if advice not in sure)]
-    return (*first, *worthy)[: criteria.MOST_ADVISED]
+    return (*first, *worthy)[:3]
 
 
 def _brought(
@@ -152,7 +153,7 @@ def distinguished(nats: FloatArray, lead: FloatArray | float = 0.0) -> FloatArra
     """The probability that a candidate, if it is true, is left (SURE) against a rival that is behind by `lead` nats and
     expected to fall behind by so many `nats` more."""
     odds = np.log(criteria.SURE / (1 - criteria.SURE))
-    sd = np.sqrt(1.0 + 2.0 * nats + (criteria.PREDICTION_ERROR * nats) ** 2)
+    sd = np.sqrt(1.0 + 2.0 * nats + (0.4 * nats) ** 2)  # a predicted λ is off by 40 %
     return np.asarray(ndtr((lead + nats - odds) / sd), dtype=np.float64)
 
 

@@ -22,7 +22,6 @@ Add: TypeAlias = Callable[[str, FloatArray], None]
 
 #: Waves of a nonlinear sensor over its range; ripples over speed (an encoder's, a mount's).
 TORQUE_WAVES, SPEED_WAVES = 20, range(4, 17)
-_LEAST_WAVE = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +56,8 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
         for z in range(1, lives + 1):
             add(SPEED if s > z + 1 else CYCLES, _cosine(s, speed) * _cosine(z, life) * steady)
     for wave in _speed_waves(design, prediction).T:
-        if np.abs(wave).max() > _LEAST_WAVE * torque.max():  # at even speeds a sine may be 0 at each
+        # at even speeds a sine may be 0 at each
+        if np.abs(wave).max() > 1e-6 * torque.max():  # at even speeds a sine may be 0 at each
             columns.append(wave)
             axes.append(SPEED)
     for p, z, s in product(range(1, presses + 1), range(1, min(lives, 2) + 1), range(1, 4)):

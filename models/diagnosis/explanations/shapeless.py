@@ -45,11 +45,9 @@ from models.gaussian_evidence import log_gain, log_mean, log_sum
 
 #: Steps of half a cycle a test: the first (two and a half cycles), slower ones that it must exceed, and the size of a
 #: neighbourhood.
-_FIRST, _SLOWER, _NEIGHBOURS = 5, 3, 61
+_SLOWER = 3
 #: Fewer plateaus in all, or in the longest run, show no line.
-_FEWEST, _FEWEST_IN_A_RUN = 64, 32
-#: Frequencies at most, and gaps between plateaus, in usual steps, beyond which a pause is shortened to that length.
-_MOST, _LONGEST_GAP = 4000, 5.0
+_FEWEST_IN_A_RUN = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,19 +88,20 @@ def lines(problem: FitProblem, residual: FloatArray) -> HighestLine:
     """The highest line, summed over the runs."""
     runs = _runs(problem.design, problem.noise, residual)
     longest = max((run.time.size for run in runs), default=0)
-    if sum(run.time.size for run in runs) < _FEWEST or longest < _FEWEST_IN_A_RUN:
+    if sum(run.time.size for run in runs) < 64 or longest < _FEWEST_IN_A_RUN:
         return HighestLine()
     kept = [run for run in runs if run.time.size > 0.5 * longest]
     duration = float(np.median([run.time[-1] * run.time.size / (run.time.size - 1) for run in kept]))
     step = float(np.median([np.median(np.diff(run.time)) for run in kept]))
-    last = min(int(duration / step), _MOST) if step > 0.0 else 0
+    last = min(int(duration / step), 4000) if step > 0.0 else 0
     if last < _FEWEST_IN_A_RUN:
         return HighestLine()
-    power = np.sum([run.power(_FIRST - _SLOWER, last, np.pi / duration) for run in kept], axis=0)
+    # from two and a half cycles a test on, beside three slower steps
+    power = np.sum([run.power(5 - _SLOWER, last, np.pi / duration) for run in kept], axis=0)
     # a line is above its neighbourhood: noise whose autocorrelation was misjudged is not
     middle = float(gammaincinv(len(kept), 0.5))
     for column in power.T:
-        column /= np.maximum(median_filter(column, size=_NEIGHBOURS, mode="reflect") / middle, 1.0)
+        column /= np.maximum(median_filter(column, size=61, mode="reflect") / middle, 1.0)
     # ... and above everything slower: structure that is larger the slower it is has no period
     slower = np.maximum.accumulate(power, axis=0)[_SLOWER - 1 : -1]
     power = np.where(power[_SLOWER:] >= slower, power[_SLOWER:], 0.0)
@@ -128,7 +127,7 @@ def _runs(design: Design, noise: Noise, residual: FloatArray) -> list[_Run]:
         usual = float(np.median(steps[1:])) if mine.size > 1 else 0.0
         runs.append(
             _Run(
-                time=np.cumsum(np.minimum(steps, _LONGEST_GAP * usual)),
+                time=np.cumsum(np.minimum(steps, 5.0 * usual)),  # longer pauses are shortened
                 left=left - along * float(along @ left) / max(float(along @ along), 1e-300),
                 weights=np.stack([1 / deviation, np.abs(design.torque[mine]) / deviation], axis=1),
             )
@@ -139,7 +138,7 @@ def _runs(design: Design, noise: Noise, residual: FloatArray) -> list[_Run]:
 #: What to do about it.
 ADVICE = "Check that run first."
 #: Orders of the cosines over speed and pressure, and deviations τ of their coefficients, shares of the usual torque.
-_SPEED, _PRESSURE, _SIZES = 4, 2, (0.1, 1.0)
+_SIZES = (0.1, 1.0)
 
 
 def outlying_run(problem: FitProblem, fitted: Fit) -> str:
@@ -181,7 +180,7 @@ def outlier_evidence(problem: FitProblem, fitted: Fit) -> float:
 def _own_curve(design: Design, here: NDArray[np.bool_]) -> FloatArray:
     """[N, m] Nm per unit: smooth in speed and pressure, in one run alone."""
     waves = [np.ones((here.size, 1))]
-    for values, orders in ((design.rows.velocity, _SPEED), (design.rows.pressure, _PRESSURE)):
+    for values, orders in ((design.rows.velocity, 4), (design.rows.pressure, 2)):
         unit = (values - values.min()) / max(float(np.ptp(values)), 1e-300)
         own = np.cos(np.pi * unit[:, None] * np.arange(orders + 1))
         waves.append((waves[-1][:, :, None] * own[:, None, :]).reshape(here.size, -1))
@@ -196,14 +195,11 @@ def _worst(problem: FitProblem, fitted: Fit) -> tuple[int | None, FloatArray]:
     count = np.bincount(design.rows.run, minlength=len(design.runs))
     beyond = np.maximum(np.bincount(design.rows.run, weights=squares, minlength=len(design.runs)) - count, 0.0)
     worst = int(np.argmax(beyond))
-    least = max(criteria.OUTLYING_SHARE * beyond.sum(), criteria.OUTLYING_DEVIATIONS**2 * count[worst])
-    if np.count_nonzero(count) < criteria.OUTLYING_FEWEST_RUNS or beyond[worst] < least:
+    # this share of all error beyond noise, and an RMS error of so many deviations
+    least = max(0.6 * beyond.sum(), 2.0**2 * count[worst])
+    if np.count_nonzero(count) < 4 or beyond[worst] < least:
         return None, left
     return worst, left
-
-
-#: Harmonics of a test's duration.
-_WAVES = 4
 
 
 def temperature_evidence(problem: FitProblem, fitted: Fit) -> float:
@@ -218,7 +214,8 @@ def temperature_evidence(problem: FitProblem, fitted: Fit) -> float:
 def _averaged(projected: Projected, between: FloatArray, within: FloatArray) -> float:
     """Over the strengths."""
     strengths = product(criteria.CHANGES_BETWEEN_TESTS, criteria.CHANGES_WITHIN_TESTS)
-    sds = [criteria.USUAL_VISCOSITY_CHANGE * (b * between + w * within) for b, w in strengths]
+    # of ln ν by some 3 K, as ASTM D341 has it near 85 °C
+    sds = [0.06 * (b * between + w * within) for b, w in strengths]
     return log_mean([log_gain(projected.info, projected.score, sd) for sd in sds])
 
 
@@ -234,7 +231,7 @@ def _courses(design: Design, fitted: Fit) -> tuple[FloatArray, FloatArray, Float
         if not design.rows.steady[here].all():
             continue
         turn = 2 * np.pi * design.rows.clock / max(float(np.ptp(design.rows.clock[here])), 1e-9)
-        for k in range(1, _WAVES + 1):
+        for k in range(1, 4 + 1):
             columns += [own * np.cos(k * turn), own * np.sin(k * turn)]
             relative += [1.0 / k, 1.0 / k]
     within = np.array(relative)

@@ -199,7 +199,7 @@ def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
                         break
                     log = evidence_of(problem, refit, smooth=False).whole + kind[index].log_weight
                     best = max(best, log)
-                    if log < best - criteria.COURSE_NEGLIGIBLE:
+                    if log < best - 10.0:  # e^-10
                         break
                     near, laws = refit.effects, refit.laws
                     yield log, refit

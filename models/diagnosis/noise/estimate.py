@@ -32,8 +32,6 @@ from models.diagnosis.noise.covariance import Noise
 
 #: Longer curves are cut, for the basis of a piece costs its length cubed; short pieces have so many rows at most.
 _LONGEST, _SHORT = 120, 15
-#: The degree up to which an error over pressure is smooth: the laws over pressure are of the first with a curvature.
-_OVER_PRESSURE = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +69,7 @@ def pieces_across_curves(design: Design, part: NDArray[np.bool_]) -> list[Piece]
     speed = np.round(rows.velocity / max(float(rows.velocity.max()), 1e-300), 2)
     pieces = list[Piece]()
     for across, fixed, degree in (
-        (rows.pressure, rows.run, _OVER_PRESSURE),
+        (rows.pressure, rows.run, 2),
         (rows.cycles, design.level, criteria.SMOOTH_DEGREE),
     ):
         same = np.unique(np.stack([speed, fixed], axis=1), axis=0, return_inverse=True)[1]
@@ -155,11 +153,9 @@ def estimate_correlation(
     grid = [Correlation(), *(Correlation(share=share, decay=decay) for share in _SHARES for decay in _DECAYS)]
     expected, price = Correlation(), criteria.CORRELATION_PRICE
     if from_samples is not None:
-        expected, price = Correlation.of_neighbours(*from_samples), criteria.CORRELATION_PRICE_FROM_SAMPLES
+        expected, price = Correlation.of_neighbours(*from_samples), 5.0  # they are more than bins are
         grid = [expected, *grid]
-    if (
-        len(groups) > criteria.MOST_KINDS
-    ):  # loops whose bins all differ: each would have a likelihood of its own to be factorised
+    if len(groups) > 40:  # loops whose bins all differ: each would have a likelihood of its own to be factorised
         grid = grid[:1]
     unit = {size: np.eye(size) for size in {series.size for series in period_differences}}
     for series in period_differences:
@@ -169,7 +165,8 @@ def estimate_correlation(
     for number, correlation in enumerate(grid):
         likelihood, variance = _restricted_likelihood(correlation, groups)
         off = abs(float(np.log(correlation.variance_inflation / expected.variance_inflation)))
-        logs.append(likelihood - (0.0 if number == 0 else price) - criteria.INFLATION_PRICE * off)
+        # slow noise was taken off with everything smooth, so the data say little about it
+        logs.append(likelihood - (0.0 if number == 0 else price) - 2.0 * off)
         variances.append(variance)
     weights = np.exp(np.array(logs) - max(logs))
     weights /= weights.sum()
@@ -197,12 +194,6 @@ def _restricted_likelihood(
     return -0.5 * (free * np.log(variance) + logdet), variance
 
 
-#: The median of a squared standard normal variable.
-_MEDIAN_SQUARE = 0.455
-#: Rounds of reweighted least squares, and the multiple of the fitted variance at which squares are cut there.
-_ROUNDS, _LARGEST_SQUARE = 4, 12.0
-
-
 def first_noise(design: Design) -> Noise:
     """Before anything is fitted: the assumed share of the torque."""
     level = design.usual_torque
@@ -210,7 +201,8 @@ def first_noise(design: Design) -> Noise:
         np.minimum(design.samples, 30)
     )
     white = Correlation()
-    return Noise(deviation=deviation, plateaus=white, loops=white, run_gain=criteria.FIRST_GAIN, curve_gain=0.0)
+    # some tenths of a percent are usual
+    return Noise(deviation=deviation, plateaus=white, loops=white, run_gain=0.002, curve_gain=0.0)
 
 
 def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, before: Noise) -> tuple[Noise, bool]:
@@ -238,7 +230,7 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
         deviation[part] *= scale
         correlations.append(correlation)
     spiky = (np.abs(residual) > criteria.SPIKE * deviation) & _isolated(design, residual, deviation)
-    if spiky.mean() < criteria.MOST_SPIKES:
+    if spiky.mean() < 0.02:  # fewer are spikes
         deviation = np.where(spiky, np.abs(residual), deviation)
     return replace(before, deviation=deviation, plateaus=correlations[0], loops=correlations[1]), assumed
 
@@ -253,12 +245,12 @@ def _variance(pieces: Sequence[Piece], residual: FloatArray, torque: FloatArray,
     remainder = np.concatenate([piece.remainder(residual) for piece in pieces])
     leverage = np.concatenate([(piece.contrasts**2).sum(axis=1) for piece in pieces])
     squares = remainder**2 / np.maximum(leverage, 0.05) * samples[rows]
-    usual = max(float(np.median(squares)) / _MEDIAN_SQUARE, 1e-30)
+    usual = max(float(np.median(squares)) / 0.455, 1e-30)  # the median of a squared standard normal variable
     level = max(float(np.mean(torque**2)), 1e-30)
     columns = np.stack([np.full(rows.size, 1.0), torque[rows] ** 2 / level], axis=1)
     fitted = np.full(rows.size, usual)
-    for _ in range(_ROUNDS):
-        cut = np.minimum(squares, _LARGEST_SQUARE * fitted)
+    for _ in range(4):
+        cut = np.minimum(squares, 12.0 * fitted)
         (constant, proportional), _ = nnls(columns / fitted[:, None], cut / fitted)
         fitted = np.maximum(columns @ np.array([constant, proportional]), 1e-4 * usual)
     return np.asarray(np.maximum(constant + proportional * torque**2 / level, 1e-4 * usual) / samples, dtype=np.float64)
@@ -269,7 +261,7 @@ def _relative_differences(design: Design, variance: FloatArray, part: NDArray[np
     return [
         differences / np.sqrt(variance[rows] * design.samples[rows])
         for rows, differences in design.period_differences
-        if rows.size >= criteria.LEAST_COMPARED_BINS and part[rows[0]]
+        if rows.size >= 8 and part[rows[0]]
     ]
 
 

@@ -23,10 +23,8 @@ from models.diagnosis.noise.covariance import whitening
 from models.diagnosis.pooled_fit.problem import FitProblem, Priors
 
 #: Gauss-Newton steps where the caller asks for no other number, and damped trials for each.
-STEPS, _TRIALS = 30, 8
+STEPS = 30
 _LARGEST_STEP = 1.5
-#: When a step lowers the cost by less than this [nats] the fit has converged.
-_SMALL = 0.01
 #: Columns [N, m] with noise and gains whitened.
 Whiten: TypeAlias = Callable[[FloatArray], FloatArray]
 
@@ -73,7 +71,7 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
     for _ in range(steps):
         gram, gradient = _normal(problem, white, state)
         fallen = 0.0
-        for _ in range(_TRIALS):
+        for _ in range(8):
             step = _inside(state, priors, gram + damping * np.diag(np.diag(gram)), gradient)
             trial = _moved(state, priors, step)
             if trial is not None:
@@ -91,7 +89,7 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
             status = FitStatus.STALLED
             break
         state, made = candidate, made + 1
-        if fallen < _SMALL:
+        if fallen < 0.01:  # nats
             status = FitStatus.CONVERGED
             break
     return replace(state, status=status if np.isfinite(state.cost) else FitStatus.NOT_FINITE, steps=made)

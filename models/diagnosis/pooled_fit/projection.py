@@ -156,7 +156,8 @@ def project(gram: Gram, run_gain: float, curve_gain: float) -> Projected:
     left = full[base:, base:] - half.T @ half
     fitted = float(np.log(np.diag(factor)).sum() - np.log(scale).sum())
     miss = float(left[-1, -1])
-    prior = log_gain_prior(run_gain) - float(np.log1p((curve_gain / criteria.SMALL_CURVE_GAIN) ** 2))
+    # a controller that comes back to 0.005 bar makes 0.1 %
+    prior = log_gain_prior(run_gain) - float(np.log1p((curve_gain / 1e-3) ** 2))
     profile = -0.5 * (miss + added) + prior
     return Projected(
         info=left[:-1, :-1],
@@ -197,11 +198,6 @@ def amplitude_deviations(problem: FitProblem, fitted: Fit) -> list[float]:
     return [float(np.sqrt(max(inverse[place, place], 0.0))) for place in places]
 
 
-#: Points of the grid over ln σ_g (numerical: the spline is smooth between the gains that were projected).
-_POINTS = 601
-_LEVELS = (0.05, 0.5, 0.95)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunScatter:
     """Relative scatter of the runs' gains [-]: median, 90 % interval, and what data say of it beyond the prior [nats]."""
@@ -224,10 +220,10 @@ def run_scatter(projections: Sequence[Projected]) -> RunScatter:
         float(logsumexp([projected.evidence for projected in projections if projected.run_gain == gain]))
         for gain in gains
     ]
-    logs = np.linspace(np.log(gains[0]), np.log(gains[-1]), _POINTS)
+    logs = np.linspace(np.log(gains[0]), np.log(gains[-1]), 601)
     posterior = _normalised(CubicSpline(np.log(gains), by_gain)(logs))
     prior = _normalised(np.array([log_gain_prior(gain) for gain in np.exp(logs).tolist()]))
-    lower, median, upper = np.exp(np.interp(_LEVELS, np.cumsum(np.exp(posterior)), logs)).tolist()
+    lower, median, upper = np.exp(np.interp((0.05, 0.5, 0.95), np.cumsum(np.exp(posterior)), logs)).tolist()
     information = float(np.exp(posterior) @ (posterior - prior))
     return RunScatter(median=median, lower=lower, upper=upper, information=information)
 

@@ -104,10 +104,6 @@ def _averaged(record: Record, first: int, stop: int, count: int) -> Piece:
     return Piece(time=time, speed=speed, torque=torque)
 
 
-#: Points at which the autoregression's gain is tabulated.
-_GAINS = 512
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WhitenedRecord:
     """The samples of a record's pieces, one after the other: time [n] s, speed [n] rad/s, torque [n] Nm (the spline's).
@@ -215,7 +211,7 @@ def _whitened(pieces: Sequence[Piece], step: float, between: int, least_variance
         starts=tuple(np.cumsum([0, *(series.size for series in fast)]).tolist()),
         step=step,
         lowest=LOWEST_CYCLES / (between * step),
-        gain=np.asarray(np.abs(np.fft.rfft(polynomial, 2 * _GAINS)) ** 2, dtype=np.float64),
+        gain=np.asarray(np.abs(np.fft.rfft(polynomial, 2 * 512)) ** 2, dtype=np.float64),
     )
 
 

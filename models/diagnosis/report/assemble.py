@@ -40,7 +40,7 @@ def candidates_of(
     alone = [fitted for fitted in judgement.others if len(fitted.slugs) == 1]
     candidates = []
     for slug, probability in judgement.probabilities.items():
-        if probability < criteria.LEAST_LISTED and slug not in judgement.causes:
+        if probability < 1e-3 and slug not in judgement.causes:
             continue
         fitted = next((f for f in (*judgement.stand, *alone, *judgement.others) if slug in f.slugs), None)
         evidence = judgement.evidence.get(slug, 0.0)

@@ -87,7 +87,7 @@ def amplitudes_of(posterior: Posterior) -> FloatArray:
         freedom = 0.5 * np.min([np.log1p((scale * sd) ** 2 * info) for scale in SCALES], axis=0)
         needed = 0.5 * (np.sqrt(2 * (paid + freedom)) + float(ndtri(criteria.VISIBLE_POWER))) ** 2
         left = np.maximum(needed - best + projected.evidence, 0.0)
-        shown = info > criteria.LEAST_VISIBLE_SHARE * projected.whole
+        shown = info > 1e-6 * projected.whole  # the rest is rounding
         amplitude = np.sqrt(2 * left / np.where(shown, info, 1.0))
         largest = np.maximum(largest, np.where(shown, amplitude, np.where(left > 0, np.inf, 0.0)))
     return largest

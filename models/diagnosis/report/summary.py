@@ -20,9 +20,6 @@ from models.diagnosis.pooled_fit.projection import RunScatter
 from models.diagnosis.report.report import Candidate, Misfit, Report, Visible
 from models.diagnosis.validation.held_out import Gain
 
-#: Digits after the point at most.
-_DIGITS = 5
-
 _AXES = {
     PRESSURE: "pressure",
     TORQUE: "the torque itself",
@@ -70,7 +67,7 @@ def estimated(estimate: Estimate) -> str:
     if not estimate.sd > 0:
         return with_unit(f"{estimate.name} {number(estimate.value)}", estimate.unit)
     digits = max(0, 1 - math.floor(math.log10(estimate.sd)))
-    if digits > _DIGITS:
+    if digits > 5:
         return with_unit(f"{estimate.name} {number(estimate.value)} ± {number(estimate.sd)}", estimate.unit)
     value = _signed(f"{estimate.value:.{digits}f}")
     return with_unit(f"{estimate.name} {value} ± {estimate.sd:.{digits}f}", estimate.unit)
@@ -97,10 +94,6 @@ def _signed(text: str) -> str:
     return text.replace("-", "−")
 
 
-#: A share [%] below which its size is not given, and axes of structure that are mentioned at most.
-_LEAST_PERCENT, _AXES_MENTIONED = 0.1, 2
-#: Alternatives that are listed with their probability at most; of the others the effects are named.
-_ALTERNATIVES = 8
 #: How much a sentence matters: it stays; it goes where words are short; it goes first.
 MUST, SHOULD, MAY = 0, 1, 2
 
@@ -155,7 +148,7 @@ def _adequate(report: Report) -> list[Sentence]:
         )
     ]
     sentences += _unseen(report)
-    if report.states < criteria.FEW_STATES:
+    if report.states < 3:
         say = "says" if report.states == 1 else "say"
         few = f"{count_of(report.states, 'state')} of use {say} little about a course over life."
         sentences.append(Sentence(few, SHOULD))
@@ -164,7 +157,7 @@ def _adequate(report: Report) -> list[Sentence]:
 
 def _unseen(report: Report) -> list[Sentence]:
     """What these data would miss: the effects that must be largest against what is usual to be seen."""
-    short = [v for v in report.visible if v.amplitude > criteria.LARGE_AMPLITUDE * v.usual]
+    short = [v for v in report.visible if v.amplitude > 2.0 * v.usual]
     worst = sorted(short, key=lambda v: (-v.least / v.usual, -v.amplitude / v.usual))
     missed = [_missed(visible) for visible in worst[: criteria.VISIBLE_MENTIONED]]
     sentences = [Sentence(f"These data would miss {conjunction(missed)}.")] if missed else []
@@ -216,7 +209,7 @@ def _named(report: Report) -> list[Sentence]:
     companions = [
         f"{effect_name(item.effect)} (probability {probability(item.probability)})"
         for item in report.candidates
-        if item.effect not in causes and item.probability >= criteria.COMPANION_FROM
+        if item.effect not in causes and item.probability >= 0.3
     ]
     if companions:
         sentences.append(
@@ -250,7 +243,7 @@ def _ambiguous(report: Report) -> list[Sentence]:
             alternative if alternative.endswith("))") or ";" not in alternative else f"{alternative.split(';')[0]})"
             for alternative in listed
         ]
-        listed = short[:_ALTERNATIVES]
+        listed = short[:8]
         names = [effect_name(slug) for slug in report.causes if slug != UNCATALOGUED]
         listed += [name for name in names if not any(name in alternative for alternative in listed)]
     alternatives = listed[0]
@@ -289,12 +282,12 @@ def _error(report: Report) -> str:
     if misfit.rmse <= misfit.noise:
         return f"{error}, no more than noise, but correlated{f' along {where}' if where else ''}."
     percent = 100 * misfit.unexplained_share
-    share = f"{'less than 0.1' if percent < _LEAST_PERCENT else number(percent)} % of its square is not noise"
+    share = f"{'less than 0.1' if percent < 0.1 else number(percent)} % of its square is not noise"
     return f"{error} (noise alone: {number(misfit.noise)} Nm); {share}{f', and depends on {where}' if where else ''}."
 
 
 def _axes(misfit: Misfit | None) -> str:
-    shown = () if misfit is None else misfit.where[:_AXES_MENTIONED]
+    shown = () if misfit is None else misfit.where[:2]
     return " and ".join(axis_name(axis.axis) for axis in shown if axis.strength > 0)
 
 
@@ -326,7 +319,7 @@ def _gained(report: Report) -> list[Sentence]:
 def _hardest(gain: Gain, extended: Misfit | None) -> str:
     """Where held-out runs are predicted far worse than they were fitted, and how far from what was kept that is."""
     hardest = gain.hardest
-    if hardest is None or extended is None or gain.rmse_after < criteria.FAR_FROM_FIT * extended.rmse:
+    if hardest is None or extended is None or gain.rmse_after < 5.0 * extended.rmse:  # less is what gains make
         return ""
     pressed = hardest.axis == PRESSURE
     size, unit = (1e-5, "bar") if pressed else (1.0, "cycles")
@@ -343,7 +336,7 @@ def _next(report: Report) -> list[Sentence]:
     if not report.advice:
         return []
     best = report.advice[0]
-    if best.nats < criteria.WEAK_EVIDENCE:
+    if best.nats < 1.0:  # less than "positive" (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773)
         return [Sentence("No test that was considered would add evidence.")]
     chance = f"probability {probability(best.probability)}"
     if best.narrows:

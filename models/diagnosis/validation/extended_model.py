@@ -48,7 +48,7 @@ AXES = frozenset({*_OF_POINTS, PHASE})
 
 def smooth_fit(problem: FitProblem, baseline: Fit, axes: Sequence[str]) -> Fit | None:
     """The baseline refitted with a smooth correction on the axes; None where no axis can carry one."""
-    effects = [effect for axis in axes[: criteria.MOST_CORRECTION_AXES] for effect in _along(problem.design, axis)]
+    effects = [effect for axis in axes[:2] for effect in _along(problem.design, axis)]
     if not effects:
         return None
     size = _size(problem, baseline, effects)
@@ -60,7 +60,7 @@ def smooth_fit(problem: FitProblem, baseline: Fit, axes: Sequence[str]) -> Fit |
 def _along(design: Design, axis: str) -> list[Effect]:
     """One effect a function: cosines over the axis's range, or a loop's harmonics."""
     if axis == PHASE:
-        orders = range(1, criteria.CORRECTION_HARMONICS + 1) if design.loops else ()
+        orders = range(1, 5 + 1) if design.loops else ()
         return [_harmonic(k, wave) for k in orders for wave in (np.cos, np.sin)]
     if axis not in _OF_POINTS:
         return []
@@ -74,7 +74,7 @@ def _along(design: Design, axis: str) -> list[Effect]:
     def unit(points: Points) -> FloatArray:
         return np.clip((place(points) - low) / (high - low), 0.0, 1.0)  # NaN where it was not measured
 
-    count = min(criteria.CORRECTION_COSINES, np.unique(measured).size - 1)
+    count = min(10, np.unique(measured).size - 1)
     return [_cosine(k, unit, before_lag=axis != CLOCK) for k in range(1, count + 1)]
 
 

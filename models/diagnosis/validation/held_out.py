@@ -24,11 +24,8 @@ from models.diagnosis.noise.covariance import Noise, whitening
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 
-#: Rows left out weigh as if their noise were so many times what it is.
-_LEFT_OUT = 1e6
 #: Gauss-Newton steps from the fit to all rows: enough that nothing of the held-out rows is left in the fit.
 _STEPS = 12
-_RESAMPLES = 400
 
 BoolArray = NDArray[np.bool_]
 
@@ -129,11 +126,11 @@ def _folds(design: Design) -> list[BoolArray]:
     folds = []
     # readings of the open clutch hold no friction to predict: they are never left out
     states, levels = np.unique(design.rows.cycles[design.closed]), design.levels
-    if states.size >= criteria.FEWEST_STATES_HELD_OUT:
+    if states.size >= 3:
         inner = min(criteria.STATE_FOLDS, states.size)
         # neighbouring states go into different folds
         folds += [design.closed & np.isin(design.rows.cycles, states[start::inner]) for start in range(inner)]
-    if levels.size >= criteria.FEWEST_PRESSURES_HELD_OUT:
+    if levels.size >= 4:
         folds += [
             np.isin(design.level, levels[1:][start :: criteria.PRESSURE_FOLDS])
             for start in range(criteria.PRESSURE_FOLDS)
@@ -144,14 +141,12 @@ def _folds(design: Design) -> list[BoolArray]:
 def _ahead(design: Design) -> BoolArray | None:
     states = np.unique(design.rows.cycles[design.closed])
     count = max(1, round(criteria.FORWARD_SHARE * states.size))
-    return (
-        design.closed & (design.rows.cycles >= states[-count]) if states.size >= criteria.FEWEST_STATES_AHEAD else None
-    )
+    return design.closed & (design.rows.cycles >= states[-count]) if states.size >= 4 else None
 
 
 def _without(noise: Noise, out: BoolArray) -> Noise:
     """The noise when those rows are left out."""
-    return replace(noise, deviation=np.where(out, _LEFT_OUT, 1.0) * noise.deviation)
+    return replace(noise, deviation=np.where(out, 1e6, 1.0) * noise.deviation)  # as good as not there
 
 
 def _forecast_score(problem: FitProblem, model: Fit, out: BoolArray) -> float:
@@ -210,7 +205,7 @@ def _reduction(
     """By how much the RMSE falls [%], and its deviation: whole curves are drawn again, both models on the same ones."""
     _, index = np.unique(curve, return_inverse=True)
     sums = np.stack([np.bincount(index, weights=errors**2) for errors in (before, after)])
-    drawn = rng.integers(sums.shape[1], size=(_RESAMPLES, sums.shape[1]))
+    drawn = rng.integers(sums.shape[1], size=(400, sums.shape[1]))
     again = sums[:, drawn].sum(axis=2)
     reductions = 100 * (1 - np.sqrt(again[1] / np.maximum(again[0], 1e-300)))
     return 100 * (1 - _rms(after) / max(_rms(before), 1e-300)), float(np.std(reductions))

@@ -29,22 +29,15 @@ from models.tracking.courses import (
     log_scale_at,
     scatter_growth,
 )
-from models.tracking.criteria import DEPTH, NEGLIGIBLE, OTHER_SIZES, REACH, SLIGHT
+from models.tracking.criteria import DEPTH, OTHER_SIZES, REACH
 from models.tracking.history import History
 from models.tracking.linear_model import evidence, log_outlying, tabulated
 from models.tracking.outlying_runs import NODES, TEMPER, Nodes, Search
 from models.tracking.prior import Prior
 
-#: Blur of a coarse grid for each e-fold of τ between nodes, as a share of the observed change. A node off by half a
-#: step changes b by 0.18 at most, and most of that goes into ξ0 and Δ.
-_BLUR = 0.03
 #: Nodes along log τ (the first time, and then), log ε and log s while closing in; how often; what shrinking is worth
 #: it.
 _FIRST, COARSE = 65, (11, 8, 7)
-_CLOSINGS = 8
-_WORTHWHILE = 0.7
-#: The blur of a lattice that did not shrink, over that of the one before.
-_LESS = 0.3
 
 
 #: Of each form the one that stands for it on the first lattice, which is so blurred that the law of the scatter and smaller
@@ -190,7 +183,9 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame, FloatArray]
     if history.value.size == 0:
         kinds = Kinds.of(prior, np.zeros((1, 0)), np.arange(FORM_SIZE.size))
         return kinds, first.taken(np.zeros(kinds.form.size, dtype=np.intp)), kinds.log_weight
-    share = _BLUR * float(np.ptp(history.value))
+    # for each e-fold of τ between nodes: off by half a step b is off by 0.18 at most, and most of that goes into ξ0 and
+    # Δ
+    share = 0.03 * float(np.ptp(history.value))
     table = tabled(first, _FIRST, history, np.array(Course))
     blur = share * float((first.upper - first.lower).max()) / (_FIRST - 1)
     kinds, density = _first(prior, history, first, table, blur)
@@ -198,22 +193,22 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame, FloatArray]
     log_mass = log_masses(density, first.cells(_FIRST)) - kinds.log_weight
     kinds, laid = represented(prior, kinds)
     log_mass = log_mass[laid] + kinds.log_weight
-    kept = np.flatnonzero(log_mass > log_mass.max() - NEGLIGIBLE)
+    kept = np.flatnonzero(log_mass > log_mass.max() - 10.0)  # the first lattice is blurred
     kinds, frame, log_mass = kinds.taken(kept), frame.taken(laid[kept]), log_mass[kept]
     shares, left = np.full(kept.size, share), np.ones(kept.size, dtype=bool)
-    for _ in range(_CLOSINGS):
+    for _ in range(8):
         now = np.flatnonzero(left)
         if now.size == 0:
             break
         wide = frame.taken(now)
         closer, log_mass[now], blurs = _closer(prior, history, kinds.taken(now), wide, shares[now])
-        settled = _shrinkage(wide, closer) > _WORTHWHILE
+        settled = _shrinkage(wide, closer) > 0.7
         left[now] = ~(settled & (blurs < 0.5 * np.exp(closer.log_scatter.mean(axis=1))))
-        shares[now] *= np.where(settled, _LESS, 1.0)
+        shares[now] *= np.where(settled, 0.3, 1.0)  # one that did not shrink is less blurred
         for field in fields(Frame):
             getattr(frame, field.name)[now] = getattr(closer, field.name)
     log_mass[left] = log_mass.max()
-    kept = np.flatnonzero(log_mass > log_mass.max() - SLIGHT)
+    kept = np.flatnonzero(log_mass > log_mass.max() - 6.0)
     return kinds.taken(kept), frame.taken(kept), log_mass[kept]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.tracking.courses import scatter_growth
-from models.tracking.criteria import LEADING, MOST, WORTH
+from models.tracking.criteria import MOST
 from models.tracking.filters.lattice import COARSE, Frame, Kinds, joined, log_density, log_masses, shrunk, tabled
 from models.tracking.history import History
 from models.tracking.linear_model import log_outlying
@@ -27,7 +27,7 @@ def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame, log_ma
     """The kinds and their lattices, with those of the sets that were overlooked; `log_mass` [k] says which kinds lead."""
     if prior.outlying_share == 0.0 or history.value.size < 2:
         return kinds, frame
-    leaders = np.argsort(-log_mass, kind="stable")[:LEADING]
+    leaders = np.argsort(-log_mass, kind="stable")[:3]  # the three that lead
     leading, where = kinds.taken(leaders), frame.taken(leaders)
     table = tabled(where, COARSE[0], history, leading.course)
     density = log_density(prior, history, leading, where, table)
@@ -38,7 +38,7 @@ def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame, log_ma
     overlooked: dict[bytes, tuple[float, int, FloatArray]] = {}
     for leader in range(leaders.size):
         gain = gains(prior, history, leading.outlying[leader], _nodes(leading, where, table, mass, leader, relative))
-        for run in np.flatnonzero(gain > -WORTH).tolist():
+        for run in np.flatnonzero(gain > -3.0).tolist():
             outlying = leading.outlying[leader].copy()
             outlying[run] = 1.0 - outlying[run]
             name = _name(leading.form[leader], outlying)

@@ -22,7 +22,7 @@ from scipy.special import ndtri
 
 from models.arrays import FloatArray
 from models.tracking.courses import FORM_COURSE, Course, log_form_weight, log_scale_at, place_of
-from models.tracking.criteria import HEALTHY, KEPT, MOVED, MOVES, STARVED
+from models.tracking.criteria import KEPT, MOVED, MOVES
 from models.tracking.filters.cloud import Bridge, Cloud, effective, log_target_of, merged, table_of, weights
 from models.tracking.history import History
 from models.tracking.linear_model import pointwise
@@ -31,12 +31,8 @@ from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 from models.tracking.sampling import spread_normals, spread_points, systematic, with_linear_terms
 
-#: Where a smaller share of steps than the first is accepted, the next are shorter by the second.
-_TIMID, _SHORTER = 0.2, 0.5
 #: In a step, how often another size is tried, and how often the flag of one run, or the law of the scatter, is turned.
 _RESIZED, _TURNED = 0.25, 0.1
-#: A course with a smaller share of the weight than this is lost. Chosen: what makes up for it must not overflow; no table.
-_LOST = 1e-100
 #: Degrees by which a measurement may be introduced, and halvings in the search for each.
 _DEGREES, _HALVINGS = 30, 20
 
@@ -113,7 +109,7 @@ class Particle:
                 degree, forced = 1.0, True
             log_weight = start + degree * gap
             cloud = replace(cloud, log_weight=log_weight - log_weight.max())
-            if degree < 1.0 or effective(cloud.log_weight) < HEALTHY * self.particles:
+            if degree < 1.0 or effective(cloud.log_weight) < 0.5 * self.particles:  # half of the particles
                 cloud, before, after = self._renewed(bridge, cloud, before, after, degree, rng)
             if degree == 1.0:
                 break
@@ -152,7 +148,7 @@ class Particle:
             after = np.where(accepted, offered_after, after)
             before = np.where(accepted, offered_before, before)
             moved |= accepted
-            reach *= _SHORTER if accepted.mean() < _TIMID else 1.0
+            reach *= 0.5 if accepted.mean() < 0.2 else 1.0  # where few are accepted
             if moved.mean() >= MOVED:
                 break
         return cloud, before, after
@@ -186,7 +182,7 @@ def _kept(course: NDArray[np.intp], weight: FloatArray) -> tuple[FloatArray, Flo
     """How often to take each particle, so that every course keeps a share of KEPT, and the log weight that makes up for it
     [n]: what the data do not speak for today they may speak for later."""
     share = np.bincount(course, weights=weight, minlength=len(Course))
-    alive = share > _LOST
+    alive = share > 1e-100  # what makes up for it must not overflow
     kept = np.where(alive, np.maximum(share, KEPT), share)
     kept /= kept.sum()
     more = np.divide(kept, share, out=np.ones(len(Course)), where=alive)[course]
@@ -216,7 +212,7 @@ def _proposed(cloud: Cloud, shapes: FloatArray, span: float, rng: np.random.Gene
 
 def _next_degree(start: FloatArray, gap: FloatArray, degree: float) -> float:
     """The largest β, 1 if possible, at which weights start + β · gap do not starve the cloud."""
-    enough = STARVED * start.size
+    enough = 0.25 * start.size
     if effective(start + gap) >= enough:
         return 1.0
     low, high = degree, 1.0
