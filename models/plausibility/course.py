@@ -212,6 +212,5 @@ def log_outlying(off: FloatArray, variance: FloatArray, log_weight: FloatArray) 
 
 def log_physics(log_cof: FloatArray) -> FloatArray:
     """log of how far physics allows a COF, any shape: 0 for what wet clutches have, less beyond."""
-    # usual is 0.04 to 0.25, whatever the others show
     beyond = np.abs(log_cof - math.log(criteria.COF)) / criteria.LOG_COF_SD - criteria.USUAL
     return np.asarray(-0.5 * np.maximum(beyond, 0.0) ** 2)

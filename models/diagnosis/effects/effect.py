@@ -77,8 +77,8 @@ class Discrepancy(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShapeParameter:
-    """A shape parameter: its name and unit; `smooth` where the change may be differentiated in it (then it is refined between
-    grid values, within its bounds), else it is taken from the grid; `held` where a smooth one stays at the values of
+    """A shape parameter: its name and unit; `smooth` where the change may be differentiated in it (then it is refined
+    between grid values, within its bounds), else it is taken from the grid; `held` where a smooth one stays at the values of
     `Effect.courses` while a size is averaged over them: the size bends with it."""
 
     name: str
