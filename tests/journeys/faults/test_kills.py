@@ -9,7 +9,7 @@ import shutil
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -26,8 +26,12 @@ from storage.engine.sqlite.backup import restore
 from storage.engine.sqlite.database import back_up
 from storage.migrations.upgrade import head
 from tests.service.workflows.benches import Bench, body, stood_in
+from tests.storage.engine.postgresql.server import PostgresServer
 from tests.storage.samples import OLD, integrity, old_database, revision
 from tests.support import Server, stationary
+
+#: Channels of runs, bit for bit, by clutch and run.
+Acknowledged = dict[tuple[str, str], dict[str, bytes]]
 
 
 def kills(few: int, many: int) -> pytest.MarkDecorator:
@@ -81,7 +85,7 @@ def findings(path: Path | str) -> list[str]:
     return wrong
 
 
-def stored(path: Path | str) -> dict[tuple[str, str], dict[str, bytes]]:
+def stored(path: Path | str) -> Acknowledged:
     """Every run's channels, bit for bit."""
     content = {}
     with closing(find_database(address_of(path))) as database, database.reading() as connection:
@@ -92,14 +96,31 @@ def stored(path: Path | str) -> dict[tuple[str, str], dict[str, bytes]]:
     return content
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [200])  # a few of them: test_order_and_crashes
-def test_every_run_that_was_acknowledged_is_there_bit_for_bit_after_kills(tmp_path: Path, number: int) -> None:
+def require_all(database: Path | str, acknowledged: Acknowledged, on_their_way: int) -> None:
+    """Every acknowledged run is there bit for bit, with results that follow, and at most those beside it that were sent."""
+    content = stored(database)
+    assert {run: content.get(run) for run in acknowledged} == acknowledged
+    assert len(content) <= len(acknowledged) + on_their_way
+    assert findings(database) == []
+
+
+@pytest.fixture(params=["file", "server"])
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path | str]:
+    """The path of a file that is to be, or the address of an empty database on a server."""
+    if request.param == "file":
+        yield tmp_path / "clutchlife.db"
+    else:
+        server: PostgresServer = request.getfixturevalue("postgresql")
+        yield (url := server.fresh())
+        server.drop(url)
+
+
+@kills(2, 100)
+def test_every_run_that_was_acknowledged_is_there_bit_for_bit_after_kills(database: Path | str, number: int) -> None:
     """The service is killed while runs come in, and comes back; the sender sends again what was not acknowledged."""
-    path = tmp_path / "clutchlife.db"
     rng = random.Random(number)  # noqa: S311 - moments, not secrets
-    acknowledged: dict[tuple[str, str], dict[str, bytes]] = {}
-    server = Server(path, loaded=True)
+    acknowledged: Acknowledged = {}
+    server = Server(database, loaded=True)
     for kill in range(number):
         server.start()
         poster = threading.Thread(target=post_until_killed, args=(server.url, f"c{kill}", acknowledged))
@@ -111,13 +132,10 @@ def test_every_run_that_was_acknowledged_is_there_bit_for_bit_after_kills(tmp_pa
         server.kill()
         poster.join()
     assert len(acknowledged) >= 2 * number
-    content = stored(path)
-    assert {run: content.get(run) for run in acknowledged} == acknowledged
-    assert len(content) <= len(acknowledged) + number  # the one that was on its way at each kill
-    assert findings(path) == []
+    require_all(database, acknowledged, on_their_way=number)
 
 
-def post_until_killed(url: str, clutch: str, acknowledged: dict[tuple[str, str], dict[str, bytes]]) -> None:
+def post_until_killed(url: str, clutch: str, acknowledged: Acknowledged) -> None:
     with httpx2.Client(base_url=url, timeout=60) as http:
         try:
             assert http.post("/v1/clutches", json={"clutch_id": clutch}).status_code == 201

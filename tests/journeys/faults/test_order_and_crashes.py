@@ -1,15 +1,13 @@
 """Runs come in any order, services die at bad moments: what was acknowledged stays, and the answers are the same."""
 
-import json
 import threading
-import time
 from pathlib import Path
 
 import httpx2
 import numpy as np
 import pytest
 
-from tests.support import PRESSURES_BAR, SPEEDS_RPM, Server, one_quick, serving, stationary
+from tests.support import PRESSURES_BAR, SPEEDS_RPM, Server, serving, stationary
 
 BASE = "/v1/clutches/c1"
 
@@ -135,47 +133,6 @@ def test_a_rebuild_starts_a_new_life(http: httpx2.Client) -> None:
         assert isinstance(old, dict)
         assert isinstance(new, dict)
         assert new[quantile] == pytest.approx(old[quantile] + 3000, rel=0.1)
-
-
-@pytest.mark.parametrize("delay", one_quick([0.01, 0.002, 0.02, 0.05]))
-def test_a_kill_loses_nothing_that_was_acknowledged(tmp_path: Path, delay: float) -> None:
-    server = Server(tmp_path / "clutchlife.db", loaded=True)
-    server.start()
-    acknowledged: list[str] = []
-    with httpx2.Client(base_url=server.url, timeout=60) as http:
-        http.post("/v1/clutches", json={"clutch_id": "c1"})
-
-        def post() -> None:
-            for index in range(200):
-                body = stationary(100 * index, run_id=f"run-{index}")
-                try:
-                    answer = http.post(
-                        f"{BASE}/runs", content=json.dumps(body), headers={"Content-Type": "application/json"}
-                    )
-                except httpx2.TransportError:
-                    return
-                assert answer.status_code == 201
-                acknowledged.append(answer.json()["run_id"])
-
-        poster = threading.Thread(target=post)
-        poster.start()
-        while len(acknowledged) < 3:
-            time.sleep(0.001)
-        time.sleep(delay)
-        server.kill()
-        poster.join()
-    server.start()
-    try:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            stored = [item["run_id"] for item in http.get(f"{BASE}/runs", params={"limit": 1000}).json()["items"]]
-            assert set(acknowledged) <= set(stored)
-            assert len(stored) <= len(acknowledged) + 1
-            prediction = without_revision(http)
-            assert prediction["runs_used"] == len(stored)
-            body = stationary(100 * len(stored), run_id="after")
-            assert http.post(f"{BASE}/runs", json=body).status_code == 201
-    finally:
-        assert server.stop() in (0, -15)
 
 
 def test_many_writers_at_once(server: Server) -> None:

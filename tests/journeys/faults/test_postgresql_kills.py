@@ -1,4 +1,4 @@
-"""On PostgreSQL, too, all acknowledged runs are there, whether a service, one of several, or the server is killed."""
+"""On PostgreSQL, too, all acknowledged runs are there, whether one of several services or the server is killed."""
 
 import random
 import threading
@@ -14,12 +14,11 @@ import pytest
 from storage import jobs
 from storage.engine.database import Database
 from storage.engine.opening import find_database
-from tests.journeys.faults.test_kills import findings, kills, post_until_killed, stored
+from tests.journeys.faults.test_kills import Acknowledged, kills, post_until_killed, require_all
 from tests.service.workflows import stand_in_engine
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
-from tests.support import ONCE, Server, serving, stationary
+from tests.support import ONCE, serving, stationary
 
-Acknowledged = dict[tuple[str, str], dict[str, bytes]]
 #: [s] Within which a server that was killed is used again.
 IN_TIME = 60.0
 #: The clutch that is diagnosed, by an engine that takes two seconds; a killed service's job is begun again soon.
@@ -32,33 +31,6 @@ def postgres() -> Iterator[PostgresServer]:
     """A server of the test's own, which it may kill."""
     with postgresql_server() as server:
         yield server
-
-
-def require_all(url: str, acknowledged: Acknowledged, on_their_way: int) -> None:
-    """Every acknowledged run is there bit for bit, with results that follow, and at most those beside it that were sent."""
-    content = stored(url)
-    assert {run: content.get(run) for run in acknowledged} == acknowledged
-    assert len(content) <= len(acknowledged) + on_their_way
-    assert findings(url) == []
-
-
-@kills(2, 50)
-def test_no_acknowledged_run_is_lost_where_the_service_is_killed(postgres: PostgresServer, number: int) -> None:
-    url, rng = postgres.fresh(), random.Random(number)  # noqa: S311 - moments, not secrets
-    acknowledged: Acknowledged = {}
-    server = Server(url, loaded=True)
-    for kill in range(number):
-        server.start()
-        poster = threading.Thread(target=post_until_killed, args=(server.url, f"c{kill}", acknowledged))
-        before = len(acknowledged)
-        poster.start()
-        while len(acknowledged) < before + 2 and poster.is_alive():
-            time.sleep(0.001)
-        time.sleep(rng.uniform(0.0, 0.08))
-        server.kill()
-        poster.join()
-    assert len(acknowledged) >= 2 * number
-    require_all(url, acknowledged, on_their_way=number)
 
 
 @pytest.mark.slow
