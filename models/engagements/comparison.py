@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.engagements.local_fit import Estimate
+from models.engagements.slip import Estimate
 
 #: Points of a kept course of speed. Chosen: a course that is kept is some 600 bytes.
 COURSE_POINTS = 65

@@ -20,11 +20,9 @@ from models.arrays import FloatArray
 from models.engagements.capacity import Capacity
 from models.engagements.comparison import bin_means
 from models.engagements.criteria import ENDPOINT, INITIAL, TORQUES
-from models.engagements.local_fit import Estimate
 from models.engagements.measured import MeasuredEngagement
-from models.engagements.refusal import Refusal
 from models.engagements.simulation import Drive, Engagement, engage
-from models.engagements.slip import Slip, slip_of
+from models.engagements.slip import Estimate, Refusal, Slip, slip_of
 from models.records.runs import Record
 
 

@@ -8,7 +8,7 @@
     ratios           initial, endpoint and breakaway μ over midpoint μ
     torque's rise    T(t_end)/T(midpoint) - 1
 
-T, p and ω at a moment are those of a line or parabola through the samples around it (`local_fit`). What a record does not
+T, p and ω at a moment are those of a line or parabola through the samples around it (`slip`). What a record does not
 determine is None. Valid from 10 Hz on; standard errors count the channels' noise and the open clutch's torque, no gain.
 
 Source: this project's definitions, in the manner of the friction tests of SAE J1646 and J2490, which were not read: no
@@ -25,9 +25,7 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.engagements import criteria
 from models.engagements.comparison import COURSE_POINTS, SpeedCourse, bin_means
-from models.engagements.local_fit import Channel, Estimate, channel_of
-from models.engagements.refusal import Refusal
-from models.engagements.slip import Slip, crossing, slip_of
+from models.engagements.slip import Channel, Estimate, Refusal, Slip, channel_of, crossing, slip_of
 from models.records.criteria import UNLOADED
 from models.records.runs import Record
 

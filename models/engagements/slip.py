@@ -2,28 +2,260 @@
 
     t_contact   where the line through the rising torque comes from zero
     t_start     where torque passes 10 % of its highest value
-    t_end       where speed comes to rest (`standstill`)
+    t_end       where speed comes to rest
 
 Speed counts from b, which it keeps at standstill; torque from its level before contact, which is the sensor's zero and the
 open clutch's drag. Signs are those of a slip that dissipates: both channels are turned where they read the other way.
 
 A moment at which a rising torque passes a level is the one that leaves the fewest samples on the wrong side; where samples
-show the rise a line through them refines it. Source: this project's definitions; those of SAE J1646 and J2490 were not read.
+show the rise a line through them refines it. Source: this project's definitions; those of SAE J1646 and J2490 were not
+read.
+
+The value of a noisy channel at a moment is that of a line or a parabola through the samples around it.
+
+    y(t) = c_0 + c_1 (t - t_0) + c_2 (t - t_0)²,      value = c_0,      Var = s² f (XᵀX)⁻¹_00
+
+The parabola's c_2 is kept where it is significant. s² is the residuals' variance and f = (1 + ρ)/(1 - ρ) the
+factor by which first-order autoregressive noise makes a mean more uncertain, ρ the correlation of neighbouring samples.
+
+The shaft comes to rest as ω(t) = b + Σ a_k g^k, g = max(0, t_end - t), fitted from half the speed on. b is what the sensor
+reads at standstill. The powers k go up to 2, or to 4 where the shaft creeps to rest.
 """
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from models.arrays import FloatArray
 from models.engagements import criteria
-from models.engagements.local_fit import Estimate
-from models.engagements.refusal import Refusal, SlipStatus
-from models.engagements.standstill import standstill_of
+from models.engagements.criteria import FEWEST_LOCAL
 from models.records.criteria import UNLOADED
 from models.records.runs import Record
+
+
+class SlipStatus(StrEnum):
+    """Whether a record holds an engagement, and if not, why."""
+
+    DETERMINED = "determined"
+    TOO_FEW_SAMPLES = "too_few_samples"
+    TIME_NOT_INCREASING = "time_not_increasing"
+    SAMPLED_TOO_SLOWLY = "sampled_too_slowly"
+    NO_PRESSURE = "no_pressure"
+    NO_SLIP = "no_slip"
+    SLIP_NEVER_ENDS = "slip_never_ends"
+    NO_TORQUE = "no_torque"
+    STARTS_IN_CONTACT = "starts_in_contact"
+    GAP = "gap"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refusal:
+    """Why a record holds no engagement, as a status and a sentence."""
+
+    status: SlipStatus
+    message: str
+
+
+#: Windows into which a channel is cut to see how its noise is autocorrelated.
+_WINDOWS = 8
+#: Noise is taken for no more correlated than this. Chosen: a factor of 19, beyond which no window holds samples enough.
+_MOST_CORRELATED = 0.9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """A value with its standard error, in the value's unit."""
+
+    value: float
+    sd: float
+
+    def over(self, other: "Estimate") -> "Estimate | None":
+        """The ratio to another value, errors independent; None where that is not positive."""
+        if other.value <= 0:
+            return None
+        ratio = self.value / other.value
+        return Estimate(value=ratio, sd=math.hypot(self.sd, ratio * other.sd) / other.value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """A channel over [low, high] s: time [n] s ascending, values [n]; `inflation` f >= 1 of its noise."""
+
+    time: FloatArray
+    values: FloatArray
+    inflation: float
+
+    @property
+    def low(self) -> float:
+        """The first time [s]."""
+        return float(self.time[0])
+
+    @property
+    def high(self) -> float:
+        """The last time [s]."""
+        return float(self.time[-1])
+
+    def at(self, moment: float, half_width: float) -> Estimate | None:
+        """The value at a moment [s] within the channel, by the samples within `half_width` [s] or, at an end, within twice
+        that. None where too few lie near."""
+        centre = min(max(moment, self.low + half_width), self.high - half_width)
+        distance = np.abs(self.time - centre)
+        width = half_width
+        if distance.size < FEWEST_LOCAL:
+            return None
+        width = max(width, float(np.partition(distance, FEWEST_LOCAL - 1)[FEWEST_LOCAL - 1]))
+        if width > max(half_width, 0.25 * (self.high - self.low)):
+            return None
+        rows = distance <= width * (1 + 1e-9)
+        return _fitted((self.time[rows] - moment) / width, self.values[rows], self.inflation)
+
+
+def channel_of(time: FloatArray, values: FloatArray) -> Channel:
+    """A channel whose noise is that of the residuals of parabolas through equal parts of it."""
+    before, after = [np.zeros(0)], [np.zeros(0)]
+    for at, part in zip(np.array_split(time, _WINDOWS), np.array_split(values, _WINDOWS), strict=True):
+        if at.size >= FEWEST_LOCAL:
+            residual = part - np.polynomial.Polynomial.fit(at, part, 2)(at)
+            before.append(residual[:-1])
+            after.append(residual[1:])
+    first, second = np.concatenate(before), np.concatenate(after)
+    power = float(first @ first)
+    correlation = min(max(float(first @ second) / power, 0.0), _MOST_CORRELATED) if power > 0 else 0.0
+    return Channel(time=time, values=values, inflation=(1 + correlation) / (1 - correlation))
+
+
+def _fitted(moment: FloatArray, values: FloatArray, inflation: float) -> Estimate:
+    """The value at 0 by a parabola through the samples at `moment` [n], or by a line where that serves."""
+    design = np.stack([np.ones_like(moment), moment, moment**2], axis=1)
+    estimate, curvature = _least_squares(design, values, inflation)
+    if abs(curvature.value) > 2.0 * curvature.sd:
+        return estimate
+    return _least_squares(design[:, :2], values, inflation)[0]
+
+
+def _least_squares(design: FloatArray, values: FloatArray, inflation: float) -> tuple[Estimate, Estimate]:
+    """The first and the last coefficient."""
+    inverse = np.linalg.pinv(design.T @ design)
+    coefficients = inverse @ (design.T @ values)
+    residual = values - design @ coefficients
+    variance = float(residual @ residual) / (values.size - design.shape[1]) * inflation
+    first, last = (
+        Estimate(value=float(coefficients[i]), sd=math.sqrt(max(variance * float(inverse[i, i]), 0.0))) for i in (0, -1)
+    )
+    return first, last
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standstill:
+    """The shaft's way to rest: the first fast row, the last one, and the first at which it stands; the end of slip, the
+    speed that is read at standstill [rad/s], and when the shaft turns again [s]."""
+
+    fast: int
+    slowing: int
+    rest: int
+    end: Estimate
+    zero: float
+    again: float | None
+
+
+def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
+    """How a shaft of time [n] s and speed [n] rad/s comes to rest, the first time that it does; or why it does not."""
+    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
+
+    smooth = median_filter(speed, 5, mode="nearest")
+    highest = float(smooth.max())
+    if highest < criteria.LEAST_SPEED:
+        rule = f"the shaft must slip, the highest speed is {highest:.3g} rad/s, below {criteria.LEAST_SPEED:g} rad/s"
+        return Refusal(status=SlipStatus.NO_SLIP, message=rule)
+    fast, slow = smooth >= 0.5 * highest, smooth <= criteria.SLOW * highest
+    first = int(np.argmax(fast))
+    rest = first + int(np.argmax(slow[first:]))
+    if not slow[rest]:
+        least = 100 * float(smooth[first:].min()) / highest
+        return _never_ends(f"the lowest speed is {least:.3g} % of the highest")
+    slowing = int(np.flatnonzero(fast[:rest])[-1])
+    turning = np.flatnonzero(smooth[rest:] > 2 * criteria.SLOW * highest)
+    leaves = rest + int(turning[0]) if turning.size else time.size
+    window = slice(slowing, min(leaves, rest + 2 * (rest - slowing) + 5))
+    latest = min(2 * rest - slowing + 2, leaves - 1)
+    end, zero = _rest(time[window], speed[window], float(time[slowing]), float(time[latest]))
+    if abs(zero) > criteria.LARGEST_ZERO * highest:
+        return _never_ends(f"speed stays at {100 * zero / highest:.3g} % of the highest")
+    again = None
+    if turning.size:
+        still = np.flatnonzero(speed[rest:leaves] - zero <= criteria.LARGEST_ZERO * highest)
+        again = float(time[rest + (int(still[-1]) if still.size else 0)])
+    return Standstill(fast=first, slowing=slowing, rest=rest, end=end, zero=zero, again=again)
+
+
+def _never_ends(reason: str) -> Refusal:
+    stands = 100 * criteria.LARGEST_ZERO
+    rule = f"slip must end in the record: {reason}; a shaft stands within {stands:g} % of its highest speed"
+    return Refusal(status=SlipStatus.SLIP_NEVER_ENDS, message=rule)
+
+
+def _rest(time: FloatArray, speed: FloatArray, earliest: float, latest: float) -> tuple[Estimate, float]:
+    """The end of slip and the speed at standstill; 0 where the record holds no standstill to show it.
+
+    The power of g rises from 2 for as long as that explains more than chance would.
+    """
+    rest = _rest_of(2, time, speed, earliest, latest)
+    # a shaft that its drive almost keeps turning creeps to rest, and a parabola places that 3 % too early
+    for power in range(3, 4 + 1):
+        better = _rest_of(power, time, speed, earliest, latest)
+        if (
+            better.freedom < criteria.FEWEST_SLIPPING
+            or rest.misfit - better.misfit < 3.0**2 * better.misfit / better.freedom
+        ):
+            break
+        rest = better
+    return rest.end, rest.zero
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rest:
+    """A fit of the shaft's way to rest: its sum of squares and degrees of freedom."""
+
+    end: Estimate
+    zero: float
+    misfit: float
+    freedom: int
+
+
+def _rest_of(power: int, time: FloatArray, speed: FloatArray, earliest: float, latest: float) -> _Rest:
+    span = latest - earliest
+
+    def design(end: float) -> FloatArray:
+        left = np.maximum(end - time, 0.0) / span
+        columns = [left**exponent for exponent in range(1, power + 1)]
+        return np.stack([np.ones_like(time), *columns] if np.count_nonzero(time > end) > 2 else columns, axis=1)
+
+    def misfit(end: float) -> float:
+        rows = design(end)
+        return float(np.sum((speed - rows @ np.linalg.lstsq(rows, speed)[0]) ** 2))
+
+    trials = np.linspace(earliest, latest, 42)[1:]
+    best = int(np.argmin([misfit(end) for end in trials.tolist()]))
+    low, high = trials[max(best - 1, 0)], trials[min(best + 1, trials.size - 1)]
+    end = float(minimize_scalar(misfit, bounds=(low, high), method="bounded", options={"xatol": 1e-7}).x)
+    rows = design(end)
+    coefficients = np.linalg.lstsq(rows, speed)[0]
+    polynomial = np.polynomial.Polynomial([0.0, *coefficients[-power:].tolist()]).deriv()
+    slope = np.where(time < end, polynomial((end - time) / span) / span, 0.0)
+    jacobian = np.column_stack([rows, slope])
+    freedom = max(time.size - jacobian.shape[1], 1)
+    variance = misfit(end) / freedom * float(np.linalg.pinv(jacobian.T @ jacobian)[-1, -1])
+    return _Rest(
+        end=Estimate(value=end, sd=math.sqrt(max(variance, 0.0))),
+        zero=float(coefficients[0]) if rows.shape[1] > power else 0.0,
+        misfit=misfit(end),
+        freedom=freedom,
+    )
+
 
 #: Half of all normal deviates are smaller than this. Derived: Φ⁻¹(0.75).
 _NORMAL_QUARTILE = 0.6745

@@ -10,7 +10,7 @@ Z90 = 1.6448536269514722
 #: A fit with an error of eq. 5 below this is acceptable [%]. Chosen: the reference calls its fits of some percent good.
 ACCEPTABLE_MSE = 5.0
 
-# The uncertainty of a fit (`fit_uncertainty`)
+# The uncertainty of a fit (`identification`)
 
 #: Noise where it cannot be estimated, as a share of the root mean square torque. Chosen; no table.
 ASSUMED_NOISE = 0.05

@@ -9,7 +9,7 @@ NEAR_ZERO = 0.05
 #: Residuals are not white where block means scatter by so many deviations more than white noise's. Chosen; no table.
 NOT_WHITE = 2.5
 
-# The lag (`lag_problem`, `lag_fit`)
+# The lag (`lag_fit`)
 
 #: The gain's prior deviation [-]. Chosen: what a torque sensor's gain differs by from day to day.
 GAIN_SD = 0.05

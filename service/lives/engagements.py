@@ -13,9 +13,8 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.engagements.comparison import Comparison, Reference, SpeedCourse, compared, reference_of, same_duty
-from models.engagements.local_fit import Estimate
 from models.engagements.measured import MeasuredEngagement, measured_engagement
-from models.engagements.refusal import Refusal
+from models.engagements.slip import Estimate, Refusal
 from service.columns import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 from service.lives.incoming_run import IncomingRun, sampled_record
 

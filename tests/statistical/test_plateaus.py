@@ -56,7 +56,7 @@ def test_deviations_cover_under_white_and_coloured_noise(rate: float, memory: fl
 
 @pytest.mark.parametrize(("rate", "memory"), [(10.0, 0.8), (10.0, 0.9), (100.0, 0.97)])
 def test_deviations_nearly_cover_under_noise_that_outlasts_the_dwells(rate: float, memory: float) -> None:
-    """Noise is autocorrelated over nine, nineteen and 66 samples of 50 and 500: without `models.records.slow_noise` 45 to
+    """Noise is autocorrelated over nine, nineteen and 66 samples of 50 and 500: without `slow_correlation` 45 to
     80 % were held.
 
     All dwells of a record share one estimate of its memory, so that eight records scatter by more than their dwells'

@@ -17,8 +17,7 @@ from scipy.special import ndtri
 from models.arrays import FloatArray
 from models.tracking.courses import log_scale_at
 from models.tracking.filters import lattice
-from models.tracking.filters.lattice import Frame, Kinds
-from models.tracking.filters.outlying_refinement import completed
+from models.tracking.filters.lattice import Frame, Kinds, completed
 from models.tracking.history import History
 from models.tracking.linear_model import Points, evidence, pointwise
 from models.tracking.measurement import Measurement

@@ -20,8 +20,7 @@ from models.friction.stribeck import torque
 from models.records.runs import Record
 from models.rig import campaign
 from models.rig.hysteresis import FrictionLag
-from models.rig.recorder import Recorder
-from models.rig.sampled import DynamicTest, sampled_test
+from models.rig.sampled import DynamicTest, Recorder, sampled_test
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor
 from models.rig.surface import Surface, surface

@@ -9,12 +9,12 @@ from models.clutch import Geometry
 from models.engagements.capacity import Capacity
 from models.engagements.comparison import SpeedCourse, compared, reference_of, same_duty
 from models.engagements.discrepancy import Discrepancy, discrepancy
-from models.engagements.local_fit import Estimate
 from models.engagements.measured import MeasuredEngagement, measured_engagement
 from models.engagements.simulation import engage
+from models.engagements.slip import Estimate
 from models.records.runs import Record
 from models.rig.campaign import simulated_clutch
-from models.rig.recorder import Recorder
+from models.rig.sampled import Recorder
 from models.rig.stationary import NOISELESS
 from tests.models.engagements.closed_forms import FORMS, INERTIA, PER_PASCAL, constant, record
 

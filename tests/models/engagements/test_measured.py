@@ -7,7 +7,7 @@ import pytest
 
 from models.clutch import Geometry
 from models.engagements.measured import MeasuredEngagement, measured_engagement
-from models.engagements.refusal import Refusal, SlipStatus
+from models.engagements.slip import Refusal, SlipStatus
 from models.records.runs import Record
 from tests.models.engagements.closed_forms import CONTACT, EXACT, FORMS, PRESSURE, SPEED, Engagement, Sensors, record
 

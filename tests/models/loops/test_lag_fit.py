@@ -8,7 +8,7 @@ import pytest
 from models.friction.criteria import Z90
 from models.friction.identification import fit_curves
 from models.friction.stribeck import StribeckParameters
-from models.loops import lag_problem
+from models.loops import lag_fit
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, Law, StationaryCurve, fit_lag
 from models.loops.loop_area import Direction, clean_samples
 from models.loops.loops import LoopStatus, evaluate_loops
@@ -121,7 +121,7 @@ def test_a_curve_wrong_in_shape_moves_the_attractor_little(monkeypatch):
     assert fit.status is LagStatus.DETERMINED
     assert 1 / fit.lag == pytest.approx(150.0, rel=0.08)
     # the control: with gain and zero alone to absorb it, C goes half as far again astray
-    monkeypatch.setattr(lag_problem, "_SHAPES", 0)
+    monkeypatch.setattr(lag_fit, "_SHAPES", 0)
     bare = fit_lag(ATTRACTOR, cycle, samples.phase, samples.torque, StationaryCurve(parameters=wrong))
     assert abs(bare.lag * 150.0 - 1) > 1.3 * abs(fit.lag * 150.0 - 1)
     assert fit.noise < bare.noise

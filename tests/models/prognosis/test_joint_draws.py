@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.degradation.general_order import Degradation, value
-from models.prognosis.joint_draws import draw_jointly, paired, shrunk_correlation
+from models.prognosis.from_parameters import draw_jointly, paired, shrunk_correlation
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior

@@ -11,9 +11,8 @@ from scipy.signal import lfilter
 from models.arrays import FloatArray
 from models.records.criteria import OUTLIER_SHARE
 from models.records.decimation import extreme_rows
-from models.records.mean_deviation import Stretch, deviations
+from models.records.mean_deviation import Stretch, deviations, slow_correlation
 from models.records.outliers import beside, inliers, near
-from models.records.slow_noise import slow_correlation
 
 # --- Spikes are told from what a fit merely bends around.
 

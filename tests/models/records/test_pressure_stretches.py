@@ -13,8 +13,7 @@ from models.records.criteria import LEVEL_GAP
 from models.records.pressure_levels import level_width, levels_of
 from models.records.pressure_stretches import pressure_stretches
 from models.records.runs import Record
-from models.rig.recorder import EXACT, Recorder
-from models.rig.sampled import DynamicTest
+from models.rig.sampled import EXACT, DynamicTest, Recorder
 from models.rig.stationary import Sensor
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 

@@ -19,8 +19,7 @@ from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, curves_by_pressure
 from models.rig.campaign import simulated_clutch
 from models.rig.hysteresis import ATTRACTOR, NO_LAG, FrictionLag
-from models.rig.recorder import EXACT, Recorder
-from models.rig.sampled import DynamicTest, RawTest, sampled_test
+from models.rig.sampled import EXACT, DynamicTest, RawTest, Recorder, sampled_test
 from models.rig.stationary import NOISELESS, SHARP, Sensor, stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 from tests.models.tracking.simulated_lives import GEOMETRY

@@ -12,8 +12,7 @@ from models.degradation.general_order import Degradation, progress_fraction, val
 from models.prognosis.first_passage import PassageStatus, predict_first_passage
 from models.tracking.courses import FORM_COURSE, SCALE_SIGN
 from models.tracking.filters.grid import Grid
-from models.tracking.filters.sigma_points import DOMAIN, Way, measured, predicted, scatter_learnt, unscaled
-from models.tracking.filters.ukf import Ukf, UkfState
+from models.tracking.filters.ukf import DOMAIN, Ukf, UkfState, Way, measured, predicted, scatter_learnt, unscaled
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
