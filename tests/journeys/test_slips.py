@@ -59,7 +59,7 @@ def test_slips_are_seen_and_mended_in_the_terminal(server: Server, tmp_path: Pat
     assert 'fluid = "CVTF"' in clutchlife(*edit)
     assert life(server, "c1")["criterion"]["fraction"] == 0.4
     assert "FIELD=VALUE" in clutchlife("edit", "c1", "--set", "fluid", "--reason", "x", *at, code=64)
-    assert "no clutch is known" in clutchlife("archive", "nobody", *at, code=65)
+    assert "there is no clutch" in clutchlife("archive", "nobody", *at, code=65)
     ended = clutchlife("end", "c1", "--note", "squeals", *at)
     assert "c1: ended at 4,000 cycles (worn)" in ended
     assert "ended at 4,000 cycles" in clutchlife("life", "c1", *at)

@@ -235,7 +235,7 @@ def empty(
                 with Spool.of(spool, *owner).sending(0.0):
                     Spool.of(spool, *owner).discard(entries)
         except HeldError:
-            fail("a process is sending from the spool: try again when it has ended", EX_TEMPFAIL)
+            fail("another process is sending from the spool: try again when it has ended", EX_TEMPFAIL)
         print_line(f"{len(kept)} deleted; the service never stored {waiting} of them")
 
 

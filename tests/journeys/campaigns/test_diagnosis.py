@@ -68,7 +68,7 @@ def commanded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
         (folder / "report.json").write_text(clutchlife("diagnose", "c1", "--json", "--url", server.url))
         (folder / "model.txt").write_text(clutchlife("model", "c1", "--baseline", "--url", server.url))
         clutchlife("export", "c1", "--out", str(folder / "export"), "--url", server.url)
-        assert "no clutch is known" in clutchlife("diagnose", "nobody", "--url", server.url, code=65)
+        assert "there is no clutch" in clutchlife("diagnose", "nobody", "--url", server.url, code=65)
         assert "not both" in clutchlife("model", "c1", "--baseline", "--adopt", "x", "--url", server.url, code=64)
         assert "no diagnosis" in clutchlife("model", "c1", "--adopt", "x", "--url", server.url, code=65)
     return folder, output

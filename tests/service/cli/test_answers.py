@@ -86,7 +86,7 @@ def test_an_end_by_other_criteria_is_shown_with_how_probably_each_is_the_first(
 
 def test_what_cannot_be_answered_is_refused_in_a_line(terminal: Terminal) -> None:
     refused: list[tuple[tuple[str, ...], int, str]] = [
-        (("life", "nobody"), 65, "no clutch is known"),
+        (("life", "nobody"), 65, "there is no clutch"),
         (("life", "c1", "--query", "quantitty=slope"), 65, "quantitty is no argument here"),
         (("life", "c1", "--query", "slope"), 64, "--query takes NAME=VALUE"),
         (("life", "c1", "--json", "--csv"), 64, "use --json or --csv"),

@@ -19,7 +19,7 @@ def test_a_first_file_is_asked_about_and_the_second_is_not(
     # the torque is the first column that is left out, the kind the first of those that fit, the cycles, send, the name
     shown = terminal("import", first, "--clutch", "c1", answers="1\n1\n7000\ny\nbench-3\n")
     assert "Column of torque_nm" in shown
-    assert "saved as rig bench-3; file names such as Stat_{cycles}.csv give the cycles" in shown
+    assert "saved as rig profile bench-3; file names such as Stat_{cycles}.csv give the cycles" in shown
     assert "3 curves" in shown
     again = terminal("import", second, "--clutch", "c1", "--yes")
     assert "read by the rig profile bench-3" in again
