@@ -83,7 +83,7 @@ def test_what_is_wrong_is_said_at_its_field_and_can_be_mended(page: Page) -> Non
     wrong.fill("1000")
     second.get_by_label("Standard deviation of this energy, kJ").fill("3")
     page.get_by_role("button", name="Predict", exact=True).click()
-    expect(second).to_contain_text("which is missing")
+    expect(second).to_contain_text("needs energy_per_cycle_kj")
     page.get_by_role("button", name="Remove block 2").click()
     page.get_by_role("button", name="Predict", exact=True).click()
     expect(page.get_by_role("table", name="Remaining life under planned duty, by probability")).to_be_visible()
