@@ -347,16 +347,13 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
         return {"time_s": series["time_s"].values}
     leading = next((name for name in _LEADING if name in series), next(iter(series)))
     lead = series[leading]
-    lengths = {name: own.values.size for name, own in series.items()}
     same = all(_same_clock(own, lead) for own in series.values())
-    if not same and any(own.times is None for own in series.values()):
-        _refuse_lengths(series, lengths)
-    if same and len(set(lengths.values())) > 1:
-        _refuse_lengths(series, lengths)
-    for name, own in series.items():
-        if own.times is not None and own.times.size != own.values.size:
-            message = f"{name} has {own.values.size} rows and its times {own.times.size}"
-            raise InvalidError.of(message, code="ragged", pointer=f"/channels/{name}")
+    sizes = {own.values.size for own in series.values()}
+    ragged = any(own.times is not None and own.times.size != own.values.size for own in series.values())
+    if ragged or (len(sizes) > 1 if same else any(own.times is None for own in series.values())):
+        rows = [f"{name} has {own.values.size}{' without times' * (own.times is None)}" for name, own in series.items()]
+        message = f"all channels must have as many rows by one clock, or times of their own, got: {', '.join(rows)}"
+        raise InvalidError.of(message, code="ragged")
     columns: dict[str, FloatArray] = {} if lead.times is None else {"time_s": lead.times}
     kept = np.ones(lead.values.size, dtype=np.bool_)
     invalid: dict[str, int] = {}
@@ -388,19 +385,6 @@ def _same_clock(series: _Series, other: _Series) -> bool:
     if series.times is None or other.times is None:
         return series.times is other.times
     return series.clock == other.clock or np.array_equal(series.times, other.times)
-
-
-def _refuse_lengths(series: Mapping[str, _Series], lengths: Mapping[str, int]) -> None:
-    """Raise InvalidError: lengths or clocks differ and a channel has no times by which it could be brought to the others."""
-    timeless = [name for name, own in series.items() if own.times is None]
-    shown = ", ".join(f"{name} has {rows}" for name, rows in lengths.items())
-    if len(set(lengths.values())) > 1:
-        message = f"all channels must have one number of rows, or times of their own, got: {shown}"
-    else:
-        message = (
-            f"all channels must be sampled by one clock, or each have its own; without a time: {', '.join(timeless)}"
-        )
-    raise InvalidError.of(message, code="ragged")
 
 
 def _resampled(

@@ -62,7 +62,7 @@ def stated_clock(held: Mapping[str, float | str], rows: Callable[[], int], count
     first, ways = starts[0] if starts else (0.0, "", ""), [*steps, *rates, *others]
 
     def read() -> FloatArray:
-        seconds = {one[2]: in_seconds(*one) if one in steps else 1 / _in_hertz(*one) for one in ways if one[0] > 0}
+        seconds = {one[2]: in_seconds(*one, rate=one not in steps) for one in ways if one[0] > 0}
         stored = {key: step for key, step in seconds.items() if _STORED.search(key)} or seconds
         step, against = next(iter(stored.values())), [key for key, own in stored.items() if not _alike(own, stored)]
         against += [f"{key} = {value}" for key, value in named.items() if _is_decimation(key, value)]
@@ -118,21 +118,11 @@ def _stated(named: Mapping[str, float | str], names: str) -> Iterator[tuple[floa
         yield number, str(stated), key
 
 
-def in_seconds(number: float, unit: str, key: str) -> float:
-    """A time [s]. Raises InvalidError where its unit is not known."""
-    converted = conversion("time_s", unit or "s")
-    if converted is None:
-        raise _unknown(unit, key)
-    return number * converted.factor
-
-
-def _in_hertz(number: float, unit: str, key: str) -> float:
-    factor = _HERTZ.get(unit.lower())
+def in_seconds(number: float, unit: str, key: str, *, rate: bool = False) -> float:
+    """A time, or the step of a rate [s]. Raises InvalidError where its unit is not known."""
+    known = None if rate else conversion("time_s", unit or "s")
+    factor = _HERTZ.get(unit.lower()) if rate else None if known is None else known.factor
     if factor is None:
-        raise _unknown(unit, key)
-    return number * factor
-
-
-def _unknown(unit: str, key: str) -> InvalidError:
-    message = f"the unit of {key[:MAX_QUOTED]} must be known, got {unit[:MAX_QUOTED]!r}"
-    return InvalidError.of(message, code="unknown_unit")
+        message = f"the unit of {key[:MAX_QUOTED]} must be known, got {unit[:MAX_QUOTED]!r}"
+        raise InvalidError.of(message, code="unknown_unit")
+    return 1 / (number * factor) if rate else number * factor

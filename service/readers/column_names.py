@@ -2,7 +2,7 @@
 
 import re
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
@@ -62,7 +62,8 @@ _OTHER = re.compile(
     "set|soll|sp$|target|ziel|cmd|command|demand|anford|ref|desired|consign|nomin|nenn|rated|lim|grenz|alarm|warn|max|min|"
     "peak|spitz|sd$|std|stand|devia|abweich|err|fehl|difference|ratio|rate|grad|deriv|änderung|offset|zero|null|tar[ae]$|"
     "gain|coef|koef|calc|berech|estim|model|simul|predict|drag|schlepp|bearing|lager|loss|verlust|lube|schmier|ambient|"
-    "umgeb|baro|luft|air$|supply|versorg|tank|pump|fan$|raw$|roh$"
+    "umgeb|baro|atmos|luft|air$|supply|versorg|tank|pump|fan$|raw$|roh$|"
+    "rippl|ampl|uncert|unsich|request|bend|biege|inert|träghe|idle|leerl|cool|kühl|critic|kriti"
 )
 #: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports, Simulink's.
 _SECONDS = frozenset({"x_value", "timestamps", "tout"})
@@ -253,25 +254,14 @@ def _taken_apart(title: str) -> tuple[str, str | None]:
         return match["name"].strip(), bare_unit(match["square"] if match["unit"] is None else match["unit"])
     if known_channel(title):
         return title, None
-    for name, unit in _endings(title):
-        channel = meaning(name, unit)[0] if is_unit(unit) else None
-        if (channel and conversion(channel, unit)) or (is_unit(unit) and _stands_apart(title, name, unit)):
-            return name, unit
-    return title, None
-
-
-def _stands_apart(title: str, name: str, unit: str) -> bool:
-    """Whether what parts a name that is not known from its unit is a sign, which a mere word does not have before it."""
-    between = title[len(name) : len(title) - len(unit)].strip()
-    return between not in ("", "_") or between == "in"
-
-
-def _endings(title: str) -> Iterator[tuple[str, str]]:
-    """Where a title may be parted into a name and a unit, the longest unit first."""
-    for mark in _BETWEEN.finditer(title, max(0, len(title) - LONGEST_UNIT - 4)):
+    for mark in _BETWEEN.finditer(title, max(0, len(title) - LONGEST_UNIT - 4)):  # the longest unit first
         name, unit = title[: mark.start()].strip(), title[mark.end() :]
-        if name and unit:
-            yield name, unit
+        if name and is_unit(unit):
+            channel = meaning(name, unit)[0]
+            # a sign parts any name from its unit, a blank only one that is known
+            if (channel and conversion(channel, unit)) or mark[0].strip() not in ("", "_"):
+                return name, unit
+    return title, None
 
 
 def bare_unit(text: str) -> str | None:
