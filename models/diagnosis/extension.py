@@ -11,7 +11,7 @@ runs of a life: a life is tracked under each, and the prognosis is their mixture
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -203,8 +203,7 @@ def facts_from(stored: Mapping[str, Any]) -> Facts:
     """The inverse of `facts_to`."""
     values: dict[str, Any] = dict(stored) | {"geometry": Geometry(**stored["geometry"]), "oil": Oil(**stored["oil"])}
     for field in fields(Facts):
-        lacking = [] if field.default is MISSING else field.default
-        value = values.setdefault(field.name, lacking)  # what an older build did not store
+        value = values[field.name]
         if isinstance(value, list):
             numbers = [math.nan if x is None else x for x in value]
             values[field.name] = np.array(numbers, dtype=np.float64) if field.type is FloatArray else tuple(numbers)

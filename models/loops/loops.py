@@ -22,8 +22,7 @@ from models.loops.criteria import FEWEST_SAMPLES, TELLING
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
 from models.loops.loop_area import Area, Direction, Samples, area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
-from models.records.pressure_levels import level_width, levels_of
-from models.records.pressure_stretches import pressure_stretches
+from models.records.pressure_levels import level_width, levels_of, pressure_stretches
 from models.records.runs import Record
 
 

@@ -1,9 +1,18 @@
-"""Levels of pressure: which measured pressures belong together, and the pressure [Pa] by which a level is called."""
+"""Levels of pressure: which measured pressures belong together, and the pressure [Pa] by which a level is called; and where
+the pressure of a record is constant: the stretches at one level, without the ramps to and from it.
+"""
+
+import bisect
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE, LEVEL_STEP
+from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE, LEVEL_STEP, MEDIAN_DURATION, SHORTEST_STRETCH
+from models.records.outliers import leading
+from models.records.periods import sample_interval
 
 
 def level_width(pressure: float) -> float:
@@ -34,3 +43,87 @@ def levels_of(pressure: FloatArray) -> FloatArray:
 def _rounded_level(median: float) -> float:
     snapped = round(median / LEVEL_STEP) * LEVEL_STEP
     return snapped if snapped > 0 and abs(median - snapped) <= 0.02e5 else round(median, 1)
+
+
+#: Ends are cut so many times at most.
+_CUTS = 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureStretch:
+    """Consecutive rows [start, stop) at one pressure [Pa] (their median)."""
+
+    pressure: float
+    start: int
+    stop: int
+
+
+def pressure_stretches(time: FloatArray, pressure: FloatArray) -> Iterator[PressureStretch]:
+    """The stretches of time [n] s, ascending, in which pressure [n] Pa is constant, in their order.
+
+    Medians over a quarter of a second that stay within LEVEL_GAP of the stretch's own median belong together; where
+    pressure still moves towards the level or already away from it is cut off. Ramps between levels give stretches that
+    are too short (under 2 s) to count, or straight lines, which do not count either.
+    """
+    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
+
+    smooth = median_filter(pressure, size=min(5, pressure.size), mode="nearest")
+    block = np.floor((time - time[0]) / max(MEDIAN_DURATION, 5 * sample_interval(time))).astype(np.int64)
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1, [time.size]])
+    medians = _block_medians(smooth, block, edges)
+    first = 0
+    ordered: list[float] = []  # the medians [first, i), ascending
+    for i in range(1, medians.size + 1):
+        bisect.insort(ordered, float(medians[i - 1]))
+        level = 0.5 * (ordered[(i - first - 1) // 2] + ordered[(i - first) // 2])
+        allowed = level_width(abs(level))
+        if i < medians.size and abs(medians[i] - level) <= allowed:
+            continue
+        if i - first >= SHORTEST_STRETCH:
+            near = np.abs(smooth - level) <= allowed
+            lowest, highest = edges[max(first - 1, 0)], edges[min(i + 1, medians.size)]
+            inside_start, inside_stop = edges[first + 1], edges[i - 1]
+            before = np.flatnonzero(~near[lowest:inside_start])
+            after = np.flatnonzero(~near[inside_stop:highest])
+            start = int(lowest + before[-1] + 1) if before.size else int(lowest)
+            stop = int(inside_stop + after[0]) if after.size else int(highest)
+            if _ramps(medians[first:i], allowed):
+                first, ordered = i, []
+                continue
+            start, stop = _without_ramps(smooth, start, stop, allowed)
+            if time[stop - 1] - time[start] >= SHORTEST_STRETCH * MEDIAN_DURATION - MEDIAN_DURATION:
+                yield PressureStretch(pressure=float(np.median(pressure[start:stop])), start=start, stop=stop)
+        first, ordered = i, []
+
+
+def _block_medians(values: FloatArray, block: NDArray[np.int64], edges: NDArray[np.int64]) -> FloatArray:
+    """The median of values [n] in each block [n], ascending, that starts at its edge."""
+    ordered = values[np.lexsort((values, block))]
+    first, count = edges[:-1], np.diff(edges)
+    return np.asarray(0.5 * (ordered[first + (count - 1) // 2] + ordered[first + count // 2]), dtype=np.float64)
+
+
+def _ramps(medians: FloatArray, gap: float) -> bool:
+    """Whether medians [b] over equal times are a straight line across the gap."""
+    if float(np.ptp(medians)) < 1.5 * gap:
+        return False
+    return abs(float(np.corrcoef(np.arange(medians.size), medians)[0, 1])) > 0.98
+
+
+def _without_ramps(smooth: FloatArray, start: int, stop: int, gap: float) -> tuple[int, int]:
+    """[start, stop) without the rows at its ends where pressure is off the level by more than its usual wander.
+
+    Level and wander are those of the middle half, so that a pressure which wanders all the time keeps its ends. They are
+    computed again after each cut: half of a long ramp may lie in the first middle.
+    """
+    for _ in range(_CUTS):
+        quarter = (stop - start) // 4
+        middle = smooth[start + quarter : stop - quarter]
+        level = float(np.median(middle))
+        wander = 1.4826 * float(np.median(np.abs(middle - level)))
+        off = np.abs(smooth[start:stop] - level) > max(4.0 * wander, 0.05 * gap)
+        before, after = leading(off), leading(off[::-1])
+        if before + after == 0 or before + after >= off.size:
+            break
+        start, stop = start + before, stop - after
+    return start, stop

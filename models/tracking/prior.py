@@ -77,8 +77,8 @@ class Prior:
 
     @classmethod
     def from_array(cls, numbers: FloatArray) -> "Prior":
-        """The inverse of `to_array`; of earlier versions too, which knew eq. 6 and constant scatter alone [14]."""
-        return cls(**{field.name: float(x) for field, x in zip(fields(cls), numbers, strict=False)})
+        """The inverse of `to_array`."""
+        return cls(**{field.name: float(x) for field, x in zip(fields(cls), numbers, strict=True)})
 
     def log_density(
         self, log_scale: FloatArray | float, log_exponent: FloatArray | float, log_scatter: FloatArray | float
@@ -104,18 +104,17 @@ def weak(first: Measurement, *, falling: bool) -> Prior:
     a, two deviations covering 0.06 % to 1.5 %.
     """
     size = math.hypot(first.value, math.sqrt(first.variance)) or 1.0
-    # of a quantity known to fall 7 % remains for a rise
     change_mean, change_sd = (-0.6, 0.4) if falling else (0.0, 1.0)
     return Prior(
         initial_mean=first.value,
-        initial_sd=0.5 * size,  # the first run need not be at ζ = 0
+        initial_sd=0.5 * size,
         change_mean=change_mean * size,
         change_sd=change_sd * size,
-        log_scale_mean=math.log(4_000.0),  # φ and ε: lives of 10² to 10⁶ cycles within two deviations
+        log_scale_mean=math.log(4_000.0),
         log_scale_sd=2.3,
         log_exponent_mean=math.log(0.8),
         log_exponent_sd=0.7,
-        log_scatter_mean=math.log(0.003 * size),  # 0.06 to 1.5 % within two deviations
+        log_scatter_mean=math.log(0.003 * size),
         log_scatter_sd=0.8,
         eq_6_share=criteria.EQ_6_SHARE if falling else 1.0,
         proportional_share=criteria.PROPORTIONAL_SHARE if falling else 0.0,

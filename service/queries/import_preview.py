@@ -10,7 +10,7 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.records.decimation import extreme_rows
 from models.records.plateaus import cut_plateaus
-from models.records.pressure_stretches import pressure_stretches
+from models.records.pressure_levels import pressure_stretches
 from service import records
 from service.columns import CHANNELS, RADIANS_PER_SECOND_PER_RPM, bar
 from service.errors import InvalidError

@@ -24,7 +24,7 @@ from models.friction.stribeck import GAMMA
 from models.records.criteria import SPEED_HARMONICS
 from models.records.outliers import beside, inliers
 from models.records.periods import Cycle, fit_cycle, harmonics
-from models.records.pressure_stretches import pressure_stretches
+from models.records.pressure_levels import pressure_stretches
 from models.records.runs import Record, plate_rise
 
 

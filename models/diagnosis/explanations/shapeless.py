@@ -52,12 +52,9 @@ _FEWEST_IN_A_RUN = 32
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HighestLine:
-    """The highest line: its power above the middle of its neighbourhood, its p-value among all that were looked at, and its
-    place (frequency by frequency, in Nm and in shares of the torque)."""
+    """The p-value of the highest line among all that were looked at."""
 
-    value: float = 0.0
     p_value: float = 1.0
-    index: int = -1
 
     @property
     def evidence(self) -> float:
@@ -105,14 +102,8 @@ def lines(problem: FitProblem, residual: FloatArray) -> HighestLine:
     # ... and above everything slower: structure that is larger the slower it is has no period
     slower = np.maximum.accumulate(power, axis=0)[_SLOWER - 1 : -1]
     power = np.where(power[_SLOWER:] >= slower, power[_SLOWER:], 0.0)
-    index = int(np.argmax(power))
-    highest = float(power.ravel()[index])
     tests = 1.5 * power.size
-    return HighestLine(
-        value=max(highest - middle, 0.0),
-        p_value=min(1.0, tests * float(gammaincc(len(kept), highest))),
-        index=index,
-    )
+    return HighestLine(p_value=min(1.0, tests * float(gammaincc(len(kept), power.max()))))
 
 
 def _runs(design: Design, noise: Noise, residual: FloatArray) -> list[_Run]:

@@ -24,7 +24,7 @@ from scipy.ndimage import uniform_filter1d
 from models.arrays import FloatArray
 from models.records.cleaning import UnusableRecordError, clean
 from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
-from models.records.pressure_stretches import pressure_stretches
+from models.records.pressure_levels import pressure_stretches
 from models.records.runs import Record
 
 #: A piece holds at least so many samples, means of several where the record is fast.

@@ -151,9 +151,6 @@ _RESIZED, _TURNED = 0.25, 0.1
 #: Degrees by which a measurement may be introduced, and halvings in the search for each.
 _DEGREES, _HALVINGS = 30, 20
 
-#: Names of arrays in stored states, where they are not those of the fields: databases of earlier versions stay readable.
-_STORED = {"outlying": "spoiled"}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticleState:
@@ -167,7 +164,7 @@ class ParticleState:
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
-        cloud = {_STORED.get(field.name, field.name): getattr(self.cloud, field.name) for field in fields(self.cloud)}
+        cloud = {field.name: getattr(self.cloud, field.name) for field in fields(self.cloud)}
         lone = {"prior": self.prior.to_array(), "forced": np.array([self.forced], dtype=np.float64)}
         return lone | self.history.to_arrays() | cloud
 
@@ -178,7 +175,7 @@ class ParticleState:
             prior=Prior.from_array(arrays["prior"]),
             history=History.from_arrays(arrays),
             forced=bool(arrays["forced"][0]),
-            cloud=Cloud(**{field.name: arrays[_STORED.get(field.name, field.name)] for field in fields(Cloud)}),
+            cloud=Cloud(**{field.name: arrays[field.name] for field in fields(Cloud)}),
         )
 
 

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from models.loops.loops import evaluate_loops
 from models.records.criteria import LEVEL_GAP
-from models.records.pressure_levels import level_width, levels_of
-from models.records.pressure_stretches import pressure_stretches
+from models.records.pressure_levels import level_width, levels_of, pressure_stretches
 from models.records.runs import Record
 from models.rig.sampled import EXACT, DynamicTest, Recorder
 from models.rig.stationary import Sensor

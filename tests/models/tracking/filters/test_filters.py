@@ -104,7 +104,7 @@ SERIES = {"prior", "progress", "value", "variance", "epoch"}
 
 STORED_NAMES = {
     "grid": SERIES,
-    "particle": SERIES | {"points", "form", "spoiled", "log_weight", "log_target", "forced"},
+    "particle": SERIES | {"points", "form", "outlying", "log_weight", "log_target", "forced"},
     "ukf": SERIES | {"place", "form", "log_weight", "mean", "covariance", "scatter"},
 }
 
@@ -120,12 +120,6 @@ def test_stored_arrays_have_the_names_of_this_version(tracker, state_type) -> No
     assert arrays["prior"].tolist()[10:] == [0.05, 0.1, 0.95, 0.05, EQ_6_SHARE, PROPORTIONAL_SHARE, KNEE_HAZARD]
     again = state_type.from_arrays({name: np.array(column) for name, column in arrays.items()}).to_arrays()
     assert all((again[name] == column).all() for name, column in arrays.items())
-
-
-def test_the_flags_of_outlying_runs_are_read_from_their_stored_name() -> None:
-    state = followed(Particle(particles=50), PRIOR, CAMPAIGN)
-    arrays = state.to_arrays() | {"spoiled": np.ones_like(state.cloud.outlying)}
-    assert (ParticleState.from_arrays(arrays).cloud.outlying == 1.0).all()
 
 
 # --- The grid against plain quadrature, the prior and itself.
