@@ -47,7 +47,7 @@ def test_slips_are_seen_and_mended_in_the_terminal(server: Server, tmp_path: Pat
     assert "accepted" in clutchlife("confirm", "c1", "odd", *at)
     assert life(server, "c1") != whole
     assert "c1 has no held runs" in clutchlife("confirm", "c1", "--all", *at)
-    assert "give the runs, or --all" in clutchlife("confirm", "c1", "odd", "--all", *at, code=64)
+    assert "name the runs, or use --all" in clutchlife("confirm", "c1", "odd", "--all", *at, code=64)
     clutchlife("withdraw", "c1", "odd", "--reason", "in lbf", *at)
     assert life(server, "c1") == whole
     post(server, "c1", 4000.0, run_id="typo", sent=4001.0)
