@@ -48,7 +48,7 @@ def simulate(
     ] = None,
     film: Annotated[
         bool,
-        typer.Option("--film", help="Add the lag of the reference's ageing film to friction; answer.json says so"),
+        typer.Option("--film", help="Let friction lag as by the oil film of the reference, too; answer.json says so"),
     ] = False,
     plate_rise: Annotated[
         float | None,

@@ -154,7 +154,7 @@ class StateCounts(Answer):
 
 
 class FleetTotals(Answer):
-    """How many clutches a list holds."""
+    """The number of clutches, by state."""
 
     all: int = Field(description="Clutches in use, or archived ones if requested")
     archived: int = Field(description="Archived clutches")

@@ -55,7 +55,7 @@ _OF_STATUS = {
     "503": {"Retry-After": _header("Seconds after which to try again", "1")},
 }
 _UNCHANGED = {
-    "description": "`If-None-Match` names the answer as it is: it need not be sent again",
+    "description": "Unchanged: `If-None-Match` names the present answer",
     "headers": _TAG | _ID,
 }
 

@@ -54,7 +54,7 @@ async def list_alarms(
 @router.post(
     "",
     status_code=201,
-    **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE, SENDING, {200: "The rule is there already"}),
+    **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE, SENDING, {200: "The rule existed before"}),
 )
 async def post_alarm(request: Request, context: auth.OwnIngester) -> Response:
     """Create a rule. Clutches that already pass its limit raise an alarm at once."""

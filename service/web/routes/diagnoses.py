@@ -33,7 +33,7 @@ Prefer = Annotated[
     "/diagnoses",
     status_code=201,
     **answers.taking(
-        DiagnosisIn, DiagnosisOut, {"adopt": False}, SENDING, {202: "It still runs: look again at `Location`"}
+        DiagnosisIn, DiagnosisOut, {"adopt": False}, SENDING, {202: "The diagnosis still runs: ask again at `Location`"}
     ),
 )
 async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchId, prefer: Prefer = None) -> Response:

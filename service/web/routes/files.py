@@ -34,7 +34,8 @@ SENDING_FILE = SENDING | described(NoRoomError)
     "/file",
     status_code=201,
     response_model=Receipt,
-    responses=SENDING_FILE | {200: {"model": Receipt, "description": "The same run again: the same receipt"}},
+    responses=SENDING_FILE
+    | {200: {"model": Receipt, "description": "The run was stored before; the answer is its receipt"}},
     openapi_extra=FILE_BODY,
 )
 async def post_run_file(

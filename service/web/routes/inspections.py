@@ -38,7 +38,7 @@ _KEPT = {
 _READING_FILE = READING | {
     200: {"content": _FILES, "headers": {"Cache-Control": _KEPT}, "description": "The file as it was sent"}
 }
-_SENDING_FILE = CHANGING | {200: {"model": PhotographOut, "description": "The inspection has this photograph already"}}
+_SENDING_FILE = CHANGING | {200: {"model": PhotographOut, "description": "The inspection had this photograph before"}}
 
 EXAMPLE = {
     "cycles": 11000,
@@ -58,7 +58,7 @@ EXAMPLE = {
         InspectionOut,
         EXAMPLE,
         SENDING,
-        {200: "The same inspection again; withdrawn where its `state` says so"},
+        {200: "The inspection was stored before; its `state` may be `withdrawn`"},
     ),
 )
 async def post_inspection(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:

@@ -70,7 +70,7 @@ async def read_rig(request: Request, context: OwnReader, name: RigName) -> Respo
     return await answer(request, lambda: rigs.look_up(context.database, name))
 
 
-@router.post("", status_code=201, **taking(RigIn, RigOut, EXAMPLE, SENDING, {200: "The profile is saved already"}))
+@router.post("", status_code=201, **taking(RigIn, RigOut, EXAMPLE, SENDING, {200: "The profile existed before"}))
 async def post_rig(request: Request, context: Ingester) -> Response:
     """Save a new rig profile: how the files of a rig are read."""
     return await _saved(request, context, None)

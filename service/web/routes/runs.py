@@ -52,7 +52,9 @@ EXAMPLE = {
 @router.post(
     "",
     status_code=201,
-    **answers.taking(RUN_IN.json_schema(), Receipt, EXAMPLE, SENDING, {200: "The same run again: the same receipt"}),
+    **answers.taking(
+        RUN_IN.json_schema(), Receipt, EXAMPLE, SENDING, {200: "The run was stored before; the answer is its receipt"}
+    ),
 )
 async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Post a run, in any order of cycles. The receipt has the results. When you get it, the run is stored for good."""
