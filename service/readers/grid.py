@@ -99,11 +99,14 @@ class DataRows:
                 summary = not self._summarised and _is_summary(row) and any(map(is_value, row))
                 self._summaries += [row] if summary else []
                 held += [] if summary else [(number, row)]
-        if last and self._summaries:
-            self._leave_out(self._summaries, "of means, extremes or sums in")
         if last and (footer := self._without_footer(held)):
             self._leave_out(footer, "below")
         return [number for number, _ in held], [row for _, row in held]
+
+    def end(self) -> None:
+        """Say what was left out among the rows, once all are read."""
+        if self._summaries:
+            self._leave_out(self._summaries, "of means, extremes or sums in")
 
     def _without_footer(self, held: list[tuple[int, Row]]) -> list[Row]:
         """The rows at the end that are words, or that a word begins (`Mean;5;100;20`), which are taken out."""

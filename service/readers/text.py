@@ -39,6 +39,8 @@ _ENCODINGS = ("cp1252", "cp1250", "cp1254", "gb18030", "shift_jis", "euc_jp", "b
 _CHINESE = re.compile(rb"(?:[\x00-\x7f]|[\xa1-\xf7][\xa1-\xfe])*")
 #: Cells of which the last is in quotes and goes on; a quotation mark within a cell is no other (3/4").
 _OPEN = re.compile(r'(?:(?:[ \t]*"(?:[^"]|"")*+"[^;,\t|\n]*|(?![ \t]*")[^;,\t|\n]*)[;,\t|\n])*+[ \t]*"(?:[^"]|"")*+')
+#: What is neither in numbers nor in points in time.
+_WORDS = re.compile(r"[^\d \n.,;:|\teETZ/+-]")
 #: Lines that one cell in quotes may go over.
 _MAX_CELL_LINES = 5
 
@@ -303,6 +305,7 @@ class _Body:
             self._rows += columns[0].size
             if self._rows > most:
                 raise TooLargeError(f"a file of {len(channels)} channels must not have more than {most} rows")
+        self.data.end()
         joined = []
         while parts:
             part = parts.pop(0) or [np.empty(0)]
@@ -358,11 +361,26 @@ class _Body:
     def _parsed(self, block: str) -> Iterator[tuple[int, list[str], bool]]:
         return _rows(block.split("\n")[:-1], self._separator)
 
+    def _even(self, block: str) -> list[str] | None:
+        """The cells of a block without words, with a line feed after each row, where all rows have as many; else None."""
+        separator, width = self._separator, self._width
+        empty = f"\n{separator * (width - 1)}\n"
+        if not separator.strip() or _WORDS.search(block) or "//" in block or empty in f"\n{block}":
+            return None
+        cells = block.replace("\n", f"{separator}\n{separator}").split(separator)
+        rows = block.count("\n")
+        return cells if len(cells) == (width + 1) * rows + 1 and cells[width :: width + 1].count("\n") == rows else None
+
     def _careful(self, block: str, channels: Mapping[int, str], last: bool) -> list[NDArray[Any]]:
         """The columns of any other block, without comments, blank lines and repeated titles.
 
         Raises InvalidError with every line of it that has too few or too many cells, or cells that are no numbers.
         """
+        if (cells := self._even(block)) is not None:
+            rows_read = range(self._line, self._line + block.count("\n"))
+            self._lines.append((self._rows, rows_read))
+            even = [cells[index : -1 : self._width + 1] for index in channels]
+            return self._numerals.values(channels, even, self.line_of, self._rows)
         titles = self.data.titles
         found = (
             (self._line + at, cells) for at, cells, comment in self._parsed(block) if not comment or cells == titles

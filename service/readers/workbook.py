@@ -67,6 +67,7 @@ def _table(name: str, rows: list[Sequence[Any]], layout: Layout, sheets: tuple[s
     limits.require_columns(len(layout.headings))
     data = DataRows(rows, layout)
     lines, held = data.of(enumerate(rows[layout.start :], layout.start + 1), 0, last=True)
+    data.end()
 
     def read(channels: Mapping[int, str]) -> list[NDArray[Any]]:
         columns = []
