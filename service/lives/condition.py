@@ -13,7 +13,7 @@ from models.prognosis.criteria import FEWEST_TESTS, HORIZON
 from models.prognosis.first_passage import PassageStatus
 from service.columns import whole
 from service.errors import Notice
-from service.lives.criteria import MAX_LINE_POINTS, NEAR_LIMIT, SOON
+from service.lives.criteria import LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, SOON
 from service.lives.history import WORN, Event, Series, date_of
 from service.lives.payloads import ENDED, INSUFFICIENT, interval_in_words
 
@@ -228,8 +228,14 @@ def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: 
         return f"Adopt the model with {' and '.join(causes)}: it explains where data and model disagree."
     if (advice := diagnosis["advice"]) is not None:
         unclear = "The cause is not clear yet. " if diagnosis["verdict"] == AMBIGUOUS else ""
-        return f"{unclear}Run a {advice['test'].removeprefix('the ')}: {_decides(advice['separates'])}."
+        return f"{unclear}Run {_test_in_words(advice['test'])}: {_decides(advice['separates'])}."
     return "Read the diagnosis before you rely on the forecast."
+
+
+def _test_in_words(test: str) -> str:
+    """An advised test; of a long protocol, which the diagnosis shows whole, its first test."""
+    test = test.removeprefix("the ")
+    return f"a {test}" if len(test) <= LONGEST_TEST else f"the advised tests, first a {test.partition(',')[0]}"
 
 
 def _decides(separates: Sequence[str]) -> str:

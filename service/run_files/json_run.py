@@ -18,7 +18,7 @@ from service.columns import CHANNELS, check_columns
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
 from service.lives.history import END_OF_LIFE, WORN
 from service.lives.incoming_run import IncomingRun, name_run
-from service.schemas.base import LONGEST_NOTE, MAX_MARKS
+from service.schemas.base import LONGEST_NOTE, MAX_MARKS, rule_in_words
 from service.schemas.run import RUN_IN, DutyRunIn, MaintenanceRunIn
 
 #: Items of a list and characters of a name of a run that are checked by its schema: more than a message quotes.
@@ -192,7 +192,7 @@ def _field_error(loc: tuple[int | str, ...], code: str, rule: str, value: object
     pointer = "".join(f"/{str(part).replace('~', '~0').replace('/', '~1')}" for part in place)
     name = ".".join(str(part) for part in place) or "the body"
     shown = "" if code == "missing" else repr(value)[:MAX_QUOTED]
-    rule = rule.removeprefix("Value error, ")
+    rule = rule_in_words(code, rule)
     message = f"{name}: {rule}" + (f", got {shown}" if shown and "got" not in rule else "")
     row = place[-1] + 1 if place and isinstance(place[-1], int) else None
     return FieldError(pointer=pointer, code=code, message=message, row=row, value=shown)

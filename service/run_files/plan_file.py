@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from models.rig.programme import PlannedTest
 from models.rig.stationary import OIL_TEMPERATURE
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
+from service.schemas.base import rule_in_words
 from service.schemas.diagnosis import PlanStep
 
 _LISTS = ("pressures_bar", "speeds_rpm")
@@ -46,7 +47,9 @@ def _planned(place: str, given: Mapping[str, Any]) -> PlannedTest:
         step = PlanStep.model_validate(given)
     except ValidationError as error:
         wrong = error.errors()[0]
-        raise ValueError(f"{place}: {'.'.join(map(str, wrong['loc']))}: {wrong['msg']}") from None
+        raise ValueError(
+            f"{place}: {'.'.join(map(str, wrong['loc']))}: {rule_in_words(wrong['type'], wrong['msg'])}"
+        ) from None
     if not step.pressures_bar or not step.speeds_rpm or step.cycles is None:
         raise ValueError(f"{place}: pressures_bar, speeds_rpm and cycles must be given")
     warm = step.oil_temperature_c

@@ -3,6 +3,7 @@ clutches; bases that refuse unknown fields, numbers that are finite, fields that
 error (RFC 9457), which `web.problems` makes.
 """
 
+import re
 from datetime import UTC, datetime
 from typing import Annotated, Any, Literal
 
@@ -80,6 +81,32 @@ LONGEST_TITLE, MAX_COLUMNS, MAX_SKIPPED, MAX_WORDS = 1000, 1000, 10_000, 20
 #: Characters of a receiver's address and of the secret that signs what it is sent. Chosen: a query of tokens fits, and what
 #: is shorter can be guessed.
 LONGEST_ADDRESS, SHORTEST_SECRET, LONGEST_SECRET = 2000, 8, 200
+
+
+#: What pydantic calls kinds of values, in a user's words.
+_KINDS_OF_VALUES = (
+    ("a valid integer", "a whole number"),
+    ("a valid dictionary or instance of", "an object, as"),
+    ("a valid dictionary", "an object"),
+    ("a valid boolean", "true or false"),
+    ("a valid ", "a "),
+)
+
+
+def rule_in_words(kind: str, message: str) -> str:
+    """The rule that a value breaks, of pydantic's kind of error and message, for users who never saw the schema."""
+    if kind == "extra_forbidden":
+        return "no such field"
+    if kind in ("missing", "union_tag_not_found"):
+        return "must be given"
+    if kind == "union_tag_invalid":
+        return f"must be one of {message.partition('expected tags: ')[2]}"
+    if IDENTIFIER_PATTERN in message:
+        return f"must have letters, digits and . _ : @ + - only, {LONGEST_IDENTIFIER} at most, a letter or digit first"
+    rule = re.sub(r"^\w+ should ", "must ", message.removeprefix("Value error, "))
+    for technical, plain in _KINDS_OF_VALUES:
+        rule = rule.replace(technical, plain)
+    return rule
 
 
 class Schema(BaseModel):

@@ -28,7 +28,7 @@ from service.errors import (
 )
 from service.logging import request_id
 from service.queries.cache import to_json
-from service.schemas.base import IDENTIFIER_PATTERN, Problem
+from service.schemas.base import Problem, rule_in_words
 from service.web.auth import route_of
 from service.web.limits import RETRY_AFTER_SECONDS
 from storage.engine.errors import DatabaseBusy, RawStoreUnavailable, StorageError, UnstorableText
@@ -115,21 +115,13 @@ def _request_error(_: Request, error: Exception) -> Response:
     return problem(422, InvalidError.slug, InvalidError.title, detail, tuple(errors[:MAX_ERRORS]), len(errors))
 
 
-#: What pydantic says for programmers, in words; by kind of error and pattern.
-_RULES = {
-    ("extra_forbidden", None): "no such field",
-    ("string_pattern_mismatch", IDENTIFIER_PATTERN): "a name has letters, digits and . _ : @ + -, no blanks or slashes",
-}
-
-
 def _argument_error(details: dict[str, Any]) -> FieldError:
     name = ".".join(str(part) for part in details["loc"][1:])
     shown = repr(details.get("input"))[:80]
-    rule = _RULES.get((details["type"], (details.get("ctx") or {}).get("pattern")), details["msg"])
     return FieldError(
         pointer="/" + "/".join(str(part) for part in details["loc"]),
         code=details["type"],
-        message=f"{name}: {rule}, got {shown}",
+        message=f"{name}: {rule_in_words(details['type'], details['msg'])}, got {shown}",
         value=shown,
     )
 

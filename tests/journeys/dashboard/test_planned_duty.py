@@ -72,7 +72,7 @@ def test_what_is_wrong_is_said_at_its_field_and_can_be_mended(page: Page) -> Non
     wrong = second.get_by_label("Duty cycles")
     expect(wrong).to_have_attribute("aria-invalid", "true")
     expect(wrong).to_be_focused()
-    expect(wrong).to_have_accessible_description(re.compile("^Input should be greater than"))
+    expect(wrong).to_have_accessible_description(re.compile("^must be greater than"))
     expect(page.get_by_role("group", name="Block 1").locator("[aria-invalid]")).to_have_count(0)
     assert violations(page) == []
     for typed in ("1,000", "ten"):

@@ -197,6 +197,11 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
             summary(9000.0), found(["oil_temperature"], ["oil_temperature", "baseline"]), "Out of specification: ",
             "Run a stationary test with the oil at 60 °C: it shows whether oil temperature is at work.",
         ),
+        (
+            summary(9000.0),
+            found(["film"]) | {"advice": {"test": f"stationary test at 5 bar, and {80 * 'x'}", "separates": ["film"]}},
+            "Out of specification: ", "Run the advised tests, first a stationary test at 5 bar: it shows whether film",
+        ),
         (summary(9000.0), found([]), "Out of specification: ", "Read the diagnosis before you rely on the forecast."),
     ],
     ids=str,
