@@ -180,7 +180,8 @@ $(VENV)-lowest/.tests: pyproject.toml tests/requirements-lowest.txt | $(VENV)/.p
 	@touch $@
 
 $(VENV)/.runs: $(VENV)/.python pyproject.toml docker/requirements.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r docker/requirements.txt
+	@echo "Installing the $$(grep -c == docker/requirements.txt) packages that Clutchlife needs into $(VENV): once, a minute or two"
+	@$(BIN)/python -m pip install --disable-pip-version-check --no-deps --require-hashes -r docker/requirements.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
 

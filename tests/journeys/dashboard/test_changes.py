@@ -191,7 +191,7 @@ def test_a_clutch_is_archived_and_brought_back(watched: Watched) -> None:
     dialog.get_by_label("Reason").fill("worn out")
     dialog.get_by_role("button", name="Archive").click()
     done(page, "bench is archived.")
-    expect(page.locator("#archived")).to_contain_text("takes no new runs")
+    expect(page.locator("#archived")).to_contain_text("accepts no new runs")
     drop(page, {"last.json": json.dumps(right(LAST))})
     sending = page.get_by_role("dialog", name="Send a run")
     sending.get_by_role("button", name="Send").click()
@@ -219,12 +219,12 @@ def test_a_clutch_is_archived_and_brought_back(watched: Watched) -> None:
 def test_warnings_of_a_life_stand_on_its_page(watched: Watched, server: Server) -> None:
     page = turned(opened(watched), "overview")
     page.locator("#chart-fan[data-sketched]").wait_for()
-    expect(page.locator("#tab-overview")).not_to_contain_text("Off its course")
+    expect(page.locator("#tab-overview")).not_to_contain_text("The last test does not fit")
     odd = right(LAST)
     odd["channels"]["torque_nm"] = [0.93 * value for value in odd["channels"]["torque_nm"]]
     with httpx2.Client(base_url=server.url, timeout=60) as http:
         assert [warning["code"] for warning in post(http, "bench", odd)["warnings"]] == ["off_track"]
-    warning = page.locator("#warnings li").filter(has_text="Off its course")
+    warning = page.locator("#warnings li").filter(has_text="The last test does not fit")
     warning.get_by_text(re.compile("its mean COF of .* is .* standard deviations below")).wait_for()
     link = warning.get_by_role("link", name="Stationary Stribeck test at 7,000 cycles")
     link.focus()

@@ -1,15 +1,14 @@
 // @ts-check
 // Alarms: events that wait for someone to acknowledge them, the rules that raise them, and the receivers that are called. Answers of
-// the API go in; lists, a form and tests come out, of all clutches or of one. Open this file first, then form.js (a rule in a dialog)
-// and words.js (a rule as a sentence).
+// the API go in; lists, a form and tests come out, of all clutches or of one. Open this file first, then form.js (a rule as a sentence
+// and in a dialog).
 
 import { Problem, read, readAll, sendJson } from "../shared/api.js";
 import { h, scrolling, table } from "../shared/dom.js";
 import { rowFiles } from "../shared/files.js";
 import { moment } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
-import { askReceiver, askRule } from "./form.js";
-import { ruleText } from "./words.js";
+import { askReceiver, askRule, ruleText } from "./form.js";
 
 /** @import { AlarmOut, EventOut, TestedOut, WebhookOut } from "../shared/types.js" */
 

@@ -1,48 +1,40 @@
 // @ts-check
-// Questions of the alarms' page: a rule, a receiver. Each resolves to what is to be sent, null where it is left.
+// What a rule of an alarm watches, a rule as part of a sentence, and the questions of the alarms' page: a rule, a receiver. Each
+// resolves to what is to be sent, null where it is left.
 
-import { answered, field, h } from "../shared/dom.js";
-import { numberOf, NOT_A_NUMBER } from "../shared/format.js";
-import { WATCHED } from "./words.js";
+import { Problem } from "../shared/api.js";
+import { asked } from "../shared/dialog.js";
+import { field, h } from "../shared/dom.js";
+import { fixed, NOT_A_NUMBER, numberOf, percent, significant, words } from "../shared/format.js";
 
-/** @import { Content } from "../shared/dom.js" */
 /** @import { AlarmOut } from "../shared/types.js" */
-/** @import { Watched } from "./words.js" */
+
+/** @typedef {AlarmOut["quantity"]} Watched */
+
+/** @type {Record<Watched, { title: string, side: "below" | "above" | null, unit: string, limit: string }>} */
+export const WATCHED = {
+  remaining_cycles: { title: "Remaining cycles, safe bound", side: "below", unit: "cycles", limit: "4000" },
+  remaining_days: { title: "Remaining days at this pace", side: "below", unit: "days", limit: "14" },
+  health: { title: "Health", side: "below", unit: "", limit: "0.2" },
+  shudder_margin: { title: "Shudder margin dμ/dv", side: "below", unit: "s/m", limit: "0" },
+  held_runs: { title: "Held runs", side: "above", unit: "", limit: "0" },
+  off_course: { title: "A test that does not fit the earlier ones", side: null, unit: "", limit: "" },
+  verdict: { title: "A new verdict: data and model disagree", side: null, unit: "", limit: "" },
+  state: { title: "Any state but normal", side: null, unit: "", limit: "" },
+  silent_hours: { title: "Hours since the last run", side: "above", unit: "h", limit: "24" },
+};
 
 /**
- * A form in a dialog; `read` gives what is to be sent, or says why it cannot yet.
- * @param {string} title
- * @param {Content} fields
- * @param {() => object | string} read
- * @returns {Promise<object | null>}
+ * When a rule raises an alarm.
+ * @param {AlarmOut} rule
  */
-function question(title, fields, read) {
-  const wrong = h("p", { class: "wrong", role: "alert" });
-  /** @type {object | null} */
-  let result = null;
-  const dialog = h("dialog", { class: "narrow", "aria-labelledby": "alarm-title" });
-  const submit = (/** @type {Event} */ event) => {
-    event.preventDefault();
-    const wanted = read();
-    if (typeof wanted === "string") {
-      wrong.textContent = wanted;
-      return;
-    }
-    result = wanted;
-    dialog.close();
-  };
-  const cancel = h("button", { type: "button", onclick: () => dialog.close() }, "Cancel");
-  dialog.append(
-    h("h2", { id: "alarm-title" }, title),
-    h(
-      "form",
-      { onsubmit: submit },
-      h("div", { class: "fields" }, fields),
-      wrong,
-      h("div", { class: "buttons" }, cancel, h("button", { class: "main" }, "Save")),
-    ),
-  );
-  return answered(dialog, () => result);
+export function ruleText({ quantity, below, above, probability, any_of: names }) {
+  const { title, side, unit } = WATCHED[quantity];
+  if (side === null) return names ? `${title} (${names.map((name) => words(name).toLowerCase()).join(", ")})` : title;
+  const limit = below ?? above ?? 0;
+  const value = Math.abs(limit) >= 100 ? fixed(limit) : significant(limit, 3);
+  const sure = probability === 0.05 ? "" : `, ${percent(probability)} quantile`;
+  return `${title} ${side} ${value}${unit && ` ${unit}`}${sure}`;
 }
 
 /**
@@ -87,10 +79,12 @@ export function askRule(rule, clutchId) {
     field(name, "Name (optional)"),
     h("label", { class: "switch" }, enabled, "In use"),
   ];
-  return question(rule === null ? "New rule" : "Change the rule", fields, () => {
+  const send = () => {
     const { side } = watched();
     const [at, back] = [numberOf(limit.value), numberOf(share.value)];
-    if (side !== null && (typeof at !== "number" || typeof back !== "number")) return NOT_A_NUMBER;
+    if (side !== null && (typeof at !== "number" || typeof back !== "number")) {
+      throw new Problem(422, { detail: NOT_A_NUMBER });
+    }
     return {
       name: name.value.trim(),
       quantity: quantity.value,
@@ -101,7 +95,8 @@ export function askRule(rule, clutchId) {
         : {}),
       enabled: enabled.checked,
     };
-  });
+  };
+  return asked({ title: rule === null ? "New rule" : "Change the rule", fields, action: "Save", send });
 }
 
 /** @param {string | null} clutchId of a clutch's page */
@@ -109,13 +104,11 @@ export function askReceiver(clutchId) {
   const url = h("input", { id: "receiver-url", type: "text", required: true, autocomplete: "off" });
   const name = input("receiver-name", "");
   const about = "https:// for a signed webhook; with the extra notify also mailtos://, msteams://, slack://, ntfys://";
-  return question(
-    "New receiver",
-    [field(url, "Address", h("small", {}, about)), field(name, "Name (optional)")],
-    () => ({
-      url: url.value.trim(),
-      name: name.value.trim(),
-      ...(clutchId === null ? {} : { clutch_id: clutchId }),
-    }),
-  );
+  const fields = [field(url, "Address", h("small", {}, about)), field(name, "Name (optional)")];
+  const send = () => ({
+    url: url.value.trim(),
+    name: name.value.trim(),
+    ...(clutchId === null ? {} : { clutch_id: clutchId }),
+  });
+  return asked({ title: "New receiver", fields, action: "Save", send });
 }

@@ -4,10 +4,9 @@
 
 import { doubtList } from "../sending/receipt.js";
 import { clutchPath, Problem, readAll, sendJson } from "../shared/api.js";
-import { answered, field, h } from "../shared/dom.js";
+import { asked } from "../shared/dialog.js";
+import { field, h } from "../shared/dom.js";
 import { fixed, kindName } from "../shared/format.js";
-import { problemView } from "../shared/problem_view.js";
-import { isCorrected } from "./states.js";
 
 /** @import { DeclaredEnd, InspectionOut, Receipt } from "../shared/types.js" */
 
@@ -36,6 +35,19 @@ export const LABELS = {
   withdraw: "Withdraw …",
   restore: "Restore …",
 };
+
+/** @param {Receipt} run */
+export const isCorrected = (run) => run.cycles !== run.sent_cycles;
+
+/**
+ * The state as a mark in the list of runs; nothing where the run counts as it was sent.
+ * @param {Receipt} run
+ */
+export function stateMark(run) {
+  if (run.state === "held") return h("span", { class: "mark-held" }, "Held");
+  if (run.state === "withdrawn") return h("span", { class: "mark-withdrawn" }, "Withdrawn");
+  return isCorrected(run) ? h("span", { class: "mark-corrected" }, `Sent as ${fixed(run.sent_cycles)}`) : "";
+}
 
 /**
  * What can be done to a run now.
@@ -390,42 +402,17 @@ function ask({ title, lines, action, optional = false, cycles, choice, note, sen
   const reason = h("input", { id: "reason", required: !optional, maxlength: LONGEST_REASON, autocomplete: "off" });
   const options = choice?.options.map(([value, text]) => h("option", { value }, text)) ?? [];
   const chosen = h("select", { id: "chosen", required: true }, ...options);
-  const answer = h("div", { class: "answer", "aria-live": "polite" });
-  const go = h("button", { class: "main" }, action);
-  const dialog = h("dialog", { class: "narrow", "aria-labelledby": "change-title" });
-  /** @type {Done | null} */
-  let result = null;
-  const submit = async (/** @type {SubmitEvent} */ event) => {
-    event.preventDefault();
-    go.disabled = true;
-    answer.replaceChildren(h("p", { class: "quiet" }, "Computing …"));
-    try {
-      result = await send(reason.value.trim(), Number(number.value), chosen.value);
-      dialog.close();
-    } catch (problem) {
-      answer.replaceChildren(problemView(problem, "Nothing was changed. "));
-    } finally {
-      go.disabled = false;
-    }
-  };
-  dialog.append(
-    h("h2", { id: "change-title" }, title),
-    ...lines.filter((line) => line !== "").map((line) => (typeof line === "string" ? h("p", {}, line) : line)),
-    h(
-      "form",
-      { onsubmit: submit },
-      h(
-        "div",
-        { class: "fields" },
-        cycles === undefined ? null : field(number, "Duty cycles since new"),
-        choice ? field(chosen, choice.label) : null,
-        field(reason, note ?? (optional ? "Reason (optional)" : "Reason")),
-      ),
-      answer,
-      h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"), go),
-    ),
-  );
-  const closed = answered(dialog, () => result);
+  const closed = asked({
+    title,
+    lines: lines.map((line) => (typeof line === "string" ? line && h("p", {}, line) : line)),
+    fields: [
+      cycles === undefined ? null : field(number, "Duty cycles since new"),
+      choice ? field(chosen, choice.label) : null,
+      field(reason, note ?? (optional ? "Reason (optional)" : "Reason")),
+    ],
+    action,
+    send: () => send(reason.value.trim(), Number(number.value), chosen.value),
+  });
   if (cycles !== undefined) number.select();
   return closed;
 }

@@ -6,9 +6,9 @@ import { doubtList, fitTable, loopTable, warnings } from "../sending/receipt.js"
 import { h } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import { fixed, kindName, moment, words } from "../shared/format.js";
+import { isCorrected, stateMark } from "./changes.js";
 import { buttons } from "./held.js";
 import { runCharts } from "./run_view.js";
-import { isCorrected, stateMark } from "./states.js";
 
 /** @import { Receipt } from "../shared/types.js" */
 /** @import { Page } from "./clutch.js" */

@@ -1,12 +1,13 @@
 // @ts-check
-// What may be changed of what is stored of a clutch: each change is asked about, made, said, and read again.
+// What may be changed of what is stored of a clutch: each change is asked about, made, said at the foot of the window with the way
+// back (the next change takes its place), and read again.
 
 import { byId, h } from "../shared/dom.js";
+import { problemView } from "../shared/problem_view.js";
 import { answerDoubts, askArchive, askEnd, askInspection, askRun, askTakeBack, askUndo } from "./changes.js";
-import { showDone } from "./done.js";
 
 /** @import { ClutchOut, DeclaredEnd, InspectionOut, Receipt } from "../shared/types.js" */
-/** @import { Answer, RunAction } from "./changes.js" */
+/** @import { Answer, Done, RunAction } from "./changes.js" */
 
 export class Stored {
   /**
@@ -51,4 +52,32 @@ export class Stored {
     const text = "This clutch is archived: it is not in the list of clutches and accepts no new runs.";
     byId("archived").replaceChildren(clutch.archived ? h("div", { class: "notice" }, h("p", {}, text), back) : "");
   }
+}
+
+/** @type {HTMLElement | null} */
+let shown = null;
+
+/**
+ * @param {Done | null} done
+ * @param {() => Promise<unknown>} refresh reads the clutch again
+ */
+async function showDone(done, refresh) {
+  if (done === null) return;
+  shown?.remove();
+  const { text, undo } = done;
+  const place = h("div", { class: "done", role: "status", tabindex: "-1" });
+  const close = () => place.remove();
+  const goBack = async () => {
+    try {
+      await showDone(undo && (await undo()), refresh);
+    } catch (problem) {
+      place.replaceChildren(problemView(problem, "Not undone. "), dismiss());
+    }
+  };
+  const dismiss = () => h("button", { type: "button", onclick: close }, "Close");
+  document.body.append(place);
+  place.append(h("p", {}, text), undo ? h("button", { type: "button", onclick: goBack }, "Undo") : "", dismiss());
+  shown = place;
+  place.focus({ preventScroll: true });
+  await refresh();
 }

@@ -1,21 +1,25 @@
 // @ts-check
 // The diagnosis: reports of the API go in; verdict, tables, charts and the buttons to run and adopt it come out.
 // Open this file first, then report.js (a report in words and tables) and charts.js (residuals and loops, before and after);
-// confirm.js asks before the model changes, with lifebars.js showing what the change means.
+// before the model changes, lifebars.js shows what the change means.
 
 import { clutchPath, Problem, read, sendJson } from "../shared/api.js";
+import { agreed } from "../shared/dialog.js";
 import { h } from "../shared/dom.js";
 import { words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { charts } from "./charts.js";
-import { confirm } from "./confirm.js";
+import { lifeBars } from "./lifebars.js";
 import { report } from "./report.js";
 
-/** @import { DiagnosisListed, DiagnosisOut, ListPage, ModelName } from "../shared/types.js" */
+/** @import { BeforeAndAfter, DiagnosisListed, DiagnosisOut, ListPage, ModelName } from "../shared/types.js" */
 
 const QUESTION =
   "Do the data and the model disagree beyond noise and run-to-run scatter? If so: where, and which physical cause accounts for it?";
 const NEVER_RUN = "No diagnosis has been run yet. It reads the stored runs and changes nothing.";
+
+/** @param {BeforeAndAfter | null | undefined} life remaining life under both models */
+const nowAndThen = (life) => life && lifeBars(life, ["Now", "Then"]);
 
 export class Diagnosis {
   /**
@@ -140,7 +144,7 @@ export class Diagnosis {
     const { latest } = this;
     if (latest === null) return;
     const names = namesOf(latest.causes);
-    const agreed = await confirm({
+    const sure = await agreed({
       title: `Adopt ${names}?`,
       action: "Adopt it",
       points: [
@@ -148,23 +152,23 @@ export class Diagnosis {
         "All its predictions, the past ones too, are recomputed from the stored runs.",
         "The runs themselves are not touched, and you can go back to the baseline at any time.",
       ],
-      life: latest.gain?.remaining_useful_life ?? null,
+      more: nowAndThen(latest.gain?.remaining_useful_life),
     });
-    if (agreed) await this.put(latest.diagnosis_id, "Adopting: the predictions are recomputed …");
+    if (sure) await this.put(latest.diagnosis_id, "Adopting: the predictions are recomputed …");
   }
 
   async goBack() {
     const life = this.latest?.gain?.remaining_useful_life;
-    const agreed = await confirm({
+    const sure = await agreed({
       title: "Go back to the baseline?",
       action: "Go back",
       points: [
         `Tracking and remaining life will no longer account for ${namesOf(this.model?.effects)}.`,
         "All predictions are recomputed under the baseline. The runs and the report stay.",
       ],
-      life: life ? { before: life.after, after: life.before } : null,
+      more: nowAndThen(life && { before: life.after, after: life.before }),
     });
-    if (agreed) await this.put(null, "Going back: the predictions are recomputed …");
+    if (sure) await this.put(null, "Going back: the predictions are recomputed …");
   }
 
   /**

@@ -4,11 +4,11 @@
 // Open this file first (what is asked for and shown), then rows.js (which rows are drawn), row.js (one of them), chips.js.
 
 import { Alarms } from "../alarms/alarms.js";
-import { confirm } from "../diagnosis/confirm.js";
 import { register } from "../sending/registration.js";
 import { sender } from "../sending/sending.js";
 import { at } from "../shared/address.js";
 import { clutchPath, read, sendJson } from "../shared/api.js";
+import { agreed } from "../shared/dialog.js";
 import { byId, h } from "../shared/dom.js";
 import { age } from "../shared/format.js";
 import { withKey } from "../shared/key.js";
@@ -141,7 +141,7 @@ function drawPicked() {
 async function archive(ids) {
   const archived = !ARCHIVED.checked;
   const count = ids.length === 1 ? "1 clutch" : `${ids.length} clutches`;
-  const agreed = await confirm({
+  const sure = await agreed({
     title: archived ? `Archive ${count}?` : `Bring ${count} back?`,
     points: [
       archived
@@ -151,7 +151,7 @@ async function archive(ids) {
     ],
     action: archived ? "Archive" : "Bring back",
   });
-  if (!agreed) return;
+  if (!sure) return;
   try {
     for (const id of ids) {
       await sendJson("PATCH", clutchPath(id), { archived, reason: "" });

@@ -1,0 +1,61 @@
+// @ts-check
+// Questions in a dialog: each has a form that is sent, or is left.
+
+import { answered, h } from "./dom.js";
+import { problemView } from "./problem_view.js";
+
+/** @import { Content } from "./dom.js" */
+
+/**
+ * @template Result
+ * @typedef {object} Question
+ * @property {string} title
+ * @property {Content[]} [lines] what stands above the form
+ * @property {Content} [fields]
+ * @property {string} action the button's word
+ * @property {string} [leave] the other button's word
+ * @property {() => Promise<Result> | Result} send a Problem of it is shown, and the dialog stays
+ */
+
+/**
+ * Resolves to what `send` gives, null where the reader leaves it.
+ * @template Result
+ * @param {Question<Result>} question
+ * @returns {Promise<Result | null>}
+ */
+export function asked({ title, lines = [], fields = [], action, leave = "Cancel", send }) {
+  const answer = h("div", { class: "answer", "aria-live": "polite" });
+  const go = h("button", { class: "main" }, action);
+  const dialog = h("dialog", { class: "narrow", "aria-labelledby": "question-title" });
+  /** @type {Result | null} */
+  let result = null;
+  const submit = async (/** @type {SubmitEvent} */ event) => {
+    event.preventDefault();
+    go.disabled = true;
+    answer.replaceChildren(h("p", { class: "quiet" }, "Computing …"));
+    try {
+      result = await send();
+      dialog.close();
+    } catch (problem) {
+      answer.replaceChildren(problemView(problem, "Nothing was changed. "));
+    } finally {
+      go.disabled = false;
+    }
+  };
+  const cancel = h("button", { type: "button", onclick: () => dialog.close() }, leave);
+  const form = h("div", { class: "fields" }, fields);
+  const buttons = h("div", { class: "buttons" }, cancel, go);
+  dialog.append(h("h2", { id: "question-title" }, title), h("div", {}, ...lines));
+  dialog.append(h("form", { onsubmit: submit }, form, answer, buttons));
+  return answered(dialog, () => result);
+}
+
+/**
+ * Whether the reader agrees to what will happen.
+ * @param {{ title: string, points: string[], action: string, more?: Content }} question
+ */
+export async function agreed({ title, points, action, more = null }) {
+  const items = points.map((point) => h("li", {}, point));
+  const lines = [h("ul", {}, items), more];
+  return (await asked({ title, lines, action, leave: "Leave it as it is", send: () => true })) === true;
+}
