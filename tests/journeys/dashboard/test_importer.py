@@ -85,7 +85,7 @@ def test_the_second_file_of_a_rig_is_taken_without_a_question(
     page = opened(watched)
     drop(page, {f"Stat_{first}_a.{ending}": content(first)})
     dialog = page.get_by_role("dialog", name="Send a run")
-    expect(dialog.get_by_text("Still to be given")).to_be_visible()  # no title says which column is the torque
+    expect(dialog.get_by_text("Still missing")).to_be_visible()  # no title says which column is the torque
     dialog.get_by_label(f"Channel of {torque}").select_option("torque_nm")
     expect(dialog.get_by_label(f"Unit of {torque}")).to_have_value("kNm")
     dialog.get_by_label("Kind of test").select_option("stationary_stribeck")
