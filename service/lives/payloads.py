@@ -28,6 +28,8 @@ from service.settings import CODE_VERSION
 OFF_TRACK = "off_track"
 #: The warning of a prediction whose course is none of eq. 6's.
 NOT_EQ_6 = "not_eq6"
+#: The warning of a prediction by a value when new that lies far above the first test's.
+NEW_EXTRAPOLATED = "new_extrapolated"
 #: The warning of a prediction whose forerunners held too few of the tests since.
 MISSED_FORECASTS = "missed_forecasts"
 #: The warning of an answer that another filter's median lies outside of.
@@ -49,6 +51,20 @@ def not_eq_6(courses: Sequence[CourseShare]) -> list[Notice]:
         "and allows for further changes"
     )
     return [Notice(code=NOT_EQ_6, message=message)]
+
+
+def new_extrapolated(series: Series, assumptions: Assumptions, initial: float, fraction: float) -> list[Notice]:
+    """The warning of a clutch that has come more than half of the way to its end before its first test, as tracked: what it
+    was when new then decides, and no test has seen it. A bench's counter that began with another clutch looks the same."""
+    cycles, (first, _) = series.as_measured(assumptions, 0)
+    if cycles <= series.scale.origin or (share_of_way(first, initial, fraction * initial) or 0.0) >= 0.5:
+        return []
+    message = (
+        f"the first test is at {cycles:,.0f} cycles, and a mean COF when new of {initial:.3g} is estimated from how it has "
+        f"fallen since: the first test has {first:.3g}. Where the counter did not begin with this clutch, send maintenance "
+        f"with the event rebuild at {cycles:,.0f} cycles: its life is then counted from there"
+    )
+    return [Notice(code=NEW_EXTRAPOLATED, message=message)]
 
 
 def missed(back_cast: BackCast) -> list[Notice]:
@@ -282,11 +298,13 @@ def predicted(
     """A first passage in ζ, led back to cycles. Without `enough` tests only the last of them and the safe bound are stated:
     what else the prior makes of them is no finding."""
     ends = {q: None if zeta is None else float(series.scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
+    of_new = new_extrapolated(series, assumptions, passage.initial, fraction)
+    of_course = (*not_eq_6(courses), *of_new, *missed(back_cast))
     present = {
         "runs_used": runs,
         "current": _measured_last(series, assumptions, runs),
         "at_least": safe_bound(ends[SAFE], cycles, series.scale.origin),
-        "warnings": notice_items([*warnings, *((*not_eq_6(courses), *missed(back_cast)) if enough else ())]),
+        "warnings": notice_items([*warnings, *(of_course if enough else ())]),
     }
     answer = insufficient(assumptions, cycles, series.pressure, fraction) | present
     if not enough:

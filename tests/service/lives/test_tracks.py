@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fastapi.testclient import TestClient
 
 from models.prognosis.fleet import FleetPrior
 from models.tracking.measurement import Measurement
@@ -140,3 +141,19 @@ def test_a_test_is_odd_only_where_it_is_under_every_draw() -> None:
         said = predict("particle", series, under, tracked, CYCLES[-1], 0.5)
         warned.append("off_track" in {warning["code"] for warning in said["warnings"]})
     assert warned == [False, False, True]
+
+
+def test_a_clutch_whose_counter_began_elsewhere_is_told_to_declare_where_its_life_began(client: TestClient) -> None:
+    for share in range(8):
+        body = stationary(50_000.0 + 1_000.0 * share, wear=0.08 * share)
+        assert client.post("/v1/clutches/c1/runs", json=body).status_code == 201
+    before = client.get("/v1/clutches/c1/remaining-useful-life").json()
+    said = {warning["code"]: warning["message"] for warning in before["warnings"]}
+    assert "the event rebuild at 50,000 cycles" in said["new_extrapolated"]
+    declared = {"kind": "maintenance", "cycles": 50_000.0, "event": "rebuild"}
+    assert client.post("/v1/clutches/c1/runs", json=declared).status_code == 201
+    answer = client.get("/v1/clutches/c1/remaining-useful-life").json()
+    assert "new_extrapolated" not in {warning["code"] for warning in answer["warnings"]}
+    assert (before["status"], before["at_least"]) == ("reached", 0.0)
+    assert answer["status"] == "predicted"
+    assert answer["at_least"] > 0.0

@@ -1,0 +1,153 @@
+"""`make blind ABLATE=each`: every number that gates a verdict, taken for another, on the fixed set of campaigns.
+
+SEED=  other campaigns (1)    SIZE=  a share of them (1: some two hours of one core; any share is a fair sample)
+ONLY=  rows whose names begin with these
+Verdicts are stored in .blind/ablations, a file a campaign: the next run goes on where this one ended. After a change of code
+remove them.
+"""
+
+import json
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from time import process_time
+
+from models.diagnosis import criteria
+from models.diagnosis.design.design import build_design
+from models.diagnosis.explanations.decide import judge
+from models.diagnosis.explanations.posterior import Search
+from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline
+from models.diagnosis.raw_records import evidence
+from models.diagnosis.raw_records.evidence import RawEvidence, raw_evidence
+from tests.blind.rig.loudness import UnreachableError
+from tests.blind.rig.sent import campaign
+from tests.blind.subset import STORE, Judged, trials
+from tests.blind.trials import Trial
+
+#: What each number is taken for, by when it acts: before the search, in it, and on what it found.
+BEFORE: dict[str, tuple[object, ...]] = {"SHARP": (1e9,), "LEAST_EVIDENCE": (2.0, 9.0)}
+IN_SEARCH: dict[str, tuple[object, ...]] = {
+    "ANYTHING_WRONG": (0.1,),
+    "UNCATALOGUED_SHARE": (0.03,),
+    "SECOND": (0.25,),
+    "TEMPLATE_ERRORS": (((0.25, 0.05),),),
+    "CONTRAST_SIZES": ((0.003,),),
+    "NEGLIGIBLE": (0.1,),
+    "SLACK": (0.0,),
+    "MOST_REFITS": (5, 1000),
+    "RELATIVE": (1.1,),
+}
+AFTER: dict[str, tuple[object, ...]] = {
+    "LIKELY": (0.35, 0.65),
+    "SURE": (0.8, 0.95),
+    "VIBRATION_TRACE": (0.0, 0.5),
+    "MISFIT": (1e9,),
+}
+AS_IT_IS = "as it is"
+
+
+@contextmanager
+def taken_for(number: str, value: object) -> Iterator[None]:
+    """A number of the diagnosis' criteria, or of those of raw records, as another."""
+    module = criteria if hasattr(criteria, number) else evidence
+    before = getattr(module, number)
+    setattr(module, number, value)
+    try:
+        yield
+    finally:
+        setattr(module, number, before)
+
+
+def verdicts(trial: Trial) -> dict[str, Judged]:
+    """What is said with each value of each number; what the number does not act on is computed once."""
+    seen = campaign(trial.hidden())
+    design = build_design(seen)
+
+    def recorded() -> tuple[RawEvidence, ...]:
+        return tuple(record for record in raw_evidence(seen) if record.effect not in trial.without)
+
+    def searched(fitted: Baseline, raw: tuple[RawEvidence, ...]) -> Search:
+        search = Search(fitted, raw, trial.without)
+        search.run()
+        return search
+
+    def said(search: Search, raw: tuple[RawEvidence, ...], began: float) -> Judged:
+        judgement = judge(search.posterior(raw, trial.without))
+        seconds = process_time() - began
+        return Judged(trial.row, frozenset(trial.slugs), str(judgement.verdict), frozenset(judgement.causes), seconds)
+
+    began = process_time()
+    baseline, raw = fit_baseline(design), recorded()
+    search, exhausted = searched(baseline, raw), criteria.MOST_REFITS
+    out = {AS_IT_IS: said(search, raw, began)}
+    for number, values in (BEFORE | IN_SEARCH | AFTER).items():
+        for value in values:
+            began = process_time()
+            with taken_for(number, value):
+                fitted = fit_baseline(design) if number == "SHARP" else baseline
+                records = recorded() if number == "LEAST_EVIDENCE" else raw
+                same = number in AFTER or (number == "LEAST_EVIDENCE" and records == raw)
+                same |= number == "MOST_REFITS" and search.refits < min(exhausted, criteria.MOST_REFITS)
+                other = search if same else searched(fitted, records)
+                out[f"{number} = {value}"] = said(other, records, began)
+    return out
+
+
+def stored(name: str, trial: Trial) -> dict[str, Judged]:
+    """The verdicts on a trial, computed or read; none where no such campaign could be made."""
+    path = STORE / "ablations" / f"{name}.json"
+    if not path.exists():
+        try:
+            said = verdicts(trial)
+        except UnreachableError:
+            said = {}
+        path.parent.mkdir(parents=True, exist_ok=True)
+        rows = {variant: [one.verdict, sorted(one.causes), one.seconds] for variant, one in said.items()}
+        path.with_suffix(".part").write_text(json.dumps(rows), encoding="utf-8")
+        path.with_suffix(".part").rename(path)
+    truth = frozenset(trial.slugs)
+    rows = json.loads(path.read_text(encoding="utf-8"))
+    return {
+        variant: Judged(trial.row, truth, verdict, frozenset(causes), seconds)
+        for variant, (verdict, causes, seconds) in rows.items()
+    }
+
+
+def good(one: Judged) -> bool:
+    """Nothing called adequate, an effect named right, what is left out or uncatalogued neither named nor overlooked."""
+    if not one.truth or one.row.startswith("none"):
+        return one.verdict == "model_adequate"
+    if one.row.startswith(("left/", "outside/")):
+        return not one.named and one.verdict != "model_adequate"
+    return one.right
+
+
+def table(found: Sequence[dict[str, Judged]]) -> list[str]:
+    """A row a value: how many verdicts changed, became good or ceased to be, and of those named wrong."""
+    lines = [
+        f"| {len(found)} campaigns | changed | good only so | good only as it is | named wrong (as it is) | seconds |",
+        "|---" * 6 + "|",
+    ]
+    for variant in found[0]:
+        pairs = [(each[AS_IT_IS], each[variant]) for each in found]
+        changed = sum((a.verdict, a.causes) != (b.verdict, b.causes) for a, b in pairs)
+        won, lost = sum(good(b) and not good(a) for a, b in pairs), sum(good(a) and not good(b) for a, b in pairs)
+        wrong = f"{sum(b.wrong for _, b in pairs)} ({sum(a.wrong for a, _ in pairs)})"
+        seconds = sum(b.seconds for _, b in pairs) / len(pairs)
+        lines.append(f"| {variant} | {changed} | {won} | {lost} | {wrong} | {seconds:.1f} |")
+    return lines
+
+
+def main() -> None:
+    """Judge, and print the rows."""
+    only = tuple((os.environ.get("ONLY") or "").split(","))
+    chosen = {name: one for name, one in trials(int(os.environ.get("SEED") or 1)).items() if one.row.startswith(only)}
+    share = float(os.environ.get("SIZE") or 1.0)
+    places = [int(place / share) for place in range(round(len(chosen) * share))]
+    names = [list(chosen)[place] for place in places]
+    found = [said for name in names if (said := stored(name, chosen[name]))]
+    print("\n".join(table(found)))
+
+
+if __name__ == "__main__":
+    main()
