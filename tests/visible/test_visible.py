@@ -1,5 +1,7 @@
 """What a report calls visible is seen at twice that amplitude; a small sample, `make visible` hides 200."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -16,9 +18,11 @@ def test_an_offset_that_raises_no_alarm_is_not_called_visible() -> None:
     offset = next(each for each in report.visible if each.effect == "pressure_offset")
     assert offset.amplitude > 0.5 or report.verdict != "model_adequate"
     assert offset.least < 0.2  # of one that steps less would do
-    stated = report.summary.partition("would have shown")[2].partition("nine times in ten")[0]
-    assert stated != "" or report.verdict != "model_adequate"
-    assert "pressure offset" not in stated
+    stated = report.summary.partition("would have shown")[2]
+    assert "pressure offset" in stated or report.verdict != "model_adequate"
+    assert report.verdict != "model_adequate" or re.search(
+        r"pressure offset from [^(]* \((in its hardest|in some)", stated
+    )
 
 
 @pytest.mark.slow

@@ -90,9 +90,10 @@ def advise(
     ranked = []
     for key, rows in trials_of(campaign, problem.design, distances).items():
         chance, other, nats = _brought(before, distances.with_freedom(rows), evidences, len(race))
-        if np.isfinite(chance) and nats > 0.1:
+        narrows = distances.size_left(rows) if len(race) == 1 else 0.0
+        # less than "positive" (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773) is no advice
+        if np.isfinite(chance) and nats >= 1.0 and narrows <= criteria.MAX_LEFT:
             effect, rival = _names(fits[0], fits[other] if len(race) > 1 else None)
-            narrows = distances.size_left(rows) if len(race) == 1 else 0.0
             advice = Advice(
                 key=key,
                 test=TRIALS[key].text,

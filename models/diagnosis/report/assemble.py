@@ -134,10 +134,11 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
 def _unsure(slug: str, size: Size) -> str:
     effect = BY_SLUG[slug]
     low, high = (number(effect.scale * end) for end in size.interval)
-    why = "it depends on the course over life that is assumed, even in sign" if size.courses else "not even its sign"
+    wrong = f"its sign may be wrong with probability {size.other_sign:.2f}"
+    why = f"it depends on the course over life that is assumed, and {wrong}" if size.courses else wrong
     return (
         f"The extension is not proposed: these data do not determine the size of {effect_name(slug)} "
-        f"({low} to {high} {effect.unit}): {why}."
+        f"(90 % interval {low} to {high} {effect.unit}): {why}."
     )
 
 
@@ -172,7 +173,7 @@ def report_of(
     """Candidates, misfits, gain, advice, maps, loops, extension, summary."""
     problem, fitted = posterior.problem, posterior.null.fit
     reason = reason_against(validation.gain, sizes)
-    notes = tuple(note for note in (*_notes(baseline, posterior, judgement, raw), reason) if note)
+    notes = tuple(note for note in _notes(baseline, posterior, judgement, raw) if note)
     scatter = run_scatter(posterior.null.evidence.screened)
     candidates = candidates_of(problem, judgement, raw, sizes.by_slug)
     extended = validation.extended

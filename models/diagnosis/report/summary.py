@@ -12,10 +12,10 @@ from models.diagnosis import criteria
 from models.diagnosis.design.design import CLOCK, CYCLES, FREQUENCY, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.fitted_effect import Estimate
-from models.diagnosis.experiments.test_plan import BASELINE
+from models.diagnosis.experiments.test_plan import BASELINE, Advice
 from models.diagnosis.explanations.decide import smallest
 from models.diagnosis.explanations.shapeless import ADVICE
-from models.diagnosis.explanations.verdict import UNCATALOGUED, Verdict
+from models.diagnosis.explanations.verdict import UNCATALOGUED, Verdict, probabilities_by_slug
 from models.diagnosis.pooled_fit.projection import RunScatter
 from models.diagnosis.report.report import Candidate, Misfit, Report, Visible
 from models.diagnosis.validation.held_out import Gain
@@ -74,12 +74,18 @@ def estimated(estimate: Estimate) -> str:
 
 
 def signed(estimate: Estimate) -> str:
-    """Value and deviation, and where the sign is open its probability."""
+    """Value with its 90 % interval where one is stated, else with its deviation, and where the sign is open its
+    probability: said to be open where the interval holds both signs."""
     sign = None if estimate.one_sided else estimate.sign_probability
+    low, high = estimate.interval
+    size = estimated(estimate)
+    if estimate.stated_interval is not None:
+        size = with_unit(f"{estimate.name} {number(estimate.value)}", estimate.unit)
+        size += f", 90 % interval {number(low)} to {_amount(high, estimate.unit)}"
     if sign is None:
-        return estimated(estimate)
-    way = "negative" if estimate.value < 0 else "positive"
-    return f"{estimated(estimate)}, {way} with probability {probability(sign)}"
+        return size
+    way = f"{'negative' if estimate.value < 0 else 'positive'} with probability {probability(sign)}"
+    return f"{size}, the sign is open ({way})" if low < 0.0 < high else f"{size}, {way}"
 
 
 def number(value: float) -> str:
@@ -117,7 +123,8 @@ def summarise(report: Report) -> str:
     data = f"{count_of(report.tests, 'test')} at {count_of(report.states, 'state')} of use were examined."
     if report.tests == 1:
         data = data.replace("were", "was")
-    sentences = [Sentence(data, MAY), *say(report), *_noted(report.notes)]
+    said = {sentence.text: sentence for sentence in (Sentence(data, MAY), *say(report), *_noted(report.notes))}
+    sentences = list(said.values())  # each once
     return " ".join(sentence.text for sentence in _short(sentences) if sentence.text)
 
 
@@ -155,30 +162,36 @@ def _adequate(report: Report) -> list[Sentence]:
     return sentences
 
 
+#: What an engineer asks for first: what the paragraph always gives, where the data show it in some form.
+_ASKED_FIRST = ("torque_zero_shift", "pressure_offset")
+
+
 def _unseen(report: Report) -> list[Sentence]:
-    """What these data would miss: the effects that must be largest against what is usual to be seen."""
-    short = [v for v in report.visible if v.amplitude > 2.0 * v.usual]
-    worst = sorted(short, key=lambda v: (-v.least / v.usual, -v.amplitude / v.usual))
-    missed = [_missed(visible) for visible in worst[: criteria.VISIBLE_MENTIONED]]
-    sentences = [Sentence(f"These data would miss {conjunction(missed)}.")] if missed else []
-    if reach := [v for v in report.visible if v not in short]:
-        reach.sort(key=lambda v: v.amplitude / v.usual)
-        sizes = [
-            f"{effect_name(v.effect)} from {_amount(v.amplitude, v.unit)}" for v in reach[: criteria.VISIBLE_MENTIONED]
-        ]
-        sentences.append(Sentence(f"Nine times in ten they would have shown {conjunction(sizes)}.", SHOULD))
+    """From which size on these data would have shown an effect, in the form that shows best and in the hardest one: a zero
+    and a pressure first, then effects that must be largest against what is usual, those with a unit before the others."""
+    order = sorted(report.visible, key=lambda v: (v.unit == "-", -v.least / v.usual, -v.amplitude / v.usual))
+    first = [v for slug in _ASKED_FIRST for v in order if v.effect == slug]
+    listed = [*first, *(v for v in order if v not in first)][: criteria.VISIBLE_MENTIONED]
+    shown = [_shown(visible) for visible in listed]
+    sentences = []
+    if shown:
+        sentences = [Sentence(f"Nine times in ten these data would have shown {conjunction(shown)}.")]
     if report.unseen:
         names = conjunction([effect_name(slug) for slug in report.unseen])
         sentences.append(Sentence(f"Nothing of these would show at any size: {names}.", SHOULD))
     return sentences
 
 
-def _missed(visible: Visible) -> str:
-    """How large an effect may be without being seen, in some of its forms or in all of them."""
-    name, least = effect_name(visible.effect), _amount(visible.least, visible.unit)
+def _shown(visible: Visible) -> str:
+    """The smallest sizes that show, `torque zero shift from 0.64 Nm (in its hardest form 11.3 Nm)`."""
+    name = effect_name(visible.effect)
+    if visible.unit == "-":
+        name = f"{name} ({BY_SLUG[visible.effect].amplitude})"
+    least = _amount(visible.least, visible.unit)
     if math.isinf(visible.amplitude):
-        return f"{name} below {least}, in some forms at any size"
-    return f"{name} below {_amount(visible.amplitude, visible.unit)}"
+        return f"{name} from {least} (in some forms at no size)"
+    hardest = _amount(visible.amplitude, visible.unit)
+    return f"{name} from {least}" + ("" if hardest == least else f" (in its hardest form {hardest})")
 
 
 def _amount(value: float, unit: str) -> str:
@@ -218,13 +231,21 @@ def _named(report: Report) -> list[Sentence]:
     return [*sentences, *_gained(report), *_next(report)]
 
 
+def sure_causes(report: Report) -> tuple[str, ...]:
+    """The causes that are as good as certain: the explanations that hold them have a probability of SURE together."""
+    shares = probabilities_by_slug(report.explanations)
+    return tuple(slug for slug in report.causes if shares.get(slug, 0.0) >= criteria.SURE)
+
+
 def _ambiguous(report: Report) -> list[Sentence]:
-    """The explanations among which the choice is, each with its probability, and each effect's size where it first comes."""
+    """What is certain with its size, then the explanations among which the choice is, each with its probability, and each
+    effect's size where it first comes."""
     sized = {candidate.effect: candidate.estimate for candidate in report.candidates}
-    listed = []
+    sure = sure_causes(report)
     near = smallest({item.effects: item.probability for item in report.explanations})
-    for item in (item for item in report.explanations if item.effects in near):
-        names = [effect_name(slug) for slug in item.effects if slug != UNCATALOGUED]
+    listed = []
+    for item in (item for item in report.explanations if item.effects in near and set(sure) <= set(item.effects)):
+        names = [effect_name(slug) for slug in item.effects if slug not in {*sure, UNCATALOGUED}]
         if UNCATALOGUED in item.effects:
             names.append(
                 f"something that is not in the catalogue{f', such as {report.resembles}' if report.resembles else ''}"
@@ -232,26 +253,42 @@ def _ambiguous(report: Report) -> list[Sentence]:
         sizes = [
             signed(estimate) if estimate.value != 0.0 else "not measured, so it cannot be excluded"
             for slug in item.effects
-            if (estimate := sized.pop(slug, None)) is not None
+            if slug not in sure and (estimate := sized.pop(slug, None)) is not None
         ]
-        listed.append(f"{' together with '.join(names)} ({'; '.join([probability(item.probability), *sizes])})")
-    first = "Something is wrong that the model does not explain"
-    if (
-        sum(len(alternative.split()) for alternative in listed) > criteria.MAX_WORDS // 2
-    ):  # the sizes are in the report's fields
-        short = [
-            alternative if alternative.endswith("))") or ";" not in alternative else f"{alternative.split(';')[0]})"
-            for alternative in listed
-        ]
-        listed = short[:8]
-        names = [effect_name(slug) for slug in report.causes if slug != UNCATALOGUED]
-        listed += [name for name in names if not any(name in alternative for alternative in listed)]
-    alternatives = listed[0]
-    if len(listed) > 1:
-        first += ", and these data cannot distinguish which of these it is"
-        alternatives = f"{', '.join(listed[:-1])}, or {listed[-1]}"
-    sentences = [Sentence(f"{first} (with its probability): {alternatives}."), Sentence(_error(report), MAY)]
-    return [*sentences, *_gained(report), *_next(report)]
+        listed.append((" together with ".join(names) or "nothing", probability(item.probability), sizes))
+    long = sum(len(" ".join((name, *sizes)).split()) + 1 for name, _, sizes in listed) > criteria.MAX_WORDS // 2
+    if long:  # the sizes are in the report's fields
+        brief = [name for name, _, _ in listed[:8]]
+        others = [effect_name(slug) for slug in report.causes if slug not in {*sure, UNCATALOGUED}]
+        left = [name for name in others if not any(name in alternative for alternative in brief)]
+        unmeasured = "not measured, so it cannot be excluded"
+        listed = [(name, chance, [size for size in sizes if size == unmeasured]) for name, chance, sizes in listed[:8]]
+    alternatives = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in listed] + (
+        left if long else []
+    )
+    if sure:
+        share = sum(item.probability for item in report.explanations if set(sure) <= set(item.effects))
+        verb = "is at work" if len(sure) == 1 else "are at work"
+        said = f"{conjunction([effect_name(slug) for slug in sure])} {verb} (probability {probability(share)})"
+        sentences = [Sentence(f"{said[0].upper()}{said[1:]}.")]
+        sentences += [Sentence(f"Size: {signed(sized[slug])}.") for slug in sure if slug in sized]
+        if len(alternatives) == 1:
+            sentences.append(Sentence(f"Beside it is {alternatives[0]}."))
+        elif alternatives:
+            sentences.append(
+                Sentence(f"Open is only what is beside it (with its probability): {_either(alternatives)}.")
+            )
+    else:
+        first = "Something is wrong that the model does not explain"
+        if len(alternatives) > 1:
+            first += ", and these data cannot distinguish which of these it is"
+        sentences = [Sentence(f"{first} (with its probability): {_either(alternatives)}.")]
+    return [*sentences, Sentence(_error(report), MAY), *_gained(report), *_next(report)]
+
+
+def _either(parts: Sequence[str]) -> str:
+    """`a`, `a, or b`, `a, b, or c`."""
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])}, or {parts[-1]}"
 
 
 def _unexplained(report: Report) -> list[Sentence]:
@@ -280,7 +317,9 @@ def _error(report: Report) -> str:
     error = f"The baseline model's error is {number(misfit.rmse)} Nm RMS"
     where = _axes(misfit)
     if misfit.rmse <= misfit.noise:
-        return f"{error}, no more than noise, but correlated{f' along {where}' if where else ''}."
+        return (
+            f"{error}, as large as noise alone, but it follows a pattern{f' that depends on {where}' if where else ''}."
+        )
     percent = 100 * misfit.unexplained_share
     share = f"{'less than 0.1' if percent < 0.1 else number(percent)} % of its square is not noise"
     return f"{error} (noise alone: {number(misfit.noise)} Nm); {share}{f', and depends on {where}' if where else ''}."
@@ -336,18 +375,42 @@ def _next(report: Report) -> list[Sentence]:
     if not report.advice:
         return []
     best = report.advice[0]
-    if best.nats < 1.0:  # less than "positive" (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773)
-        return [Sentence("No test that was considered would add evidence.")]
     chance = f"probability {probability(best.probability)}"
     if best.narrows:
         left = f"{100 * best.narrows:.0f} % of what it is"
-        return [Sentence(f"Next, to narrow its size: {best.test} (brings the uncertainty to {left}).")]
+        return [Sentence(f"Next, to narrow its size: {brief_test(best)} (brings the uncertainty to {left}).")]
     if best.other == BASELINE:
-        return [Sentence(f"Next, to confirm it ({chance}): {best.test}.")]
+        return [Sentence(f"Next, to confirm it ({chance}): {brief_test(best)}.")]
     pair = f"{effect_name(best.effect)} from {effect_name(best.other)}"
     if best.nats < criteria.WORTHWHILE:
-        return [Sentence(f"No single test would decide. The best: {best.test} (it tells {pair}; {chance}).")]
-    return [Sentence(f"Next: {best.test}. It tells {pair} ({chance}).")]
+        return [Sentence(f"No single test would decide. The best: {brief_test(best)} (it tells {pair}; {chance}).")]
+    return [Sentence(f"Next: {brief_test(best)}. It tells {pair} ({chance}).")]
+
+
+#: Words from which a test is put shortly. The longest test of one kind has 16, two kinds take 29 and more.
+_LONG_TEST = 20
+
+
+def brief_test(advice: Advice) -> str:
+    """A test in words; a long one by its kinds, pressures, speeds and frequency alone: its steps are the protocol."""
+    if len(advice.test.split()) <= _LONG_TEST or not advice.steps:
+        return advice.test
+    kinds = []
+    for kind, name in (("stationary_stribeck", "stationary"), ("dynamic_stribeck", "dynamic")):
+        if steps := [step for step in advice.steps if step.kind == kind]:
+            frequencies = sorted({step.frequency for step in steps if step.frequency is not None})
+            at = f" at {number(frequencies[0])} Hz" if frequencies else ""
+            pressures = _range([1e-5 * value for step in steps for value in step.pressures])
+            speeds = _range([value * 30.0 / math.pi for step in steps for value in step.speeds])
+            oils = {step.temperature - 273.15 for step in steps if step.temperature is not None}
+            oil = f", also with the oil at {number(max(oils))} °C" if oils else ""
+            kinds.append(f"{name} tests{at}, {pressures} bar, {speeds} rpm{oil}")
+    return f"{' and '.join(kinds)} (as the protocol has it)"
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = number(min(values)), number(max(values))
+    return low if low == high else f"{low} to {high}"
 
 
 def _noted(notes: Sequence[str]) -> list[Sentence]:

@@ -127,6 +127,10 @@ def _remaining(report: Report, before: Mapping[str, Any], after: Mapping[str, An
     now, then = (f"{float(f'{median:.2g}'):,.0f}" for median in medians)
     if now == then == "0":
         return ""
+    if now == "0":
+        return f"Adopting it takes back that the end is reached: a median of about {then} cycles remains."
+    if then == "0":
+        return f"Adopting it says that the end is reached; without it a median of about {now} cycles remains."
     if now == then:
         return f"Adopting it leaves the median of the remaining life at about {now} cycles."
     return f"Adopting it changes the median of the remaining life from about {now} to about {then} cycles."

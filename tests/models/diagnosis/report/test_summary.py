@@ -9,6 +9,7 @@ import pytest
 from models.diagnosis.criteria import MAX_WORDS
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.experiments.candidates import TRIALS, Step
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import UNCATALOGUED, Explanation, Verdict, Where
 from models.diagnosis.report.report import Candidate, Misfit, Report, Visible
@@ -141,18 +142,83 @@ def test_what_was_not_measured_cannot_be_excluded() -> None:
     assert "or oil temperature (0.30; not measured, so it cannot be excluded)" in said
 
 
-def test_what_these_data_would_miss_is_said_the_worst_first() -> None:
-    found = findings(Verdict.MODEL_ADEQUATE)
-    assert "would miss" not in summarise(found)
-    short = tuple(visible(slug, sizes) for slug, sizes in (("pressure_offset", 10.0), ("torque_zero_shift", 12.0)))
-    said = summarise(replace(found, visible=short))
-    assert "These data would miss torque zero shift below 6 Nm and pressure offset below 1.5 bar." in said
-    assert "would have shown" not in said
-    some = replace(visible("pressure_offset", 3.0), amplitude=math.inf, least=0.1)  # seen in one of its shapes alone
-    said = summarise(replace(found, visible=(some,)))
-    assert "would miss pressure offset below 0.1 bar, in some forms at any size." in said
-    said = summarise(replace(found, unseen=("channel_delay", "stick_slip")))
+def test_what_these_data_would_show_is_said_with_units_zero_and_pressure_first() -> None:
+    """Oil temperature below 2.83 was said to be missed, without a unit, and of a zero nothing."""
+    found = replace(findings(Verdict.MODEL_ADEQUATE), unseen=("channel_delay", "stick_slip"))
+    sizes = {"oil_temperature": 4.0, "running_in": 30.0, "unsettled_dwell": 20.0, "pressure_offset": 1.0}
+    shown = tuple(visible(slug, size) for slug, size in (*sizes.items(), ("torque_zero_shift", 12.0)))
+    said = summarise(replace(found, visible=shown))
+    assert (
+        "Nine times in ten these data would have shown torque zero shift from 3 Nm (in its hardest form 6 Nm), "
+        "pressure offset from 0.075 bar (in its hardest form 0.15 bar) and running in from "
+    ) in said
     assert "Nothing of these would show at any size: channel delay and stick slip." in said
+    said = summarise(replace(found, visible=(visible("oil_temperature", 4.0),)))
+    assert "oil temperature (viscosity exponent β) from 1.4 (in its hardest form 2.8)" in said
+    some = replace(visible("pressure_offset", 3.0), amplitude=math.inf, least=0.1)  # seen in one of its shapes alone
+    assert "pressure offset from 0.1 bar (in some forms at no size)." in summarise(replace(found, visible=(some,)))
+
+
+def sized(interval: tuple[float, float], sign: float) -> str:
+    """The paragraph on a shifted zero of 3.06 ± 3.16 Nm of this interval."""
+    found = findings(Verdict.CAUSE_NAMED, "torque_zero_shift")
+    estimate = replace(found.candidates[0].estimate, value=3.06, sd=3.16, stated_interval=interval, stated_sign=sign)
+    return summarise(replace(found, candidates=(replace(found.candidates[0], estimate=estimate),)))
+
+
+def test_a_size_and_the_words_on_its_sign_agree() -> None:
+    """3.1 ± 3.2 Nm was said to be positive with probability above 0.99."""
+    said = sized((0.972, 9.23), 0.995)
+    assert "3.06 Nm, 90 % interval 0.972 to 9.23 Nm, positive with probability above 0.99" in said
+    assert "±" not in said.split("Size:")[1].split(". ")[0]
+    assert "the sign is open (positive with probability 0.55)" in sized((-4.2, 6.49), 0.55)
+
+
+def test_no_sentence_stands_twice() -> None:
+    why = "The extension is not proposed: its error on held-out runs is larger than the baseline's."
+    found = replace(findings(Verdict.CAUSE_NAMED, "oil_change"), not_adoptable=why, notes=(why,))
+    assert summarise(found).count(why) == 1
+
+
+def test_a_cause_of_all_explanations_is_certain_and_open_is_what_is_beside_it() -> None:
+    """Neither of "channel delay, or channel delay together with something" was said to be certain."""
+    found = findings(Verdict.CAUSE_AMBIGUOUS, "channel_delay")
+    both = explanations_of({("channel_delay",): 0.55, ("channel_delay", UNCATALOGUED): 0.45})
+    said = summarise(replace(found, explanations=both))
+    assert "Channel delay is at work (probability above 0.99)." in said
+    assert "Open is only what is beside it (with its probability): nothing (0.55), or something that" in said
+    assert "cannot distinguish" not in said
+    one = explanations_of({("channel_delay", UNCATALOGUED): 1.0})
+    said = summarise(replace(found, explanations=one))
+    assert "Beside it is something that is not in the catalogue (above 0.99)." in said
+    assert "cannot distinguish" not in said
+
+
+def test_a_test_of_many_words_is_put_into_a_short_line() -> None:
+    """A test of 60 words stood before the uncertainty that it leaves."""
+    found = findings(Verdict.CAUSE_NAMED, "inertia_torque")
+    sweep = Step(
+        kind="stationary_stribeck",
+        pressures=(75e3, 175e3),
+        speeds=(2.0944, 206.3),
+        temperature=None,
+        cycles=1,
+        minutes=3,
+    )
+    swing = replace(sweep, kind="dynamic_stribeck", speeds=(0.0, 209.44), frequency=0.3, temperature=333.15)
+    advice = replace(found.advice[0], test=TRIALS["all_loads_and_60c"].text, steps=(sweep, swing), narrows=0.3)
+    said = summarise(replace(found, advice=(advice,)))
+    assert (
+        "Next, to narrow its size: stationary tests, 0.75 to 1.75 bar, 20 to 1,970 rpm and dynamic tests at 0.3 Hz, 0.75 to "
+        "1.75 bar, 0 to 2,000 rpm, also with the oil at 60 °C (as the protocol has it) (brings"
+    ) in said
+
+
+def test_an_error_as_large_as_noise_is_not_called_correlated_along_cycles() -> None:
+    found = replace(findings(Verdict.UNEXPLAINED_STRUCTURE), baseline=replace(MISFIT, rmse=0.1))
+    assert "as large as noise alone, but it follows a pattern that depends on oil temperature and cycles." in summarise(
+        found
+    )
 
 
 def test_notes_on_single_runs_stay_in_the_report() -> None:
