@@ -30,6 +30,8 @@ _VERDICTS = {
 }
 #: An axis is named where chance alone makes such a pattern less often than this.
 _SHOWN_P = 0.01
+#: Probability from which a cause is certain though others are open (that of what a diagnosis names).
+_CERTAIN = 0.9
 #: Candidates that are less probable, or come after this many, are shown by `--json` only. Chosen: a screenful.
 _MIN_PROBABILITY, _MAX_CANDIDATES = 0.005, 6
 #: A gain in log evidence [nats] from which the evidence has this name. Derived: 2 ln B of 6 and 2 in R. E. Kass, A. E.
@@ -50,11 +52,15 @@ def _spelt(slug: str) -> str:
 def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     """The parts of a finished report, each to be printed."""
     words, colour = _VERDICTS[report["verdict"]]
-    causes = f": {', '.join(map(_spelt, report['causes']))}" if report["causes"] else ""
+    named = report["causes"]
+    likely = {item["effect"] for item in report["candidates"] if (item["probability"] or 0.0) >= _CERTAIN}
+    if report["verdict"] == "cause_ambiguous" and likely.intersection(named):
+        words, named = "Certain, though not what is beside it", [cause for cause in named if cause in likely]
+    causes = f": {', '.join(map(_spelt, named))}" if named else ""
     yield Panel(Text(report["summary"]), title=Text(f"{words}{causes}", style=f"bold {colour}"), border_style=colour)
     if report["candidates"]:
-        likely = [item for item in report["candidates"] if (item["probability"] or 0.0) >= _MIN_PROBABILITY]
-        yield _candidates((likely or report["candidates"])[:_MAX_CANDIDATES])
+        shown_ones = [item for item in report["candidates"] if (item["probability"] or 0.0) >= _MIN_PROBABILITY]
+        yield _candidates((shown_ones or report["candidates"])[:_MAX_CANDIDATES])
     if report["maps"] is not None:
         yield _maps(report["maps"])
     axes = [_spelt(item["axis"]) for item in report["baseline"]["where"] if item["p_value"] < _SHOWN_P]

@@ -89,3 +89,10 @@ def test_what_could_be_told_apart_is_shown_where_it_was_asked_for(report: dict[s
     assert "oil change and running in" not in text
     assert "These tests would distinguish 1 of 2 pairs of causes." in text
     assert "These tests cannot show: channel delay." in text
+
+
+def test_a_cause_that_all_explanations_share_is_certain_in_the_heading(report: dict[str, Any]) -> None:
+    """The cause cannot be distinguished: channel delay, uncatalogued, was the heading where the delay was certain."""
+    likely = report["candidates"][0] | {"effect": "channel_delay", "probability": 0.99}
+    open_beside = {"verdict": "cause_ambiguous", "causes": ["channel_delay", "uncatalogued"], "candidates": [likely]}
+    assert "Certain, though not what is beside it: channel delay " in printed(report | open_beside)
