@@ -32,6 +32,7 @@ from models.diagnosis.effects.catalogue import BY_SLUG, Column, columns_at_rows,
 from models.diagnosis.effects.effect import SCALES, Kind, Shape
 from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
 from models.diagnosis.effects.fitted_effect import FittedEffect, effect_rows, free_shapes
+from models.diagnosis.effects.history import OIL_CHANGE
 from models.diagnosis.effects.thermal import OIL_TEMPERATURE
 from models.diagnosis.explanations.evidence import Evidence, evidence_of
 from models.diagnosis.explanations.shapeless import lines, outlier_evidence, temperature_evidence
@@ -413,6 +414,13 @@ class Search:
         if not facts.temperature_measured and OIL_TEMPERATURE.slug not in without:
             warm = Alternative((OIL_TEMPERATURE.slug,))
             weights[warm] = null.log_evidence + temperature_evidence(self.problem, null.fit) + self.prior(warm)
+            if (
+                not facts.oil_changes
+            ):  # oil of another temperature from some state on is oil of another viscosity as well
+                for alternative in [a for a in weights if OIL_CHANGE.slug in a.causes]:
+                    causes = {*alternative.causes} - {OIL_CHANGE.slug} | {*warm.causes}
+                    twin = Alternative(tuple(sorted(causes)), alternative.unknown)
+                    weights[twin] = float(np.logaddexp(weights.get(twin, -np.inf), weights[alternative]))
         single = self.prior(Alternative(("",)))
         swings = {record.effect: record.log_evidence for record in raw if is_vibration(record)}
         loudest = max(swings.values(), default=0.0)

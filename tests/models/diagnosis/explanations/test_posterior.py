@@ -227,6 +227,13 @@ def test_a_logged_oil_change_is_likelier_than_a_temperature_that_nobody_measured
     assert report.candidates[0].probability > 0.6
 
 
+@pytest.mark.long
+def test_without_a_thermometer_an_oil_change_that_nobody_logged_may_be_warmer_oil() -> None:
+    report = diagnose(campaign(5, fresh, temperature=False), rng=np.random.default_rng(0))
+    assert report.verdict is Verdict.CAUSE_AMBIGUOUS
+    assert set(report.causes) >= {"oil_change", "oil_temperature"}
+
+
 def test_gains_that_scatter_are_no_evidence_of_a_temperature() -> None:
     """Whatever size of them the noise was given; the control: a temperature is."""
     given = study(campaign(5, temperature=False, gain=0.005))
