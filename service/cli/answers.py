@@ -294,6 +294,7 @@ def loops(
             show_table(_LOOPS, map(_loop, answer["items"]), left=2)
         else:
             print_line(f"{clutch} has no loops")
+        warn(answer["warnings"])
 
     _answer(service, f"/v1/clutches/{clutch}/loops", _arguments(query), show, as_json=as_json, as_csv=as_csv)
 
@@ -349,6 +350,7 @@ def _show_engagement(answer: Mapping[str, Any]) -> None:
     if answer["measured"]:
         out.print("measured engagements", style="bold")
         show_table(["run", "cycles", *_INDICATORS], map(_measured, answer["measured"]))
+    warn(answer["warnings"])
 
 
 def _measured(item: Mapping[str, Any]) -> list[str]:

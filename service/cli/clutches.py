@@ -89,7 +89,9 @@ def _row(item: dict[str, Any]) -> list[str]:
         numbers = [number(summary["as_of_cycles"]), number(summary["at_least"]), "-"]
         if summary["status"] != "insufficient_data":
             numbers[2] = cycles(summary["remaining_cycles"]["0.5"])
-    return [item["clutch_id"], item["state"]["name"].replace("_", " "), *numbers, held]
+    state = item["state"]["name"].replace("_", " ")
+    ended = "ended, " if summary and summary["ended"] else ""
+    return [item["clutch_id"], ended + state, *numbers, held]
 
 
 def status(clutch: ClutchId, as_json: Json = False, url: Url = URL, key: Key = None, patience: Patience = 10.0) -> None:

@@ -12,7 +12,6 @@ from typing import Any
 from models.prognosis.criteria import FEWEST_TESTS, HORIZON
 from models.prognosis.first_passage import PassageStatus
 from service.columns import whole
-from service.errors import Notice
 from service.lives.criteria import LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, SOON
 from service.lives.history import WORN, Event, Series, date_of
 from service.lives.payloads import ENDED, INSUFFICIENT, interval_in_words
@@ -64,15 +63,15 @@ def rank_of(summary: Mapping[str, Any]) -> float:
 
 
 def beside_held(
-    payload: Mapping[str, Any], summary: Mapping[str, Any], among: Mapping[str, Any] | None
+    payload: Mapping[str, Any], summary: Mapping[str, Any], among: Mapping[str, Any] | None, count: int
 ) -> dict[str, Any]:
-    """What an answer says beside its prediction: `held_runs` with what these would make of it, which is `among` (None: none
-    is held), and the safe bound as the lower of both, with its date at the pace of the runs; `summary` is that of the
-    clutch, empty where the answer is of an earlier time."""
+    """What an answer says beside its prediction: `held_runs` with what these, `count`, would make of it, which is `among`
+    (None: none is held), and the safe bound as the lower of both, with its date at the pace of the runs; `summary` is that
+    of the clutch, empty where the answer is of an earlier time or life."""
     held, warnings = None, list(payload["warnings"])
     if among is not None:
-        held = {"count": summary["held"]} | {name: among[name] for name in ("status", "remaining_cycles")}
-        warnings.append(_held_warning(payload, held))
+        held = {"count": count} | {name: among[name] for name in ("status", "remaining_cycles")}
+        warnings.append(_held_warning(payload, among, count))
     at_least = lower_bound(payload["at_least"], among)
     at, statement = _at_pace(summary, at_least), statement_of(payload, at_least)
     return {"at_least": at_least, "at_least_at": at, "held_runs": held, "statement": statement, "warnings": warnings}
@@ -89,7 +88,7 @@ def stated(summary: Mapping[str, Any]) -> dict[str, Any] | None:
     if "status" not in summary:
         return None
     among = (summary.get("with_held") or {}).get(SHOWN)
-    beside = beside_held({**summary, "warnings": ()}, summary, among)
+    beside = beside_held({**summary, "warnings": ()}, summary, among, summary.get("held", 0))
     return {name: summary[name] for name in SUMMARY} | {name: beside[name] for name in BESIDE}
 
 
@@ -99,23 +98,25 @@ def lower_bound(at_least: float | None, among: Mapping[str, Any] | None) -> floa
     return min((bound for bound in bounds if bound is not None), default=None)
 
 
-def _held_warning(payload: Mapping[str, Any], held: Mapping[str, Any]) -> dict[str, str]:
-    remaining = held["remaining_cycles"]
-    runs = held_in_words(held["count"])
-    if remaining == payload["remaining_cycles"]:
-        message = f"{runs}: the remaining life would be the same with them"
-    elif held["status"] == INSUFFICIENT:
-        message = f"{runs}: with them nothing could be predicted"
-    elif held["status"] == REACHED:
-        message = f"{runs}: with them the end of life would be reached"
+def _held_warning(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> dict[str, str]:
+    """What held runs would make of an answer, by all that it states: where both are unknown the safe bounds may differ."""
+    if all(among[name] == payload[name] for name in ("status", "remaining_cycles", "at_least")):
+        effect = "the remaining life would be the same with them"
+    elif among["status"] == REACHED:
+        effect = "with them the end of life would be reached"
+    elif among["status"] == INSUFFICIENT and among["at_least"] is None:
+        effect = "with them nothing could be predicted"
+    elif among["status"] == INSUFFICIENT:
+        effect = f"with them the remaining life is not known: {bound_in_words(among['at_least'])}"
     else:
-        message = f"{runs}: with them {interval_in_words(remaining)} cycles would remain"
-    return {"code": HELD_RUNS, "message": message}
+        effect = f"with them {interval_in_words(among['remaining_cycles'])} cycles would remain"
+    return {"code": HELD_RUNS, "message": f"{held_in_words(count)}: {effect}"}
 
 
-def held_notices(count: int) -> list[Notice]:
-    """The warning of an answer that is without so many held runs; none where none is held."""
-    return [Notice(code=HELD_RUNS, message=f"{held_in_words(count)}: this is without them")] if count else []
+def held_beside(count: int) -> dict[str, Any]:
+    """What an answer that is without so many held runs says of them: `held_runs`, and a warning where there are some."""
+    message = f"{held_in_words(count)}: this is without them"
+    return {"held_runs": count, "warnings": [{"code": HELD_RUNS, "message": message}] if count else []}
 
 
 def held_in_words(count: int) -> str:

@@ -17,7 +17,7 @@ from models.prognosis.from_parameters import CofPaths, Disagreement, disagreemen
 from service import records, stored_runs
 from service.errors import Notice
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
-from service.lives.condition import held_notices
+from service.lives.condition import held_beside
 from service.lives.criteria import SEVERITY_EXPONENTS
 from service.lives.history import Series, reference_velocities
 from service.lives.outlook import measured_life
@@ -74,17 +74,15 @@ def degradation(
         chosen = chosen_life(state, life, at_cycles)
         evidence = stored_runs.evidence(connection, clutch_id)
     measured = measured_life(state, chosen, evidence)
-    held = held_notices(len(state.held))
+    held = held_beside(len(chosen.held))
     head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}
-    head |= {"held_runs": len(state.held)}
     if measured is None or (wanted is None and not measured.life.reference):
         nothing: dict[str, Any] = {
             "items": [],
             "rebuilt": None,
             "severity_estimate": None,
-            "warnings": notice_items(held),
         }
-        return head | nothing | chosen.assumptions.named() | {"next": None}
+        return head | nothing | held | chosen.assumptions.named() | {"next": None}
     estimate = None
     if wanted is None:
         items, again = _all(measured, method, draws, until)
@@ -96,7 +94,8 @@ def degradation(
         "items": items,
         "rebuilt": again,
         "severity_estimate": _severity_item(estimate),
-        "warnings": notice_items([*_disagreements(again), *doubted, *held]),
+        "held_runs": held["held_runs"],
+        "warnings": [*notice_items([*_disagreements(again), *doubted]), *held["warnings"]],
     }
     return head | answered | chosen.assumptions.named() | {"next": None}
 

@@ -51,7 +51,7 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
     if state.held:
         evidence = stored_runs.evidence_for(database, state, stored_runs.run_reader(database, clutch_id))
         among = None if evidence is None else _prediction(with_held(state, evidence), method, planned)
-    summary: dict[str, Any] = {"held": len(state.held)}
+    summary: dict[str, Any] = {}
     if pace is not None and events:
         a_second = pace / _SECONDS_PER_HOUR
         summary["pace"] = {"cycles_per_second": a_second, "moment": moment_at(events, a_second, events[-1].cycles)}
@@ -63,7 +63,7 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
         "end_of_life_at": _dates(prediction["end_of_life_cycles"], events, pace),
         "pace_cycles_per_hour": pace,
         "pace_from": None if pace is None else "runs" if stated is None else "request",
-        **beside_held(prediction, summary, among),
+        **beside_held(prediction, summary, among, len(state.held)),
     }
 
 

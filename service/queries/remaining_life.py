@@ -64,24 +64,28 @@ def remaining_life(
         )
         disagree = [] if pressure_bar is not None else _disagreement(connection, clutch_id, at_cycles)
         carried_on = pressure_bar is None and at_cycles is None
-        state = records.state(connection, clutch_id, carried=carried_on) if stored is None else None
+        now = at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf)
+        earlier = not now and bool(row.summary.get("held"))
+        state = records.state(connection, clutch_id, carried=carried_on) if stored is None or earlier else None
     head = {
         "clutch_id": clutch_id,
         "method": method,
         "revision": row.revision,
         "origin": row.record["origin"],
     }
-    now = at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf)
-    summary = row.summary if now else {}
+    summary, count = row.summary if now else {}, row.summary.get("held", 0)
+    among = (summary.get("with_held") or {}).get(method)
+    if state is not None:
+        count = len(chosen_life(state, at_cycles=None if now else at_cycles).held)
+        among = _with_held(database, state, method, pressure_bar, None if now else at_cycles) if count else None
     if stored is not None:
-        payload, among = stored.payload, (summary.get("with_held") or {}).get(method)
+        payload = stored.payload
     elif state is None:
         raise AssertionError("a prediction is stored, or the state was loaded")
     else:
         payload = _predicted(state, method, pressure_bar, at_cycles)
-        among = _with_held(database, state, method, pressure_bar) if state.held and now else None
     payload = {**payload, "warnings": [*payload["warnings"], *disagree]}
-    answer = head | payload | beside_held(payload, summary, among)
+    answer = head | payload | beside_held(payload, summary, among, count)
     return answer | {"criteria": _criteria(payload)}
 
 
@@ -106,12 +110,14 @@ def _predicted(state: ClutchState, method: str, pressure_bar: float | None, at_c
     )
 
 
-def _with_held(database: Database, state: ClutchState, method: str, pressure_bar: float | None) -> dict[str, Any]:
+def _with_held(
+    database: Database, state: ClutchState, method: str, pressure_bar: float | None, at_cycles: float | None
+) -> dict[str, Any]:
     """The same with the held runs, where it is not stored."""
     evidence = stored_runs.evidence_for(database, state, stored_runs.run_reader(database, state.clutch_id))
     if evidence is None:
         raise AssertionError("runs are held: the evidence was loaded")
-    return _predicted(with_held(state, evidence), method, pressure_bar, None)
+    return _predicted(with_held(state, evidence), method, pressure_bar, at_cycles)
 
 
 def _criteria(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -186,12 +192,12 @@ def life_by_criteria(
     answer["warnings"] = [*answer["warnings"], *disagree]
     now = chosen.number == chosen.of and (at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf))
     among = None
-    if state.held and now:
+    if chosen.held:
         evidence = replace(evidence, reader=stored_runs.run_reader(database, clutch_id))
         held = with_held(state, evidence)
-        among = _by_criteria(held, chosen_life(held), evidence, request)
+        among = _by_criteria(held, chosen_life(held, life, None if now else at_cycles), evidence, request)
     head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": state.record.origin}
-    return head | answer | beside_held(answer, row.summary if now else {}, among)
+    return head | answer | beside_held(answer, row.summary if now else {}, among, len(chosen.held))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -75,9 +75,13 @@ def trail_rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
         yield {name: item[name] for name in TRAIL_COLUMNS} | {name: to_text(item[name]) for name in ("before", "after")}
 
 
-def loops(database: Database, clutch_id: str) -> list[dict[str, Any]]:
-    """Friction loops by cycles and pressure. Raises NotFoundError."""
+def loops(database: Database, clutch_id: str) -> tuple[list[dict[str, Any]], int]:
+    """Friction loops by cycles and pressure, and how many runs are held. Raises NotFoundError."""
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED)
-    return [{"run_id": row.run_id, "cycles": whole(row.cycles)} | loop for row in rows for loop in row.receipt["loops"]]
+        held = runs.held(connection, [clutch_id]).get(clutch_id, 0)
+    found = [
+        {"run_id": row.run_id, "cycles": whole(row.cycles)} | loop for row in rows for loop in row.receipt["loops"]
+    ]
+    return found, held

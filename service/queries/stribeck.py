@@ -10,6 +10,7 @@ from models.friction.pressure_laws import LinearLaw, PressureLaws, fit_pressure_
 from service import records
 from service.columns import PASCALS_PER_BAR, whole
 from service.lists import Place, page
+from service.lives.condition import held_beside
 from service.lives.payloads import PARAMETER_UNITS
 from service.lives.run_analysis import LevelFit
 from storage import runs
@@ -26,17 +27,21 @@ def curves(database: Database, clutch_id: str, limit: int, after: Place | None) 
         records.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, fitted=True, state=runs.ACCEPTED)
         levels = records.levels(connection, clutch_id)
+        held = runs.held(connection, [clutch_id]).get(clutch_id, 0)
     items = [_item(row, levels.get(row.run_id, [])) for row in rows[:limit]]
-    return page(items, (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None)
+    following = (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None
+    return page(items, following) | held_beside(held)
 
 
-def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """The fits as rows of a table, a row a test and pressure."""
-    for item in items:
+    for item in payload["items"]:
         for fit in item["fits"]:
             plain = {name: fit[name] for name in fit if name not in ("parameters", "standard_errors", "undetermined")}
             errors = {f"{name}_se": value for name, value in fit["standard_errors"].items()}
-            yield {"run_id": item["run_id"], "cycles": item["cycles"], **plain, **fit["parameters"], **errors}
+            yield {"run_id": item["run_id"], "cycles": item["cycles"], **plain, **fit["parameters"], **errors} | {
+                "held_runs": payload["held_runs"]
+            }
 
 
 def _item(row: RunRow, levels: Sequence[LevelFit]) -> dict[str, Any]:

@@ -158,10 +158,11 @@ def of_row(schema: type[BaseModel], row: object, **own: Any) -> dict[str, Any]:
     return {name: own[name] if name in own else getattr(row, name) for name in schema.model_fields}
 
 
-def page_of(name: str, item: type[BaseModel], says: str, items: str) -> type[Answer]:
-    """The schema of a list that is answered a page at a time; `says` and `items` describe it and its items."""
+def page_of(name: str, item: type[BaseModel], says: str, items: str, *, base: type[Answer] = Answer) -> type[Answer]:
+    """The schema of a list that is answered a page at a time; `says` and `items` describe it and its items, `base` has what
+    stands beside them."""
     fields: Any = {"items": (list[item], Field(description=items)), "next": (Next, ...)}  # type: ignore[valid-type]
-    return create_model(name, __base__=Answer, __doc__=says, **fields)
+    return create_model(name, __base__=base, __doc__=says, **fields)
 
 
 class ProblemError(Answer):

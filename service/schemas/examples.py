@@ -17,7 +17,8 @@ _SPEEDS, _TORQUES = [20, 120, 520, 1020, 1970], [21.9, 22.8, 22.4, 21.5, 20.8]
 _SHARED: tuple[tuple[Any, str], ...] = (
     (_MOMENT, "_at at time"), ("key:1a2b3c4d bench 3", "_by by"), (_DIAGNOSIS, "_id"),
     (1, "attempts left repeats censored_lives check count failure life out_of_specification total_errors version"),
-    (3, "done periods"), (0, "Degradation.held_runs Surfaces.held_runs"),
+    (3, "done periods"), (0, "Degradation.held_runs Surfaces.held_runs StribeckPage.held_runs"),
+    (0, "LoopPage.held_runs EngagementOut.held_runs"),
     (0, "JobResult.kinds changed skip_rows origin_cycles below"),
     ("order a new set", "AlarmIn.name AlarmOut.name EventOut.name"),
     ("shop floor", "WebhookIn.name WebhookOut.name"),

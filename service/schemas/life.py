@@ -280,7 +280,7 @@ AtLeastAt = Annotated[
 ]
 Held = Annotated[
     HeldRuns | None,
-    Field(description="The remaining life with the held runs; null if no run is held, or for an earlier time"),
+    Field(description="What held runs of that life by then would make of the remaining life; null where none is held"),
 ]
 
 

@@ -9,6 +9,13 @@ from service.schemas.life import LifeNumber, MethodName, Model, Prior, Quantiles
 from service.schemas.run import Fit, IndicatorEstimate, Indicators, Loop, Warned
 
 
+class WithoutHeld(Answer):
+    """What an answer that follows from the accepted runs says of those that are held."""
+
+    held_runs: int = Field(description="Number of runs that are held: the answer is without them")
+    warnings: list[Warned] = Field(description="Warnings, such as tracks that disagree or runs that are held")
+
+
 class LinearLaw(Answer):
     """value = intercept + slope · pressure_bar."""
 
@@ -46,7 +53,9 @@ class StribeckItem(Answer):
     pressure_laws: PressureLawsOut | None = Field(description="The pressure laws; null with too few pressures")
 
 
-StribeckPage = page_of("StribeckPage", StribeckItem, "Stationary tests by cycles.", "The tests of this page")
+StribeckPage = page_of(
+    "StribeckPage", StribeckItem, "Stationary tests by cycles.", "The tests of this page", base=WithoutHeld
+)
 
 
 class LoopItem(Loop):
@@ -56,7 +65,9 @@ class LoopItem(Loop):
     cycles: RunCycles
 
 
-LoopPage = page_of("LoopPage", LoopItem, "Friction loops by cycles and pressure.", "The loops of this page")
+LoopPage = page_of(
+    "LoopPage", LoopItem, "Friction loops by cycles and pressure.", "The loops of this page", base=WithoutHeld
+)
 
 
 class SeriesItem(Answer):
@@ -179,7 +190,7 @@ class SeverityWeighed(Answer):
     sd: float = Field(description="Their standard deviation")
 
 
-class Degradation(Answer):
+class Degradation(WithoutHeld):
     """Eq. 6 for every Stribeck parameter and for mean COF, or the track of one quantity."""
 
     clutch_id: ClutchName
@@ -187,13 +198,11 @@ class Degradation(Answer):
     method: MethodName = Field(description="The filter")
     life: LifeNumber = Field(description="The life that the tracks belong to")
     items: list[DegradationItem] = Field(description="The quantities of this page, by pressure")
-    held_runs: int = Field(description="Number of held runs, which the tracks do not use")
     rebuilt: Rebuilt | None = Field(description="COF from the parameters; null with too few tests")
     severity_estimate: SeverityWeighed | None = Field(
         description="The exponent of severity, estimated from the tests of this life; null if its duty states no "
         "work or hardly varies, with too few tests, or if one quantity was requested"
     )
-    warnings: list[Warned] = Field(description="Warnings, such as tracks that disagree or runs that are held")
     model: Model
     prior: Prior
     severity: SeverityUsed
@@ -209,12 +218,11 @@ class SurfaceParameters(Answer):
     viscous_coefficient: list[list[float]] = Field(description="Viscous coefficient C_v, Nm/(m/s)^0.3")
 
 
-class Surfaces(Answer):
+class Surfaces(WithoutHeld):
     """The tracked Stribeck parameters over cycles and pressure (figs. 10, 11), and torque over speed too."""
 
     clutch_id: ClutchName
     revision: Revision
-    held_runs: int = Field(description="Number of held runs, which the surfaces do not use")
     cycles: list[float] = Field(description="The axis of duty cycles since new")
     pressure_bar: list[float] = Field(description="The axis of line pressure, bar")
     speed_rpm: list[float] = Field(description="The axis of speed, rpm")
@@ -299,7 +307,7 @@ class ComparedEngagement(Answer):
     )
 
 
-class EngagementOut(Answer):
+class EngagementOut(WithoutHeld):
     """A simulated engagement of the tracked clutch, and the measured ones."""
 
     clutch_id: ClutchName

@@ -26,7 +26,7 @@ from service.errors import FieldError, InvalidError, NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
 from service.lives.criteria import FEWEST_SPEEDS, TRAJECTORY_DRAWS, TRAJECTORY_LATTICE
 from service.lives.engagements import ALL_INDICATORS
-from service.lives.history import DYNAMIC, Life, Series, lives_of, nearest, nearest_pressure
+from service.lives.history import DYNAMIC, Event, Life, Series, lives_of, nearest, nearest_pressure, order
 from service.lives.payloads import PARAMETER_UNITS
 from service.lives.recomputation import ClutchState
 from service.lives.run_analysis import LevelFit, Value
@@ -99,12 +99,17 @@ def place_of(series: Series) -> dict[str, float | None]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChosenLife:
-    """A life (None: there was none yet), what it is tracked under, its number from 1 on and how many lives there are."""
+    """A life (None: there was none yet), what it is tracked under, its number from 1 on and how many lives there are.
+
+    `held`: the runs that an answer about it is without: all that are held, where it is about the present, else those of
+    this life by then.
+    """
 
     life: Life | None
     assumptions: Assumptions
     number: int
     of: int
+    held: tuple[Event, ...]
 
     def item(self) -> dict[str, Any]:
         """As answers name it."""
@@ -126,14 +131,30 @@ def chosen_life(state: ClutchState, number: int | None = None, at_cycles: float 
         raise NotFoundError(f"the clutch has {len(lives)} lives, there is no life {number}")
     until = lives if at_cycles is None else lives_of([event for event in state.events if event.cycles <= at_cycles])
     index = len(until) if number is None else number
+    held = _held_by(state, index, at_cycles)
     if not 1 <= index <= len(until):
-        return ChosenLife(life=None, assumptions=state.assumptions(), number=max(index, 1), of=len(lives))
+        return ChosenLife(life=None, assumptions=state.assumptions(), number=max(index, 1), of=len(lives), held=held)
     life = until[index - 1]
     adopted = next((a for a in state.adoptions if a is not None and a.life == lives[index - 1].name), None)
     under = state.extension if index == len(lives) else None if adopted is None else adopted.extension
     return ChosenLife(
-        life=life, assumptions=state.assumptions_under(under, lives[index - 1]), number=index, of=len(lives)
+        life=life, assumptions=state.assumptions_under(under, lives[index - 1]), number=index, of=len(lives), held=held
     )
+
+
+def _held_by(state: ClutchState, number: int, at_cycles: float | None) -> tuple[Event, ...]:
+    """The held runs that an answer about life `number` at `at_cycles` (None: whenever) is without."""
+    lives = state.lives
+    now = at_cycles is None or not state.events or at_cycles >= state.events[-1].cycles
+    if now and number >= len(lives):
+        return state.held
+    starts = {life.events[0].run_id for life in lives[1:]}
+    names, place, held = {event.run_id for event in state.held}, 1, []
+    for event in order([*state.events, *state.held]):
+        place += event.run_id in starts
+        if event.run_id in names and place == max(number, 1) and (now or event.cycles <= (at_cycles or 0.0)):
+            held.append(event)
+    return tuple(held)
 
 
 #: A series and a weighted sample of its eq. 6.

@@ -112,7 +112,7 @@ async def degradation_csv(
 async def stribeck_csv(of: answers.WholeOf, prefer: Prefer = None) -> Response:
     """The fits, one row per test and pressure; `limit` counts tests."""
     return await answers.computed_table(
-        of, stribeck.curves, lambda payload: stribeck.rows(_items(payload)), ("run_id", "cycles"), prefer=prefer,
+        of, stribeck.curves, stribeck.rows, ("run_id", "cycles", "held_runs"), prefer=prefer,
         paged_by_query=True,
     )  # fmt: skip
 
@@ -135,12 +135,12 @@ async def clutch_scores_csv(of: answers.WholeOf, method: Method = "particle", pr
 @router.get("/loops.csv", response_class=Response)
 async def loops_csv(of: answers.WholeOf) -> Response:
     """Friction loops, one row each."""
-    return await answers.clutch_table(
-        of,
-        "loops",
-        lambda: answers.sliced_rows(runs.loops(of.database, of.clutch_id), of.limit, of.after),
-        tuple(LoopItem.model_fields),
-    )
+
+    def make() -> answers.RowsAndNext:
+        found, held = runs.loops(of.database, of.clutch_id)
+        return answers.sliced_rows([loop | {"held_runs": held} for loop in found], of.limit, of.after)
+
+    return await answers.clutch_table(of, "loops", make, (*LoopItem.model_fields, "held_runs"))
 
 
 @router.get("/series.csv", response_class=Response)

@@ -7,6 +7,7 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 
 from service.lists import ALL_ITEMS, paged
+from service.lives.condition import held_beside
 from service.lives.tracks import CARRIED
 from service.queries import runs, scores
 from service.queries import series as series_query
@@ -131,7 +132,8 @@ async def loops(of: answers.WholeOf) -> Response:
     """Friction loops of the dynamic tests by cycles and pressure."""
 
     def make() -> bytes:
-        return to_json(paged(runs.loops(of.database, of.clutch_id), of.limit, of.after))
+        found, held = runs.loops(of.database, of.clutch_id)
+        return to_json(paged(found, of.limit, of.after) | held_beside(held))
 
     return await answers.clutch_answer(of, "loops", make, of.limit, of.after)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from service.cli.clutches import _row
 from service.client.clutchlife import Client
 from tests.support import Server, clutchlife, free_port, serving, stationary
 
@@ -93,3 +94,16 @@ def test_a_wrong_call_is_one_plain_line() -> None:
         lines = clutchlife(*wrong, code=64).strip().splitlines()
         assert len(lines) == 1, lines
         assert "--help" in lines[0]
+
+
+def test_a_list_says_that_a_life_has_ended() -> None:
+    summary = {
+        "status": "ended",
+        "as_of_cycles": 7200,
+        "at_least": 0,
+        "remaining_cycles": {"0.5": 0},
+        "ended": {"cycles": 7200},
+    }
+    item = {"clutch_id": "c1", "state": {"name": "failure"}, "held": 0, "summary": summary}
+    assert _row(item)[:2] == ["c1", "ended, failure"]
+    assert _row(item | {"summary": summary | {"ended": None}})[1] == "failure"

@@ -11,7 +11,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.prognosis.criteria import QUANTILES
-from service.lives.condition import bound_in_words, rank_of, recent, state_of, top_line
+from service.lives.condition import beside_held, bound_in_words, rank_of, recent, state_of, top_line
 from service.lives.criteria import MAX_LINE_POINTS
 from service.lives.history import Event
 from service.lives.payloads import filters_disagree
@@ -106,6 +106,15 @@ def summary(left: float | None, **other: Any) -> dict[str, Any]:
         "remaining_cycles": quantiles, "current": {"health": 0.5}, "criterion": criterion, "held": 0, "with_held": None,
         "probability_of_reaching": 0.94, **other,
     }  # fmt: skip
+
+
+def test_page_and_answer_say_the_same_of_held_runs_before_a_prediction() -> None:
+    nothing = {"status": "insufficient_data", "remaining_cycles": summary(None)["remaining_cycles"]}
+    among = nothing | {"at_least": 0.0}
+    known = summary(1800.0, held=1, with_held={"particle": among}, ended=None, **nothing | {"runs_used": 2})
+    (warning,) = beside_held(known | {"warnings": ()}, known, among, 1)["warnings"]
+    assert warning["message"].endswith("with them the remaining life is not known: no further cycle is certain")
+    assert "if the held run counts, no further cycle is certain" in top_line(known, disputed=False)["headline"]
 
 
 @pytest.mark.parametrize(

@@ -24,9 +24,22 @@ CONCLUSIONS = (
     "scale_cycles_sd",
     "parameters",
     "headline",
+    "fits",
+    "mean_cof",
+    "simulated",
 )
-#: What is measured, run by run; rules, which conclude nothing; how right the predictions of an ended life were.
-OF_EACH_RUN = ("/stribeck", "/stribeck.csv", "/runs", "/runs.csv", "/v1/alarms", "/scores", "/scores.csv")
+#: The runs themselves; rules, which conclude nothing; how right the predictions of an ended life were.
+OF_EACH_RUN = ("/runs", "/runs.csv", "/v1/alarms", "/scores", "/scores.csv")
+#: Answers that conclude something, whatever else there is.
+ANSWERS = (
+    "",
+    "/remaining-useful-life",
+    "/degradation",
+    "/surfaces",
+    "/stribeck",
+    "/stribeck.csv",
+    "/engagement",
+)
 #: How an answer says that two runs are held.
 SAID = re.compile(r'"held(_runs)?":(2\b|2\.0\b|\{"count":2\b)|"(code|quantity)":"held_runs"|2 (runs are|held runs)')
 
@@ -75,7 +88,7 @@ def test_no_answer_of_the_api_stands_without_a_word_while_two_runs_are_held(held
             assert SAID.search(text), f"{address} says nothing of held runs: {text[:400]}"
     forecast = held.post(f"{CLUTCH}/remaining-useful-life/forecast", json={"programme": [{"cycles": 5000}]})
     assert SAID.search(forecast.text)
-    assert {f"{CLUTCH}{end}" for end in ("", "/remaining-useful-life", "/degradation", "/surfaces")} <= set(asked)
+    assert {f"{CLUTCH}{end}" for end in ANSWERS} <= set(asked)
     assert {"/v1/clutches", f"{CLUTCH}/remaining-useful-life.csv", f"{CLUTCH}/degradation.csv"} <= set(asked)
 
 
@@ -85,3 +98,21 @@ def test_an_alarm_says_how_many_runs_are_held_beside_it(held: TestClient) -> Non
     _sent(held, 3500.0, 1.0, "accepted")
     (raised,) = held.get("/v1/alarms/events").json()["items"]
     assert raised["message"].endswith("2 runs are held and do not count")
+
+
+@pytest.mark.parametrize("answer", ["degradation", "surfaces", "stribeck", "engagement", "loops"])
+def test_answers_along_a_life_say_of_held_runs_in_the_same_words(held: TestClient, answer: str) -> None:
+    said = held.get(f"{CLUTCH}/{answer}").json()
+    warnings = [warning["message"] for warning in said["warnings"] if warning["code"] == "held_runs"]
+    assert (said["held_runs"], warnings) == (2, ["2 runs are held and do not count: this is without them"])
+
+
+def test_an_earlier_life_and_an_earlier_time_say_what_was_held_of_them(held: TestClient) -> None:
+    rebuild = {"kind": "maintenance", "event": "rebuild", "cycles": 6000.0, "run_id": "rebuilt"}
+    assert held.post(f"{CLUTCH}/runs", json=rebuild).status_code == 201
+    _sent(held, 6000.0, 1.0, "accepted")
+    for query, count in (({"life": 1}, 2), ({"life": 1, "at_cycles": 4500}, 1), ({"at_cycles": 3500}, 0)):
+        life = held.get(f"{CLUTCH}/remaining-useful-life", params=query).json()
+        assert (life["held_runs"] or {"count": 0})["count"] == count, query
+        assert ("held_runs" in {warning["code"] for warning in life["warnings"]}) is (count > 0)
+        assert held.get(f"{CLUTCH}/degradation", params=query).json()["held_runs"] == count, query

@@ -164,7 +164,7 @@ class Bench:
             named["degradation"] = degradation.degradation(database, CLUTCH)
         named["stribeck"] = stribeck.curves(database, CLUTCH, 1000, None)
         named["series"] = series.series(database, CLUTCH, None)
-        named["loops"] = runs.loops(database, CLUTCH)
+        named["loops"] = runs.loops(database, CLUTCH)[0]
         named["scores"] = scores.of_clutch(database, CLUTCH, method="particle")
         named["clutch"] = clutch_list.look_up(database, CLUTCH) | {"held": None}
         named["runs"] = [
