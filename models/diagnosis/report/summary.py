@@ -84,6 +84,8 @@ def signed(estimate: Estimate) -> str:
         size += f", 90 % interval {number(low)} to {_amount(high, estimate.unit)}"
     if sign is None:
         return size
+    if estimate.stated_interval is not None and not low < 0.0 < high and sign > 0.99:
+        return size  # the interval says it
     way = f"{'negative' if estimate.value < 0 else 'positive'} with probability {probability(sign)}"
     return f"{size}, the sign is open ({way})" if low < 0.0 < high else f"{size}, {way}"
 
@@ -256,13 +258,20 @@ def _ambiguous(report: Report) -> list[Sentence]:
             if slug not in sure and (estimate := sized.pop(slug, None)) is not None
         ]
         listed.append((" together with ".join(names) or "nothing", probability(item.probability), sizes))
-    long = sum(len(" ".join((name, *sizes)).split()) + 1 for name, _, sizes in listed) > criteria.MAX_WORDS // 2
+    certain = [signed(sized[slug]) for slug in sure if slug in sized]
+    words = " ".join([*certain, *(" ".join((name, chance, *sizes)) for name, chance, sizes in listed)]).split()
+    rest = [*_gained(report), *_next(report)]
+    stays = sum(len(sentence.text.split()) for sentence in rest if sentence.matters == MUST)
+    long = len(words) + stays > criteria.MAX_WORDS - 25  # as many words frame the list
     if long:  # the sizes are in the report's fields
         brief = [name for name, _, _ in listed[:8]]
         others = [effect_name(slug) for slug in report.causes if slug not in {*sure, UNCATALOGUED}]
         left = [name for name in others if not any(name in alternative for alternative in brief)]
         unmeasured = "not measured, so it cannot be excluded"
-        listed = [(name, chance, [size for size in sizes if size == unmeasured]) for name, chance, sizes in listed[:8]]
+        listed = [
+            (name.partition(", such as ")[0], chance, [size for size in sizes if size == unmeasured])
+            for name, chance, sizes in listed[:8]
+        ]
     alternatives = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in listed] + (
         left if long else []
     )
@@ -271,7 +280,7 @@ def _ambiguous(report: Report) -> list[Sentence]:
         verb = "is at work" if len(sure) == 1 else "are at work"
         said = f"{conjunction([effect_name(slug) for slug in sure])} {verb} (probability {probability(share)})"
         sentences = [Sentence(f"{said[0].upper()}{said[1:]}.")]
-        sentences += [Sentence(f"Size: {signed(sized[slug])}.") for slug in sure if slug in sized]
+        sentences += [Sentence(f"Size: {size}.") for size in certain]
         if len(alternatives) == 1:
             sentences.append(Sentence(f"Beside it is {alternatives[0]}."))
         elif alternatives:
@@ -283,7 +292,7 @@ def _ambiguous(report: Report) -> list[Sentence]:
         if len(alternatives) > 1:
             first += ", and these data cannot distinguish which of these it is"
         sentences = [Sentence(f"{first} (with its probability): {_either(alternatives)}.")]
-    return [*sentences, Sentence(_error(report), MAY), *_gained(report), *_next(report)]
+    return [*sentences, Sentence(_error(report), MAY), *rest]
 
 
 def _either(parts: Sequence[str]) -> str:
@@ -377,8 +386,8 @@ def _next(report: Report) -> list[Sentence]:
     best = report.advice[0]
     chance = f"probability {probability(best.probability)}"
     if best.narrows:
-        left = f"{100 * best.narrows:.0f} % of what it is"
-        return [Sentence(f"Next, to narrow its size: {brief_test(best)} (brings the uncertainty to {left}).")]
+        left = f"{100 * best.narrows:.0f} % of the uncertainty"
+        return [Sentence(f"Next, to narrow its size: {brief_test(best)} (leaves {left}).")]
     if best.other == BASELINE:
         return [Sentence(f"Next, to confirm it ({chance}): {brief_test(best)}.")]
     pair = f"{effect_name(best.effect)} from {effect_name(best.other)}"
@@ -403,9 +412,9 @@ def brief_test(advice: Advice) -> str:
             pressures = _range([1e-5 * value for step in steps for value in step.pressures])
             speeds = _range([value * 30.0 / math.pi for step in steps for value in step.speeds])
             oils = {step.temperature - 273.15 for step in steps if step.temperature is not None}
-            oil = f", also with the oil at {number(max(oils))} °C" if oils else ""
+            oil = f", also at {number(max(oils))} °C" if oils else ""
             kinds.append(f"{name} tests{at}, {pressures} bar, {speeds} rpm{oil}")
-    return f"{' and '.join(kinds)} (as the protocol has it)"
+    return f"{' and '.join(kinds)}, as in its protocol"
 
 
 def _range(values: Sequence[float]) -> str:
