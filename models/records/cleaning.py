@@ -109,6 +109,12 @@ def _require_measurements(name: str, channel: FloatArray) -> None:
         )
 
 
+def stands(times: FloatArray) -> bool:
+    """Whether a clock [s], [n], is coarser than its rows: more than one in ten of its steps is none."""
+    steps = np.diff(times)
+    return bool(np.count_nonzero(steps == 0) > 0.1 * steps.size)
+
+
 def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[Note]]:
     """The rows in order of time (None: unchanged), the sampling period [s], and notes."""
     order, notes = None, list[Note]()

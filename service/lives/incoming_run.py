@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.arrays import FloatArray
+from models.records.cleaning import stands
 from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
@@ -39,7 +40,7 @@ def name_run(run: IncomingRun) -> IncomingRun:
     """The run with its content's hash, and its name derived from that where none was given.
 
     Raises InvalidError where a stationary test holds neither a curve that could be fitted nor an open clutch, and where the
-    time of a dynamic test steps back.
+    time of a dynamic test steps back or stands still.
     """
     content = content_hash(run)
     if run.kind == "dynamic_stribeck":
@@ -134,7 +135,12 @@ def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
 
 
 def _require_forward(time: FloatArray) -> None:
-    """Refuse a record whose time steps back: its end, its beginning or its order is not what it seems."""
+    """Refuse a record whose time steps back, for its order is not what it seems, or stands still from row to row."""
+    if stands(time):
+        message = (
+            f"time_s stands still in {np.count_nonzero(np.diff(time) == 0)} of {time.size - 1} steps: send finer times"
+        )
+        raise InvalidError.of(message, code="time_stands", pointer="/channels/time_s")
     back = np.flatnonzero(np.diff(time) < 0)
     if back.size:
         row = int(back[0]) + 1

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.records.cleaning import stands
 from service.columns import LineOf, check_arrays
 from service.errors import MAX_QUOTED, InvalidError, Notice, TooLargeError
 from service.readers.column_names import (
@@ -100,7 +101,7 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
 def _refuse_standing(columns: Mapping[str, FloatArray]) -> None:
     """Raise InvalidError where the time stays as it is from row to row: a clock that is coarser than the rows is none."""
     time_s = columns.get("time_s")
-    if time_s is None or len(columns) == 1 or not _stands(time_s):
+    if time_s is None or len(columns) == 1 or not stands(time_s):
         return
     still = np.count_nonzero(np.diff(time_s) == 0)
     message = (
@@ -176,15 +177,9 @@ def _runs_on(times: FloatArray) -> bool:
     return bool(steps.size > 0 and np.count_nonzero(steps > 0) >= _MOST_OF * steps.size)
 
 
-def _stands(times: FloatArray) -> bool:
-    """Whether more than one in ten steps of a clock is none."""
-    steps = np.diff(times)
-    return bool(np.count_nonzero(steps == 0) > (1 - _MOST_OF) * steps.size)
-
-
 def _add_parts(times: FloatArray, parts: Mapping[str, tuple[FloatArray, float]]) -> Notice | None:
     """Add to times in whole seconds, in place, the part of the second that stands in a column of its own, and say so."""
-    for name, (values, factor) in parts.items() if _stands(times) else ():
+    for name, (values, factor) in parts.items() if stands(times) else ():
         seconds = factor * values
         if ((seconds >= 0) & (seconds < 1)).all() and (np.diff(times + seconds) > 0).all():
             times += seconds - seconds[0]

@@ -75,6 +75,13 @@ def test_a_record_without_a_plateau_is_refused(client: TestClient) -> None:
     assert client.get(RUNS).json()["items"] == []
 
 
+def test_a_dynamic_test_by_a_clock_in_whole_seconds_is_refused(client: TestClient) -> None:
+    record = dynamic_record()
+    record["time_s"] = np.floor(record["time_s"]).tolist()
+    answer = client.post(RUNS, json={"kind": "dynamic_stribeck", "cycles": 0, "channels": record})
+    assert (answer.status_code, answer.json()["errors"][0]["code"]) == (422, "time_stands")
+
+
 def test_a_dynamic_test_gets_its_loop(client: TestClient) -> None:
     """Whole periods only: 15 s at 0.1 Hz are one; the area is that of the ellipse, π · 1 Nm · the velocity's amplitude."""
     client.post(RUNS, json=plateaus())
