@@ -30,7 +30,7 @@ def curves(database: Database, clutch_id: str, limit: int, after: Place | None) 
         held = runs.held(connection, [clutch_id]).get(clutch_id, 0)
     items = [_item(row, levels.get(row.run_id, [])) for row in rows[:limit]]
     following = (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None
-    return page(items, following) | held_beside(held)
+    return held_beside(held) | page(items, following)  # the next page last, where it is found
 
 
 def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:

@@ -159,7 +159,7 @@ def test_the_other_answers_and_their_csv_exports(http: httpx2.Client) -> None:
     stribeck = http.get(f"{BASE}/stribeck").json()["items"]
     assert [item["cycles"] for item in stribeck] == [0, 1000, 2000, 3000, 4000]
     assert stribeck[0]["pressure_laws"]["static_torque_nm"]["slope_per_bar"] > 0
-    assert http.get(f"{BASE}/loops").json() == {"items": [], "next": None}
+    assert http.get(f"{BASE}/loops").json() == {"held_runs": 0, "warnings": [], "items": [], "next": None}
     assert {row["quantity"] for row in http.get(f"{BASE}/series").json()["items"]} > PARAMETERS | {"remaining_cycles"}
     for name, rows in (("degradation", 21), ("stribeck", 20), ("loops", 0), ("runs", 5), ("remaining-useful-life", 7)):
         answer = http.get(f"{BASE}/{name}.csv")

@@ -133,7 +133,7 @@ async def loops(of: answers.WholeOf) -> Response:
 
     def make() -> bytes:
         found, held = runs.loops(of.database, of.clutch_id)
-        return to_json(paged(found, of.limit, of.after) | held_beside(held))
+        return to_json(held_beside(held) | paged(found, of.limit, of.after))
 
     return await answers.clutch_answer(of, "loops", make, of.limit, of.after)
 

@@ -166,7 +166,7 @@ def test_a_clutch_is_registered_by_the_form(watched: Watched, server: Server) ->
     form.get_by_text("Not registered.").wait_for()
     assert "dropped" not in names(server)
     form.get_by_label("Outer diameter, mm").fill("140")
-    form.get_by_label("Mean COF over its value when new").fill("0.4")
+    form.get_by_label("Mean COF as a share of its value when new").fill("0.4")
     form.get_by_label("Friction material").fill("carbon")
     page.keyboard.press("Enter")
     dialog.locator("svg.curve").wait_for()

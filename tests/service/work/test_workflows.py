@@ -135,7 +135,7 @@ def test_who_asks_twice_joins_and_too_many_are_sent_away(database: Database) -> 
     first, other, whole = (ask(jobs.REPLAY, clutch_id) for clutch_id in ("c0", "c1", None))
     assert len({first, other, whole}) == 3
     assert [ask(jobs.REPLAY, clutch_id) for clutch_id in ("c0", "c1", None)] == [first, other, whole]
-    with pytest.raises(BusyError, match="3 jobs of the kind replay wait"):
+    with pytest.raises(BusyError, match="3 jobs of the kind replay already wait"):
         ask(jobs.REPLAY, "c2")
     assert ask(jobs.FLEET_REFRESH, None) not in {first, other, whole}
     with database.writing() as connection:

@@ -149,8 +149,8 @@ def test_the_spool_is_not_emptied_under_a_sender(terminal: Terminal) -> None:
     terminal.service.instead = away
     terminal.push(body(1), code=75)
     with Spool.of(terminal.folder / "spool", URL, "c1").sending(0.0):
-        assert "a process is sending" in terminal("spool", "empty", "--yes", code=75)
-        assert "a process is sending from the spool; 2 runs wait" in terminal.push(body(2), "2.json", code=75)
+        assert "another process is sending" in terminal("spool", "empty", "--yes", code=75)
+        assert "another process is sending from the spool; 2 runs wait" in terminal.push(body(2), "2.json", code=75)
     assert len(terminal.listed()) == 2
 
 
