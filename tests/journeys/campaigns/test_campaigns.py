@@ -21,6 +21,7 @@ def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(serve
     for form in ("csv", "mdf4"):
         folder = tmp_path / form
         assert "3 simulated runs" in clutchlife("simulate", "--film", "--out", folder, "--format", form, "--tests", "1")
+        clutchlife("register", form, "--record", folder / "clutch.json", "--url", server.url)
         push = ("push", folder, "--clutch", form, "--url", server.url, "--spool", tmp_path / "spool")
         assert "4 stored now, 0 stored before, 0 refused" in clutchlife(*push)
         assert "0 stored now, 4 stored before, 0 refused" in clutchlife(*push)

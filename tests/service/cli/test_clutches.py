@@ -86,6 +86,9 @@ def test_a_push_to_a_mistyped_clutch_leaves_nothing_in_the_spool(server: Server,
     spool = tmp_path / "spool"
     printed = clutchlife("push", run, "--clutch", "fien", "--url", server.url, "--spool", spool, code=65)
     assert "clutchlife register fien" in printed
+    (tmp_path / "clutch.json").write_text(json.dumps({"clutch_id": "fine"}), encoding="utf-8")
+    printed = clutchlife("push", tmp_path, "--clutch", "fien", "--url", server.url, "--spool", spool, code=65)
+    assert "clutchlife register fien" in printed
     assert not list(spool.rglob("*.body"))
 
 
