@@ -46,7 +46,7 @@ def stated_end(
         kin = as_its_kind(tests, as_of, ended, _added(posterior, tests, offset))
     if kin is None:
         return StatedEnd(ends=ends, weight=posterior.weight, lives=0)
-    ends, weight = kin.together(ends, posterior.weight, as_of)
+    ends, weight = kin.together(ends, posterior.weight, posterior.form, as_of)
     return StatedEnd(ends=ends, weight=weight, lives=sum(not life.censored for life in ended))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN, HORIZON
-from models.prognosis.ended_lives import EndedLife, declared_end, ended_life, new_and_lawful, representative
+from models.prognosis.ended_lives import EndedLife, declared_end, ended_life, new_and_laws, representative
 from models.prognosis.fleet import Taught, population, taught
 from models.prognosis.scoring import measured_end
 from service import records, stored_runs
@@ -246,7 +246,7 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
     offset = mean_offset_of(series, assumptions)
     progress = np.array([measurement.progress for measurement in measurements])
     values = np.array([measurement.value for measurement in measurements])
-    initial, lawful = new_and_lawful(measurements)
+    initial, laws = new_and_laws(measurements)
     if offset is not None:
         values = values + offset(progress)[0]
         initial += float(offset(np.zeros(1))[0, 0])
@@ -258,7 +258,7 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
             end, deviation = declared_end(measurements, end, fraction=fraction, horizon=horizon, offset=offset)
     if not end:
         return Lesson(taught=lesson, ended=None)
-    ended = ended_life(progress, values, end, initial=initial, fraction=fraction, lawful=lawful)
+    ended = ended_life(progress, values, end, initial=initial, fraction=fraction, laws=laws)
     if ended is None:
         return Lesson(taught=lesson, ended=None)
     ended = replace(ended, deviation=deviation, censored=censored)
