@@ -51,6 +51,7 @@ def require_web_address(url: str) -> SplitResult:
         parts = urlsplit(url)
         usable = parts.scheme in _PORTS and bool(parts.hostname) and (parts.port is None or parts.port > 0)
         (parts.hostname or "").encode("idna")
+        usable = usable and (parts.path + parts.query).isascii()
     except ValueError:
         usable = False
     if not usable or has_controls(url):

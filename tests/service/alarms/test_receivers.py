@@ -152,7 +152,7 @@ def test_a_body_without_end_is_not_read() -> None:
     [
         "ftp://example.org/", "file:///etc/passwd", "gopher://x/", "http://", "http:///hook", "example.org", "syslog://",
         "http://exa mple.org/", "http://example.org/\r\nX: 1", "http://example.org:99999/", "http://example.org:0/", "unheard://x",
-        "http://[", "http://a..b/", "json://[\x00",
+        "http://[", "http://a..b/", "json://[\x00", "https://example.org/é",
     ],
 )  # fmt: skip
 def test_what_is_no_address_is_refused(client: TestClient, url: str) -> None:
