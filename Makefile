@@ -57,7 +57,7 @@ SLIM := $(LOCK) $(foreach name,$(UNUSED),--no-emit-package $(name))
 # what the first run of the tests compiles, the next ones read: a third of what `make quick` takes
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help docs gallery reference adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
+.PHONY: help compiled docs gallery reference adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -71,6 +71,10 @@ shell: $(VENV)/.runs
 # what each target is for, as it stands above
 help:
 	@sed -n '/^# make/,/^PYTHON/{s/^# \{0,1\}//p}' Makefile
+
+# all that tests import is compiled, and their assertions rewritten, once: else each worker does so at the same time
+compiled: $(VENV)/.tests
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --collect-only -qq -m "not slow" > /dev/null
 
 test: $(VENV)/.tests
 	$(BIN)/python -m tests.browser

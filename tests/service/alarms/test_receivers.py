@@ -147,18 +147,17 @@ def test_a_body_without_end_is_not_read() -> None:
         assert time.monotonic() - started < 5
 
 
-@pytest.mark.parametrize(
-    "url",
-    [
-        "ftp://example.org/", "file:///etc/passwd", "gopher://x/", "http://", "http:///hook", "example.org", "syslog://",
-        "http://exa mple.org/", "http://example.org/\r\nX: 1", "http://example.org:99999/", "http://example.org:0/", "unheard://x",
-        "http://[", "http://a..b/", "json://[\x00", "https://example.org/é",
-    ],
+NO_ADDRESSES = (
+    "ftp://example.org/", "file:///etc/passwd", "gopher://x/", "http://", "http:///hook", "example.org", "syslog://",
+    "http://exa mple.org/", "http://example.org/\r\nX: 1", "http://example.org:99999/", "http://example.org:0/", "unheard://x",
+    "http://[", "http://a..b/", "json://[\x00", "https://example.org/é",
 )  # fmt: skip
-def test_what_is_no_address_is_refused(client: TestClient, url: str) -> None:
-    answer = client.post("/v1/webhooks", json={"url": url})
-    assert answer.status_code == 422, answer.text
-    assert answer.json()["errors"][0]["pointer"] == "/url"
+
+
+def test_what_is_no_address_is_refused(client: TestClient) -> None:
+    for url in NO_ADDRESSES:
+        answer = client.post("/v1/webhooks", json={"url": url})
+        assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/url"), url
 
 
 @pytest.mark.parametrize(

@@ -107,11 +107,13 @@ def test_a_profile_is_saved_once_and_replaced_by_put_alone(client: TestClient) -
         ({"name": "a b"}, "name"),
     ],
 )
-def test_a_profile_that_cannot_be_used_is_refused(client: TestClient, change: Mapping[str, Any], words: str) -> None:
-    answer = client.post("/v1/rigs", json=RIG | change)
+def test_a_profile_that_cannot_be_used_is_refused(
+    shared_client: TestClient, change: Mapping[str, Any], words: str
+) -> None:
+    answer = shared_client.post("/v1/rigs", json=RIG | change)
     assert answer.status_code == 422, answer.text
     assert words in answer.json()["detail"]
-    assert client.get("/v1/rigs").json()["items"] == []
+    assert shared_client.get("/v1/rigs").json()["items"] == []
 
 
 def test_no_name_of_a_file_takes_long_by_any_pattern() -> None:
