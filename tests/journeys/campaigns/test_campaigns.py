@@ -39,14 +39,15 @@ def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(serve
 
 
 def test_a_record_that_no_manifest_lists_is_named(server: Server, tmp_path: Path) -> None:
-    folder = tmp_path / "csv"
-    clutchlife("simulate", "--seed", "7", "--out", folder, "--format", "csv", "--tests", "1", "--no-dynamic")
+    folder = tmp_path / "sent"
+    folder.mkdir()
+    (folder / "first.json").write_text(json.dumps(stationary(0.0, run_id="first")), encoding="utf-8")
     (folder / "lonely.csv").write_text("torque_nm\n1\n", encoding="utf-8")
-    push = ("push", folder, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
-    output = clutchlife(*push)
+    ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
+    output = clutchlife("push", folder, "--clutch", "c1", "--url", server.url, "--spool", tmp_path / "spool")
     assert "not sent, because kind and cycles are not known: " in output
     assert "lonely.csv" in output
-    assert "3 stored" in output
+    assert "1 stored" in output
 
 
 # --- The engagement of a tracked clutch over the wire.
