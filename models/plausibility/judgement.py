@@ -1,7 +1,7 @@
 """Which runs of a clutch slipped: one question over all of them.
 
-A belief says of every run whether it is as it was sent, outlying, or slipped, and from which tests on COF has a new level.
-Its log probability is the sum of
+A belief says of every run whether it is as it was sent, outlying, or slipped, and from which tests on COF has a new level
+and a new pace. Its log probability is the sum of
 
     log p(COF of the tests that are as sent | course, outlying ones, new levels)      `course`
     log P(cycles), log P(dates)                                                       `pace`
@@ -9,10 +9,10 @@ Its log probability is the sum of
     of each slipped run: log Σ over slips  P(slip) L(the run without it | the others)
     the prior of outlying runs and of new levels
 
-From the belief that all runs are as sent, and from the one that keeps the doubtful ones out, the search takes the best
-single change until none helps. A run's probability of a slip is summed over the beliefs that it met: where two runs agree,
-that both slipped is far less probable than that neither did. The judgement is a function of the runs alone: the order of
-their arrival and what was thought before decide only where the search begins.
+From the belief that all runs are as sent the search takes the best single change until none helps. A run's probability of
+a slip is summed over that belief and those that differ from it in one run: where two runs agree, that both slipped is far
+less probable than that neither did. The judgement is a function of the runs alone: neither the order of their arrival nor
+what was held before plays a part.
 """
 
 import math
@@ -34,11 +34,13 @@ from models.plausibility.slips import OF_CLUTCH, OTHER_CLUTCH, OTHER_CYCLES, Rea
 _LEAST = math.log(1e-250)
 #: A change of belief that gains less is none.
 _WORTH = 1e-6
+#: So many runs that surprise are asked about at a time.
+SUSPECTS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Belief:
-    """Indices of the runs that slipped, of outlying tests, and of tests from which on COF has a new level."""
+    """Indices of the runs that slipped, of outlying tests, and of tests from which on COF has a new level and pace."""
 
     slipped: frozenset[int] = frozenset()
     outlying: frozenset[int] = frozenset()
@@ -60,24 +62,17 @@ class Verdict:
     latest: float | None
 
 
-def judge(runs: Sequence[Run], in_question: Collection[int], doubted: Collection[int]) -> dict[int, Verdict]:
+def judge(runs: Sequence[Run], about: Collection[int] = ()) -> dict[int, Verdict]:
     """The runs that are to be held, by index.
 
-    `runs` in the order of the history; `in_question`: the others are looked at where they surprise; `doubted`: those that
-    are held now, from which one search begins.
+    `runs` in the order of the history. Of more than can be looked at, those nearest to the runs `about` which somebody asks
+    and to the latest one are looked at; of fewer the answer depends on the runs alone.
     """
-    clutch = _Clutch(runs=tuple(runs), in_question=frozenset(in_question))
-    weighed: dict[Belief, float] = {}
-    best: _Weighed | None = None
-    for slipped in (frozenset[int](), frozenset(doubted), frozenset(in_question)):
-        if best is not None and not (best.belief.slipped or doubted or best.doubts):
-            break  # nothing surprises
-        optimum = _searched(clutch, Belief(slipped=slipped))
-        weighed[optimum.belief] = optimum.log_probability
-        if best is None or optimum.log_probability > best.log_probability:
-            best = optimum
-    if best is None or not (best.belief.slipped or doubted or best.doubts):
+    clutch = _Clutch(runs=tuple(runs), about=frozenset(about))
+    best = _searched(clutch, Belief())
+    if not (best.belief.slipped or best.doubts):
         return {}
+    weighed = {best.belief: best.log_probability}
     for index, log_odds in best.log_odds.items():
         other = replace(best.belief, slipped=best.belief.slipped ^ {index})
         sign = -1.0 if index in best.belief.slipped else 1.0
@@ -117,7 +112,7 @@ class _Clutch:
     """All runs, and what depends on no belief."""
 
     runs: tuple[Run, ...]
-    in_question: frozenset[int]
+    about: frozenset[int]
     fits: dict[tuple[Any, ...], Fit] = field(default_factory=dict)
     _slips: dict[int, list[Slip]] = field(default_factory=dict)
 
@@ -144,7 +139,7 @@ class _Clutch:
     @cached_property
     def centres(self) -> FloatArray:
         """The cycles about which runs are looked at."""
-        return np.append(self.cycles[sorted(self.in_question)], self.cycles.max(initial=0.0))
+        return np.append(self.cycles[sorted(self.about)], self.cycles.max(initial=0.0))
 
     @cached_property
     def near(self) -> list[int]:
@@ -216,6 +211,7 @@ class _Weighed:
 
     clutch: _Clutch
     belief: Belief
+    _slips: dict[int, tuple[float, float, Slip] | None] = field(default_factory=dict)
 
     @cached_property
     def kept(self) -> list[int]:
@@ -295,7 +291,7 @@ class _Weighed:
             if run.sent.log_cof is not None:
                 own = float(log_physics(np.array(run.sent.log_cof))) if run.tests else self.log_cof(i, [run.sent])[0]
                 total += own
-        return total + sum(self.slips[i][1] for i in self.belief.slipped)
+        return total + sum(slips[1] for i in self.belief.slipped if (slips := self.weigh(i)) is not None)
 
     @cached_property
     def base(self) -> float:
@@ -381,29 +377,30 @@ class _Weighed:
         own = [i for i in self.clutch.near if i in kept and i != index and self.clutch.runs[i].kind == kind]
         return np.unique(self.clutch.cycles[own]) if own else np.zeros(0)
 
-    @cached_property
-    def slips(self) -> dict[int, tuple[float, float, Slip]]:
-        """Of every run in question: log L as sent, log Σ P(slip) L without it, and the most probable slip."""
-        weighed = {}
-        for i in sorted(self.suspects | self.belief.slipped):
-            run = self.clutch.runs[i]
-            slips = self.clutch.slips(i, self.expected(i))
-            if all(own in ([], [i]) for _, own in self.fits):
-                slips = [slip for slip in slips if slip.name not in OF_CLUTCH]
-            readings = [run.sent, *(slip.likely for slip in slips)]
-            of_cof = self.log_cof(i, readings)
-            of_cycles = self._log_cycles(i, [reading.cycles for reading in readings])
-            as_sent = of_cof[0] + of_cycles[0] + run.sent.log_protocol
-            weights = []
-            for slip, cof, cycles in zip(slips, of_cof[1:], of_cycles[1:], strict=True):
-                cof = 0.0 if slip.name in OF_CLUTCH else cof
-                cycles = 0.0 if slip.name in (OTHER_CYCLES, OTHER_CLUTCH) else cycles
-                weights.append(slip.log_prior + cof + cycles + slip.likely.log_protocol)
-            most = int(np.argmax(weights)) if weights else -1
-            if weights:
-                confirmed = math.log(criteria.CONFIRMED) if run.fixed else 0.0
-                weighed[i] = (as_sent, float(np.logaddexp.reduce(weights)) + confirmed, slips[most])
-        return weighed
+    def weigh(self, index: int) -> tuple[float, float, Slip] | None:
+        """Of a run: log L as sent, log Σ P(slip) L without it, and the most probable slip; None where none is possible."""
+        if index not in self._slips:
+            self._slips[index] = self._slip_of(index)
+        return self._slips[index]
+
+    def _slip_of(self, index: int) -> tuple[float, float, Slip] | None:
+        run = self.clutch.runs[index]
+        slips = self.clutch.slips(index, self.expected(index))
+        if all(own in ([], [index]) for _, own in self.fits):
+            slips = [slip for slip in slips if slip.name not in OF_CLUTCH]
+        if not slips:
+            return None
+        readings = [run.sent, *(slip.likely for slip in slips)]
+        of_cof = self.log_cof(index, readings)
+        of_cycles = self._log_cycles(index, [reading.cycles for reading in readings])
+        as_sent = of_cof[0] + of_cycles[0] + run.sent.log_protocol
+        weights = []
+        for slip, cof, cycles in zip(slips, of_cof[1:], of_cycles[1:], strict=True):
+            cof = 0.0 if slip.name in OF_CLUTCH else cof
+            cycles = 0.0 if slip.name in (OTHER_CYCLES, OTHER_CLUTCH) else cycles
+            weights.append(slip.log_prior + cof + cycles + slip.likely.log_protocol)
+        confirmed = math.log(criteria.CONFIRMED) if run.fixed else 0.0
+        return as_sent, float(np.logaddexp.reduce(weights)) + confirmed, slips[int(np.argmax(weights))]
 
     def _log_cycles(self, index: int, cycles: Sequence[float]) -> list[float]:
         """log P of a run's cycles given the others."""
@@ -416,29 +413,38 @@ class _Weighed:
 
     @cached_property
     def suspects(self) -> frozenset[int]:
-        """Runs that are in question, and others near them that surprise."""
+        """The runs that surprise most, of those that a slip might explain better: by COF given the others, and by cycles,
+        pressures, speeds and oil beside the others of their kind. One without others is always asked about."""
+        runs = self.clutch.runs
+        of_cycles = dict(zip(self.clutch.near, self.clutch.surprise(self._sets([])[0]).tolist(), strict=True))
+        asked = [i for i in self.kept if i in self.clutch.compared and i in of_cycles]
         surprise: dict[int, float] = {}
+        for i in asked:
+            others = [j for j in asked if j != i and runs[j].kind == runs[i].kind]
+            protocol = max((runs[j].sent.log_protocol for j in others), default=math.inf)
+            surprise[i] = protocol - runs[i].sent.log_protocol
+            surprise[i] += max((of_cycles[j] for j in others), default=0.0) - of_cycles[i]
         for fit, own in self.fits:
-            if len(own) > 1:
-                mean, variance, log_weight = fit.without
-                of_cof = log_outlying(fit.tests.log_cof - mean, variance, log_weight)
-                for i, value in zip(own, of_cof.tolist(), strict=True):
-                    surprise[i] = min(value - 0.0, 0.0)
-        for i, value in zip(self.clutch.near, self.clutch.surprise(self._sets([])[0]).tolist(), strict=True):
-            surprise[i] = surprise.get(i, 0.0) + min(value - (-9.0), 0.0)
-        odd = [i for i, value in sorted(surprise.items(), key=lambda item: item[1]) if value < 0.0]
-        odd = [i for i in odd if i in self.clutch.compared]
-        return self.clutch.in_question.union(odd[:4])
+            mean, variance, log_weight = fit.without
+            off = fit.tests.log_cof - mean
+            of_cof = log_outlying(0.0 * off, variance, log_weight) - log_outlying(off, variance, log_weight)
+            for i, value in zip(own, of_cof.tolist(), strict=True):
+                if i in surprise:
+                    surprise[i] += value
+        least = math.log(criteria.HELD / criteria.OTHER_TEST)
+        odd = sorted((i for i in asked if surprise[i] > least), key=lambda i: (-surprise[i], i))
+        return frozenset(odd[:SUSPECTS])
 
     @property
     def doubts(self) -> bool:
-        """Whether any run in question may have slipped."""
+        """Whether any run may have slipped, all else as the belief has it."""
         return any(log_odds >= math.log(criteria.HELD) for log_odds in self.log_odds.values())
 
     @cached_property
     def log_odds(self) -> dict[int, float]:
-        """log odds of a slip for every run in question, all else as the belief has it."""
-        return {i: slipped - sent for i, (sent, slipped, _) in self.slips.items()}
+        """log odds of a slip for every run that is asked about, all else as the belief has it."""
+        asked = sorted(self.suspects | self.belief.slipped)
+        return {i: slips[1] - slips[0] for i in asked if (slips := self.weigh(i)) is not None}
 
     def moves(self) -> Iterator[tuple[Belief, float]]:
         """Single changes, and by how much they would change the log probability, about."""
@@ -471,7 +477,8 @@ class _Weighed:
     def verdict(self, index: int, log_odds: float) -> Verdict:
         """What is said of a run that is doubted."""
         sent = self.clutch.runs[index].sent
-        slip = self.slips[index][2] if index in self.slips else Slip(name=OTHER_CYCLES, log_prior=0.0, likely=sent)
+        weighed = self.weigh(index)
+        slip = Slip(name=OTHER_CYCLES, log_prior=0.0, likely=sent) if weighed is None else weighed[2]
         made = self._of_kind(index)
         if made.size == 0:
             made = np.unique(self.clutch.cycles[[i for i in self.kept if i != index]])

@@ -182,11 +182,9 @@ def doubts_together(
     if incoming is None and not doubted:
         return Judged()
     events = order([*accepted, *doubted, *new])
-    aside = {event.run_id for event in doubted}
-    runs = runs_of(events, aside, geometry, corrected=corrected)
+    runs = runs_of(events, geometry, corrected=corrected)
     place = {run.name: index for index, run in enumerate(runs)}
-    in_question = [place[event.run_id] for event in [*doubted, *new]]
-    verdicts = judge(runs, in_question, [place[name] for name in aside])
+    verdicts = judge(runs, [place[event.run_id] for event in [*doubted, *new]])
     doubts = {
         runs[index].name: (doubt(verdict, runs[index].sent, events[index].shown or Shown()),)
         for index, verdict in verdicts.items()

@@ -6,9 +6,10 @@ the history.
 """
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
+from statistics import median_low
 
 import numpy as np
 
@@ -38,9 +39,9 @@ OTHER_OIL_SD = 0.004
 
 # Pressures, speeds and oil
 
-#: Share of tests made at other pressures or speeds than the reference test, deviation of the same and of others' logarithm.
-#: Chosen: a diagnosis advises such tests.
-OTHER_PROTOCOL, SAME_PROTOCOL_SD, OTHER_PROTOCOL_SD = 0.05, 0.03, 1.0
+#: Share of tests made at other pressures, speeds or oil temperatures than any other test; the deviation of the logarithm of
+#: pressures and speeds that are the same. Chosen: a diagnosis advises such tests.
+OTHER_PROTOCOL, SAME_PROTOCOL_SD = 0.05, 0.03
 #: Highest pressure [Pa] and speed [rad/s] of a rig of which nothing is known, and the deviations of their logarithms.
 #: Chosen: slow rigs are many.
 PRESSURE, LOG_PRESSURE_SD, SPEED, LOG_SPEED_SD = 8e5, 1.2, 200.0, 2.0
@@ -70,6 +71,8 @@ LOG_DRAG = (math.log(0.003), 1.4)
 PRESSED_SD = 0.5
 
 
+#: No number is so improbable that its logarithm underflows.
+_LEAST = -600.0
 #: Bins of speed.
 _BINS = 16
 
@@ -142,14 +145,37 @@ def shown_by(columns: Columns | None, geometry: Geometry) -> Shown:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class _Comparison:
-    """What the runs of a life are compared with: its first test that has mean COFs, and the range of its speeds."""
+    """What the runs of a life are compared with: all its tests, and of these the first at the pressures that are usual."""
 
-    reference: Event | None
     life: Life
     geometry: Geometry
     corrected: bool
+
+    @cached_property
+    def tests(self) -> list[Event]:
+        """Tests with mean COFs."""
+        return [event for event in self.life.events if event.cofs]
+
+    @cached_property
+    def reference(self) -> Event | None:
+        """The test with whose pressures COFs are compared."""
+        if not self.tests:
+            return None
+        usual = median_low([max(event.cofs) for event in self.tests])
+        return next(event for event in self.tests if max(event.cofs) == usual)
+
+    @cached_property
+    def oil(self) -> float | None:
+        """The usual oil temperature of tests [K]."""
+        logged = [event.oil_temperature for event in self.tests if event.oil_temperature is not None]
+        return median_low(logged) if logged else None
+
+    def in_other_oil(self, event: Event) -> bool:
+        """Whether a test was made at another oil temperature than is usual: its COF is none of the course."""
+        there = self.oil is not None and event.oil_temperature is not None
+        return there and abs((event.oil_temperature or 0.0) - (self.oil or 0.0)) > OTHER_OIL
 
     def reading(self, event: Event, shown: Shown, cofs: Mapping[float, tuple[float, float]] | None) -> Reading:
         """The reading of a run that shows this."""
@@ -166,8 +192,8 @@ class _Comparison:
         own = {STATIONARY: 0.0, DYNAMIC: DYNAMIC_SD}.get(event.kind, ENGAGEMENT_SD)
         spread = math.hypot(own, odds.STEP_SD if self.corrected else 0.0)
         first = self.reference
-        if first is not None and first.oil_temperature is not None and shown.oil is not None:
-            beyond = max(abs(shown.oil - first.oil_temperature) - OTHER_OIL, 0.0)
+        if self.oil is not None and shown.oil is not None:
+            beyond = max(abs(shown.oil - self.oil) - OTHER_OIL, 0.0)
             spread = math.hypot(spread, OTHER_OIL_SD * beyond)
         pooled = pooled_value(first.cofs, mean_cof) if mean_cof and first is not None else None
         if pooled is not None and pooled[0] > 0:
@@ -182,24 +208,29 @@ class _Comparison:
         return (math.log(cof), spread) if cof > 0 else None
 
     def _log_protocol(self, event: Event, shown: Shown) -> float:
-        """log density of pressures, speeds and oil temperature: those of the reference test, or others."""
+        """log density of pressures, speeds and oil temperature: those of another test of the life, or others."""
         is_test = event.kind in (STATIONARY, DYNAMIC)
+        others = [other.shown for other in self.tests if other.run_id != event.run_id and other.shown is not None]
         declared = None if event.duty is None else event.duty.speed
-        speeds = self.life.speed_range
-        pressure, speed = max(self.life.reference, default=None), None if speeds is None else speeds[1]
-        usual_pressure = (PRESSURE, LOG_PRESSURE_SD)
-        total = _log_of(shown.pressure if is_test else None, pressure, usual_pressure)
-        shown_speed = shown.speed if is_test or declared else None
-        total += _log_of(shown_speed, declared or speed, (SPEED, LOG_SPEED_SD))
+        total = 0.0
+        if is_test and shown.pressure:
+            usual = _Usual(math.log(PRESSURE), LOG_PRESSURE_SD, SAME_PROTOCOL_SD)
+            total += usual.log_of(math.log(shown.pressure), [math.log(one.pressure) for one in others if one.pressure])
+        if (is_test or declared) and shown.speed:
+            usual = _Usual(math.log(SPEED), LOG_SPEED_SD, SAME_PROTOCOL_SD)
+            speeds = [declared] if declared else [one.speed for one in others]
+            total += usual.log_of(math.log(shown.speed), [math.log(speed) for speed in speeds if speed])
         if shown.oil is not None:
-            total += _log_normal(shown.oil, OIL, OIL_SD)
+            total += _Usual(OIL, OIL_SD, OTHER_OIL).log_of(
+                shown.oil, [one.oil for one in others if one.oil is not None]
+            )
         if shown.open_torque is not None and shown.open_torque > 0:  # an open clutch's drag
             total += _log_normal(self._pressed(shown), *LOG_DRAG)
         return total
 
     def _pressed(self, shown: Shown) -> float:
         """log COF of the torque of an open clutch if it were pressed as in the reference test."""
-        levels = list(self.life.reference) or [PRESSURE]
+        levels = [PRESSURE] if self.reference is None else list(self.reference.cofs)
         return math.log((shown.open_torque or 0.0) / self.geometry.torque_per_cof(sum(levels) / len(levels)))
 
     def slips(self, event: Event, shown: Shown) -> Iterator[Slip]:
@@ -238,17 +269,14 @@ UNITS = (
 )
 
 
-def runs_of(events: Sequence[Event], held: Collection[str], geometry: Geometry, *, corrected: bool) -> list[Run]:
-    """All runs of a clutch in the order of their history, those that are `held` among them.
+def runs_of(events: Sequence[Event], geometry: Geometry, *, corrected: bool) -> list[Run]:
+    """All runs of a clutch in the order of their history, held or not.
 
     `corrected`: a model in force corrects the mean COFs of tests.
     """
     runs: list[Run] = []
-    rebuilds = {event.run_id for event in events if event.rebuild}
-    for life in lives_of([replace(event, rebuild=event.rebuild and event.run_id not in held) for event in events]):
-        tests = [event for event in life.events if event.cofs]
-        reference = next((event for event in tests if event.run_id not in held), tests[0] if tests else None)
-        comparison = _Comparison(reference=reference, life=life, geometry=geometry, corrected=corrected)
+    for life in lives_of(events):
+        comparison = _Comparison(life=life, geometry=geometry, corrected=corrected)
         for event in life.events:
             shown = event.shown or Shown()
             sent = comparison.reading(event, shown, event.cofs)
@@ -258,11 +286,11 @@ def runs_of(events: Sequence[Event], held: Collection[str], geometry: Geometry, 
                     kind=event.kind,
                     sent=sent,
                     slips=none if event.shown is None else partial(comparison.slips, event, shown),
-                    tests=bool(event.cofs) and sent.log_cof is not None and not life.in_other_oil(event),
+                    tests=bool(event.cofs) and sent.log_cof is not None and not comparison.in_other_oil(event),
                     block=None if event.duty is None or event.kind == RUN_IN else event.duty.cycles,
                     moment=event.moment if event.dated else None,
                     shift=event.shift,
-                    rebuild=event.run_id in rebuilds,
+                    rebuild=event.rebuild,
                     fixed=event.confirmed,
                 )
             )
@@ -292,16 +320,21 @@ def _scaled(
     return {pressure / level: (value * cof, sd * cof) for pressure, (value, sd) in values.items()}
 
 
-def _log_of(value: float | None, reference: float | None, usual: tuple[float, float]) -> float:
-    """log density of a test's highest pressure or speed: the reference test's, or another."""
-    if value is None or value <= 0:
-        return 0.0
-    if reference is None or reference <= 0:
-        return _log_normal(math.log(value), math.log(usual[0]), usual[1])
-    off = math.log(value / reference)
-    same = math.log1p(-OTHER_PROTOCOL) + _log_normal(off, 0.0, SAME_PROTOCOL_SD)
-    other = math.log(OTHER_PROTOCOL) + _log_normal(off, 0.0, OTHER_PROTOCOL_SD)
-    return max(same, other) + math.log1p(math.exp(-abs(same - other)))
+@dataclass(frozen=True, slots=True)
+class _Usual:
+    """What is known of a number before any test: mean and deviation; and the deviation of numbers that are the same."""
+
+    mean: float
+    deviation: float
+    same: float
+
+    def log_of(self, value: float, others: Sequence[float]) -> float:
+        """log density of a value: one of the others' again, or any."""
+        anywhere = _log_normal(value, self.mean, self.deviation)
+        if not others:
+            return anywhere
+        again = math.fsum(math.exp(_log_normal(value, other, self.same)) for other in others) / len(others)
+        return math.log((1.0 - OTHER_PROTOCOL) * again + OTHER_PROTOCOL * math.exp(max(anywhere, _LEAST)))
 
 
 def _log_normal(value: float, mean: float, deviation: float) -> float:

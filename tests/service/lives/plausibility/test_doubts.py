@@ -159,12 +159,21 @@ def test_another_clutch_is_held_once_there_is_a_course() -> None:
     assert "another clutch" in answer.message
 
 
-def test_doubts_change_nothing_and_are_the_same_twice() -> None:
-    bench, body = bench_after(), next_test(cycles=70_000)
-    before = bench.events
-    first, second = bench.answer(body), bench.answer(body)
-    assert first.message == second.message
-    assert bench.events == before
+def test_what_is_held_does_not_depend_on_the_order_of_arrival() -> None:
+    """Two zeros too many, a test in °F and one of another clutch: asked about in any order, the same runs are held."""
+    runs = [stationary(1000 * k, run_id=f"s{k}") for k in range(11)]
+    for k, run in enumerate(runs):
+        rows = len(run["channels"]["torque_nm"])
+        run["channels"]["oil_temperature_c"] = [140.0 if k == 5 else 60.0] * rows
+    runs[3]["cycles"], runs[9]["cycles"] = 30_000, 90_000
+    runs[7]["channels"]["torque_nm"] = [1.6 * torque for torque in runs[7]["channels"]["torque_nm"]]
+    slipped = {"s3", "s5", "s7", "s9"}
+    rng = np.random.default_rng(4)
+    for order in (range(11), range(10, -1, -1), *(rng.permutation(11).tolist() for _ in range(2))):
+        bench = Bench({})
+        for k in order:
+            bench.answer(runs[k])
+        assert {event.run_id for event in bench.held} == slipped
 
 
 @pytest.mark.slow
