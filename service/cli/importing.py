@@ -118,7 +118,7 @@ def _show(shown: dict[str, Any]) -> None:
         read = column["channel"] is not None
         unit = column["unit"] if read else column["stated_unit"]
         cells = [
-            column["channel"] or "left out",
+            (column["channel"] or "left out") + (" (check: its title is known in part)" if column["in_part"] else ""),
             unit or "",
             *(f"{column[name]:g}" if read else "" for name in ("scale", "offset")),
         ]

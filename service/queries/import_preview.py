@@ -152,6 +152,7 @@ def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, 
         "stated_unit": column["unit"],
         "unit": column["read_in"] if channel == column["channel"] else None,
         "channel": channel,
+        "in_part": channel is not None and column["in_part"],
         "scale": 1.0 if own is None else own.scale,
         "offset": 0.0 if own is None else own.offset,
     }

@@ -16,8 +16,8 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
     """The table and its columns.
 
     `columns`: of each its `title`, the `unit` that the file states, the one `stated` by the caller's map, the `channel` that
-    it is taken for (null: left out) and the unit that it is `read_in` (null: not known). `problem` says why the columns
-    cannot be read so.
+    it is taken for (null: left out), the unit that it is `read_in` (null: not known), and whether its title is understood
+    `in_part` only. `problem` says why the columns cannot be read so.
     """
     try:
         table, reading = widened(table, reading)
@@ -38,6 +38,7 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
                 "stated": None if own is None else stated_in_map.get(own.channel),
                 "channel": None if own is None else own.channel,
                 "read_in": None if own is None else own.unit,
+                "in_part": own is not None and own.in_part,
             }
         )
     return {

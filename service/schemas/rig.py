@@ -123,6 +123,7 @@ class PreviewColumn(Answer):
     stated_unit: str | None = Field(description="The unit that the file states; null: none")
     unit: str | None = Field(description="The unit that is used; null: none, or the column is ignored")
     channel: ChannelName | None = Field(description="The channel; null: the column is ignored")
+    in_part: bool = Field(description="Whether words of its title are not known, so that the channel should be checked")
     scale: float = Field(description="The scale, in the channel's unit")
     offset: float = Field(description="The offset, in the channel's unit")
 

@@ -86,6 +86,10 @@ def test_a_title_that_is_understood_in_part_is_marked_as_in_a_push(client: TestC
     codes = [[warning["code"] for warning in warnings] for warnings in (shown["warnings"], pushed)]
     assert (shown["problem"], shown["missing"], codes[0]) == (None, [], codes[1])
     assert "name_in_part" in codes[0]
+    assert [column["in_part"] for column in shown["columns"]] == [False, False, True]
+    left_open = preview(client, b"p [bar];n a [rpm];n b [rpm];Torque FZG [Nm]\n5;20;21;20,5\n5;40;41;20,7\n")
+    assert left_open["missing"][0] == "speed_rpm"
+    assert [column["in_part"] for column in left_open["columns"]] == [False, False, False, True]
 
 
 def test_cycles_stand_in_a_cell_above_the_table(client: TestClient) -> None:

@@ -169,7 +169,7 @@ export class Importer {
    * @param {number} index
    * @param {string[]} channels
    */
-  channel({ title, channel }, index, channels) {
+  channel({ title, channel, in_part: inPart }, index, channels) {
     const options = channels.map((name) => h("option", { value: name, selected: name === channel }, quantity(name)));
     const label = { id: this.id(index, "channel"), "aria-label": `Channel of ${title}` };
     const choose = (/** @type {any} */ event) => {
@@ -179,7 +179,8 @@ export class Importer {
         Object.assign(columns[index], { channel: value, unit: null, stated: null });
       });
     };
-    return h("select", { ...label, onchange: choose }, h("option", { value: "" }, "left out"), options);
+    const select = h("select", { ...label, onchange: choose }, h("option", { value: "" }, "left out"), options);
+    return h("div", {}, select, inPart ? h("p", {}, "Check: its title is known in part.") : null);
   }
 
   /**
