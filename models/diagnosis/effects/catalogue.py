@@ -16,20 +16,21 @@ from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import Effect, Shape, sized, unit_changes
 from models.diagnosis.effects.history import ACCELERATED_WEAR, LOAD_SEVERITY, OIL_CHANGE, REST_RECOVERY, RUNNING_IN
 from models.diagnosis.effects.moving import INERTIA_TORQUE, SHAFT_RIPPLE, SQUEEZE_FILM, STICK_SLIP
+from models.diagnosis.effects.onset import begins
 from models.diagnosis.effects.readings import CHANNEL_DELAY, PRESSURE_OFFSET, TORQUE_ZERO_SHIFT, UNSETTLED_DWELL
 from models.diagnosis.effects.thermal import HYDRODYNAMIC_DRAG, INTERFACE_HEATING, OIL_TEMPERATURE, VISCOUS_EXPONENT
 
 CATALOGUE: tuple[Effect, ...] = (
-    OIL_TEMPERATURE,
-    INTERFACE_HEATING,
-    VISCOUS_EXPONENT,
-    HYDRODYNAMIC_DRAG,
+    begins(OIL_TEMPERATURE),
+    begins(INTERFACE_HEATING),
+    begins(VISCOUS_EXPONENT),
+    begins(HYDRODYNAMIC_DRAG),
     TORQUE_ZERO_SHIFT,
     PRESSURE_OFFSET,
-    UNSETTLED_DWELL,
-    CHANNEL_DELAY,
-    INERTIA_TORQUE,
-    SQUEEZE_FILM,
+    begins(UNSETTLED_DWELL),
+    begins(CHANNEL_DELAY),
+    begins(INERTIA_TORQUE),
+    begins(SQUEEZE_FILM),
     SHAFT_RIPPLE,
     STICK_SLIP,
     RUNNING_IN,
@@ -82,13 +83,21 @@ def columns_of(effects: Sequence[Effect], facts: Facts) -> list[Column]:
 
 
 def columns_at_rows(design: Design, prediction: Prediction, columns: Sequence[Column]) -> FloatArray:
-    """The changes [N, m] of small amplitudes, per unit, at the rows."""
+    """The changes [N, m] of small amplitudes, per unit, at the rows. What begins at a state is, after it, what it would be
+    from the start: no lag goes from one test to the next."""
+    starts: dict[tuple[str, Shape], tuple[int, Effect]] = {}
+    places = [
+        starts.setdefault((c.effect.slug, c.effect.from_the_start(c.shape)), (len(starts), c.effect))[0]
+        for c in columns
+    ]
     changes = list[tuple[FloatArray, bool]]()
-    for _, alike in groupby(columns, key=lambda column: column.effect.slug):
-        group = list(alike)
-        unit = unit_changes(group[0].effect, prediction.scene, [column.shape for column in group])
-        changes += [(unit[:, i], column.effect.lags(column.shape)) for i, column in enumerate(group)]
-    return change_columns(design, prediction, changes)
+    for _, alike in groupby(starts.items(), key=lambda start: start[0][0]):
+        group = [(effect, shape) for (_, shape), (_, effect) in alike]
+        unit = unit_changes(group[0][0], prediction.scene, [shape for _, shape in group])
+        changes += [(unit[:, i], effect.lags(shape)) for i, (effect, shape) in enumerate(group)]
+    onsets = np.array([column.effect.onset(column.shape) for column in columns])
+    at_rows = change_columns(design, prediction, changes)[:, places]
+    return np.where(design.rows.cycles[:, None] > onsets, at_rows, 0.0)
 
 
 def change_columns(design: Design, prediction: Prediction, changes: list[tuple[FloatArray, bool]]) -> FloatArray:

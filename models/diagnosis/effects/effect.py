@@ -29,6 +29,8 @@ from models.diagnosis.design.design import IntArray, Points
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.design.loop_bins import PHASES
 
+#: The onset of what is at work in every test [cycles].
+FROM_THE_START = -1.0
 #: Values of an effect's shape parameters, in the order of `Effect.shapes`.
 Shape: TypeAlias = tuple[float, ...]
 
@@ -79,7 +81,8 @@ class Discrepancy(StrEnum):
 class ShapeParameter:
     """A shape parameter: its name and unit; `smooth` where the change may be differentiated in it (then it is refined
     between grid values, within its bounds), else it is taken from the grid; `held` where a smooth one stays at the values of
-    `Effect.courses` while a size is averaged over them: the size bends with it."""
+    `Effect.courses` while a size is averaged over them: the size bends with it; `lags` where it says (1 or 0) whether
+    friction in loops lags behind the change."""
 
     name: str
     unit: str
@@ -87,6 +90,7 @@ class ShapeParameter:
     highest: float = math.inf
     smooth: bool = False
     held: bool = False
+    lags: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,10 +113,11 @@ class Effect:
     grid(facts) gives the shapes to be tried (one, without a parameter), none where the campaign cannot show the effect.
     change(scene, amplitude, shape) -> [P] Nm at the scene's points (0: averages do not show it). before_lag: whether it
     changes the stationary curve, which friction in loops then lags behind, or the measured torque itself; None where that
-    is unknown and the last shape says (1 or 0).
+    is unknown and a shape says.
     discrepancies: along what its form is uncertain (`effects.fitted_effect`); an exact law has none.
     courses(facts) gives the shapes between which a size is averaged; None: as it was fitted.
     several(scene, settings) -> [P, m] Nm is its change for many (amplitude, shape) at once, where that is cheaper.
+    begins: whether its last shape is the cycle from which on it is at work (`effects.onset`).
     tails: degrees of freedom of the amplitude's prior (`effects.effect`), infinite for a normal one.
     counts_in_severity: its amplitude is the exponent by which ζ counts engagements (no torque is added along a life).
     named: whether it may be named as a cause; where not, what it explains is uncatalogued and lies on `axis`
@@ -141,6 +146,7 @@ class Effect:
     tails: float = 2.0
     courses: Callable[[Facts], tuple[Tried, ...]] | None = None
     several: Callable[[Scene, Sequence[tuple[float, Shape]]], FloatArray] | None = None
+    begins: bool = False
     grows_with: Measure | None = None
     counts_in_severity: bool = False
     named: bool = True
@@ -161,9 +167,19 @@ class Effect:
         """The shapes that a refit moves, each with its parameter."""
         return [(x, parameter) for x, parameter in zip(shape, self.shapes, strict=True) if parameter.smooth]
 
+    def onset(self, shape: Shape) -> float:
+        """The cycle from which on it is at work."""
+        return shape[-1] if self.begins else FROM_THE_START
+
+    def from_the_start(self, shape: Shape) -> Shape:
+        """The same at work in every test."""
+        return (*shape[:-1], FROM_THE_START) if self.begins else shape
+
     def lags(self, shape: Shape) -> bool:
         """Whether friction in loops lags behind what the effect changes."""
-        return shape[-1] > 0.5 if self.before_lag is None else self.before_lag
+        if self.before_lag is not None:
+            return self.before_lag
+        return any(value > 0.5 for value, parameter in zip(shape, self.shapes, strict=False) if parameter.lags)
 
 
 def sized(effect: Effect, facts: Facts) -> Effect:

@@ -11,10 +11,11 @@ from collections.abc import Callable
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.baseline.laws import Scene
+from models.diagnosis.baseline.laws import Scene, curve
 from models.diagnosis.design.design import CLOCK, CYCLES, PRESSURE, SPEED, IntArray
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried, life_of
+from models.diagnosis.effects.onset import begins
 from models.friction.stribeck import PARAMETER_NAMES
 
 #: Powers of the cycles in which a gain creeps [-].
@@ -72,19 +73,34 @@ def _gain_with_clock(scene: Scene, amplitude: float, shape: Shape) -> FloatArray
     return np.asarray(amplitude * np.where(shown, share, 0.0) * scene.curve, dtype=np.float64)
 
 
-def _stepped(relative: Callable[[Scene], FloatArray]) -> Callable[[Scene, float, Shape], FloatArray]:
-    """amplitude times `relative` [P] Nm after the cycle in the first shape, 0 before."""
+def _stepped(change: Callable[[Scene, float], FloatArray]) -> Callable[[Scene, float, Shape], FloatArray]:
+    """A change [P] Nm after the cycle in the first shape, 0 before."""
 
-    def change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-        return np.asarray(amplitude * np.where(scene.points.cycles > shape[0], relative(scene), 0.0), dtype=np.float64)
+    def stepped(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+        return np.asarray(np.where(scene.points.cycles > shape[0], change(scene, amplitude), 0.0), dtype=np.float64)
+
+    return stepped
+
+
+def _speed_scaled(scene: Scene, amplitude: float) -> FloatArray:
+    """S((1 + a) v) - S(v) [P] Nm."""
+    return scene.curve_at(velocity=scene.points.velocity * _factor(amplitude)) - scene.curve
+
+
+def _parameter_scaled(parameter: str) -> Callable[[Scene, float], FloatArray]:
+    """S with (1 + a) θ less S with θ [P] Nm, θ a parameter of eq. 3 (one of PARAMETER_NAMES)."""
+    place = PARAMETER_NAMES.index(parameter)
+
+    def change(scene: Scene, amplitude: float) -> FloatArray:
+        parameters = scene.parameters.copy()
+        parameters[:, place] *= _factor(amplitude)
+        return scene.points.engaged * curve(scene.points.velocity, parameters) - scene.curve
 
     return change
 
 
-def _by_parameter(parameter: str) -> Callable[[Scene], FloatArray]:
-    """θ ∂S/∂θ of a parameter of eq. 3 (one of PARAMETER_NAMES)."""
-    place = PARAMETER_NAMES.index(parameter)
-    return lambda scene: np.asarray(scene.gradient[:, place] * scene.parameters[:, place], dtype=np.float64)
+def _factor(amplitude: float) -> float:
+    return max(1.0 + amplitude, 0.05)  # a fit may try what is no speed
 
 
 def _gauge_hysteresis(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
@@ -104,8 +120,10 @@ def _fault(
     grid: Callable[[Facts], tuple[Tried, ...]],
     change: Callable[[Scene, float, Shape], FloatArray],
     shapes: int = 0,
+    *,
+    before_lag: bool = False,
 ) -> Effect:
-    """A fault with so many `shapes` that are taken from its grid; it changes the measured torque."""
+    """A fault with so many `shapes` that are taken from its grid."""
     return Effect(
         slug=slug,
         title=title,
@@ -120,21 +138,23 @@ def _fault(
         shapes=tuple(ShapeParameter(name="course", unit="-") for _ in range(shapes)),
         grid=grid,
         change=change,
-        before_lag=False,
+        before_lag=before_lag,
         named=False,
         axis=axis,
     )
 
 
 FAULTS: tuple[Effect, ...] = (
-    _fault(
-        "gain_with_clock",
-        "a gain of the torque that drifts while a test lasts, as a sensor's does that warms up",
-        "a S t/30 min, or a S (1 - e^{-t/τ})",
-        CLOCK,
-        _gains_with_clock,
-        _gain_with_clock,
-        shapes=2,
+    begins(
+        _fault(
+            "gain_with_clock",
+            "a gain of the torque that drifts while a test lasts, as a sensor's does that warms up",
+            "a S t/30 min, or a S (1 - e^{-t/τ})",
+            CLOCK,
+            _gains_with_clock,
+            _gain_with_clock,
+            shapes=2,
+        )
     ),
     _fault(
         "gain_with_life",
@@ -148,45 +168,52 @@ FAULTS: tuple[Effect, ...] = (
     _fault(
         "speed_scale_step",
         "another scale of the speed from a cycle on, as of another encoder or belt",
-        "a v ∂S/∂v from a cycle on",
+        "S((1 + a) v) - S(v) from a cycle on",
         CYCLES,
         _onsets,
-        _stepped(lambda scene: scene.by_velocity * scene.points.velocity),
+        _stepped(_speed_scaled),
         shapes=1,
+        before_lag=True,
     ),
     _fault(
         "static_torque_step",
         "a static torque that steps at a cycle",
-        "a M_s ∂S/∂M_s from a cycle on",
+        "S with (1 + a) M_s from a cycle on",
         CYCLES,
         _onsets,
-        _stepped(_by_parameter("static_torque")),
+        _stepped(_parameter_scaled("static_torque")),
         shapes=1,
+        before_lag=True,
     ),
     _fault(
         "stribeck_velocity_step",
         "a Stribeck velocity that steps at a cycle",
-        "a V_S ∂S/∂V_S from a cycle on",
+        "S with (1 + a) V_S from a cycle on",
         CYCLES,
         _onsets,
-        _stepped(_by_parameter("stribeck_velocity")),
+        _stepped(_parameter_scaled("stribeck_velocity")),
         shapes=1,
+        before_lag=True,
     ),
-    _fault(
-        "gauge_hysteresis",
-        "a pressure that depends on whether it was last raised or lowered",
-        "± a p ∂S/∂p",
-        PRESSURE,
-        lambda _: (Tried(shape=()),),
-        _gauge_hysteresis,
+    begins(
+        _fault(
+            "gauge_hysteresis",
+            "a pressure that depends on whether it was last raised or lowered",
+            "± a p ∂S/∂p",
+            PRESSURE,
+            lambda _: (Tried(shape=()),),
+            _gauge_hysteresis,
+        )
     ),
-    _fault(
-        "speed_hysteresis",
-        "a torque that depends on whether the speed was last raised or lowered",
-        "± a S",
-        SPEED,
-        lambda _: (Tried(shape=()),),
-        _speed_hysteresis,
+    begins(
+        _fault(
+            "speed_hysteresis",
+            "a torque that depends on whether the speed was last raised or lowered",
+            "± a S",
+            SPEED,
+            lambda _: (Tried(shape=()),),
+            _speed_hysteresis,
+        )
     ),
 )
 

@@ -247,7 +247,7 @@ HYDRODYNAMIC_DRAG = Effect(
         ShapeParameter(name="power m", unit="-", lowest=0.5, highest=1.8, smooth=True),
         ShapeParameter(name="rupture of the film r", unit="-"),
         ShapeParameter(name="viscosity's exponent t", unit="-"),
-        ShapeParameter(name="whether friction lags behind it", unit="-"),
+        ShapeParameter(name="whether friction lags behind it", unit="-", lags=True),
     ),
     grid=_hydrodynamic_drag_grid,
     change=_hydrodynamic_drag_change,

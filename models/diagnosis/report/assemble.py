@@ -10,9 +10,9 @@ import numpy as np
 from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.effect import sized
+from models.diagnosis.effects.effect import FROM_THE_START, sized
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
-from models.diagnosis.effects.fitted_effect import Estimate, ranges_of
+from models.diagnosis.effects.fitted_effect import Estimate, FittedEffect, ranges_of
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.posterior import Posterior
 from models.diagnosis.explanations.shapeless import outlying_run
@@ -51,6 +51,7 @@ def candidates_of(
             )
             if slug in sizes:
                 estimate = _sized(slug, sizes[slug])
+            estimate = _with_onset(estimate, fitted.fit.effects[place])
             evidence = fitted.evidence
         elif slug in records:
             estimate, evidence = _finite_estimate(records[slug].estimate), records[slug].log_evidence
@@ -85,6 +86,14 @@ def _sized(slug: str, size: Size) -> Estimate:
     scale = BY_SLUG[slug].scale
     low, high = (_finite(scale * end) for end in size.interval)
     return replace(_estimate(slug, size.value, size.sd), stated_interval=(low, high), stated_sign=1.0 - size.other_sign)
+
+
+def _with_onset(estimate: Estimate, fitted: FittedEffect) -> Estimate:
+    """With the cycle from which on the effect is at work, where it was not from the start."""
+    onset = fitted.effect.onset(fitted.shape)
+    if onset == FROM_THE_START:
+        return estimate
+    return replace(estimate, name=f"{estimate.name} (from about {number(onset)} cycles on)")
 
 
 def _finite_estimate(estimate: Estimate) -> Estimate:

@@ -156,6 +156,13 @@ def _adequate(report: Report) -> list[Sentence]:
             f"from run to run{_scatter(report.scatter)}."
         )
     ]
+    if report.scatter is not None and report.scatter.lower > criteria.USUAL_GAIN:
+        sentences.append(
+            Sentence(
+                "They scatter more than usual, and a zero that wanders from run to run would look the same: repeat one of "
+                "these tests at once."
+            )
+        )
     sentences += _unseen(report)
     if report.states < 3:
         say = "says" if report.states == 1 else "say"

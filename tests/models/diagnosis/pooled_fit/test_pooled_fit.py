@@ -9,6 +9,7 @@ from models.diagnosis.baseline.laws import Laws
 from models.diagnosis.baseline.prediction import frame_of
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.effect import FROM_THE_START
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, starting_laws
@@ -92,7 +93,7 @@ def test_an_extended_model_is_not_off_all_runs_by_one_share() -> None:
     baseline = fit_baseline(build_design(rehearsal(3, {"oil_temperature": 1.0}, tests=8, noise=0.01)))
     problem = baseline.problem.with_noise(replace(baseline.problem.noise, run_gain=0.02))
     start = starting_laws(problem.design, frame_of(problem.design))
-    hersey = FittedEffect(effect=BY_SLUG["oil_temperature"], amplitude=0.1, shape=(-1.0, AT_ONCE))
+    hersey = FittedEffect(effect=BY_SLUG["oil_temperature"], amplitude=0.1, shape=(-1.0, AT_ONCE, FROM_THE_START))
     found = fit(problem, start, [hersey], steps=40)
     assert abs(np.mean(found.residual / found.torque)) < 0.01
     # the control: where gains multiply what was measured, they take a share of everything

@@ -12,6 +12,7 @@ from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.experiments.candidates import TRIALS, Step
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import UNCATALOGUED, Explanation, Verdict, Where
+from models.diagnosis.pooled_fit.projection import RunScatter
 from models.diagnosis.report.report import Candidate, Misfit, Report, Visible
 from models.diagnosis.report.summary import summarise
 from models.diagnosis.validation.held_out import Gain, Hardest
@@ -125,6 +126,20 @@ def test_what_is_named_is_explained_with_its_size_its_gain_and_the_next_test() -
     assert "the extended model errs by 7.5 ± 0.9 % less" in said or "errs by 7.4 ± 0.9 % less" in said
     assert "predicts the last ones better" in said
     assert "It tells oil change from running in (probability 0.80)." in said
+
+
+def test_where_runs_scatter_more_than_usual_the_paragraph_says_what_may_hide_in_it() -> None:
+    """A zero that crept by 3 Nm over the days was called adequate, with gains that scatter by 0.8 %."""
+    found = findings(Verdict.MODEL_ADEQUATE)
+    usual, large = (
+        RunScatter(median=median, lower=lower, upper=upper, information=3.0)
+        for median, lower, upper in ((0.003, 0.002, 0.005), (0.0084, 0.0061, 0.0126))
+    )
+    assert "scatter more than usual" not in summarise(replace(found, scatter=usual))
+    said = summarise(replace(found, scatter=large))
+    assert "(0.84 % of the torque; 90 % interval 0.61 to 1.3 %)" in said
+    assert "a zero that wanders from run to run would look the same: repeat one of these tests at once." in said
+    assert len(said.split()) <= MAX_WORDS
 
 
 def test_why_nothing_may_be_adopted_stands_in_the_paragraph() -> None:
