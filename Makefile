@@ -12,8 +12,9 @@
 # make score   how good the prognosis is, on simulated lives: the tables of docs/appendix/prognosis.md  (SEED= SIZE= PARTS= ARGS=--write)
 # make rivals  the same beside other packages, in an environment of their own                (SEED= SIZE=)
 # make blind   hides effects and wants them found: the table of docs/appendix/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
-#              SUBSET=name: verdicts on a fixed set of campaigns, kept in .blind/name; ABLATE=NUMBER=value of the criteria;
+#              SUBSET=name: verdicts on a fixed set of campaigns, kept in .blind/name;
 #              ARGS="--against other" puts two of them beside each other; ABLATE=each: every number that gates a verdict
+#              taken for another (ABLATE=NUMBER=value: one)
 # make visible hides effects at twice the amplitude that a report calls visible, and counts alarms (SEED= COUNT= STORE=)
 # make adoption  hides artefacts, adopts what the diagnosis offers, holds remaining life against the truth: a table of
 #              docs/appendix/diagnosis.md; goes on where it ended                         (SEED= SIZE=small|full ONLY= ARGS=--list)
@@ -56,7 +57,7 @@ SLIM := $(LOCK) $(foreach name,$(UNUSED),--no-emit-package $(name))
 # what the first run of the tests compiles, the next ones read: a third of what `make quick` takes
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help docs gallery reference adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
+.PHONY: help compiled docs gallery reference adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -70,6 +71,10 @@ shell: $(VENV)/.runs
 # what each target is for, as it stands above
 help:
 	@sed -n '/^# make/,/^PYTHON/{s/^# \{0,1\}//p}' Makefile
+
+# all that tests import is compiled, and their assertions rewritten, once: else each worker does so at the same time
+compiled: $(VENV)/.tests
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --collect-only -qq -m "not slow" > /dev/null
 
 test: $(VENV)/.tests
 	$(BIN)/python -m tests.browser
@@ -142,7 +147,7 @@ architecture: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.architecture
 
 blind: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.blind$(if $(filter each,$(ABLATE)),.ablations,$(if $(SUBSET),.subset)) $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.blind$(if $(ABLATE),.ablations,$(if $(SUBSET),.subset)) $(ARGS)
 
 visible: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.visible

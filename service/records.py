@@ -41,6 +41,7 @@ from service.settings import CODE_VERSION
 from storage import assumptions, changes, clutches, diagnoses, inspections, jobs, results, rigs, runs
 from storage.clutches import ClutchRow
 from storage.diagnoses import VerdictRow
+from storage.encoding import Json
 from storage.inspections import InspectionRow, PhotographRow
 from storage.jobs import NewJob
 from storage.results import FilterStateRow, FitRow, PredictionRow
@@ -281,17 +282,20 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
         raising.evaluate(connection, clutch_id)
 
 
-def ask_fleet_refresh(connection: Connection, *, by: str, at: str) -> None:
-    """Have fleets learn again, for what an ended life teaches has changed; unless a job that will see it waits already."""
-    if jobs.any_waiting(connection, jobs.FLEET_REFRESH):
-        return
+def ask_fleet_refresh(connection: Connection, kind: Json | None, *, by: str, at: str, learned: bool = False) -> None:
+    """Have the fleet of a kind (None: all) learn again, for what an ended life teaches has changed; where it has `learned`,
+    only have its clutches tracked under that. Unless a job that will do it waits already."""
+    fleet = None if kind is None else assumptions.fleet_key(kind)
+    for row in jobs.open_of(connection, jobs.FLEET_REFRESH):
+        if row.state == jobs.WAITING and row.of in (fleet, None) and row.arguments.get("learned", False) <= learned:
+            return
     job = NewJob(
         job_id=secrets.token_hex(8),
         kind=jobs.FLEET_REFRESH,
         clutch_id=None,
         asked_at=at,
         asked_by=by,
-        arguments={"request": request_id.get()},
+        arguments={"request": request_id.get(), "fleet": fleet, "learned": learned},
     )
     jobs.insert(connection, job)
 

@@ -47,6 +47,11 @@ class JobRow(NewJob):
     progress: Json | None
     problem: str | None
 
+    @property
+    def of(self) -> str | None:
+        """What the job is of: a clutch, or the key of a kind of clutches; None: of all."""
+        return self.clutch_id or self.arguments.get("fleet")
+
 
 _new, _rows = Rows(NewJob), Rows(JobRow)
 _insert = sa.insert(job)
@@ -61,18 +66,8 @@ _newest = (
     .order_by(job.c.job_key.desc())
     .limit(bindparam("most"))
 )
-_same = (
-    select(job)
-    .where(
-        OPEN_ONLY, job.c.kind == bindparam("of_kind"), job.c.clutch_id.is_not_distinct_from(bindparam("of", type_=Text))
-    )
-    .order_by(job.c.job_key)
-    .limit(1)
-)
+_open = select(job).where(OPEN_ONLY, job.c.kind == bindparam("of_kind")).order_by(job.c.job_key)
 _count = select(func.count()).select_from(job).where(OPEN_ONLY, job.c.kind == bindparam("of_kind"))
-_any_waiting = select(
-    sa.exists(select(job.c.job_key).where(OPEN_ONLY, job.c.kind == bindparam("of_kind"), job.c.state == WAITING))
-)
 _free = and_(
     OPEN_ONLY, among(job.c.kind, "of_kinds"), or_(job.c.state == WAITING, job.c.leased_until < now_in_seconds())
 )
@@ -154,14 +149,9 @@ def count_open(connection: Connection, kind: str) -> int:
     return connection.execute(_count, {"of_kind": kind}).scalar_one()
 
 
-def find_open(connection: Connection, kind: str, clutch_id: str | None) -> JobRow | None:
-    """The job of a kind and a clutch that waits or runs, the first of them; `clutch_id` None: of no single clutch."""
-    return _rows.first(connection.execute(_same, {"of_kind": kind, "of": clutch_id}))
-
-
-def any_waiting(connection: Connection, kind: str) -> bool:
-    """Whether a job of a kind waits: it will find all that is stored by then."""
-    return bool(connection.execute(_any_waiting, {"of_kind": kind}).scalar_one())
+def open_of(connection: Connection, kind: str) -> list[JobRow]:
+    """The jobs of a kind that wait or run, in the order in which they were asked for."""
+    return _rows.all(connection.execute(_open, {"of_kind": kind}))
 
 
 def any_free(connection: Connection, kinds: Collection[str]) -> bool:

@@ -1,13 +1,17 @@
 """Rig profiles by name: how the files that a rig's recorder writes are read."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import sqlalchemy as sa
 from sqlalchemy import Connection, bindparam, select
 
-from storage.dialects import ALL_ROWS, upsert
+from storage.dialects import upsert
 from storage.encoding import Json, Rows
 from storage.tables import rig
+
+#: Profiles in memory at once. Chosen: one of a thousand columns is a quarter of a megabyte of JSON and some ten in memory.
+MAX_AT_ONCE = 50
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +47,14 @@ def get(connection: Connection, name: str) -> RigRow | None:
     return _rows.first(connection.execute(_by_name, {"wanted": name}))
 
 
-def page(connection: Connection, *, limit: int | None = None, after: str = "") -> list[RigRow]:
+def page(connection: Connection, *, limit: int = MAX_AT_ONCE, after: str = "") -> list[RigRow]:
     """Profiles by name, at most `limit`, behind the name `after`."""
-    values = {"after": after, "most": ALL_ROWS if limit is None else limit}
-    return _rows.all(connection.execute(_in_order, values))
+    return _rows.all(connection.execute(_in_order, {"after": after, "most": limit}))
+
+
+def every(connection: Connection) -> Iterator[RigRow]:
+    """All profiles by name, a page of them in memory."""
+    rows = page(connection)
+    while rows:
+        yield from rows
+        rows = page(connection, after=rows[-1].name)

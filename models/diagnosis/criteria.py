@@ -95,8 +95,6 @@ NEGLIGIBLE, SLACK, MOST_REFITS = 0.01, 0.2, 14
 #: Cosine between changes of torque from which an effect is refitted beside a leader that it resembles. Two of two pressure
 #: offsets at λ = 300 were named a shifted zero; refitted, one is 16 nats better, and had been promised to be 49 worse.
 RELATIVE = 0.8
-#: Up to this share of a vibration's evidence [-] what has no name counts as its trace in averages.
-VIBRATION_TRACE = 0.1
 #: An extension whose held-out error is more than this times the baseline's is withheld; it changes no verdict.
 MOST_WORSE = 1.02
 #: Factors on what is usual, by which an unmeasured viscosity changes from test to test and within a test.

@@ -14,10 +14,12 @@ alive:
 
     p(T) ∝ t((log T - c - μ)/σ) · Σ w_jqs(T') N(log T; log T', ...),    T > ζ
 
-A clutch of the kind may also take a course that none of them took: three plain ones stand beside theirs. Or it follows
-eq. 6: then its own filter knows the end best, and its draws are weighted by the predictive. How probable that is depends on
-the kind: the exact filter knows of every ended life how probably its whole course is eq. 6 with nothing beside it, and the
-share of such lives is the mean of a beta distribution. The clutch's tests do not decide: before a knee they follow it too.
+A clutch of the kind may also take a course that none of them took: three plain ones stand beside theirs. Or it follows a
+law that its own filter knows (eq. 6, a straight line, a logarithm, ...): then that filter knows the end best, and its draws
+are weighted by the predictive. How probable each law is depends on the kind: the exact filter knows of every ended life how
+probably its whole course is that law with the least discrepancy, and the shares of the filter's forms among the kind are the
+mean of a Dirichlet distribution about their prior. So the kind teaches the filter its law, and each draw counts by how much
+more probable its form is for it; those of a law that the clutch's own tests contradict count for little.
 
 A clutch of another kind takes one of all these courses with an end anywhere, or a plain one, or has the end that its filter
 gives: the evidence says how probable that is, and with that probability the ended lives say nothing. That a clutch has
@@ -44,7 +46,7 @@ from scipy.special import gammaincinv, log_ndtr, logsumexp, ndtri
 from models.arrays import FloatArray
 from models.prognosis import criteria
 from models.prognosis.first_passage import Offset, ends_of_life
-from models.tracking.courses import Course
+from models.tracking.courses import FORM_COURSE, LEAST_DISCREPANCY, Course, log_form_weight
 from models.tracking.criteria import STEP_SIZE
 from models.tracking.filters.grid import Grid
 from models.tracking.history import later_epochs
@@ -65,6 +67,8 @@ _FARTHEST = 3.0
 _LEVEL_SD = 0.5
 #: Means, and deviations, that a predictive with censored values is averaged over.
 _NODES = 16
+#: The laws of a life of which it is not known that it follows any.
+_NO_LAWS = (0.0,) * len(Course)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +78,7 @@ class EndedLife:
     does not state it.
 
     `deviation` is that of the logarithm of an uncertain end; of a `censored` life `end` is when it was taken out before it;
-    `lawful` is the probability that its whole course is eq. 6 with nothing beside it.
+    `laws` are the probabilities that its whole course is each `Course` with the least discrepancy.
     """
 
     end: float
@@ -84,7 +88,7 @@ class EndedLife:
     energy: float | None = None
     deviation: float = 0.0
     censored: bool = False
-    lawful: float = 0.0
+    laws: tuple[float, ...] = _NO_LAWS
 
     @property
     def final_pace(self) -> float:
@@ -106,20 +110,30 @@ class EndedLife:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON can carry it."""
-        return asdict(self) | {"progress": list(self.progress), "damage": list(self.damage)}
+        return asdict(self) | {name: list(getattr(self, name)) for name in _COLUMNS}
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> "EndedLife":
         """The inverse of `to_dict`, exactly."""
-        return cls(**{**stored, "progress": tuple(stored["progress"]), "damage": tuple(stored["damage"])})
+        return cls(**{**stored, **{name: tuple(stored[name]) for name in _COLUMNS}})
+
+
+#: What of an ended life is a series of numbers.
+_COLUMNS = ("progress", "damage", "laws")
 
 
 def ended_life(
-    progress: FloatArray, values: FloatArray, end: float, *, initial: float, fraction: float, lawful: float = 0.0
+    progress: FloatArray,
+    values: FloatArray,
+    end: float,
+    *,
+    initial: float,
+    fraction: float,
+    laws: tuple[float, ...] = _NO_LAWS,
 ) -> EndedLife | None:
     """What a life that ended at ζ = `end` > 0 teaches, by its tests at progress [n] >= 0 with values [n].
 
-    `initial` > 0 is the value when new, `lawful` as `new_and_lawful` has it. None where it was measured at fewer than
+    `initial` > 0 is the value when new, `laws` as `new_and_laws` has them. None where it was measured at fewer than
     FEWEST_TESTS different ζ before its end.
     """
     before = np.flatnonzero(progress < end)
@@ -128,19 +142,16 @@ def ended_life(
         return None
     mean = np.bincount(where, weights=values[before]) / np.bincount(where)
     damage = (1.0 - mean / initial) / (1.0 - fraction)
-    return EndedLife(
-        end=end, fraction=fraction, progress=tuple(at.tolist()), damage=tuple(damage.tolist()), lawful=lawful
-    )
+    return EndedLife(end=end, fraction=fraction, progress=tuple(at.tolist()), damage=tuple(damage.tolist()), laws=laws)
 
 
-def new_and_lawful(history: Sequence[Measurement]) -> tuple[float, float]:
+def new_and_laws(history: Sequence[Measurement]) -> tuple[float, tuple[float, ...]]:
     """Of a life by its measurements in order, as the exact filter has it under the weak prior: ξ0 in the mean, and the
-    probability that its course is eq. 6 without a discrepancy."""
+    probabilities that its course is each `Course` with the least discrepancy."""
     drawn = _drawn(history)
-    lawful = drawn.course == Course.EQ_6
-    if drawn.discrepancy is not None:
-        lawful &= drawn.discrepancy.size == 0.0
-    return float(drawn.weight @ drawn.initial), float(drawn.weight @ lawful)
+    lawful = drawn.weight * LEAST_DISCREPANCY[drawn.form]
+    laws = np.bincount(drawn.course, weights=lawful, minlength=len(Course))
+    return float(drawn.weight @ drawn.initial), tuple(laws.tolist())
 
 
 def _drawn(history: Sequence[Measurement]) -> Posterior:
@@ -178,33 +189,42 @@ def representative(lives: Sequence[EndedLife]) -> list[EndedLife]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kin:
-    """What ended lives say of a clutch's end of life, by `lawful`, the share of their kind that follows eq. 6.
+    """What ended lives say of a clutch's end of life.
 
     If a clutch takes one of their courses: `ends` [n] with weights [n] that sum to one, and the `log_odds` of its tests that
-    it is of their kind. If it follows eq. 6 its own filter knows the end, and `predictive` is that of log(T/`centre`).
+    it is of their kind. If it follows a law of its own filter, that knows the end, and `predictive` is that of
+    log(T/`centre`). `lawful` is the share of their kind that does, and `lean` what share of the kind has each form
+    (`courses`), over its share of the filter's prior.
     """
 
     ends: FloatArray
     weight: FloatArray
     log_odds: float
     lawful: float
+    lean: FloatArray
     predictive: "_Predictive"
     centre: float
 
-    def together(self, own: FloatArray, weight: FloatArray, as_of: float) -> tuple[FloatArray, FloatArray]:
-        """The end of life as a sample with its weights, from a filter's `own` ends [n] with weights [n] that sum to one.
+    def together(
+        self, own: FloatArray, weight: FloatArray, form: NDArray[np.intp], as_of: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """The end of life as a sample with its weights, from a filter's `own` ends [n] with weights [n] that sum to one and
+        forms [n].
 
-        It holds these as they are (all of those behind `as_of`), weighted by the predictive, and `ends`; of a clutch of the
-        kind the share `lawful` of what is ahead is the former. How well the filter's ends agree with the predictive, against
-        an end anywhere, is evidence that the clutch is of the kind, and none for eq. 6 against their courses.
+        It holds these as they are (all of those behind `as_of`), under the forms' shares and weighted by the predictive, and
+        `ends`. How much the clutch's tests speak for the forms of the kind is evidence against its courses. How well those
+        draws agree with the predictive, against an end anywhere, is evidence that the clutch is of the kind, and none for a
+        law against their courses.
         """
         ahead = own > as_of
         near = ahead & np.isfinite(own)
+        left = float(weight[ahead].sum())
+        by_form = np.where(ahead, weight * self.lean[form], 0.0)
         agreeing = np.zeros(own.size)
-        agreeing[near] = weight[near] * np.exp(self.predictive.log_density(np.log(own[near] / self.centre)))
-        agreed, left = float(agreeing.sum()), float(weight[ahead].sum())
-        lawful = self.lawful if agreed > 0.0 else 0.0
-        by_law = lawful * _ANYWHERE * agreed / left if lawful else 0.0
+        agreeing[near] = by_form[near] * np.exp(self.predictive.log_density(np.log(own[near] / self.centre)))
+        agreed, evidence = float(agreeing.sum()), float(by_form.sum())
+        lawful = evidence / (evidence + left * (1.0 - self.lawful)) if agreed > 0.0 else 0.0
+        by_law = lawful * _ANYWHERE * agreed / evidence if lawful else 0.0
         by_course = (1.0 - lawful) * math.exp(self.log_odds)
         odds = (by_law + by_course) * (1.0 - criteria.OTHER_KIND) / criteria.OTHER_KIND
         of_kind = odds / (1.0 + odds)
@@ -268,15 +288,27 @@ def _as_its_kind(
     anywhere = logsumexp(kin.log_evidence) + math.log(step / _ANYWHERE) - math.log(pace.size)
     beside = logsumexp(others.log_evidence) - math.log(_ENDS * others.log_evidence.shape[2])
     log_odds -= np.logaddexp(anywhere, beside) - math.log(2.0)
+    lawful, lean = _forms(tests[0], courses)
     return Kin(
         ends=np.exp(places),
         weight=stated / stated.sum(),
         log_odds=float(log_odds),
-        lawful=(criteria.LAWFUL_WORTH[0] + sum(life.lawful for life in courses))
-        / (sum(criteria.LAWFUL_WORTH) + len(courses)),
+        lawful=lawful,
+        lean=lean,
         predictive=of_ends,
         centre=math.exp(centre),
     )
+
+
+def _forms(first: Measurement, lives: Sequence[EndedLife]) -> tuple[float, FloatArray]:
+    """The share of a kind that follows a law of a filter of a series that begins with `first`, by lives that have ended; and
+    the shares of the filter's forms among the kind over those of its prior."""
+    prior = np.exp(log_form_weight(weak(first, falling=True)))
+    by_law = np.bincount(FORM_COURSE, weights=prior * LEAST_DISCREPANCY)
+    taught = np.sum([life.laws for life in lives], axis=0)
+    worth = criteria.LAWFUL_WORTH[0] + LEAST_DISCREPANCY * (taught / by_law)[FORM_COURSE]
+    lean = worth / (sum(criteria.LAWFUL_WORTH) + len(lives))
+    return float(lean @ prior), lean
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

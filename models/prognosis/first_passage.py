@@ -65,12 +65,13 @@ def predict_first_passage(
     quantiles: Sequence[float] = QUANTILES,
     offset: Offset | None = None,
     stated: tuple[FloatArray, FloatArray] | None = None,
+    initial: float | None = None,
 ) -> FirstPassage:
     """The end of life of a weighted sample of coefficients; 0 < fraction < 1, as_of >= 0 and horizon > 0 in cycles.
 
     With an `offset` the criterion is ξ(ζ) + offset(ζ) <= fraction · (ξ0 + offset(0)). A sample of the end of life with its
-    weights that is `stated` counts in place of the coefficients' own. A horizon before `as_of` is taken to be `as_of`.
-    Raises ValueError where an argument is out of its range.
+    weights that is `stated` counts in place of the coefficients' own, as does an `initial` value. A
+    horizon before `as_of` is taken to be `as_of`. Raises ValueError where an argument is out of its range.
     """
     if not 0.0 < fraction < 1.0:
         raise ValueError(f"fraction must lie between 0 and 1, got {fraction}")
@@ -85,7 +86,7 @@ def predict_first_passage(
     values = weighted_quantiles(np.minimum(passages, 10.0 * horizon), weight, quantiles)
     end = {q: float(x) if x <= horizon else None for q, x in zip(quantiles, values, strict=True)}
     fresh, now = paths(posterior, np.array([0.0, as_of]), offset)
-    initial = float(posterior.weight @ fresh)
+    initial = float(posterior.weight @ fresh) if initial is None else initial
     return FirstPassage(
         as_of=as_of,
         end_of_life=end,

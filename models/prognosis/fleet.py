@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.special import gammaln, log_expit, logsumexp
+from scipy.special import gammaln, log_expit
 
 from models.arrays import FloatArray
 from models.prognosis import criteria
@@ -81,7 +81,7 @@ class FleetPrior:
     def log_density(self, x: FloatArray) -> FloatArray:
         """Log density of the population at x [n, 4]; [n]."""
         root = np.linalg.cholesky(self.scale)
-        off = np.linalg.solve(root, (x - self.mean).T)
+        off = np.linalg.inv(root) @ (x - self.mean).T
         d, f = x.shape[1], self.freedom
         constant = gammaln(0.5 * (f + d)) - gammaln(0.5 * f) - 0.5 * d * math.log(f * math.pi)
         distance = np.square(off).sum(axis=0)
@@ -176,7 +176,8 @@ def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArra
     means, spread = np.zeros((n, d)), np.zeros((d, d))
     for index, clutch in enumerate(fleet):
         log_weight = clutch.log_weight + population.log_density(clutch.x)
-        weight = np.exp(log_weight - logsumexp(log_weight))
+        weight = np.exp(log_weight - log_weight.max())
+        weight /= weight.sum()
         means[index] = weight @ clutch.x
         off = clutch.x - means[index]
         spread += (weight * off.T) @ off

@@ -61,6 +61,8 @@ _SIZES = np.concatenate([SIZES, np.tile(OTHER_SIZES, 5)])
 FORM_COURSE: NDArray[np.intp] = np.tile(_COURSES, 2)
 FORM_SIZE = np.tile(_SIZES, 2)
 FORM_PROPORTIONAL: NDArray[np.bool_] = np.repeat([False, True], _SIZES.size)
+#: Whether a form has the least discrepancy that its course may have: none beside eq. 6.
+LEAST_DISCREPANCY = np.where(FORM_COURSE == Course.EQ_6, SIZES[0], OTHER_SIZES[0]) == FORM_SIZE
 
 
 def basis(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.degradation.general_order import Degradation
-from models.tracking.courses import basis, coordinates_of, course_of, unit_of_change
+from models.tracking.courses import basis, coordinates_of, course_of, form_of, unit_of_change
 from models.tracking.discrepancy import BY_DRAW, Discrepancy
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
@@ -73,6 +73,13 @@ class Posterior:
             return SampleStatus.FORCED
         # a 5 % quantile rests on five draws then
         return SampleStatus.SOUND if self.effective_draws >= 100.0 else SampleStatus.FEW_DRAWS
+
+    @property
+    def form(self) -> NDArray[np.intp]:
+        """The form of every draw [n] (`courses`)."""
+        none = np.zeros(self.weight.size)
+        size = none if self.discrepancy is None else self.discrepancy.size
+        return form_of(self.course, size, none > 0.0 if self.proportional is None else self.proportional)
 
     @property
     def degradation(self) -> Degradation:

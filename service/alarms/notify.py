@@ -9,9 +9,11 @@ addresses that alarms may go to, start nothing, and read no file but those of th
 import importlib.util
 import ipaddress
 import json
+import os
 import subprocess
 import sys
 from contextlib import redirect_stdout
+from pathlib import Path
 from typing import Any
 
 from service.alarms.receivers import (
@@ -35,7 +37,12 @@ _SECONDS = 3 * ATTEMPT_SECONDS
 #: What a process that sends must not do: start others, or load code that no hook sees.
 _FORBIDDEN = ("subprocess.", "os.exec", "os.fork", "os.posix_spawn", "os.spawn", "os.system", "os.startfile", "ctypes.")
 #: Files that a connection needs, beside those of the installation.
-_SYSTEM_FILES = ("/etc/", "/usr/share/", "/usr/lib/ssl", "/dev/null", "/dev/urandom", "/var/lib/ca-certificates")
+_SYSTEM_FILES = (
+    "/etc/ssl/", "/etc/pki/", "/etc/mime.types", "/etc/localtime", "/etc/os-release",
+    "/usr/share/", "/usr/lib/ssl", "/dev/null", "/dev/urandom", "/var/lib/ca-certificates",
+)  # fmt: skip
+#: How the process is begun: the folder that the service runs in is none of the installation's.
+PYTHON = (sys.executable, "-P")
 
 
 def require_address(url: str, *, private: bool) -> None:
@@ -80,7 +87,7 @@ def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
 
 def _exchange(task: dict[str, Any]) -> dict[str, Any]:
     """What the process of its own answers: a message is sent where the task has one, else the address is looked at."""
-    command = [sys.executable, "-m", "service.alarms.notify"]
+    command = [*PYTHON, "-m", "service.alarms.notify"]
     try:
         done = subprocess.run(  # noqa: S603  (our own module)
             command, input=json.dumps(task), capture_output=True, text=True, timeout=_SECONDS, check=False
@@ -102,14 +109,17 @@ def confine(private: bool) -> None:
             _require_connectable(arguments[-1], private=private)
         elif event == "open":
             path = arguments[0]
-            if isinstance(path, (str, bytes)) and not str(path if isinstance(path, str) else path.decode()).startswith(
-                places
-            ):
+            if isinstance(path, (str, bytes)) and not _opened(path).startswith(places):
                 raise PermissionError("a file that a sender has no need of")
         elif event.startswith(_FORBIDDEN):
             raise PermissionError(event)
 
     sys.addaudithook(watch)
+
+
+def _opened(path: str | bytes) -> str:
+    """The absolute path of what is to be opened."""
+    return os.path.normpath(Path.cwd() / os.fsdecode(path))
 
 
 def _require_connectable(address: Any, *, private: bool) -> None:

@@ -51,6 +51,7 @@ def require_web_address(url: str) -> SplitResult:
         parts = urlsplit(url)
         usable = parts.scheme in _PORTS and bool(parts.hostname) and (parts.port is None or parts.port > 0)
         (parts.hostname or "").encode("idna")
+        usable = usable and (parts.path + parts.query).isascii()
     except ValueError:
         usable = False
     if not usable or has_controls(url):
@@ -107,7 +108,7 @@ def why_not(address: Address, *, private: bool) -> str | None:
         return why_not(inner, private=private)
     if address.is_multicast or address.is_unspecified or address.is_link_local:
         return f"{address} is a {'link-local' if address.is_link_local else 'multicast or unspecified'} address"
-    if address.is_global and not address.is_reserved:
+    if address.is_global and not address.is_reserved and not (address.version == 6 and address.is_site_local):
         return None
     if private and (address.is_loopback or address.is_private):
         return None

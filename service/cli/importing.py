@@ -1,7 +1,6 @@
 """`clutchlife import`: a rig's file as it would be read, asked about where that is open, sent, and kept as a rig profile."""
 
 import json
-import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,14 +9,11 @@ from rich.table import Table
 
 from service.cli.options import EX_DATAERR, ChannelMap, Decimal, Missing, asking, fail, out, print_line
 from service.cli.runs import run_line
-from service.client.clutchlife.answers import RefusedError
 from service.client.clutchlife.transport import Service
 
 _KINDS = ("stationary_stribeck", "dynamic_stribeck")
 #: Rows that are shown.
 _ROWS = 3
-#: Characters of a run's name.
-_MAX_NAME = 128
 
 
 @asking
@@ -65,28 +61,8 @@ def import_file(
     elif profile is None:
         given["rig"] = shown["rig"]
     given |= {"kind": given["kind"] or shown["kind"], "cycles": shown["cycles"]}
-    print_line(run_line(_posted(service, clutch, file, given | {"run_id": shown["run_id"] or _name(file)}, profile)))
-
-
-def _name(file: Path) -> str | None:
-    """The name of a file's run: the file's own, with dashes for what a name may not hold."""
-    stem = file.name.removesuffix(".gz").rpartition(".")[0] or file.name
-    return re.sub(r"[^A-Za-z0-9._:@+-]+", "-", stem).strip("-._:@+")[:_MAX_NAME] or None
-
-
-def _posted(
-    service: Service, clutch: str, file: Path, given: dict[str, Any], profile: dict[str, Any] | None
-) -> dict[str, Any]:
-    """The receipt of the run; where another has its name, as of a recorder that writes each test into one file, the service
-    names it."""
-    path = f"/v1/clutches/{clutch}/runs/file"
-    try:
-        return _sent(service, path, file, given, profile)
-    except RefusedError as error:
-        if error.status != 409 or given["run_id"] is None:
-            raise
-        print_line(f"the clutch has another run of the name {given['run_id']}: the service names this one")
-        return _sent(service, path, file, given | {"run_id": None}, profile)
+    receipt = _sent(service, f"/v1/clutches/{clutch}/runs/file", file, given, profile)
+    print_line(run_line(receipt) + ("  stored before" if receipt["duplicate"] else ""))
 
 
 def _preview(

@@ -3,14 +3,16 @@
 import functools
 import inspect
 import json
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import httpx2
 import typer
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.markup import escape
+from rich.segment import Segment
 
 from service.client.clutchlife.answers import RefusedError, ServiceAwayError
 from service.client.clutchlife.transport import Service, connect
@@ -25,8 +27,21 @@ if TYPE_CHECKING:
 #: Exit codes of sysexits.h: the input is wrong, the service is away (try again later), the call is wrong.
 EX_DATAERR, EX_TEMPFAIL, EX_USAGE = 65, 75, 64
 
-out = Console(highlight=False)
-err = Console(stderr=True, highlight=False)
+#: What commands a terminal or turns the order of letters about, as no text that somebody sent may.
+_COMMANDING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+
+
+class _Terminal(Console):
+    """A console on which a text moves no cursor, whoever wrote the note, title or name in it."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """What is printed, piece by piece; rich's own commands are pieces of their own."""
+        for part in super().render(renderable, options):
+            yield part if part.control else Segment(_COMMANDING.sub("\N{REPLACEMENT CHARACTER}", part.text), part.style)
+
+
+out = _Terminal(highlight=False)
+err = _Terminal(stderr=True, highlight=False)
 
 Database = Annotated[
     str,

@@ -156,3 +156,9 @@ def kind_of(record: ClutchIn, severity: Severity) -> dict[str, Any]:
         "origin": record.origin,
         "severity": {"basis": severity.basis.value, "exponent": severity.exponent},
     }
+
+
+def may_be_of(record: ClutchIn, kind: Mapping[str, Any]) -> bool:
+    """Whether a clutch is of that kind but for its severity, which follows from what was adopted, too."""
+    own = kind_of(record, Severity()) | {"severity": kind["severity"]}
+    return own == kind

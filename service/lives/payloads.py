@@ -10,6 +10,7 @@ from models.prognosis.back_cast import BackCast
 from models.prognosis.course_shares import CourseName, CourseShare
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import FirstPassage
+from models.prognosis.stated_end import NewLater
 from models.tracking.innovation import last_innovation
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -53,16 +54,19 @@ def not_eq_6(courses: Sequence[CourseShare]) -> list[Notice]:
     return [Notice(code=NOT_EQ_6, message=message)]
 
 
-def new_extrapolated(series: Series, assumptions: Assumptions, initial: float, fraction: float) -> list[Notice]:
+def new_extrapolated(series: Series, assumptions: Assumptions, late: NewLater | None, fraction: float) -> list[Notice]:
     """The warning of a clutch that has come more than half of the way to its end before its first test, as tracked: what it
     was when new then decides, and no test has seen it. A bench's counter that began with another clutch looks the same."""
-    cycles, (first, _) = series.as_measured(assumptions, 0)
-    if cycles <= series.scale.origin or (share_of_way(first, initial, fraction * initial) or 0.0) >= 0.5:
+    if late is None:
+        return []
+    (cycles, (first, _)), initial = series.as_measured(assumptions, 0), late.extrapolated
+    if (share_of_way(first, initial, fraction * initial) or 0.0) >= 0.5:
         return []
     message = (
-        f"the first test is at {cycles:,.0f} cycles, and a mean COF when new of {initial:.3g} is estimated from how it has "
-        f"fallen since: the first test has {first:.3g}. Where the counter did not begin with this clutch, send maintenance "
-        f"with the event rebuild at {cycles:,.0f} cycles: its life is then counted from there"
+        f"the first test is at {cycles:,.0f} cycles with a mean COF of {first:.3g}, which led back to 0 cycles is "
+        f"{initial:.3g}. With a probability of {late.probability:.0%} the counter began with another clutch, and this "
+        "one was new at its first test; the forecast weighs both. If it was, send maintenance with the event rebuild at "
+        f"{cycles:,.0f} cycles: its life is then counted from there"
     )
     return [Notice(code=NEW_EXTRAPOLATED, message=message)]
 
@@ -292,13 +296,13 @@ def predicted(
     courses: Sequence[CourseShare],
     back_cast: BackCast,
     ended_lives: int,
+    of_new: Sequence[Notice],
     sample: Mapping[str, Any],
     warnings: Sequence[Notice],
 ) -> dict[str, Any]:
     """A first passage in ζ, led back to cycles. Without `enough` tests only the last of them and the safe bound are stated:
     what else the prior makes of them is no finding."""
     ends = {q: None if zeta is None else float(series.scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
-    of_new = new_extrapolated(series, assumptions, passage.initial, fraction)
     of_course = (*not_eq_6(courses), *of_new, *missed(back_cast))
     present = {
         "runs_used": runs,

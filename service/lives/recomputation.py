@@ -15,7 +15,7 @@ from models.clutch import Geometry
 from models.degradation.severity import Severity
 from models.diagnosis.campaign import StationaryRun
 from service.errors import Notice
-from service.lives.assumptions import Assumptions, LearnedPrior, ModelInForce, severity_under
+from service.lives.assumptions import Assumptions, LearnedPrior, ModelInForce, kind_of, severity_under
 from service.lives.condition import SHOWN
 from service.lives.diagnosis.campaign import tested
 from service.lives.history import (
@@ -112,6 +112,11 @@ class ClutchState:
         """The extension that the present life is tracked under, None under the baseline: a rebuild ends an adoption."""
         name, adoption = self.lives[-1].name if self.events else "", self.adoption
         return adoption.extension if adoption is not None and adoption.life == name else None
+
+    @property
+    def kind(self) -> dict[str, Any]:
+        """What the clutch has in common with those that it teaches and that teach it."""
+        return kind_of(self.record, self.assumptions().severity)
 
     def assumptions(self) -> Assumptions:
         """What the present life is tracked under."""

@@ -31,7 +31,7 @@ from service.errors import NotFoundError, Notice
 from service.lives.assumptions import ALL_PRESSURES, WEAK, Assumptions
 from service.lives.criteria import FEWEST_PARTICLES, PREDICTION_DRAWS
 from service.lives.history import Event, Life, Series, lives_of, nearest_pressure
-from service.lives.payloads import ended, insufficient, off_track, predicted
+from service.lives.payloads import ended, insufficient, new_extrapolated, off_track, predicted
 
 FilterState = ParticleState | UkfState | GridState
 
@@ -254,6 +254,7 @@ def predict(
         horizon=horizon,
         offset=offset_of(series, assumptions),
         stated=(end.ends, end.weight),
+        initial=None if end.late is None else end.late.initial,
     )
     measurements = series.measurements[: tracked.runs]
     return predicted(
@@ -267,6 +268,7 @@ def predict(
         courses=course_shares(sample),
         back_cast=tracked.back_cast,
         ended_lives=end.lives,
+        of_new=new_extrapolated(series, assumptions, end.late, fraction),
         sample={
             "effective_draws": sample.effective_draws,
             "status": sample.status.value,

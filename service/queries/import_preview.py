@@ -116,7 +116,7 @@ def _fitting(database: Database, shown: Mapping[str, Any], filename: str) -> tup
     """The one profile that has the file's columns; of several, the one whose pattern has the file's name."""
     titles = [_title(column) for column in shown["columns"] if column["name"]]
     with database.reading() as connection:
-        fitting = [profile for row in rigs.page(connection) if fits(profile := records.rig_out(row), titles)]
+        fitting = [records.rig_out(row) for row in rigs.every(connection) if fits(row.content, titles)]
     if len(fitting) > 1:
         fitting = [
             profile for profile in fitting if profile.file_name and named(profile, filename, {}) != _nothing(profile)

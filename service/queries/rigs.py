@@ -11,7 +11,8 @@ from storage.engine.database import Database
 
 
 def page(database: Database, *, limit: int, after: Place | None) -> dict[str, Any]:
-    """A page of the profiles behind the name at which another ended."""
+    """A page of the profiles behind the name at which another ended, of fewer where so many would be too much memory."""
+    limit = min(limit, rigs.MAX_AT_ONCE)
     with database.reading() as connection:
         rows = rigs.page(connection, limit=limit + 1, after="" if after is None else after[1])
     items = [records.rig_out(row).model_dump(mode="json") for row in rows[:limit]]

@@ -8,13 +8,14 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import PurePath
+from typing import Any
 
 from service.errors import InvalidError
 from service.readers.unit_table import conversion, spellings
 from service.schemas.base import MAX_CYCLES
 from service.schemas.rig import RigProfile
 
-#: Places of a pattern that may match in several ways. Chosen: matching takes time with that power of the name's length.
+#: Places of a pattern that stand for something. Chosen: names of rigs have the cycles, a kind, a number, and a rest.
 _MAX_WILD = 4
 _WILD = re.compile(r"\{cycles\}|\{kind\}|\{run_id\}|\*")
 _MEANING = {
@@ -100,11 +101,15 @@ def _is(part: str, whole: str, thousands: str | None) -> bool:
 
 
 def _regex(pattern: str) -> re.Pattern[str]:
-    parts, start = [], 0
-    for wild in _WILD.finditer(pattern):
-        parts += [re.escape(pattern[start : wild.start()]), _MEANING[wild.group()]]
-        start = wild.end()
-    return re.compile("".join([*parts, re.escape(pattern[start:])]), re.IGNORECASE)
+    """The pattern as a regular expression. Between two `*` the first place where a text stands is the only one to be tried,
+    for the second `*` takes the rest: else a name is looked through with the power of their number."""
+    pattern = re.sub(r"\*+", "*", pattern)
+    texts, wilds = _WILD.split(pattern), _WILD.findall(pattern)
+    parts = [re.escape(texts[0])]
+    for wild, text, following in zip(wilds, texts[1:], [*wilds[1:], ""], strict=False):
+        part = _MEANING[wild] + re.escape(text)
+        parts.append(f"(?>{part})" if wild == following == "*" else part)
+    return re.compile("".join(parts), re.IGNORECASE)
 
 
 def _count(text: str | None) -> float | None:
@@ -118,9 +123,9 @@ def _count(text: str | None) -> float | None:
     return value if value <= MAX_CYCLES else None
 
 
-def fits(profile: RigProfile, titles: Collection[str]) -> bool:
-    """Whether a file has the profile's columns and no others, whatever their case and blanks."""
-    return {_plain(column.title) for column in profile.columns} == {_plain(title) for title in titles}
+def fits(profile: Mapping[str, Any], titles: Collection[str]) -> bool:
+    """Whether a file has the columns of a stored profile and no others, whatever their case and blanks."""
+    return {_plain(column["title"]) for column in profile["columns"]} == {_plain(title) for title in titles}
 
 
 def _plain(title: str) -> str:

@@ -1,5 +1,6 @@
 """Rig profiles: how the files that a rig's recorder writes are read; and the preview of a file before it is sent."""
 
+from collections import Counter
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
@@ -91,7 +92,7 @@ class RigProfile(Schema):
     def _each_once(self) -> Self:
         for name in ("title", "channel"):
             given = [value for column in self.columns if (value := getattr(column, name)) is not None]
-            twice = next((value for value in given if given.count(value) > 1), None)
+            twice = next((value for value, count in Counter(given).items() if count > 1), None)
             if twice is not None:
                 raise ValueError(f"each {name} must stand once among the columns, {twice!r} stands twice")
         if not any(column.channel for column in self.columns):

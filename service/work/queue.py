@@ -68,7 +68,13 @@ def workflow_work(function: str) -> Callable[[JobRow, Settings], Work]:
     """
 
     def work(job: JobRow, settings: Settings) -> Work:
-        task = {"function": function, "clutch_id": job.clutch_id, "at": job.started_at}
+        task = {
+            "function": function,
+            "of": job.of,
+            "at": job.started_at,
+            "by": job.asked_by,
+            "arguments": job.arguments,
+        }
         longest = settings.replay_hours * _SECONDS_PER_HOUR
         return Work(modules=("service.work.workflow",), task=task, longest=longest)
 

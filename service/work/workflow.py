@@ -25,11 +25,14 @@ MAX_REASONS = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """What is to be done: `function` (module:function) for the clutch, None: for all; `at` is when it was begun."""
+    """What is to be done: `function` (module:function) for what the job is `of`, None: for all; `at` is when it was begun,
+    `by` who asked, `arguments` what else the job was asked for with."""
 
     function: str
-    clutch_id: str | None
+    of: str | None
     at: str
+    by: str
+    arguments: Json
 
 
 def main() -> None:
@@ -58,7 +61,7 @@ def done(database: Database, task: Task, say: Callable[[Json], None], at_once: A
         steps[:] = [progress]
         say(progress)
 
-    counts, left = function(database, task.clutch_id, at=task.at, say=say_and_keep, at_once=at_once)
+    counts, left = function(database, task, say=say_and_keep, at_once=at_once)
     for clutch_id, reason in left.items():
         sys.stderr.write(f"{clutch_id}: left as it was: {reason}\n")
     reasons = [{"clutch_id": clutch_id, "reason": reason} for clutch_id, reason in left.items()]

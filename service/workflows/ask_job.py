@@ -24,12 +24,12 @@ def ask(
     with database.writing(of=kind) as connection:  # who asks for one of the same kind meanwhile waits
         if clutch_id is not None:
             records.clutch(connection, clutch_id)
-        row = jobs.find_open(connection, kind, clutch_id)
-        if row is not None:
-            return row
-        waiting = jobs.count_open(connection, kind)
-        if waiting >= most:
-            raise BusyError(f"{waiting} jobs of the kind {kind} already wait: try again later")
+        already = jobs.open_of(connection, kind)
+        for row in already:
+            if row.of == clutch_id and not row.arguments.get("learned", False):
+                return row
+        if len(already) >= most:
+            raise BusyError(f"{len(already)} jobs of the kind {kind} already wait: try again later")
         job_id = secrets.token_hex(8)
         new = NewJob(
             job_id=job_id,
@@ -40,10 +40,7 @@ def ask(
             arguments={"request": request},
         )
         jobs.insert(connection, new)
-        row = jobs.get(connection, job_id)
-    if row is None:
-        raise LookupError(f"job {job_id!r} is not stored")
-    return row
+        return found(jobs.get(connection, job_id), "job", job_id)
 
 
 def finish(database: Database, job: JobRow, ended: Mapping[str, Any], *, at: str) -> None:

@@ -49,6 +49,7 @@ from service.run_files.upload import read_file_run
 from service.settings import CODE_VERSION
 from storage import changes, channels, clutches, results, runs
 from storage.channels import Encoded
+from storage.encoding import Json
 from storage.engine.database import Database
 from storage.runs import RunRow
 
@@ -110,14 +111,14 @@ class _Loaded:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Changed:
     """The runs as they are to be, what that changes in the doubts about others, the mean COFs of those of them that are then
-    not accepted, by run_id, and the results of the clutch's history; whether that changes what an ended life
-    `teaches` its fleet."""
+    not accepted, by run_id, and the results of the clutch's history; and, where that changes what an ended life
+    teaches, the kind of clutches that it `teaches`."""
 
     rows: tuple[RunRow, ...]
     judged: Judged
     aside: Mapping[str, ByPressure]
     results: Results
-    teaches: bool = False
+    teaches: Json | None = None
 
 
 def withdraw(database: Database, clutch_id: str, run_id: str, *, reason: str, by: str, at: str) -> Receipt:
@@ -399,7 +400,7 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _C
         judged=judged,
         aside=aside,
         results=replace(computed, receipts=changed, summary=summary),
-        teaches=teaches,
+        teaches=after.kind if teaches else None,
     )
 
 
@@ -432,8 +433,8 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
     records.store_judged(
         connection, clutch_id, changed.judged, changed.aside, loaded.levels, at=request.at, revision=revision
     )
-    if changed.teaches:
-        records.ask_fleet_refresh(connection, by=request.by, at=request.at)
+    if changed.teaches is not None:
+        records.ask_fleet_refresh(connection, changed.teaches, by=request.by, at=request.at)
     for was, row in zip(loaded.rows, changed.rows, strict=True):
         before, after = records.summary(was), records.summary(row)
         if loaded.again is not None:

@@ -53,6 +53,7 @@ from service.lives.run_analysis import LevelFit, analyse, loops_of
 from service.settings import CODE_VERSION
 from storage import changes, channels, clutches, results, runs
 from storage.channels import PackedFile
+from storage.encoding import Json
 from storage.engine.database import Database
 from storage.runs import NewRun, RunRow
 
@@ -63,8 +64,8 @@ MAX_FILE_BYTES = 900_000_000
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Outcome:
     """What a run changes in a clutch at a revision: its receipt and mean COFs, doubts about it and what it changes in the
-    doubts about others (with the mean COFs of those that are held now), and the results of what was there before; whether
-    it changes what an ended life `teaches` its fleet."""
+    doubts about others (with the mean COFs of those that are held now), and the results of what was there before; and,
+    where it changes what an ended life teaches, the kind of clutches that it `teaches`."""
 
     revision: int
     receipt: dict[str, Any]
@@ -74,7 +75,7 @@ class _Outcome:
     judged: Judged = field(default_factory=Judged)
     aside: Mapping[str, ByPressure] = field(default_factory=dict)
     levels: Levels = field(default_factory=dict)
-    teaches: bool = False
+    teaches: Json | None = None
 
     @property
     def state(self) -> str:
@@ -213,7 +214,7 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
         receipt=answer,
         cofs=event.cofs,
         results=replace(computed, receipts=others),
-        teaches=life_with(state.events, event).end is not None,
+        teaches=state.kind if life_with(state.events, event).end is not None else None,
     )
 
 
@@ -242,7 +243,7 @@ def _with_others(
         revision=before.revision,
         receipt=changed.pop(event.run_id, answer),
         cofs=computed.cofs.get(event.run_id, event.cofs),
-        teaches=not doubtful and life_with(state.events, event).end is not None,
+        teaches=state.kind if not doubtful and life_with(state.events, event).end is not None else None,
         results=replace(
             computed,
             receipts=changed,
@@ -370,8 +371,8 @@ def _store(
     records.store_judged(
         connection, clutch_id, outcome.judged, outcome.aside, outcome.levels, at=arrival.received_at, revision=revision
     )
-    if outcome.teaches:
-        records.ask_fleet_refresh(connection, by=by, at=arrival.received_at)
+    if outcome.teaches is not None:
+        records.ask_fleet_refresh(connection, outcome.teaches, by=by, at=arrival.received_at)
     if outcome.doubts:
         held, at = records.summary(row), arrival.received_at
         changes.insert(

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN, HORIZON
-from models.prognosis.ended_lives import EndedLife, declared_end, ended_life, new_and_lawful, representative
+from models.prognosis.ended_lives import EndedLife, declared_end, ended_life, new_and_laws, representative
 from models.prognosis.fleet import Taught, population, taught
 from models.prognosis.scoring import measured_end
 from service import records, stored_runs
-from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
+from service.lives.assumptions import ALL_PRESSURES, Assumptions, may_be_of
 from service.lives.criteria import MAX_ATTEMPTS
 from service.lives.history import WORN, Life
 from service.lives.outlook import Evidence, needs_evidence, summarised
@@ -24,13 +24,15 @@ from service.lives.tracks import CARRIED, mean_offset_of
 from service.settings import CODE_VERSION
 from service.work.background import AtOnce, directly
 from service.work.executor import Ended, Ending, Executor, InProcess, in_rounds
-from storage import assumptions, clutches, results
+from service.work.workflow import Task
+from storage import assumptions, clutches, jobs, results
 from storage.assumptions import NOBODY, FleetPriorRow
 from storage.encoding import Json, to_object
 from storage.engine.database import Database
 
 #: Why a refresh leaves a clutch.
 LEFT = "left to the next refresh: runs came while its predictions were made"
+GAVE_WAY = "left to a job of its own: another fleet is to learn first"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,40 +90,70 @@ def refresh(
     database: Database,
     *,
     now: str,
+    of: str | None = None,
+    learned: bool = False,
     at_once: AtOnce = directly,
     executor: Executor | None = None,
     advance: Callable[[], object] = lambda: None,
+    gives_way: Callable[[], bool] = lambda: False,
 ) -> Refreshed:
-    """Learn every fleet's prior again; one that differs is a new version, and tracks are made again. Stored by `at_once`.
+    """Learn the prior of a fleet, by its key, None: of all, again; one that differs is a new version, and tracks are made
+    again. Stored by `at_once`.
 
+    Where it is `learned` already, tracks alone are made again; of no more clutches once it `gives_way`, but of one at least.
     Computed by the executor, None: in this process. `advance` is called twice for every clutch: as it has taught, and as its
     tracks are up to date.
     """
     executor = InProcess() if executor is None else executor
-    fresh: set[str] = set()
-    progress = advance
-    while True:
-        with database.reading() as connection:
-            names = clutches.all_ids(connection)
-        endings = {
-            kind: _stored_again(database, fleet, now, at_once, executor)
-            for kind, fleet in _fleets(database, executor, names, progress).items()
-        }
-        fresh.update(kind for kind, ending in endings.items() if ending is Ending.STORED)
-        if Ending.LEFT not in endings.values():  # else another refresh was quicker, perhaps with less than is known now
-            break
-        progress = _silent
-    ended = []
+    fresh = set() if learned else _learned(database, of, now, at_once, executor, advance)
+    names = _names(database, of)
+    ended: dict[Ending, list[str]] = {ending: [] for ending in Ending}
+    left: dict[str, str] = {}
     for clutch in _brought_up(database, names, at_once, executor):
         if clutch.error is not None:
             raise clutch.error
-        ended.append(clutch)
+        ended[clutch.ending].append(clutch.name)
         advance()
-    by_ending = {ending: tuple(sorted(clutch.name for clutch in ended if clutch.ending is ending)) for ending in Ending}
-    left = dict.fromkeys(by_ending[Ending.LEFT], LEFT)
+        if clutch.ending is Ending.STORED and gives_way():
+            left = dict.fromkeys(set(names).difference(*ended.values()), GAVE_WAY)
+            break
+    left |= dict.fromkeys(ended[Ending.LEFT], LEFT)
     return Refreshed(
-        kinds=tuple(to_object(kind) for kind in sorted(fresh)), changed=by_ending[Ending.STORED], left=left
+        kinds=tuple(to_object(kind) for kind in sorted(fresh)),
+        changed=tuple(sorted(ended[Ending.STORED])),
+        left=dict(sorted(left.items())),
     )
+
+
+def _names(database: Database, of: str | None) -> list[str]:
+    """The clutches that may be of a fleet, those first whose life goes on: somebody waits for their predictions."""
+    kind = None if of is None else to_object(of)
+    with database.reading() as connection:
+        rows = [records.clutch(connection, clutch_id) for clutch_id in clutches.all_ids(connection)]
+    rows = [row for row in rows if kind is None or may_be_of(records.record(row), kind)]
+    return [row.clutch_id for row in sorted(rows, key=lambda row: row.summary.get("ended") is not None)]
+
+
+def _learned(
+    database: Database,
+    of: str | None,
+    now: str,
+    at_once: AtOnce,
+    executor: Executor,
+    advance: Callable[[], object],
+) -> set[str]:
+    """The fleets, by key, of which a new version was learned and stored."""
+    fresh: set[str] = set()
+    while True:
+        endings = {
+            key: _stored_again(database, fleet, now, at_once, executor)
+            for key, fleet in _fleets(database, executor, _names(database, of), advance).items()
+            if of in (key, None)
+        }
+        fresh.update(key for key, ending in endings.items() if ending is Ending.STORED)
+        if Ending.LEFT not in endings.values():  # else another refresh was quicker, perhaps with less than is known now
+            return fresh
+        advance = _silent
 
 
 def _silent() -> None:
@@ -149,30 +181,44 @@ def _fleets(
 
 
 def as_job(
-    database: Database,
-    clutch_id: str | None,  # noqa: ARG001  (a fleet is all of them)
-    *,
-    at: str,
-    say: Callable[[Json], None],
-    at_once: AtOnce,
+    database: Database, task: Task, *, say: Callable[[Json], None], at_once: AtOnce
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Refresh all priors in this process, saying how far it has come.
+    """Refresh a fleet's prior, or all of them, in this process, saying how far it has come.
+
+    Once a clutch is tracked, another fleet that is to learn goes first; the rest of the clutches becomes a job of its own.
 
     How many kinds have a new version and of how many clutches the answers have changed, and why others are left.
     """
-    with database.reading() as connection:
-        number = len(clutches.all_ids(connection))
-    advanced = 0
+    number, learned = len(_names(database, task.of)), task.arguments.get("learned", False)
+    advanced = number if learned else 0
+
+    def say_so() -> None:
+        learning = advanced <= number and not learned
+        say({"step": _LEARNS if learning else _UPDATES, "done": advanced - (0 if learning else number), "of": number})
 
     def advance() -> None:
         nonlocal advanced
         advanced += 1
-        learning = advanced <= number
-        say({"step": _LEARNS if learning else _UPDATES, "done": advanced - (0 if learning else number), "of": number})
+        say_so()
 
-    say({"step": _LEARNS, "done": 0, "of": number})
-    done = refresh(database, now=at, at_once=at_once, advance=advance)
+    def gives_way() -> bool:
+        with database.reading() as connection:
+            others = jobs.open_of(connection, jobs.FLEET_REFRESH)
+        return any(row.state == jobs.WAITING and not row.arguments.get("learned", False) for row in others)
+
+    say_so()
+    done = refresh(
+        database, now=task.at, of=task.of, learned=learned, at_once=at_once, advance=advance, gives_way=gives_way
+    )
+    if GAVE_WAY in done.left.values():
+        at_once(_ask_for_the_rest, database, task)
     return {"kinds": len(done.kinds), "changed": len(done.changed)}, dict(done.left)
+
+
+def _ask_for_the_rest(database: Database, task: Task) -> None:
+    kind = None if task.of is None else to_object(task.of)
+    with database.writing(of=jobs.FLEET_REFRESH) as connection:
+        records.ask_fleet_refresh(connection, kind, by=task.by, at=task.at, learned=True)
 
 
 _LEARNS, _UPDATES = "learns from the clutches", "updates their predictions"
@@ -187,8 +233,7 @@ def lessons_of(state: ClutchState) -> tuple[Json, list[Lesson]]:
     """A clutch's kind, and what each of its lives teaches."""
     assumptions = state.assumptions()
     lessons = [_lesson(life, assumptions, state.fraction) for life in state.lives]
-    kind = kind_of(state.record, assumptions.severity)
-    return kind, [lesson for lesson in lessons if lesson is not None]
+    return state.kind, [lesson for lesson in lessons if lesson is not None]
 
 
 def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | None:
@@ -201,7 +246,7 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
     offset = mean_offset_of(series, assumptions)
     progress = np.array([measurement.progress for measurement in measurements])
     values = np.array([measurement.value for measurement in measurements])
-    initial, lawful = new_and_lawful(measurements)
+    initial, laws = new_and_laws(measurements)
     if offset is not None:
         values = values + offset(progress)[0]
         initial += float(offset(np.zeros(1))[0, 0])
@@ -213,7 +258,7 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
             end, deviation = declared_end(measurements, end, fraction=fraction, horizon=horizon, offset=offset)
     if not end:
         return Lesson(taught=lesson, ended=None)
-    ended = ended_life(progress, values, end, initial=initial, fraction=fraction, lawful=lawful)
+    ended = ended_life(progress, values, end, initial=initial, fraction=fraction, laws=laws)
     if ended is None:
         return Lesson(taught=lesson, ended=None)
     ended = replace(ended, deviation=deviation, censored=censored)

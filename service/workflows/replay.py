@@ -9,6 +9,7 @@ from service.lives.criteria import MAX_ATTEMPTS
 from service.stored_runs import Recomputed, Recorded
 from service.work.background import AtOnce, directly
 from service.work.executor import Ending, Executor, InProcess, WorkerLostError, in_rounds
+from service.work.workflow import Task
 from storage import clutches
 from storage.encoding import Json
 from storage.engine.database import Database
@@ -69,18 +70,13 @@ def replay_clutch(database: Database, clutch_id: str) -> int:
 
 
 def as_job(
-    database: Database,
-    clutch_id: str | None,
-    *,
-    at: str,  # noqa: ARG001  (every job of a workflow is called so)
-    say: Callable[[Json], None],
-    at_once: AtOnce,
+    database: Database, task: Task, *, say: Callable[[Json], None], at_once: AtOnce
 ) -> tuple[dict[str, int], dict[str, str]]:
     """Replay a clutch, None: all of them, in this process, saying how far it has come.
 
     How many clutches were replayed, and why the others keep the results that they had.
     """
-    names = clutch_ids(database) if clutch_id is None else [clutch_id]
+    names = clutch_ids(database) if task.of is None else [task.of]
     left: dict[str, str] = {}
     say({"step": _STEP, "done": 0, "of": len(names)})
     for done, replayed in enumerate(replay(database, names, InProcess(), at_once=at_once), start=1):

@@ -1,9 +1,8 @@
 """The product's source as the tests of the architecture read it: modules, their syntax trees, their imports."""
 
 import ast
-import io
 import re
-import tokenize
+import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -16,23 +15,15 @@ ROOT = Path(__file__).parents[2]
 SITE = ROOT / "service" / "dashboard" / "help"
 PACKAGES = ("models", "storage", "service")
 
-#: The chapters of the diagnosis in reading order: none imports a later one. import-linter holds the same order.
-CHAPTERS = (
-    "campaign",
-    "criteria",
-    "design",
-    "baseline",
-    "noise",
-    "effects",
-    "pooled_fit",
-    "raw_records",
-    "explanations",
-    "extension",
-    "validation",
-    "experiments",
-    "report",
-    "diagnose",
-)
+
+def _chapters() -> tuple[str, ...]:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    (order,) = (each["layers"] for each in settings["contracts"] if each.get("containers") == ["models.diagnosis"])
+    return tuple(layer.strip("()") for layer in reversed(order))
+
+
+#: The chapters of the diagnosis in reading order: none imports a later one, as import-linter holds.
+CHAPTERS = _chapters()
 
 
 @dataclass(frozen=True)
@@ -67,26 +58,13 @@ class Module:
         """The module's docstring, "" where it has none."""
         return ast.get_docstring(self.tree) or ""
 
-    @cached_property
-    def comments(self) -> dict[int, str]:
-        """Line number -> the comment on that line, without the sign and without what only a checker reads."""
-        tokens = tokenize.generate_tokens(io.StringIO(self.text).readline)
-        comments = {token.start[0]: token.string for token in tokens if token.type == tokenize.COMMENT}
-        directive = r"#\s*(noqa\b[^#(]*|type:\s*ignore\S*)"
-        return {line: re.sub(directive, "", comment).strip("# \t") for line, comment in comments.items()}
-
 
 @dataclass(frozen=True)
 class Import:
-    """One module that another imports, and where."""
+    """One module that another imports."""
 
     importer: str
     imported: str
-    shown: str
-    line: int
-    in_function: bool
-    for_types: bool
-    reason: str
 
 
 @cache
@@ -110,10 +88,9 @@ def imports() -> tuple[Import, ...]:
 
 def imports_of(module: Module) -> Iterator[Import]:
     """The imports of one module: `from package import module` is an import of that module, of anything else of `package`."""
-    for node, in_function, for_types in _import_nodes(module.tree, in_function=False, for_types=False):
-        reason = " ".join(filter(None, (module.comments.get(n, "") for n in range(node.lineno, _end(node) + 1))))
-        for imported in _imported(module, node):
-            yield Import(module.name, imported, module.shown, node.lineno, in_function, for_types, reason)
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield from (Import(module.name, imported) for imported in _imported(module, node))
 
 
 def none_of(wrong: Sequence[str], rule: str) -> None:
@@ -131,22 +108,6 @@ def first_sentence(docstring: str) -> str:
 def _dotted(path: Path) -> str:
     parts = path.relative_to(ROOT).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-def _end(node: ast.stmt) -> int:
-    return node.lineno if node.end_lineno is None else node.end_lineno
-
-
-def _import_nodes(
-    node: ast.AST, *, in_function: bool, for_types: bool
-) -> Iterator[tuple[ast.Import | ast.ImportFrom, bool, bool]]:
-    if isinstance(node, ast.Import | ast.ImportFrom):
-        yield node, in_function, for_types
-        return
-    inside = in_function or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-    typing = for_types or (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test))
-    for child in ast.iter_child_nodes(node):
-        yield from _import_nodes(child, in_function=inside, for_types=typing)
 
 
 def _imported(module: Module, node: ast.Import | ast.ImportFrom) -> Iterator[str]:

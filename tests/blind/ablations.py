@@ -1,14 +1,16 @@
-"""`make blind ABLATE=each`: every number that gates a verdict, taken for another, on the fixed set of campaigns.
+"""`make blind ABLATE=...`: numbers that gate a verdict, each taken for another, on the fixed set of campaigns.
 
-SEED=  other campaigns (1)    SIZE=  a share of them (1: some two hours of one core; any share is a fair sample)
-ONLY=  rows whose names begin with these
-Verdicts are stored in .blind/ablations, a file a campaign: the next run goes on where this one ended. After a change of code
-remove them.
+ABLATE= each: all of the table; NAME=value: one number of the diagnosis' criteria, as SLACK=0.0
+SEED=   other campaigns (1)    SIZE=   a share of them (1: some two hours of one core; any share is a fair sample)
+ONLY=   rows whose names begin with these
+Verdicts are stored in .blind/ablations, a file a campaign and what was tried: the next run goes on where this one ended.
+After a change of code remove them.
 """
 
 import json
 import os
-from collections.abc import Iterator, Sequence
+from ast import literal_eval
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from time import process_time
 
@@ -16,17 +18,15 @@ from models.diagnosis import criteria
 from models.diagnosis.design.design import build_design
 from models.diagnosis.explanations.decide import judge
 from models.diagnosis.explanations.posterior import Search
-from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline
-from models.diagnosis.raw_records import evidence
-from models.diagnosis.raw_records.evidence import RawEvidence, raw_evidence
+from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
+from models.diagnosis.raw_records.evidence import raw_evidence
 from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.sent import campaign
 from tests.blind.subset import STORE, Judged, trials
 from tests.blind.trials import Trial
 
-#: What each number is taken for, by when it acts: before the search, in it, and on what it found.
-BEFORE: dict[str, tuple[object, ...]] = {"SHARP": (1e9,), "LEAST_EVIDENCE": (2.0, 9.0)}
-IN_SEARCH: dict[str, tuple[object, ...]] = {
+#: What each number is taken for.
+EACH: dict[str, tuple[object, ...]] = {
     "ANYTHING_WRONG": (0.1,),
     "UNCATALOGUED_SHARE": (0.03,),
     "SECOND": (0.25,),
@@ -36,69 +36,70 @@ IN_SEARCH: dict[str, tuple[object, ...]] = {
     "SLACK": (0.0,),
     "MOST_REFITS": (5, 1000),
     "RELATIVE": (1.1,),
-}
-AFTER: dict[str, tuple[object, ...]] = {
     "LIKELY": (0.35, 0.65),
     "SURE": (0.8, 0.95),
-    "VIBRATION_TRACE": (0.0, 0.5),
+    "SHARP": (1e9,),
     "MISFIT": (1e9,),
 }
+#: Those that act on the noise, and those that act on what was found: the search is as it is.
+ON_NOISE, ON_WHAT_WAS_FOUND = {"SHARP"}, {"LIKELY", "SURE", "MISFIT"}
 AS_IT_IS = "as it is"
+
+
+def asked(ablate: str) -> dict[str, tuple[object, ...]]:
+    """The numbers and what they are taken for. Raises ValueError where the criteria have no such number."""
+    if ablate == "each":
+        return EACH
+    name, _, value = ablate.partition("=")
+    if not hasattr(criteria, name):
+        raise ValueError(f"the diagnosis' criteria have no number {name}")
+    return {name: (literal_eval(value),)}
 
 
 @contextmanager
 def taken_for(number: str, value: object) -> Iterator[None]:
-    """A number of the diagnosis' criteria, or of those of raw records, as another."""
-    module = criteria if hasattr(criteria, number) else evidence
-    before = getattr(module, number)
-    setattr(module, number, value)
+    """A number of the diagnosis' criteria as another."""
+    before = getattr(criteria, number)
+    setattr(criteria, number, value)
     try:
         yield
     finally:
-        setattr(module, number, before)
+        setattr(criteria, number, before)
 
 
-def verdicts(trial: Trial) -> dict[str, Judged]:
-    """What is said with each value of each number; what the number does not act on is computed once."""
+def verdicts(trial: Trial, numbers: Mapping[str, Sequence[object]]) -> dict[str, Judged]:
+    """What is said as it is, and with each value of each number; what a number does not act on is computed once."""
     seen = campaign(trial.hidden())
     design = build_design(seen)
+    raw = tuple(record for record in raw_evidence(seen) if record.effect not in trial.without)
 
-    def recorded() -> tuple[RawEvidence, ...]:
-        return tuple(record for record in raw_evidence(seen) if record.effect not in trial.without)
-
-    def searched(fitted: Baseline, raw: tuple[RawEvidence, ...]) -> Search:
-        search = Search(fitted, raw, trial.without)
-        search.run()
-        return search
-
-    def said(search: Search, raw: tuple[RawEvidence, ...], began: float) -> Judged:
+    def said(search: Search, began: float) -> Judged:
         judgement = judge(search.posterior(raw, trial.without))
         seconds = process_time() - began
         return Judged(trial.row, frozenset(trial.slugs), str(judgement.verdict), frozenset(judgement.causes), seconds)
 
     began = process_time()
-    baseline, raw = fit_baseline(design), recorded()
-    search, exhausted = searched(baseline, raw), criteria.MOST_REFITS
-    out = {AS_IT_IS: said(search, raw, began)}
-    for number, values in (BEFORE | IN_SEARCH | AFTER).items():
+    baseline = fit_baseline(design)
+    search = Search(baseline, raw, trial.without)
+    search.run()
+    out = {AS_IT_IS: said(search, began)}
+    for number, values in numbers.items():
         for value in values:
-            began = process_time()
+            began, other = process_time(), search
             with taken_for(number, value):
-                fitted = fit_baseline(design) if number == "SHARP" else baseline
-                records = recorded() if number == "LEAST_EVIDENCE" else raw
-                same = number in AFTER or (number == "LEAST_EVIDENCE" and records == raw)
-                same |= number == "MOST_REFITS" and search.refits < min(exhausted, criteria.MOST_REFITS)
-                other = search if same else searched(fitted, records)
-                out[f"{number} = {value}"] = said(other, records, began)
+                if number not in ON_WHAT_WAS_FOUND:
+                    other = Search(fit_baseline(design) if number in ON_NOISE else baseline, raw, trial.without)
+                    other.run()
+                out[f"{number} = {value}"] = said(other, began)
     return out
 
 
-def stored(name: str, trial: Trial) -> dict[str, Judged]:
+def stored(name: str, trial: Trial, ablate: str) -> dict[str, Judged]:
     """The verdicts on a trial, computed or read; none where no such campaign could be made."""
-    path = STORE / "ablations" / f"{name}.json"
+    path = STORE / "ablations" / ablate / f"{name}.json"
     if not path.exists():
         try:
-            said = verdicts(trial)
+            said = verdicts(trial, asked(ablate))
         except UnreachableError:
             said = {}
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -140,12 +141,14 @@ def table(found: Sequence[dict[str, Judged]]) -> list[str]:
 
 def main() -> None:
     """Judge, and print the rows."""
+    ablate = os.environ["ABLATE"]
+    asked(ablate)  # what is not there is said at once
     only = tuple((os.environ.get("ONLY") or "").split(","))
     chosen = {name: one for name, one in trials(int(os.environ.get("SEED") or 1)).items() if one.row.startswith(only)}
     share = float(os.environ.get("SIZE") or 1.0)
     places = [int(place / share) for place in range(round(len(chosen) * share))]
     names = [list(chosen)[place] for place in places]
-    found = [said for name in names if (said := stored(name, chosen[name]))]
+    found = [said for name in names if (said := stored(name, chosen[name], ablate))]
     print("\n".join(table(found)))
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import httpx2
 import numpy as np
 from fastapi.testclient import TestClient
 
@@ -115,24 +116,30 @@ def forecasts_of(
     """The report on runs that are posted, and the forecast of the end of life before and after adoption; the same twice
     where nothing is there to adopt."""
     with _posted(sent, fraction) as http:
-        answer = http.post("diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"})
-        report = answer.raise_for_status().json()
+        report = asked(http, "POST", "diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"})
         while report["status"] == "running":
             time.sleep(1.0)
-            report = http.get(f"diagnoses/{report['diagnosis_id']}").raise_for_status().json()
+            report = asked(http, "GET", f"diagnoses/{report['diagnosis_id']}")
         if report["status"] != "finished":
             raise RuntimeError(f"a diagnosis ended without a report: {report['problem']}")
-        before = after = http.get(REMAINING).raise_for_status().json()
+        before = after = asked(http, "GET", REMAINING)
         if report["adoptable"]:
-            http.put("model", json={"diagnosis_id": report["diagnosis_id"]}).raise_for_status()
-            after = http.get(REMAINING).raise_for_status().json()
+            asked(http, "PUT", "model", json={"diagnosis_id": report["diagnosis_id"]})
+            after = asked(http, "GET", REMAINING)
     return report, before, after
+
+
+def asked(http: httpx2.Client, method: str, path: str, **sent: Any) -> dict[str, Any]:
+    """The service's answer; while it is busy, as beside other work on the machine, it is asked again when it says."""
+    while (answer := http.request(method, path, **sent)).status_code == 503:
+        time.sleep(float(answer.headers["Retry-After"]))
+    return dict(answer.raise_for_status().json())
 
 
 def forecast_of(sent: Sequence[dict[str, Any]], fraction: float) -> dict[str, Any]:
     """The forecast of the end of life from runs that are posted."""
     with _posted(sent, fraction) as http:
-        return dict(http.get(REMAINING).raise_for_status().json())
+        return asked(http, "GET", REMAINING)
 
 
 @contextmanager
@@ -142,11 +149,9 @@ def _posted(sent: Sequence[dict[str, Any]], fraction: float) -> Iterator[TestCli
         app = create_app(Settings(workers=0, database=f"sqlite:///{Path(folder) / 'a.db'}"))
         with TestClient(app, base_url=f"http://127.0.0.1{CLUTCH}", client=("127.0.0.1", 50000)) as http:
             clutch = {"clutch_id": "blind", "origin": "simulated", "end_of_life": {"cof_fraction": fraction}}
-            http.post("http://127.0.0.1/v1/clutches", json=clutch).raise_for_status()
+            asked(http, "POST", "http://127.0.0.1/v1/clutches", json=clutch)
             for run in sent:
-                while (answer := http.post("runs", json=run | {"origin": "simulated"})).status_code == 503:
-                    time.sleep(float(answer.headers["Retry-After"]))  # other work on the machine took its time
-                answer.raise_for_status()
+                asked(http, "POST", "runs", json=run | {"origin": "simulated"})
             yield http
 
 

@@ -2,24 +2,19 @@
 
 SUBSET=  the name under which results are stored (`.blind/NAME`); a run goes on where it ended, some 25 minutes of one core
 SEED=    other campaigns (1)                         ONLY=    rows whose names begin with these
-ABLATE=  a number of the diagnosis' criteria without which it is judged: `SECOND=0.25`, `MOST_REFITS=6`
 ARGS="--against OTHER": the rows of both beside each other, campaign by campaign the same ones
 """
 
-import importlib
 import json
 import math
 import os
-import pkgutil
 import sys
 import zlib
-from ast import literal_eval
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import models.diagnosis
 from models.diagnosis.diagnose import diagnose
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
 from tests.blind.rows import drawn_pairs
@@ -155,26 +150,10 @@ def table(first: dict[str, Judged], second: dict[str, Judged], labels: tuple[str
     return lines
 
 
-def ablate(change: str) -> None:
-    """Set a number of the criteria in every module of the diagnosis that has it. Raises ValueError where none has."""
-    name, _, value = change.partition("=")
-    found = [
-        importlib.import_module(each.name)
-        for each in pkgutil.walk_packages(models.diagnosis.__path__, "models.diagnosis.")
-    ]
-    having = [module for module in found if hasattr(module, name)]
-    if not having:
-        raise ValueError(f"no module of the diagnosis has a number {name}")
-    for module in having:
-        setattr(module, name, literal_eval(value))
-
-
 def main(arguments: Sequence[str]) -> None:
     """Judge, and print the rows."""
     label, seed = os.environ["SUBSET"], int(os.environ.get("SEED") or 1)
     only = tuple((os.environ.get("ONLY") or "").split(","))
-    if os.environ.get("ABLATE"):
-        ablate(os.environ["ABLATE"])
     chosen = {name: trial for name, trial in trials(seed).items() if trial.row.startswith(only)}
     mine = {name: found for name, trial in chosen.items() if (found := judged(name, trial, label)) is not None}
     other, against = mine, label

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import httpx2
 import numpy as np
 import pytest
 
@@ -67,3 +68,11 @@ def test_the_table_counts_what_was_made() -> None:
     assert "1 of 4 lives could not be made" in lives.meaning([good, good, bad, unmade])[0]
     assert {job[0] for job in lives.jobs(1, 0.01)} == {*lives.COURSES, *lives.ARTEFACTS}
     assert len(lives.jobs(1, 1.0)) == 7 * lives.LIVES
+
+
+def test_a_busy_service_is_asked_again() -> None:
+    """As it may be beside other work, the adoption among all that is asked."""
+    answers = [httpx2.Response(503, headers={"Retry-After": "0"}), httpx2.Response(200, json={"version": 1})]
+    transport = httpx2.MockTransport(lambda _: answers.pop(0))
+    with httpx2.Client(base_url="http://127.0.0.1", transport=transport) as http:
+        assert lives.asked(http, "PUT", "model", json={}) == {"version": 1}

@@ -1,9 +1,6 @@
 """The fixed set of campaigns: the same for a seed, and a table that says where one way to decide is worse than another."""
 
-import pytest
-
-from models.diagnosis import diagnose
-from tests.blind.subset import Judged, ablate, table, trials
+from tests.blind.subset import Judged, table, trials
 
 
 def right(count: int, of: int) -> dict[str, Judged]:
@@ -40,11 +37,3 @@ def test_a_seed_has_its_campaigns_and_no_two_are_alike() -> None:
     assert list(first) == list(trials(1))
     assert not first.keys() & other.keys()
     assert len({trial.seed for trial in first.values()}) == len(first)
-
-
-def test_a_number_is_ablated_wherever_it_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(diagnose, "A_NUMBER", 1, raising=False)
-    ablate("A_NUMBER=6")
-    assert diagnose.A_NUMBER == 6  # type: ignore[attr-defined]
-    with pytest.raises(ValueError, match="no module of the diagnosis has a number NOT_THERE"):
-        ablate("NOT_THERE=1")

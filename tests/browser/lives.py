@@ -54,11 +54,10 @@ def demo(http: httpx2.Client, seed: int = 1, last: float = math.inf) -> str:
     """The life that `clutchlife demo` simulates, warm oil hidden in it, posted run by run; the clutch's id."""
     clutch_id = f"sim-{seed}"
     http.post("/v1/clutches", json=simulated.simulated_clutch_body(clutch_id)).raise_for_status()
-    life = list(itertools.takewhile(lambda run: run.cycles <= last, demo_life.runs(seed)))
-    for run in sorted([*life, *demo_life.loops(seed, life[-1].cycles)], key=lambda run: run.cycles):
+    for run in itertools.takewhile(lambda run: run.cycles <= last, demo_life.runs(seed)):
         body = json.dumps(simulated.simulated_body(run)).encode()
         http.post(f"/v1/clutches/{clutch_id}/runs", content=body, headers=JSON).raise_for_status()
-    for cycles, surface in demo_life.inspections(seed, life[-1].cycles):
+    for cycles, surface in demo_life.inspections(seed, run.cycles):
         inspection = simulated.simulated_inspection(surface, cycles)
         http.post(f"/v1/clutches/{clutch_id}/inspections", json=inspection).raise_for_status()
     return clutch_id

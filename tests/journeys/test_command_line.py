@@ -104,7 +104,7 @@ def test_keys_open_and_close_the_service(server: Server) -> None:
 
 
 @pytest.mark.slow
-def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops_and_inspections() -> None:
+def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_up_to_date_with_friction_loops_and_inspections() -> None:
     """Until Ctrl-C; `--exit` ends by itself instead."""
     called = [sys.executable, "-u", "-m", "service.cli.main", "demo", "--no-browser"]
     with subprocess.Popen(called, stdout=subprocess.PIPE, text=True, start_new_session=True) as demo:
@@ -118,6 +118,7 @@ def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops
             url = line.rpartition("all clutches: ")[2].strip()
             loops = ONCE.get(f"{url}/v1/clutches/sim-1/loops").json()["items"]
             inspections = ONCE.get(f"{url}/v1/clutches/sim-1/inspections").json()["items"]
+            (diagnosed,) = ONCE.get(f"{url}/v1/clutches/sim-1/diagnoses").json()["items"]
         finally:
             os.killpg(demo.pid, signal.SIGINT)
             rest = demo.communicate(timeout=60)[0]
@@ -128,6 +129,7 @@ def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops
     assert "The truth: it halved at" in life
     assert rows[-1][-2] == "reached"
     assert "The hidden cause, oil temperature, was found." in diagnosis
+    assert not diagnosed["stale"]
     assert len({loop["cycles"] for loop in loops}) == len({loop["pressure_bar"] for loop in loops}) == 3
     assert all(loop["loop_area_nm_m_s"] is not None for loop in loops)
     roughness = [inspection["roughness_um"] for inspection in inspections]

@@ -20,6 +20,7 @@ def blocks(path: Path, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.slow
 def test_the_examples_of_the_api_run(server: Server) -> None:
     script = "\n".join(["set -eu", *blocks(ROOT / "docs" / "reference" / "api.md", "sh")])
     done = subprocess.run(

@@ -29,7 +29,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.prognosis.criteria import HORIZON
-from models.prognosis.ended_lives import EndedLife, ended_life, new_and_lawful, severity_exponent
+from models.prognosis.ended_lives import EndedLife, ended_life, new_and_laws, severity_exponent
 from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.scoring import crps_of_sample, measured_end
 from models.prognosis.stated_end import stated_end
@@ -191,8 +191,8 @@ def teaches(life: Life) -> EndedLife:
     progress, values = (
         np.array(column) for column in zip(*((test.progress, test.value) for test in tests), strict=True)
     )
-    initial, lawful = new_and_lawful(tests)
-    taught = ended_life(progress, values, end, initial=initial, fraction=0.5, lawful=lawful)
+    initial, laws = new_and_laws(tests)
+    taught = ended_life(progress, values, end, initial=initial, fraction=0.5, laws=laws)
     assert taught is not None
     return taught
 

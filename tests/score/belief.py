@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.tracking.courses import form_of, log_form_weight
+from models.tracking.courses import log_form_weight
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior, weak
@@ -114,13 +114,9 @@ def _told(
         doubtful = replace(prior, eq_6_share=LAID)
         for index, seen in enumerate(stages):
             drawn = grid.posterior(grid.from_history(doubtful, seen), DRAWS, rng)
-            beside = drawn.discrepancy
-            assert beside is not None
-            assert drawn.proportional is not None
-            form = form_of(drawn.course, beside.size, drawn.proportional)
             for share in BELIEFS:
                 lean = np.exp(log_form_weight(replace(prior, eq_6_share=share)) - log_form_weight(doubtful))
-                weight = drawn.weight * lean[form]
+                weight = drawn.weight * lean[drawn.form]
                 # where the data leave no draw of eq. 6 the sure are as wrong as can be
                 weight = weight / weight.sum() if weight.any() else np.full(weight.size, 1.0 / weight.size)
                 found[share][index].append(score(ends(drawn), weight, end))

@@ -6,7 +6,7 @@ import numpy as np
 
 from models.degradation.general_order import Degradation, first_passage
 from models.prognosis.criteria import HORIZON
-from models.prognosis.ended_lives import EndedLife, ended_life, new_and_lawful
+from models.prognosis.ended_lives import EndedLife, ended_life, new_and_laws
 from models.prognosis.fleet import learn
 from models.prognosis.stated_end import stated_end
 from models.tracking.filters.grid import Grid
@@ -32,8 +32,8 @@ def kind(rng: np.random.Generator, change: float, scale: float, exponent: float)
 
 def taught(history: list[Measurement], end: float) -> EndedLife | None:
     progress, values = (np.array(column) for column in zip(*((m.progress, m.value) for m in history), strict=True))
-    initial, lawful = new_and_lawful(history)
-    return ended_life(progress, values, end, initial=initial, fraction=0.5, lawful=lawful)
+    initial, laws = new_and_laws(history)
+    return ended_life(progress, values, end, initial=initial, fraction=0.5, laws=laws)
 
 
 def fleets(count: int, seed: int) -> str:

@@ -423,12 +423,6 @@ class Search:
                     weights[twin] = float(np.logaddexp(weights.get(twin, -np.inf), weights[alternative]))
         single = self.prior(Alternative(("",)))
         swings = {record.effect: record.log_evidence for record in raw if is_vibration(record)}
-        loudest = max(swings.values(), default=0.0)
-        for alternative in list(weights):  # what a vibration leaves in averages is no second thing
-            trace = weights[alternative] - self.prior(alternative) - null.log_evidence
-            unnamed = not alternative.causes and (is_axis(alternative.unknown) or alternative.unknown in LINES)
-            if unnamed and loudest + single > 0 and trace < criteria.VIBRATION_TRACE * loudest:
-                weights[NOTHING] = float(np.logaddexp(weights[NOTHING], weights.pop(alternative)))
         misfit = min(nodes[0].evidence.misfit for nodes in self.nodes.values())
         if misfit > criteria.MISFIT:
             nameless = [alternative for alternative in weights if alternative.unknown and not alternative.causes]

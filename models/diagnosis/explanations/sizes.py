@@ -40,7 +40,8 @@ from models.gaussian_evidence import log_gain, log_sum
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Size:
     """The size of an effect after the last state, given that it is at work: mean and deviation, the 90 % interval; the
-    probability that it is at work with the less likely sign; `courses` whether likely courses ask for different signs."""
+    probability that it is at work without the likelier sign, for nothing of it may be left by then; `courses` whether likely
+    courses ask for different signs."""
 
     value: float
     sd: float
@@ -146,14 +147,14 @@ def _shares(judgement: Judgement) -> list[tuple[Fit, float]]:
 
 def _size(pairs: Sequence[tuple[float, int]]) -> Size:
     sizes, of = np.array([size for size, _ in pairs]), np.array([index for _, index in pairs])
-    positive = float((sizes > 0).mean())
+    likelier = max(float((sizes > 0).mean()), float((sizes < 0).mean()))
     signs = {bool((sizes[of == index] > 0).mean() > 0.5) for index in np.unique(of) if (of == index).mean() > 0.02}
     low, high = np.quantile(sizes, (0.05, 0.95)).tolist()
     return Size(
         value=float(sizes.mean()),
         sd=float(sizes.std()),
         interval=(low, high),
-        other_sign=min(positive, float((sizes < 0).mean())) * sizes.size / criteria.SIZES_SAMPLED,
+        other_sign=(1.0 - likelier) * sizes.size / criteria.SIZES_SAMPLED,
         courses=len(signs) > 1,
     )
 

@@ -18,7 +18,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from models.diagnosis import criteria
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
+from models.diagnosis.effects.catalogue import CATALOGUE
 from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.effects.moving import SHAFT_RIPPLE, STICK_SLIP
 from models.diagnosis.effects.readings import UNSETTLED_DWELL
@@ -29,9 +31,9 @@ from models.records.cleaning import UnusableRecordError
 from models.records.plateaus import PlateauCut, cut_plateaus
 from models.records.runs import Record
 
-#: Log likelihood ratio [nats] from which a line or a settling transient counts as evidence. Noise alone reaches it in one
-#: campaign of a thousand or fewer (chosen; no table).
-LEAST_EVIDENCE = 4.5
+#: Log likelihood ratio [nats] from which a line or a settling transient counts as evidence. Derived: it pays for the prior
+#: odds of one effect of the catalogue, so that the effect is at work rather than not.
+LEAST_EVIDENCE = math.log((1 / criteria.ANYTHING_WRONG - 1) * len(CATALOGUE) / (1 - criteria.UNCATALOGUED_SHARE))
 #: A line of one frequency at all speeds: structure that is no effect of the catalogue.
 FIXED_LINE = "fixed_line"
 

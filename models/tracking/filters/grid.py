@@ -104,7 +104,11 @@ class Grid:
 
     def posterior(self, state: GridState, size: int, rng: np.random.Generator) -> Posterior:
         """`size` draws: systematic over the cells, evenly spread within them, weighted by the exact density."""
-        prior, history, laid = state.prior, state.history, self.laid(state)
+        return self.drawn(state, self.laid(state), size, rng)
+
+    def drawn(self, state: GridState, laid: Laid, size: int, rng: np.random.Generator) -> Posterior:
+        """The same, of a posterior that is laid already."""
+        prior, history = state.prior, state.history
         offset = rng.random(7)
         count = size * min(max(MANY // max(history.progress.size, 1), 1), OVERSAMPLING)
         uniform = spread_points(count, offset[:5])

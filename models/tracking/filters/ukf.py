@@ -40,7 +40,6 @@ from models.tracking.courses import (
     FORM_PROPORTIONAL,
     FORM_SIZE,
     coefficients_at,
-    form_of,
     log_scale_at,
     place_of,
 )
@@ -411,7 +410,7 @@ def _started(prior: Prior, history: History) -> UkfState:
     many = _DRAWS * (1 + history.steps.size // 20)
     draws = _STARTER.posterior(GridState(prior=prior, history=history), many, np.random.default_rng(0))
     reference = history.span
-    form, course, steps = _beside(draws, history.steps.size)
+    form, (course, steps) = draws.form, _beside(draws, history.steps.size)
     points = scaled(
         prior,
         np.column_stack(
@@ -445,15 +444,12 @@ def _started(prior: Prior, history: History) -> UkfState:
     )
 
 
-def _beside(draws: Posterior, steps: int) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
-    """Of every draw its form [n], (δ, T δ') at the end of what was measured [n, 2], and the level's steps [n, steps]."""
-    beside, proportional = draws.discrepancy, draws.proportional
-    if proportional is None:
-        proportional = np.zeros(draws.weight.size, dtype=bool)
+def _beside(draws: Posterior, steps: int) -> tuple[FloatArray, FloatArray]:
+    """Of every draw (δ, T δ') at the end of what was measured [n, 2], and the level's steps [n, steps]."""
+    beside = draws.discrepancy
     if beside is None:
-        none = np.zeros(draws.weight.size)
-        return form_of(draws.course, none, proportional), np.zeros((none.size, 2)), np.zeros((none.size, steps))
-    return form_of(draws.course, beside.size, proportional), beside.curvature[:, :PAST] @ at_end().T, beside.height
+        return np.zeros((draws.weight.size, 2)), np.zeros((draws.weight.size, steps))
+    return beside.curvature[:, :PAST] @ at_end().T, beside.height
 
 
 def _moments(points: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -40,11 +40,9 @@ def demo(
     with tempfile.TemporaryDirectory(prefix="clutchlife-demo-") as folder, _service(Path(folder)) as (url, process):
         out.print(f"Clutchlife at {url}, its database in {folder}", markup=False, soft_wrap=True)
         with connect(url) as http:
-            cycles = _life(Service(http=http), seed)
+            _life(Service(http=http), seed)
             if exit_at_end:
                 return
-            _loops(Service(http=http), seed, cycles)
-            _inspections(Service(http=http), seed, cycles)
         page = f"{url}/clutches/sim-{seed}"
         with suppress(KeyboardInterrupt):
             out.print(
@@ -56,8 +54,8 @@ def demo(
         out.print("closing")
 
 
-def _life(service: Service, seed: int) -> float:
-    """Post the life and have it diagnosed; the duty cycles at its end."""
+def _life(service: Service, seed: int) -> None:
+    """Post the life with its inspections, and have it diagnosed: nothing comes later that the diagnosis has not seen."""
     from models.rig import campaign  # start-up time
     from service.cli.demo import life  # start-up time
     from service.run_files import simulated  # start-up time
@@ -86,28 +84,10 @@ def _life(service: Service, seed: int) -> float:
         f"The truth: {halved}.\nThe 90 % interval contained it {sum(inside)} times out of {len(inside)}.\n"
         "'-' means: too few tests yet, or the end may never come."
     )
-    _diagnosed(service, clutch_id, end)
-    return run.cycles
-
-
-def _loops(service: Service, seed: int, last: float) -> None:
-    """Dynamic tests at some states of the same life, for the dashboard: they come late, as from a rig's archive."""
-    from service.cli.demo import life  # start-up time
-    from service.run_files import simulated  # start-up time
-
-    out.print("\nDynamic tests of the same life follow, for the friction loops on the dashboard.")
-    for run in life.loops(seed, last):
-        service.post(f"/v1/clutches/sim-{seed}/runs", json.dumps(simulated.simulated_body(run)).encode())
-
-
-def _inspections(service: Service, seed: int, last: float) -> None:
-    """The roughness and skewness of the lining at some states of the same life; a simulated one has no photographs."""
-    from service.cli.demo import life  # start-up time
-    from service.run_files import simulated  # start-up time
-
-    for cycles, surface in life.inspections(seed, last):
+    for cycles, surface in life.inspections(seed, run.cycles):
         body = json.dumps(simulated.simulated_inspection(surface, cycles)).encode()
-        service.post(f"/v1/clutches/sim-{seed}/inspections", body)
+        service.post(f"/v1/clutches/{clutch_id}/inspections", body)
+    _diagnosed(service, clutch_id, end)
 
 
 def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:

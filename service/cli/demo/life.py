@@ -45,33 +45,31 @@ _ENGAGEMENT_STREAM = 0xE6
 
 
 def runs(seed: int) -> Iterator[SimulatedRun]:
-    """All runs but the dynamic tests, in rig order; torque as the oil's temperature makes it.
+    """All runs in rig order; torque as the oil's temperature makes it.
 
     Runs are made one by one. The same seed >= 0 gives the same bits. Raises ValueError on a negative seed.
     """
-    truth = campaign.simulated_clutch(seed)
+    truth, looped = campaign.simulated_clutch(seed), replace(campaign.simulated_clutch(seed), lag=_LAG)
     for run in campaign.simulate(seed, clutch=truth, stop_fraction=_STOP):
         if run.duty is not None and run.cycles in _ENGAGED_AT:
             yield replace(run, record=_engagement(seed, truth, run.duty, run.cycles))
         else:
             yield run if run.plateaus is None else replace(run, plateaus=warmed(run.plateaus, truth, run.wear))
+        if run.plateaus is not None and run.cycles in _LOOPS_AT:
+            yield _looped(seed, looped, run.cycles)
 
 
-def loops(seed: int, last: float) -> Iterator[SimulatedRun]:
-    """The dynamic tests of that life up to `last` duty cycles; `runs` ages the clutch by cycles alone."""
-    truth = replace(campaign.simulated_clutch(seed), lag=_LAG)
-    for cycles in _LOOPS_AT:
-        if cycles > last:
-            return
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_STREAM, cycles)))
-        record = _recorded(sampled_test(truth, cycles, _TEST, rng, Sensor()))
-        yield SimulatedRun(
-            run_id=f"sim-{seed}-dynamic-{cycles:05d}",
-            kind=RunKind.DYNAMIC_STRIBECK,
-            cycles=cycles,
-            record=warmed(record, truth, cycles),
-            wear=cycles,
-        )
+def _looped(seed: int, truth: SimulatedClutch, cycles: int) -> SimulatedRun:
+    """The dynamic test after so many duty cycles; `runs` ages the clutch by cycles alone."""
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_STREAM, cycles)))
+    record = _recorded(sampled_test(truth, cycles, _TEST, rng, Sensor()))
+    return SimulatedRun(
+        run_id=f"sim-{seed}-dynamic-{cycles:05d}",
+        kind=RunKind.DYNAMIC_STRIBECK,
+        cycles=cycles,
+        record=warmed(record, truth, cycles),
+        wear=cycles,
+    )
 
 
 def inspections(seed: int, last: float) -> Iterator[tuple[int, Surface]]:

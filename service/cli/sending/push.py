@@ -66,7 +66,8 @@ def push(
     """Send run files to the service.
 
     A JSON run is complete. For other files (CSV, workbooks, TDMS, MDF4, MATLAB, HDF5, Parquet), state kind and cycles
-    in the options or in a `runs.json`. JSON files in a folder named inspections are sent as inspections.
+    in the options or in a `runs.json`. JSON files in a folder named inspections are sent as inspections. A `clutch.json`
+    registers the clutch that it names.
 
     While the service is away, runs wait in the spool; the next call sends them first. A corrected file replaces the
     version that waits.
@@ -83,7 +84,8 @@ def push(
         elif unlisted:
             names = ", ".join(str(record) for record in unlisted)
             say(f"not sent, because kind and cycles are not known: {names}. {_REMEDY}")
-        if _record(paths) is None:
+        record = _record(paths, clutch)
+        if record is None:
             _require_known(url, key, clutch)
         waiting = Spool.of(spool, url, clutch)
         runs = [_request(file, kind, cycles, reading, rig) for file in files if not file.of_inspection]
@@ -95,7 +97,7 @@ def push(
             for entry in replaced:
                 say(_replacement(waiting, entry))
         _warn_of_others(waiting, digests)
-        transmit([waiting], url, key, patience, lambda service, _: _register(service, clutch, paths))
+        transmit([waiting], url, key, patience, lambda service, _: _register(service, clutch, record))
 
 
 def _request(
@@ -135,9 +137,15 @@ def _parameters(file: manifest.RunFile, kind: str | None, cycles: float | None, 
     return {"kind": kind, "cycles": repr(cycles), "filename": file.path.name}
 
 
-def _record(paths: list[Path]) -> Path | None:
-    """The `clutch.json` in one of the folders."""
-    return next((path / manifest.CLUTCH_FILE for path in paths if (path / manifest.CLUTCH_FILE).is_file()), None)
+def _record(paths: list[Path], clutch_id: str) -> dict[str, Any] | None:
+    """What a `clutch.json` in one of the folders says of the clutch; that of another clutch says nothing of it."""
+    for record in (path / manifest.CLUTCH_FILE for path in paths):
+        body = json.loads(record.read_bytes()) if record.is_file() else {}
+        if not isinstance(body, dict):
+            raise ValueError(f"{record} must hold a JSON object")  # noqa: TRY004  (a wrong file, not a wrong call)
+        if body.get("clutch_id") == clutch_id:
+            return body
+    return None
 
 
 def _require_known(url: str, key: str | None, clutch_id: str) -> None:
@@ -152,17 +160,12 @@ def _require_known(url: str, key: str | None, clutch_id: str) -> None:
                 fail(str(error), EX_DATAERR)
 
 
-def _register(service: Service, clutch_id: str, paths: list[Path]) -> None:
-    """Register the clutch from a `clutch.json` in one of the folders; without one it must be registered already."""
-    record = _record(paths)
+def _register(service: Service, clutch_id: str, record: dict[str, Any] | None) -> None:
+    """Register the clutch from its record; without one it must be registered already."""
     if record is None:
         service.get(f"/v1/clutches/{clutch_id}")
-        return
-    body = json.loads(record.read_bytes())
-    if not isinstance(body, dict):
-        raise ValueError(f"{record} must hold a JSON object")  # noqa: TRY004  (a wrong file, not a wrong call)
-    body["clutch_id"] = clutch_id
-    service.post("/v1/clutches", json.dumps(body).encode())
+    else:
+        service.post("/v1/clutches", json.dumps(record).encode())
 
 
 app = typer.Typer(help="Runs that wait to be sent, or were refused.", no_args_is_help=True)

@@ -21,6 +21,7 @@ def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(serve
     for form in ("csv", "mdf4"):
         folder = tmp_path / form
         assert "3 simulated runs" in clutchlife("simulate", "--film", "--out", folder, "--format", form, "--tests", "1")
+        clutchlife("register", form, "--record", folder / "clutch.json", "--url", server.url)
         push = ("push", folder, "--clutch", form, "--url", server.url, "--spool", tmp_path / "spool")
         assert "4 stored now, 0 stored before, 0 refused" in clutchlife(*push)
         assert "0 stored now, 4 stored before, 0 refused" in clutchlife(*push)
@@ -38,14 +39,15 @@ def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(serve
 
 
 def test_a_record_that_no_manifest_lists_is_named(server: Server, tmp_path: Path) -> None:
-    folder = tmp_path / "csv"
-    clutchlife("simulate", "--seed", "7", "--out", folder, "--format", "csv", "--tests", "1", "--no-dynamic")
+    folder = tmp_path / "sent"
+    folder.mkdir()
+    (folder / "first.json").write_text(json.dumps(stationary(0.0, run_id="first")), encoding="utf-8")
     (folder / "lonely.csv").write_text("torque_nm\n1\n", encoding="utf-8")
-    push = ("push", folder, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
-    output = clutchlife(*push)
+    ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
+    output = clutchlife("push", folder, "--clutch", "c1", "--url", server.url, "--spool", tmp_path / "spool")
     assert "not sent, because kind and cycles are not known: " in output
     assert "lonely.csv" in output
-    assert "3 stored" in output
+    assert "1 stored" in output
 
 
 # --- The engagement of a tracked clutch over the wire.

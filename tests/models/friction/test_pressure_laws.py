@@ -31,13 +31,6 @@ def fits_of_fresh_clutch() -> tuple[StribeckFit, ...]:
     return fit_curves(curves_by_pressure(plateaus, clutch.geometry))
 
 
-def test_a_straight_line_is_found_exactly() -> None:
-    pressure = PROTOCOL_PRESSURES
-    law = fit_linear(pressure, 2.0 + 3e-6 * pressure, np.ones(7))
-    assert law.intercept == pytest.approx(2.0, abs=1e-12)
-    assert law.slope == pytest.approx(3e-6, rel=1e-12)
-
-
 def test_weights_count() -> None:
     value = np.array([1.0, 2.0, 3.0, 40.0])
     law = fit_linear(np.array([1.0, 2.0, 3.0, 4.0]), value, np.array([1e-3, 1e-3, 1e-3, 1e3]))

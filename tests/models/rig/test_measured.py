@@ -74,11 +74,6 @@ class TestStationaryTest:
                 plateaus.torque, stationary_test(nominal, 0, np.random.default_rng(99), NOISELESS).torque
             )
 
-    @pytest.mark.parametrize("setting", ["noise", "floor", "gain_scatter", "torque_counts", "temperature_counts"])
-    def test_a_sensor_refuses_what_is_no_deviation(self, setting):
-        with pytest.raises(ValueError, match=f"{setting} must be finite and not negative, got -1"):
-            Sensor(**{setting: -1.0})
-
 
 # --- The simulated recorder: noise, counts, losses and spikes.
 
@@ -108,11 +103,6 @@ class TestRecorder:
         assert record.time.size == pytest.approx(0.9 * count, rel=0.01)
         assert (np.diff(record.time) > 0).all()
         assert 200 < (np.abs(record.torque - 20) > 4).sum() < 330  # 300 in ten minutes, a tenth of them lost
-
-    @pytest.mark.parametrize("name", Recorder.__slots__)
-    def test_refuses_what_is_no_deviation(self, name: str) -> None:
-        with pytest.raises(ValueError, match=f"{name} must be finite and not negative, got -1"):
-            Recorder(**{name: -1.0})
 
 
 # --- The simulated sampled records and their lag, against closed forms and an integrator.
@@ -174,11 +164,6 @@ class TestDynamicTest:
         at = CLUTCH.parameters(record.pressure, 0)
         assert record.torque == pytest.approx(torque(CLUTCH.geometry.sliding_velocity(record.speed), at), rel=1e-12)
 
-    @pytest.mark.parametrize("wrong", [{"rate": 0.0}, {"amplitude": 2000.0}, {"step": -1.0}, {"frequency": np.nan}])
-    def test_refuses_what_is_no_test(self, wrong: dict[str, float]) -> None:
-        with pytest.raises(ValueError, match=next(iter(wrong))):
-            DynamicTest(**wrong)
-
 
 class TestRawTest:
     def test_gives_the_fits_of_its_plateaus_within_their_deviations(self) -> None:
@@ -205,10 +190,6 @@ class TestRawTest:
         assert np.abs(dwells[1:, 0] - true[1:]).max() > 1.0
         assert np.abs(dwells[:, -1] - true).max() < 0.05
         assert record.speed.reshape(280, 250)[:, -1] == pytest.approx(np.tile(REFERENCE_SPEEDS, 7))
-
-    def test_refuses_what_is_no_test(self) -> None:
-        with pytest.raises(ValueError, match="rate must be finite and positive, got 0"):
-            RawTest(rate=0.0)
 
 
 # --- The sensor of the reference's fit errors: plateaus and raw records of one clutch agree, and both laws of lag are
@@ -265,3 +246,20 @@ def test_a_film_beside_an_attractor_shows_both_laws_when_fresh() -> None:
         determined.append(sum(loop.attractor is not None for loop in loops))
     assert determined[0] == 0
     assert determined[1] >= 3
+
+
+@pytest.mark.parametrize(
+    ("made", "name", "value", "rule"),
+    [
+        *((Sensor, name, -1.0, " must be finite and not negative, got -1") for name in Sensor.__slots__),
+        *((Recorder, name, -1.0, " must be finite and not negative, got -1") for name in Recorder.__slots__),
+        *(
+            (DynamicTest, name, value, "")
+            for name, value in (("rate", 0.0), ("amplitude", 2000.0), ("step", -1.0), ("frequency", np.nan))
+        ),
+        (RawTest, "rate", 0.0, " must be finite and positive, got 0"),
+    ],
+)
+def test_what_no_rig_has_is_refused(made: type, name: str, value: float, rule: str) -> None:
+    with pytest.raises(ValueError, match=f"{name}{rule}"):
+        made(**{name: value})

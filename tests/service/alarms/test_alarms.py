@@ -226,9 +226,9 @@ def test_an_archived_clutch_has_no_alarms(life: TestClient) -> None:
     ],
     ids=str,
 )
-def test_a_rule_that_says_nothing_is_refused(client: TestClient, body: dict[str, Any]) -> None:
-    assert client.post("/v1/alarms", json=body).status_code == 422
-    assert client.get("/v1/alarms").json()["items"] == []
+def test_a_rule_that_says_nothing_is_refused(shared_client: TestClient, body: dict[str, Any]) -> None:
+    assert shared_client.post("/v1/alarms", json=body).status_code == 422
+    assert shared_client.get("/v1/alarms").json()["items"] == []
 
 
 def test_an_unknown_clutch_has_no_rules(client: TestClient) -> None:

@@ -4,6 +4,7 @@ import ipaddress
 import logging
 import socket
 import socketserver
+import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -24,7 +25,7 @@ INSIDE = [
     "127.0.0.1", "10.0.0.1", "172.16.3.4", "192.168.1.1", "100.64.0.1", "169.254.169.254", "0.0.0.0",  # noqa: S104
     "224.0.0.1", "240.0.0.1", "255.255.255.255", "::1", "::", "fe80::1", "fc00::1", "ff02::1", "::ffff:127.0.0.1",
     "::127.0.0.1", "::ffff:169.254.169.254", "2002:7f00:1::", "64:ff9b::7f00:1", "64:ff9b::a9fe:a9fe",
-    "2001:0:4136:e378:8000:63bf:80ff:fffe",
+    "2001:0:4136:e378:8000:63bf:80ff:fffe", "fec0::1",
 ]  # fmt: skip
 
 
@@ -146,18 +147,17 @@ def test_a_body_without_end_is_not_read() -> None:
         assert time.monotonic() - started < 5
 
 
-@pytest.mark.parametrize(
-    "url",
-    [
-        "ftp://example.org/", "file:///etc/passwd", "gopher://x/", "http://", "http:///hook", "example.org", "syslog://",
-        "http://exa mple.org/", "http://example.org/\r\nX: 1", "http://example.org:99999/", "http://example.org:0/", "unheard://x",
-        "http://[", "http://a..b/", "json://[\x00",
-    ],
+NO_ADDRESSES = (
+    "ftp://example.org/", "file:///etc/passwd", "gopher://x/", "http://", "http:///hook", "example.org", "syslog://",
+    "http://exa mple.org/", "http://example.org/\r\nX: 1", "http://example.org:99999/", "http://example.org:0/", "unheard://x",
+    "http://[", "http://a..b/", "json://[\x00", "https://example.org/é",
 )  # fmt: skip
-def test_what_is_no_address_is_refused(client: TestClient, url: str) -> None:
-    answer = client.post("/v1/webhooks", json={"url": url})
-    assert answer.status_code == 422, answer.text
-    assert answer.json()["errors"][0]["pointer"] == "/url"
+
+
+def test_what_is_no_address_is_refused(client: TestClient) -> None:
+    for url in NO_ADDRESSES:
+        answer = client.post("/v1/webhooks", json={"url": url})
+        assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/url"), url
 
 
 @pytest.mark.parametrize(
@@ -269,3 +269,19 @@ def test_apprise_does_not_lead_inside_either() -> None:
             ended = notify.send(url, body, secret=SECRET, delivery_id="d", private=False)
             assert ended.problem is not None, url
     assert (mails, receiver.requests) == ([], [])
+
+
+def test_a_sender_reads_no_file_of_this_machine(tmp_path: Path) -> None:
+    """An address may name a file, such as a template of Teams: not one of the folder that the service runs in, either."""
+    (tmp_path / "clutches.db").write_text("secret", encoding="utf-8")
+    script = tmp_path / "sender.py"
+    script.write_text(
+        "import sys\nfrom service.alarms.notify import confine\nconfine(True)\n"
+        "for path in sys.argv[1:]:\n"
+        "    try:\n        open(path).close()\n        print(path)\n    except PermissionError:\n        pass\n",
+        encoding="utf-8",
+    )
+    files = ["clutches.db", str(tmp_path / "clutches.db"), "/etc/passwd", f"/usr/share/../..{tmp_path}/clutches.db"]
+    command = [*notify.PYTHON, str(script), *files, notify.__file__]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == [notify.__file__]

@@ -6,8 +6,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+import typer
+from rich.table import Table
 
 from service.cli.clutches import _row
+from service.cli.options import fail, out, print_line
 from service.client.clutchlife import Client
 from tests.support import Server, clutchlife, free_port, serving, stationary
 
@@ -86,6 +89,9 @@ def test_a_push_to_a_mistyped_clutch_leaves_nothing_in_the_spool(server: Server,
     spool = tmp_path / "spool"
     printed = clutchlife("push", run, "--clutch", "fien", "--url", server.url, "--spool", spool, code=65)
     assert "clutchlife register fien" in printed
+    (tmp_path / "clutch.json").write_text(json.dumps({"clutch_id": "fine"}), encoding="utf-8")
+    printed = clutchlife("push", tmp_path, "--clutch", "fien", "--url", server.url, "--spool", spool, code=65)
+    assert "clutchlife register fien" in printed
     assert not list(spool.rglob("*.body"))
 
 
@@ -107,3 +113,17 @@ def test_a_list_says_that_a_life_has_ended() -> None:
     item = {"clutch_id": "c1", "state": {"name": "failure"}, "held": 0, "summary": summary}
     assert _row(item)[:2] == ["c1", "ended, failure"]
     assert _row(item | {"summary": summary | {"ended": None}})[1] == "failure"
+
+
+def test_no_note_or_name_commands_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    """The title of a window, colours, a line written over: by a line, a table, an error."""
+    evil = "a\x1b]0;b\x07\x1b[2Jc\x9bd\u202e"
+    table = Table("note")
+    table.add_row(evil)
+    print_line(evil)
+    out.print(table)
+    with pytest.raises(typer.Exit):
+        fail(evil)
+    printed = "".join(capsys.readouterr())
+    assert printed.count("a\ufffd]0;b") == 3
+    assert all(sign.isprintable() or sign == "\n" for sign in printed)

@@ -24,10 +24,22 @@ def test_a_first_file_is_asked_about_and_the_second_is_not(
     again = terminal("import", second, "--clutch", "c1", "--yes")
     assert "read by the rig profile bench-3" in again
     receipts = client.get("/v1/clutches/c1/runs").json()["items"]
-    assert [(receipt["run_id"], receipt["cycles"], receipt["file"]["rig"]) for receipt in receipts] == [
-        ("Stat_7000", 7000, "bench-3"),
-        ("Stat_8000", 8000, "bench-3"),
+    assert [(receipt["cycles"], receipt["file"]["filename"], receipt["file"]["rig"]) for receipt in receipts] == [
+        (7000, "Stat_7000.csv", "bench-3"),
+        (8000, "Stat_8000.csv", "bench-3"),
     ]
+
+
+def test_a_file_that_was_pushed_is_the_same_run_when_it_is_imported(
+    terminal: Terminal, client: TestClient, tmp_path: Path
+) -> None:
+    file = tmp_path / "Stat_7000.csv"
+    file.write_bytes(german(7000, torque="Drehmoment"))
+    as_pushed = {"kind": "stationary_stribeck", "cycles": "7000.0", "filename": file.name}
+    assert client.post("/v1/clutches/c1/runs/file", params=as_pushed, content=file.read_bytes()).status_code == 201
+    kind = ("--kind", "stationary_stribeck", "--cycles", "7000")
+    assert "stored before" in terminal("import", file, "--clutch", "c1", *kind, "--yes")
+    assert len(client.get("/v1/clutches/c1/runs").json()["items"]) == 1
 
 
 def test_what_is_not_sent_leaves_no_profile(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
@@ -50,16 +62,12 @@ def test_options_say_what_no_title_does_and_the_profile_keeps_them(
     assert "decimal=" in terminal("import", file, *given, "--map", columns, code=EX_DATAERR)
     assert "missing=-9999" in terminal("import", file, *given, "--map", columns, "--decimal", ",", code=EX_DATAERR)
     terminal("import", file, *given, "--map", columns, "--decimal", ",", "--missing", "-9999")
-    run = client.get("/v1/clutches/c1/runs/Pr-fung-3").json()
+    (item,) = client.get("/v1/clutches/c1/runs").json()["items"]
+    run = client.get(f"/v1/clutches/c1/runs/{item['run_id']}").json()
     assert run["channels"]["speed_rpm"] == [20, 520, 1100, 20, 520, 1100]
     assert "invalid_samples" in [warning["code"] for warning in run["warnings"]]
     saved = client.get("/v1/rigs/odd").json()
     assert (saved["decimal"], saved["missing"], saved["columns"][1]["unit"]) == (",", "-9999", "1/min")
-    other = tmp_path / "other"
-    other.mkdir()
-    (other / file.name).write_text(file.read_text(encoding="utf-8").replace("20", "30"), encoding="utf-8")
-    shown = terminal("import", other / file.name, "--clutch", "c1", "--cycles", "4", "--yes")
-    assert "the clutch has another run of the name Pr-fung-3" in shown
 
 
 def test_what_is_missing_ends_it_where_nothing_may_be_asked(

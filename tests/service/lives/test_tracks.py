@@ -143,7 +143,9 @@ def test_a_test_is_odd_only_where_it_is_under_every_draw() -> None:
     assert warned == [False, False, True]
 
 
-def test_a_clutch_whose_counter_began_elsewhere_is_told_to_declare_where_its_life_began(client: TestClient) -> None:
+def test_a_clutch_whose_counter_began_elsewhere_is_predicted_and_told_where_it_may_have_begun(
+    client: TestClient,
+) -> None:
     for share in range(8):
         body = stationary(50_000.0 + 1_000.0 * share, wear=0.08 * share)
         assert client.post("/v1/clutches/c1/runs", json=body).status_code == 201
@@ -154,6 +156,5 @@ def test_a_clutch_whose_counter_began_elsewhere_is_told_to_declare_where_its_lif
     assert client.post("/v1/clutches/c1/runs", json=declared).status_code == 201
     answer = client.get("/v1/clutches/c1/remaining-useful-life").json()
     assert "new_extrapolated" not in {warning["code"] for warning in answer["warnings"]}
-    assert (before["status"], before["at_least"]) == ("reached", 0.0)
-    assert answer["status"] == "predicted"
-    assert answer["at_least"] > 0.0
+    assert before["status"] == answer["status"] == "predicted"
+    assert before["at_least"] == pytest.approx(answer["at_least"], rel=0.3)

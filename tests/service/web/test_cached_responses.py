@@ -194,27 +194,27 @@ def post_at_5_bar(client: TestClient, cycles: float) -> None:
     assert client.post("/v1/clutches/c1/runs", json=run).status_code == 201
 
 
-@pytest.mark.parametrize("address", POLLED)
-def test_the_same_again_is_the_same_answer_or_304(polled: TestClient, address: str) -> None:
-    first = polled.get(address)
-    assert first.status_code == 200
-    assert polled.get(address).content == first.content
-    seen = polled.get(address, headers={"If-None-Match": first.headers["ETag"]})
-    assert (seen.status_code, seen.content, seen.headers["ETag"]) == (304, b"", first.headers["ETag"])
-    assert "Content-Security-Policy" in seen.headers
-    assert polled.head(address).headers["ETag"] == first.headers["ETag"]
+def test_the_same_again_is_the_same_answer_or_304(polled: TestClient) -> None:
+    for address in POLLED:
+        first = polled.get(address)
+        assert first.status_code == 200
+        assert polled.get(address).content == first.content
+        seen = polled.get(address, headers={"If-None-Match": first.headers["ETag"]})
+        assert (seen.status_code, seen.content, seen.headers["ETag"]) == (304, b"", first.headers["ETag"])
+        assert "Content-Security-Policy" in seen.headers
+        assert polled.head(address).headers["ETag"] == first.headers["ETag"]
     assert routed(polled) == []
 
 
-@pytest.mark.parametrize("address", POLLED)
-def test_a_changed_clutch_is_looked_at_anew(polled: TestClient, address: str) -> None:
-    before = polled.get(address)
+def test_a_changed_clutch_is_looked_at_anew(polled: TestClient) -> None:
+    before = {address: polled.get(address).headers["ETag"] for address in POLLED}
     post_at_5_bar(polled, 1000.0)
     routed(polled)
-    after = polled.get(address, headers={"If-None-Match": before.headers["ETag"]})
-    assert after.status_code == 200
-    assert after.headers["ETag"] != before.headers["ETag"]
-    assert len(routed(polled)) == 1
+    for address, tag in before.items():
+        after = polled.get(address, headers={"If-None-Match": tag})
+        assert after.status_code == 200
+        assert after.headers["ETag"] != tag
+        assert len(routed(polled)) == 1, address
 
 
 def test_nobody_is_answered_who_may_not_read(polled: TestClient) -> None:
@@ -249,14 +249,16 @@ def test_a_number_is_one_entry_however_it_is_written(polled: TestClient) -> None
     assert (len(index._polls), routed(polled)) == (entries, [])
 
 
-@pytest.mark.parametrize(
-    "argument",
-    ["remaining-useful-life?at_cycles=", "remaining-useful-life?pressure_bar=", "runs?limit=", "scores?limit="],
-)
-def test_what_cannot_be_a_number_is_refused_by_its_length(polled: TestClient, argument: str) -> None:
-    answer = polled.get(f"/v1/clutches/c1/{argument}{'0' * 40}1")
-    assert answer.status_code == 422
-    assert "at most 32 characters" in answer.json()["detail"]
+def test_what_cannot_be_a_number_is_refused_by_its_length(client: TestClient) -> None:
+    for argument in (
+        "remaining-useful-life?at_cycles",
+        "remaining-useful-life?pressure_bar",
+        "runs?limit",
+        "scores?limit",
+    ):
+        answer = client.get(f"/v1/clutches/c1/{argument}={'0' * 40}1")
+        assert answer.status_code == 422
+        assert "at most 32 characters" in answer.json()["detail"]
 
 
 @pytest.mark.slow

@@ -6,10 +6,13 @@ Answers are found in the API's description, so that new ones are asked as well.
 import csv
 import io
 import re
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.service.clients import client_of, client_on_copy
 from tests.support import stationary
 
 CLUTCH = "/v1/clutches/c1"
@@ -44,14 +47,23 @@ ANSWERS = (
 SAID = re.compile(r'"held(_runs)?":(2\b|2\.0\b|\{"count":2\b)|"(code|quantity)":"held_runs"|2 (runs are|held runs)')
 
 
+@pytest.fixture(scope="module")
+def laid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database of a clutch with four tests that count and two that are held."""
+    path = tmp_path_factory.mktemp("held") / "held.db"
+    with client_of(path) as client:
+        for cycles in (0.0, 1000.0, 2000.0, 3000.0):
+            _sent(client, cycles, 1.0, "accepted")
+        for cycles in (4000.0, 5000.0):
+            _sent(client, cycles, 60.0, "held")
+    return path
+
+
 @pytest.fixture
-def held(client: TestClient) -> TestClient:
-    """A clutch with four tests that count and two that are held."""
-    for cycles in (0.0, 1000.0, 2000.0, 3000.0):
-        _sent(client, cycles, 1.0, "accepted")
-    for cycles in (4000.0, 5000.0):
-        _sent(client, cycles, 60.0, "held")
-    return client
+def held(laid: Path, tmp_path: Path) -> Iterator[TestClient]:
+    """A client of a service on a copy of it."""
+    with client_on_copy(laid, tmp_path) as client:
+        yield client
 
 
 def _sent(client: TestClient, cycles: float, gain: float, state: str) -> None:
@@ -100,11 +112,11 @@ def test_an_alarm_says_how_many_runs_are_held_beside_it(held: TestClient) -> Non
     assert raised["message"].endswith("2 runs are held and do not count")
 
 
-@pytest.mark.parametrize("answer", ["degradation", "surfaces", "stribeck", "engagement", "loops"])
-def test_answers_along_a_life_say_of_held_runs_in_the_same_words(held: TestClient, answer: str) -> None:
-    said = held.get(f"{CLUTCH}/{answer}").json()
-    warnings = [warning["message"] for warning in said["warnings"] if warning["code"] == "held_runs"]
-    assert (said["held_runs"], warnings) == (2, ["2 runs are held and do not count: this is without them"])
+def test_answers_along_a_life_say_of_held_runs_in_the_same_words(held: TestClient) -> None:
+    for answer in ("degradation", "surfaces", "stribeck", "engagement", "loops"):
+        said = held.get(f"{CLUTCH}/{answer}").json()
+        warnings = [warning["message"] for warning in said["warnings"] if warning["code"] == "held_runs"]
+        assert (said["held_runs"], warnings) == (2, ["2 runs are held and do not count: this is without them"]), answer
 
 
 def test_an_earlier_life_and_an_earlier_time_say_what_was_held_of_them(held: TestClient) -> None:

@@ -131,9 +131,11 @@ def test_a_byte_order_mark_before_a_body_is_taken_off(client: TestClient) -> Non
         ("latin-1", "0xd6, which is 'Ö' in Latin-1"),
     ],
 )
-def test_a_body_in_another_encoding_is_refused_by_its_name(client: TestClient, encoding: str, named: str) -> None:
+def test_a_body_in_another_encoding_is_refused_by_its_name(
+    shared_client: TestClient, encoding: str, named: str
+) -> None:
     for body in (BODY, json.dumps([{}] * 20_000) + BODY):
-        answer = client.post(RUNS, content=body.encode(encoding), headers=JSON)
+        answer = shared_client.post(RUNS, content=body.encode(encoding), headers=JSON)
         assert answer.status_code == 422
         if encoding != "latin-1" or body is BODY:
             assert named in answer.json()["detail"]

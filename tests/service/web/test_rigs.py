@@ -1,6 +1,9 @@
 """Rig profiles, the files that are kept with their runs, and runs that are read again by another profile."""
 
+import fnmatch
 import hashlib
+import random
+import time
 from collections.abc import Mapping
 from contextlib import closing
 from typing import Any
@@ -10,8 +13,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.queries.verification import check_results, check_runs
+from service.run_files.rig_profile import Named, _regex, named
+from service.schemas.rig import RigProfile
 from storage.channels import FILE
 from storage.engine.opening import open_database
+from storage.rigs import MAX_AT_ONCE
 from storage.tables import channel
 from tests.support import PRESSURES_BAR, SPEEDS_RPM, stationary, torque_nm
 
@@ -101,11 +107,35 @@ def test_a_profile_is_saved_once_and_replaced_by_put_alone(client: TestClient) -
         ({"name": "a b"}, "name"),
     ],
 )
-def test_a_profile_that_cannot_be_used_is_refused(client: TestClient, change: Mapping[str, Any], words: str) -> None:
-    answer = client.post("/v1/rigs", json=RIG | change)
+def test_a_profile_that_cannot_be_used_is_refused(
+    shared_client: TestClient, change: Mapping[str, Any], words: str
+) -> None:
+    answer = shared_client.post("/v1/rigs", json=RIG | change)
     assert answer.status_code == 422, answer.text
     assert words in answer.json()["detail"]
-    assert client.get("/v1/rigs").json()["items"] == []
+    assert shared_client.get("/v1/rigs").json()["items"] == []
+
+
+def test_no_name_of_a_file_takes_long_by_any_pattern() -> None:
+    """Each of three `*` may stand for anything: 10 s where all of it was tried. What is found is the same."""
+    columns = [{"title": "a", "channel": "torque_nm"}]
+    slow = RigProfile.model_validate({"columns": columns, "file_name": "*a*a*a*b"})
+    began = time.process_time()
+    assert named(slow, "a" * 255, {}) == Named()
+    assert time.process_time() - began < 1.0
+    rng = random.Random(5)  # noqa: S311 - patterns, not secrets
+    for _ in range(500):
+        pattern, name = ("".join(rng.choices(of, k=rng.randint(1, 7))) for of in ("*ab", "ab"))
+        assert bool(_regex(pattern).fullmatch(name)) == fnmatch.fnmatchcase(name, pattern), (pattern, name)
+
+
+def test_many_large_profiles_come_in_small_pages(client: TestClient) -> None:
+    """A page of the thousand that may be asked for would be a gigabyte."""
+    for number in range(MAX_AT_ONCE + 1):
+        assert client.post("/v1/rigs", json=RIG | {"name": f"bench-{number:03}"}).status_code == 201
+    first = client.get("/v1/rigs", params={"limit": 1000}).json()
+    rest = client.get("/v1/rigs", params={"limit": 1000, "cursor": first["next"]}).json()
+    assert (len(first["items"]), len(rest["items"]), rest["next"]) == (MAX_AT_ONCE, 1, None)
 
 
 def test_a_file_is_read_by_its_rig_and_arguments_win(client: TestClient) -> None:

@@ -79,11 +79,14 @@ def test_a_clutch_that_is_left_is_named_with_the_reason(in_file: Database, caplo
     assert ["c0: left as it was" in line for line in said] == [True]
 
 
+TASK = Task(function=f"{__name__}:leaving", of=None, at=AT, by="local", arguments={})
+
+
 def leaving(
-    database: Database, clutch_id: str | None, *, at: str, say: Callable[[Json], None], at_once: object
+    database: Database, task: Task, *, say: Callable[[Json], None], at_once: object
 ) -> tuple[dict[str, int], dict[str, str]]:
     """A workflow that leaves many clutches."""
-    assert (database, clutch_id, at, at_once) == (None, None, AT, directly)
+    assert (database, task, at_once) == (None, TASK, directly)
     say({"step": "leaves", "done": 1, "of": 2})
     say({"step": "leaves", "done": 2, "of": 2})
     return {"replayed": 3}, {f"c{number}": "why" for number in range(MAX_REASONS + 5)}
@@ -91,8 +94,7 @@ def leaving(
 
 def test_the_result_has_few_reasons_and_the_log_all(capsys: pytest.CaptureFixture[str]) -> None:
     said: list[Json] = []
-    task = Task(function=f"{__name__}:leaving", clutch_id=None, at=AT)
-    ended = done(None, task, said.append, directly)  # type: ignore[arg-type]  # the workflow reads nothing
+    ended = done(None, TASK, said.append, directly)  # type: ignore[arg-type]  # the workflow reads nothing
     assert ended["progress"] == said[-1] == {"step": "leaves", "done": 2, "of": 2}
     assert (ended["result"]["replayed"], ended["result"]["left"]) == (3, MAX_REASONS + 5)
     assert ended["result"]["reasons"] == [{"clutch_id": f"c{n}", "reason": "why"} for n in range(MAX_REASONS)]

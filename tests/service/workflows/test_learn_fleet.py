@@ -9,14 +9,29 @@ import pytest
 from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
+from models.degradation.severity import Severity
 from service import records
 from service.cli.main import app
+from service.lives.assumptions import kind_of
 from service.lives.plausibility.doubts import Judged
 from service.lives.recomputation import ClutchState, Tracking
+from service.run_files.json_run import read_run
+from service.schemas.clutch import ClutchIn
+from service.settings import Settings
+from service.web.answers import to_json
+from service.work.background import directly
+from service.work.queue import workflow_work
+from service.work.workflow import Task
 from service.workflows import learn_fleet
+from service.workflows.edit_clutch import register
+from service.workflows.ingest_run import ingest
 from service.workflows.replay import replay_clutch
+from storage import jobs
+from storage.encoding import Json
+from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.service.clients import client_on
+from tests.service.work.replaying import AT, stock
 from tests.support import stationary
 
 LIFE = "/v1/clutches/{}/remaining-useful-life"
@@ -137,6 +152,52 @@ def test_a_refresh_that_learns_nothing_new_changes_nothing(url: str) -> None:
         assert again.changed == ()
         assert again.kinds == ()
         assert client.get(LIFE.format("new"), headers={"If-None-Match": said.headers["etag"]}).status_code == 304
+
+
+def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
+    in_file: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four clutches of a kind, of which one has ended, and one of another kind, which ends while the four are tracked."""
+    stock(in_file, 4, tests=6)
+    other = ClutchIn(clutch_id="other", friction_material="sinter")
+    register(in_file, other, created_at=AT)
+    taught: list[str] = []
+
+    def lessons_of(state: ClutchState) -> tuple[Json, list[learn_fleet.Lesson]]:
+        taught.append(state.clutch_id)
+        return _lessons_of(state)
+
+    _lessons_of = learn_fleet.lessons_of
+    monkeypatch.setattr(learn_fleet, "lessons_of", lessons_of)
+
+    def declare(clutch_id: str) -> None:
+        end = {"kind": "maintenance", "event": "end_of_life", "cycles": 6000}
+        ingest(in_file, clutch_id, read_run(to_json(end)), received_at=AT)
+
+    def do_next() -> tuple[dict[str, int], dict[str, str]]:
+        with in_file.writing() as connection:
+            job = jobs.claim(connection, "here", [jobs.FLEET_REFRESH], lease=60.0, at=AT)
+        assert job is not None
+        task = Task(**workflow_work("f")(job, Settings()).task)
+        done = learn_fleet.as_job(in_file, task, say=lambda _: None, at_once=directly)
+        with in_file.writing() as connection:
+            jobs.end(connection, job.job_id, jobs.FINISHED, AT)
+        return done
+
+    declare("c3")
+    with in_file.writing() as connection:
+        for _ in range(2):
+            records.ask_fleet_refresh(connection, kind_of(other, Severity()), by="local", at=AT)
+        assert len(jobs.open_of(connection, jobs.FLEET_REFRESH)) == 2
+    done, left = do_next()
+    assert sorted(taught) == ["c0", "c1", "c2", "c3"]
+    assert (done, left) == ({"kinds": 1, "changed": 1}, dict.fromkeys(("c1", "c2", "c3"), learn_fleet.GAVE_WAY))
+    assert do_next() == ({"kinds": 0, "changed": 0}, {})
+    assert taught[4:] == ["other"]
+    assert do_next() == ({"kinds": 0, "changed": 3}, {})
+    assert len(taught) == 5
+    with in_file.reading() as connection:
+        assert jobs.open_of(connection, jobs.FLEET_REFRESH) == []
 
 
 @pytest.mark.slow

@@ -107,7 +107,8 @@ def test_ended_lives_that_were_stored_before_they_had_a_law_can_be_read(tmp_path
     with closing(open_database(f"sqlite:///{path}")) as database, database.reading() as connection:
         (row,) = assumptions.current_fleet_priors(connection)
     lives = [EndedLife.from_dict(life) for name in ("ended", "censored") for life in row.content[name]]
-    assert [life.to_dict() for life in lives] == [ended | {"lawful": 0.0}, ended | {"lawful": 0.0, "censored": True}]
+    unknown = ended | {"laws": [0.0] * 6}
+    assert [life.to_dict() for life in lives] == [unknown, unknown | {"censored": True}]
 
 
 def test_steps_are_one_line_and_named_after_their_files() -> None:

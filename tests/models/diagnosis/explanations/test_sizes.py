@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from models.diagnosis import criteria
-from models.diagnosis.criteria import DRAWS, SIGN_UNDETERMINED
+from models.diagnosis.criteria import DRAWS, SIGN_UNDETERMINED, SIZES_SAMPLED
 from models.diagnosis.diagnose import diagnose
+from models.diagnosis.explanations.sizes import _size
 from models.diagnosis.report.report import Report
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.rehearsals import rehearsal
@@ -37,6 +38,14 @@ def test_an_offset_whose_sign_depends_on_the_course_assumed_is_no_adoption(creep
     estimate = next(each for each in creeping.candidates if each.effect == "pressure_offset").estimate
     low, high = estimate.interval
     assert low < 0.0 < 0.35 < high
+
+
+def test_where_nothing_of_a_size_may_be_left_its_sign_is_not_determined() -> None:
+    """A zero of 3.1 ± 3.2 Nm was offered: samples whose form leaves nothing of it after the last state have no sign."""
+    tenth = SIZES_SAMPLED // 10
+    assert _size([(0.0, 0)] * 3 * tenth + [(4.4, 0)] * 7 * tenth).other_sign == pytest.approx(0.3)
+    assert _size([(-1.0, 0)] * tenth + [(4.4, 0)] * 9 * tenth).other_sign == pytest.approx(0.1)
+    assert _size([(4.4, 0)] * 10 * tenth).other_sign == 0.0
 
 
 def test_a_zero_whose_sign_is_known_is_offered(shifted: Report) -> None:

@@ -51,18 +51,18 @@ def test_an_inspection_is_stored_as_it_was_sent_and_its_repeat_is_the_same_one(c
     ],
 )
 def test_an_inspection_that_is_wrong_is_refused_with_its_place(
-    client: TestClient, body: dict[str, Any], pointer: str
+    shared_client: TestClient, body: dict[str, Any], pointer: str
 ) -> None:
-    answer = client.post(LIST, json=body)
+    answer = shared_client.post(LIST, json=body)
     assert answer.status_code == 422, answer.text
     assert [error["pointer"] for error in answer.json()["errors"]] == [pointer]
-    assert client.get(LIST).json() == {"items": [], "next": None}
+    assert shared_client.get(LIST).json() == {"items": [], "next": None}
 
 
 @pytest.mark.parametrize("skewness", ["NaN", "Infinity"])
-def test_a_number_that_is_not_finite_is_refused(client: TestClient, skewness: str) -> None:
+def test_a_number_that_is_not_finite_is_refused(shared_client: TestClient, skewness: str) -> None:
     body = f'{{"cycles": 5, "skewness": {skewness}}}'
-    assert client.post(LIST, content=body, headers={"Content-Type": "application/json"}).status_code == 422
+    assert shared_client.post(LIST, content=body, headers={"Content-Type": "application/json"}).status_code == 422
 
 
 def test_a_skewness_alone_a_roughness_alone_and_a_note_alone_are_inspections(client: TestClient) -> None:

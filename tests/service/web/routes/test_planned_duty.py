@@ -176,7 +176,7 @@ def test_nothing_is_stored(aged: TestClient) -> None:
         ({}, "/programme"),
     ],
 )
-def test_a_programme_that_is_none_is_refused(client: TestClient, body: dict[str, Any], pointer: str) -> None:
-    answer = client.post(FORECAST.format("c1"), json=body)
+def test_a_programme_that_is_none_is_refused(shared_client: TestClient, body: dict[str, Any], pointer: str) -> None:
+    answer = shared_client.post(FORECAST.format("c1"), json=body)
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["pointer"] == pointer
