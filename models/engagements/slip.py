@@ -264,7 +264,7 @@ _NORMAL_QUARTILE = 0.6745
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slip:
     """An engagement's record freed of its sensors' zeros: time [n] s, pressure [n] Pa, speed [n] rad/s, torque [n] Nm, and
-    where it slips: contact [s], start and end [s], the highest torque [Nm] and the zero of torque [Nm].
+    where it slips: contact [s], start and end [s], and the zero of torque [Nm].
 
     `again` [s] is when slip begins again after the standstill; None where it does not.
     """
@@ -276,7 +276,6 @@ class Slip:
     contact: float
     start: Estimate
     end: Estimate
-    highest_torque: float
     open_torque: Estimate
     again: float | None
 
@@ -324,7 +323,6 @@ def slip_of(record: Record) -> Slip | Refusal:
         contact=contact.contact,
         start=contact.start,
         end=stop.end,
-        highest_torque=contact.highest,
         open_torque=contact.zero,
         again=stop.again,
     )
@@ -363,11 +361,10 @@ def _sign(values: FloatArray) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Contact:
-    """Contact and start of slip [s], the highest torque [Nm] above that before contact, and that."""
+    """Contact and start of slip [s], and the torque [Nm] before contact."""
 
     contact: float
     start: Estimate
-    highest: float
     zero: Estimate
 
 
@@ -430,4 +427,4 @@ def _start_of(time: FloatArray, torque: FloatArray, highest: float, zero: Estima
             spread = 1 / at.size + (passed - middle) ** 2 / square
             estimate = Estimate(value=passed, sd=math.sqrt(variance * spread) / slope)
             contact = min(below, middle - float(values.mean()) / slope)
-    return _Contact(contact=contact, start=estimate, highest=highest, zero=zero)
+    return _Contact(contact=contact, start=estimate, zero=zero)

@@ -8,7 +8,6 @@ law describes the loop better is stated where the likelihoods differ by enough; 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, sections 2.3.4 and 3.2.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -43,9 +42,9 @@ class Loop:
     """One pressure of a dynamic test. `pressure` [Pa] names the level, `mean_pressure` [Pa] was measured.
 
     frequency [Hz], periods, area and area_sd [Nm m/s] are None, 0, None and None where there is no whole period. attractor
-    C [Nm/s] and film_time τ_1 [s] with deviations and 90 % intervals (an end None: no bound) are None where the record does
-    not determine them; `better_law` is "attractor", "squeeze film" or None where neither is clearly better. `message` is a
-    sentence.
+    C [Nm/s] with its deviation and 90 % interval (an end None: no bound) and film_time τ_1 [s] with its deviation are None
+    where the record does not determine them; `better_law` is "attractor", "squeeze film" or None where neither is clearly
+    better. `message` is a sentence.
     """
 
     pressure: float
@@ -60,7 +59,6 @@ class Loop:
     attractor_interval: tuple[float, float | None] | None = None
     film_time: float | None = None
     film_time_sd: float | None = None
-    film_time_interval: tuple[float, float | None] | None = None
     better_law: str | None = None
     status: LoopStatus
     message: str
@@ -129,7 +127,6 @@ def _loop(
         attractor_interval=None if attractor is None else _inverted(attractor),
         film_time=None if film is None else film.lag,
         film_time_sd=None if film is None or film.lag is None else film.lag_sd,
-        film_time_interval=None if film is None or film.status is LagStatus.AGAINST_THE_LAW else _positive(film),
         better_law=None if attractor is None or film is None else _better(attractor, film),
         status=status,
         message=_message(status, area, attractor, film),
@@ -156,11 +153,6 @@ def _inverted(fit: LagFit) -> tuple[float, float | None] | None:
     if high <= 0 or fit.status is LagStatus.AGAINST_THE_LAW:
         return None
     return 1 / high, 1 / low if low > 0 else None
-
-
-def _positive(fit: LagFit) -> tuple[float, float | None] | None:
-    low, high = fit.interval
-    return (max(low, 0.0), high if math.isfinite(high) else None) if high > 0 else None
 
 
 def _better(attractor: LagFit, film: LagFit) -> str | None:

@@ -36,18 +36,16 @@ class PlateauCut:
 
     `plateaus.torque_sd` [n] Nm is the deviation of the mean torque. `count` [n] samples were used; `noise` [n] Nm is the
     deviation of a sample about its dwell; `drift` [n] Nm/s the slope of torque over the samples used, with its deviation
-    `drift_sd`; `time_constant` [n] s that of torque's exponential approach and `settling_time` [n] s four times that,
-    both nan where no transient exceeds the noise. `settled` [n] is false where more of the transient than the
-    mean's deviation was left at the end of the dwell: that mean is taken over the last quarter, is not extrapolated, and
-    the shift by its transient is part of its torque_sd. `start` and `stop` [n] s bound the samples
-    used. `notes` are pairs of a code and a sentence.
+    `drift_sd`; `time_constant` [n] s that of torque's exponential approach, nan where no transient exceeds the noise.
+    `settled` [n] is false where more of the transient than the mean's deviation was left at the end of the dwell: that mean
+    is taken over the last quarter, is not extrapolated, and the shift by its transient is part of its torque_sd. `start`
+    and `stop` [n] s bound the samples used. `notes` are pairs of a code and a sentence.
     """
 
     plateaus: Plateaus
     count: NDArray[np.int64]
     drift: FloatArray
     drift_sd: FloatArray
-    settling_time: FloatArray
     time_constant: FloatArray
     settled: NDArray[np.bool_]
     noise: FloatArray
@@ -96,7 +94,6 @@ def cut_plateaus(record: Sampled, torque_filter: float = 0.0) -> PlateauCut:
         count=np.array([(dwell.stop - dwell.start) * blocks.size for dwell in used]),
         drift=moments.drift,
         drift_sd=moments.drift_sd,
-        settling_time=4.0 * transients.time_constant,  # e^-4 = 1.8 % of the transient is left then
         time_constant=transients.time_constant,
         settled=settled,
         noise=noise,

@@ -69,12 +69,8 @@ class Gram:
         return np.asarray(inverse * scale[:, None] * scale, dtype=np.float64)
 
 
-def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None, *, held: bool = True) -> Gram:
-    """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows, none if None.
-
-    `held`: whether the priors of the effects' amplitudes are included; they are not where the residual is examined, for a
-    residual must not contain what only a prior prevented from being fitted.
-    """
+def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None) -> Gram:
+    """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows, none if None."""
     design, noise, priors = problem.design, problem.noise, problem.priors
     changes = np.zeros((design.torque.size, 0)) if changes is None else changes
     own = [effect_columns(design, fit.prediction, effect) for effect in fit.effects]
@@ -93,12 +89,11 @@ def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None, *,
     at = free
     for effect, columns in zip(fit.effects, own, strict=True):
         precisions = effect_precisions(effect)
-        precisions[0] *= float(held)
         diagonal = np.arange(at, at + columns.shape[1])
         matrix[diagonal, diagonal] += precisions
         matrix[at, -1] -= precisions[0] * effect.amplitude
         matrix[-1, at] -= precisions[0] * effect.amplitude
-        matrix[-1, -1] += 2.0 * float(held) * amplitude_cost(effect.effect, effect.amplitude)
+        matrix[-1, -1] += 2.0 * amplitude_cost(effect.effect, effect.amplitude)
         at += columns.shape[1]
     diagonal = np.arange(at, base)
     matrix[diagonal, diagonal] += criteria.DISCREPANCY_SD**-2.0

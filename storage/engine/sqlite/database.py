@@ -251,14 +251,14 @@ def find_file(path: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> FoundFile:
     return database
 
 
-def back_up(url: str, target: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> None:
+def back_up(url: str, target: Path) -> None:
     """A consistent copy of the database at `target`, at the revision that it is at, while others read and write.
 
     Raises FileExistsError where `target` exists, StorageUnavailable as `find_file` does, ValueError on another address.
     """
     path = path_of(url)
     with translated(path):
-        copy(path, target, lock_timeout=lock_timeout)
+        copy(path, target, lock_timeout=LOCK_TIMEOUT)
 
 
 def open_file(path: Path, *, lock_timeout: float = LOCK_TIMEOUT, serving: bool = False) -> FileDatabase:
