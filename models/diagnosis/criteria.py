@@ -75,9 +75,9 @@ LEAST_CURVE_GAIN_EVIDENCE = 0.5
 
 # --- explanations: the posterior and its verdict -------------------------------------------------------------------------
 
-#: Prior probability that anything is wrong; the share of it that is nothing of the catalogue; the probability of a second
-#: thing beside the first. A factor of five in each changes single cases.
-ANYTHING_WRONG, UNCATALOGUED_SHARE, SECOND = 0.3, 0.15, 0.05
+#: Prior probability that anything is wrong, and that anything is beside what is; the share of it that is nothing of the
+#: catalogue. A factor of five in each changes single cases.
+ANYTHING_WRONG, UNCATALOGUED_SHARE = 0.3, 0.15
 #: χ²/N [-] that even the best refit leaves when structure and templates' errors have taken their part, from which no name is
 #: given. 0.7 to 1.0 in 60 campaigns of the blind rig, loud and outside the catalogue; 20 and more on the traction sweeps.
 MISFIT = 4.0

@@ -29,7 +29,6 @@ from tests.blind.trials import Trial
 EACH: dict[str, tuple[object, ...]] = {
     "ANYTHING_WRONG": (0.1,),
     "UNCATALOGUED_SHARE": (0.03,),
-    "SECOND": (0.25,),
     "TEMPLATE_ERRORS": (((0.25, 0.05),),),
     "CONTRAST_SIZES": ((0.003,),),
     "NEGLIGIBLE": (0.1,),

@@ -7,8 +7,9 @@ from tests.blind.ablations import AS_IT_IS, EACH, asked, table, taken_for
 from tests.blind.subset import Judged
 
 
-def test_each_number_that_gates_a_verdict_is_one_of_the_criteria() -> None:
+def test_each_number_that_gates_a_verdict_is_one_of_the_criteria_and_they_are_twelve_at_most() -> None:
     assert all(hasattr(criteria, number) for number in EACH)
+    assert len(EACH) <= 12
 
 
 def test_one_number_is_asked_for_by_name() -> None:

@@ -134,7 +134,7 @@ class Posterior:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prior:
     """Log prior odds against nothing at work: ANYTHING_WRONG that anything is, UNCATALOGUED_SHARE of it nothing of the
-    catalogue, SECOND a second thing beside the first; evenly within each."""
+    catalogue, and as probable a second thing beside the first; evenly within each."""
 
     effects: int
     unknowns: int
@@ -150,13 +150,13 @@ class Prior:
         value = wrong + of_effect
         if len(alternative.causes) > 1:  # in either order
             value += (
-                np.log(criteria.SECOND)
+                np.log(criteria.ANYTHING_WRONG)
                 + np.log(2.0)
                 + np.log1p(-criteria.UNCATALOGUED_SHARE)
                 - np.log(max(self.effects - 1, 1))
             )
         if alternative.unknown:
-            value += np.log(criteria.SECOND) + of_unknown
+            value += np.log(criteria.ANYTHING_WRONG) + of_unknown
         return float(value)
 
 

@@ -11,7 +11,8 @@ the template's discrepancies are jointly normal, with the mean that the discrepa
 under each size of the templates' errors and scatter of the gains, weighed by evidence as in `evidence`. The size that is
 stated is that after the last state, a (1 + Σ_k b_k φ_k) e^(f z): what a template calls an amplitude another rig's form of
 the same cause would call a little differently, and no data of torque show it. The draws have no f, for their torque is
-what was measured. Explanations count with their probability; what is left to one is nothing at work.
+what was measured. Explanations count with their probability, with what may be beside them; what is left to one is nothing
+at work.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -141,8 +142,14 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
 
 
 def _shares(judgement: Judgement) -> list[tuple[Fit, float]]:
-    """The fitted explanations that stand with their probabilities, which sum to one at most."""
-    return [(cause.fit, cause.probability) for cause in judgement.stand if cause.probability > 0.0]
+    """The fitted explanations that stand with their probabilities, which sum to one at most. What holds one of them and
+    something beside it that does not stand counts as the largest that it holds."""
+    shares = [0.0] * len(judgement.stand)
+    for each in judgement.explanations:
+        held = [k for k, cause in enumerate(judgement.stand) if set(cause.slugs) <= {*each.effects}]
+        if held:
+            shares[max(held, key=lambda k: len(judgement.stand[k].slugs))] += each.probability
+    return [(cause.fit, share) for cause, share in zip(judgement.stand, shares, strict=True) if share > 0.0]
 
 
 def _size(pairs: Sequence[tuple[float, int]]) -> Size:

@@ -53,7 +53,7 @@ def test_the_paragraph_says_from_when_on_an_effect_is_at_work() -> None:
     assert report.causes == ("hydrodynamic_drag",)
     assert "drag in mid speed (from about " in report.summary
     assert report.extension is not None
-    onset = report.extension.content["draws"][0]["effects"][0]["shape"][-1]
+    (onset,) = {effect["shape"][-1] for draw in report.extension.content["draws"] for effect in draw["effects"]}
     assert f"(from about {onset:,.0f} cycles on)" in report.summary
 
 

@@ -62,6 +62,9 @@ def test_draws_weigh_one_and_carry_only_what_the_report_names(shifted: Report) -
     assert shifted.extension.weights.size <= DRAWS
     assert shifted.extension.weights.sum() == pytest.approx(1.0)
     assert set(shifted.extension.effects) == set(shifted.causes)
+    at_work = sum(each.probability for each in shifted.explanations if set(shifted.causes) <= set(each.effects))
+    assert at_work > 0.98  # alone, or with something beside it: no draw has nothing to take off
+    assert all(draw["effects"] for draw in shifted.extension.content["draws"])
     sizes = [effect["amplitude"] for draw in shifted.extension.content["draws"] for effect in draw["effects"]]
     assert len(set(sizes)) > DRAWS // 2
     assert np.mean(np.array(sizes) < 0) <= SIGN_UNDETERMINED
