@@ -27,6 +27,9 @@ const NOTICES = { model_adequate: "good", cause_named: "bad", cause_ambiguous: "
 
 const MOST_ROWS = 8;
 
+/** Probability from which a cause is certain though others are open (that of what a diagnosis names). */
+const CERTAIN = 0.9;
+
 /**
  * The report's elements.
  * @param {DiagnosisOut} diagnosis
@@ -42,7 +45,7 @@ export function report(diagnosis) {
     h(
       "div",
       { class: `notice ${NOTICES[verdict] ?? ""}` },
-      h("p", { class: "verdict" }, h("b", {}, `${VERDICTS[verdict] ?? words(verdict)}. `), sentence(diagnosis)),
+      h("p", { class: "verdict" }, h("b", {}, `${heading(diagnosis)}. `), sentence(diagnosis)),
       diagnosis.summary ? h("p", {}, diagnosis.summary) : null,
       h("p", { class: "quiet" }, date, outdated(diagnosis)),
     ),
@@ -67,11 +70,28 @@ function outdated({ earlier_life: earlier, stale }) {
 }
 
 /**
- * The verdict as a sentence.
- * @param {{ verdict: string | null, causes?: string[] }} diagnosis
+ * Of an ambiguous verdict the causes that are certain.
+ * @param {{ verdict: string | null, causes?: string[], candidates?: CandidateOut[] }} diagnosis
  */
-export function sentence({ verdict, causes = [] }) {
-  const names = causes.map((cause) =>
+function certain({ verdict, causes = [], candidates: all = [] }) {
+  const likely = all.filter((candidate) => (candidate.probability ?? 0) >= CERTAIN).map(({ effect }) => effect);
+  return verdict === "cause_ambiguous" ? causes.filter((cause) => likely.includes(cause)) : [];
+}
+
+/** @param {{ verdict: string | null, causes?: string[], candidates?: CandidateOut[] }} diagnosis */
+export function heading(diagnosis) {
+  const verdict = diagnosis.verdict ?? "";
+  return certain(diagnosis).length > 0 ? "Certain, though not what is beside it" : (VERDICTS[verdict] ?? words(verdict));
+}
+
+/**
+ * The verdict as a sentence.
+ * @param {{ verdict: string | null, causes?: string[], candidates?: CandidateOut[] }} diagnosis
+ */
+export function sentence(diagnosis) {
+  const sure = certain(diagnosis);
+  const verdict = sure.length > 0 ? "cause_named" : diagnosis.verdict;
+  const names = (sure.length > 0 ? sure : (diagnosis.causes ?? [])).map((cause) =>
     cause === "uncatalogued" ? "something that is not in the catalogue" : words(cause).toLowerCase(),
   );
   const last = names.at(-1) ?? "the named cause";
