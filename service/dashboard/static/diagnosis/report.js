@@ -81,7 +81,9 @@ function certain({ verdict, causes = [], candidates: all = [] }) {
 /** @param {{ verdict: string | null, causes?: string[], candidates?: CandidateOut[] }} diagnosis */
 export function heading(diagnosis) {
   const verdict = diagnosis.verdict ?? "";
-  return certain(diagnosis).length > 0 ? "Certain, though not what is beside it" : (VERDICTS[verdict] ?? words(verdict));
+  return certain(diagnosis).length > 0
+    ? "Certain, though not what is beside it"
+    : (VERDICTS[verdict] ?? words(verdict));
 }
 
 /**
