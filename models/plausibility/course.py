@@ -156,15 +156,19 @@ class Fit:
         log_weight = self.log_weight[:, None] - log_normal(self.tests.log_cof - mean, variance)
         return mean, variance, log_weight - np.logaddexp.reduce(log_weight, axis=0)
 
+    def misses(self) -> FloatArray:
+        """How far each test [n] is from where the others predict it: log density lost against its middle."""
+        mean, variance, log_weight = self.without
+        return missed(self.tests.log_cof - mean, variance, log_weight)
+
     def log_step_gains(self) -> FloatArray:
         """By how much the log evidence would grow by a new level and pace from each test on [n]."""
         cycles = self.tests.cycles
         turns = criteria.LEVEL_SD * np.array([_turns(cycles, at, self.latest) for at in cycles])
-        explained = np.einsum("gpn,kan->gkap", self._explained, turns)
-        inner = np.einsum("kan,gn,kbn->gkab", turns, 1.0 / self.noise, turns) - np.einsum(
-            "gkap,gkbp->gkab", explained, explained
-        )
-        pulled = np.einsum("kan,gn->gka", turns, self.pull)
+        explained = (self._explained @ turns.reshape(-1, cycles.size).T).reshape(len(_NODES), -1, *turns.shape[:2])
+        within = np.moveaxis((turns[:, :, None] * turns[:, None]) @ (1.0 / self.noise).T, 3, 0)
+        inner = within - (explained[..., :, None] * explained[..., None, :]).sum(axis=1)
+        pulled = np.moveaxis(turns @ self.pull.T, 2, 0)
         scale = np.eye(2) + inner
         solved = np.linalg.solve(scale, pulled[..., None])[..., 0]
         gain = 0.5 * (pulled * solved).sum(axis=2) - 0.5 * np.log(np.linalg.det(scale))
@@ -217,6 +221,11 @@ def log_outlying(off: FloatArray, variance: FloatArray, log_weight: FloatArray) 
     plain = math.log1p(-criteria.OUTLYING_SHARE) + log_normal(off, variance)
     further = math.log(criteria.OUTLYING_SHARE) + log_normal(off, variance + criteria.OUTLYING_SD**2)
     return np.asarray(np.logaddexp.reduce(log_weight + np.logaddexp(plain, further), axis=0))
+
+
+def missed(off: FloatArray, variance: FloatArray, log_weight: FloatArray) -> FloatArray:
+    """log density [m] that is lost by being `off` the mean [g, m]."""
+    return np.asarray(log_outlying(0.0 * off, variance, log_weight) - log_outlying(off, variance, log_weight))
 
 
 def log_physics(log_cof: FloatArray) -> FloatArray:

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.gaussian_evidence import log_normal
 from models.plausibility import criteria, pace
-from models.plausibility.course import Fit, Predicted, Tests, log_outlying, log_physics
+from models.plausibility.course import Fit, Predicted, Tests, log_physics, missed
 from models.plausibility.slips import OF_CLUTCH, OTHER_CLUTCH, OTHER_CYCLES, Reading, Run, Slip, slips_of
 
 #: No slip is proved by a number that underflows.
@@ -70,9 +70,10 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> dict[int, Verdict
     """
     clutch = _Clutch(runs=tuple(runs), about=frozenset(about))
     best = _searched(clutch, Belief())
-    if not (best.belief.slipped or best.doubts):
-        return {}
     weighed = {best.belief: best.log_probability}
+    weighed |= {other: _Weighed(clutch=clutch, belief=other).log_probability for other in best.instead()}
+    if not (best.belief.slipped or best.doubts or len(weighed) > 1):
+        return {}
     for index, log_odds in best.log_odds.items():
         other = replace(best.belief, slipped=best.belief.slipped ^ {index})
         sign = -1.0 if index in best.belief.slipped else 1.0
@@ -424,16 +425,24 @@ class _Weighed:
             protocol = max((runs[j].sent.log_protocol for j in others), default=math.inf)
             surprise[i] = protocol - runs[i].sent.log_protocol
             surprise[i] += max((of_cycles[j] for j in others), default=0.0) - of_cycles[i]
-        for fit, own in self.fits:
-            mean, variance, log_weight = fit.without
-            off = fit.tests.log_cof - mean
-            of_cof = log_outlying(0.0 * off, variance, log_weight) - log_outlying(off, variance, log_weight)
-            for i, value in zip(own, of_cof.tolist(), strict=True):
-                if i in surprise:
-                    surprise[i] += value
-        least = math.log(criteria.HELD / criteria.OTHER_TEST)
+        for life, (fit, own) in enumerate(self.fits):
+            shows = [i for i in asked if i not in own and self.life_of[i] == life and runs[i].sent.log_cof is not None]
+            of_tests = dict(zip(own, (fit.misses() if own else np.zeros(0)).tolist(), strict=True))
+            of_others = dict(zip(shows, self._misses(shows, life, fit).tolist(), strict=True))
+            for i in surprise.keys() & (of_tests | of_others):
+                surprise[i] += (of_tests | of_others)[i]
+        least = math.log(criteria.HELD / criteria.DIGIT_SLIP)  # by less no slip is as probable as that
         odd = sorted((i for i in asked if surprise[i] > least), key=lambda i: (-surprise[i], i))
         return frozenset(odd[:SUSPECTS])
+
+    def _misses(self, shows: Sequence[int], life: int, fit: Fit) -> FloatArray:
+        """How far the COF of runs that are no tests [k] is from the course: log density lost against its middle."""
+        sent = [self.clutch.runs[i].sent for i in shows]
+        cycles = np.array([reading.cycles for reading in sent])
+        predicted = fit.predict(np.maximum(cycles - self.origins[life], 0.0), _epoch(self._shifts(life), cycles))
+        spread = np.array([reading.spread for reading in sent])
+        off = np.array([reading.log_cof for reading in sent], dtype=np.float64) - predicted.mean
+        return missed(off, predicted.variance + spread**2, predicted.log_weight[:, None])
 
     @property
     def doubts(self) -> bool:
@@ -473,6 +482,15 @@ class _Weighed:
                 i = own[k]
                 if i not in belief.levels and fit.tests.cycles[k] > fit.tests.cycles.min():
                     yield replace(belief, levels=belief.levels | {i}), float(gains[k]) + self._log_level(i)
+
+    def instead(self) -> Iterator[Belief]:
+        """A slip in place of the latest test of a life where that is outlying, or begins a level that none has after it."""
+        belief = self.belief
+        for _, own in self.fits:
+            i = max(own, key=lambda j: float(self.clutch.cycles[j]), default=-1)
+            if i in belief.outlying | belief.levels:
+                left = belief.outlying - {i}, belief.levels - {i}
+                yield Belief(slipped=belief.slipped | {i}, outlying=left[0], levels=left[1])
 
     def verdict(self, index: int, log_odds: float) -> Verdict:
         """What is said of a run that is doubted."""

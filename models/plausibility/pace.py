@@ -57,11 +57,10 @@ def log_probability(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArra
 
 
 def log_given_others(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArray) -> FloatArray:
-    """log P [n] of each run's cycles [n] given those of its kind; 0 for a run that meets one of another kind, or is not
-    there."""
+    """log P [n] of each run's cycles [n] given those of the others; 0 for a run that is not there."""
     there = np.isfinite(cycles)
     finite = np.where(there, cycles, -1.0)
-    meets, _, in_life = _meets(cycles[None], finite[None], rank, block)
+    meets, left, in_life = _meets(cycles[None], finite[None], rank, block)
     total = np.zeros(cycles.size)
     for kind in set(rank.tolist()):
         own = np.flatnonzero(rank == kind)
@@ -72,7 +71,7 @@ def log_given_others(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArr
         sets[1:][np.diag_indices(own.size)] = math.inf
         made = np.where(np.isfinite(sets), np.log(np.maximum(_by_gaps(sets), _LEAST)), 0.0).sum(axis=1)
         total[own] = made[0] - made[1:]
-    return np.where((meets[0] > 0.0) | ~there, 0.0, total)
+    return np.where(there, np.log(meets[0] + left * np.exp(np.minimum(total, 0.0))), 0.0)
 
 
 def _meets(

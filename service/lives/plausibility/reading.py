@@ -6,8 +6,9 @@ the history.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from statistics import median_low
 
@@ -207,23 +208,31 @@ class _Comparison:
             spread = math.hypot(spread, OTHER_PRESSURE_SD * apart)
         return (math.log(cof), spread) if cof > 0 else None
 
+    @cached_property
+    def usual(self) -> tuple["_Usual", "_Usual", "_Usual"]:
+        """What log pressure, log speed and oil temperature of tests are in this life."""
+        shown = [event.shown for event in self.tests if event.shown is not None]
+        return (
+            _PRESSURE.with_tests(math.log(one.pressure) for one in shown if one.pressure),
+            _SPEED.with_tests(math.log(one.speed) for one in shown if one.speed),
+            _OIL.with_tests(one.oil for one in shown if one.oil is not None),
+        )
+
     def _log_protocol(self, event: Event, shown: Shown) -> float:
         """log density of pressures, speeds and oil temperature: those of another test of the life, or others."""
         is_test = event.kind in (STATIONARY, DYNAMIC)
-        others = [other.shown for other in self.tests if other.run_id != event.run_id and other.shown is not None]
+        own = event.shown if event.cofs and event.shown is not None else Shown()
         declared = None if event.duty is None else event.duty.speed
+        pressure, speed, oil = self.usual
         total = 0.0
         if is_test and shown.pressure:
-            usual = _Usual(math.log(PRESSURE), LOG_PRESSURE_SD, SAME_PROTOCOL_SD)
-            total += usual.log_of(math.log(shown.pressure), [math.log(one.pressure) for one in others if one.pressure])
-        if (is_test or declared) and shown.speed:
-            usual = _Usual(math.log(SPEED), LOG_SPEED_SD, SAME_PROTOCOL_SD)
-            speeds = [declared] if declared else [one.speed for one in others]
-            total += usual.log_of(math.log(shown.speed), [math.log(speed) for speed in speeds if speed])
+            total += pressure.log_of(math.log(shown.pressure), math.log(own.pressure) if own.pressure else None)
+        if declared and shown.speed:
+            total += _SPEED.with_tests([math.log(declared)]).log_of(math.log(shown.speed), None)
+        elif is_test and shown.speed:
+            total += speed.log_of(math.log(shown.speed), math.log(own.speed) if own.speed else None)
         if shown.oil is not None:
-            total += _Usual(OIL, OIL_SD, OTHER_OIL).log_of(
-                shown.oil, [one.oil for one in others if one.oil is not None]
-            )
+            total += oil.log_of(shown.oil, own.oil)
         if shown.open_torque is not None and shown.open_torque > 0:  # an open clutch's drag
             total += _log_normal(self._pressed(shown), *LOG_DRAG)
         return total
@@ -322,19 +331,38 @@ def _scaled(
 
 @dataclass(frozen=True, slots=True)
 class _Usual:
-    """What is known of a number before any test: mean and deviation; and the deviation of numbers that are the same."""
+    """What is known of a number before any test, mean and deviation; the deviation of numbers that are the same; and how
+    many tests have which, in tenths of that."""
 
     mean: float
     deviation: float
     same: float
+    tests: Mapping[int, int] = field(default_factory=dict)
 
-    def log_of(self, value: float, others: Sequence[float]) -> float:
-        """log density of a value: one of the others' again, or any."""
+    def with_tests(self, values: Iterable[float]) -> "_Usual":
+        """The same with these values of tests."""
+        return replace(self, tests=Counter(self._place(value) for value in values))
+
+    def _place(self, value: float) -> int:
+        return round(10.0 * value / self.same)
+
+    def log_of(self, value: float, own: float | None) -> float:
+        """log density of a value: that of a test again, but for its `own` one (None: it has none), or any."""
         anywhere = _log_normal(value, self.mean, self.deviation)
-        if not others:
+        place = None if own is None else self._place(own)
+        others = {at: count - (at == place) for at, count in self.tests.items()}
+        total = sum(others.values())
+        if total <= 0:
             return anywhere
-        again = math.fsum(math.exp(_log_normal(value, other, self.same)) for other in others) / len(others)
-        return math.log((1.0 - OTHER_PROTOCOL) * again + OTHER_PROTOCOL * math.exp(max(anywhere, _LEAST)))
+        again = sum(
+            count * math.exp(_log_normal(value, 0.1 * self.same * at, self.same)) for at, count in others.items()
+        )
+        return math.log((1.0 - OTHER_PROTOCOL) * again / total + OTHER_PROTOCOL * math.exp(max(anywhere, _LEAST)))
+
+
+_PRESSURE = _Usual(math.log(PRESSURE), LOG_PRESSURE_SD, SAME_PROTOCOL_SD)
+_SPEED = _Usual(math.log(SPEED), LOG_SPEED_SD, SAME_PROTOCOL_SD)
+_OIL = _Usual(OIL, OIL_SD, OTHER_OIL)
 
 
 def _log_normal(value: float, mean: float, deviation: float) -> float:
