@@ -55,7 +55,7 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     named = report["causes"]
     likely = {item["effect"] for item in report["candidates"] if (item["probability"] or 0.0) >= _CERTAIN}
     if report["verdict"] == "cause_ambiguous" and likely.intersection(named):
-        words, named = "Certain, though not what is beside it", [cause for cause in named if cause in likely]
+        words, named = "Cause certain, others possible", [cause for cause in named if cause in likely]
     causes = f": {', '.join(map(_spelt, named))}" if named else ""
     yield Panel(Text(report["summary"]), title=Text(f"{words}{causes}", style=f"bold {colour}"), border_style=colour)
     if report["candidates"]:

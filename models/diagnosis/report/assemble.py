@@ -147,7 +147,7 @@ def _unsure(slug: str, size: Size) -> str:
     why = f"it depends on the course over life that is assumed, and {wrong}" if size.courses else wrong
     return (
         f"The extension is not proposed: these data do not determine the size of {effect_name(slug)} "
-        f"(90 % interval {low} to {high} {effect.unit}): {why}."
+        f"(90 % interval {low} to {high} {effect.unit}); {why}."
     )
 
 

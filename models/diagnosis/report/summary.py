@@ -156,11 +156,19 @@ def _adequate(report: Report) -> list[Sentence]:
             f"from run to run{_scatter(report.scatter)}."
         )
     ]
+    others, mass = list[str](), nothing
+    for item in (item for item in report.explanations if item.effects):
+        if mass >= criteria.SURE:
+            break
+        others.append(f"{' together with '.join(map(_cause_name, item.effects))} ({probability(item.probability)})")
+        mass += item.probability
+    if others:
+        sentences.append(Sentence(f"These data do not exclude: {_either(others)}."))
     if report.scatter is not None and report.scatter.lower > criteria.USUAL_GAIN:
         sentences.append(
             Sentence(
-                "They scatter more than usual, and a zero that wanders from run to run would look the same: repeat one of "
-                "these tests at once."
+                "The runs scatter more than usual, which a zero that wanders between runs would also cause: repeat a "
+                "test at once."
             )
         )
     sentences += _unseen(report)
@@ -184,23 +192,21 @@ def _unseen(report: Report) -> list[Sentence]:
     shown = [_shown(visible) for visible in listed]
     sentences = []
     if shown:
-        sentences = [Sentence(f"Nine times in ten these data would have shown {conjunction(shown)}.")]
+        say = "The smallest sizes that these data would have shown nine times in ten, in the most (least) visible form"
+        sentences = [Sentence(f"{say}: {conjunction(shown)}.")]
     if report.unseen:
         names = conjunction([effect_name(slug) for slug in report.unseen])
-        sentences.append(Sentence(f"Nothing of these would show at any size: {names}.", SHOULD))
+        sentences.append(Sentence(f"These would not have shown at any size: {names}.", SHOULD))
     return sentences
 
 
 def _shown(visible: Visible) -> str:
-    """The smallest sizes that show, `torque zero shift from 0.64 Nm (in its hardest form 11.3 Nm)`."""
+    """The smallest sizes that show, `torque zero shift 0.64 Nm (11.3 Nm)`."""
     name = effect_name(visible.effect)
     if visible.unit == "-":
-        name = f"{name} ({BY_SLUG[visible.effect].amplitude})"
-    least = _amount(visible.least, visible.unit)
-    if math.isinf(visible.amplitude):
-        return f"{name} from {least} (in some forms at no size)"
-    hardest = _amount(visible.amplitude, visible.unit)
-    return f"{name} from {least}" + ("" if hardest == least else f" (in its hardest form {hardest})")
+        name = f"{BY_SLUG[visible.effect].amplitude} of {name}"
+    hardest = "none" if math.isinf(visible.amplitude) else _amount(visible.amplitude, visible.unit)
+    return f"{name} {_amount(visible.least, visible.unit)} ({hardest})"
 
 
 def _amount(value: float, unit: str) -> str:
@@ -235,7 +241,9 @@ def _named(report: Report) -> list[Sentence]:
     ]
     if companions:
         sentences.append(
-            Sentence(f"These data neither confirm nor exclude, beside it: {' or '.join(companions)}.", SHOULD)
+            Sentence(
+                f"These data neither confirm nor exclude that something else is at work: {_either(companions)}.", SHOULD
+            )
         )
     return [*sentences, *_gained(report), *_next(report)]
 
@@ -246,6 +254,10 @@ def sure_causes(report: Report) -> tuple[str, ...]:
     return tuple(slug for slug in report.causes if shares.get(slug, 0.0) >= criteria.SURE)
 
 
+#: Instead of the size of an effect that was not fitted, or whose quantity was not measured.
+_NO_SIZE = "size not estimated"
+
+
 def _ambiguous(report: Report) -> list[Sentence]:
     """What is certain with its size, then the explanations among which the choice is, each with its probability, and each
     effect's size where it first comes."""
@@ -254,13 +266,11 @@ def _ambiguous(report: Report) -> list[Sentence]:
     near = smallest({item.effects: item.probability for item in report.explanations})
     listed = []
     for item in (item for item in report.explanations if item.effects in near and set(sure) <= set(item.effects)):
-        names = [effect_name(slug) for slug in item.effects if slug not in {*sure, UNCATALOGUED}]
-        if UNCATALOGUED in item.effects:
-            names.append(
-                f"something that is not in the catalogue{f', such as {report.resembles}' if report.resembles else ''}"
-            )
+        names = [_cause_name(slug) for slug in item.effects if slug not in sure]
+        if UNCATALOGUED in item.effects and report.resembles:
+            names[-1] += f", such as {report.resembles}"
         sizes = [
-            signed(estimate) if estimate.value != 0.0 else "not measured, so it cannot be excluded"
+            signed(estimate) if estimate.value != 0.0 else _NO_SIZE
             for slug in item.effects
             if slug not in sure and (estimate := sized.pop(slug, None)) is not None
         ]
@@ -274,9 +284,8 @@ def _ambiguous(report: Report) -> list[Sentence]:
         brief = [name for name, _, _ in listed[:8]]
         others = [effect_name(slug) for slug in report.causes if slug not in {*sure, UNCATALOGUED}]
         left = [name for name in others if not any(name in alternative for alternative in brief)]
-        unmeasured = "not measured, so it cannot be excluded"
         listed = [
-            (name.partition(", such as ")[0], chance, [size for size in sizes if size == unmeasured])
+            (name.partition(", such as ")[0], chance, [size for size in sizes if size == _NO_SIZE])
             for name, chance, sizes in listed[:8]
         ]
     alternatives = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in listed] + (
@@ -289,17 +298,19 @@ def _ambiguous(report: Report) -> list[Sentence]:
         sentences = [Sentence(f"{said[0].upper()}{said[1:]}.")]
         sentences += [Sentence(f"Size: {size}.") for size in certain]
         if len(alternatives) == 1:
-            sentences.append(Sentence(f"Beside it is {alternatives[0]}."))
+            sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
         elif alternatives:
-            sentences.append(
-                Sentence(f"Open is only what is beside it (with its probability): {_either(alternatives)}.")
-            )
+            sentences.append(Sentence(f"What else is at work is open (with probabilities): {_either(alternatives)}."))
     else:
-        first = "Something is wrong that the model does not explain"
+        first = "One explanation stands (with its probability)"
         if len(alternatives) > 1:
-            first += ", and these data cannot distinguish which of these it is"
-        sentences = [Sentence(f"{first} (with its probability): {_either(alternatives)}.")]
+            first = "These data cannot distinguish between the following explanations (with probabilities)"
+        sentences = [Sentence(f"The data disagree with the model. {first}: {_either(alternatives)}.")]
     return [*sentences, Sentence(_error(report), MAY), *rest]
+
+
+def _cause_name(slug: str) -> str:
+    return "something that is not in the catalogue" if slug == UNCATALOGUED else effect_name(slug)
 
 
 def _either(parts: Sequence[str]) -> str:
@@ -318,9 +329,8 @@ def _unexplained(report: Report) -> list[Sentence]:
         Sentence(_error(report)),
         *_gained(report),
         Sentence(
-            "Next: repeat one of these tests at once. What the rig did differently in one run is gone then; what stays "
-            f"depends on {_axes(report.baseline) or 'the rig'}: look there.",
-            SHOULD,
+            "Next: repeat one of these tests at once. If the error is gone, it came from one run; if it stays, look for "
+            f"what depends on {_axes(report.baseline) or 'the rig'}."
         ),
     ]
 
@@ -353,21 +363,23 @@ def _gained(report: Report) -> list[Sentence]:
         return [Sentence(report.not_adoptable)]
     if gain is None:
         return []
-    way = "less" if gain.reduction_percent >= 0 else "more"
+    way = "smaller" if gain.reduction_percent >= 0 else "larger"
     model = {
         Verdict.CAUSE_AMBIGUOUS: "the model with the most probable of them",
         Verdict.UNEXPLAINED_STRUCTURE: "the model with a smooth correction",
     }.get(report.verdict, "the extended model")
     change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} % {way}"
     sentences = [
-        Sentence(f"On runs held out, {model} errs by {change}.", SHOULD),
+        Sentence(f"On held-out runs, the error of {model} is {change}.", SHOULD),
         Sentence(_hardest(gain, report.extended)),
     ]
     if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         return sentences
-    ahead = f"From the first states, {model} predicts the last ones better, so remaining life follows it."
+    better, uses = "better", "extrapolates"
     if not gain.forecast_log_score_gain > 0:
-        ahead = f"From the first states, {model} predicts the last ones no better: remaining life does not follow it."
+        better, uses = "no better", "does not extrapolate"
+    ahead = f"{model[0].upper()}{model[1:]} predicts the last states from the first ones {better}"
+    ahead += f", so remaining life {uses} it."
     return [*sentences, Sentence(ahead, SHOULD if report.verdict is Verdict.CAUSE_AMBIGUOUS else MUST)]
 
 
@@ -378,12 +390,11 @@ def _hardest(gain: Gain, extended: Misfit | None) -> str:
         return ""
     pressed = hardest.axis == PRESSURE
     size, unit = (1e-5, "bar") if pressed else (1.0, "cycles")
-    kept = "between others that were kept"
+    kept = "within the others' range"
     if hardest.beyond > 0.0:
-        kept = f"{number(size * hardest.beyond)} {unit} beyond all that were kept"
-    place = f"{'at' if pressed else 'after'} {number(size * hardest.value)} {unit}"
-    beside = f"by {number(hardest.rmse)} Nm RMS, beside {number(extended.rmse)} Nm in the fit."
-    return f"Held out, the runs {place}, {kept}, are predicted worst: {beside}"
+        kept = f"{number(size * hardest.beyond)} {unit} outside the others' range"
+    error = f"{number(hardest.rmse)} Nm RMS (fit: {number(extended.rmse)} Nm)."
+    return f"Held-out runs are predicted worst at {number(size * hardest.value)} {unit}, {kept}: {error}"
 
 
 def _next(report: Report) -> list[Sentence]:
@@ -394,13 +405,13 @@ def _next(report: Report) -> list[Sentence]:
     chance = f"probability {probability(best.probability)}"
     if best.narrows:
         left = f"{100 * best.narrows:.0f} % of the uncertainty"
-        return [Sentence(f"Next, to narrow its size: {brief_test(best)} (leaves {left}).")]
+        size = f"to size {effect_name(best.effect)} more precisely"
+        return [Sentence(f"Next, {size}: {brief_test(best)} (leaves {left}).")]
     if best.other == BASELINE:
         return [Sentence(f"Next, to confirm it ({chance}): {brief_test(best)}.")]
-    pair = f"{effect_name(best.effect)} from {effect_name(best.other)}"
-    if best.nats < criteria.WORTHWHILE:
-        return [Sentence(f"No single test would decide. The best: {brief_test(best)} (it tells {pair}; {chance}).")]
-    return [Sentence(f"Next: {brief_test(best)}. It tells {pair} ({chance}).")]
+    first = "No single test would decide. The best" if best.nats < criteria.WORTHWHILE else "Next"
+    pair = f"{_cause_name(best.effect)} from {_cause_name(best.other)}"
+    return [Sentence(f"{first}: {brief_test(best)}. It distinguishes {pair} ({chance}).")]
 
 
 #: Words from which a test is put shortly. The longest test of one kind has 16, two kinds take 29 and more.
@@ -421,7 +432,7 @@ def brief_test(advice: Advice) -> str:
             oils = {step.temperature - 273.15 for step in steps if step.temperature is not None}
             oil = f", also at {number(max(oils))} °C" if oils else ""
             kinds.append(f"{name} tests{at}, {pressures} bar, {speeds} rpm{oil}")
-    return f"{' and '.join(kinds)}, as in its protocol"
+    return f"{' and '.join(kinds)}; see its protocol"
 
 
 def _range(values: Sequence[float]) -> str:

@@ -95,4 +95,4 @@ def test_a_cause_that_all_explanations_share_is_certain_in_the_heading(report: d
     """The cause cannot be distinguished: channel delay, uncatalogued, was the heading where the delay was certain."""
     likely = report["candidates"][0] | {"effect": "channel_delay", "probability": 0.99}
     open_beside = {"verdict": "cause_ambiguous", "causes": ["channel_delay", "uncatalogued"], "candidates": [likely]}
-    assert "Certain, though not what is beside it: channel delay " in printed(report | open_beside)
+    assert "Cause certain, others possible: channel delay " in printed(report | open_beside)

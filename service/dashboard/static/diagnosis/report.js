@@ -17,7 +17,7 @@ const SENTENCES = {
   cause_named: (causes) =>
     `The data disagree with the model, and ${causes} ${causes.includes(" and ") ? "account" : "accounts"} for it.`,
   cause_ambiguous: (causes) =>
-    `The data disagree with the model; what explains it may be ${causes}: these runs cannot distinguish.`,
+    `The data disagree with the model. The cause may be ${causes}: these runs cannot distinguish between them.`,
   unexplained_structure: () => "The data disagree with the model, and no cause in the catalogue accounts for it.",
   insufficient_data: () => "There is too little data for a verdict.",
 };
@@ -82,7 +82,7 @@ function certain({ verdict, causes = [], candidates: all = [] }) {
 export function heading(diagnosis) {
   const verdict = diagnosis.verdict ?? "";
   return certain(diagnosis).length > 0
-    ? "Certain, though not what is beside it"
+    ? "Cause certain, others possible"
     : (VERDICTS[verdict] ?? words(verdict));
 }
 

@@ -83,14 +83,14 @@ def test_why_an_extension_is_not_proposed_is_said(given: Study) -> None:
     assert reason_against(LARGER, Sizes(by_slug={})) == ""  # nothing was fitted
     either = Size(value=1e4, sd=2e4, interval=(-2e4, 4e4), other_sign=0.3, courses=True)
     some = Sizes(draws=(Draw(weight=1.0, laws=given.baseline.fit.laws),), by_slug={"pressure_offset": either})
-    assert "size of pressure offset (90 % interval −0.2 to 0.4 bar): it depends on the course" in reason_against(
+    assert "size of pressure offset (90 % interval −0.2 to 0.4 bar); it depends on the course" in reason_against(
         GAIN, some
     )
     positive = replace(
         either, interval=(1e3, 4e4), other_sign=0.03, courses=False
     )  # "not even its sign" was said of it
     said = reason_against(GAIN, replace(some, by_slug={"pressure_offset": positive}))
-    assert "(90 % interval 0.01 to 0.4 bar): its sign may be wrong with probability 0.03." in said
+    assert "(90 % interval 0.01 to 0.4 bar); its sign may be wrong with probability 0.03." in said
     sure = replace(either, interval=(1e4, 4e4), other_sign=0.001)
     assert reason_against(GAIN, replace(some, by_slug={"pressure_offset": sure})) == ""
 

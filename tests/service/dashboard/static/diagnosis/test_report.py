@@ -12,8 +12,8 @@ pytestmark = pytest.mark.browser
 @pytest.mark.parametrize(
     ("probability", "heading", "said"),
     [
-        (0.95, "Certain, though not what is beside it", "and oil change accounts for it."),
-        (0.6, "Cause ambiguous", "what explains it may be oil change or inertia torque"),
+        (0.95, "Cause certain, others possible", "and oil change accounts for it."),
+        (0.6, "Cause ambiguous", "The cause may be oil change or inertia torque"),
     ],
 )
 def test_the_heading_says_which_cause_is_certain(
