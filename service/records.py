@@ -252,7 +252,9 @@ def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:
 def attempts(clutch_id: str) -> Iterator[int]:
     """The numbers of the attempts to compute and store, from 1; raises BusyError where the clutch has changed at each."""
     yield from range(1, MAX_ATTEMPTS + 1)
-    raise BusyError(f"clutch {clutch_id!r} was changed by others {MAX_ATTEMPTS} times meanwhile: try again later")
+    raise BusyError(
+        f"clutch {clutch_id!r} was changed by other requests {MAX_ATTEMPTS} times meanwhile: try again later"
+    )
 
 
 def store(connection: Connection, clutch_id: str, computed: Results) -> None:

@@ -241,11 +241,11 @@ def _crest(channels: tuple[_Channel, ...], before: Dwell, dwell: Dwell, followin
 
 
 _SENTENCES = {
-    "overshoot": "{n} crests of overshoots left out, from {at} s.",
-    "no_pressure": "{n} stretches without pressure left out, from {at} s.",
-    "standstill": "{n} stretches at standstill left out, from {at} s.",
-    "dwell_too_short": "{n} dwells of fewer than 8 averages left out, from {at} s.",
-    "not_steady": "{n} stretches left out whose speed or pressure changes slowly throughout, from {at} s.",
+    "overshoot": "{n} crests of overshoots left out, beginning at {at} s.",
+    "no_pressure": "{n} stretches without pressure left out, beginning at {at} s.",
+    "standstill": "{n} stretches at standstill left out, beginning at {at} s.",
+    "dwell_too_short": "{n} dwells of fewer than 8 averages left out, beginning at {at} s.",
+    "not_steady": "{n} stretches left out whose speed or pressure changes slowly throughout, beginning at {at} s.",
 }
 
 

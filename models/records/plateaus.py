@@ -148,11 +148,11 @@ def _notes(cut: PlateauCut, drop: FloatArray) -> list[Note]:
         )
     ]
     for code, rows, sentence in (
-        ("unsettled", ~cut.settled, "{n} of {all} dwells ended before their torque had settled, from {at} s."),
+        ("unsettled", ~cut.settled, "{n} of {all} dwells ended before their torque had settled, beginning at {at} s."),
         (
             "drifting",
             cut.settled & (np.abs(cut.drift) > 4.0 * cut.drift_sd),
-            "Torque drifts on {n} of {all} settled dwells, from {at} s.",
+            "Torque drifts on {n} of {all} settled dwells, beginning at {at} s.",
         ),
     ):
         if rows.any():

@@ -63,9 +63,9 @@ def new_extrapolated(series: Series, assumptions: Assumptions, late: NewLater | 
     if (share_of_way(first, initial, fraction * initial) or 0.0) >= 0.5:
         return []
     message = (
-        f"the first test is at {cycles:,.0f} cycles with a mean COF of {first:.3g}, which led back to 0 cycles is "
-        f"{initial:.3g}. With a probability of {late.probability:.0%} the counter began with another clutch, and this "
-        "one was new at its first test; the forecast weighs both. If it was, send maintenance with the event rebuild at "
+        f"the first test is at {cycles:,.0f} cycles with a mean COF of {first:.3g}; extrapolated back to 0 cycles "
+        f"that is {initial:.3g}. With a probability of {late.probability:.0%} the counter began with another clutch, and "
+        "this one was new at its first test; the forecast weighs both. If so, send maintenance with the event rebuild at "
         f"{cycles:,.0f} cycles: its life is then counted from there"
     )
     return [Notice(code=NEW_EXTRAPOLATED, message=message)]

@@ -226,4 +226,4 @@ def too_slow(kind: Format, limits: Limits) -> InvalidError:
 
 def overdue(kind: Format, limits: Limits) -> BusyError:
     """The error of a file that was waited for too long, though its reader has not used the time that it may."""
-    return BusyError(f"the {kind} file was not read within {limits.wall_seconds} s: the machine has too much to do")
+    return BusyError(f"the {kind} file was not read within {limits.wall_seconds} s: the machine is too busy")

@@ -282,7 +282,7 @@ def _refuse_unknown_arguments(request: Request) -> None:
             FieldError(
                 pointer=f"/query/{name}",
                 code="extra_forbidden",
-                message=f"{name} is no argument here; there are: {', '.join(sorted(arguments)) or 'none'}",
+                message=f"{name} is not an argument of this route; its arguments: {', '.join(sorted(arguments)) or 'none'}",
                 value=request.query_params[name][:80],
             )
             for name in unknown

@@ -104,7 +104,7 @@ class Shares:
                 self._keys.popitem(last=False)
 
     async def _refuse(self, wait: float, scope: Scope, receive: Receive, send: Send) -> None:
-        detail = f"one caller may ask {self.per_second:g} times a second and {self.at_once} at once"
+        detail = f"one caller may send {self.per_second:g} requests a second and have {self.at_once} open at once"
         response = refused(TooManyError, detail)
         response.headers["Retry-After"] = str(math.ceil(wait))
         await response(scope, receive, send)

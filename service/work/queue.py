@@ -148,7 +148,7 @@ class JobQueue:
                     self._do(job, group[job.kind])
                     continue
             except Exception:  # noqa: BLE001  (the next job is to be done whatever became of this one)
-                _log.exception("a job could not be begun")
+                _log.exception("a job could not be started")
             wakes = self._waited(wakes)
 
     def _waited(self, wakes: int) -> int:
@@ -230,7 +230,7 @@ class JobQueue:
             with running(kind.work(job, self._settings), self._database.url) as process:
                 return process.written(f"{job.kind} {job.job_id}") if self._seen_through(job, process) else None
         except AwayError:
-            _log.warning("%s %s is made again once its lease has run out", job.kind, job.job_id)
+            _log.warning("%s %s is repeated once its lease has expired", job.kind, job.job_id)
             return None
         except FailedError as error:
             return {"problem": str(error)}
@@ -256,7 +256,7 @@ class JobQueue:
             with self._database.writing(of=self._name) as connection:
                 jobs.release(connection, job.job_id, self._name)
         except StorageError as error:
-            _log.warning("job %s is made again once its lease has run out: %s", job.job_id, error)
+            _log.warning("job %s is repeated once its lease has expired: %s", job.job_id, error)
 
     def _renewed(self, job: JobRow, progress: Json | None) -> bool:
         try:

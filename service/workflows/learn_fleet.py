@@ -31,8 +31,8 @@ from storage.encoding import Json, to_object
 from storage.engine.database import Database
 
 #: Why a refresh leaves a clutch.
-LEFT = "left to the next refresh: runs came while its predictions were made"
-GAVE_WAY = "left to a job of its own: another fleet is to learn first"
+LEFT = "left to the next refresh: runs arrived while its predictions were computed"
+GAVE_WAY = "left to a separate job: another fleet learns first"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -87,9 +87,7 @@ def as_job(
 
 
 _STEP = "replays the clutches"
-_LEFT = (
-    f"left as it was: runs came each of the {MAX_ATTEMPTS} times that it was computed again; replay it when fewer come"
-)
+_LEFT = f"unchanged: runs arrived each of the {MAX_ATTEMPTS} times that it was recomputed; replay it when fewer arrive"
 
 
 def _replaced(database: Database, recorded: Recorded, replayed: Recomputed) -> bool:

@@ -87,7 +87,7 @@ def test_an_end_by_other_criteria_is_shown_with_how_probably_each_is_the_first(
 def test_what_cannot_be_answered_is_refused_in_a_line(terminal: Terminal) -> None:
     refused: list[tuple[tuple[str, ...], int, str]] = [
         (("life", "nobody"), 65, "there is no clutch"),
-        (("life", "c1", "--query", "quantitty=slope"), 65, "quantitty is no argument here"),
+        (("life", "c1", "--query", "quantitty=slope"), 65, "quantitty is not an argument of this route"),
         (("life", "c1", "--query", "slope"), 64, "--query takes NAME=VALUE"),
         (("life", "c1", "--json", "--csv"), 64, "use --json or --csv"),
         (("life", "c1", "--pace", "120"), 64, "use --pace only with"),
@@ -95,7 +95,7 @@ def test_what_cannot_be_answered_is_refused_in_a_line(terminal: Terminal) -> Non
         (("life", "c1", "--block", "5000:20:30"), 65, "sd must not be larger than energy_per_cycle_kj"),
         (("life", "c1", "--plan", "nowhere.json"), 64, "nowhere.json"),
         (("life", "c1", "--block", "5000:20", "--csv"), 64, "--csv is not available for planned duty"),
-        (("engagement", "c1", "--query", "points=5"), 65, "points is no argument here"),
+        (("engagement", "c1", "--query", "points=5"), 65, "points is not an argument of this route"),
     ]
     for arguments, code, words in refused:
         assert words in terminal(*arguments, code=code), arguments

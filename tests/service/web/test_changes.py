@@ -150,4 +150,4 @@ def test_a_clutch_that_others_change_all_the_time_is_busy_and_not_computed_for_e
         asked.clear()
         answer = client.request(method, f"/v1/clutches/c1{path}", json=body)
         assert (answer.status_code, "Retry-After" in answer.headers, len(asked)) == (503, True, 3), path
-        assert "was changed by others 3 times" in answer.json()["detail"]
+        assert "was changed by other requests 3 times" in answer.json()["detail"]
