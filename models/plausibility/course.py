@@ -36,8 +36,8 @@ _NEVER = 1e-300
 class Tests:
     """The tests of a life: cycles ζ since it began [n], log COF [n], its variance [n], the epoch of maintenance [n].
 
-    `levels` are the cycles from which on COF has a new level and pace [l]; `level` and `level_sd` what was known of log COF
-    before the first test.
+    `levels` are the cycles from which on COF has a new level [l]; `level` and `level_sd` what was known of log COF before
+    the first test.
     """
 
     cycles: FloatArray
@@ -62,13 +62,6 @@ def _own_clock(cycles: FloatArray, latest: float) -> FloatArray:
     return np.asarray(at / whole)
 
 
-def _turns(cycles: FloatArray, at: float, latest: float) -> FloatArray:
-    """What a new level and a new pace from some cycles on add to COF at cycles [n], in deviations: a step, and a line from
-    there to the latest test and beyond; [2, n]."""
-    since = np.maximum(cycles - at, 0.0)
-    return np.array([cycles >= at, since / (latest - at) if latest > at else 0.0 * since], dtype=np.float64)
-
-
 @dataclass(frozen=True)
 class Fit:
     """The tests of a life taken in, and what they say of further ones.
@@ -83,7 +76,7 @@ class Fit:
     def _columns(self, cycles: FloatArray, epoch: FloatArray, stretches: int = PAST + FUTURE) -> FloatArray:
         """A at cycles [k] in epochs [k]; [g, k, p], with so many of δ's stretches last, those after T behind the others."""
         u = _own_clock(cycles, self.latest)
-        levels = [criteria.LEVEL_SD * turn for at in self.tests.levels for turn in _turns(cycles, at, self.latest)]
+        levels = [criteria.LEVEL_SD * (cycles >= at) for at in self.tests.levels]
         steps = [criteria.STEP_SD * (epoch > e) for e in np.unique(self.tests.epoch)]
         level = np.stack([np.full(cycles.shape, self.tests.level_sd), *levels, *steps], axis=1)
         shared = np.broadcast_to(level, (*u.shape, level.shape[1]))
@@ -162,20 +155,19 @@ class Fit:
         return missed(self.tests.log_cof - mean, variance, log_weight)
 
     def log_step_gains(self) -> FloatArray:
-        """By how much the log evidence would grow by a new level and pace from each test on [n]."""
-        cycles = self.tests.cycles
-        turns = criteria.LEVEL_SD * np.array([_turns(cycles, at, self.latest) for at in cycles])
-        explained = (self._explained @ turns.reshape(-1, cycles.size).T).reshape(len(_NODES), -1, *turns.shape[:2])
-        within = np.moveaxis((turns[:, :, None] * turns[:, None]) @ (1.0 / self.noise).T, 3, 0)
-        inner = within - (explained[..., :, None] * explained[..., None, :]).sum(axis=1)
-        pulled = np.moveaxis(turns @ self.pull.T, 2, 0)
-        scale = np.eye(2) + inner
-        solved = np.linalg.solve(scale, pulled[..., None])[..., 0]
-        gain = 0.5 * (pulled * solved).sum(axis=2) - 0.5 * np.log(np.linalg.det(scale))
-        gains = np.logaddexp.reduce(self.log_weight[:, None] + gain, axis=0)
+        """By how much the log evidence would grow by a new level from each test on [n]; 0 for the first."""
+        order = np.argsort(self.tests.cycles, kind="stable")[::-1]
+        explained = np.square(self._explained[:, :, order].cumsum(axis=2)).sum(axis=1)
+        volume = (1.0 / self.noise[:, order]).cumsum(axis=1) - explained
+        pulled = self.pull[:, order].cumsum(axis=1)
+        scale = 1.0 + criteria.LEVEL_SD**2 * volume
+        gain = -0.5 * np.log(scale) + 0.5 * criteria.LEVEL_SD**2 * pulled**2 / scale
+        total = np.logaddexp.reduce(self.log_weight[:, None] + gain, axis=0)
+        gains = np.zeros(order.size)
+        gains[order] = total
         # tests at the same cycles begin a new level together: the first of them stands for all
         first = np.unique(self.tests.cycles, return_index=True)[1]
-        alone = np.full(cycles.size, -np.inf)
+        alone = np.full(order.size, -np.inf)
         alone[first] = gains[first]
         return alone
 

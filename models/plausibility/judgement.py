@@ -1,7 +1,7 @@
 """Which runs of a clutch slipped: one question over all of them.
 
-A belief says of every run whether it is as it was sent, outlying, or slipped, and from which tests on COF has a new level
-and a new pace. Its log probability is the sum of
+A belief says of every run whether it is as it was sent, outlying, or slipped, and from which tests on COF has a new level.
+Its log probability is the sum of
 
     log p(COF of the tests that are as sent | course, outlying ones, new levels)      `course`
     log P(cycles), log P(dates)                                                       `pace`
@@ -10,9 +10,9 @@ and a new pace. Its log probability is the sum of
     the prior of outlying runs and of new levels
 
 From the belief that all runs are as sent the search takes the best single change until none helps. A run's probability of
-a slip is summed over that belief and those that differ from it in one run: where two runs agree, that both slipped is far
-less probable than that neither did. The judgement is a function of the runs alone: neither the order of their arrival nor
-what was held before plays a part.
+a slip is summed over the beliefs that it met, and those that differ from the last in one run: where two runs agree, that
+both slipped is far less probable than that neither did. The judgement is a function of the runs alone: neither the order of
+their arrival nor what was held before plays a part.
 """
 
 import math
@@ -40,11 +40,15 @@ SUSPECTS = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Belief:
-    """Indices of the runs that slipped, of outlying tests, and of tests from which on COF has a new level and pace."""
+    """Indices of the runs that slipped, of outlying tests, and of tests from which on COF has a new level."""
 
     slipped: frozenset[int] = frozenset()
     outlying: frozenset[int] = frozenset()
     levels: frozenset[int] = frozenset()
+
+    def turned(self, run: int) -> "Belief":
+        """A run slipped that did not, or did not that slipped; all else is the same."""
+        return Belief(slipped=self.slipped ^ {run}, outlying=self.outlying - {run}, levels=self.levels - {run})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,15 +73,14 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> dict[int, Verdict
     and to the latest one are looked at; of fewer the answer depends on the runs alone.
     """
     clutch = _Clutch(runs=tuple(runs), about=frozenset(about))
-    best = _searched(clutch, Belief())
-    weighed = {best.belief: best.log_probability}
+    best, weighed = _searched(clutch)
     weighed |= {other: _Weighed(clutch=clutch, belief=other).log_probability for other in best.instead()}
     if not (best.belief.slipped or best.doubts or len(weighed) > 1):
         return {}
     for index, log_odds in best.log_odds.items():
-        other = replace(best.belief, slipped=best.belief.slipped ^ {index})
-        sign = -1.0 if index in best.belief.slipped else 1.0
-        weighed.setdefault(other, best.log_probability + sign * log_odds)
+        if index not in best.belief.outlying | best.belief.levels:  # else other tests lean on it
+            sign = -1.0 if index in best.belief.slipped else 1.0
+            weighed.setdefault(best.belief.turned(index), best.log_probability + sign * log_odds)
     total = np.logaddexp.reduce(list(weighed.values()))
     verdicts = {}
     for index in sorted(set().union(*(belief.slipped for belief in weighed))):
@@ -89,23 +92,23 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> dict[int, Verdict
     return verdicts
 
 
-def _searched(clutch: "_Clutch", start: Belief) -> "_Weighed":
-    """The belief that no single change improves, from a first one."""
-    now, tried = _Weighed(clutch=clutch, belief=start), {start}
+def _searched(clutch: "_Clutch") -> tuple["_Weighed", dict[Belief, float]]:
+    """The belief that no single change improves, from the one that all runs are as sent; and the log probability of all
+    that were met on the way."""
+    now = _Weighed(clutch=clutch, belief=Belief())
+    met = {now.belief: now.log_probability}
     for _ in range(16):  # changes at most
         moves = sorted(
-            ((gain, moved) for moved, gain in now.moves() if gain > _WORTH and moved not in tried),
+            ((gain, moved) for moved, gain in now.moves() if gain > _WORTH and moved not in met),
             key=lambda move: -move[0],
         )
-        for _, moved in moves[:3]:
-            tried.add(moved)
-            then = _Weighed(clutch=clutch, belief=moved)
-            if then.log_probability > now.log_probability + _WORTH:
-                now = then
-                break
-        else:
-            return now
-    return now
+        then = [_Weighed(clutch=clutch, belief=moved) for _, moved in moves[:3]]
+        met |= {weighed.belief: weighed.log_probability for weighed in then}
+        best = max(then, key=lambda weighed: weighed.log_probability, default=now)
+        if best.log_probability <= now.log_probability + _WORTH:
+            break
+        now = best
+    return now, met
 
 
 @dataclass(frozen=True)
@@ -460,8 +463,7 @@ class _Weighed:
         belief = self.belief
         for i, log_odds in self.log_odds.items():
             gain = -log_odds if i in belief.slipped else log_odds
-            without = Belief(slipped=belief.slipped ^ {i}, outlying=belief.outlying - {i}, levels=belief.levels - {i})
-            yield without, gain
+            yield belief.turned(i), gain
         to_outlying = math.log(criteria.OUTLYING_SHARE) - math.log1p(-criteria.OUTLYING_SHARE)
         for fit, own in self.fits:
             if not own:
@@ -489,8 +491,7 @@ class _Weighed:
         for _, own in self.fits:
             i = max(own, key=lambda j: float(self.clutch.cycles[j]), default=-1)
             if i in belief.outlying | belief.levels:
-                left = belief.outlying - {i}, belief.levels - {i}
-                yield Belief(slipped=belief.slipped | {i}, outlying=left[0], levels=left[1])
+                yield belief.turned(i)
 
     def verdict(self, index: int, log_odds: float) -> Verdict:
         """What is said of a run that is doubted."""

@@ -10,7 +10,7 @@ from models.diagnosis.baseline.prediction import predict
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.effect import Shape
+from models.diagnosis.effects.effect import FROM_THE_START, Shape
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
@@ -32,8 +32,15 @@ class Study:
 
     def extended(self, *effects: tuple[str, float, Shape]) -> Fit:
         """The baseline with effects (slug, first amplitude, shape) fitted along."""
-        start = [FittedEffect(effect=BY_SLUG[slug], amplitude=first, shape=shape) for slug, first, shape in effects]
+        start = [of_size(slug, first, shape) for slug, first, shape in effects]
         return fit(self.problem, self.baseline.fit.laws, start)
+
+
+def of_size(slug: str, amplitude: float, shape: Shape) -> FittedEffect:
+    """An effect as large and formed so, at work from the start where the shape does not say from when on."""
+    effect = BY_SLUG[slug]
+    missing = effect.begins and len(shape) < len(effect.shapes)
+    return FittedEffect(effect=effect, amplitude=amplitude, shape=(*shape, FROM_THE_START) if missing else shape)
 
 
 def study(campaign: Campaign) -> Study:

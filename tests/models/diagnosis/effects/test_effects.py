@@ -33,7 +33,7 @@ from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, starting_laws
 from models.diagnosis.pooled_fit.projection import gram_of, project
 from models.friction.stribeck import GAMMA
 from tests.models.diagnosis.campaigns import campaign
-from tests.models.diagnosis.fitted import study
+from tests.models.diagnosis.fitted import of_size, study
 
 SLUGS = [
     "oil_temperature",
@@ -264,7 +264,7 @@ def test_a_discrepancy_absorbs_what_a_template_misses_as_far_as_its_prior_allows
     """Whitened squares that are left of a truth off by one deviation of the prior, with discrepancy and without; a truth
     that is off by ten deviations keeps most of its misfit."""
     drag = BY_SLUG["hydrodynamic_drag"]
-    fitted = FittedEffect(effect=drag, amplitude=1.5, shape=(1.0, 0.0, 0.0, 0.0))
+    fitted = of_size("hydrodynamic_drag", 1.5, (1.0, 0.0, 0.0, 0.0))
     baseline = given.baseline
     change = effect_rows(given.design, baseline.fit.prediction, fitted)
     extra = discrepancy_columns(given.design, baseline.fit.prediction, fitted)[:, :1].sum(axis=1)

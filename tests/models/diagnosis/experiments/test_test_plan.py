@@ -10,7 +10,7 @@ from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun
 from models.diagnosis.criteria import WORTHWHILE
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.fitted_effect import FittedEffect, effect_rows
+from models.diagnosis.effects.fitted_effect import effect_rows
 from models.diagnosis.effects.readings import STRAIGHT
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.experiments import candidates
@@ -21,7 +21,7 @@ from models.diagnosis.explanations.verdict import Fitted
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.records.runs import Plateaus
 from tests.models.diagnosis.campaigns import Where, campaign
-from tests.models.diagnosis.fitted import Study, study, warmth
+from tests.models.diagnosis.fitted import Study, of_size, study, warmth
 
 
 def inertia(at: Where) -> np.ndarray:
@@ -65,8 +65,8 @@ def squeeze(given: Study):
 
 def test_a_zero_is_parted_from_wear_by_an_open_clutch(warm):
     """A shifted zero stays without pressure, wear does not."""
-    zero = of_size(warm, "torque_zero_shift", -0.6, (0.0, 8000.0, *STRAIGHT))
-    wear = of_size(warm, "accelerated_wear", 0.03, (6000.0, 1.0))
+    zero = beside(warm, "torque_zero_shift", -0.6, (0.0, 8000.0, *STRAIGHT))
+    wear = beside(warm, "accelerated_wear", 0.03, (6000.0, 1.0))
     found = advised(warm, zero, wear)
     assert found[0].key == "open_sweep"
     assert found[0].nats > WORTHWHILE
@@ -74,9 +74,9 @@ def test_a_zero_is_parted_from_wear_by_an_open_clutch(warm):
     assert "repeats" not in {each.key for each in found}
 
 
-def of_size(given: Study, slug: str, amplitude: float, shape: tuple[float, ...]) -> Fit:
+def beside(given: Study, slug: str, amplitude: float, shape: tuple[float, ...]) -> Fit:
     """The baseline with an effect as large as wanted beside it, not fitted."""
-    return replace(given.baseline.fit, effects=(FittedEffect(effect=BY_SLUG[slug], amplitude=amplitude, shape=shape),))
+    return replace(given.baseline.fit, effects=(of_size(slug, amplitude, shape),))
 
 
 def test_what_was_predicted_is_what_the_test_brings(warm):

@@ -128,7 +128,7 @@ def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
         precision[: rows.shape[1], : rows.shape[1]] += rows.T @ rows
         if own:
             (each,) = found.effects  # half the width of a shape's bounds is its prior's deviation
-            widths = [0.5 * (shape.highest - shape.lowest) for shape in each.effect.shapes]
+            widths = [0.5 * (shape.highest - shape.lowest) for _, shape in each.effect.smooth(each.shape)]
             weak = [amplitude_precision(each.effect, each.amplitude), *(width**-2.0 for width in widths)]
             precision[[-3, -2, -1], [-3, -2, -1]] += weak
         scale = 1 / np.sqrt(np.diag(precision))
