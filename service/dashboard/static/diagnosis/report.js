@@ -81,9 +81,7 @@ function certain({ verdict, causes = [], candidates: all = [] }) {
 /** @param {{ verdict: string | null, causes?: string[], candidates?: CandidateOut[] }} diagnosis */
 export function heading(diagnosis) {
   const verdict = diagnosis.verdict ?? "";
-  return certain(diagnosis).length > 0
-    ? "Cause certain, others possible"
-    : (VERDICTS[verdict] ?? words(verdict));
+  return certain(diagnosis).length > 0 ? "Cause certain, others possible" : (VERDICTS[verdict] ?? words(verdict));
 }
 
 /**
