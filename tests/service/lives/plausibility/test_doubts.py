@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.plausibility import simulated, slips
+from tests.plausibility import simulated, slips, trials
 from tests.plausibility.bench import REFUSED, Bench
 from tests.support import stationary
 
@@ -157,6 +157,19 @@ def test_another_clutch_is_held_once_there_is_a_course() -> None:
     answer = bench_after().answer(other)
     assert answer.codes == ("cof_off_course",)
     assert "another clutch" in answer.message
+
+
+@pytest.mark.parametrize(
+    ("rig", "number"),
+    [
+        pytest.param("simulated rig", 18, id="the latest test, as if COF had a new level"),
+        pytest.param("simulated rig", 55, id="a block that would join others by its length alone"),
+        pytest.param("blind rig", 2, id="a dynamic test in kNm"),
+        pytest.param("blind rig", 28, id="a dynamic test of another clutch"),
+    ],
+)
+def test_a_slip_is_seen_in_a_run_that_has_no_place_in_the_course(rig: str, number: int) -> None:
+    assert trials.slipped(7001, rig, number).held
 
 
 def test_what_is_held_does_not_depend_on_the_order_of_arrival() -> None:
