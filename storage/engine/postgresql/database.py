@@ -32,7 +32,7 @@ from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.exc import ProgrammingError, SQLAlchemyError
 
 from storage.engine.database import Database, Question, SharedAnswer, SharedAnswers, Snapshot, Watch, granted
-from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailable
+from storage.engine.errors import DatabaseTooOld, ServiceRuns, StorageError, StorageUnavailable
 from storage.engine.integrity import refuse_newer
 from storage.engine.postgresql.connect import (
     SingleStatements,
@@ -253,24 +253,33 @@ class ServerDatabase(Database):
 
     def migrate(self) -> None:
         """Make the tables of an empty database, or run the steps that it lacks, not under a running service."""
+        in_use = self._is_in_use()
+        if in_use is None:
+            return
+        try:
+            with (
+                migration_lock(self._address, self._lock_timeout) if in_use else nullcontext(),
+                self.writing() as connection,
+            ):
+                revision = current(connection)  # another process may have been before
+                if revision != head():
+                    refuse_newer(revision)
+                    upgrade(connection)
+                server_tables.create_all(connection)
+                if revision is None:
+                    connection.execute(commits.insert().values(number=0))
+        except ServiceRuns:
+            # the service that runs may be the one that was before, and has nothing left to do
+            if self._is_in_use() is not None:
+                raise
+
+    def _is_in_use(self) -> bool | None:
+        """Whether services may use the database, which lacks a step; None where it lacks none."""
         with self.reading() as connection:
             _require_utf8(connection, self.name)
             revision = current(connection)
             has_server_tables = set(inspect(connection).get_table_names()) >= set(server_tables.tables)
-        if revision == head() and has_server_tables:
-            return
-        in_use = revision is not None
-        with (
-            migration_lock(self._address, self._lock_timeout) if in_use else nullcontext(),
-            self.writing() as connection,
-        ):
-            revision = current(connection)  # another process may have been before
-            if revision != head():
-                refuse_newer(revision)
-                upgrade(connection)
-            server_tables.create_all(connection)
-            if revision is None:
-                connection.execute(commits.insert().values(number=0))
+        return None if revision == head() and has_server_tables else revision is not None
 
     def _refuse_closed(self) -> None:
         if self._closed:

@@ -3,10 +3,10 @@
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, closing, suppress
+from contextlib import AbstractContextManager, ExitStack, closing, suppress
 
 import pytest
-from sqlalchemy import make_url, text
+from sqlalchemy import URL, make_url, text
 from sqlalchemy.exc import ProgrammingError
 
 from storage import changes, clutches, runs
@@ -21,6 +21,7 @@ from storage.engine.errors import (
 )
 from storage.engine.integrity import other_schema
 from storage.engine.opening import database_exists, find_database, open_database
+from storage.engine.postgresql import database as server
 from storage.migrations.upgrade import current, head
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
 from tests.storage.samples import clutch_row, store_run, take_back
@@ -103,6 +104,25 @@ def test_a_database_of_an_earlier_revision_is_not_migrated_under_a_service(datab
         with database.reading() as connection:
             assert current(connection) == head()
             assert connection.exec_driver_sql("SELECT count(later) FROM clutch").scalar_one() == 0
+
+
+@pytest.mark.usefixtures("later_step")
+def test_a_service_that_comes_late_to_a_migration_starts_beside_the_one_that_made_it(
+    database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with database.writing() as connection:
+        take_back(connection)
+    lock = server.migration_lock
+    with ExitStack() as serving:
+
+        def lock_late(address: URL, lock_timeout: float) -> AbstractContextManager[None]:
+            monkeypatch.setattr(server, "migration_lock", lock)
+            serving.enter_context(closing(open_database(database.url, serving=True)))
+            return lock(address, lock_timeout)
+
+        monkeypatch.setattr(server, "migration_lock", lock_late)
+        with closing(open_database(database.url, lock_timeout=0.1, serving=True)) as late, late.reading() as connection:
+            assert current(connection) == head()
 
 
 def test_what_came_with_a_later_revision_is_not_found(database: Database) -> None:
