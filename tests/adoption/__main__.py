@@ -1,4 +1,4 @@
-"""`make adoption`: hide artefacts, adopt what the diagnosis offers, and hold remaining life against the truth.
+"""`make adoption`: hide effects, adopt what the diagnosis offers, and hold remaining life against the truth.
 
 SEED= other campaigns (1)    SIZE= small, full, or a share of the full table    PROCESSES= how many at once (1)
 ONLY= trials whose names begin with these    ARGS="--scheduler WHERE" as in `make blind`
@@ -8,23 +8,17 @@ Campaigns and results are stored in .adoption, a file each: the next run goes on
 code remove .adoption/results.
 """
 
-import os
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.prognosis.criteria import HORIZON
-from service.work.executor import executor_of
-from tests.adoption.trials import LOUD, STORE, Adopted, Trial, adopted, trials
-from tests.blind.__main__ import run, scheduler
-from tests.blind.lives import ARTEFACTS
+from models.prognosis.scoring import crps_of_quantiles
+from tests.adoption.trials import ARTEFACTS, COURSES, LOUD, STORE, Adopted, adopted, trials
+from tests.measuring import APPENDIX, Asked, each, fill, table, where
 
-SIZES = {"small": 0.1, "full": 1.0}
-DOCUMENT = Path(__file__).parents[2] / "docs" / "appendix" / "diagnosis.md"
-BEGIN, END = "<!-- adoption: begin -->", "<!-- adoption: end -->"
 #: A median further from the truth than before by more than this share of life is worse [-].
 WORSE = 0.02
 
@@ -39,6 +33,12 @@ def off(quantiles: dict[str, float | None], truth: float) -> float:
     """How far the median is from the end, in lives."""
     median = quantiles["0.5"]
     return abs((HORIZON if median is None else median) - truth) / truth
+
+
+def crps(quantiles: dict[str, float | None], truth: float) -> float:
+    """CRPS of the logarithm of the end; one beyond the horizon is scored as if it were at the horizon."""
+    ends = {float(q): HORIZON if x is None else max(x, 1.0) for q, x in quantiles.items()}
+    return crps_of_quantiles(list(ends), [float(np.log(x)) for x in ends.values()], float(np.log(truth)))
 
 
 def _estimated(one: Adopted) -> list[float]:
@@ -72,35 +72,44 @@ def size_held(one: Adopted) -> bool:
     return low <= one.size <= high
 
 
-def table(results: Sequence[Adopted]) -> list[str]:
-    """A row an artefact and loudness, and all."""
-    lines = [
-        "| hidden | made | named right | offered of these | adopted | end held before | end held after | nothing hidden | "
-        "nearer | further by 2 % of life | than nothing hidden too | wrong sign | size held |",
-        "|---" * 13 + "|",
-    ]
-    rows = [(f"`{slug}`, λ = {lam:.0f}", slug, lam) for slug in ARTEFACTS for lam in LOUD]
-    for title, slug, lam in [*rows, ("all", None, None)]:
-        mine = [one for one in results if one.made and slug in {one.trial.slug, None} and lam in {one.trial.lam, None}]
+TITLES = (
+    "hidden", "made", "named right", "offered of these", "adopted", "end held before", "end held after", "nothing hidden",
+    "nearer", "further by 2 % of life", "than nothing hidden too", "wrong sign", "size held",
+    "CRPS of ln end, before and after",
+)  # fmt: skip
+
+
+def rows(results: Sequence[Adopted]) -> list[str]:
+    """A row an effect and loudness, and all artefacts."""
+    groups = [(f"`{slug}`, λ = {lam:.0f}", (slug,), (lam,)) for slug in (*ARTEFACTS, *COURSES) for lam in LOUD]
+    lines = []
+    for title, slugs, lams in [*groups, ("all artefacts", ARTEFACTS, LOUD)]:
+        mine = [one for one in results if one.made and one.trial.slug in slugs and one.trial.lam in lams]
         right = [one for one in mine if one.named_right]
         offered = [one for one in mine if one.adoptable]
-        ours = [one for one in offered if one.trial.slug in one.estimates and one.trial.slug in one.causes]
-        cells = [
-            str(len(mine)),
-            str(len(right)),
-            _share(right, lambda one: one.adoptable),
-            str(len(offered)),
-            _share(offered, lambda one: held(one.before, one.end)),
-            _share(offered, lambda one: held(one.after, one.end)),
-            _share(offered, lambda one: held(one.clean, one.end)),
-            _share(offered, nearer),
-            _share(offered, worse),
-            _share(offered, worse_than_clean),
-            str(sum(wrong_sign(one) for one in ours)),
-            _share(right, size_held),
+        distorted = [one for one in offered if one.clean]
+        ours = [one for one in distorted if one.trial.slug in one.estimates and one.trial.slug in one.causes]
+        scores = [
+            np.mean([crps(getattr(one, name), one.end) for one in offered]) for name in ("before", "after") if offered
         ]
-        lines.append(f"| {title} | " + " | ".join(cells) + " |")
-    return lines
+        if mine:
+            cells = [
+                str(len(mine)),
+                str(len(right)),
+                _share(right, lambda one: one.adoptable),
+                str(len(offered)),
+                _share(offered, lambda one: held(one.before, one.end)),
+                _share(offered, lambda one: held(one.after, one.end)),
+                _share(distorted, lambda one: held(one.clean, one.end)),
+                _share(offered, nearer),
+                _share(offered, worse),
+                _share(distorted, worse_than_clean),
+                str(sum(wrong_sign(one) for one in ours)),
+                _share([one for one in right if one.clean], size_held),
+                ", ".join(f"{score:.3f}" for score in scores),
+            ]
+            lines.append([title, *cells])
+    return table(TITLES, lines)
 
 
 def meaning(results: Sequence[Adopted], command: str) -> list[str]:
@@ -112,7 +121,8 @@ def meaning(results: Sequence[Adopted], command: str) -> list[str]:
         "before in 90 % and further by 2 % of life in 3 % at most; no wrong sign of the named size among those offered; its "
         "90 % interval holds what was hidden in 85 to 95 %; offered in 80 % of those named right at λ = 300, of each "
         "artefact in half. *Nothing hidden* is the same interval of the same runs with the same noise and no artefact in "
-        "them: adoption cannot do better than that, and where that is further from the truth than before, before was luck."
+        "them: adoption cannot do better than that, and where that is further from the truth than before, before was luck. "
+        "What moves a life (running-in, an oil change, wear, severity) stays in it: nothing is taken off."
     )
     return [
         f"`{command}`, at {', '.join(commits)}; {unmade} of {len(results)} campaigns could not be made.",
@@ -131,7 +141,7 @@ def listed(one: Adopted) -> str:
     size = "–" if estimate is None else "{:+.3f} ± {:.3f} [{:+.3f}, {:+.3f}]".format(*estimate)
     ends = [
         " ".join("never" if forecast[q] is None else f"{forecast[q]:,.0f}" for q in ("0.05", "0.5", "0.95"))
-        for forecast in (one.before, one.after, one.clean)
+        for forecast in (one.before, one.after, one.clean or dict.fromkeys(one.before))
     ]
     signs = f"{'offered' if one.adoptable else 'no offer':9s}{'held' if held(one.after, one.end) else 'MISSED':7s}"
     signs += "nearer " if nearer(one) else "FURTHER" if worse(one) else "as far "
@@ -141,30 +151,20 @@ def listed(one: Adopted) -> str:
     )
 
 
-def write(lines: Sequence[str]) -> None:
-    """Between the markers of docs/appendix/diagnosis.md."""
-    text = DOCUMENT.read_text(encoding="utf-8")
-    before, rest = text.split(BEGIN)
-    DOCUMENT.write_text(f"{before}{BEGIN}\n\n" + "\n".join(lines) + f"\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
-
-
 def main() -> None:
     """Print the table."""
-    seed, chosen_size = int(os.environ.get("SEED") or 1), os.environ.get("SIZE") or "small"
-    only = tuple((os.environ.get("ONLY") or "").split(","))
-    size = SIZES[chosen_size] if chosen_size in SIZES else float(chosen_size)
-    chosen: list[Trial] = [trial for trial in trials(seed, size) if trial.name.startswith(only)]
+    asked = Asked.here()
+    chosen = [trial for trial in trials(asked.seed, asked.size) if trial.name.startswith(asked.only)]
     if "--stored" in sys.argv:
         chosen = [trial for trial in chosen if (STORE / "results" / f"{trial.name}.json").exists()]
-    with executor_of(scheduler(sys.argv) or f"processes:{os.environ.get('PROCESSES') or '1'}") as executor:
-        results = run(adopted, chosen, executor)
+    results = list(each(adopted, chosen, where(1)))
     if "--list" in sys.argv:
         print("\n".join(listed(one) for one in results))
-    lines = [*meaning(results, f"make adoption SEED={seed} SIZE={chosen_size}"), *table(results)]
+    lines = [*meaning(results, f"make adoption {asked}"), *rows(results)]
     print("\n".join(lines))
     print(f"median {np.median([one.seconds for one in results if one.made] or [0.0]):.1f} s a campaign")
     if "--write" in sys.argv:
-        write(lines)
+        fill(APPENDIX / "diagnosis.md", {"adoption": "\n".join(lines)})
 
 
 if __name__ == "__main__":

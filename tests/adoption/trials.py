@@ -1,4 +1,4 @@
-"""One trial: an artefact is hidden, what the diagnosis offers is adopted, and remaining life is held against the truth.
+"""One trial: an effect is hidden, what the diagnosis offers is adopted, and remaining life is held against the truth.
 
 Campaigns are those of the blind rig in its own forms (`tests.blind.rig`), lives end as in `tests.blind.lives`. Both the
 campaign and what came of it are stored, a file each, so that a run goes on where it ended.
@@ -10,26 +10,30 @@ import subprocess
 import time
 import zlib
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tests.blind.lives import ARTEFACTS, DRAWS, LATEST, SOONEST, STATES, forecast_of, forecasts_of, passed_at
+from tests.blind.lives import forecast_of, forecasts_of, passed_at
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.sent import runs
 from tests.blind.rig.world import read
+from tests.measuring import ROOT, kept
 
-#: How loud the artefacts are, and campaigns of each at each loudness with loops and as many without in the whole table.
-LOUD, EACH = (80.0, 300.0), 20
-ROOT = Path(__file__).parents[2]
+#: Artefacts that distort what is measured of a life, and what moves it.
+ARTEFACTS = ("oil_temperature", "torque_zero_shift", "pressure_offset")
+COURSES = ("running_in", "oil_change", "accelerated_wear", "load_severity")
+#: How loud they are, and campaigns of each at each loudness with loops and as many without in the whole table; states.
+LOUD, EACH, STATES = (80.0, 300.0), 20, 8
+#: The end in lengths of what was measured; draws until one of them is the first passage of its own value.
+SOONEST, LATEST, DRAWS = 1.3, 2.5, 20
 STORE = ROOT / ".adoption"
 
 
 @dataclass(frozen=True)
 class Trial:
-    """An artefact at a loudness, with dynamic tests or without, and its number."""
+    """An effect at a loudness, with dynamic tests or without, and its number."""
 
     slug: str
     lam: float
@@ -44,9 +48,9 @@ class Trial:
 
 @dataclass(frozen=True)
 class Campaign:
-    """What is posted, the same runs with nothing hidden in the same noise, and the truth: the share of its first mean COF at
-    which the clutch ends, its end [cycles], the cycles measured, the artefact's size in the catalogue's unit and sense after
-    the last state. None: it could not be made."""
+    """What is posted, the same runs without the artefact in the same noise (none of what moves a life), and the truth: the
+    share of its first mean COF at which the clutch ends, its end [cycles], the cycles measured, the artefact's size in the
+    catalogue's unit and sense after the last state. None: it could not be made."""
 
     sent: list[dict[str, Any]]
     clean: list[dict[str, Any]]
@@ -92,7 +96,7 @@ def trials(seed: int, size: float) -> list[Trial]:
     return [
         Trial(slug, lam, loops, seed, number)
         for number in range(count)
-        for slug in ARTEFACTS
+        for slug in (*ARTEFACTS, *COURSES)
         for lam in LOUD
         for loops in (False, True)
     ]
@@ -100,15 +104,13 @@ def trials(seed: int, size: float) -> list[Trial]:
 
 def made(trial: Trial) -> Campaign | None:
     """The campaign of a trial, made or read."""
-    path = STORE / "campaigns" / f"{trial.name}.json.gz"
-    if not path.exists():
+
+    def packed() -> bytes:
         campaign = _made(trial)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        stored = json.dumps(None if campaign is None else asdict(campaign)).encode()
-        path.with_suffix(".part").write_bytes(gzip.compress(stored, 3))
-        path.with_suffix(".part").rename(path)
-    read = json.loads(gzip.decompress(path.read_bytes()))
-    return None if read is None else Campaign(**read)
+        return gzip.compress(json.dumps(None if campaign is None else asdict(campaign)).encode(), 3)
+
+    stored = json.loads(gzip.decompress(kept(STORE / "campaigns" / f"{trial.name}.json.gz", packed)))
+    return None if stored is None else Campaign(**stored)
 
 
 def _made(trial: Trial) -> Campaign | None:
@@ -121,7 +123,8 @@ def _made(trial: Trial) -> Campaign | None:
         end = float(np.random.default_rng([*seed, k]).uniform(SOONEST, LATEST) * hidden.plan.life.span)
         fraction = passed_at(hidden, end)
         if fraction is not None:
-            return Campaign(runs(hidden), runs(without(hidden)), fraction, end, hidden.plan.life.span, size_of(hidden))
+            clean = runs(without(hidden)) if trial.slug in ARTEFACTS else []
+            return Campaign(runs(hidden), clean, fraction, end, hidden.plan.life.span, size_of(hidden))
     return None
 
 
@@ -133,7 +136,7 @@ def without(hidden: Hidden) -> Hidden:
 
 
 def size_of(hidden: Hidden) -> float:
-    """The artefact's size after the last state: a zero [Nm] or an offset [bar] with its sign, the oil's exponent [-]."""
+    """An artefact's size after the last state: a zero [Nm] or an offset [bar] with its sign, the oil's exponent [-]."""
     effect, amplitude = hidden.effects[0]
     site = hidden.plan.sites[0]
     last = np.flatnonzero(site.state == site.state.max())
@@ -149,14 +152,8 @@ def size_of(hidden: Hidden) -> float:
 def adopted(trial: Trial) -> Adopted:
     """What comes of a trial, computed or read."""
     path = STORE / "results" / f"{trial.name}.json"
-    if path.exists():
-        stored = json.loads(path.read_text(encoding="utf-8"))
-        return Adopted(**(stored | {"trial": Trial(**stored["trial"])}))
-    result = _adopted(trial)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.with_suffix(".part").write_text(json.dumps(asdict(result)), encoding="utf-8")
-    path.with_suffix(".part").rename(path)
-    return result
+    stored = json.loads(kept(path, lambda: json.dumps(asdict(_adopted(trial))).encode()))
+    return Adopted(**(stored | {"trial": Trial(**stored["trial"])}))
 
 
 def _adopted(trial: Trial) -> Adopted:
@@ -176,7 +173,7 @@ def _adopted(trial: Trial) -> Adopted:
         estimates={candidate["effect"]: _estimate(candidate["estimate"]) for candidate in report["candidates"]},
         before=before["end_of_life_cycles"],
         after=after["end_of_life_cycles"],
-        clean=forecast_of(campaign.clean, campaign.fraction)["end_of_life_cycles"],
+        clean=forecast_of(campaign.clean, campaign.fraction)["end_of_life_cycles"] if campaign.clean else {},
         end=campaign.end,
         span=campaign.span,
         size=campaign.size,

@@ -4,14 +4,13 @@ import sys
 
 from tests.architecture import document, picture
 from tests.documents import __main__ as reference
+from tests.measuring import fill
 
 
 def main() -> int:
     """Write both, and the pages of docs/reference."""
     picture.main()
-    text = document.DOCUMENT.read_text(encoding="utf-8")
-    text = document.filled(text, document.written() | document.measured())
-    document.DOCUMENT.write_text(text, encoding="utf-8")
+    fill(document.DOCUMENT, document.written() | document.measured())
     return reference.main()
 
 

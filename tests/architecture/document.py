@@ -13,23 +13,6 @@ DOCUMENT = ROOT / "docs" / "explanation" / "architecture.md"
 DIAGNOSIS = "models.diagnosis"
 
 
-def parts(text: str) -> dict[str, str]:
-    """The written parts of a document by name."""
-    found = re.findall(r"<!-- ([a-z-]+) -->\n(.*?)<!-- end -->", text, flags=re.DOTALL)
-    return {name: body.strip("\n") for name, body in found}
-
-
-def filled(text: str, bodies: dict[str, str]) -> str:
-    """The document with these parts written again; each must be there."""
-    for name, body in bodies.items():
-        start, end = f"<!-- {name} -->\n", "<!-- end -->"
-        before, _, rest = text.partition(start)
-        if not rest:
-            raise ValueError(f"{DOCUMENT.name} must hold the part {start.strip()}")
-        text = f"{before}{start}\n{body}\n\n{end}{rest.partition(end)[2]}"
-    return text
-
-
 def way(paths: Iterable[str]) -> str:
     """A numbered list of files, each with the first sentence of its docstring."""
     modules = {module.shown: module for module in by_name().values()}

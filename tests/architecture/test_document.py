@@ -4,8 +4,9 @@ import pytest
 
 from tests.architecture import document, graph, picture
 from tests.architecture.source import ROOT, none_of
+from tests.measuring import filled, parts
 
-PARTS = document.parts(document.DOCUMENT.read_text(encoding="utf-8"))
+PARTS = parts(document.DOCUMENT.read_text(encoding="utf-8"))
 AGAIN = "write it again: make architecture"
 
 
@@ -31,11 +32,11 @@ def test_every_part_is_written_by_the_code() -> None:
 
 def test_a_part_that_is_missing_is_named() -> None:
     text = "<!-- get -->\nold\n<!-- end -->\n\n<!-- post -->\n<!-- end -->\n"
-    filled = document.filled(text, {"get": "1. `a.py`: A.", "post": ""})
-    assert document.parts(filled) == {"get": "1. `a.py`: A.", "post": ""}
-    assert document.paths_of(filled) == ["a.py"]
+    written = filled(text, {"get": "1. `a.py`: A.", "post": ""})
+    assert parts(written) == {"get": "1. `a.py`: A.", "post": ""}
+    assert document.paths_of(written) == ["a.py"]
     with pytest.raises(ValueError, match="must hold the part <!-- chapters -->"):
-        document.filled(text, {"chapters": ""})
+        filled(text, {"chapters": ""})
 
 
 def test_only_arrows_that_no_longer_way_implies_are_drawn() -> None:

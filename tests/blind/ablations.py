@@ -24,6 +24,8 @@ from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.sent import campaign
 from tests.blind.subset import STORE, Judged, trials
 from tests.blind.trials import Trial
+from tests.measuring import Asked, kept
+from tests.measuring import table as markdown
 
 #: What each number is taken for.
 EACH: dict[str, tuple[object, ...]] = {
@@ -96,17 +98,16 @@ def verdicts(trial: Trial, numbers: Mapping[str, Sequence[object]]) -> dict[str,
 def stored(name: str, trial: Trial, ablate: str) -> dict[str, Judged]:
     """The verdicts on a trial, computed or read; none where no such campaign could be made."""
     path = STORE / "ablations" / ablate / f"{name}.json"
-    if not path.exists():
+
+    def judged() -> bytes:
         try:
             said = verdicts(trial, asked(ablate))
         except UnreachableError:
             said = {}
-        path.parent.mkdir(parents=True, exist_ok=True)
         rows = {variant: [one.verdict, sorted(one.causes), one.seconds] for variant, one in said.items()}
-        path.with_suffix(".part").write_text(json.dumps(rows), encoding="utf-8")
-        path.with_suffix(".part").rename(path)
-    truth = frozenset(trial.slugs)
-    rows = json.loads(path.read_text(encoding="utf-8"))
+        return json.dumps(rows).encode()
+
+    truth, rows = frozenset(trial.slugs), json.loads(kept(path, judged))
     return {
         variant: Judged(trial.row, truth, verdict, frozenset(causes), seconds)
         for variant, (verdict, causes, seconds) in rows.items()
@@ -124,28 +125,32 @@ def good(one: Judged) -> bool:
 
 def table(found: Sequence[dict[str, Judged]]) -> list[str]:
     """A row a value: how many verdicts changed, became good or ceased to be, and of those named wrong."""
-    lines = [
-        f"| {len(found)} campaigns | changed | good only so | good only as it is | named wrong (as it is) | seconds |",
-        "|---" * 6 + "|",
-    ]
+    titles = (
+        f"{len(found)} campaigns",
+        "changed",
+        "good only so",
+        "good only as it is",
+        "named wrong (as it is)",
+        "seconds",
+    )
+    lines: list[tuple[object, ...]] = []
     for variant in found[0]:
         pairs = [(each[AS_IT_IS], each[variant]) for each in found]
         changed = sum((a.verdict, a.causes) != (b.verdict, b.causes) for a, b in pairs)
         won, lost = sum(good(b) and not good(a) for a, b in pairs), sum(good(a) and not good(b) for a, b in pairs)
         wrong = f"{sum(b.wrong for _, b in pairs)} ({sum(a.wrong for a, _ in pairs)})"
         seconds = sum(b.seconds for _, b in pairs) / len(pairs)
-        lines.append(f"| {variant} | {changed} | {won} | {lost} | {wrong} | {seconds:.1f} |")
-    return lines
+        lines.append((variant, changed, won, lost, wrong, f"{seconds:.1f}"))
+    return markdown(titles, lines)
 
 
 def main() -> None:
     """Judge, and print the rows."""
     ablate = os.environ["ABLATE"]
     asked(ablate)  # what is not there is said at once
-    only = tuple((os.environ.get("ONLY") or "").split(","))
-    chosen = {name: one for name, one in trials(int(os.environ.get("SEED") or 1)).items() if one.row.startswith(only)}
-    share = float(os.environ.get("SIZE") or 1.0)
-    places = [int(place / share) for place in range(round(len(chosen) * share))]
+    wanted = Asked.here("full")
+    chosen = {name: one for name, one in trials(wanted.seed).items() if one.row.startswith(wanted.only)}
+    places = [int(place / wanted.size) for place in range(round(len(chosen) * wanted.size))]
     names = [list(chosen)[place] for place in places]
     found = [said for name in names if (said := stored(name, chosen[name], ablate))]
     print("\n".join(table(found)))

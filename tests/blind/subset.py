@@ -12,15 +12,16 @@ import sys
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from models.diagnosis.diagnose import diagnose
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
 from tests.blind.rows import drawn_pairs
 from tests.blind.trials import Diagnose, Trial, judge
+from tests.measuring import ROOT, Asked, kept
+from tests.measuring import table as markdown
 
-STORE = Path(__file__).parents[2] / ".blind"
+STORE = ROOT / ".blind"
 #: Effects that only loops show, and those that only raw records do.
 LOOPS, RECORDS = {"channel_delay", "inertia_torque", "squeeze_film"}, {"shaft_ripple", "stick_slip"}
 
@@ -92,14 +93,13 @@ def trials(seed: int) -> dict[str, Trial]:
 
 def judged(name: str, trial: Trial, label: str, look: Diagnose = diagnose) -> Judged | None:
     """The verdict on a trial, computed or read; None where no such campaign could be made."""
-    path = STORE / label / f"{name}.json"
-    if not path.exists():
+
+    def stored() -> bytes:
         outcome = judge(trial, look)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        stored = {"verdict": outcome.verdict, "causes": sorted(outcome.causes), "seconds": outcome.seconds}
-        path.with_suffix(".part").write_text(json.dumps(stored | {"candidates": outcome.candidates}), encoding="utf-8")
-        path.with_suffix(".part").rename(path)
-    said = json.loads(path.read_text(encoding="utf-8"))
+        found = {name: getattr(outcome, name) for name in ("verdict", "seconds", "candidates")}
+        return json.dumps(found | {"causes": sorted(outcome.causes)}).encode()
+
+    said = json.loads(kept(STORE / label / f"{name}.json", stored))
     if said["verdict"] == "unreachable":
         return None
     return Judged(trial.row, frozenset(trial.slugs), said["verdict"], frozenset(said["causes"]), said["seconds"])
@@ -137,24 +137,22 @@ def table(first: dict[str, Judged], second: dict[str, Judged], labels: tuple[str
     """Both beside each other on the campaigns that both have; worse where the difference of the pairs is beyond two of its
     standard errors."""
     both = sorted(first.keys() & second.keys())
-    lines = [f"| on the same campaigns | n | {labels[0]} | {labels[1]} | only {labels[0]} / only {labels[1]} | |"]
-    lines.append("|---|---|---|---|---|---|")
+    lines: list[tuple[object, ...]] = []
     for title, rows, counts, more in ROWS:
         pairs = [(counts(first[name]), counts(second[name])) for name in both if first[name].row.startswith(rows)]
         lost, won = sum(a and not b for a, b in pairs), sum(b and not a for a, b in pairs)
         worse = (lost - won if more else won - lost) > 2 * math.sqrt(max(lost + won, 1))
-        cells = f"{sum(a for a, _ in pairs)} | {sum(b for _, b in pairs)} | {lost} / {won} | {'worse' if worse else ''}"
-        lines.append(f"| {title} | {len(pairs)} | {cells} |")
+        counted = (sum(a for a, _ in pairs), sum(b for _, b in pairs), f"{lost} / {won}", "worse" if worse else "")
+        lines.append((title, len(pairs), *counted))
     seconds = [sum(each[name].seconds for name in both) / max(len(both), 1) for each in (first, second)]
-    lines.append(f"| seconds a campaign | {len(both)} | {seconds[0]:.2f} | {seconds[1]:.2f} | | |")
-    return lines
+    lines.append(("seconds a campaign", len(both), *(f"{mean:.2f}" for mean in seconds), "", ""))
+    return markdown(("on the same campaigns", "n", *labels, "only {} / only {}".format(*labels), ""), lines)
 
 
 def main(arguments: Sequence[str]) -> None:
     """Judge, and print the rows."""
-    label, seed = os.environ["SUBSET"], int(os.environ.get("SEED") or 1)
-    only = tuple((os.environ.get("ONLY") or "").split(","))
-    chosen = {name: trial for name, trial in trials(seed).items() if trial.row.startswith(only)}
+    label, asked = os.environ["SUBSET"], Asked.here()
+    chosen = {name: trial for name, trial in trials(asked.seed).items() if trial.row.startswith(asked.only)}
     mine = {name: found for name, trial in chosen.items() if (found := judged(name, trial, label)) is not None}
     other, against = mine, label
     if "--against" in arguments:

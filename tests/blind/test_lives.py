@@ -1,4 +1,4 @@
-"""Lives that go on after what was measured, and the table of what is said of them."""
+"""Lives that go on after what was measured."""
 
 from dataclasses import replace
 
@@ -48,26 +48,6 @@ def test_an_end_is_the_first_time_that_its_share_is_passed() -> None:
     assert first == pytest.approx(end, abs=2 * cycles[1])
     growing = replace(hidden, clutch=replace(hidden.clutch, theta=np.abs(hidden.clutch.theta)))
     assert lives.passed_at(growing, end) is None  # it never falls
-
-
-def test_a_forecast_is_scored_by_how_far_it_is_from_the_truth() -> None:
-    levels = ("0.05", "0.5", "0.95")
-    near = {"end_of_life_cycles": dict(zip(levels, (9e3, 1e4, 1.1e4), strict=True))}
-    far = {"end_of_life_cycles": dict(zip(levels, (2e4, 4e4, None), strict=True))}
-    assert lives._crps(near, 1e4) < 0.05 < 1.0 < lives._crps(far, 1e4)
-
-
-def test_the_table_counts_what_was_made() -> None:
-    good = lives.Lived("running_in", (1,), "cause_named", True, 0.3, 0.1)
-    bad = lives.Lived("oil_change", (1,), "cause_named", True, 0.1, 0.3)
-    unmade = lives.Lived("oil_change", (2,), "unreachable", False, None, None)
-    rows = lives.table([good, good, bad, unmade])
-    assert rows[2] == "| `running_in` | 2 | 2 | 0.300 | 0.100 | 2/0 | -0.200 [-0.200, -0.200] | met |"
-    assert rows[3].startswith("| `oil_change` | 1 | 1 |")
-    assert rows[3].endswith("| missed |")
-    assert "1 of 4 lives could not be made" in lives.meaning([good, good, bad, unmade])[0]
-    assert {job[0] for job in lives.jobs(1, 0.01)} == {*lives.COURSES, *lives.ARTEFACTS}
-    assert len(lives.jobs(1, 1.0)) == 7 * lives.LIVES
 
 
 def test_a_busy_service_is_asked_again() -> None:

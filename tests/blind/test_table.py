@@ -69,9 +69,9 @@ def test_what_cannot_be_made_is_an_outcome_that_counts_nowhere(monkeypatch: pyte
     made = [all_knowing(replace(trial, seed=(1, 3))), all_knowing(Trial("none", (1, 4)))]
     line = next(line for line in counts() if line.title == "λ = 1000: named and wrong")
     assert (line.of([unmade]), line.of([*made, unmade])) == ((0, 0), (0, 1))
-    lines = blind.document([*made, unmade], [], "make blind")
+    lines = blind.document([*made, unmade], "make blind")
     assert any("1 of 3 trials could not be made" in row and "`running_in` at λ = 1000 (1)" in row for row in lines)
-    assert lines[4:] == blind.document(made, [], "make blind")[4:]
+    assert lines[4:] == blind.document(made, "make blind")[4:]
     assert table.unmade(made) == ["All 2 trials could be made."]
     assert table.failures([unmade]) == []
 
@@ -95,13 +95,3 @@ def test_failures_say_how_to_repeat_them() -> None:
     wrong = replace(all_knowing(trial), causes=frozenset({"running_in"}))
     assert "hide((1, 2, 3), ('oil_change',), 20.0)" in table.failures([wrong])[0]
     assert table.failures([all_knowing(trial)]) == []
-
-
-def test_the_table_goes_between_its_markers_only(
-    tmp_path: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    page = tmp_path / "diagnosis.md"
-    page.write_text(f"before\n{blind.BEGIN}\nold\n{blind.END}\nafter\n")
-    monkeypatch.setattr(blind, "DOCUMENT", page)
-    blind.write(["| new |"])
-    assert page.read_text() == f"before\n{blind.BEGIN}\n\n| new |\n{blind.END}\nafter\n"

@@ -3,7 +3,6 @@
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from time import process_time
 from typing import Any
 
@@ -17,12 +16,13 @@ from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.more import with_test
 from tests.blind.rig.sent import campaign
+from tests.measuring import ROOT, kept
 
 Diagnose = Callable[..., Report]
 #: The verdict on a campaign that could not be made: no draw in which the effect was as loud as it should be.
 UNREACHABLE = "unreachable"
 #: Outcomes of `make blind`, a file each.
-STORE = Path(__file__).parents[2] / ".blind" / "table"
+STORE = ROOT / ".blind" / "table"
 
 
 @dataclass(frozen=True)
@@ -114,11 +114,7 @@ def stored(trial: Trial) -> Outcome:
     """The outcome of a trial, judged or read from where an earlier run left it."""
     seed = "-".join(str(part) for part in trial.seed)
     path = STORE / f"{trial.row.replace('/', '-')}-{seed}.pickle"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.with_suffix(".part").write_bytes(pickle.dumps(judge(trial)))
-        path.with_suffix(".part").rename(path)
-    outcome: Outcome = pickle.loads(path.read_bytes())  # noqa: S301 -- written above, by this program
+    outcome: Outcome = pickle.loads(kept(path, lambda: pickle.dumps(judge(trial))))  # noqa: S301 -- of this program
     return outcome
 
 

@@ -5,15 +5,15 @@ Plausibility was developed on the simulated rig with other seeds; the blind rig 
 
 import argparse
 import itertools
-import json
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tests.blind.rows import wilson
+from tests.measuring import APPENDIX, Lines, fill, table
 from tests.plausibility import slips, trials
 from tests.plausibility.ablation import WITHOUT
 from tests.plausibility.bench import Answer
@@ -25,8 +25,6 @@ LEAST_HELD, MOST_FALSE = 0.95, 0.005
 #: Of the runs of honest lives that are no eq. 6 so many are held in the end at most; of slips so many are out of the track
 #: after ten further runs at least.
 MOST_IN_THE_END, LEAST_AFTER = 0.01, 0.93
-DOCUMENT = Path(__file__).parents[2] / "docs" / "appendix" / "plausibility.md"
-BEGIN, END = "<!-- plausibility -->", "<!-- end of plausibility -->"
 
 
 def percent(hits: int, count: int) -> str:
@@ -37,10 +35,9 @@ def percent(hits: int, count: int) -> str:
     return f"{100 * hits / count:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
 
 
-def by_slip(outcomes: Sequence[Outcome]) -> Iterator[str]:
+def by_slip(outcomes: Sequence[Outcome]) -> list[str]:
     """A row a kind of slip: how many of how many are held, on each rig."""
-    yield "| slip | " + " | ".join(trials.RIGS) + " | codes |"
-    yield "|---|" + "---|" * len(trials.RIGS) + "---|"
+    rows = []
     names = [*slips.CYCLES, *slips.UNITS, *slips.CLUTCHES, *slips.UNPLUGGED, *slips.OTHERS, *slips.ALIKE]
     for name in names:
         mine = [one for one in outcomes if one.slip == name]
@@ -50,68 +47,57 @@ def by_slip(outcomes: Sequence[Outcome]) -> Iterator[str]:
             cells.append(f"{sum(one.held for one in here)} of {len(here)}" if here else "")
         codes = sorted({code for one in mine for code in one.answer.codes})
         if mine:
-            yield f"| {name} | " + " | ".join(cells) + " | " + ", ".join(f"`{code}`" for code in codes) + " |"
+            rows.append((name, *cells, ", ".join(f"`{code}`" for code in codes)))
+    return table(("slip", *trials.RIGS, "codes"), rows)
 
 
-def by_source(outcomes: Sequence[Outcome]) -> Iterator[str]:
+#: Sources of honest runs, by what their names begin with.
+SOURCES = {
+    "simulated rig": "simulated rig",
+    "blind rig, nothing hidden": "blind rig, nothing hidden",
+    "blind rig, hidden": "blind rig, an effect hidden",
+    "blind rig, with": "blind rig, with an advised test",
+    "real": "real",
+}
+
+
+def by_source(outcomes: Sequence[Outcome]) -> list[str]:
     """A row a source of honest runs: how many are held."""
-    yield "| honest runs of | runs | held | share |"
-    yield "|---|---|---|---|"
-    groups = ("simulated rig", "blind rig, nothing hidden", "blind rig, hidden", "blind rig, with", "real")
-    for group in groups:
-        mine = [one for one in outcomes if one.source.startswith(group)]
-        held = sum(one.held for one in mine)
-        name = {
-            "blind rig, hidden": "blind rig, an effect hidden",
-            "blind rig, with": "blind rig, with an advised test",
-        }
-        yield f"| {name.get(group, group)} | {len(mine)} | {held} | {percent(held, len(mine))} |"
+    groups = {name: [one for one in outcomes if one.source.startswith(begin)] for begin, name in SOURCES.items()}
+    return table(("honest runs of", "runs", "held", "share"), (_counted(name, mine) for name, mine in groups.items()))
 
 
 def by_mechanism(
     wrong: Sequence[Outcome], honest: Sequence[Outcome], lives: Sequence[Mapping[str, int]], runs: int, end: int
-) -> Iterator[str]:
+) -> list[str]:
     """A row a mechanism that is left out: what is then held; of honest lives in the end, `end` of `runs` with all."""
-    yield "| left out or changed | slips held | honest held | honest lives, in the end |"
-    yield "|---|---|---|---|"
     judged = [one for one in honest if one.answer.without]
-    held, false = sum(one.held for one in wrong), sum(one.held for one in judged)
-    yield f"| nothing | {held} of {len(wrong)} | {false} of {len(judged)} | {end} of {runs} |"
-    for name in WITHOUT:
-        of_wrong = sum(one.answer.without[name] for one in wrong)
-        of_honest = sum(one.answer.without[name] for one in judged)
-        of_lives = sum(one[name] for one in lives)
-        yield f"| {name} | {of_wrong} of {len(wrong)} | {of_honest} of {len(judged)} | {of_lives} of {runs} |"
+    rows = [("nothing", sum(one.held for one in wrong), sum(one.held for one in judged), end)]
+    rows += [
+        (
+            name,
+            sum(one.answer.without[name] for one in wrong),
+            sum(one.answer.without[name] for one in judged),
+            sum(one[name] for one in lives),
+        )
+        for name in WITHOUT
+    ]
+    counts = (len(wrong), len(judged), runs)
+    cells = ((name, *(f"{held} of {of}" for held, of in zip(found, counts, strict=True))) for name, *found in rows)
+    return table(("left out or changed", "slips held", "honest held", "honest lives, in the end"), cells)
 
 
-def by_life(lives: Mapping[str, Sequence[Mapping[str, int]]]) -> Iterator[str]:
+def by_life(lives: Mapping[str, Sequence[Mapping[str, int]]]) -> list[str]:
     """A row a kind of honest lives that are no eq. 6."""
-    yield "| honest lives | runs | held when they came in | held in the end |"
-    yield "|---|---|---|---|"
-    for kind, mine in lives.items():
-        runs, arrived, end = (sum(one[name] for one in mine) for name in ("runs", "held", "end"))
-        yield f"| {kind} | {runs} | {arrived} | {end} |"
-    every = [one for mine in lives.values() for one in mine]
-    runs, arrived, end = (sum(one[name] for one in every) for name in ("runs", "held", "end"))
-    yield f"| **all** (demand: ≤ 1 % in the end) | {runs} | {percent(arrived, runs)} | {percent(end, runs)} |"
+    names = ("runs", "held", "end")
+    rows = [(kind, *(sum(one[name] for one in mine) for name in names)) for kind, mine in lives.items()]
+    runs, arrived, end = (sum(one[name] for mine in lives.values() for one in mine) for name in names)
+    rows.append(("**all** (demand: ≤ 1 % in the end)", runs, percent(arrived, runs), percent(end, runs)))
+    return table(("honest lives", "runs", "held when they came in", "held in the end"), rows)
 
 
-class Store:
-    """What was computed, a line each, so that a run that was ended goes on where it ended; in memory without a file."""
-
-    def __init__(self, path: Path | None) -> None:
-        self.path, self.known = path, dict[str, Any]()
-        if path is not None and path.exists():
-            self.known = dict(json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
-
-    def get(self, name: str, make: Callable[[], Any]) -> Any:
-        """What is known by a name, or is made and noted."""
-        if name not in self.known:
-            self.known[name] = make()
-            if self.path is not None:
-                with self.path.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps([name, self.known[name]]) + "\n")
-        return self.known[name]
+class Store(Lines):
+    """Outcomes as lines of what was computed."""
 
     def outcome(self, name: str, make: Callable[[], Outcome]) -> Outcome:
         """The same of an outcome."""
@@ -138,9 +124,9 @@ def _outcome(known: Mapping[str, Any]) -> Outcome:
     return Outcome(**{**known, "answer": Answer(**{**answer, "codes": tuple(answer["codes"])})})
 
 
-def _counted(title: str, outcomes: Sequence[Outcome]) -> str:
+def _counted(title: str, outcomes: Sequence[Outcome], *demand: str) -> tuple[object, ...]:
     held = sum(one.held for one in outcomes)
-    return f"| {title} | {len(outcomes)} | {held} | {percent(held, len(outcomes))} | |"
+    return title, len(outcomes), held, percent(held, len(outcomes)), *demand
 
 
 def main() -> int:
@@ -155,7 +141,7 @@ def main() -> int:
     )
     parser.add_argument("--store", type=Path, help="a file of what was computed, to go on where a run was ended")
     parser.add_argument("--failures", action="store_true", help="list what was missed and what was held wrongly")
-    parser.add_argument("--write", action="store_true", help=f"put the tables into {DOCUMENT.name}")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/appendix/plausibility.md")
     chosen = parser.parse_args()
     store, seed = Store(chosen.store), chosen.seed
     rigs = {
@@ -213,13 +199,16 @@ def main() -> int:
         f"`make plausibility SEED={seed} CAMPAIGNS={chosen.campaigns} HONEST={chosen.honest} LIVES={chosen.lives} "
         f'ARGS="--ablated {chosen.ablated}"`:',
         "",
-        "| | runs | held | share | demand |",
-        "|---|---|---|---|---|",
-        *(_counted(f"one slip, {rig}", outcomes) for rig, outcomes in rigs.items()),
-        f"| **one slip** | {len(wrong)} | {held} | {percent(held, len(wrong))} | ≥ 95 % |",
-        f"| **honest** | {len(honest)} | {false} | {percent(false, len(honest))} | ≤ 0.5 % |",
-        f"| **out after ten further runs** | {len(followed)} | {out} | {percent(out, len(followed))} | ≥ 93 % |",
-        f"| **honest lives, in the end** | {of_lives} | {in_the_end} | {percent(in_the_end, of_lives)} | ≤ 1 % |",
+        *table(
+            ("", "runs", "held", "share", "demand"),
+            (
+                *(_counted(f"one slip, {rig}", outcomes, "") for rig, outcomes in rigs.items()),
+                _counted("**one slip**", wrong, "≥ 95 %"),
+                _counted("**honest**", honest, "≤ 0.5 %"),
+                ("**out after ten further runs**", len(followed), out, percent(out, len(followed)), "≥ 93 %"),
+                ("**honest lives, in the end**", of_lives, in_the_end, percent(in_the_end, of_lives), "≤ 1 %"),
+            ),
+        ),
         "",
         *by_slip([*wrong, *aside]),
         "",
@@ -252,9 +241,7 @@ def main() -> int:
                 one.answer.message,
             )
     if chosen.write:
-        text = DOCUMENT.read_text(encoding="utf-8")
-        head, tail = text.split(BEGIN)[0], text.split(END)[1]
-        DOCUMENT.write_text(f"{head}{BEGIN}\n\n" + "\n".join(lines) + f"\n\n{END}{tail}", encoding="utf-8")
+        fill(APPENDIX / "plausibility.md", {"plausibility": "\n".join(lines)})
     return 0 if met else 1
 
 

@@ -20,6 +20,7 @@ from models.loops.loop_area import measured_area
 from models.loops.squeeze_film import film_time_at, squeeze_film_torque
 from models.records.periods import Cycle, fit_cycle
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
+from tests import measuring
 from tests.models.loops.dynamic_records import attractor_area
 from tests.real.loaders import FOLDER, TRACTION_SWEEPS
 
@@ -35,8 +36,8 @@ Row = dict[str, Any]
 def table(rows: Iterable[Row]) -> str:
     """A Markdown table, its head the rows' keys."""
     rows = list(rows)
-    lines = [" | ".join(f"{v:.4g}" if isinstance(v, float) else str(v) for v in row.values()) for row in rows]
-    return "\n".join(f"| {line} |" for line in (" | ".join(rows[0]), " | ".join("---" for _ in rows[0]), *lines))
+    cells = [[f"{v:.4g}" if isinstance(v, float) else v for v in row.values()] for row in rows]
+    return "\n".join(measuring.table(list(rows[0]), cells))
 
 
 def loop_signs() -> list[Row]:

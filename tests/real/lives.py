@@ -20,10 +20,11 @@ and the next run goes on where this one ended; delete it after a change of the n
 
 import argparse
 import csv
-import json
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from models.prognosis.scoring import crps_of_sample, measured_end
 from models.prognosis.stated_end import stated_end
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
+from tests.measuring import Lines
 from tests.real.lag import Row, table
 from tests.real.loaders import FOLDER
 from tests.real.prognosis import BLOCKS, columns, laser_histories
@@ -199,7 +201,7 @@ def teaches(life: Life) -> EndedLife:
 
 def judged(half: str, every: int, store: Path) -> Iterator[tuple[str, dict[str, dict[str, list[float]]]]]:
     """The row and the outcomes of every life of a half, from the store where they are there."""
-    known = dict(json.loads(line) for line in store.read_text().splitlines()) if store.exists() else {}
+    known = Lines(store)
     for name, world in WORLDS.items():
         kinds: dict[str, list[Life]] = defaultdict(list)
         for life in world():
@@ -209,20 +211,16 @@ def judged(half: str, every: int, store: Path) -> Iterator[tuple[str, dict[str, 
             for number in range(HALVES.index(half), len(lives), 2):
                 if every > 1 and len(lives) > every and number // 2 % every:
                     continue
-                key = f"{name}/{kind}/{number}"
-                if key not in known:
-                    _, tests, end = lives[number]
-                    rng = np.random.default_rng([SEED, number])
-                    order = [index for index in rng.permutation(len(lives)).tolist() if index != number]
-                    kin = {
-                        count: [taught[index] for index in order[:count]]
-                        for count, least in OTHERS.items()
-                        if len(order) >= least
-                    }
-                    known[key] = {"alone": alone(tests, end, number)} | with_ended(tests, end, kin, rng)
-                    with store.open("a") as file:
-                        file.write(json.dumps([key, known[key]]) + "\n")
-                yield name, known[key]
+                yield name, known.get(f"{name}/{kind}/{number}", partial(forecasts, lives, taught, number))
+
+
+def forecasts(lives: Sequence[Life], taught: Sequence[EndedLife], number: int) -> dict[str, Any]:
+    """What is said of one of a kind's lives, alone and with others of them."""
+    _, tests, end = lives[number]
+    rng = np.random.default_rng([SEED, number])
+    order = [index for index in rng.permutation(len(lives)).tolist() if index != number]
+    kin = {count: [taught[k] for k in order[:count]] for count, least in OTHERS.items() if len(order) >= least}
+    return {"alone": alone(tests, end, number)} | with_ended(tests, end, kin, rng)
 
 
 def rows_alone(found: Sequence[tuple[str, dict[str, dict[str, list[float]]]]]) -> list[Row]:

@@ -19,8 +19,8 @@ from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.prior import weak
+from tests.measuring import APPENDIX, fill
 from tests.rivals.others import CAP, DRAWS, PlainUkf, Progpy, Sample, Surpyval, fitted
-from tests.score.table import written
 from tests.statistical.lives import STAGES, ends, typical
 
 #: Inspections in a life, and the scatter of each as a share of COF when new.
@@ -141,7 +141,8 @@ def main() -> None:
     table = f"{head}\n\n{tally.table()}"
     print(table)
     if chosen.write:
-        written("rivals", f"make rivals SIZE={chosen.size:g} SEED={chosen.seed}", table)
+        command = f"`make rivals SIZE={chosen.size:g} SEED={chosen.seed}`"
+        fill(APPENDIX / "prognosis.md", {"score rivals": f"{command}: {table}"})
 
 
 if __name__ == "__main__":

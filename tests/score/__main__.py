@@ -6,21 +6,18 @@ tcp://host:port of a Dask scheduler whose workers can import these tests.
 """
 
 import argparse
+import time
 from collections.abc import Callable
 from functools import partial
 
-from rich.console import Console
-
 from service.defaults import SCHEDULERS
-from service.work.executor import executor_of
-from service.work.progress import progress
+from tests.measuring import APPENDIX, each, fill
 from tests.score import off_prior, on_prior, paper
 from tests.score.after_end import after_end
 from tests.score.belief import belief, knees
 from tests.score.ended import ended
 from tests.score.fleets import fleets
 from tests.score.severity import severity
-from tests.score.table import timed, written
 
 
 def main() -> None:
@@ -54,15 +51,19 @@ def main() -> None:
         "after": partial(after_end, lives(100), seed + 8),
     }
     names = chosen.parts or list(parts)
-    with executor_of(chosen.scheduler) as executor, progress(Console(stderr=True), "parts of the score") as advance:
-        advance(0, total=len(names))
-        tables = executor.map(timed, (parts[name] for name in names))
-        for name, outcome in zip(names, tables, strict=True):
-            table, seconds = outcome.value()
-            advance()
-            print(f"\n### {name} ({seconds:.0f} s)\n\n{table}", flush=True)
-            if chosen.write:
-                written(name, f"make score PARTS={name} SIZE={chosen.size:g} SEED={seed}", table)
+    for name, (table, seconds) in zip(
+        names, each(timed, (parts[name] for name in names), chosen.scheduler), strict=True
+    ):
+        print(f"\n### {name} ({seconds:.0f} s)\n\n{table}", flush=True)
+        if chosen.write:
+            command = f"`make score PARTS={name} SIZE={chosen.size:g} SEED={seed}`"
+            fill(APPENDIX / "prognosis.md", {f"score {name}": f"{command}: {table}"})
+
+
+def timed(part: Callable[[], str]) -> tuple[str, float]:
+    """A part's table, and how long it took [s]."""
+    start = time.monotonic()
+    return part(), time.monotonic() - start
 
 
 if __name__ == "__main__":

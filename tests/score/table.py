@@ -1,12 +1,8 @@
 """Scores of predictions by stage of life, and how they are written down."""
 
 import math
-import re
-import time
 from collections import defaultdict
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
@@ -14,8 +10,6 @@ from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.scoring import crps_of_sample, pit_histogram, pit_of_sample
 from models.tracking.posterior import Posterior
 from tests.statistical.lives import ends
-
-DOCS = Path(__file__).parents[2] / "docs" / "appendix" / "prognosis.md"
 
 
 @dataclass(frozen=True)
@@ -74,25 +68,9 @@ class Scores:
         return "/".join(f"{100 * share:.0f}" for share in pit_histogram(pits.tolist()))
 
 
-def timed(part: Callable[[], str]) -> tuple[str, float]:
-    """A part's table, and how long it took [s]."""
-    start = time.monotonic()
-    return part(), time.monotonic() - start
-
-
 def percents(numbers: list[float]) -> str:
     return "/".join(f"{100 * number:.0f}" for number in numbers)
 
 
 def shares(numbers: list[float]) -> str:
     return " | ".join(f"{100 * number:.1f}" for number in numbers)
-
-
-def written(part: str, command: str, table: str) -> None:
-    """Put a table, under the command that made it, in its place in docs/appendix/prognosis.md."""
-    block = f"<!-- score {part} -->\n`{command}`: {table}\n<!-- end -->"
-    text = DOCS.read_text()
-    found, count = re.subn(rf"<!-- score {part} -->.*?<!-- end -->", lambda _: block, text, flags=re.DOTALL)
-    if count != 1:
-        raise SystemExit(f"docs/appendix/prognosis.md has {count} places for {part}")
-    DOCS.write_text(found)

@@ -3,54 +3,54 @@
 SEED=  another seed       COUNT=  so many hidden effects (200)       STORE=  a file of results, from which a run goes on
 """
 
-import json
 import os
 import sys
+from collections import Counter
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from tests.blind.rows import wilson
+from tests.measuring import Asked, Lines, table
 from tests.visible.trial import SLUGS, Shown, shown
 
 
-def report(results: list[Shown], left_out: dict[str, int]) -> list[str]:
+def report(results: list[Shown], left_out: list[str]) -> list[str]:
     """The table, effect by effect."""
-    lines = [
-        "| hidden at twice the stated amplitude | effects | raised an alarm | 95 % interval |",
-        "|---|---|---|---|",
-    ]
+    rows = []
     for slug in (*SLUGS, ""):
         mine = [each for each in results if slug in {"", each.slug}]
         if mine:
             hits = sum(each.seen for each in mine)
             low, high = wilson(hits, len(mine))
-            name = f"`{slug}`" if slug else "all"
-            lines.append(f"| {name} | {len(mine)} | {hits / len(mine):.0%} | {low:.0%} to {high:.0%} |")
-    lines += ["", f"Not tried: {', '.join(f'{why} ({count})' for why, count in left_out.items()) or 'none'}."]
-    return lines
+            rows.append(
+                (f"`{slug}`" if slug else "all", len(mine), f"{hits / len(mine):.0%}", f"{low:.0%} to {high:.0%}")
+            )
+    lines = table(("hidden at twice the stated amplitude", "effects", "raised an alarm", "95 % interval"), rows)
+    return [*lines, "", f"Not tried: {', '.join(f'{slug} ({n})' for slug, n in Counter(left_out).items()) or 'none'}."]
 
 
 def main() -> None:
     """Hide, print what was seen; results are kept as lines of JSON."""
-    seed, count = int(os.environ.get("SEED") or 1), int(os.environ.get("COUNT") or 200)
-    store = Path(os.environ.get("STORE") or f"visible-{seed}.jsonl")
-    known = [json.loads(line) for line in store.read_text().splitlines()] if store.exists() else []
-    k = len(known)
-    while sum("seen" in line for line in known) < count and k < 10 * count:
+    asked, count = Asked.here(), int(os.environ.get("COUNT") or 200)
+    store = Lines(Path(os.environ.get("STORE") or f"visible-{asked.seed}.jsonl"))
+    results, left_out = list[Shown](), list[str]()
+    for k in range(10 * count):
         slug = SLUGS[k % len(SLUGS)]
-        found = shown((seed, 7, k), slug)
-        line = {"slug": slug, "not": found} if isinstance(found, str) else {**vars(found), "seed": list(found.seed)}
-        known.append(line)
-        with store.open("a") as file:
-            file.write(json.dumps(line) + "\n")
-        print(line, file=sys.stderr, flush=True)
-        k += 1
-    results = [Shown(**line) for line in known if "seen" in line]
-    left_out: dict[str, int] = {}
-    for line in known:
-        if "not" in line:
-            left_out[line["slug"]] = left_out.get(line["slug"], 0) + 1
-    print(f"`make visible SEED={seed} COUNT={count}`\n")
+        found = store.get(f"{k} {slug}", lambda k=k, slug=slug: _noted(shown((asked.seed, 7, k), slug)))  # type: ignore[misc]
+        print(slug, found, file=sys.stderr, flush=True)
+        if isinstance(found, str):
+            left_out.append(slug)
+        else:
+            results.append(Shown(**found))
+        if len(results) == count:
+            break
+    print(f"`make visible SEED={asked.seed} COUNT={count}`\n")
     print("\n".join(report(results, left_out)))
+
+
+def _noted(found: Shown | str) -> dict[str, Any] | str:
+    return found if isinstance(found, str) else asdict(found)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,112 @@
+"""What tools that measure share: what they are asked for, results that are kept, tables in Markdown, parts of documents."""
+
+import json
+import os
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rich.console import Console
+
+from service.work.executor import executor_of
+from service.work.progress import progress
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+ROOT = Path(__file__).parents[1]
+APPENDIX = ROOT / "docs" / "appendix"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What `make` passes on: SEED= (1), SIZE= small, full or a share of the whole, ONLY= beginnings of names."""
+
+    seed: int
+    size: float
+    only: tuple[str, ...]
+
+    @classmethod
+    def here(cls, size: str = "small") -> "Asked":
+        """By the environment."""
+        seed, chosen, only = (os.environ.get(name) or "" for name in ("SEED", "SIZE", "ONLY"))
+        share = {"small": 0.1, "full": 1.0}.get(chosen or size)
+        return cls(int(seed or 1), float(chosen) if share is None else share, tuple(only.split(",")))
+
+    def __str__(self) -> str:
+        return f"SEED={self.seed} SIZE={self.size:g}" + (f" ONLY={','.join(self.only)}" if any(self.only) else "")
+
+
+def where(processes: int) -> str:
+    """Where work is done: what follows `--scheduler`, else by PROCESSES= of this machine."""
+    if "--scheduler" in sys.argv:
+        return sys.argv[sys.argv.index("--scheduler") + 1]
+    return f"processes:{os.environ.get('PROCESSES') or processes}"
+
+
+def each(work: Callable[[Job], Result], jobs: Iterable[Job], place: str) -> Iterator[Result]:
+    """What comes of every job, in their order, with a bar that says how far it is."""
+    chosen = list(jobs)
+    with executor_of(place) as executor, progress(Console(stderr=True), work.__name__) as advance:
+        advance(0, total=len(chosen))
+        for outcome in executor.map(work, chosen):
+            yield outcome.value()
+            advance()
+
+
+def kept(path: Path, make: Callable[[], bytes]) -> bytes:
+    """What a file holds: made, and written whole or not at all, where it is not there yet."""
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.with_suffix(".part").write_bytes(make())
+        path.with_suffix(".part").rename(path)
+    return path.read_bytes()
+
+
+class Lines:
+    """What was computed, a line of JSON each, so that a run goes on where it ended; in memory without a file."""
+
+    def __init__(self, path: Path | None) -> None:
+        self.path, self.known = path, dict[str, Any]()
+        if path is not None and path.exists():
+            self.known = dict(json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
+
+    def get(self, name: str, make: Callable[[], Any]) -> Any:
+        """What is known by a name, or is made and noted."""
+        if name not in self.known:
+            self.known[name] = make()
+            if self.path is not None:
+                with self.path.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps([name, self.known[name]]) + "\n")
+        return self.known[name]
+
+
+def table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
+    """Lines of a table in Markdown; a pipe within a cell is escaped."""
+    lines = [[*titles], ["---"] * len(titles), *([str(cell) for cell in row] for row in rows)]
+    return ["| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines]
+
+
+def parts(text: str) -> dict[str, str]:
+    """The parts of a document by name: what stands between `<!-- name -->` and `<!-- end -->`."""
+    found = re.findall(r"<!-- ([a-z -]+) -->\n(.*?)<!-- end -->", text, flags=re.DOTALL)
+    return {name: body.strip("\n") for name, body in found}
+
+
+def filled(text: str, bodies: Mapping[str, str]) -> str:
+    """A document with these parts written again. Raises ValueError where one is not there."""
+    for name, body in bodies.items():
+        start, end = f"<!-- {name} -->\n", "<!-- end -->"
+        before, _, rest = text.partition(start)
+        if not rest:
+            raise ValueError(f"the document must hold the part {start.strip()}")
+        text = f"{before}{start}\n{body}\n\n{end}{rest.partition(end)[2]}"
+    return text
+
+
+def fill(page: Path, bodies: Mapping[str, str]) -> None:
+    """Write these parts of a page again."""
+    page.write_text(filled(page.read_text(encoding="utf-8"), bodies), encoding="utf-8")
