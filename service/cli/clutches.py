@@ -1,6 +1,7 @@
 """`clutchlife register`, `list`, `status`, `watch`, `edit`, `archive`, `model`: clutches, their states and records."""
 
 import json
+import math
 import time
 from datetime import datetime
 from pathlib import Path
@@ -25,7 +26,7 @@ from service.cli.options import (
     out,
     print_line,
 )
-from service.cli.tables import cycles, number, show_table
+from service.cli.tables import cycles, show_table
 from service.client.clutchlife import Client, ClutchlifeError
 from service.client.clutchlife.transport import Service
 
@@ -86,8 +87,11 @@ def _row(item: dict[str, Any]) -> list[str]:
     held = str(item["held"]) if item["held"] else ""
     summary, numbers = item["summary"], ["-", "-", "-"]
     if summary:
-        numbers = [number(summary["as_of_cycles"]), number(summary["at_least"]), "-"]
-        if summary["status"] != "insufficient_data":
+        if summary["as_of_cycles"] is not None:
+            numbers[0] = cycles(summary["as_of_cycles"])
+        if summary["at_least"] is not None:
+            numbers[1] = cycles(math.floor(summary["at_least"]))
+        if summary["status"] not in ("insufficient_data", "ended"):
             numbers[2] = cycles(summary["remaining_cycles"]["0.5"])
     state = item["state"]["name"].replace("_", " ")
     ended = "ended, " if summary and summary["ended"] else ""

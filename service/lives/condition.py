@@ -148,7 +148,7 @@ def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str
         (FAILURE, "" if status == REACHED or worn else None),
         (MAINTENANCE, near),
         (CHECK, held_in_words(held) if held else None),
-        (CHECK, _tests(summary["runs_used"]) if status == INSUFFICIENT else None),
+        (CHECK, _tests(summary) if status == INSUFFICIENT else None),
         (CHECK, (silent and status != ENDED and silence_in_words(silent)) or None),
         (OUT_OF_SPECIFICATION, "data and model disagree, see the diagnosis" if disputed and status != ENDED else None),
         (NORMAL, ""),
@@ -219,9 +219,10 @@ def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: 
     if name == CHECK and summary.get("status", INSUFFICIENT) != INSUFFICIENT:
         return "Find out why the rig sends nothing."
     if name == CHECK:
-        missing = FEWEST_TESTS - summary.get("runs_used", 0)
+        missing = FEWEST_TESTS - _places(summary)
         tests = "one more stationary test" if missing == 1 else f"{missing} more stationary tests, at different cycles"
-        return f"Run {tests}: then the remaining life is predicted."
+        like_the_first = ", at the pressures and the oil temperature of the first" if _left_out(summary) else ""
+        return f"Run {tests}{like_the_first}: then the remaining life is predicted."
     if name == NORMAL or diagnosis is None:
         return "Its life has ended: nothing to do." if summary.get("ended") else "Nothing to do: carry on testing."
     causes = [_cause_in_words(cause) for cause in diagnosis["causes"]]
@@ -256,8 +257,23 @@ def _day_in_words(moment: str) -> str:
     return f"{day.day} {day:%b %Y}"
 
 
-def _tests(count: int) -> str:
-    return f"{count} of the {FEWEST_TESTS} tests that a prediction needs"
+def _tests(summary: Mapping[str, Any]) -> str:
+    """How many of the tests that a prediction needs there are, as a clause."""
+    known = f"{_places(summary)} of the {FEWEST_TESTS} tests that a prediction needs"
+    if _places(summary) < summary["runs_used"]:
+        known = f"tests at {_places(summary)} of the {FEWEST_TESTS} different cycles that a prediction needs"
+    left_out = _left_out(summary)
+    return f"{known}, {left_out} more cannot be compared with the first" if left_out else known
+
+
+def _places(summary: Mapping[str, Any]) -> int:
+    """At how many different cycles there are tests that count; of a summary that does not state it, how many tests count."""
+    return int(summary.get("places", summary.get("runs_used", 0)))
+
+
+def _left_out(summary: Mapping[str, Any]) -> int:
+    """How many tests cannot be compared with the first."""
+    return int(summary.get("tests", 0) - summary.get("runs_used", 0)) if "tests" in summary else 0
 
 
 def _near_end(summary: Mapping[str, Any]) -> str | None:

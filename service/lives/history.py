@@ -176,6 +176,11 @@ class Life:
         """Mean oil temperature [K] of that test; None where it was not measured."""
         return next((event.oil_temperature for event in self.events if event.cofs), None)
 
+    @property
+    def tests(self) -> int:
+        """How many of its tests have a mean COF, those among them that cannot be compared with the first."""
+        return sum(bool(event.cofs) for event in self.events)
+
     def in_other_oil(self, event: Event) -> bool:
         """Whether a test was made at another oil temperature than the reference test: it cannot be compared with it."""
         reference = self.reference_oil

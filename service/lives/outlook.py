@@ -43,12 +43,14 @@ def summarised(state: ClutchState, tracking: Tracking, evidence: Evidence | None
     payload = next(made.payload for made in tracking.predictions if (made.cycles, made.method) == (last, SHOWN))
     if evidence is not None:
         payload = payload | by_own_criteria(state, SHOWN, payload, evidence, tracking.filters)
-    pace = pace_of(life.events)
+    pace, pooled = pace_of(life.events), life.pooled(state.assumptions())
     summary = {name: payload[name] for name in SUMMARY} | {
         "runs": len(state.events),
-        "recent": recent(state.events, life.pooled(state.assumptions())),
+        "recent": recent(state.events, pooled),
         "life": life.name,
         "from_cycles": life.origin,
+        "tests": life.tests,
+        "places": len({measurement.progress for measurement in pooled.measurements}),
         "pace": None if pace is None else {"cycles_per_second": pace, "moment": moment_at(life.events, pace, last)},
     }
     return summary | held_part(state, tracking.filters, evidence)

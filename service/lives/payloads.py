@@ -38,6 +38,7 @@ FILTERS_DISAGREE = "filters_disagree"
 #: Warnings of a run in its clutch's history, written again where the history changes: it arrived after a run of more cycles,
 #: its pressures or its oil temperature are not those of the first test, its mean COF is not what those before it predict.
 LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE = "late_arrival", "other_pressures", "other_oil_temperature"
+TESTS_LEFT_OUT = "tests_left_out"
 OF_HISTORY = LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE, OFF_TRACK
 
 
@@ -139,6 +140,17 @@ def other_pressures(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
     measured = ", ".join(f"{bar(level):g}" for level in sorted(reference))
     message = f"it shares no pressure with the first stationary test ({measured} bar): tracking does not use it"
     return [Notice(code=OTHER_PRESSURES, message=message)]
+
+
+def left_out(tests: int, runs: int) -> list[Notice]:
+    """The warning of a life of so many tests of which only these `runs` can be compared with the first."""
+    if runs >= tests:
+        return []
+    message = (
+        f"{tests - runs} of {tests} tests do not count: they share no pressure with the first test, or their oil was more "
+        f"than {OTHER_OIL:g} °C warmer or colder; each receipt says which"
+    )
+    return [Notice(code=TESTS_LEFT_OUT, message=message)]
 
 
 def other_oil(life: Life, event: Event) -> list[Notice]:

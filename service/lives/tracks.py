@@ -31,7 +31,7 @@ from service.errors import NotFoundError, Notice
 from service.lives.assumptions import ALL_PRESSURES, WEAK, Assumptions
 from service.lives.criteria import FEWEST_PARTICLES, PREDICTION_DRAWS
 from service.lives.history import Event, Life, Series, lives_of, nearest_pressure
-from service.lives.payloads import ended, insufficient, new_extrapolated, off_track, predicted
+from service.lives.payloads import ended, insufficient, left_out, new_extrapolated, off_track, predicted
 
 FilterState = ParticleState | UkfState | GridState
 
@@ -109,7 +109,7 @@ def follow(
     for index in range(first_event, len(life.events)):
         series = whole if assumptions.counts_cycles else life.until(index).pooled(assumptions)
         runs = series.until(index)
-        cycles, end = life.events[index].cycles, life.until(index).end
+        cycles, end, tests = life.events[index].cycles, life.until(index).end, life.until(index).tests
         if runs:
             states = {method: advance(method, series, assumptions, states.get(method), runs) for method in CARRIED}
         yield (
@@ -118,7 +118,9 @@ def follow(
                 Prediction(
                     cycles=cycles,
                     method=method,
-                    payload=ended(predict(method, series, assumptions, states.get(method), cycles, fraction), end),
+                    payload=ended(
+                        predict(method, series, assumptions, states.get(method), cycles, fraction, tests=tests), end
+                    ),
                 )
                 for method in CARRIED
             ],
@@ -240,8 +242,10 @@ def predict(
     tracked: Tracked | None,
     cycles: float,
     fraction: float,
+    *,
+    tests: int,
 ) -> dict[str, Any]:
-    """The prediction at `cycles` of a series, in the public shape."""
+    """The prediction at `cycles` of a series, in the public shape; the life has so many `tests`."""
     if tracked is None:
         return insufficient(assumptions, cycles, series.pressure, fraction)
     sample = drawn(method, series, assumptions, tracked)
@@ -273,7 +277,7 @@ def predict(
             "effective_draws": sample.effective_draws,
             "status": sample.status.value,
         },
-        warnings=_off_track(sample, series, assumptions, tracked.runs),
+        warnings=[*left_out(tests, tracked.runs), *_off_track(sample, series, assumptions, tracked.runs)],
     )
 
 
@@ -355,7 +359,7 @@ def predict_at(
     if not series.measurements:
         return ended(insufficient(assumptions, cycles, level, fraction), life.end)
     tracked = advance(method, series, assumptions, carried, len(series.measurements), back_cast=back_cast)
-    return ended(predict(method, series, assumptions, tracked, cycles, fraction), life.end)
+    return ended(predict(method, series, assumptions, tracked, cycles, fraction, tests=life.tests), life.end)
 
 
 def _level(life: Life | None, pressure_bar: float) -> float:

@@ -80,11 +80,12 @@ def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[s
     if series is None or not series.measurements:
         recent = predict_at(state.events, assumptions, fraction, method=method)
         return recent | {"recent_duty_cycles": by_quantile({})} | unknown
-    now, runs = state.lives[-1].events[-1].cycles, len(series.measurements)
+    life, runs = state.lives[-1], len(series.measurements)
+    now = life.events[-1].cycles
     tracked = advance(method, series, assumptions, (state.filters or {}).get(method), runs)
     sample = drawn(method, series, assumptions, tracked)
     tracked = replace(tracked, sample=sample)
-    recent = ended(predict(method, series, assumptions, tracked, now, fraction), state.lives[-1].end)
+    recent = ended(predict(method, series, assumptions, tracked, now, fraction, tests=life.tests), life.end)
     recent["recent_duty_cycles"] = recent["remaining_cycles"]
     if recent["status"] in (INSUFFICIENT, ENDED):
         return recent | unknown

@@ -8,16 +8,17 @@ from models.prognosis.criteria import QUANTILES
 from service.schemas.base import (
     LARGEST_LIMIT,
     LONGEST_ADDRESS,
-    LONGEST_NAME,
     LONGEST_SECRET,
     MAX_SPEED_RPM,
     SHORTEST_SECRET,
     Answer,
     Identifier,
+    Name,
     NotNegativeNumber,
     PositiveNumber,
     Reason,
     Schema,
+    Title,
     page_of,
 )
 
@@ -59,7 +60,6 @@ Probability = Annotated[
     AfterValidator(_quantile),
 ]
 Limit = Annotated[float, Field(ge=-LARGEST_LIMIT, le=LARGEST_LIMIT, allow_inf_nan=False, strict=True)]
-Material = Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_NAME)]
 StateName = Literal["failure", "maintenance", "check", "out_of_specification", "normal"]
 VerdictName = Literal["model_adequate", "cause_named", "cause_ambiguous", "unexplained_structure", "insufficient_data"]
 EventState = Literal["raised", "acknowledged", "cleared"]
@@ -68,15 +68,15 @@ EventState = Literal["raised", "acknowledged", "cleared"]
 class KindIn(Schema):
     """A kind of clutch. Omitted fields match everything."""
 
-    friction_material: Material | None = Field(default=None, description="The friction material")
-    reaction_plate: Material | None = Field(default=None, description="The reaction plate's material")
-    fluid: Material | None = Field(default=None, description="The fluid")
+    friction_material: Name | None = Field(default=None, description="The friction material")
+    reaction_plate: Name | None = Field(default=None, description="The reaction plate's material")
+    fluid: Name | None = Field(default=None, description="The fluid")
 
 
 class AlarmIn(Schema):
     """A rule: when an alarm is raised, of which clutches."""
 
-    name: Annotated[str, StringConstraints(max_length=LONGEST_NAME)] = Field(default="", description="Name for people")
+    name: Title = Field(default="", description="Name for people")
     clutch_id: Identifier | None = Field(default=None, description="The clutch; default: all clutches")
     kind: KindIn | None = Field(default=None, description="Only clutches of this kind")
     quantity: WatchedQuantity = Field(
@@ -182,7 +182,7 @@ class WebhookIn(Schema):
         default=None,
         description="Secret that signs the requests; default: the service makes one and shows it once, in this answer",
     )
-    name: Annotated[str, StringConstraints(max_length=LONGEST_NAME)] = Field(default="", description="Name for people")
+    name: Title = Field(default="", description="Name for people")
     clutch_id: Identifier | None = Field(default=None, description="Only alarms of this clutch")
     cleared: bool = Field(
         default=False, strict=True, description="Whether the receiver also gets a message when an alarm is cleared"

@@ -8,12 +8,14 @@ from datetime import UTC, datetime
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     AwareDatetime,
     BaseModel,
     ConfigDict,
     Field,
     PlainSerializer,
     StringConstraints,
+    ValidationInfo,
     WithJsonSchema,
     create_model,
 )
@@ -52,6 +54,9 @@ LONGEST_MAP = 4000
 #: A clutch's or a run's name: safe in an address and as a file's name, 128 characters at most.
 LONGEST_IDENTIFIER = 128
 IDENTIFIER_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._:@+-]{0,127}$"
+#: Text that stands in one line: without control characters, breaks of lines and marks that turn the direction of writing, by
+#: which a name could write over the line that a terminal, a log or a message shows it in.
+LINE_PATTERN = r"^[^\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]*$"
 #: Characters of a number in an address. Derived: the longest that a 64-bit float is written in has 24.
 LONGEST_NUMBER = 32
 #: Quotation marks and opening brackets of a JSON body. Derived: those of a note that consists of them, and as many again.
@@ -67,6 +72,8 @@ LARGEST_SKEWNESS = 1e4
 #: Bytes of a photograph, and photographs of one inspection. Chosen: twice what a camera of 24 megapixels writes as JPEG; a
 #: place on each of eight radii of both sides of three discs.
 MAX_PHOTOGRAPH_BYTES, MAX_PHOTOGRAPHS = 16 << 20, 48
+#: Rules of alarms of one clutch, and rules of several. Chosen: beyond what anybody reads, and a run asks each of them.
+MAX_RULES = 100
 #: Joint draws of a track's coefficients: beyond what the sample behind it holds they would repeat.
 MAX_DRAWS = 1_000
 #: Blocks of a programme of planned duty.
@@ -124,6 +131,23 @@ class Answer(BaseModel):
 # --- in requests ---
 
 Identifier = Annotated[str, StringConstraints(pattern=IDENTIFIER_PATTERN)]
+
+
+def _one_line(text: str, info: ValidationInfo) -> str:
+    """The text, refused in a request if it does not stand in one line; what is stored already stays readable."""
+    if info.mode == "json" and not re.fullmatch(LINE_PATTERN, text):
+        raise ValueError("must be one line of text without control characters")
+    return text
+
+
+#: A name for people, and one that must be given.
+Title = Annotated[
+    str,
+    StringConstraints(max_length=LONGEST_NAME),
+    AfterValidator(_one_line),
+    Field(json_schema_extra={"pattern": LINE_PATTERN}),
+]
+Name = Annotated[Title, StringConstraints(min_length=1)]
 
 Cycles = Annotated[float, Field(ge=0, le=MAX_CYCLES, allow_inf_nan=False, strict=True), PlainSerializer(whole)]
 

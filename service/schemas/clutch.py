@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, StringConstraints, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from models.clutch import Geometry
 from models.degradation.severity import Severity, SeverityBasis
@@ -12,6 +12,7 @@ from service.schemas.base import (
     Answer,
     ClutchName,
     Identifier,
+    Name,
     NotNegativeNumber,
     Origin,
     PositiveNumber,
@@ -39,7 +40,6 @@ from service.schemas.life import (
 WholeNumber = Annotated[
     int, Field(strict=True), BeforeValidator(lambda sent: whole(sent) if isinstance(sent, float) else sent)
 ]
-Name = Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_NAME)]
 TorqueFilter = Annotated[
     Annotated[NotNegativeNumber, Field(le=base.MAX_TORQUE_FILTER_MS)] | None,
     Field(

@@ -5,8 +5,9 @@ from typing import Any
 
 from service import records
 from service.alarms import raising
-from service.errors import found
+from service.errors import NotPossibleNowError, found
 from service.schemas.alarm import AlarmIn
+from service.schemas.base import MAX_RULES
 from storage import alarms, clutches
 from storage.alarms import AlarmRow
 from storage.dialects import ALL_ROWS
@@ -16,18 +17,23 @@ from storage.engine.database import Database
 def save(database: Database, rule: AlarmIn, *, by: str, at: str, alarm_id: str | None = None) -> tuple[AlarmRow, bool]:
     """Save a rule, new or (`alarm_id`) in the place of another; as it is in force, and whether it is new.
 
-    A rule that is there already under any name is not made twice. Raises NotFoundError for an unknown clutch or rule.
+    A rule that is there already under any name is not made twice. Raises NotFoundError for an unknown clutch or rule,
+    NotPossibleNowError where there are MAX_RULES beside it.
     """
     content = rule.model_dump(mode="json")
     with database.writing() as connection:
         if rule.clutch_id is not None:
             records.clutch(connection, rule.clutch_id)
+        beside = [row for row in alarms.page(connection, limit=ALL_ROWS) if row.clutch_id == rule.clutch_id]
         if alarm_id is None:
-            same = [row for row in alarms.page(connection, limit=ALL_ROWS) if row.content == content]
+            same = [row for row in beside if row.content == content]
             if same:
                 return same[0], False
         else:
             found(alarms.get(connection, alarm_id), "alarm", alarm_id)
+        if sum(row.alarm_id != alarm_id for row in beside) >= MAX_RULES:
+            whose = "rules of several clutches" if rule.clutch_id is None else f"rules of clutch {rule.clutch_id!r}"
+            raise NotPossibleNowError(f"there are {MAX_RULES} {whose}, which is the maximum: change or delete one")
         row = AlarmRow(
             alarm_id=alarm_id or secrets.token_hex(8),
             clutch_id=rule.clutch_id,

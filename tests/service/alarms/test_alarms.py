@@ -9,6 +9,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.alarms import outbox
+from service.schemas.alarm import AlarmIn
+from service.workflows import change_alarms
 from tests.service.alarms.receiving import SECRET, Receiver, receiving, signed_rightly
 from tests.service.clients import client_of
 from tests.support import stationary
@@ -74,6 +76,37 @@ def test_the_rule_of_the_contract_is_the_same_made_twice(life: TestClient) -> No
     assert again.json()["alarm_id"] == first.json()["alarm_id"]
     assert life.get(first.headers["Location"]).json() == first.json()
     assert [item["alarm_id"] for item in life.get("/v1/alarms").json()["items"]] == [first.json()["alarm_id"]]
+
+
+def test_a_clutch_has_so_many_rules_and_no_more(life: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(change_alarms, "MAX_RULES", 2)
+    made = [rule(life, quantity="remaining_cycles", below=limit)["alarm_id"] for limit in (1.0, 2.0)]
+    body = {"clutch_id": "e", "quantity": "remaining_cycles", "below": 3.0}
+    refused = life.post("/v1/alarms", json=body)
+    assert refused.status_code == 409
+    assert "there are 2 rules of clutch 'e', which is the maximum" in refused.json()["detail"]
+    assert life.put(f"/v1/alarms/{made[0]}", json=body).status_code == 200
+    assert life.post("/v1/alarms", json=body).status_code == 200  # it is there already
+    several = [
+        life.post("/v1/alarms", json={"quantity": "held_runs", "above": limit}).status_code for limit in range(3)
+    ]
+    assert several == [201, 201, 409]
+
+
+@pytest.mark.parametrize("name", ["a\x1b[31m", "two\nlines", "a\x00", "gpj.exe\u202e", "a\x85b"])
+def test_a_name_stands_in_one_line(life: TestClient, name: str) -> None:
+    watched = {"quantity": "remaining_cycles", "below": 1.0}
+    for address, body in (
+        ("alarms", watched | {"name": name}),
+        ("alarms", watched | {"kind": {"fluid": name}}),
+        ("webhooks", {"url": "http://127.0.0.1/x", "name": name}),
+        ("clutches", {"clutch_id": "f", "fluid": name}),
+    ):
+        answer = life.post(f"/v1/{address}", json=body)
+        assert answer.status_code == 422
+        assert "must be one line of text without control characters" in answer.json()["detail"]
+    assert life.post("/v1/alarms", json=watched | {"name": "Kühlöl 日本 🙂"}).status_code == 201
+    assert AlarmIn.model_validate(watched | {"name": name}).name == name  # what is stored already stays readable
 
 
 def test_an_acknowledged_alarm_is_not_raised_again(life: TestClient) -> None:

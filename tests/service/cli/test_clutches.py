@@ -115,6 +115,20 @@ def test_a_list_says_that_a_life_has_ended() -> None:
     assert _row(item | {"summary": summary | {"ended": None}})[1] == "failure"
 
 
+def test_a_list_states_cycles_whole_and_no_remaining_life_after_an_end() -> None:
+    summary = {
+        "as_of_cycles": 1e7,
+        "at_least": 2.9,
+        "status": "predicted",
+        "ended": None,
+        "remaining_cycles": {"0.5": 4.2},
+    }
+    item = {"clutch_id": "c", "held": 0, "summary": summary, "state": {"name": "normal"}}
+    assert _row(item) == ["c", "normal", "10,000,000", "2", "4", ""]
+    over = {"at_least": None, "status": "ended", "ended": {"cycles": 1e7}, "remaining_cycles": {"0.5": None}}
+    assert _row(item | {"summary": summary | over}) == ["c", "ended, normal", "10,000,000", "-", "-", ""]
+
+
 def test_no_note_or_name_commands_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     """The title of a window, colours, a line written over: by a line, a table, an error."""
     evil = "a\x1b]0;b\x07\x1b[2Jc\x9bd\u202e"

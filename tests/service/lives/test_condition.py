@@ -71,6 +71,20 @@ def test_two_tests_say_at_least_how_many_cycles_are_left(bench: Bench) -> None:
     assert life["statement"] in item(bench)["state"]["why"]
 
 
+def test_tests_at_the_same_cycles_or_at_other_pressures_are_not_asked_for_again(bench: Bench) -> None:
+    for place, pressures in enumerate([(4.0, 5.0), (4.0, 5.0), (4.0, 5.0), (4.0, 5.0), (2.0,)]):
+        bench.send(stationary(500.0 * (place == 4), run_id=f"n{place}", wear=0.01 * place, pressures=pressures))
+    shown = item(bench)
+    assert shown["state"]["why"].startswith(
+        "tests at 1 of the 3 different cycles that a prediction needs, 1 more cannot"
+    )
+    assert shown["action"].startswith("Run 2 more stationary tests, at different cycles, at the pressures and the oil")
+    for answer in (now(bench, method) for method in METHODS):
+        (warning,) = answer["warnings"]
+        assert (warning["code"], answer["runs_used"]) == ("tests_left_out", 4)
+        assert warning["message"].startswith("1 of 5 tests do not count: ")
+
+
 @pytest.mark.parametrize("every", one_quick([60, 24]))
 def test_what_is_said_of_held_runs_does_not_depend_on_the_order_of_arrival(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, every: int
@@ -190,6 +204,16 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
             summary(800.0, status="insufficient_data", runs_used=2), None,
             "Function check: 2 of the 3 tests that a prediction needs; the remaining life is not known yet: at least",
             "Run one more stationary test: then the remaining life is predicted.",
+        ),
+        (
+            summary(800.0, status="insufficient_data", runs_used=6, tests=6, places=2), None,
+            "Function check: tests at 2 of the 3 different cycles that a prediction needs; the remaining life is not",
+            "Run one more stationary test: then the remaining life is predicted.",
+        ),
+        (
+            summary(0.0, status="insufficient_data", runs_used=1, tests=7, places=1), None,
+            "Function check: 1 of the 3 tests that a prediction needs, 6 more cannot be compared with the first; ",
+            "Run 2 more stationary tests, at different cycles, at the pressures and the oil temperature of the first: then",
         ),
         ({}, None, "Function check: no run yet", "Run 3 more stationary tests, at different cycles: then "),
         (summary(9000.0), found(["oil_temperature"], adoptable=True), "Out of specification: ", "Adopt the model with oil"),

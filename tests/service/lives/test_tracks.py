@@ -117,7 +117,7 @@ def test_a_filter_that_is_carried_on_says_what_one_that_starts_again_says(method
     again = advance(method, series, under, None, len(CYCLES))
     assert carried is not None
     assert set(carried.states) == {"weak@0", "weak@1"}
-    said = [predict(method, series, under, states, CYCLES[-1], 0.5) for states in (carried, again)]
+    said = [predict(method, series, under, states, CYCLES[-1], 0.5, tests=of.tests) for states in (carried, again)]
     assert said[0] == said[1]
 
 
@@ -138,7 +138,7 @@ def test_a_test_is_odd_only_where_it_is_under_every_draw() -> None:
     for one in (of, odd_under_one, both):
         series = one.pooled(under)
         tracked = advance("particle", series, under, None, len(CYCLES))
-        said = predict("particle", series, under, tracked, CYCLES[-1], 0.5)
+        said = predict("particle", series, under, tracked, CYCLES[-1], 0.5, tests=of.tests)
         warned.append("off_track" in {warning["code"] for warning in said["warnings"]})
     assert warned == [False, False, True]
 
