@@ -41,8 +41,16 @@ _LEADING = ("torque_nm", "speed_rpm", "pressure_bar")
 _LONGEST_PAUSE = 10
 #: A second, in days; as a step in seconds, less than rigs sample at.
 _SECOND_OF_DAY = 1.2e-5
-#: Seconds since 1970 of 1990 and 2100.
-_OUR_TIME = (6.3e8, 4.1e9)
+#: Seconds since 1970 of 2000 and 2100. In nanoseconds, .NET's ticks of that time would be of 1990.
+_OUR_TIME = np.array([9.46e8, 4.1e9])
+#: What computers count since when: Unix, Windows' file times, .NET's ticks.
+_COUNTED = {
+    "ms since 1970": 1e3,
+    "µs since 1970": 1e6,
+    "ns since 1970": 1e9,
+    "100 ns since 1601": 1e7,
+    "100 ns since 0001": 1e7,
+}
 #: Empty cells that show a channel of a lower rate. Chosen: fewer may have been left empty by hand.
 _MIN_GAPS = 4
 #: The share of a clock's steps that go on. Chosen: times that are rounded to half a step stand still at every second.
@@ -287,17 +295,18 @@ def _numbers(column: Taken, values: NDArray[Any], start: Any) -> tuple[FloatArra
 
 
 def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> Notice | None:
-    """Scale times without a unit that only as a computer's milliseconds, microseconds or nanoseconds since 1970 are of our
-    time, in place, from the first on, and say so.
+    """Scale times without a unit that only as one of a computer's counts are of our time, in place, from the first on, and
+    say so.
 
     Raises InvalidError where no map takes them for seconds, or where they may be days as spreadsheets or MATLAB count them:
     of our time since 1900 or the year 0, less than five of them, in steps that would be shorter than a rig samples.
     """
-    for unit, factor in (("ms", 1e3), ("µs", 1e6), ("ns", 1e9)):
-        if times.size and times.min() / factor > _OUR_TIME[0] and times.max() / factor < _OUR_TIME[1]:
+    for unit, factor in _COUNTED.items():
+        first, last = _OUR_TIME + (np.datetime64("1970-01-01") - np.datetime64(f"{unit[-4:]}-01-01")) / _SECOND
+        if times.size and times.min() / factor > first and times.max() / factor < last:
             times -= times[0]
             times /= factor
-            return Notice(code="unit_found", message=f"{column.shown()} was read as {unit} since 1970")
+            return Notice(code="unit_found", message=f"{column.shown()} was read as {unit}")
     name = column.title or column.name
     if "time_s" not in choices_of(reading):
         raise no_unit([("time_s", column)], reading)

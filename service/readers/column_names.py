@@ -21,15 +21,15 @@ _NAMES = {name: name for name in CHANNELS} | {"x_value": "time_s", "rpm": "speed
 _NOUNS = {
     "time_s": "time -zeit temps tiempo tempo tout -stamp ts timestamps -stempel date datum datetime fecha elapsed čas czas "
     "tijd tid zaman -时间 -時間 -時刻 -日時 время 시간",
-    "pressure_bar": "pressure press -druck pression presión presion pressione pressão ciśnienie tlak tryck basınç druk "
+    "pressure_bar": "pressure press pres -druck pression presión presion pressione pressão ciśnienie tlak tryck basınç druk "
     "-压力 -油压 -壓力 -油壓 -圧力 -油圧 давление -압력",
     "speed_rpm": "speed spd velocity -drehzahl -geschwindigkeit omega vitesse velocidad velocità velocidade rotação "
     "prędkość otáčky toerental varvtal devir hız régime -회전수 -转速 -轉速 -回転数 -回転速度 обороты -frequenz frequency "
     "frecuencia fréquence частота",
-    "torque_nm": "torque trq tq md -moment couple par coppia binário koppel vridmoment tork -扭矩 -转矩 -轉矩 -トルク "
+    "torque_nm": "torque trq tq md -moment couple par coppia binário koppel vridmoment tork -力矩 -扭矩 -转矩 -轉矩 -トルク "
     "момент -토크",
-    "temperature": "temperature -temp toil oiltemp oiltemperature -temperatur température temperatura teplota sıcaklığı "
-    "theta -温 -溫 -온 температура",
+    "temperature": "temperature -temp toil oiltemp oiltemperature -temperatur -temperatuur température temperatura teplota "
+    "sıcaklığı theta -温 -溫 -온 температура",
 }
 #: Letters that stand for a quantity beside another word or a unit, which decides between several.
 _SYMBOLS = {
@@ -42,18 +42,19 @@ _PLAIN = (
     "ist act actual istwert messwert measured sensor signal channel kanal clutch kupplung kupplungs embrayage embrague of "
     "the de del der des di du d"
 )
+_WHOLE = "abs absolute absolut"  # of a pressure another one: from vacuum on
 _PLAIN_OF = {
-    "time_s": "standardmessrate default sample rate time zeit mess uhr date datum elapsed hora y und and",
+    "time_s": f"{_WHOLE} standardmessrate default sample rate time zeit mess uhr date datum elapsed hora y und and",
     "pressure_bar": "line leitung leitungs anpress kolben piston",
-    "speed_rpm": "rotational rotation shaft differential diff slip relative rel dreh winkel angular differenz schlupf "
-    "giro obrotowa drum trommel welle вращения",
-    "torque_nm": "friction reib frottement fricción dreh obrotowy kroutící 摩擦 r",
+    "speed_rpm": f"{_WHOLE} rotational rotation shaft differential diff slip relative rel dreh winkel angular differenz "
+    "schlupf giro obrotowa drum trommel welle вращения",
+    "torque_nm": f"{_WHOLE} friction reib frottement fricción dreh obrotowy kroutící 摩擦 r",
     "temperature": "",
 }
 #: Whose temperature it is.
 _OIL = {
     "oil", "toil", "oiltemp", "oiltemperature", "öl", "olje", "oleje", "yağ", "유", "sump", "sumpf", "huile", "aceite",
-    "olio", "óleo", "oleju", "масла", "油",
+    "olie", "olio", "óleo", "oleju", "масла", "油",
 }  # fmt: skip
 _PLATE, _REAR = {"plate", "platte", "platten", "lamelle", "lamellen"}, {"rear", "hinten"}
 _SPREAD = {"sd", "std", "deviation", "standard", "standardabweichung"}
@@ -63,7 +64,7 @@ _OTHER = re.compile(
     "peak|spitz|sd$|std|stand|devia|abweich|err|fehl|difference|ratio|rate|grad|deriv|änderung|offset|zero|null|tar[ae]$|"
     "gain|coef|koef|calc|berech|estim|model|simul|predict|drag|schlepp|bearing|lager|loss|verlust|lube|schmier|ambient|"
     "umgeb|baro|atmos|luft|air$|supply|versorg|tank|pump|fan$|raw$|roh$|"
-    "rippl|ampl|uncert|unsich|request|bend|biege|inert|träghe|idle|leerl|cool|kühl|critic|kriti"
+    "abs(?:ol|$)|rippl|ampl|uncert|unsich|request|bend|biege|inert|träghe|idle|leerl|cool|kühl|critic|kriti"
 )
 #: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports, Simulink's.
 _SECONDS = frozenset({"x_value", "timestamps", "tout"})
@@ -520,7 +521,7 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
     if choice is None:
         return "s" if column.unit is None and _key(column.name) in _SECONDS else column.unit
     stated = column.unit or (None if public or scaled else unit_in_title(channel, column.name))
-    differ = stated not in (None, choice.stated) and wanted and not scaled
+    differ = stated not in (None, choice.stated) and wanted and not scaled and is_unit(stated or "")
     if differ and conversion(channel, stated or "") != conversion(channel, wanted or ""):
         rule = f"must be {wanted}, as its profile or map says"
         raise _wrong_unit(channel, column, "mixed_units", rule, repr((stated or "")[:MAX_QUOTED]))
@@ -540,7 +541,8 @@ def _conversion(channel: str, column: Column, choice: Choice | None, unit: str |
     converted = Conversion() if unit is None else conversion(channel, unit)
     if converted is None:
         rule = f"must be a known one ({spellings(channel)})"
-        raise _wrong_unit(channel, column, "unknown_unit", rule, repr((unit or "")[:MAX_QUOTED]))
+        way = "" if is_unit(unit or "") else f"; map={channel}:{column.shown()} [UNIT] says which it is"
+        raise _wrong_unit(channel, column, "unknown_unit", rule, repr((unit or "")[:MAX_QUOTED]) + way)
     if public and not converted.is_identity() and choice is None:
         rule = f"is in {own} by its name"
         raise _wrong_unit(channel, column, "mixed_units", rule, repr((unit or "")[:MAX_QUOTED]))

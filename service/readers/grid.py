@@ -51,7 +51,7 @@ NUMERIC = re.compile(
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
     """Where a table is: of each column the title, unit, group and first cell; the row of its titles, the first row of data,
-    how many rows with numbers beside a label stand between, and a score by which other separators or encodings compare."""
+    how many rows with numbers beside a label stand between, and a score by which other rows of titles compare."""
 
     headings: tuple[tuple[str, str, str, Any], ...]
     titles: int
@@ -62,6 +62,10 @@ class Layout:
     def texts(self) -> tuple[tuple[str, str, str], ...]:
         """The titles, units and groups."""
         return tuple((title, unit, group) for title, unit, group, _ in self.headings)
+
+    def fit(self) -> tuple[int, ...]:
+        """How well a separator or an encoding reads the table: known titles, less what they are more or fewer than cells."""
+        return self.score[0] + self.score[1], *self.score
 
     def columns(self) -> tuple[Column, ...]:
         """The columns. Raises InvalidError on a title that is too long, or beside whose unit another is stated."""

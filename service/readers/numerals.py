@@ -98,6 +98,9 @@ class Numerals:
                 for row, cell in enumerate(cells):
                     if len(_decimals(cell)) > 1:
                         raise _doubtful(name, before + row, with_unit_apart(cell)[0].strip(), line_of)
+        for index, cells in zip(channels, columns, strict=True):
+            apart = (with_unit_apart(cell)[1] for cell in cells if any(map(str.isdigit, _shown(cell))))
+            self._units.setdefault(index, "" if before else next(apart, ""))
         read: list[NDArray[Any]] = []
         wrong: list[tuple[int, str, str, str]] = []
         total = 0
@@ -113,17 +116,18 @@ class Numerals:
         return read
 
     def _column(self, index: int, name: str, cells: Sequence[Any]) -> NDArray[Any] | None:
-        """One column; None where a cell is no number, by this file's decimal sign and in the unit behind the first cell."""
+        """One column; None where a cell is no number by this file's decimal sign, in the unit behind the first number."""
         if not name:
             held = np.empty(len(cells), dtype=object)
             held[:] = cells
             return held
         values = self._moments(index, cells) if name == "time_s" else None
-        values = self._floats(cells) if values is None else values
+        unit = self._units.get(index, "")
+        values = self._floats(cells) if values is None and not unit else values
         if values is not None:
             return values
         bare = [cell.strip() if isinstance(cell, str) else cell for cell in cells]
-        if unit := self._units.setdefault(index, next((unit for _, unit in map(with_unit_apart, cells) if unit), "")):
+        if unit:
             if not all(cell in (None, "") or (isinstance(cell, str) and cell.endswith(unit)) for cell in bare):
                 return None
             bare = [(cell or "").removesuffix(unit).rstrip() for cell in bare]
@@ -179,7 +183,7 @@ class Numerals:
         for row, cell in enumerate(cells):
             if self._column(index, "no time", [cell]) is None:
                 rule = f"must be a number in {unit}, as the first" if unit else "must be a number"
-                if self.decimal and isinstance(cell, str) and swapped._floats([cell]) is not None:
+                if self.decimal and not unit and isinstance(cell, str) and swapped._floats([cell]) is not None:
                     rule = f"must have the decimal sign {self.decimal!r} as before"
                 elif name == "time_s":
                     rule = rule.replace("a number", "a number or a time such as 2026-11-02 07:00:00.5")

@@ -164,7 +164,7 @@ def _form(first: bytes, reading: Reading, limits: Limits) -> _Form:
             rows = [cells for _, cells, _ in numbered]
             layout = find_table(rows, comments, named)
             unfit = unfit or rows
-            if layout is not None and (best is None or layout.score > best.layout.score):
+            if layout is not None and (best is None or layout.fit() > best.layout.fit()):
                 lines = [line + 1 for line, _, _ in numbered]
                 best = _Form(encoding=encoding, separator=separator, layout=layout, rows=rows, lines=lines)
         if best is not None and encoding.startswith("utf"):

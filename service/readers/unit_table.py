@@ -88,7 +88,7 @@ _TORQUE = (
     | _spelled(_NEWTON_METRES_PER_POUND_FOOT / 192, "ozfin ozin inoz inozf")
 )
 _TEMPERATURE = (
-    _spelled(1.0, "°C degC degreeC degreesC C celsius cel 摄氏度")
+    _spelled(1.0, "°C degC degreeC degreesC gradC C celsius cel 摄氏度")
     | _spelled(1.0, "K degK kelvin", -ZERO_CELSIUS)
     | _spelled(5 / 9, "°F degF F fahrenheit", -160 / 9)
 )

@@ -22,10 +22,16 @@ from service.readers.table import Choice, Column, Reading
         ("t", "time_s"), ("Zeit", "time_s"),
         ("N", None), ("P", None), ("T", None), ("m", None), ("Mz", None), ("", None), ("Temperatur", None),
         ("-Torque", None), ("Torque/2", None), ("Torque^2", None), ("Motordrehzahl", None),
+        ("Pressure abs", None), ("Absolutdruck", None), ("Torque abs", "torque_nm"), ("Absolute Time", "time_s"),
     ],
 )  # fmt: skip
 def test_names_are_known(name: str, channel: str | None) -> None:
     assert known_channel(name) == channel
+
+
+def test_an_absolute_pressure_is_another_one() -> None:
+    columns = [column_of("p_abs [bar]"), column_of("M [Nm]")]
+    assert [taken.channel for taken in choose(columns, Reading())] == ["torque_nm"]
 
 
 @pytest.mark.parametrize(

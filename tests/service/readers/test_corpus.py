@@ -265,9 +265,8 @@ TEXTS: dict[str, tuple[str | bytes, str | None]] = {
         "***End_of_Header***\nX_Value\tPressure\tX_Value\tSpeed\tX_Value\tTorque\tComment\n"
         + "".join(f"02.11.2026 07:00:{t:06.3f}\t{p}\t02.11.2026 07:00:{t:06.3f}\t{n}\t02.11.2026 07:00:{t:06.3f}\t{m}\n"
                   for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
-    "milliseconds-since-1970.csv": ("timestamp,p [bar],n [rpm],M [Nm]\n"
-                                    + "".join(f"{1793602800000 + round(1000 * t)},{p},{n},{m}\n"
-                                              for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
+    "titles-of-two-words.txt": ("Time\tTorsional Torque\tTorsional Speed\tPiston Pressure\nsec\tN-m\trpm\tbar\n"
+                                + rows("\t", names=["time_s", "torque_nm", "speed_rpm", "pressure_bar"]), None),
     "units-in-cells.csv": ("Zeit;Druck;Drehzahl;Drehmoment\n"
                            + re.sub("(.*);(.*);(.*);(.*)", r"\1 s;\2 bar;\3 1/min;\4 Nm", rows(";", ",")), None),
     "zone-by-name.csv": (stamps("%d.%m.%Y %H:%M:%S.%f MEZ"), None),
@@ -307,6 +306,25 @@ def require_record(path: Path, reading: Reading | None = None) -> None:
     assert columns.keys() == RECORD.keys()
     for channel, values in RECORD.items():
         np.testing.assert_allclose(columns[channel], values, rtol=1e-9, atol=1e-9, err_msg=channel)
+
+
+@pytest.mark.parametrize(
+    ("first", "a_second", "unit"),
+    [
+        (1793602800000, 10**3, "ms since 1970"),
+        (1793602800 * 10**9, 10**9, "ns since 1970"),
+        (134380764 * 10**9, 10**7, "100 ns since 1601"),
+        (639291996 * 10**9, 10**7, "100 ns since 0001"),
+    ],
+)
+def test_counts_that_can_only_be_one_computers_are_times(tmp_path: Path, first: int, a_second: int, unit: str) -> None:
+    lines = [f"{first + round(a_second * t)},{m}\n" for t, m in zip(TIME, RECORD["torque_nm"], strict=True)]
+    (tmp_path / "a.csv").write_text("timestamp,M [Nm]\n" + "".join(lines), encoding="utf-8")
+    read = read_file(tmp_path / "a.csv", filename="a.csv")
+    np.testing.assert_allclose(
+        read.columns["time_s"], TIME, atol=1.3e-5
+    )  # what a float holds of 100 ns since the year 1
+    assert [notice.message for notice in read.notices] == [f"timestamp was read as {unit}"]
 
 
 def test_a_slower_channel_in_the_same_rows_is_brought_to_their_clock(tmp_path: Path) -> None:
@@ -359,6 +377,17 @@ REFUSED = {
         None,
         "torque_nm[1] (line 3) must be a number in Nm, as the first, got '22 mNm'",
     ),
+    "a-unit-in-one-cell": (
+        "t [s];M [Nm]\n0;21\n1;22 Nm\n",
+        None,
+        "torque_nm[1] (line 3) must be a number, got '22 Nm'",
+    ),
+    "a-unit-in-all-cells-but-one": (
+        "t [s];M\n0;21 Nm\n1;22\n",
+        None,
+        "torque_nm[1] (line 3) must be a number in Nm, as the first, got '22'",
+    ),
+    "an-unknown-unit": ("t [s];M [10 Nm]\n0;1\n1;2\n", None, "got '10 Nm'; map=torque_nm:M [UNIT] says which it is"),
     "two-zones": (
         "time;M [Nm]\n2026-10-25 02:59:59 CEST;1\n2026-10-25 02:00:00 CET;2\n",
         None,
@@ -585,6 +614,9 @@ def test_a_unit_in_the_map_is_used_and_must_not_contradict_the_file(tmp_path: Pa
     assert columns["torque_nm"].tolist() == [1000, 2000]
     with pytest.raises(InvalidError, match="must be kNm, as its profile or map says, got 'Nm'"):
         read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("torque_nm:Mx [kNm]"))
+    (tmp_path / "a.csv").write_text(REFUSED["an-unknown-unit"][0], encoding="utf-8")
+    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("torque_nm:M [x10 Nm]")).columns
+    assert columns["torque_nm"].tolist() == [10, 20]
 
 
 @pytest.mark.parametrize("number", [1, 2])
