@@ -6,6 +6,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+
 
 def family(pid: int) -> list[int]:
     """A process and all that it has started, itself first; those that have ended by the time they are looked at left out."""
@@ -28,6 +30,14 @@ def held(pid: int) -> int:
         with suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
             total += held_alone(number)
     return total
+
+
+def resident(pid: int) -> int:
+    """Bytes of a process in memory, 0 where it has just ended."""
+    try:
+        return int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]) * _PAGE
+    except (FileNotFoundError, ProcessLookupError):
+        return 0
 
 
 def held_alone(pid: int) -> int:

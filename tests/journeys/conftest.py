@@ -7,7 +7,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser
 
-from tests.browser.driving import FLAT, chromium, launched
+from tests.browser.driving import FLAT, Watched, chromium, launched
 from tests.service.clients import client_on
 from tests.support import Server, serving
 
@@ -31,6 +31,14 @@ def browser() -> Iterator[Browser]:
     """A headless Chromium for all pages, which draws nothing in 3D."""
     with chromium(more=FLAT) as flat:
         yield flat
+
+
+@pytest.fixture
+def watched(browser: Browser, server: Server) -> Iterator[Watched]:
+    """A page of the module's service."""
+    found = Watched(browser, server.url)
+    yield found
+    found.close()
 
 
 @pytest.fixture(scope="module")

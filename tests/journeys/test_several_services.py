@@ -15,8 +15,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from tests.service.web.test_connections import resident
-from tests.service.web.test_stopping import family
+from tests.benchmarks.memory import family, resident
 from tests.service.workflows import stand_in_engine
 from tests.storage.engine.postgresql.server import PostgresServer
 from tests.support import ONCE, Server, clutchlife, free_port, serving, stationary, wait_until_ready

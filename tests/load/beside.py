@@ -11,14 +11,13 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tests.benchmarks.memory import family, family_seconds
+from tests.benchmarks.memory import family, family_seconds, resident
 from tests.load.bodies import JSON_TYPE, asked, posted
 from tests.load.exchange import Line
 from tests.load.field import noted
 
 #: Seconds between two looks at a diagnosis, between two refreshes, and between two looks at the memory.
 LOOK_EVERY, REFRESH_EVERY, WATCH_EVERY = 0.5, 20.0, 1.0
-_PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
 @dataclass(slots=True)
@@ -93,14 +92,6 @@ async def watch(pids: Sequence[int], begin: float, end: float, beside: Beside) -
         beside.alone.append(sum(map(resident, pids)))
         beside.together.append(sum(resident(each) for pid in pids for each in family(pid)))
         planned += WATCH_EVERY
-
-
-def resident(pid: int) -> int:
-    """Bytes of a process in memory, 0 where it has just ended."""
-    try:
-        return int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]) * _PAGE
-    except (FileNotFoundError, ProcessLookupError):
-        return 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

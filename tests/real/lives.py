@@ -30,7 +30,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.prognosis.criteria import HORIZON
-from models.prognosis.ended_lives import EndedLife, ended_life, new_and_laws, severity_exponent
+from models.prognosis.ended_lives import EndedLife, severity_exponent
 from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.scoring import crps_of_sample, measured_end
 from models.prognosis.stated_end import stated_end
@@ -41,6 +41,7 @@ from tests.real.lag import Row, table
 from tests.real.loaders import FOLDER
 from tests.real.prognosis import BLOCKS, columns, laser_histories
 from tests.statistical.forecasts import DRAWS, GRID, forecast
+from tests.statistical.lives import taught
 
 SEED, TESTS, LIMIT, CRACK, RISE, DONE = 2026, 30, 600.0, 0.25, 0.05, 0.9
 STAGES = (0.4, 0.6, 0.8)
@@ -188,17 +189,6 @@ def _outcome(ends: FloatArray, weight: FloatArray, end: float) -> Outcome:
     return bool(low <= end <= high), bool(low > end), crps_of_sample(capped, weight, end) / end
 
 
-def teaches(life: Life) -> EndedLife:
-    _, tests, end = life
-    progress, values = (
-        np.array(column) for column in zip(*((test.progress, test.value) for test in tests), strict=True)
-    )
-    initial, laws = new_and_laws(tests)
-    taught = ended_life(progress, values, end, initial=initial, fraction=0.5, laws=laws)
-    assert taught is not None
-    return taught
-
-
 def judged(half: str, every: int, store: Path) -> Iterator[tuple[str, dict[str, dict[str, list[float]]]]]:
     """The row and the outcomes of every life of a half, from the store where they are there."""
     known = Lines(store)
@@ -207,19 +197,19 @@ def judged(half: str, every: int, store: Path) -> Iterator[tuple[str, dict[str, 
         for life in world():
             kinds[life[0]].append(life)
         for kind, lives in kinds.items():
-            taught = [teaches(life) for life in lives]
+            ended = [taught(tests, end) for _, tests, end in lives]
             for number in range(HALVES.index(half), len(lives), 2):
                 if every > 1 and len(lives) > every and number // 2 % every:
                     continue
-                yield name, known.get(f"{name}/{kind}/{number}", partial(forecasts, lives, taught, number))
+                yield name, known.get(f"{name}/{kind}/{number}", partial(forecasts, lives, ended, number))
 
 
-def forecasts(lives: Sequence[Life], taught: Sequence[EndedLife], number: int) -> dict[str, Any]:
+def forecasts(lives: Sequence[Life], ended: Sequence[EndedLife], number: int) -> dict[str, Any]:
     """What is said of one of a kind's lives, alone and with others of them."""
     _, tests, end = lives[number]
     rng = np.random.default_rng([SEED, number])
     order = [index for index in rng.permutation(len(lives)).tolist() if index != number]
-    kin = {count: [taught[k] for k in order[:count]] for count, least in OTHERS.items() if len(order) >= least}
+    kin = {count: [ended[k] for k in order[:count]] for count, least in OTHERS.items() if len(order) >= least}
     return {"alone": alone(tests, end, number)} | with_ended(tests, end, kin, rng)
 
 

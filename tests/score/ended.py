@@ -12,9 +12,9 @@ from models.prognosis.scoring import crps_of_sample
 from models.prognosis.stated_end import stated_end
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
-from tests.score.fleets import GRID, kind, taught
+from tests.score.fleets import GRID, kind
 from tests.score.table import percents
-from tests.statistical.lives import STAGES
+from tests.statistical.lives import STAGES, taught
 
 #: Damage up to a factor, by the share of a life.
 Damage = Callable[[FloatArray], FloatArray]
@@ -95,9 +95,8 @@ def _fleet(name: str, longer: float, seed: list[int]) -> list[list[list[tuple[fl
             drawn = GRID.posterior(GRID.from_history(weak(seen[0], falling=True), seen), 500, rng)
             outcomes = []
             for count in COUNTS:
-                known = [other for other in others[:count] if other is not None]
                 stated = stated_end(
-                    drawn, fraction=0.5, as_of=seen[-1].progress, horizon=HORIZON, ended=known, tests=seen
+                    drawn, fraction=0.5, as_of=seen[-1].progress, horizon=HORIZON, ended=others[:count], tests=seen
                 )
                 ends = np.minimum(stated.ends, HORIZON)
                 low, high = weighted_quantiles(ends, stated.weight, (0.05, 0.95)).tolist()

@@ -6,14 +6,13 @@ import numpy as np
 
 from models.degradation.general_order import Degradation, first_passage
 from models.prognosis.criteria import HORIZON
-from models.prognosis.ended_lives import EndedLife, ended_life, new_and_laws
+from models.prognosis.ended_lives import EndedLife
 from models.prognosis.fleet import learn
 from models.prognosis.stated_end import stated_end
 from models.tracking.filters.grid import Grid
-from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.score.table import Scores
-from tests.statistical.lives import STAGES, Life
+from tests.statistical.lives import STAGES, Life, taught
 
 GRID = Grid()
 
@@ -28,12 +27,6 @@ def kind(rng: np.random.Generator, change: float, scale: float, exponent: float)
         exponent=exponent * math.exp(0.1 * rng.standard_normal()),
     )
     return Life(truth, 0.003 * initial, float(first_passage(0.5 * initial, truth)))
-
-
-def taught(history: list[Measurement], end: float) -> EndedLife | None:
-    progress, values = (np.array(column) for column in zip(*((m.progress, m.value) for m in history), strict=True))
-    initial, laws = new_and_laws(history)
-    return ended_life(progress, values, end, initial=initial, fraction=0.5, laws=laws)
 
 
 def fleets(count: int, seed: int) -> str:
@@ -52,8 +45,7 @@ def fleets(count: int, seed: int) -> str:
                 fleet = [kind(rng, 0.75, 5_000.0 * other, 0.7) for _ in range(size)]
                 taught_by = [(each.end, each.measured(1.0, 25, rng)) for each in fleet if math.isfinite(each.end)]
                 learned = learn([history for _, history in taught_by])
-                lives = [taught(history, end) for end, history in taught_by]
-                ended = [each for each in lives if each is not None]
+                ended = [taught(history, end) for end, history in taught_by]
             life = kind(rng, 0.75, 5_000.0, 0.7)
             assert learned is not None
             if not math.isfinite(life.end):

@@ -10,11 +10,20 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from fastapi.testclient import TestClient
+from typer.testing import CliRunner
 
 from service.app import create_app
+from service.cli.main import app as command_line
 from service.settings import Settings
 from tests.storage.samples import lay_empty
 from tests.support import stationary
+
+
+def clutchlife(*arguments: str | Path, code: int = 0) -> str:
+    """Run a command in this process and return what it printed."""
+    done = CliRunner().invoke(command_line, list(map(str, arguments)), catch_exceptions=False)
+    assert done.exit_code == code, done.output
+    return done.output
 
 
 @cache

@@ -1,13 +1,14 @@
 """Simulated lives, brute-force posteriors and scores for the statistical tests of tracking and prognosis."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from models.degradation.general_order import Degradation, first_passage, value
+from models.prognosis.ended_lives import EndedLife, ended_life, new_and_laws
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
 from models.prognosis.scoring import crps_of_sample
 from models.tracking import linear_model, sampling
@@ -210,6 +211,15 @@ def exact(
 
 #: (log φ, log ε, log s) to (log τ, log ε, log s), where the ridge is nearly straight.
 TURN = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def taught(tests: Sequence[Measurement], end: float) -> EndedLife:
+    """What a life with these tests teaches that ended at `end`, with half of its new value."""
+    initial, laws = new_and_laws(tests)
+    progress, values = (np.array(column) for column in zip(*((t.progress, t.value) for t in tests), strict=True))
+    life = ended_life(progress, values, end, initial=initial, fraction=0.5, laws=laws)
+    assert life is not None
+    return life
 
 
 def ends(posterior: Posterior) -> np.ndarray:

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from models.prognosis.first_passage import predict_first_passage
-from models.rig.truth import draw
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
+from tests.score.off_prior import rig_lives
 from tests.statistical.forecasts import STAGES, followed
 from tests.statistical.laws import LAWS
 
@@ -62,15 +62,9 @@ def test_a_filter_sure_of_eq_6_is_wrong_about_a_line() -> None:
 
 def test_the_rigs_own_lives_are_held_though_they_are_not_one_eq_6() -> None:
     """Mean COF of curves whose four parameters follow an eq. 6 each: 30 clutches leave a deviation of 5 points."""
-    told = []
-    for seed in range(LIVES):
-        clutch = draw(np.random.default_rng([901, seed]))
-        end = clutch.end_of_life()
-        assert end is not None
-        fresh = clutch.mean_cof(0.0)
-        told.append(
-            followed(lambda x, c=clutch, e=end, f=fresh: c.mean_cof(x * e) / f, np.random.default_rng([902, seed]), end)  # type: ignore[misc]
-        )
+    lives = rig_lives(LIVES, 901)
+    assert len(lives) == LIVES
+    told = [followed(course, np.random.default_rng([902, k]), end) for k, (course, end) in enumerate(lives)]
     held, late = shares(told)
     print(f"seeds 901 and 902: held {held}, begins after the truth {late}")
     assert min(held) > 0.8

@@ -7,7 +7,7 @@ from models.arrays import FloatArray
 from models.friction.identification import fit_curves, mean_torques
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, Record, curves_by_pressure
-from tests.models.records.raw_records import GEOMETRY, SPEEDS, Made, Sensors, jitter, lose, make, protocol, spike
+from tests.models.records.raw_records import GEOMETRY, SPEEDS, Made, Sensors, harmed, make, protocol
 
 pytestmark = pytest.mark.slow
 
@@ -93,16 +93,7 @@ def test_deviations_cover_in_harmed_records(harm: str) -> None:
     misses = []
     for _ in range(RECORDS):
         made = make(*protocol(rng, SPEEDS[::2]), rng, tau=0.2)
-        record = made.record
-        if harm in ("lost", "all"):
-            record = lose(record, 0.01, rng)
-        if harm == "gap":
-            record = lose(record, 0.01, rng, gap=True)
-        if harm in ("jitter", "all"):
-            record = jitter(record, rng)
-        if harm in ("spikes", "all"):
-            record = spike(record, rng)
-        misses.append(_misses(record, made))
+        misses.append(_misses(harmed(made.record, harm, rng), made))
     _assert_calibrated(np.concatenate(misses))
 
 
@@ -113,7 +104,7 @@ def test_the_fits_are_those_of_the_exact_plateaus() -> None:
     misses = []
     for _ in range(10):
         made = make(*protocol(rng), rng, tau=float(np.exp(rng.uniform(np.log(0.02), np.log(0.5)))))
-        record = spike(jitter(lose(made.record, 0.01, rng), rng), rng)
+        record = harmed(made.record, "all", rng)
         exact = Plateaus(pressure=made.pressure, speed=made.speed, torque=made.torque)
         truth = mean_torques(fit_curves(curves_by_pressure(exact, GEOMETRY)), velocities)
         estimate = mean_torques(fit_curves(curves_by_pressure(cut_plateaus(record).plateaus, GEOMETRY)), velocities)

@@ -11,7 +11,7 @@ from typing import Any
 
 import httpx2
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 from tests.browser.driving import Watched, turned
 from tests.browser.dropping import drop
@@ -54,13 +54,6 @@ def server(tmp_path: Path) -> Iterator[Server]:
         with httpx2.Client(base_url=running.url, timeout=60) as http:
             fill(http)
         yield running
-
-
-@pytest.fixture
-def watched(browser: Browser, server: Server) -> Iterator[Watched]:
-    found = Watched(browser, server.url)
-    yield found
-    found.close()
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from typing import Any
 import httpx2
 import openpyxl
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from tests.browser.driving import Watched, turned
 from tests.browser.dropping import drop
@@ -27,13 +27,6 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         with httpx2.Client(base_url=running.url, timeout=60) as http:
             http.post("/v1/clutches", json={"clutch_id": "bench3-017"}).raise_for_status()
         yield running
-
-
-@pytest.fixture
-def watched(browser: Browser, server: Server) -> Iterator[Watched]:
-    found = Watched(browser, server.url)
-    yield found
-    found.close()
 
 
 def rows_of(cycles: int) -> list[tuple[float, float, float, float, str]]:

@@ -31,19 +31,12 @@ _IN_SIGHT = """rows => rows.map((row) => [row.getBoundingClientRect(), Number(ro
 
 
 @pytest.fixture(scope="module")
-def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     path = tmp_path_factory.mktemp("large") / "clutchlife.db"
     life(path, [json.dumps(stationary(cycles, wear=cycles / 26_000)).encode() for cycles in range(0, 8000, 2000)])
     multiply(f"sqlite:///{path}", CLUTCHES)
-    with serving(path, loaded=True) as server:
-        yield server
-
-
-@pytest.fixture
-def watched(browser: Browser, fleet: Server) -> Iterator[Watched]:
-    found = Watched(browser, fleet.url)
-    yield found
-    found.close()
+    with serving(path, loaded=True) as running:
+        yield running
 
 
 def opened(watched: Watched) -> Page:
@@ -91,9 +84,9 @@ def goes_to(page: Page, key: str, clutch: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("viewport", [WIDE, PHONE], ids=["wide", "phone"])
 def test_scrolling_shows_every_row_and_the_page_holds_few(
-    browser: Browser, fleet: Server, viewport: dict[str, int]
+    browser: Browser, server: Server, viewport: dict[str, int]
 ) -> None:
-    watched = Watched(browser, fleet.url, viewport=viewport)
+    watched = Watched(browser, server.url, viewport=viewport)
     page = opened(watched)
     seen: dict[int, str] = {}
     far = viewport is PHONE  # a card is five rows high: there the way is cut short
@@ -163,11 +156,11 @@ def test_the_focus_stays_while_the_rows_about_it_change(watched: Watched) -> Non
     assert page.locator(ROWS).count() <= MAX_ROWS
 
 
-def test_a_walk_by_name_skips_nothing_while_ranks_change(fleet: Server) -> None:
+def test_a_walk_by_name_skips_nothing_while_ranks_change(server: Server) -> None:
     """Between two pages half of the clutches get better by so much that they lie behind all others."""
-    database = open_database(fleet.address)
+    database = open_database(server.address)
     seen: list[str] = []
-    with httpx2.Client(base_url=fleet.url, timeout=60) as http:
+    with httpx2.Client(base_url=server.url, timeout=60) as http:
         address: str | None = "/v1/clutches?sort=name&limit=37"
         while address is not None:
             answer = http.get(address)
@@ -182,4 +175,4 @@ def test_a_walk_by_name_skips_nothing_while_ranks_change(fleet: Server) -> None:
                     clutches.set_summary(connection, row.clutch_id, row.rank + 1000.0, row.summary, **state)
     database.close()
     assert seen == [name(number) for number in range(CLUTCHES)]
-    assert ONCE.get(f"{fleet.url}/v1/fleet/totals").json()["all"] == CLUTCHES
+    assert ONCE.get(f"{server.url}/v1/fleet/totals").json()["all"] == CLUTCHES

@@ -10,7 +10,6 @@ from models.diagnosis import diagnose as diagnose_module
 from models.diagnosis.campaign import Campaign, MaintenanceEvent, StationaryRun
 from models.diagnosis.campaign import EventKind as Event
 from models.diagnosis.diagnose import diagnose
-from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.report.report import Report
 from models.friction.stribeck import StribeckParameters, torque
@@ -90,21 +89,6 @@ def test_an_amplitude_is_what_was_planted() -> None:
     estimate = of_planted("torque_zero_shift").candidates[0].estimate
     assert estimate.unit == "Nm"
     assert abs(estimate.value - 0.6) < 4 * estimate.sd < 0.4
-
-
-@pytest.mark.slow
-def test_what_is_taken_out_of_the_catalogue_is_not_named() -> None:
-    report = look(campaign(7, PLANTED["unsettled_dwell"]), without=frozenset({"unsettled_dwell"}))
-    assert report.verdict not in {Verdict.CAUSE_NAMED, Verdict.MODEL_ADEQUATE}
-    assert "unsettled_dwell" not in report.causes
-    assert all(each.effect != "unsettled_dwell" for each in report.candidates)
-
-
-@pytest.mark.slow
-def test_with_an_empty_catalogue_structure_is_unexplained() -> None:
-    report = look(campaign(7, PLANTED["unsettled_dwell"]), without=frozenset(BY_SLUG))
-    assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
-    assert not report.candidates
 
 
 def test_a_bump_in_speed_is_unexplained_and_on_speed() -> None:

@@ -21,7 +21,6 @@ from models.prognosis.ended_lives import (
     as_its_kind,
     declared_end,
     ended_life,
-    new_and_laws,
     representative,
 )
 from models.prognosis.first_passage import weighted_quantiles
@@ -32,6 +31,7 @@ from models.tracking.criteria import STEP_SIZE
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
+from tests.statistical.lives import taught
 
 GRID = Grid()
 ENDS = 1_000.0 * np.exp(0.2 * np.array([-1.5, -1.0, -0.6, -0.3, 0.0, 0.1, 0.4, 0.7, 1.1, 1.6]))
@@ -142,14 +142,6 @@ def lawful(end: float, until: float, seed: int) -> list[Measurement]:
     return [
         Measurement(progress=x, value=y, variance=0.0) for x, y in zip(shares.tolist(), values.tolist(), strict=True)
     ]
-
-
-def taught(tests: list[Measurement], end: float) -> EndedLife:
-    initial, laws = new_and_laws(tests)
-    progress, values = (np.array(column) for column in zip(*((t.progress, t.value) for t in tests), strict=True))
-    life = ended_life(progress, values, end, initial=initial, fraction=0.5, laws=laws)
-    assert life is not None
-    return life
 
 
 @pytest.fixture(scope="module")

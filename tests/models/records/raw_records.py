@@ -160,3 +160,16 @@ def protocol(rng: np.random.Generator | None = None, speeds: FloatArray = SPEEDS
     order = rng.permutation(PRESSURES)
     columns = [speeds if rng.random() < 0.5 else speeds[::-1] for _ in order]
     return np.repeat(order, speeds.size), np.concatenate(columns)
+
+
+def harmed(record: Record, harm: str, rng: np.random.Generator) -> Record:
+    """The record with samples lost, a gap, jitter or spikes, or all of these but the gap."""
+    if harm in ("lost", "all"):
+        record = lose(record, 0.01, rng)
+    if harm == "gap":
+        record = lose(record, 0.01, rng, gap=True)
+    if harm in ("jitter", "all"):
+        record = jitter(record, rng)
+    if harm in ("spikes", "all"):
+        record = spike(record, rng)
+    return record

@@ -19,6 +19,7 @@ from tests.models.records.raw_records import (
     SPEEDS,
     Made,
     Sensors,
+    harmed,
     jitter,
     lose,
     make,
@@ -231,18 +232,6 @@ def test_the_fits_are_those_of_the_exact_plateaus(seed, tau, harm):
     truth = mean_torques(fit_curves(exact), velocities)
     assert (np.abs(told[:, 0] - truth[:, 0]) < 5 * told[:, 1]).all()
     assert (np.abs(told[:, 0] - truth[:, 0]) < 0.02).all(), "0.1 % of the torque"
-
-
-def harmed(record: Record, harm: str, rng: np.random.Generator) -> Record:
-    if harm in ("lost", "all"):
-        record = lose(record, 0.01, rng)
-    if harm == "gap":
-        record = lose(record, 0.01, rng, gap=True)
-    if harm in ("jitter", "all"):
-        record = jitter(record, rng)
-    if harm in ("spikes", "all"):
-        record = spike(record, rng)
-    return record
 
 
 def plain(n: int = 5000, **changes) -> Record:

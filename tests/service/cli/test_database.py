@@ -6,22 +6,13 @@ from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
-from typer.testing import CliRunner
 
 from service.app import create_app
-from service.cli.main import app
 from service.settings import Settings
 from storage.engine.sqlite.connect import service_lock
-from tests.service.clients import client_on
+from tests.service.clients import client_on, clutchlife
 from tests.storage.samples import OLD, integrity, old_database, revision
 from tests.support import stationary
-
-
-def clutchlife(*arguments: str | Path, code: int = 0) -> str:
-    """Run a command in this process and return what it printed."""
-    done = CliRunner().invoke(app, list(map(str, arguments)), catch_exceptions=False)
-    assert done.exit_code == code, done.output
-    return done.output
 
 
 @pytest.fixture(scope="module")

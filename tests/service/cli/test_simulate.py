@@ -4,18 +4,15 @@ import json
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from service.cli.main import app
 from service.run_files import manifest
+from tests.service.clients import clutchlife
 
 QUICK = ("simulate", "--seed", "3", "--tests", "1", "--pressures", "5", "--pressures", "4")
 
 
 def simulated(folder: Path, *arguments: str, code: int = 0) -> str:
-    done = CliRunner().invoke(app, [*QUICK, "--out", str(folder), *arguments])
-    assert done.exit_code == code, done.output
-    return done.output
+    return clutchlife(*QUICK, "--out", folder, *arguments, code=code)
 
 
 def test_what_is_hidden_is_in_a_file_and_not_on_the_screen(tmp_path: Path) -> None:

@@ -10,12 +10,10 @@ import numpy as np
 import pyarrow.parquet as parquet  # type: ignore[import-untyped]
 import pytest
 from fastapi.testclient import TestClient
-from typer.testing import CliRunner
 
-from service.cli.main import app
 from service.web import readiness
 from storage.blobs.stores import DATABASE, BlobStore, open_store
-from tests.service.clients import client_on
+from tests.service.clients import client_on, clutchlife
 from tests.support import stationary
 
 SAMPLES = 20_000
@@ -42,13 +40,6 @@ def service(database: str, raw: str | None = None) -> Iterator[TestClient]:
     with client_on(database, raw=raw, max_body_mb=8) as client:
         client.post("/v1/clutches", json={"clutch_id": "c1"})
         yield client
-
-
-def clutchlife(*arguments: str, code: int = 0) -> str:
-    """What a command prints."""
-    done = CliRunner().invoke(app, list(arguments), catch_exceptions=False)
-    assert done.exit_code == code, done.output
-    return done.output
 
 
 @pytest.fixture(params=[DATABASE, "in_folder", "in_bucket"])

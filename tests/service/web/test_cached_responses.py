@@ -22,8 +22,8 @@ from storage import keys
 from storage.engine.errors import DatabaseBusy
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import back_up
+from tests.benchmarks.memory import resident
 from tests.service.clients import client_on
-from tests.service.web.test_connections import resident
 from tests.support import one_quick, serving, stationary
 
 # --- Answers that are kept by the clutch's revision: computed once, and never given when they no longer hold.

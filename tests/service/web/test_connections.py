@@ -2,7 +2,6 @@
 
 import asyncio
 import re
-import resource
 import socket
 import time
 from collections.abc import Iterator
@@ -18,6 +17,7 @@ from uvicorn.config import Config
 from uvicorn.server import ServerState
 
 from service.web.connections import bounded
+from tests.benchmarks.memory import resident
 from tests.service.web.routes.routes_of import routes_of
 from tests.support import ONCE, serving, stationary
 
@@ -158,11 +158,6 @@ def test_what_one_connection_sends_before_any_key_is_asked_for_is_not_kept(tmp_p
                         line.sendall(piece)
                 assert resident(server.pid) - before < 24 << 20, name
         assert ONCE.get(f"{server.url}/livez").status_code == 200
-
-
-def resident(pid: int) -> int:
-    """Bytes of memory that a process holds."""
-    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * resource.getpagesize()
 
 
 def test_a_connection_that_goes_on_asking_stays_open() -> None:

@@ -19,10 +19,9 @@ from service.web import limits
 from service.web.files import emptied_folder
 from service.web.routes import files
 from storage.encoding import to_text
+from tests.benchmarks.memory import family, resident
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import context_of
-from tests.service.web.test_connections import resident
-from tests.service.web.test_stopping import family
 from tests.support import ONCE, serving, stationary
 
 RUNS = "/v1/clutches/c1/runs"

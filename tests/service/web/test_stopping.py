@@ -14,23 +14,10 @@ import pytest
 
 from storage import runs
 from storage.engine.opening import open_database
+from tests.benchmarks.memory import family
 from tests.support import ONCE, Server, stationary
 
 RUNS = "/v1/clutches/c1/runs"
-
-
-def family(pid: int) -> list[int]:
-    """A process and all below it, as what stops a whole unit sees them."""
-    parents = {}
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            parents[int(stat.parent.name)] = int(stat.read_text().rpartition(")")[2].split()[1])
-        except FileNotFoundError:  # it has just ended
-            continue
-    found = [pid]
-    for each in found:
-        found += [child for child, parent in parents.items() if parent == each]
-    return found
 
 
 def test_a_stop_amid_posts_ends_with_0_and_keeps_every_acknowledged_run(tmp_path: Path) -> None:

@@ -17,11 +17,10 @@ from tests.service.client.clutchlife.test_transport import Clock
 
 
 class Sender:
-    """A sender with its spool, a service, a clock, and what was reported."""
+    """A sender with its files, its spool, a service, and what was reported."""
 
-    def __init__(self, folder: Path, clock: Clock) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.clock = clock
         self.spool = Spool.of(folder / "spool", URL, "c1")
         self.service = StandInService()
         self.lines: list[str] = []
@@ -45,10 +44,16 @@ class Sender:
 
 
 @pytest.fixture
-def sender(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Sender:
-    clock = Clock()
-    monkeypatch.setattr(transport, "time", clock)
-    return Sender(tmp_path, clock)
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    found = Clock()
+    monkeypatch.setattr(transport, "time", found)
+    return found
+
+
+@pytest.fixture
+def sender(tmp_path: Path, clock: Clock) -> Sender:
+    del clock
+    return Sender(tmp_path)
 
 
 def of_run(name: bytes, answer: Callable[[], httpx2.Response]) -> Answer:
@@ -134,13 +139,20 @@ def test_a_service_that_answers_nothing_but_looks_is_left_alone_after_two_runs(s
     assert [entry.tries for entry in sender.spool.waiting()].count(0) == 3
 
 
-def test_a_run_that_was_withdrawn_since_waits_no_more(sender: Sender) -> None:
-    sender.service.stored["r1"] = body(1, "r1")
-    sender.service.states["r1"] = {"state": "withdrawn", "cycles": 1, "sent_cycles": 1}
-    sender.push(body(1, "r1"))
+@pytest.mark.parametrize(
+    ("state", "words"),
+    [
+        ({"state": "withdrawn", "cycles": 70000, "sent_cycles": 70000}, "withdrawn since"),
+        ({"state": "accepted", "cycles": 7000.0, "sent_cycles": 70000.0}, "from 70000 to 7000 cycles"),
+    ],
+)
+def test_a_run_that_was_changed_since_waits_no_more(sender: Sender, state: dict[str, object], words: str) -> None:
+    sender.service.stored["r1"] = body(70000, "r1")
+    sender.service.states["r1"] = state
+    sender.push(body(70000, "r1"))
     assert sender.send().duplicates == 1
     assert sender.counts == (1, 0, 0)
-    assert ["withdrawn since" in line for line in sender.lines] == [True]
+    assert [words in line for line in sender.lines] == [True]
 
 
 def test_an_inspection_waits_while_the_service_is_away_and_is_sent_to_its_own_address(sender: Sender) -> None:
@@ -160,15 +172,6 @@ def test_an_inspection_waits_while_the_service_is_away_and_is_sent_to_its_own_ad
     assert sender.lines[-1:] == [f"{name} was stored before and withdrawn since: it stays withdrawn, and waits no more"]
 
 
-def test_a_run_that_was_corrected_since_waits_no_more(sender: Sender) -> None:
-    sender.service.stored["r1"] = body(70000, "r1")
-    sender.service.states["r1"] = {"state": "accepted", "cycles": 7000.0, "sent_cycles": 70000.0}
-    sender.push(body(70000, "r1"))
-    assert sender.send().duplicates == 1
-    assert sender.counts == (1, 0, 0)
-    assert ["from 70000 to 7000 cycles" in line for line in sender.lines] == [True]
-
-
 def test_a_run_known_with_other_content_waits_no_more(sender: Sender) -> None:
     sender.service.stored["r1"] = body(7000, "r1")
     sender.push(body(70000, "r1"))
@@ -185,7 +188,7 @@ def test_a_run_that_is_held_is_reported(sender: Sender) -> None:
     assert sender.lines == ["r1 is held: is it 7000?"]
 
 
-def test_a_run_that_is_corrected_between_two_tries_is_not_tried_again(sender: Sender) -> None:
+def test_a_run_that_is_corrected_between_two_tries_is_not_tried_again(sender: Sender, clock: Clock) -> None:
     """Another process pushes the correction while this one waits for the service."""
     older, newer = body(70000), body(7000)
     posted: list[bytes] = []
@@ -195,11 +198,11 @@ def test_a_run_that_is_corrected_between_two_tries_is_not_tried_again(sender: Se
         return httpx2.Response(503) if len(posted) == 1 else None
 
     def correct(seconds: float) -> None:
-        sender.clock.now += seconds
+        clock.now += seconds
         sender.push(newer)
 
     sender.service.instead = away_at_first
-    sender.clock.sleep = correct  # type: ignore[method-assign]  # what happens meanwhile
+    clock.sleep = correct  # type: ignore[method-assign]  # what happens meanwhile
     sender.push(older)
     assert sender.send().stored == 0
     assert sender.send().stored == 1

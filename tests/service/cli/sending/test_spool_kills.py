@@ -8,11 +8,9 @@ from pathlib import Path
 import pytest
 
 from service.cli.sending import spool
-from service.cli.sending.delivery import Sent, deliver
-from service.cli.sending.spool import Spool
-from service.client.clutchlife.transport import Service
 from tests.service.cli.sending.kills import every_kill
-from tests.service.cli.sending.stand_in_service import URL, StandInService, body
+from tests.service.cli.sending.stand_in_service import body
+from tests.service.cli.sending.test_delivery import Sender
 from tests.service.cli.sending.test_spool import PARAMETERS, contents, set_aside, written
 
 
@@ -23,34 +21,17 @@ def quick_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spool, "_DURABLE", "PRAGMA synchronous = OFF")
 
 
-class Bench:
-    """A sender with its files and its spool, and a service; made again for each kill."""
-
-    def __init__(self, folder: Path) -> None:
-        folder.mkdir()
-        self.files = folder
-        self.spool = Spool.of(folder / "spool", URL, "c1")
-        self.service = StandInService()
-
-    def push(self, content: bytes, name: str = "run.json") -> None:
-        """Keep one run."""
-        self.spool.add([(written(self.files / name, content), None)])
-
-    def send(self) -> None:
-        """Send what waits."""
-        with self.spool.sending(0.0):
-            deliver(Service(http=self.service.client()), self.spool, Sent(), lambda _line: None, lambda: None)
-
-
-def benches(tmp_path: Path, prepare: Callable[[Bench], None], act: Callable[[Bench], None]) -> list[Bench]:
-    """A bench for each operation of `act`, killed before it."""
-    made: list[Bench] = []
+def benches(tmp_path: Path, prepare: Callable[[Sender], None], act: Callable[[Sender], None]) -> list[Sender]:
+    """A sender with its files, its spool and a service for each operation of `act`, killed before it."""
+    made: list[Sender] = []
 
     def act_on(_operation: int) -> None:
         act(made[-1])
 
     def folder_of(operation: int) -> Path:
-        made.append(Bench(tmp_path / str(operation)))
+        folder = tmp_path / str(operation)
+        folder.mkdir()
+        made.append(Sender(folder))
         prepare(made[-1])
         return made[-1].spool.folder
 
@@ -61,7 +42,7 @@ def benches(tmp_path: Path, prepare: Callable[[Bench], None], act: Callable[[Ben
 OLDER, NEWER = body(70000), body(7000)
 
 
-def waits(bench: Bench) -> None:
+def waits(bench: Sender) -> None:
     bench.push(OLDER)
 
 
@@ -92,7 +73,7 @@ def test_a_killed_correction_leaves_one_version(tmp_path: Path) -> None:
 
 
 def test_a_correction_that_is_pushed_again_after_a_kill_is_all_that_is_sent(tmp_path: Path) -> None:
-    def correct(bench: Bench) -> None:
+    def correct(bench: Sender) -> None:
         bench.push(NEWER)
         bench.send()
 
@@ -105,14 +86,14 @@ def test_a_correction_that_is_pushed_again_after_a_kill_is_all_that_is_sent(tmp_
 def test_a_kill_while_sending_loses_and_doubles_nothing(tmp_path: Path) -> None:
     """Of the runs one is stored, one is refused, one is a record file, one has replaced another."""
 
-    def prepare(bench: Bench) -> None:
-        bench.spool.add([(written(bench.files / "a.csv", b"csv"), PARAMETERS)])
+    def prepare(bench: Sender) -> None:
+        bench.spool.add([(written(bench.folder / "a.csv", b"csv"), PARAMETERS)])
         bench.push(body(1), "1.json")
         bench.push(body(-1), "2.json")
         bench.push(OLDER)
         bench.push(NEWER)
 
-    for bench in benches(tmp_path, prepare, Bench.send):
+    for bench in benches(tmp_path, prepare, Sender.send):
         bench.send()
         assert sorted(bench.service.stored.values()) == sorted([b"csv", body(1), NEWER])
         assert contents(bench.spool) == []

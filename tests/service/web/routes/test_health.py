@@ -14,9 +14,9 @@ from fastapi.testclient import TestClient
 
 from service.web import readiness
 from service.web.readiness import available_memory
+from tests.benchmarks.memory import family
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import context_of
-from tests.service.web.test_stopping import family
 from tests.support import ONCE, serving
 
 WHOLE = dict.fromkeys(("database", "disk", "memory", "workers"), "ok")
