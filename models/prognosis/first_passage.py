@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.degradation import general_order
-from models.prognosis.criteria import BAND, HORIZON, QUANTILES
+from models.prognosis.criteria import BAND, HORIZON, HORIZON_AGES, QUANTILES
 from models.tracking.discrepancy import Discrepancy
 from models.tracking.posterior import Posterior
 
@@ -54,6 +54,11 @@ class FirstPassage:
     initial: float
     threshold: float
     current: tuple[float, float]
+
+
+def horizon_at(age: float) -> float:
+    """The cycles since new up to which an end is sought of a life that has so many behind it."""
+    return max(HORIZON, HORIZON_AGES * age)
 
 
 def predict_first_passage(

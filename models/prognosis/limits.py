@@ -46,10 +46,14 @@ class Limit:
         return np.full(np.shape(initial), fixed)
 
     def passages(self, paths: FloatArray, progress: FloatArray) -> FloatArray:
-        """The ζ [n] at which each path [k, n] over ascending progress [k] first is at the limit or past it; inf where it
-        never is, the first place where it is from the beginning."""
+        """The ζ [n] at which each path [k, n] over ascending progress [k] first comes to the limit; inf where it never does.
+
+        A path that begins past its limit comes to it only once it has left it; one that never does is at it from the first.
+        """
         sign = -1.0 if self.above is not None else 1.0
-        return first_below(sign * paths, progress, sign * self.level(paths[0]))
+        from_above, level = sign * paths, sign * self.level(paths[0])
+        left = np.logical_or.accumulate(from_above > level, axis=0)
+        return first_below(np.where(left | ~left[-1], from_above, np.inf), progress, level)
 
 
 def places(now: float, horizon: float) -> FloatArray:

@@ -59,7 +59,7 @@ def rank_of(summary: Mapping[str, Any]) -> float:
     if summary.get("status", INSUFFICIENT) == INSUFFICIENT:
         return RANK_UNKNOWN
     bound = lower_bound(summary["at_least"], (summary.get("with_held") or {}).get(SHOWN))
-    return HORIZON if bound is None else bound
+    return HORIZON if bound is None else min(bound, HORIZON)
 
 
 def beside_held(
@@ -305,7 +305,7 @@ def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
 def _left_open(bound: str, payload: Mapping[str, Any]) -> str:
     """An interval that reaches the horizon: its safe bound is the number that counts, and how probable an end is."""
     chance = chance_in_words(payload["probability_of_reaching"])
-    within = f"the end comes within {HORIZON:,.0f} cycles with a probability of {chance}"
+    within = f"the end comes within {payload.get('horizon_cycles', HORIZON):,.0f} cycles with a probability of {chance}"
     return f"{bound}; the tests do not yet show how many more ({within})"
 
 

@@ -49,6 +49,7 @@ def summarised(state: ClutchState, tracking: Tracking, evidence: Evidence | None
         "recent": recent(state.events, pooled),
         "life": life.name,
         "from_cycles": life.origin,
+        "horizon_cycles": payload["horizon_cycles"],
         "tests": life.tests,
         "places": len({measurement.progress for measurement in pooled.measurements}),
         "pace": None if pace is None else {"cycles_per_second": pace, "moment": moment_at(life.events, pace, last)},

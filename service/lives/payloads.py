@@ -9,7 +9,7 @@ from models.loops.loops import Loop
 from models.prognosis.back_cast import BackCast
 from models.prognosis.course_shares import CourseName, CourseShare
 from models.prognosis.criteria import HORIZON, QUANTILES
-from models.prognosis.first_passage import FirstPassage
+from models.prognosis.first_passage import FirstPassage, horizon_at
 from models.prognosis.stated_end import NewLater
 from models.tracking.innovation import last_innovation
 from models.tracking.measurement import Measurement
@@ -104,7 +104,7 @@ def interval_in_words(remaining: Mapping[str, float | None]) -> str:
     low, median, high = (remaining[quantile] for quantile in ("0.05", "0.5", "0.95"))
     if median is None:
         return "an unknown number of" if low is None else f"at least {low:,.0f}"
-    upper = f"over {HORIZON:,.0f}" if high is None else f"{high:,.0f}"
+    upper = f"over {max(HORIZON, median):,.0f}" if high is None else f"{high:,.0f}"
     return f"{median:,.0f} (90 %: {low:,.0f} to {upper})"
 
 
@@ -319,6 +319,7 @@ def predicted(
     present = {
         "runs_used": runs,
         "current": _measured_last(series, assumptions, runs),
+        "horizon_cycles": whole(horizon_at(cycles - series.scale.origin)),
         "at_least": safe_bound(ends[SAFE], cycles, series.scale.origin),
         "warnings": notice_items([*warnings, *(of_course if enough else ())]),
     }
@@ -361,7 +362,7 @@ def share_of_way(value: float, initial: float, limit: float, *, rises: bool = Fa
 def safe_bound(end: float | None, now: float, origin: float) -> float:
     """Cycles from `now` that are left with 95 %, by the 5 % quantile of the end of life in cycles since new; None of that
     lies beyond the horizon of the life that began at `origin`."""
-    return max(0.0, (origin + HORIZON if end is None else end) - now)
+    return max(0.0, (origin + horizon_at(now - origin) if end is None else end) - now)
 
 
 def ended(payload: Mapping[str, Any], end: Event | None) -> dict[str, Any]:

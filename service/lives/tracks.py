@@ -17,8 +17,8 @@ import numpy as np
 from models.arrays import FloatArray
 from models.prognosis.back_cast import BackCast, kept_after
 from models.prognosis.course_shares import course_shares
-from models.prognosis.criteria import FEWEST_TESTS, HORIZON
-from models.prognosis.first_passage import Offset, predict_first_passage
+from models.prognosis.criteria import FEWEST_TESTS
+from models.prognosis.first_passage import Offset, horizon_at, predict_first_passage
 from models.prognosis.stated_end import StatedEnd, stated_end
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState
@@ -249,7 +249,8 @@ def predict(
     if tracked is None:
         return insufficient(assumptions, cycles, series.pressure, fraction)
     sample = drawn(method, series, assumptions, tracked)
-    horizon = float(series.scale.progress(series.scale.origin + HORIZON))
+    origin = series.scale.origin
+    horizon = float(series.scale.progress(origin + horizon_at(cycles - origin)))
     end = end_of_life(sample, series, assumptions, tracked, cycles, fraction, horizon)
     passage = predict_first_passage(
         sample,

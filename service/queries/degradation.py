@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from models.friction.stribeck import PARAMETER_NAMES
-from models.prognosis.criteria import FEWEST_TESTS, HORIZON, QUANTILES
-from models.prognosis.first_passage import ends_of_life
+from models.prognosis.criteria import FEWEST_TESTS, QUANTILES
+from models.prognosis.first_passage import ends_of_life, horizon_at
 from models.prognosis.first_passage import paths as track_paths
 from models.prognosis.from_parameters import CofPaths, Disagreement, disagreement, far_apart, mean_cof_paths
 from service import records, stored_runs
@@ -196,7 +196,9 @@ def _from_parameters(
             if level in direct and all((name, level) in tracks for name in PARAMETER_NAMES)
         ],
         now=series.measurements[-1].progress,
-        horizon=float(series.scale.progress(series.scale.origin + HORIZON)),
+        horizon=float(
+            series.scale.progress(series.scale.origin + horizon_at(life.events[-1].cycles - series.scale.origin))
+        ),
         velocities=reference_velocities(life.speed_range, measured.geometry),
         reference_cofs=[cof for cof, _ in life.reference.values()],
         rng=step_rng("rebuilt", series, len(series.measurements)),
@@ -238,7 +240,7 @@ def _payload(paths: CofPaths, direct: Track, assumptions: Assumptions, fraction:
     now = float(paths.progress[paths.now])
     ends = series.scale.cycles(paths.ends_of_life(fraction))
     shown = paths.progress <= max(1.0, now) * 1.5
-    cap = series.scale.origin + HORIZON
+    cap = float(series.scale.cycles(paths.progress[-1]))
     quantiles = np.quantile(np.minimum(ends, 10 * cap), QUANTILES).tolist()
     apart = _apart(paths, ends, direct, assumptions, fraction)
     return {

@@ -16,7 +16,7 @@ from models.clutch import Geometry
 from models.degradation.programme import Programme, uncertain_work
 from models.degradation.severity import Block, Severity, SeverityBasis, SeverityMap, counted, severity_map
 from models.prognosis.criteria import HORIZON, QUANTILES
-from models.prognosis.first_passage import PassageStatus, weighted_quantiles
+from models.prognosis.first_passage import PassageStatus, horizon_at, weighted_quantiles
 from models.prognosis.stated_end import StatedEnd
 from service import records, stored_runs
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
@@ -92,7 +92,7 @@ def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[s
     duty = _counted(state, assumptions.severity, series, planned)
     rng = step_rng(f"{method}-programme", series, runs)
     programme = duty.programme(planned.programme, recent["current"]["mean_cof"], rng)
-    most = max(series.scale.origin + HORIZON - now, 0.0)
+    most = series.scale.origin + horizon_at(now - series.scale.origin) - now
     horizon = float(series.scale.progress(now)) + most * float(programme.rates.max())
     end = end_of_life(sample, series, assumptions, tracked, now, fraction, horizon)
     answer = _planned_answer(programme, end, series, now=now, most=most)

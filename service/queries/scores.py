@@ -13,7 +13,7 @@ import numpy as np
 
 from models.prognosis import scoring
 from models.prognosis.back_cast import BackCast
-from models.prognosis.criteria import HORIZON, QUANTILES
+from models.prognosis.criteria import QUANTILES
 from service import records
 from service.columns import whole
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
@@ -113,7 +113,8 @@ def _scored(life: Life, assumptions: Assumptions, end: float, made: dict[float, 
 def _test(prediction: dict[str, Any], cycles: float, origin: float, end: float) -> dict[str, Any]:
     """One prediction and how right it was; a quantile beyond the horizon is scored as if it were there."""
     remaining, length = prediction["remaining_cycles"], end - origin
-    ends = [origin + HORIZON if value is None else value for value in prediction["end_of_life_cycles"].values()]
+    horizon = origin + prediction["horizon_cycles"]
+    ends = [horizon if value is None else value for value in prediction["end_of_life_cycles"].values()]
     crps = scoring.crps_of_quantiles(QUANTILES, ends, end)
     low, high = (prediction["end_of_life_cycles"][quantile] for quantile in (_LOW, _HIGH))
     return {

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN, HORIZON
+from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN
 from models.prognosis.ended_lives import EndedLife, declared_end, ended_life, new_and_laws, representative
+from models.prognosis.first_passage import horizon_at
 from models.prognosis.fleet import Taught, population, taught
 from models.prognosis.scoring import measured_end
 from service import records, stored_runs
@@ -251,7 +252,8 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
         values = values + offset(progress)[0]
         initial += float(offset(np.zeros(1))[0, 0])
     end, deviation, censored = measured_end(progress, values, fraction * initial), 0.0, False
-    horizon = float(series.scale.progress(series.scale.origin + HORIZON))
+    origin = series.scale.origin
+    horizon = float(series.scale.progress(origin + horizon_at(life.events[-1].cycles - origin)))
     if end is None and life.end is not None:  # stopped before any test passed the threshold
         end, censored = float(series.scale.progress(life.end.cycles)), life.end.end != WORN
         if not censored and end > 0.0:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from models.arrays import FloatArray
-from models.prognosis.criteria import FEWEST_TESTS, HORIZON, QUANTILES
-from models.prognosis.first_passage import PassageStatus, weighted_quantiles
+from models.prognosis.criteria import FEWEST_TESTS, QUANTILES
+from models.prognosis.first_passage import PassageStatus, horizon_at, weighted_quantiles
 from models.prognosis.first_passage import paths as track_paths
 from models.prognosis.limits import Limit, first_reached, places
 from service.columns import PASCALS_PER_BAR
@@ -71,8 +71,8 @@ def criterion_end(measured: MeasuredLife, criterion: CriterionIn, method: str) -
     )
     if len({measurement.progress for measurement in series.measurements}) < FEWEST_TESTS:
         return too_few
-    now = float(series.scale.progress(measured.life.events[-1].cycles))
-    horizon = max(now, float(series.scale.progress(series.scale.origin + HORIZON)))
+    cycles, origin = measured.life.events[-1].cycles, series.scale.origin
+    now, horizon = series.scale.progress(np.array([cycles, origin + horizon_at(cycles - origin)])).tolist()
     at = places(now, horizon)
     if quantity.family is Family.MEAN_COF and criterion.fraction is not None:
         passages, paths = _mean_cof(measured, series, criterion.fraction, method, np.array([0.0, now]), horizon)
@@ -190,7 +190,7 @@ def _quantiles(sample: Sample | None, now: float) -> dict[str, dict[str, float |
     if sample is None:
         return {"end_of_life_cycles": by_quantile({}), "remaining_cycles": by_quantile({})}
     ends, weight = sample
-    cap = 10.0 * HORIZON
+    cap = 10.0 * horizon_at(now)
     at = weighted_quantiles(np.minimum(ends, cap), weight, QUANTILES).tolist()
     by_level = {level: number if number < 0.5 * cap else None for level, number in zip(QUANTILES, at, strict=True)}
     left = {level: None if end is None else max(0.0, end - now) for level, end in by_level.items()}

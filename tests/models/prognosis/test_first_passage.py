@@ -356,3 +356,13 @@ def test_places_go_from_the_beginning_to_the_horizon() -> None:
     assert (at[0], at[-1]) == (0.0, pytest.approx(1e6))
     assert (np.diff(at) > 0.0).all()
     assert 5_000.0 in at
+
+
+def test_a_path_that_begins_past_its_limit_comes_to_it_once_it_has_left_it() -> None:
+    progress = np.arange(5.0)
+    paths = np.array(
+        [[-1.0, 1.0, 3.0, 3.0, 3.0], [-1.0, 1.0, 1.0, -1.0, -1.0], [-1.0] * 5, [1.0, -1.0, 1.0, 1.0, 1.0], [1.0] * 5]
+    ).T
+    reached = [math.inf, 2.5, 0.0, 0.5, math.inf]
+    assert Limit(below=0.0).passages(paths, progress).tolist() == reached
+    assert Limit(above=0.0).passages(-paths, progress).tolist() == reached

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
@@ -69,6 +70,18 @@ def test_two_tests_say_at_least_how_many_cycles_are_left(bench: Bench) -> None:
     assert life["at_least"] > 100.0
     assert life["statement"] == f"the remaining life is not known yet: {bound_in_words(life['at_least'])}"
     assert life["statement"] in item(bench)["state"]["why"]
+
+
+def test_a_life_of_millions_of_cycles_is_predicted_beyond_a_million(bench: Bench) -> None:
+    for cycles in np.arange(7) * 1e6:
+        bench.send(body("test", f"n{cycles:g}", float(cycles), wear=cycles / 2e7))
+    for answer in (now(bench, method) for method in METHODS):
+        assert answer["horizon_cycles"] == 6e7
+        assert 2e6 < answer["remaining_cycles"]["0.5"] < 8e6  # half of its friction is gone at 10 million
+        assert 0.0 < answer["at_least"] == answer["remaining_cycles"]["0.05"]
+    assert rank_of(item(bench)["summary"]) == min(now(bench)["at_least"], 1e6)  # before those that are not known
+    bench.send(body("duty", "d", 9e6))
+    assert now(bench)["horizon_cycles"] == 9e7
 
 
 def test_tests_at_the_same_cycles_or_at_other_pressures_are_not_asked_for_again(bench: Bench) -> None:
