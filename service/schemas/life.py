@@ -339,7 +339,10 @@ class RemainingLife(Answer):
     life: LifeNumber | None = Field(
         default=None, description="The life that the answer concerns, if a life or criterion was requested"
     )
-    horizon_cycles: float = Field(description="The prediction goes no further than this many duty cycles")
+    horizon_cycles: float = Field(
+        description="The prediction goes no further than this many duty cycles since new: a million, or ten times "
+        "its age if that is more"
+    )
     model: Model
     prior: Prior
     severity: SeverityUsed
