@@ -223,7 +223,6 @@ def canonical(value: Any) -> Any:
 
 
 def instant(stated: str | None) -> datetime | None:
-    """A stored time as what is compared, None where none was stated."""
     return None if stated is None else datetime.fromisoformat(stated)
 
 

@@ -18,7 +18,6 @@ Place = tuple[float, str]
 
 
 def to_cursor(place: Place | None) -> str | None:
-    """Where a next page starts, as text that fits an address."""
     return None if place is None else base64.urlsafe_b64encode(json.dumps(place).encode()).decode().rstrip("=")
 
 

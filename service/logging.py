@@ -69,7 +69,6 @@ class JsonLines(logging.Formatter):
     """A record as one line of JSON: time, level, logger, process, message, and what is there of the rest."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The line."""
         line: dict[str, Any] = {
             "time": _time(record),
             "level": record.levelname.lower(),
@@ -89,7 +88,6 @@ class TextLines(logging.Formatter):
     """The same for people: `time LEVEL logger: message name=value ...`, and a traceback below."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The line, and further ones that begin with a bar."""
         fields = dict(getattr(record, "fields", {}))
         if request_id.get():
             fields["request_id"] = request_id.get()

@@ -84,7 +84,6 @@ def rig_out(row: RigRow) -> RigOut:
 
 
 def record(row: ClutchRow) -> ClutchIn:
-    """A clutch's record in force."""
     return ClutchIn.model_validate(row.record)
 
 
@@ -177,7 +176,6 @@ def set_aside(connection: Connection, clutch_id: str) -> dict[str, Event]:
 
 
 def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
-    """All fits of a clutch by run_id."""
     names = {run_key: run_id for run_id, run_key in runs.keys(connection, clutch_id).items()}
     of_runs = results.fits_of(connection, clutch_id)
     return {names[run_key]: [_level_fit(row) for row in rows] for run_key, rows in of_runs.items()}
@@ -334,7 +332,6 @@ def _filter_rows(filters: States) -> list[FilterStateRow]:
 
 
 def _filters(connection: Connection, clutch_id: str) -> States | None:
-    """The inverse of `_filter_rows`; None where another release stored them."""
     rows = {method: row for (method, _), row in results.filter_states_of(connection, clutch_id).items()}
     if any(row.code_version != CODE_VERSION for row in rows.values()):
         return None
@@ -433,7 +430,6 @@ def latest_diagnosis(row: ClutchRow, verdict: VerdictRow | None) -> dict[str, An
 
 
 def condition(row: ClutchRow) -> dict[str, str]:
-    """The clutch's state and why."""
     return state_of(row.summary, disputed=row.is_disputed, silent=row.silent)
 
 
@@ -466,7 +462,6 @@ def inspection_hash(content: Mapping[str, Any]) -> str:
 
 
 def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) -> list[dict[str, Any]]:
-    """Inspections as they are answered."""
     photographs = inspections.photographs(connection, [row.inspection_key for row in rows])
     return [
         {"clutch_id": row.clutch_id, "inspection_id": row.inspection_id}
@@ -484,5 +479,4 @@ def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) ->
 
 
 def photograph_answer(row: PhotographRow) -> dict[str, Any]:
-    """A photograph as it is answered."""
     return of_row(PhotographOut, row, photograph_id=row.sha256)

@@ -173,7 +173,6 @@ class Settings(BaseSettings):
                     yield f"{name} is no setting and has no effect; is {meant} meant?"
 
     def shown(self) -> dict[str, Any]:
-        """All settings by name, without secrets."""
         return self.model_dump() | {"database": redacted(self.database)}
 
     @property
@@ -203,7 +202,6 @@ class Settings(BaseSettings):
 
 
 def redacted(address: str) -> str:
-    """An address without its password and its options."""
     for secret, mark in _SECRETS:
         address = secret.sub(mark, address)
     return address

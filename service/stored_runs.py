@@ -144,12 +144,10 @@ class _LoadedRuns:
         return incoming(self.rows[run_id], {column.name: column.values() for column in self.channels[run_id]})
 
     def describe(self, run_id: str) -> IncomingRun:
-        """A run without its channels."""
         return incoming(self.rows[run_id], {})
 
 
 def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> IncomingRun:
-    """A stored run as it came in."""
     return IncomingRun(
         kind=row.kind,
         cycles=row.cycles,

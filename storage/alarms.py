@@ -52,7 +52,6 @@ class EventRow(NewEvent):
 
     @property
     def state(self) -> str:
-        """Raised, acknowledged or cleared."""
         return CLEARED if self.cleared_at is not None else RAISED if self.acknowledged_at is None else ACKNOWLEDGED
 
 
@@ -104,12 +103,10 @@ def put(connection: Connection, row: AlarmRow) -> None:
 
 
 def get(connection: Connection, alarm_id: str) -> AlarmRow | None:
-    """The rule in force, or None."""
     return _rules.first(connection.execute(_by_id, {"wanted": alarm_id}))
 
 
 def remove(connection: Connection, alarm_id: str) -> None:
-    """Delete a rule; what it has raised stays."""
     connection.execute(_delete, {"wanted": alarm_id})
 
 
@@ -133,7 +130,6 @@ def insert_event(connection: Connection, row: NewEvent) -> None:
 
 
 def event(connection: Connection, event_id: str) -> EventRow | None:
-    """An alarm, or None."""
     return _events.first(connection.execute(_event_by_id, {"wanted": event_id}))
 
 
@@ -143,7 +139,6 @@ def open_of_clutch(connection: Connection, clutch_id: str) -> dict[str, EventRow
 
 
 def open_of_alarm(connection: Connection, alarm_id: str) -> list[EventRow]:
-    """What a rule has raised and is not cleared."""
     return _events.all(connection.execute(_open_of_alarm, {"of_alarm": alarm_id}))
 
 

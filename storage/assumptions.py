@@ -62,7 +62,6 @@ def current_adoption(connection: Connection, clutch_id: str) -> AdoptedRow | Non
 
 
 def adoptions_of(connection: Connection, clutch_id: str) -> list[AdoptedRow]:
-    """All versions, newest first."""
     return _adoptions.all(connection.execute(_adoption_versions, {"of_clutch": clutch_id}))
 
 
@@ -98,7 +97,6 @@ def write_corrected_cofs(connection: Connection, run_key: int, cofs: Mapping[flo
 
 
 def clear_corrected_cofs(connection: Connection, clutch_id: str) -> None:
-    """Drop all corrected mean COFs of a clutch."""
     connection.execute(_adoption_clear, {"of_clutch": clutch_id})
 
 
@@ -200,7 +198,6 @@ def fleet_prior_for(connection: Connection, fleet: Json, clutch_id: str, version
 
 
 def current_fleet_priors(connection: Connection) -> list[FleetPriorRow]:
-    """The newest version of every kind of clutch."""
     return _priors.all(connection.execute(_fleet_all_current))
 
 
@@ -216,5 +213,4 @@ def forget_left_out(connection: Connection, fleet: Json, *, before: int) -> None
 
 
 def fleet_key(fleet: Json) -> str:
-    """A kind of clutch as it is stored."""
     return to_text(dict(sorted(fleet.items())))

@@ -38,7 +38,6 @@ class ChangeRow:
     revision: int
 
     def entry(self) -> Json:
-        """What the trail shows of it."""
         return {name: getattr(self, name) for name in SHOWN}
 
 

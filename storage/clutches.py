@@ -115,7 +115,6 @@ def insert(connection: Connection, row: ClutchRow) -> None:
 
 
 def get(connection: Connection, clutch_id: str) -> ClutchRow | None:
-    """The clutch, or None."""
     return _stored.first(connection.execute(_by_id, {"wanted": clutch_id}))
 
 
@@ -144,7 +143,6 @@ def page(
 
 
 def counts(connection: Connection, choice: Choice) -> Counts:
-    """How many clutches a choice holds."""
     by_state, values = _chosen(_states, choice)
     with_held, _ = _chosen(_number.where(_with_held_runs), choice)
     return Counts(
@@ -243,7 +241,6 @@ def bump_revision(connection: Connection, clutch_id: str) -> int:
 
 
 def revision(connection: Connection, clutch_id: str) -> int | None:
-    """The clutch's revision, or None."""
     number: int | None = connection.execute(_revision, {"wanted": clutch_id}).scalar_one_or_none()
     return number
 
@@ -262,12 +259,10 @@ def count_within(connection: Connection, ranks: Sequence[float]) -> dict[float, 
 
 
 def all_ids(connection: Connection) -> list[str]:
-    """The ids of all clutches, ascending."""
     return list(connection.execute(_ids).scalars())
 
 
 def revisions(connection: Connection) -> dict[str, int]:
-    """The revisions of all clutches by id, ascending."""
     return {row.clutch_id: row.revision for row in connection.execute(_revisions)}
 
 

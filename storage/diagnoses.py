@@ -85,7 +85,6 @@ def insert(connection: Connection, row: NewDiagnosis) -> None:
 
 
 def get(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisRow | None:
-    """The diagnosis, or None."""
     return _rows.first(connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": diagnosis_id}))
 
 

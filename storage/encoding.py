@@ -321,11 +321,9 @@ class Rows(Generic[Value]):
         return of
 
     def all(self, rows: Result[*tuple[Any, ...]]) -> list[Value]:
-        """The values of several rows."""
         return list(map(self.reader(rows), rows))
 
     def first(self, rows: Result[*tuple[Any, ...]]) -> Value | None:
-        """The value of the first row, None where there is none."""
         of, row = self.reader(rows), rows.first()
         return None if row is None else of(row)
 

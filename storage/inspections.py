@@ -92,7 +92,6 @@ def insert(connection: Connection, row: NewInspection) -> int:
 
 
 def get(connection: Connection, clutch_id: str, inspection_id: str) -> InspectionRow | None:
-    """The inspection, or None."""
     return _rows.first(connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": inspection_id}))
 
 

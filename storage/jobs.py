@@ -120,7 +120,6 @@ def insert(connection: Connection, row: NewJob) -> None:
 
 
 def get(connection: Connection, job_id: str) -> JobRow | None:
-    """The job, or None."""
     return _rows.first(connection.execute(_by_id, {"wanted": job_id}))
 
 
@@ -145,7 +144,6 @@ def page(
 
 
 def count_open(connection: Connection, kind: str) -> int:
-    """How many jobs of a kind wait or run."""
     return connection.execute(_count, {"of_kind": kind}).scalar_one()
 
 
@@ -155,7 +153,6 @@ def open_of(connection: Connection, kind: str) -> list[JobRow]:
 
 
 def any_free(connection: Connection, kinds: Collection[str]) -> bool:
-    """Whether a job of these kinds could be claimed."""
     return bool(connection.execute(_any_free, {"of_kinds": to_text(list(kinds))}).scalar_one())
 
 
@@ -186,7 +183,6 @@ def release_all(connection: Connection) -> None:
 
 
 def set_arguments(connection: Connection, job_id: str, arguments: Json) -> None:
-    """Replace what a job was asked for with."""
     connection.execute(_set_arguments, {"wanted": job_id, "new_arguments": to_text(arguments)})
 
 

@@ -67,5 +67,4 @@ def revoke(connection: Connection, key_id: str, revoked_at: str) -> bool:
 
 
 def note_use(connection: Connection, key_id: str, at: str) -> None:
-    """Note when a key was last used."""
     connection.execute(_use, {"wanted": key_id, "at": at})

@@ -149,13 +149,11 @@ def prediction_at(
 
 
 def predictions_of(connection: Connection, clutch_id: str, method: str, pressure: float) -> list[PredictionRow]:
-    """All predictions of a series, cycles ascending."""
     values = {"of_clutch": clutch_id, "of_method": method, "of_pressure": pressure}
     return _predictions.all(connection.execute(_prediction_history, values))
 
 
 def clear_predictions(connection: Connection, clutch_id: str) -> None:
-    """Drop all predictions of a clutch, which are about to be computed again."""
     connection.execute(_prediction_clear, {"of_clutch": clutch_id})
 
 
@@ -202,5 +200,4 @@ def filter_states_of(connection: Connection, clutch_id: str) -> dict[tuple[str, 
 
 
 def clear_filter_states(connection: Connection, clutch_id: str) -> None:
-    """Drop all states of a clutch, which are about to be computed again."""
     connection.execute(_state_clear, {"of_clutch": clutch_id})

@@ -38,12 +38,10 @@ def insert(connection: Connection, row: RigRow) -> None:
 
 
 def put(connection: Connection, row: RigRow) -> None:
-    """Store a profile in the place of the one of that name."""
     connection.execute(_put[connection.dialect.name], _rows.values(row))
 
 
 def get(connection: Connection, name: str) -> RigRow | None:
-    """The profile in force, or None."""
     return _rows.first(connection.execute(_by_name, {"wanted": name}))
 
 

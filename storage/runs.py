@@ -142,7 +142,6 @@ def insert(connection: Connection, row: NewRun) -> int:
 
 
 def get(connection: Connection, clutch_id: str, run_id: str) -> RunRow | None:
-    """The run, or None."""
     return _stored.first(connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": run_id}))
 
 
@@ -197,7 +196,6 @@ def in_order(connection: Connection, clutch_id: str) -> list[RunInOrder]:
 
 
 def rebuilds(connection: Connection, clutch_id: str) -> list[RunInOrder]:
-    """The accepted rebuilds of a clutch in order."""
     return _in_order(connection, _rebuilds, clutch_id)
 
 
@@ -207,7 +205,6 @@ def set_aside(connection: Connection, clutch_id: str) -> list[RunInOrder]:
 
 
 def held_of(connection: Connection, clutch_id: str) -> list[RunInOrder]:
-    """The runs of a clutch that are held, in order."""
     return _in_order(connection, _held_of, clutch_id)
 
 
@@ -217,19 +214,16 @@ def held(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, int]:
 
 
 def count(connection: Connection) -> int:
-    """How many runs there are in any state."""
     number: int = connection.execute(_number).scalar_one()
     return number
 
 
 def count_held(connection: Connection) -> int:
-    """How many runs of all clutches are held."""
     number: int = connection.execute(_held_of_all).scalar_one()
     return number
 
 
 def keys(connection: Connection, clutch_id: str) -> dict[str, int]:
-    """run_id -> run_key of all runs of a clutch."""
     return {row.run_id: row.run_key for row in connection.execute(_keys, {"of_clutch": clutch_id})}
 
 

@@ -78,7 +78,6 @@ class Transfer:
     target: Database
 
     def rows(self) -> int:
-        """How many rows the source has."""
         return sum(
             self.source.execute(select(func.count()).select_from(table)).scalar_one()
             for table in metadata.sorted_tables

@@ -115,7 +115,6 @@ def insert(connection: Connection, row: WebhookRow) -> None:
 
 
 def get(connection: Connection, webhook_id: str) -> WebhookRow | None:
-    """A receiver, or None."""
     return _receivers.first(connection.execute(_by_id, {"wanted": webhook_id}))
 
 
@@ -137,7 +136,6 @@ def insert_delivery(connection: Connection, row: NewDelivery) -> None:
 
 
 def find_delivery(connection: Connection, delivery_id: str) -> DeliveryRow | None:
-    """A delivery, or None."""
     return _deliveries.first(connection.execute(_delivery, {"wanted": delivery_id}))
 
 
@@ -150,7 +148,6 @@ def deliveries(
 
 
 def any_due(connection: Connection) -> bool:
-    """Whether something is to be sent now."""
     return bool(connection.execute(_any_due).scalar_one())
 
 
@@ -185,5 +182,4 @@ def release_all(connection: Connection) -> None:
 
 
 def count_waiting(connection: Connection) -> int:
-    """How many wait to be sent."""
     return int(connection.execute(_waiting).scalar_one())

@@ -73,7 +73,6 @@ def _require_apprise(url: str, scheme: str) -> None:
 
 
 def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool) -> Attempt:
-    """One attempt to send a delivery."""
     if scheme_of(url) in _WEB:
         return post(url, body, secret=secret, delivery_id=delivery_id, private=private)
     content = json.loads(body)

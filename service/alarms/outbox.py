@@ -72,7 +72,6 @@ class Outbox:
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def is_working(self) -> bool:
-        """Whether the thread is there."""
         return self._thread.is_alive()
 
     def wake(self) -> None:
@@ -172,7 +171,6 @@ def _store(connection: Connection, row: DeliveryRow, ended: Attempt) -> None:
 
 
 def attempt(row: DeliveryRow, receiver: WebhookRow, *, private: bool) -> Attempt:
-    """One attempt to have a receiver take a delivery."""
     return notify.send(
         receiver.address, row.body.encode(), secret=receiver.secret, delivery_id=row.delivery_id, private=private
     )

@@ -63,7 +63,6 @@ def evaluate(connection: Connection, clutch_id: str) -> None:
 
 
 def concerns(rule: AlarmIn, record: ClutchIn) -> bool:
-    """Whether a rule is of a clutch."""
     if rule.clutch_id is not None:
         return rule.clutch_id == record.clutch_id
     wanted = {} if rule.kind is None else rule.kind.model_dump(exclude_none=True)
@@ -71,12 +70,10 @@ def concerns(rule: AlarmIn, record: ClutchIn) -> bool:
 
 
 def rule_of(row: AlarmRow) -> AlarmIn:
-    """A stored rule."""
     return AlarmIn.model_validate(row.content)
 
 
 def event_out(row: EventRow) -> dict[str, Any]:
-    """An alarm as it goes out."""
     return {
         "event_id": row.event_id,
         "alarm_id": row.alarm_id,

@@ -67,7 +67,6 @@ def finding(rule: AlarmIn, facts: Facts) -> Finding | None:
 
 
 def raises(rule: AlarmIn, result: Finding | None) -> bool:
-    """Whether a finding raises an alarm."""
     return result is not None and _passes(rule, result, 0.0)
 
 

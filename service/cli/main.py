@@ -41,7 +41,6 @@ class Commands(TyperGroup):
     """The commands; a wrong call ends in one line, `status` then with its code for what is unknown."""
 
     def invoke(self, ctx: Any) -> Any:
-        """The command that was called."""
         try:
             return super().invoke(ctx)
         except _UsageError as error:

@@ -120,7 +120,6 @@ def _print_runs(items: list[dict[str, Any]]) -> None:
 
 
 def run_line(receipt: dict[str, Any]) -> str:
-    """A run in a line."""
     sent = "" if receipt["cycles"] == receipt["sent_cycles"] else f" (sent as {receipt['sent_cycles']:g})"
     return f"{receipt['cycles']:>12g}  {receipt['state']:<9}  {receipt['kind']:<19}  {receipt['run_id']}{sent}"
 

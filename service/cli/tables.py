@@ -58,7 +58,6 @@ def cycles(value: float | None) -> str:
 
 
 def pressure(value: float | None) -> str:
-    """A line pressure in bar; null is the mean over the pressures."""
     return "mean" if value is None else f"{value:g}"
 
 
@@ -68,6 +67,5 @@ def place(value: float | None) -> str:
 
 
 def warn(warnings: Iterable[Mapping[str, Any]]) -> None:
-    """The warnings of an answer, a line each."""
     for notice in warnings:
         print_line(f"warning: {notice['message']}")

@@ -41,7 +41,6 @@ class Asset:
 
     @cached_property
     def digest(self) -> str:
-        """The start of its content's sha256."""
         return hashlib.sha256(self.body).hexdigest()[:16]
 
     @cached_property

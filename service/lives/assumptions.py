@@ -136,7 +136,6 @@ class Assumptions:
 
 
 def severity_name(severity: Severity) -> dict[str, Any]:
-    """What ζ counts, as answers name it."""
     return {"basis": severity.basis.value, "exponent": severity.exponent}
 
 

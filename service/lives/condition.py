@@ -120,7 +120,6 @@ def held_beside(count: int) -> dict[str, Any]:
 
 
 def held_in_words(count: int) -> str:
-    """How many runs are held, as a clause."""
     return "1 run is held and does not count" if count == 1 else f"{count} runs are held and do not count"
 
 
@@ -252,7 +251,6 @@ def _cause_in_words(slug: str) -> str:
 
 
 def _day_in_words(moment: str) -> str:
-    """A moment (ISO 8601) as a date, as 3 Dec 2026."""
     day = datetime.fromisoformat(moment)
     return f"{day.day} {day:%b %Y}"
 

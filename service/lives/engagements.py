@@ -153,12 +153,10 @@ class StoredEngagement:
 
     @property
     def run_id(self) -> str:
-        """The run's name."""
         return str(self.receipt["run_id"])
 
     @property
     def item(self) -> Mapping[str, Any]:
-        """The engagement as the receipt has it."""
         item: Mapping[str, Any] = self.receipt["engagement"]
         return item
 

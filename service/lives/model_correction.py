@@ -79,12 +79,10 @@ class RunReader:
 
 
 def _placed(run: IncomingRun, event: Event) -> IncomingRun:
-    """A run at the cycles at which the history has it."""
     return replace(run, cycles=event.cycles)
 
 
 def extension_of(content: Mapping[str, Any]) -> Extension:
-    """A stored extension."""
     from models.diagnosis.extension import Extension  # start-up time: it loads the whole diagnosis
 
     return Extension.from_dict(content)

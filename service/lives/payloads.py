@@ -194,7 +194,6 @@ def receipt(
     warnings: Sequence[Notice],
     engagement: Engagement | None = None,
 ) -> dict[str, Any]:
-    """The receipt of a run."""
     return {
         "clutch_id": clutch_id,
         "run_id": run.run_id,
@@ -224,12 +223,10 @@ def fit_items(levels: Sequence[LevelFit], cofs: ByPressure) -> list[dict[str, An
 
 
 def loop_items(loops: Sequence[Loop]) -> list[dict[str, Any]]:
-    """The loops of a dynamic test as a receipt shows them; what the record does not determine is null."""
     return [_loop_item(loop) for loop in loops]
 
 
 def notice_items(notices: Sequence[Notice]) -> list[dict[str, Any]]:
-    """Warnings and doubts in the public shape."""
     return [
         {"code": notice.code, "message": notice.message}
         | ({} if notice.likely_cycles is None else {"likely_cycles": whole(notice.likely_cycles)})

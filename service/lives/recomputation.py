@@ -84,12 +84,10 @@ class ClutchState:
 
     @property
     def clutch_id(self) -> str:
-        """The clutch's name."""
         return self.record.clutch_id
 
     @property
     def geometry(self) -> Geometry:
-        """The clutch's geometry in SI units."""
         return self.record.geometry.to_model()
 
     @property
@@ -115,11 +113,9 @@ class ClutchState:
 
     @property
     def kind(self) -> dict[str, Any]:
-        """What the clutch has in common with those that it teaches and that teach it."""
         return kind_of(self.record, self.assumptions().severity)
 
     def assumptions(self) -> Assumptions:
-        """What the present life is tracked under."""
         return self.assumptions_under(self.extension, self.lives[-1] if self.events else None)
 
     def assumptions_under(self, extension: Extension | None, life: Life | None) -> Assumptions:
@@ -335,7 +331,6 @@ class Arrival:
 
     @property
     def kept(self) -> dict[str, Any]:
-        """What is kept beside the run's channels."""
         return self.analysis.kept_beside(self.run) | ({} if self.shown is None else {"shown": self.shown.to_list()})
 
 

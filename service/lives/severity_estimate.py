@@ -32,17 +32,14 @@ class SeverityEstimate:
 
     @property
     def mean(self) -> float:
-        """The mean of the exponent."""
         return float(self.probability @ np.array(SEVERITY_EXPONENTS))
 
     @property
     def deviation(self) -> float:
-        """Its standard deviation."""
         return float(np.sqrt(self.probability @ (np.array(SEVERITY_EXPONENTS) - self.mean) ** 2))
 
     @property
     def likeliest(self) -> float:
-        """The most probable exponent."""
         return SEVERITY_EXPONENTS[int(self.probability.argmax())]
 
     def doubts(self, counted: Severity) -> list[Notice]:
@@ -84,6 +81,5 @@ def severity_estimate(life: Life, assumptions: Assumptions) -> SeverityEstimate 
 
 
 def _varies(blocks: Sequence[Block], basis: SeverityBasis) -> bool:
-    """Whether the work of a cycle varies among the blocks that state it."""
     works = [work for block in blocks if (work := block.work(basis))]
     return bool(works) and max(works) > VARIED_WORK * min(works)

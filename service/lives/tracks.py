@@ -79,7 +79,6 @@ class Tracked:
 
     @classmethod
     def from_arrays(cls, method: str, runs: int, arrays: Mapping[str, FloatArray]) -> "Tracked":
-        """The inverse of `to_arrays`."""
         parts: dict[str, dict[str, FloatArray]] = {}
         for name, array in arrays.items():
             owner, _, part = name.partition("/")
@@ -225,7 +224,6 @@ def drawn(method: str, series: Series, assumptions: Assumptions, tracked: Tracke
 
 
 def _purpose(method: str, prior: str) -> str:
-    """What a step's random numbers are for."""
     return method if prior == WEAK else f"{method}-{prior}"
 
 

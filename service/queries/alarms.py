@@ -17,7 +17,6 @@ from storage.webhooks import DeliveryRow, WebhookRow
 
 
 def rule_out(row: AlarmRow) -> dict[str, Any]:
-    """A rule as it goes out."""
     rule = raising.rule_of(row).model_dump(mode="json")
     return rule | {"alarm_id": row.alarm_id, "saved_at": row.saved_at, "saved_by": row.saved_by}
 
@@ -105,7 +104,6 @@ def delivered(database: Database, delivery_ids: Collection[str]) -> list[dict[st
 
 
 def delivery_out(row: DeliveryRow) -> dict[str, Any]:
-    """A delivery as it goes out."""
     again = row.state == webhooks.WAITING and row.due > 0.0
     next_attempt = datetime.fromtimestamp(row.due, UTC).isoformat(timespec="seconds") if again else None
     return of_row(DeliveryOut, row, next_attempt_at=next_attempt)

@@ -37,7 +37,6 @@ class Totals:
 
 
 def service_totals(database: Database) -> Totals:
-    """The numbers as they are now."""
     with database.reading() as connection:
         return Totals(
             clutches=clutches.count(connection),

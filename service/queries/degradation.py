@@ -207,7 +207,6 @@ def _from_parameters(
 
 
 def _severity_item(estimate: SeverityEstimate | None) -> dict[str, Any] | None:
-    """The exponents of severity with their probabilities, in the public shape."""
     if estimate is None:
         return None
     return {
@@ -220,7 +219,6 @@ def _severity_item(estimate: SeverityEstimate | None) -> dict[str, Any] | None:
 
 
 def _disagreements(payload: Mapping[str, Any] | None) -> list[Notice]:
-    """A warning where the two ways are further apart than their uncertainty."""
     if payload is None:
         return []
     words = {"now_sd": "the value now", "end_of_life_sd": "the median end of life"}

@@ -125,7 +125,6 @@ def model(database: Database, clutch_id: str) -> dict[str, Any]:
 
 
 def _name(extension: Extension | None) -> dict[str, Any]:
-    """The model as answers name it."""
     return dict(BASELINE) if extension is None else {"name": "extended", "effects": list(extension.effects)}
 
 

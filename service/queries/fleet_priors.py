@@ -20,13 +20,11 @@ COLUMNS = (*_KINDS, "severity", *_OWN)
 
 
 def newest(database: Database) -> list[dict[str, Any]]:
-    """The newest version of every fleet's prior, in the public shape."""
     with database.reading() as connection:
         return [_item(row) for row in assumptions.current_fleet_priors(connection)]
 
 
 def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """The priors as rows of a table."""
     for item in items:
         yield (
             {name: item["kind"][name] for name in _KINDS}

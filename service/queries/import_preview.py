@@ -102,7 +102,6 @@ def _clutch(database: Database, clutch_id: str | None) -> tuple[Geometry, float]
 
 
 def _title(column: Mapping[str, Any]) -> str:
-    """A column as a profile names it."""
     return f"{column['group']}/{column['name']}" if column["group"] else str(column["name"])
 
 

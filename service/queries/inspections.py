@@ -28,7 +28,6 @@ def page(
 
 
 def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """The same as rows of a table, photographs counted."""
     for item in items:
         yield {name: item[name] for name in COLUMNS} | {"photographs": len(item["photographs"])}
 

@@ -30,7 +30,6 @@ def page(
 
 
 def shown(row: JobRow) -> dict[str, Any]:
-    """A job as it is answered."""
     progress = row.progress or {}
     result = progress.get("result")
     if result is not None:

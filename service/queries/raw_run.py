@@ -185,7 +185,6 @@ def _look_up(database: Database, clutch_id: str, run_id: str) -> _Run:
 
 
 def _values(database: Database, run_key: int, name: str) -> FloatArray:
-    """A channel, decoded when the transaction that read it has ended."""
     with database.reading() as connection:
         stored = channels.stored(connection, run_key, name)
     return stored.values()

@@ -134,7 +134,6 @@ def _criteria(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """The quantiles as rows of a table."""
     held = payload["held_runs"]
     for quantile, remaining in payload["remaining_cycles"].items():
         yield {
@@ -231,7 +230,6 @@ def _wanted(
     criterion: str | None,
     pressure_bar: float | None,
 ) -> Sequence[CriterionIn]:
-    """The criteria that an answer is by."""
     own = record.criteria or (CriterionIn(quantity="mean_cof", fraction=record.cof_fraction),)
     if quantity is None and criterion is None and pressure_bar is None:
         return own

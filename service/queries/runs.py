@@ -70,7 +70,6 @@ def trail(
 
 
 def trail_rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """The audit trail as rows of a table; what changed is JSON."""
     for item in items:
         yield {name: item[name] for name in TRAIL_COLUMNS} | {name: to_text(item[name]) for name in ("before", "after")}
 

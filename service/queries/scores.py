@@ -91,7 +91,6 @@ def _predictions(life: Life, assumptions: Assumptions, fraction: float, method: 
 
 
 def _scored(life: Life, assumptions: Assumptions, end: float, made: dict[float, dict[str, Any]]) -> dict[str, Any]:
-    """A life's scores, with every prediction of it."""
     at = sorted({event.cycles for event in life.events if event.cofs and event.cycles < end})
     tests = [_test(made[cycles], cycles, life.origin, end) for cycles in at if made[cycles]["status"] != INSUFFICIENT]
     horizon = scoring.prognostic_horizon(
@@ -152,7 +151,6 @@ def _histogram(tests: Sequence[dict[str, Any]]) -> list[float]:
 
 
 def rows(items: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The scored predictions of lives as rows of a table."""
     names = (
         "cycles",
         "runs_used",

@@ -34,7 +34,6 @@ def curves(database: Database, clutch_id: str, limit: int, after: Place | None) 
 
 
 def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """The fits as rows of a table, a row a test and pressure."""
     for item in payload["items"]:
         for fit in item["fits"]:
             plain = {name: fit[name] for name in fit if name not in ("parameters", "standard_errors", "undetermined")}

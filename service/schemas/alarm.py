@@ -127,7 +127,6 @@ class AlarmIn(Schema):
 
     @property
     def limit(self) -> float | None:
-        """Its limit, None where the quantity has none."""
         return self.below if self.above is None else self.above
 
 

@@ -74,7 +74,6 @@ class GeometryIn(Schema):
         return self
 
     def to_model(self) -> Geometry:
-        """In SI units."""
         return Geometry(
             inner_diameter=self.inner_diameter_mm / 1000,
             outer_diameter=self.outer_diameter_mm / 1000,
@@ -124,7 +123,6 @@ class SeverityIn(Schema):
     )
 
     def to_model(self) -> Severity:
-        """As the models take it."""
         return Severity(basis=SeverityBasis(self.basis), exponent=self.exponent)
 
 

@@ -44,13 +44,11 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
 def sliced_rows(rows: Rows, limit: int, after: Place | None) -> RowsAndNext:
-    """A page of rows that are known whole."""
     page = sliced(list(rows), limit, after)
     return page["items"], page["next"]
 
 
 def encode_page(columns: Sequence[str], rows: Rows, following: str | None) -> Page:
-    """A page of a table as CSV."""
     return Page(encode_table(columns, rows), following)
 
 
@@ -86,7 +84,6 @@ _WAIT = re.compile(r'(?:^|[,;\s])wait\s*=\s*"?(\d{1,9})"?\s*(?:$|[,;])', re.IGNO
 
 
 def now() -> str:
-    """The time, UTC, ISO 8601."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
@@ -115,7 +112,6 @@ class OfClutch:
 
     @property
     def database(self) -> Database:
-        """The service's."""
         return self.context.database
 
 

@@ -105,7 +105,6 @@ def identify(snapshot: Snapshot, caller: Caller) -> Grant:
 
 
 def _key_of(caller: Caller) -> str | None:
-    """The key that is sent, None where none is."""
     scheme, _, text = (caller.authorization or "").partition(" ")
     return text.strip() if scheme.lower() == "bearer" and text else None
 
@@ -122,7 +121,6 @@ async def snapshot_at(request: Request, caller: Caller, clutch_id: str | None) -
 
 
 def snapshot_of(request: Request) -> Snapshot:
-    """The snapshot of a request."""
     snapshot: Snapshot = request.state.snapshot
     return snapshot
 
@@ -185,14 +183,12 @@ def is_loopback(name: str) -> bool:
 
 
 def context_of(request: Request) -> Context:
-    """The running service's context."""
     context = request.app.state.context
     assert isinstance(context, Context)  # noqa: S101  (set when the service starts)
     return context
 
 
 def caller_of(request: Request) -> Caller:
-    """What the request tells of its sender."""
     first: dict[bytes, str] = {}
     proxy = "HTTP/1.0" if request.scope["http_version"] == _VERSION_OF_PROXIES else None
     for name, value in request.scope["headers"]:
@@ -236,7 +232,6 @@ def allowed(scope: Scope, *, narrowed: bool = False) -> Callable[[Request], Awai
 
 
 def clutch_of(request: Request) -> str | None:
-    """The clutch that the path names."""
     clutch_id: str | None = request.scope["path_params"].get("clutch_id")
     return clutch_id
 

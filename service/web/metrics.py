@@ -71,7 +71,6 @@ class Processes(Collector):
         self._folder = folder
 
     def collect(self) -> Iterator[Metric]:
-        """The sums, and when the first of them was started."""
         metrics: dict[str, Metric] = {}
         for number in {path.stem.rpartition("_")[2] for path in self._folder.glob("*.db")}:
             if not Path("/proc", number).exists():
@@ -95,7 +94,6 @@ class Present(Collector):
         self._database = database
 
     def collect(self) -> Iterator[Metric]:
-        """The gauges, from a few statements that give a row each."""
         numbers = service_totals(self._database)
         yield GaugeMetricFamily("clutchlife_clutches", "Clutches, archived ones too", value=numbers.clutches)
         text = "Clutches in use that have at most so many cycles left with 95 %; 0: they may be at their end of life"
@@ -118,7 +116,6 @@ class Clutches(Collector):
         self._database = database
 
     def collect(self) -> Iterator[Metric]:
-        """The gauges, read from the stored summaries."""
         runs = GaugeMetricFamily("clutchlife_clutch_runs", "Runs stored", labels=["clutch"])
         health = GaugeMetricFamily("clutchlife_clutch_health", "1 when new, 0 at end of life", labels=["clutch"])
         text = "Duty cycles until end of life"

@@ -126,14 +126,12 @@ class Room:
         self._left = most
 
     def take(self, size: int) -> bool:
-        """Whether there is room for so many more, which are then taken."""
         if size > self._left:
             return False
         self._left -= size
         return True
 
     def give_back(self, size: int) -> None:
-        """So many are gone."""
         self._left += size
 
 
@@ -232,7 +230,6 @@ class _Body:
         return self._has_room
 
     def leave(self) -> None:
-        """Give back what it takes."""
         for room, size in self._held.items():
             room.give_back(size)
             self._held[room] = 0

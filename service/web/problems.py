@@ -44,7 +44,6 @@ _log = logging.getLogger("clutchlife")
 def problem(
     status: int, slug: str, title: str, detail: str, errors: tuple[FieldError, ...] = (), total: int = 0
 ) -> Response:
-    """The answer for a problem."""
     body: dict[str, Any] = {
         "type": f"urn:clutchlife:problem:{slug}",
         "title": title,
@@ -65,7 +64,6 @@ def problem(
 
 
 def refused(kind: type[ServiceError], detail: str) -> Response:
-    """The answer for a problem of that kind."""
     return problem(kind.status, kind.slug, kind.title, detail)
 
 

@@ -60,7 +60,6 @@ class Readiness:
             return {part: f"the {place} has not answered for {LONGEST_LOOK_SECONDS:g} s"}
 
     def close(self) -> None:
-        """End the threads, once they have looked."""
         self._thread.shutdown(wait=False)
         self._raw_thread.shutdown(wait=False)
 

@@ -74,11 +74,9 @@ class Executor(ABC):
         """End all work at once, from any thread."""
 
     def __enter__(self) -> Self:
-        """The executor itself."""
         return self
 
     def __exit__(self, *_raised: object) -> None:
-        """Close it."""
         self.close()
 
 
@@ -228,7 +226,6 @@ class Processes(_Elsewhere):
         self._lock = threading.Lock()
 
     def close(self) -> None:
-        """End the processes, whatever they do."""
         with self._lock:
             self._closed = True
             pool, self._pool = self._pool, None
@@ -236,11 +233,9 @@ class Processes(_Elsewhere):
             pool.end()
 
     def width(self) -> int:
-        """Two inputs for each process."""
         return INPUTS_AHEAD * self.count
 
     def submit(self, function: Callable[[Any], Any], item: Any) -> "Future[Any]":
-        """A future of `called`; in a new pool where a process has ended."""
         with self._lock:
             if self._closed:
                 raise RuntimeError("the executor is closed")
@@ -253,11 +248,9 @@ class Processes(_Elsewhere):
                 return self._pool.submit(called, function, item)
 
     def first(self, futures: Sequence["Future[Any]"]) -> set["Future[Any]"]:
-        """Those that have ended, once one has."""
         return wait(futures, return_when=FIRST_COMPLETED).done
 
     def ended(self, future: "Future[Any]") -> tuple[Any, Exception | None]:
-        """What `called` returned."""
         try:
             answer: tuple[Any, Exception | None] = future.result()
         except BrokenExecutor as error:
@@ -334,16 +327,13 @@ class Cluster(_Elsewhere):
             raise
 
     def close(self) -> None:
-        """Drop what waits, and leave the cluster."""
         self._client.close()
 
     def width(self) -> int:
-        """Two inputs for each thread that the cluster has."""
         self._count()
         return INPUTS_AHEAD * max(1, self._threads)
 
     def submit(self, function: Callable[[Any], Any], item: Any) -> Any:
-        """A future of `called` on a worker, which refuses it where it has another release."""
         import dask.config  # optional, and start-up time
 
         with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"}):

@@ -142,7 +142,6 @@ def end_with_the_service() -> None:
 
 
 def say(progress: Json) -> None:
-    """Say how far the job has come."""
     sys.stdout.write(f"{PROGRESS.decode()}{to_text(progress)}\n")
     sys.stdout.flush()
 

@@ -130,7 +130,6 @@ class JobQueue:
                 thread.join()
 
     def is_working(self) -> bool:
-        """Whether the threads are there."""
         return all(thread.is_alive() for thread in self._threads)
 
     def wake(self) -> None:

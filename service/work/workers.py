@@ -204,7 +204,6 @@ class Workers:
             return not any(self._calls.values())
 
     def calls(self) -> dict[Lane, int]:
-        """Calls that wait or run, by lane."""
         with self._lock:
             return dict(self._calls)
 
@@ -539,5 +538,4 @@ def in_processes(
 
 
 def in_threads(database: Database, note: Note = _unnoted) -> Workers:
-    """The same calls in threads of this process."""
     return Workers(lambda _: _Here(database), dict.fromkeys(Lane, 1) | {Lane.RUNS: 2}, note)

@@ -83,13 +83,11 @@ class _Loaded:
 
     @property
     def row(self) -> RunRow:
-        """The only run."""
         (row,) = self.rows
         return row
 
     @property
     def event(self) -> Event:
-        """The same as the history sees it."""
         (event,) = self.events
         return event
 
@@ -334,7 +332,6 @@ def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
 
 
 def _others(loaded: _Loaded) -> ClutchState:
-    """The clutch without the runs."""
     return replace(
         loaded.state,
         events=_without(loaded.state.events, loaded.events),
@@ -449,5 +446,4 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
 
 
 def _read_as(file: Mapping[str, Any]) -> dict[str, Any]:
-    """What the audit trail keeps of how a run's file was read."""
     return {"rig": file["rig"], "reading": file["reading"]}

@@ -79,7 +79,6 @@ class _Outcome:
 
     @property
     def state(self) -> str:
-        """Whether the run counts."""
         return runs.HELD if self.doubts else runs.ACCEPTED
 
 
@@ -308,7 +307,6 @@ def _summarised(
 
 
 def _evidence(database: Database, state: ClutchState, arrival: Arrival, answer: dict[str, Any]) -> Evidence:
-    """What was measured of the clutch, by the run that comes in too."""
     name = arrival.run.run_id
     with database.reading() as connection:
         stored = stored_runs.evidence(connection, state.clutch_id)

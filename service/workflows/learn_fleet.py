@@ -348,7 +348,6 @@ def _brought_up(
 
 
 def _retracked(tracked: _Tracked) -> Results:
-    """A clutch's tracks again."""
     state, tracking = tracked.state, track(tracked.state)
     return Results(
         tracking=tracking,

@@ -26,7 +26,6 @@ class Replayed:
 
 
 def clutch_ids(database: Database) -> list[str]:
-    """All clutches."""
     with database.reading() as connection:
         return clutches.all_ids(connection)
 

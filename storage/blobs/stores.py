@@ -85,17 +85,14 @@ class FolderStore:
 
     @property
     def address(self) -> str:
-        """Where it is."""
         return f"folder://{self._root}"
 
     def put(self, name: str, data: bytes | bytearray) -> None:
-        """Write a file whole, in place of one of that name."""
         with self._usable():
             self._require_mark()
             self._write(self._path(name), data)
 
     def get(self, name: str) -> bytes:
-        """The bytes of a file."""
         with self._usable():
             try:
                 return self._path(name).read_bytes()
@@ -104,13 +101,11 @@ class FolderStore:
                 raise MissingBlob(f"there is no blob {name} in {self.address}") from None
 
     def exists(self, name: str) -> bool:
-        """Whether there is such a file."""
         with self._usable():
             self._require_mark()
             return self._path(name).is_file()
 
     def names(self) -> Iterator[tuple[str, float]]:
-        """All files but the mark, by the time of their last change."""
         with self._usable():
             self._require_mark()
             for path in self._root.glob("*/*/*"):
@@ -119,13 +114,11 @@ class FolderStore:
                 yield f"{_PARTIAL}/{path.name}", path.stat().st_mtime
 
     def delete(self, name: str) -> None:
-        """Remove a file."""
         with self._usable():
             self._require_mark()
             self._path(name).unlink(missing_ok=True)
 
     def mark(self) -> str | None:
-        """The content of the mark's file."""
         with self._usable():
             path = self._root / MARK
             return path.read_text(encoding="utf-8") if path.is_file() else None
@@ -227,17 +220,14 @@ class ObjectStore:
 
     @property
     def address(self) -> str:
-        """Where it is."""
         return self._name
 
     def put(self, name: str, data: bytes | bytearray) -> None:
-        """Put an object, in place of one of that name, in one request."""
         import obstore  # start-up time, optional package
 
         self._request(lambda: obstore.put(self._store, name, bytes(data), use_multipart=False))
 
     def get(self, name: str) -> bytes:
-        """The bytes of an object."""
         data = self._bytes_of(name)
         if data is None:
             self._require_mark()
@@ -245,7 +235,6 @@ class ObjectStore:
         return data
 
     def exists(self, name: str) -> bool:
-        """Whether there is such an object."""
         import obstore  # start-up time, optional package
 
         try:
@@ -256,7 +245,6 @@ class ObjectStore:
         return True
 
     def names(self) -> Iterator[tuple[str, float]]:
-        """All objects but the mark, by the time of their last change."""
         import obstore  # start-up time, optional package
 
         pages = iter(obstore.list(self._store))
@@ -266,13 +254,11 @@ class ObjectStore:
                     yield item["path"], item["last_modified"].timestamp()
 
     def delete(self, name: str) -> None:
-        """Remove an object."""
         import obstore  # start-up time, optional package
 
         self._request(lambda: obstore.delete(self._store, name))
 
     def mark(self) -> str | None:
-        """The content of the mark's object."""
         data = self._bytes_of(MARK)
         return None if data is None else data.decode()
 

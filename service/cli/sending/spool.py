@@ -74,7 +74,6 @@ class Entry:
 
     @property
     def body(self) -> str:
-        """The name of the file with its bytes."""
         return _body(self.number, self.digest)
 
     @property
@@ -108,7 +107,6 @@ def _entry(row: Sequence[Any]) -> Entry:
 
 
 def stamp() -> str:
-    """Now, as text in UTC."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
@@ -172,7 +170,6 @@ class Spool:
 
     @classmethod
     def of(cls, folder: Path, url: str, clutch_id: str) -> "Spool":
-        """The spool for a clutch at a service."""
         return cls(folder=folder, url=url.rstrip("/"), clutch_id=clutch_id)
 
     @classmethod
@@ -186,11 +183,9 @@ class Spool:
         return sorted(self._in_state(WAITING), key=lambda entry: entry.failures)
 
     def refused(self) -> list[Entry]:
-        """What the service refused."""
         return self._in_state(REFUSED)
 
     def replaced(self) -> list[Entry]:
-        """What was not sent because a newer version came."""
         return self._in_state(REPLACED)
 
     def _in_state(self, state: str) -> list[Entry]:
@@ -198,7 +193,6 @@ class Spool:
         return [entry for entry in entries if self.body(entry).exists()]
 
     def body(self, entry: Entry) -> Path:
-        """The file with an entry's bytes."""
         return self.folder / entry.body
 
     def awaits(self, entry: Entry) -> bool:

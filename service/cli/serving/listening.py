@@ -35,7 +35,6 @@ def bound(host: str, port: int) -> list[socket.socket]:
 
 
 def port_of(taken: list[socket.socket]) -> int:
-    """The port that was taken."""
     return int(taken[0].getsockname()[1])
 
 

@@ -109,7 +109,6 @@ def _shaped(schema: type[Answer], found: object, **others: Any) -> dict[str, Any
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON has it."""
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, tuple):

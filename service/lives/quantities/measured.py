@@ -112,7 +112,6 @@ class ChosenLife:
     held: tuple[Event, ...]
 
     def item(self) -> dict[str, Any]:
-        """As answers name it."""
         return {
             "number": self.number,
             "of": self.of,
@@ -255,7 +254,6 @@ class MeasuredLife:
 
     @property
     def tests(self) -> list[Sequence[LevelFit]]:
-        """The fitted levels of each of the life's events, none where it is no test."""
         return tests_of(self.life, self.levels)
 
     def series(self, quantity: Quantity, speeds: Sequence[float] = SLOPE_SPEEDS) -> list[Series]:

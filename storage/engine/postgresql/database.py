@@ -83,12 +83,10 @@ class ServerAnswers(SharedAnswers):
         self._statements = statements
 
     def newest(self, clutch_id: str, name: str, release: str) -> SharedAnswer | None:
-        """The last one that a service of that build computed, None where there is none."""
         rows = self._statements.rows(_newest, {"clutch": clutch_id, "asked": name, "by": release})
         return SharedAnswer(**rows[0]) if rows else None
 
     def keep(self, answer: SharedAnswer) -> None:
-        """Keep an answer, unless one of a later revision is kept."""
         self._statements.rows(_keep, {column.name: getattr(answer, column.name) for column in shared_answer.columns})
 
 
@@ -112,7 +110,6 @@ class ServerWatch(Watch):
         self._closed = False
 
     def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
-        """What is so now, question by question, all at the same moment."""
         # no clutch is named by what the server cannot store
         clutches = sorted(
             {
@@ -135,7 +132,6 @@ class ServerWatch(Watch):
         ]
 
     async def look(self, question: Question) -> Snapshot:
-        """What is so now, for one who asks from the event loop."""
         self._refuse_closed()
         answer: asyncio.Future[Snapshot] = asyncio.get_running_loop().create_future()
         self._waiting.append((question, answer))
@@ -211,14 +207,12 @@ class ServerDatabase(Database):
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """A connection that sees one state of the database, that of its first statement, until the block ends."""
         self._refuse_closed()
         with translated(self.name), self._readers.begin() as connection:
             yield connection
 
     @contextmanager
     def writing(self, *, of: str | None = None) -> Iterator[Connection]:
-        """A connection that holds the lock of writers `of` something: committed when the block ends, else rolled back."""
         self._refuse_closed()
         with translated(self.name), self._writers.begin() as connection:
             write_lock(connection, of)
@@ -226,7 +220,6 @@ class ServerDatabase(Database):
             connection.execute(_COUNT)
 
     def faults(self, *, least_free: int) -> dict[str, str]:  # noqa: ARG002  (the server's disk is its operator's)
-        """What keeps the server from being used; of its disk nothing is known here."""
         if self._closed:
             return {"database": "it has been closed"}
         try:
@@ -244,7 +237,6 @@ class ServerDatabase(Database):
         return []
 
     def close(self) -> None:
-        """Close all connections; any later use raises StorageUnavailable. May be called twice."""
         self._closed = True
         self._engine.dispose()
         self.watch.close()

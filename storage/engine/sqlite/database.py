@@ -101,7 +101,6 @@ class FileWatch(Watch):
         self._connection = connect_shared(path, lock_timeout, writable=writable)
 
     def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
-        """What is so now, question by question, all at the same moment."""
         with self._lock:
             version = self._version()
             if version != self._rows_version or len(self._rows) > _MAX_ROWS:
@@ -132,7 +131,6 @@ class FileWatch(Watch):
         return self._rows[key]
 
     def close(self) -> None:
-        """Close the connection; any later question raises StorageUnavailable."""
         with self._lock:
             self._closed = True
             self._connection.close()
@@ -173,17 +171,12 @@ class FileDatabase(Database):
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """A connection that sees one state of the database until the block ends. Keep it short: the log grows meanwhile."""
         self.refuse_closed()
         with translated(self.path), transaction(self._engine, "BEGIN") as connection:
             yield connection
 
     @contextmanager
     def writing(self, *, of: str | None = None) -> Iterator[Connection]:  # noqa: ARG002  (a file has one writer)
-        """A connection that holds the write lock: committed when the block ends, rolled back on any exception.
-
-        Raises DatabaseBusy where the lock is not free in time, StorageUnavailable where the file cannot be written.
-        """
         self.refuse_closed()
         with (
             self._write_lock.held(),
@@ -193,25 +186,21 @@ class FileDatabase(Database):
             yield connection
 
     def close(self) -> None:
-        """Close all connections; any later use raises StorageUnavailable. May be called twice."""
         self._closed = True
         self.watch.close()
         self._engine.dispose()
         self._write_lock.close()
 
     def refuse_closed(self) -> None:
-        """Raise StorageUnavailable after `close`."""
         if self._closed:
             raise StorageUnavailable(f"the database {self.path} has been closed")
 
     def faults(self, *, least_free: int) -> dict[str, str]:
-        """What keeps the file or its disk from being used."""
         if self._closed:
             return {"database": "it has been closed"}
         return faults(self.path, journal_mode=self.journal_mode, least_free=least_free)
 
     def damage(self, connection: Connection) -> list[str]:
-        """What is wrong with the pages, the indexes and the references."""
         return damage(connection)
 
 
