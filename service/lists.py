@@ -4,8 +4,9 @@ import base64
 import binascii
 import json
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 from service.errors import FieldError, InvalidError
 
@@ -15,6 +16,7 @@ ALL_ITEMS = 1_000_000
 LONGEST_CURSOR = 600
 #: Where a page ended: a number, and a name where that is not unique.
 Place = tuple[float, str]
+Row = TypeVar("Row")
 
 
 def to_cursor(place: Place | None) -> str | None:
@@ -38,16 +40,62 @@ def from_cursor(cursor: str | None) -> Place | None:
     return place
 
 
-def sliced(items: Sequence[Any], limit: int, after: Place | None) -> dict[str, Any]:
-    """A page out of a list that is known whole: the place in it is the cursor."""
-    start = 0 if after is None else max(0, int(after[0]))
-    stop = start + limit
-    return page(items[start:stop], (float(stop), "") if stop < len(items) else None)
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Which part of a list is asked for: at most so many items, behind the place `after` which the part before ended."""
+
+    limit: int = ALL_ITEMS
+    after: Place | None = None
+
+    @property
+    def most(self) -> int:
+        """Rows to be read: whether there is one more than the items says whether there is a next part."""
+        return self.limit + 1
+
+    @property
+    def number(self) -> float | None:
+        """The number of the place, None at the beginning."""
+        return None if self.after is None else self.after[0]
+
+    @property
+    def name(self) -> str:
+        """The name of the place, empty at the beginning."""
+        return "" if self.after is None else self.after[1]
+
+    def of(
+        self, rows: Sequence[Row], place: Callable[[Row], Place], item: Callable[[Row], dict[str, Any]]
+    ) -> dict[str, Any]:
+        """The items of the rows that were read, `most` of them, each of which has its `place` in the list."""
+        return page([item(row) for row in rows[: self.limit]], self.next(rows, place))
+
+    def next(self, rows: Sequence[Row], place: Callable[[Row], Place]) -> Place | None:
+        """Where the next part begins, None where these rows are the last."""
+        return place(rows[self.limit - 1]) if len(rows) > self.limit else None
+
+    def sliced(self, items: Sequence[Any]) -> dict[str, Any]:
+        """The same out of a list that is known whole: the place in it is the cursor."""
+        start = int(max(0.0, self.number or 0.0))
+        stop = start + self.limit
+        return page(items[start:stop], (float(stop), "") if stop < len(items) else None)
 
 
-def paged(items: Sequence[Any], limit: int, after: Place | None) -> dict[str, Any]:
-    """The same, and the whole list where all of it was asked for."""
-    return page(items, None) if limit == ALL_ITEMS and after is None else sliced(items, limit, after)
+#: All of a list.
+WHOLE = Part()
+
+
+def by_name(name: str) -> Callable[[Any], Place]:
+    """The place of a row in a list that is ordered by a name, which is the field of that name."""
+    return lambda row: (0.0, getattr(row, name))
+
+
+def by_key(name: str) -> Callable[[Any], Place]:
+    """The place of a row in a list that is ordered by a number that no other row has."""
+    return lambda row: (float(getattr(row, name)), "")
+
+
+def by_cycles(name: str) -> Callable[[Any], Place]:
+    """The place of a row in a list that is ordered by cycles, and at equal cycles by a name."""
+    return lambda row: (row.cycles, getattr(row, name))
 
 
 def page(items: Sequence[Any], after: Place | None) -> dict[str, Any]:

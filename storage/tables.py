@@ -19,6 +19,11 @@ def _required(kind: type[TypeEngine[Any]] | TypeEngine[Any], *names: str) -> lis
     return [Column(name, kind, nullable=False) for name in names]
 
 
+def _optional(kind: type[TypeEngine[Any]] | TypeEngine[Any], *names: str) -> list[Column[Any]]:
+    """Columns that may be null."""
+    return [Column(name, kind) for name in names]
+
+
 #: The value stands in the text: with a parameter in its place SQLite would not use the index of held runs alone.
 HELD_ONLY = text("state = 'held'")
 OPEN_ONLY = text("state IN ('waiting', 'running')")
@@ -54,8 +59,7 @@ run = Table(
     metadata,
     Column("run_key", WHOLE, primary_key=True),
     Column("clutch_id", TEXT, ForeignKey("clutch.clutch_id"), nullable=False),
-    Column("run_id", TEXT, nullable=False),
-    Column("kind", TEXT, nullable=False),
+    *_required(TEXT, "run_id", "kind"),
     Column("cycles", NUMBER, nullable=False),
     Column("started_at", TEXT),
     *_required(TEXT, "received_at", "content_sha256", "details", "receipt", "code_version"),
@@ -74,8 +78,7 @@ raw_store = Table(
     "raw_store",
     metadata,
     Column("store_key", WHOLE, primary_key=True),
-    Column("address", TEXT, nullable=False),
-    Column("mark", TEXT, nullable=False),
+    *_required(TEXT, "address", "mark"),
     Column("in_use", WHOLE, nullable=False, server_default="0"),
     Column("removals", WHOLE, nullable=False, server_default="0"),
     UniqueConstraint("address", name="raw_store_once"),
@@ -121,12 +124,9 @@ fit = Table(
     Column("noise", NUMBER, nullable=False),
     Column("mse_percent", NUMBER),
     Column("rmse", NUMBER, nullable=False),
-    Column("points", WHOLE, nullable=False),
-    Column("speeds", WHOLE, nullable=False),
-    Column("mean_cof", NUMBER),
-    Column("mean_cof_sd", NUMBER),
-    Column("message", TEXT, nullable=False),
-    Column("code_version", TEXT, nullable=False),
+    *_required(WHOLE, "points", "speeds"),
+    *_optional(NUMBER, "mean_cof", "mean_cof_sd"),
+    *_required(TEXT, "message", "code_version"),
     Column("unbiased_covariance", TEXT),  # none of a fit by a release that had none
 )
 
@@ -137,8 +137,7 @@ prediction = Table(
     Column("method", TEXT, primary_key=True),
     Column("pressure", NUMBER, primary_key=True),
     Column("cycles", NUMBER, primary_key=True),
-    Column("payload", TEXT, nullable=False),
-    Column("code_version", TEXT, nullable=False),
+    *_required(TEXT, "payload", "code_version"),
 )
 
 filter_state = Table(
@@ -159,17 +158,13 @@ diagnosis = Table(
     metadata,
     Column("diagnosis_key", WHOLE, primary_key=True),
     Column("clutch_id", TEXT, ForeignKey("clutch.clutch_id"), nullable=False),
-    Column("diagnosis_id", TEXT, nullable=False),
-    Column("created_at", TEXT, nullable=False),
+    *_required(TEXT, "diagnosis_id", "created_at"),
     Column("finished_at", TEXT),
     Column("status", TEXT, nullable=False),
-    Column("revision", WHOLE, nullable=False),
-    Column("last_run_key", WHOLE, nullable=False),
+    *_required(WHOLE, "revision", "last_run_key"),
     Column("life", TEXT, nullable=False),
     Column("as_of_cycles", NUMBER),
-    Column("report", TEXT),
-    Column("extension", TEXT),
-    Column("problem", TEXT),
+    *_optional(TEXT, "report", "extension", "problem"),
     Column("code_version", TEXT, nullable=False),
     UniqueConstraint("diagnosis_id", name="diagnosis_once"),
     Index("diagnosis_in_order", "clutch_id", "diagnosis_key"),
@@ -182,17 +177,13 @@ job = Table(
     "job",
     metadata,
     Column("job_key", WHOLE, primary_key=True),
-    Column("job_id", TEXT, nullable=False),
-    Column("kind", TEXT, nullable=False),
+    *_required(TEXT, "job_id", "kind"),
     Column("clutch_id", TEXT, ForeignKey("clutch.clutch_id")),
     *_required(TEXT, "state", "asked_at", "asked_by", "arguments"),
     Column("attempts", WHOLE, nullable=False),
     Column("claimed_by", TEXT),
     Column("leased_until", NUMBER),
-    Column("started_at", TEXT),
-    Column("finished_at", TEXT),
-    Column("progress", TEXT),
-    Column("problem", TEXT),
+    *_optional(TEXT, "started_at", "finished_at", "progress", "problem"),
     UniqueConstraint("job_id", name="job_once"),
     Index("job_open", "job_key", sqlite_where=OPEN_ONLY, postgresql_where=OPEN_ONLY),
     Index("job_of_clutch", "clutch_id", "started_at"),
@@ -214,8 +205,7 @@ corrected_cof = Table(
     metadata,
     Column("run_key", WHOLE, ForeignKey("run.run_key"), primary_key=True),
     Column("pressure", NUMBER, primary_key=True),
-    Column("mean_cof", NUMBER, nullable=False),
-    Column("mean_cof_sd", NUMBER, nullable=False),
+    *_required(NUMBER, "mean_cof", "mean_cof_sd"),
     Column("mean_cof_draws", TEXT),
 )
 
@@ -262,8 +252,7 @@ inspection_photograph = Table(
     Column("inspection_key", WHOLE, ForeignKey("inspection.inspection_key"), primary_key=True),
     Column("sha256", TEXT, ForeignKey("photograph.sha256"), primary_key=True),
     Column("position", WHOLE, nullable=False),
-    Column("received_at", TEXT, nullable=False),
-    Column("received_by", TEXT, nullable=False),
+    *_required(TEXT, "received_at", "received_by"),
 )
 
 #: Rig profiles: how the files of a rig are read. `content` is the profile (JSON) in force, `version` counts from 1 on.
@@ -295,12 +284,10 @@ alarm_event = Table(
     "alarm_event",
     metadata,
     Column("event_key", WHOLE, primary_key=True),
-    Column("event_id", TEXT, nullable=False),
-    Column("alarm_id", TEXT, nullable=False),
+    *_required(TEXT, "event_id", "alarm_id"),
     Column("clutch_id", TEXT, ForeignKey("clutch.clutch_id"), nullable=False),
     *_required(TEXT, "quantity", "mark", "content", "raised_at"),
-    Column("acknowledged_at", TEXT),
-    Column("acknowledged_by", TEXT),
+    *_optional(TEXT, "acknowledged_at", "acknowledged_by"),
     Column("note", TEXT, nullable=False, server_default=text("''")),
     Column("cleared_at", TEXT),
     UniqueConstraint("event_id", name="alarm_event_once"),
@@ -337,8 +324,7 @@ delivery = Table(
     *_required(TEXT, "body", "state", "created_at"),
     Column("due", NUMBER, nullable=False),
     Column("attempts", WHOLE, nullable=False),
-    Column("last_attempt_at", TEXT),
-    Column("delivered_at", TEXT),
+    *_optional(TEXT, "last_attempt_at", "delivered_at"),
     Column("status", WHOLE),
     Column("problem", TEXT),
     UniqueConstraint("delivery_id", name="delivery_once"),
@@ -365,9 +351,6 @@ access_key = Table(
     metadata,
     Column("key_id", TEXT, primary_key=True),
     *_required(TEXT, "scope", "secret_sha256", "note", "created_at"),
-    Column("revoked_at", TEXT),
-    Column("clutches", TEXT),
-    Column("expires_at", TEXT),
-    Column("last_used_at", TEXT),
+    *_optional(TEXT, "revoked_at", "clutches", "expires_at", "last_used_at"),
     UniqueConstraint("secret_sha256", name="access_key_secret"),
 )

@@ -32,17 +32,9 @@ STATE_WORDS = dict(
 DISAGREES = NAMED, AMBIGUOUS, _ = ("cause_named", "cause_ambiguous", "unexplained_structure")
 #: What of a prediction is stored with a clutch.
 SUMMARY = (
-    "status",
-    "as_of_cycles",
-    "runs_used",
-    "current",
-    "criterion",
-    "remaining_cycles",
-    "at_least",
-    "probability_of_reaching",
-    "model",
-    "ended",
-)
+    "status", "as_of_cycles", "runs_used", "current", "criterion", "remaining_cycles", "at_least",
+    "probability_of_reaching", "model", "ended",
+)  # fmt: skip
 #: What is said beside a prediction.
 BESIDE = ("at_least", "at_least_at", "held_runs", "statement")
 REACHED = PassageStatus.REACHED.value

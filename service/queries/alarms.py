@@ -6,8 +6,7 @@ from typing import Any
 
 from service.alarms import raising, receivers
 from service.errors import found
-from service.lists import Place
-from service.lists import page as page_of
+from service.lists import Part, by_key, by_name
 from service.schemas.alarm import DeliveryOut
 from service.schemas.base import of_row
 from storage import alarms, webhooks
@@ -21,12 +20,11 @@ def rule_out(row: AlarmRow) -> dict[str, Any]:
     return rule | {"alarm_id": row.alarm_id, "saved_at": row.saved_at, "saved_by": row.saved_by}
 
 
-def page(database: Database, *, limit: int, after: Place | None, only: Collection[str] | None = None) -> dict[str, Any]:
-    """A page of rules, of `only` these clutches, behind the name at which another ended."""
+def page(database: Database, part: Part, *, only: Collection[str] | None = None) -> dict[str, Any]:
+    """Rules by name, of `only` these clutches."""
     with database.reading() as connection:
-        rows = alarms.page(connection, limit=limit + 1, after="" if after is None else after[1], only=only)
-    following = (0.0, rows[limit - 1].alarm_id) if len(rows) > limit else None
-    return page_of([rule_out(row) for row in rows[:limit]], following)
+        rows = alarms.page(connection, limit=part.most, after=part.name, only=only)
+    return part.of(rows, by_name("alarm_id"), rule_out)
 
 
 def look_up(database: Database, alarm_id: str, *, only: Collection[str] | None = None) -> dict[str, Any]:
@@ -38,19 +36,16 @@ def look_up(database: Database, alarm_id: str, *, only: Collection[str] | None =
 
 def events(
     database: Database,
+    part: Part,
     *,
-    limit: int,
-    after: Place | None,
     state: str | None = None,
     alarm_id: str | None = None,
     only: Collection[str] | None = None,
 ) -> dict[str, Any]:
-    """A page of what was raised, newest first, of `only` these clutches."""
-    before = None if after is None else after[0]
+    """What was raised, newest first, of `only` these clutches."""
     with database.reading() as connection:
-        rows = alarms.events(connection, limit=limit + 1, before=before, state=state, alarm_id=alarm_id, only=only)
-    following = (float(rows[limit - 1].event_key), "") if len(rows) > limit else None
-    return page_of([raising.event_out(row) for row in rows[:limit]], following)
+        rows = alarms.events(connection, limit=part.most, before=part.number, state=state, alarm_id=alarm_id, only=only)
+    return part.of(rows, by_key("event_key"), raising.event_out)
 
 
 def event(database: Database, event_id: str, *, only: Collection[str] | None = None) -> dict[str, Any]:
@@ -72,12 +67,11 @@ def receiver_out(row: WebhookRow, *, secret: str | None = None) -> dict[str, Any
     }
 
 
-def receiver_page(database: Database, *, limit: int, after: Place | None) -> dict[str, Any]:
-    """A page of receivers behind the name at which another ended."""
+def receivers_by_name(database: Database, part: Part) -> dict[str, Any]:
+    """Receivers by name."""
     with database.reading() as connection:
-        rows = webhooks.page(connection, limit=limit + 1, after="" if after is None else after[1])
-    following = (0.0, rows[limit - 1].webhook_id) if len(rows) > limit else None
-    return page_of([receiver_out(row) for row in rows[:limit]], following)
+        rows = webhooks.page(connection, limit=part.most, after=part.name)
+    return part.of(rows, by_name("webhook_id"), receiver_out)
 
 
 def receiver(database: Database, webhook_id: str) -> dict[str, Any]:
@@ -86,14 +80,12 @@ def receiver(database: Database, webhook_id: str) -> dict[str, Any]:
         return receiver_out(found(webhooks.get(connection, webhook_id), "webhook", webhook_id))
 
 
-def deliveries(database: Database, webhook_id: str, *, limit: int, after: Place | None) -> dict[str, Any]:
-    """A page of what a receiver was sent or is to be sent, newest first. Raises NotFoundError."""
-    before = None if after is None else after[0]
+def deliveries(database: Database, webhook_id: str, part: Part) -> dict[str, Any]:
+    """What a receiver was sent or is to be sent, newest first. Raises NotFoundError."""
     with database.reading() as connection:
         found(webhooks.get(connection, webhook_id), "webhook", webhook_id)
-        rows = webhooks.deliveries(connection, webhook_id, limit=limit + 1, before=before)
-    following = (float(rows[limit - 1].delivery_key), "") if len(rows) > limit else None
-    return page_of([delivery_out(row) for row in rows[:limit]], following)
+        rows = webhooks.deliveries(connection, webhook_id, limit=part.most, before=part.number)
+    return part.of(rows, by_key("delivery_key"), delivery_out)
 
 
 def delivered(database: Database, delivery_ids: Collection[str]) -> list[dict[str, Any]]:

@@ -3,7 +3,7 @@ numbers of all that is stored, for the metrics.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -12,7 +12,7 @@ from sqlalchemy import Connection
 
 from models.prognosis.criteria import HORIZON
 from service import records
-from service.lists import Place, page_as_bytes
+from service.lists import Part, by_name, page_as_bytes
 from service.lives.condition import STATES, stated
 from service.queries.cache import AnswerCache, to_json
 from storage import assumptions, clutches, diagnoses, jobs, runs
@@ -60,34 +60,29 @@ def look_up(database: Database, clutch_id: str) -> dict[str, Any]:
     return _item(*shown)
 
 
-def page_by_name(
-    database: Database, *, limit: int, after: Place | None, archived: bool = False
-) -> tuple[list[dict[str, Any]], Place | None]:
-    """Clutches in use, or the archived ones, by their names, and where the next page starts: a walk through all of them."""
-    with database.reading() as connection:
-        rows = clutches.page(connection, Choice(archived=archived), limit=limit + 1, after=after, by_name=True)
-        items = [_item(*clutch) for clutch in _shown(connection, rows[:limit])]
-    return items, _next(rows, limit, by_name=True)
+def every(database: Database, *, at_once: int) -> Iterator[dict[str, Any]]:
+    """All clutches in use by their names, so many of them in memory."""
+    part: Part | None = Part(at_once)
+    while part is not None:
+        with database.reading() as connection:
+            rows = clutches.page(connection, Choice(), limit=part.most, after=part.after, by_name=True)
+            items = [_item(*clutch) for clutch in _shown(connection, rows[:at_once])]
+        yield from items
+        place = part.next(rows, by_name("clutch_id"))
+        part = None if place is None else Part(at_once, place)
 
 
 def page_as_json(
-    database: Database,
-    cache: AnswerCache,
-    choice: Choice,
-    *,
-    limit: int,
-    after: Place | None = None,
-    offset: int = 0,
-    sort: str = "worst",
+    database: Database, cache: AnswerCache, choice: Choice, part: Part, *, offset: int = 0, sort: str = "worst"
 ) -> bytes:
     """A page of the clutches of a choice as JSON; each clutch's item is made once for its revision and verdict. By kind a
     page's place is how many clutches are before it."""
-    by_name, by_kind = sort == "name", sort == "kind"
+    by_kind, limit, after = sort == "kind", part.limit, part.after
     if by_kind:
-        offset, after = offset + (0 if after is None else int(after[0])), None
+        offset, after = offset + int(part.number or 0), None
     with database.reading() as connection:
         rows = clutches.page(
-            connection, choice, limit=limit + 1, after=after, left_out=offset, by_name=by_name, by_kind=by_kind
+            connection, choice, limit=part.most, after=after, left_out=offset, by_name=sort == "name", by_kind=by_kind
         )
         clutches_shown = _shown(connection, rows[:limit])
     items = [
@@ -98,8 +93,12 @@ def page_as_json(
         )
         for row, held, verdict, state in clutches_shown
     ]
-    more = (float(offset + limit), "") if by_kind and len(rows) > limit else None
-    return page_as_bytes([item.body for item in items], more if by_kind else _next(rows, limit, by_name=by_name))
+    places = {
+        "worst": lambda row: (row.rank, row.clutch_id),
+        "name": by_name("clutch_id"),
+        "kind": lambda _: (float(offset + limit), ""),
+    }
+    return page_as_bytes([item.body for item in items], part.next(rows, places[sort]))
 
 
 def totals(database: Database, choice: Choice) -> dict[str, Any]:
@@ -123,12 +122,6 @@ def _round_above(row: ClutchRow) -> float:
     end = max(row.rank, *(end for end in (quantiles["0.5"], quantiles["0.95"]) if end is not None), 1.0)
     unit = 10.0 ** math.floor(math.log10(end))
     return next(step * unit for step in (1, 2, 5, 10) if step * unit >= end)
-
-
-def _next(rows: Sequence[ClutchRow], limit: int, *, by_name: bool) -> Place | None:
-    if len(rows) <= limit:
-        return None
-    return 0.0 if by_name else rows[limit - 1].rank, rows[limit - 1].clutch_id
 
 
 def _as_json(row: ClutchRow, held: int, verdict: dict[str, Any] | None, state: dict[str, Any]) -> bytes:

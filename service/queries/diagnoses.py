@@ -10,6 +10,7 @@ from sqlalchemy import Connection
 from service import records
 from service.columns import whole
 from service.errors import NotFoundError
+from service.lists import Part, by_key
 from service.lives.assumptions import BASELINE
 from service.lives.diagnosis.report import empty
 from service.lives.model_correction import extension_of
@@ -58,16 +59,17 @@ def plan_rows(protocol: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             yield choice | step | lists | why
 
 
-def page(
-    database: Database, clutch_id: str, *, limit: int, after: tuple[float, str] | None
-) -> tuple[list[dict[str, Any]], tuple[float, str] | None]:
-    """Diagnoses without their maps and loops, newest first, and where the next page starts. Raises NotFoundError."""
+def page(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+    """Diagnoses without their maps and loops, newest first. Raises NotFoundError."""
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = diagnoses.page(connection, clutch_id, limit=limit + 1, before=None if after is None else after[0])
-        items = _items(connection, clutch_id, rows[:limit])
-    shown = [{name: value for name, value in item.items() if name not in _LARGE} for item in items]
-    return shown, (float(rows[limit - 1].diagnosis_key), "") if len(rows) > limit else None
+        rows = diagnoses.page(connection, clutch_id, limit=part.most, before=part.number)
+        items = {item["diagnosis_id"]: item for item in _items(connection, clutch_id, rows)}
+
+    def shown(row: DiagnosisRow) -> dict[str, Any]:
+        return {name: value for name, value in items[row.diagnosis_id].items() if name not in _LARGE}
+
+    return part.of(rows, by_key("diagnosis_key"), shown)
 
 
 def _items(connection: Connection, clutch_id: str, rows: list[DiagnosisRow]) -> list[dict[str, Any]]:

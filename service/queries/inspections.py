@@ -5,7 +5,7 @@ from typing import Any
 
 from service import records
 from service.errors import NotFoundError
-from service.lists import Place
+from service.lists import Part, by_cycles
 from service.records import inspection, inspection_answers
 from storage import inspections
 from storage.engine.database import Database
@@ -16,15 +16,13 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def page(
-    database: Database, clutch_id: str, *, limit: int, after: Place | None
-) -> tuple[list[dict[str, Any]], Place | None]:
-    """Inspections by cycles, and where the next page starts. Raises NotFoundError."""
+def page(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+    """Inspections by cycles. Raises NotFoundError."""
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = inspections.page(connection, clutch_id, limit=limit + 1, after=after)
-        items = inspection_answers(connection, rows[:limit])
-    return items, (rows[limit - 1].cycles, rows[limit - 1].inspection_id) if len(rows) > limit else None
+        rows = inspections.page(connection, clutch_id, limit=part.most, after=part.after)
+        items = {item["inspection_id"]: item for item in inspection_answers(connection, rows)}
+    return part.of(rows, by_cycles("inspection_id"), lambda row: items[row.inspection_id])
 
 
 def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:

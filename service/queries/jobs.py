@@ -4,7 +4,7 @@ from collections.abc import Collection
 from typing import Any
 
 from service.errors import found
-from service.lists import Place
+from service.lists import Part, by_key
 from service.schemas.base import of_row
 from service.schemas.diagnosis import JobOut
 from storage import jobs
@@ -18,15 +18,11 @@ def find(database: Database, job_id: str, *, only: Collection[str] | None) -> Jo
         return found(jobs.get(connection, job_id), "job", job_id, only=only)
 
 
-def page(
-    database: Database, *, limit: int, after: Place | None, state: str | None, only: Collection[str] | None
-) -> tuple[list[dict[str, Any]], Place | None]:
-    """Jobs in that state, of `only` these clutches, newest first, and where the next page starts."""
-    before = None if after is None else after[0]
+def page(database: Database, part: Part, *, state: str | None, only: Collection[str] | None) -> dict[str, Any]:
+    """Jobs in that state, of `only` these clutches, newest first."""
     with database.reading() as connection:
-        rows = jobs.page(connection, limit=limit + 1, before=before, state=state, only=only)
-    following = (float(rows[limit - 1].job_key), "") if len(rows) > limit else None
-    return [shown(row) for row in rows[:limit]], following
+        rows = jobs.page(connection, limit=part.most, before=part.number, state=state, only=only)
+    return part.of(rows, by_key("job_key"), shown)
 
 
 def shown(row: JobRow) -> dict[str, Any]:

@@ -149,15 +149,9 @@ def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 COLUMNS = (
-    "as_of_cycles",
-    "status",
-    "quantile",
-    "remaining_cycles",
-    "end_of_life_cycles",
-    "at_least",
-    "held_runs",
+    "as_of_cycles", "status", "quantile", "remaining_cycles", "end_of_life_cycles", "at_least", "held_runs",
     "remaining_cycles_with_held",
-)
+)  # fmt: skip
 
 
 #: What is said of mean COF's course and of its forecasts, where another quantity is asked for.

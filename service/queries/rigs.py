@@ -1,22 +1,21 @@
 """`/v1/rigs`: rig profiles in force, by name."""
 
+from dataclasses import replace
 from typing import Any
 
 from service import records
-from service.lists import Place
-from service.lists import page as page_of
+from service.lists import Part, by_name
 from service.schemas.rig import RigOut
 from storage import rigs
 from storage.engine.database import Database
 
 
-def page(database: Database, *, limit: int, after: Place | None) -> dict[str, Any]:
-    """A page of the profiles behind the name at which another ended, of fewer where so many would be too much memory."""
-    limit = min(limit, rigs.MAX_AT_ONCE)
+def page(database: Database, part: Part) -> dict[str, Any]:
+    """Profiles by name, fewer where so many would be too much memory."""
+    part = replace(part, limit=min(part.limit, rigs.MAX_AT_ONCE))
     with database.reading() as connection:
-        rows = rigs.page(connection, limit=limit + 1, after="" if after is None else after[1])
-    items = [records.rig_out(row).model_dump(mode="json") for row in rows[:limit]]
-    return page_of(items, (0.0, rows[limit - 1].name) if len(rows) > limit else None)
+        rows = rigs.page(connection, limit=part.most, after=part.name)
+    return part.of(rows, by_name("name"), lambda row: records.rig_out(row).model_dump(mode="json"))
 
 
 def look_up(database: Database, name: str) -> dict[str, Any]:

@@ -1,12 +1,11 @@
 """`/runs` and `/loops`: receipts by cycles, and the friction loops of the dynamic tests."""
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from service import records
 from service.columns import whole
-from service.lists import Place, page_as_bytes
+from service.lists import Part, by_cycles, by_key, page_as_bytes
 from service.lives.history import DYNAMIC
 from storage import changes, runs
 from storage.encoding import to_text
@@ -20,13 +19,7 @@ TRAIL_COLUMNS = changes.SHOWN
 
 
 def page_as_json(
-    database: Database,
-    clutch_id: str,
-    *,
-    limit: int,
-    after: Place | None,
-    state: str | None = None,
-    kind: str | None = None,
+    database: Database, clutch_id: str, part: Part, *, state: str | None = None, kind: str | None = None
 ) -> bytes:
     """Receipts by cycles, of runs in one state or all, of one kind or all, as JSON. Raises NotFoundError.
 
@@ -34,9 +27,8 @@ def page_as_json(
     """
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = runs.receipts(connection, clutch_id, limit=limit + 1, after=after, state=state, kind=kind)
-    items = [_as_json(row) for row in rows[:limit]]
-    return page_as_bytes(items, (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None)
+        rows = runs.receipts(connection, clutch_id, limit=part.most, after=part.after, state=state, kind=kind)
+    return page_as_bytes([_as_json(row) for row in rows[: part.limit]], part.next(rows, by_cycles("run_id")))
 
 
 def _as_json(row: runs.ReceiptRow) -> bytes:
@@ -46,27 +38,19 @@ def _as_json(row: runs.ReceiptRow) -> bytes:
     return f"{row.receipt[:-1]},{present}}}".encode()
 
 
-def rows(
-    database: Database, clutch_id: str, *, limit: int, after: Place | None, state: str | None = None
-) -> tuple[list[dict[str, Any]], str | None]:
-    """The same as rows of a table, warnings and fits counted; and the next page's cursor."""
-    page = json.loads(page_as_json(database, clutch_id, limit=limit, after=after, state=state))
-    counted = ("warnings", "fits")
-    items = [
-        {name: item[name] for name in COLUMNS} | {name: len(item[name]) for name in counted} for item in page["items"]
-    ]
-    return items, page["next"]
+def rows(items: Iterable[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+    """The same as rows of a table, warnings and fits counted."""
+    for item in items:
+        counted = {name: len(item[name]) for name in ("warnings", "fits")}
+        yield {name: item[name] for name in COLUMNS} | counted
 
 
-def trail(
-    database: Database, clutch_id: str, *, limit: int, after: Place | None
-) -> tuple[list[dict[str, Any]], Place | None]:
-    """The audit trail of a clutch and its runs, newest first, and where the next page starts. Raises NotFoundError."""
+def trail(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+    """The audit trail of a clutch and its runs, newest first. Raises NotFoundError."""
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = changes.page(connection, clutch_id, limit=limit + 1, before=None if after is None else after[0])
-    items = [row.entry() for row in rows[:limit]]
-    return items, (float(rows[limit - 1].change_key), "") if len(rows) > limit else None
+        rows = changes.page(connection, clutch_id, limit=part.most, before=part.number)
+    return part.of(rows, by_key("change_key"), changes.ChangeRow.entry)
 
 
 def trail_rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:

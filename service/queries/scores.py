@@ -152,14 +152,8 @@ def _histogram(tests: Sequence[dict[str, Any]]) -> list[float]:
 
 def rows(items: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     names = (
-        "cycles",
-        "runs_used",
-        "share_of_life",
-        "true_remaining_cycles",
-        "crps_cycles",
-        "crps_share",
-        "interval_share",
-    )
+        "cycles", "runs_used", "share_of_life", "true_remaining_cycles", "crps_cycles", "crps_share", "interval_share",
+    )  # fmt: skip
     judged = ("covered", "pit", "alpha_lambda")
     return [
         {"end_of_life_cycles": item["end_of_life_cycles"]}

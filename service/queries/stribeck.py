@@ -9,7 +9,7 @@ from models.arrays import FloatArray
 from models.friction.pressure_laws import LinearLaw, PressureLaws, fit_pressure_laws, law_covariances
 from service import records
 from service.columns import PASCALS_PER_BAR, whole
-from service.lists import Place, page
+from service.lists import Part, by_cycles
 from service.lives.condition import held_beside
 from service.lives.payloads import PARAMETER_UNITS
 from service.lives.run_analysis import LevelFit
@@ -18,19 +18,18 @@ from storage.engine.database import Database
 from storage.runs import RunRow
 
 
-def curves(database: Database, clutch_id: str, limit: int, after: Place | None) -> dict[str, Any]:
-    """A page of stationary tests by cycles with their fits and pressure laws. Raises NotFoundError.
+def curves(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+    """Stationary tests by cycles with their fits and pressure laws. Raises NotFoundError.
 
     A test of the open clutch has neither fits nor laws.
     """
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, fitted=True, state=runs.ACCEPTED)
+        rows = runs.page(connection, clutch_id, limit=part.most, after=part.after, fitted=True, state=runs.ACCEPTED)
         levels = records.levels(connection, clutch_id)
         held = runs.held(connection, [clutch_id]).get(clutch_id, 0)
-    items = [_item(row, levels.get(row.run_id, [])) for row in rows[:limit]]
-    following = (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None
-    return held_beside(held) | page(items, following)  # the next page last, where it is found
+    tests = part.of(rows, by_cycles("run_id"), lambda row: _item(row, levels.get(row.run_id, [])))
+    return held_beside(held) | tests  # the next page last, where it is found
 
 
 def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:

@@ -5,12 +5,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from models.prognosis.criteria import QUANTILES
+from service.schemas import base
 from service.schemas.base import (
-    LARGEST_LIMIT,
-    LONGEST_ADDRESS,
-    LONGEST_SECRET,
-    MAX_SPEED_RPM,
-    SHORTEST_SECRET,
     Answer,
     Identifier,
     Name,
@@ -23,16 +19,9 @@ from service.schemas.base import (
 )
 
 WatchedQuantity = Literal[
-    "remaining_cycles",
-    "remaining_days",
-    "health",
-    "shudder_margin",
-    "held_runs",
-    "off_course",
-    "verdict",
-    "state",
+    "remaining_cycles", "remaining_days", "health", "shudder_margin", "held_runs", "off_course", "verdict", "state",
     "silent_hours",
-]
+]  # fmt: skip
 #: Which side of its limit a quantity is watched at, and the limit where none is given (None: it must be); quantities that
 #: have no limit are not here.
 LIMITS: dict[str, tuple[Literal["below", "above"], float | None]] = {
@@ -59,10 +48,9 @@ Probability = Annotated[
     Field(strict=True, json_schema_extra={"oneOf": [{"const": quantile} for quantile in QUANTILES]}),
     AfterValidator(_quantile),
 ]
-Limit = Annotated[float, Field(ge=-LARGEST_LIMIT, le=LARGEST_LIMIT, allow_inf_nan=False, strict=True)]
-StateName = Literal["failure", "maintenance", "check", "out_of_specification", "normal"]
-VerdictName = Literal["model_adequate", "cause_named", "cause_ambiguous", "unexplained_structure", "insufficient_data"]
+Limit = Annotated[float, Field(ge=-base.LARGEST_LIMIT, le=base.LARGEST_LIMIT, allow_inf_nan=False, strict=True)]
 EventState = Literal["raised", "acknowledged", "cleared"]
+_Address = Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_ADDRESS, strip_whitespace=True)]
 
 
 class KindIn(Schema):
@@ -91,12 +79,12 @@ class AlarmIn(Schema):
     )
     below: Limit | None = Field(default=None, description="The alarm is raised if the value is below this limit")
     above: Limit | None = Field(default=None, description="The alarm is raised if the value is above this limit")
-    any_of: tuple[StateName | VerdictName, ...] | None = Field(
+    any_of: tuple[base.StateName | base.VerdictName, ...] | None = Field(
         default=None,
         description="States or verdicts that raise the alarm; default: every state but `normal`, or every verdict"
         " with a disagreement of data and model",
     )
-    speed_rpm: Annotated[PositiveNumber, Field(le=MAX_SPEED_RPM)] = Field(
+    speed_rpm: Annotated[PositiveNumber, Field(le=base.MAX_SPEED_RPM)] = Field(
         default=100.0, description="Speed at which the shudder margin is taken, rpm"
     )
     hysteresis: Annotated[NotNegativeNumber, Field(le=1.0)] = Field(
@@ -173,11 +161,11 @@ class AcknowledgeIn(Schema):
 class WebhookIn(Schema):
     """A receiver of alarms."""
 
-    url: Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_ADDRESS, strip_whitespace=True)] = Field(
+    url: _Address = Field(
         description="`https://...` or `http://...`; with the extra `notify` also an address of Apprise, as `mailtos://...`, "
         "`msteams://...`, `slack://...`, `ntfys://...`"
     )
-    secret: Annotated[str, StringConstraints(max_length=LONGEST_SECRET, pattern=r"^[^\x00]*$")] | None = Field(
+    secret: Annotated[str, StringConstraints(max_length=base.LONGEST_SECRET, pattern=r"^[^\x00]*$")] | None = Field(
         default=None,
         description="Secret that signs the requests; default: the service makes one and shows it once, in this answer",
     )
@@ -189,8 +177,8 @@ class WebhookIn(Schema):
 
     @model_validator(mode="after")
     def _long_enough(self) -> Self:
-        if self.secret and len(self.secret) < SHORTEST_SECRET:
-            raise ValueError(f"secret must have at least {SHORTEST_SECRET} characters, or be left out")
+        if self.secret and len(self.secret) < base.SHORTEST_SECRET:
+            raise ValueError(f"secret must have at least {base.SHORTEST_SECRET} characters, or be left out")
         return self
 
 

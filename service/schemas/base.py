@@ -165,6 +165,10 @@ Column = Annotated[
 
 Origin = Annotated[Literal["measured", "simulated"], Field(description="Whether a rig measured it or it is simulated")]
 
+#: The states of a clutch after NAMUR NE 107, and the verdicts of a diagnosis.
+StateName = Literal["failure", "maintenance", "check", "out_of_specification", "normal"]
+VerdictName = Literal["model_adequate", "cause_named", "cause_ambiguous", "unexplained_structure", "insufficient_data"]
+
 #: Why something is changed.
 Reason = Annotated[str, StringConstraints(max_length=LONGEST_REASON, strip_whitespace=True)]
 

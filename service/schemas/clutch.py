@@ -235,7 +235,7 @@ class LatestDiagnosis(Answer):
 class ClutchState(Answer):
     """The state of a clutch after NAMUR NE 107."""
 
-    name: Literal["failure", "maintenance", "check", "out_of_specification", "normal"] = Field(
+    name: base.StateName = Field(
         description="`failure`: a criterion is reached. `maintenance`: at the safe bound less than a fifth of the"
         " life is left, or a quantity is near its limit. `check`: runs are held, or there are too few"
         " tests. `out_of_specification`: data and model disagree. `normal`: none of these. If several"

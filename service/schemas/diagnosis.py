@@ -4,7 +4,16 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.schemas.base import LONGEST_DIAGNOSIS_ID, Answer, ClutchName, Identifier, Revision, Schema, page_of
+from service.schemas.base import (
+    LONGEST_DIAGNOSIS_ID,
+    Answer,
+    ClutchName,
+    Identifier,
+    Revision,
+    Schema,
+    VerdictName,
+    page_of,
+)
 from service.schemas.life import ModelName
 
 Number = float | None
@@ -252,9 +261,7 @@ class DiagnosisListed(Answer):
     adopted: bool = Field(description="Whether its model is the current one")
     problem: str | None = Field(description="Why it failed")
     code_version: str = Field(description="The release that computed it")
-    verdict: (
-        Literal["model_adequate", "cause_named", "cause_ambiguous", "unexplained_structure", "insufficient_data"] | None
-    ) = Field(description="The verdict")
+    verdict: VerdictName | None = Field(description="The verdict")
     causes: list[str] = Field(
         description="Slugs of the named causes, or of those that these data cannot distinguish; `uncatalogued`: "
         "something that is not in the catalogue"

@@ -4,21 +4,12 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.schemas.base import (
-    LARGEST_SKEWNESS,
-    LONGEST_NAME,
-    LONGEST_NOTE,
-    Answer,
-    ClutchName,
-    Cycles,
-    Origin,
-    PositiveNumber,
-    Schema,
-    StartedAt,
-    page_of,
-)
+from service.schemas import base
+from service.schemas.base import Answer, ClutchName, Cycles, Origin, PositiveNumber, Schema, StartedAt, page_of
 
-Skewness = Annotated[float, Field(ge=-LARGEST_SKEWNESS, le=LARGEST_SKEWNESS, allow_inf_nan=False, strict=True)]
+Skewness = Annotated[
+    float, Field(ge=-base.LARGEST_SKEWNESS, le=base.LARGEST_SKEWNESS, allow_inf_nan=False, strict=True)
+]
 MediaType = Literal["image/png", "image/jpeg", "image/webp"]
 
 
@@ -29,7 +20,7 @@ class InspectionIn(Schema):
     performed_at: Annotated[StartedAt, Field(strict=True)] | None = Field(
         default=None, description="When it was inspected: ISO 8601 with a time zone"
     )
-    lining: Annotated[str, StringConstraints(max_length=LONGEST_NAME, strip_whitespace=True)] = Field(
+    lining: Annotated[str, StringConstraints(max_length=base.LONGEST_NAME, strip_whitespace=True)] = Field(
         default="", description="The disc, its side, or the place on its lining; empty if the clutch has only one"
     )
     roughness_um: PositiveNumber | None = Field(
@@ -38,7 +29,7 @@ class InspectionIn(Schema):
     skewness: Skewness | None = Field(
         default=None, description="Skewness R_sk of the surface profile; negative if valleys outweigh peaks"
     )
-    note: Annotated[str, StringConstraints(max_length=LONGEST_NOTE, strip_whitespace=True)] = Field(
+    note: Annotated[str, StringConstraints(max_length=base.LONGEST_NOTE, strip_whitespace=True)] = Field(
         default="", description="A remark"
     )
     origin: Origin = "measured"

@@ -7,42 +7,17 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from service.schemas.base import (
-    LARGEST_LIMIT,
-    MAX_BLOCKS,
-    MAX_CRITERION_PRESSURE_BAR,
-    MAX_CYCLES,
-    MAX_SPEED_RPM,
-    MIN_BLOCK_CYCLES,
-    MIN_PLANNED_KJ,
-    Answer,
-    ClutchName,
-    NotNegativeNumber,
-    Origin,
-    PositiveNumber,
-    Revision,
-    Schema,
-)
+from service.schemas import base
+from service.schemas.base import Answer, ClutchName, NotNegativeNumber, Origin, PositiveNumber, Revision, Schema
 from service.schemas.run import EndReason, Warned
 
 ParameterQuantity = Literal["static_torque_nm", "coulomb_ratio", "stribeck_velocity_m_s", "viscous_coefficient"]
 LoopQuantity = Literal["attractor", "film_time", "loop_area"]
 EngagementQuantity = Literal[
-    "stop_time_s",
-    "engagement_energy_kj",
-    "peak_power_kw",
-    "initial_cof",
-    "midpoint_cof",
-    "endpoint_cof",
-    "breakaway_cof",
-    "initial_cof_ratio",
-    "endpoint_cof_ratio",
-    "breakaway_cof_ratio",
-    "torque_rise",
-    "normalised_duration",
-    "euclidean_distance",
-    "spectral_angle_rad",
-]
+    "stop_time_s", "engagement_energy_kj", "peak_power_kw", "initial_cof", "midpoint_cof", "endpoint_cof",
+    "breakaway_cof", "initial_cof_ratio", "endpoint_cof_ratio", "breakaway_cof_ratio", "torque_rise",
+    "normalised_duration", "euclidean_distance", "spectral_angle_rad",
+]  # fmt: skip
 #: Other names of three of them, as a record's criteria and a query may have them.
 ALIASES = {"static_ratio": "breakaway_cof_ratio", "stop_time": "stop_time_s", "energy": "engagement_energy_kj"}
 #: Measured at a pressure level.
@@ -62,7 +37,7 @@ SeriesQuantity = Literal[
 ]
 
 
-_Value = Annotated[float, Field(ge=-LARGEST_LIMIT, le=LARGEST_LIMIT, allow_inf_nan=False, strict=True)]
+_Value = Annotated[float, Field(ge=-base.LARGEST_LIMIT, le=base.LARGEST_LIMIT, allow_inf_nan=False, strict=True)]
 
 
 class CriterionIn(Schema):
@@ -76,11 +51,11 @@ class CriterionIn(Schema):
         default=None, description="The life ends when it falls below this value; the default for a slope is 0"
     )
     above: _Value | None = Field(default=None, description="The life ends when it rises above this value")
-    pressure_bar: Annotated[PositiveNumber, Field(le=MAX_CRITERION_PRESSURE_BAR)] | None = Field(
+    pressure_bar: Annotated[PositiveNumber, Field(le=base.MAX_CRITERION_PRESSURE_BAR)] | None = Field(
         default=None,
         description="Line pressure, bar; required, except for mean COF: there the default is the mean over all pressures",
     )
-    speed_rpm: Annotated[PositiveNumber, Field(le=MAX_SPEED_RPM)] | None = Field(
+    speed_rpm: Annotated[PositiveNumber, Field(le=base.MAX_SPEED_RPM)] | None = Field(
         default=None, description="Speed of a slope, rpm"
     )
     frequency_hz: PositiveNumber | None = Field(default=None, description="Frequency of a quantity of loops, Hz")
@@ -353,10 +328,10 @@ class RemainingLife(Answer):
 class PlannedBlock(Schema):
     """A block of planned duty cycles. Without a stated severity it counts as recent duty."""
 
-    cycles: Annotated[PositiveNumber, Field(ge=MIN_BLOCK_CYCLES, le=MAX_CYCLES)] = Field(
+    cycles: Annotated[PositiveNumber, Field(ge=base.MIN_BLOCK_CYCLES, le=base.MAX_CYCLES)] = Field(
         description="Duty cycles in the block"
     )
-    energy_per_cycle_kj: Annotated[PositiveNumber, Field(ge=MIN_PLANNED_KJ)] | None = Field(
+    energy_per_cycle_kj: Annotated[PositiveNumber, Field(ge=base.MIN_PLANNED_KJ)] | None = Field(
         default=None, description="Energy to be dissipated in a duty cycle, kJ"
     )
     sd: NotNegativeNumber = Field(
@@ -386,7 +361,7 @@ class PlannedBlock(Schema):
 class ProgrammeIn(Schema):
     """Blocks of duty, which are repeated until the end of life."""
 
-    programme: Annotated[tuple[PlannedBlock, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = Field(
+    programme: Annotated[tuple[PlannedBlock, ...], Field(min_length=1, max_length=base.MAX_BLOCKS)] = Field(
         description="The blocks of duty"
     )
     pace_cycles_per_hour: PositiveNumber | None = Field(

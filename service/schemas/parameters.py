@@ -4,27 +4,15 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from service.schemas.base import (
-    IDENTIFIER_PATTERN,
-    LONGEST_FILENAME,
-    LONGEST_IDENTIFIER,
-    LONGEST_MAP,
-    LONGEST_NUMBER,
-    LONGEST_SEARCH,
-    MAX_CYCLES,
-    MAX_DRAWS,
-    MAX_OFFSET,
-    MAX_POINTS,
-    MAX_SKIPPED,
-    StartedAt,
-)
+from service.schemas import base
+from service.schemas.base import StartedAt
 from service.schemas.diagnosis import JobState
 from service.schemas.life import SeriesQuantity
 
 
 def _short(value: object) -> object:
-    if isinstance(value, str) and len(value) > LONGEST_NUMBER:
-        raise ValueError(f"a number has at most {LONGEST_NUMBER} characters")
+    if isinstance(value, str) and len(value) > base.LONGEST_NUMBER:
+        raise ValueError(f"a number has at most {base.LONGEST_NUMBER} characters")
     return value
 
 
@@ -44,7 +32,7 @@ Points = Annotated[
     SHORT,
     Field(
         ge=1,
-        le=MAX_POINTS,
+        le=base.MAX_POINTS,
         description="Highest number of samples per channel, for a plot. The answer keeps the samples at which a "
         "channel is lowest or highest within its bin, the first and the last; default: all. Plateaus "
         "and Parquet are always complete",
@@ -54,14 +42,14 @@ Quantity = Annotated[SeriesQuantity | None, Field(description="Only rows of this
 EngagementRun = Annotated[
     str | None,
     Field(
-        max_length=LONGEST_IDENTIFIER,
+        max_length=base.LONGEST_IDENTIFIER,
         description="The run whose measured engagement is compared with the model; default: the newest of the life",
     ),
 ]
 TrackedQuantity = Annotated[
     str | None,
     Field(
-        max_length=LONGEST_FILENAME,
+        max_length=base.LONGEST_FILENAME,
         description="A tracked quantity: `mean_cof`, a Stribeck parameter such as `static_torque_nm`, `slope`, "
         "`attractor`, `film_time`, `loop_area`, or one of engagements such as `stop_time_s`; default:"
         " mean COF (in `/degradation` also every parameter)",
@@ -73,7 +61,7 @@ LifeNumber = Annotated[
     Field(ge=1, description="Number of the life, from 1; default: the present one. A rebuild begins a new life"),
 ]
 Draws = Annotated[
-    int, SHORT, Field(ge=0, le=MAX_DRAWS, description="Joint draws of the coefficients of eq. 6 for each track")
+    int, SHORT, Field(ge=0, le=base.MAX_DRAWS, description="Joint draws of the coefficients of eq. 6 for each track")
 ]
 RunKind = Annotated[
     Literal["stationary_stribeck", "dynamic_stribeck", "duty_cycles", "run_in", "maintenance"] | None,
@@ -84,14 +72,14 @@ State = Annotated[
 ]
 Archived = Annotated[bool, Field(description="Archived clutches instead of those in use")]
 ClutchStateName = Annotated[
-    Literal["failure", "maintenance", "check", "out_of_specification", "normal"] | None,
+    base.StateName | None,
     Field(description="Only clutches in this state by NAMUR NE 107; default: all"),
 ]
 Held = Annotated[bool, Field(description="Only clutches with held runs")]
 Find = Annotated[
     str,
     Field(
-        max_length=LONGEST_SEARCH,
+        max_length=base.LONGEST_SEARCH,
         pattern=r"^[^\x00-\x1f]*$",
         description="Only clutches with this text in name, friction material or fluid, in upper or lower case; default: all",
     ),
@@ -107,7 +95,9 @@ Sort = Annotated[
 Offset = Annotated[
     int,
     SHORT,
-    Field(ge=0, le=MAX_OFFSET, description="Number of clutches to skip. To read all pages, use the cursor instead"),
+    Field(
+        ge=0, le=base.MAX_OFFSET, description="Number of clutches to skip. To read all pages, use the cursor instead"
+    ),
 ]
 
 # --- of a posted file: what a JSON run has in fields ---
@@ -121,29 +111,29 @@ FileCycles = Annotated[
     SHORT,
     Field(
         ge=0,
-        le=MAX_CYCLES,
+        le=base.MAX_CYCLES,
         allow_inf_nan=False,
         description="Duty cycles since new at the run; default: from the rig profile",
     ),
 ]
 FileRig = Annotated[
     str | None,
-    Field(pattern=IDENTIFIER_PATTERN, description="The rig profile for the file; other arguments override it"),
+    Field(pattern=base.IDENTIFIER_PATTERN, description="The rig profile for the file; other arguments override it"),
 ]
 OfClutch = Annotated[
     str | None,
-    Field(pattern=IDENTIFIER_PATTERN, description="The clutch whose geometry and torque filter evaluate the file"),
+    Field(pattern=base.IDENTIFIER_PATTERN, description="The clutch whose geometry and torque filter evaluate the file"),
 ]
 FileMap = Annotated[
     str | None,
-    Field(max_length=LONGEST_MAP, description="The columns of the channels, such as torque_nm:Mz,speed_rpm:n"),
+    Field(max_length=base.LONGEST_MAP, description="The columns of the channels, such as torque_nm:Mz,speed_rpm:n"),
 ]
 FileTable = Annotated[
     str,
-    Field(max_length=LONGEST_FILENAME, description="The sheet, group or archived file, if there are several"),
+    Field(max_length=base.LONGEST_FILENAME, description="The sheet, group or archived file, if there are several"),
 ]
 FileTime = Annotated[
-    str, Field(max_length=LONGEST_FILENAME, description="The time column; `none`: each row is a plateau")
+    str, Field(max_length=base.LONGEST_FILENAME, description="The time column; `none`: each row is a plateau")
 ]
 FileDecimal = Annotated[
     Literal["", ".", ","], Field(description="The decimal sign; required if 1.100 may be 1.1 or 1100")
@@ -151,14 +141,16 @@ FileDecimal = Annotated[
 FileMissing = Annotated[
     str,
     Field(
-        max_length=LONGEST_FILENAME,
+        max_length=base.LONGEST_FILENAME,
         description="Marks of missing values, such as -9999,n/a: rows with one, or with an empty cell, are left "
         "out; `none`: all numbers are measurements",
     ),
 ]
-FileSkipRows = Annotated[int, SHORT, Field(ge=0, le=MAX_SKIPPED, description="Number of lines above the table to skip")]
-FileName = Annotated[str, Field(max_length=LONGEST_FILENAME, description="The sender's name for the file")]
+FileSkipRows = Annotated[
+    int, SHORT, Field(ge=0, le=base.MAX_SKIPPED, description="Number of lines above the table to skip")
+]
+FileName = Annotated[str, Field(max_length=base.LONGEST_FILENAME, description="The sender's name for the file")]
 FileRunId = Annotated[
-    str | None, Field(pattern=IDENTIFIER_PATTERN, description="The run's name; default: derived from the content")
+    str | None, Field(pattern=base.IDENTIFIER_PATTERN, description="The run's name; default: derived from the content")
 ]
 FileStartedAt = Annotated[StartedAt | None, Field(description="When the run was started: ISO 8601 with a time zone")]

@@ -5,18 +5,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.schemas.base import (
-    LARGEST_NUMBER,
-    LONGEST_NAME,
-    LONGEST_TITLE,
-    MAX_COLUMNS,
-    MAX_SKIPPED,
-    MAX_WORDS,
-    Answer,
-    Identifier,
-    Schema,
-    page_of,
-)
+from service.schemas import base
+from service.schemas.base import Answer, Identifier, Schema, page_of
 from service.schemas.run import Fit, Warned
 
 FileKindName = Literal["stationary_stribeck", "dynamic_stribeck"]
@@ -24,14 +14,14 @@ ChannelName = Literal[
     "time_s", "pressure_bar", "speed_rpm", "torque_nm", "torque_sd_nm", "oil_temperature_c",
     "plate_temperature_front_c", "plate_temperature_rear_c",
 ]  # fmt: skip
-Text = Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_NAME)]
-Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER, allow_inf_nan=False)]
+Text = Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_NAME)]
+Number = Annotated[float, Field(ge=-base.LARGEST_NUMBER, le=base.LARGEST_NUMBER, allow_inf_nan=False)]
 
 
 class RigColumn(Schema):
     """One column of the rig's files: a channel, or a column to ignore."""
 
-    title: Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_TITLE)] = Field(
+    title: Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_TITLE)] = Field(
         description="Its title in the file, without the unit; `group/title` in files with groups"
     )
     channel: ChannelName | None = Field(default=None, description="The channel; null: ignore the column")
@@ -56,7 +46,7 @@ class RigProfile(Schema):
     """How the files of a rig are read. Arguments of a request override it."""
 
     columns: list[RigColumn] = Field(
-        min_length=1, max_length=MAX_COLUMNS, description="The columns by their titles; others are ignored"
+        min_length=1, max_length=base.MAX_COLUMNS, description="The columns by their titles; others are ignored"
     )
     decimal: Literal[".", ","] | None = Field(
         default=None,
@@ -66,7 +56,7 @@ class RigProfile(Schema):
         default=None,
         description="The sheet, group or test of a file with several, by name or number from 1; null: the only one",
     )
-    skip_rows: Annotated[int, Field(ge=0, le=MAX_SKIPPED)] = Field(
+    skip_rows: Annotated[int, Field(ge=0, le=base.MAX_SKIPPED)] = Field(
         default=0, description="Number of lines above the titles to skip"
     )
     missing: Text | None = Field(
@@ -82,7 +72,7 @@ class RigProfile(Schema):
         description="Pattern of the file's name: `{cycles}`, `{kind}`, `{run_id}` and `*` stand for the parts that change",
     )
     kinds: dict[Text, FileKindName] = Field(
-        default_factory=dict, max_length=MAX_WORDS, description="The words that stand for `{kind}` in the name"
+        default_factory=dict, max_length=base.MAX_WORDS, description="The words that stand for `{kind}` in the name"
     )
     cycles_cell: Text | None = Field(
         default=None, description="Label above the table that stands beside the number of cycles, such as `Lastspiele`"

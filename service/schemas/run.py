@@ -4,10 +4,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StringConstraints, TypeAdapter, model_validator
 
+from service.schemas import base
 from service.schemas.base import (
-    LONGEST_NOTE,
-    MAX_CONFIRMED,
-    MAX_CYCLES,
     Answer,
     ClutchName,
     Column,
@@ -110,7 +108,7 @@ class DynamicChannels(Schema):
 class Duty(Schema):
     """The block of engagements that ends at the run's `cycles`."""
 
-    cycles: Annotated[PositiveNumber, Field(le=MAX_CYCLES)] = Field(description="Duty cycles in the block")
+    cycles: Annotated[PositiveNumber, Field(le=base.MAX_CYCLES)] = Field(description="Duty cycles in the block")
     energy_per_cycle_kj: NotNegativeNumber | None = Field(
         default=None, description="Energy dissipated in a duty cycle, kJ"
     )
@@ -169,7 +167,7 @@ class MaintenanceRunIn(RunBase):
         default=None,
         description="Why a life has ended: `worn` (default), or `other` (taken out before its end)",
     )
-    note: Annotated[str, StringConstraints(max_length=LONGEST_NOTE)] = Field(default="", description="A remark")
+    note: Annotated[str, StringConstraints(max_length=base.LONGEST_NOTE)] = Field(default="", description="A remark")
 
     @model_validator(mode="after")
     def _reason_is_of_an_end(self) -> Self:
@@ -213,7 +211,7 @@ class Confirmation(Schema):
 class Confirmations(Schema):
     """Held runs to accept together, and the reason."""
 
-    run_ids: list[Identifier] = Field(min_length=1, max_length=MAX_CONFIRMED, description="The runs")
+    run_ids: list[Identifier] = Field(min_length=1, max_length=base.MAX_CONFIRMED, description="The runs")
     reason: Reason = Field(default="", description="Why")
 
 

@@ -23,7 +23,7 @@ from pydantic import BaseModel
 from starlette.requests import ClientDisconnect
 
 from service.errors import UnsupportedMediaTypeError, unknown_clutch
-from service.lists import ALL_ITEMS, Place, from_cursor, sliced
+from service.lists import ALL_ITEMS, WHOLE, Part, from_cursor
 from service.queries.cache import Answer, Page, name_of, revision_and_json, shared_answer, to_json
 from service.schemas.parameters import ClutchId
 from service.web.auth import Admin, Reader, name_of_caller, snapshot_of
@@ -37,19 +37,25 @@ from storage import clutches
 from storage.engine.database import Database
 
 Rows = Iterable[Mapping[str, Any]]
-#: Rows of a page, and the cursor of the next one; None on the last.
-RowsAndNext = tuple[Rows, str | None]
 #: How a text begins that spreadsheets take for a formula. Source: https://owasp.org/www-community/attacks/CSV_Injection.
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
-def sliced_rows(rows: Rows, limit: int, after: Place | None) -> RowsAndNext:
-    page = sliced(list(rows), limit, after)
-    return page["items"], page["next"]
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table that is exported: the `rows` of an answer, and their columns where there are none."""
 
+    rows: Callable[[Any], Rows]
+    columns: Sequence[str]
 
-def encode_page(columns: Sequence[str], rows: Rows, following: str | None) -> Page:
-    return Page(encode_table(columns, rows), following)
+    def page(self, answer: Mapping[str, Any]) -> Page:
+        """The rows of a list's page, which goes on where the list does."""
+        return Page(encode_table(self.columns, self.rows(answer["items"])), answer["next"])
+
+    def sliced(self, answer: Any, part: Part) -> Page:
+        """The part of all rows that was asked for."""
+        page = part.sliced(list(self.rows(answer)))
+        return Page(encode_table(self.columns, page["items"]), page["next"])
 
 
 def encode_table(columns: Sequence[str], rows: Rows) -> bytes:
@@ -107,12 +113,16 @@ class OfClutch:
     request: Request
     context: Context
     clutch_id: str
-    limit: int = ALL_ITEMS
-    after: Place | None = None
+    part: Part = WHOLE
 
     @property
     def database(self) -> Database:
         return self.context.database
+
+    @property
+    def whole(self) -> "OfClutch":
+        """The same of all, where the query itself makes the page."""
+        return replace(self, part=WHOLE)
 
 
 async def _of_clutch(request: Request, context: Reader, clutch_id: ClutchId) -> OfClutch:
@@ -128,15 +138,28 @@ Of = Annotated[OfClutch, Depends(_of_clutch)]
 ChangeOf = Annotated[OfClutch, Depends(_change_of_clutch)]
 
 
-async def _page_of_clutch(of: Of, limit: Limit = USUAL_ITEMS, cursor: Cursor = None) -> OfClutch:
-    return replace(of, limit=limit, after=from_cursor(cursor))
+async def _page(limit: Limit = USUAL_ITEMS, cursor: Cursor = None) -> Part:
+    return Part(limit, from_cursor(cursor))
 
 
-async def _whole_of_clutch(of: Of, limit: Whole = ALL_ITEMS, cursor: Cursor = None) -> OfClutch:
-    return replace(of, limit=limit, after=from_cursor(cursor))
+async def _whole(limit: Whole = ALL_ITEMS, cursor: Cursor = None) -> Part:
+    return Part(limit, from_cursor(cursor))
 
 
-#: The same for a page of a list, of the usual length or, where no limit is given, of all of it.
+#: The part of a list that is asked for: of the usual length or, where no limit is given, all of it.
+Paged = Annotated[Part, Depends(_page)]
+WholePaged = Annotated[Part, Depends(_whole)]
+
+
+async def _page_of_clutch(of: Of, part: Paged) -> OfClutch:
+    return replace(of, part=part)
+
+
+async def _whole_of_clutch(of: Of, part: WholePaged) -> OfClutch:
+    return replace(of, part=part)
+
+
+#: The same of a clutch.
 PageOf = Annotated[OfClutch, Depends(_page_of_clutch)]
 WholeOf = Annotated[OfClutch, Depends(_whole_of_clutch)]
 
@@ -159,13 +182,10 @@ async def clutch_answer(of: OfClutch, name: str, make: Callable[[], bytes], *arg
     return tagged(of.request, held, JSON_TYPE, revision)
 
 
-async def clutch_table(
-    of: OfClutch, name: str, make: Callable[[], RowsAndNext], columns: Sequence[str], *arguments: Hashable
-) -> Response:
+async def clutch_table(of: OfClutch, name: str, make: Callable[[], Page], *arguments: Hashable) -> Response:
     """The CSV export of an answer that follows from a clutch's revision, a page of it. Raises NotFoundError."""
     revision = _revision(of.request, of.clutch_id)
-    key = (of.clutch_id, f"{name}.csv", *arguments, of.limit, of.after)
-    exported = await kept(of.context, key, revision, lambda: encode_page(columns, *make()))
+    exported = await kept(of.context, (of.clutch_id, f"{name}.csv", *arguments, of.part), revision, make)
     return tagged(of.request, exported, CSV_TYPE, revision)
 
 
@@ -181,40 +201,34 @@ async def computed_answer(
     request, context, clutch_id = of.request, of.context, of.clutch_id
     revision = _revision(request, clutch_id)
     revision, whole = await _computed(request, context, clutch_id, revision, query, arguments, prefer, lane)
-    if of.limit == ALL_ITEMS and of.after is None:
+    if of.part == WHOLE:
         remember(request, held_again(context, (clutch_id, name_of(query), *arguments)))
         return tagged(request, whole, JSON_TYPE, revision)
 
     def one_page() -> bytes:
         payload = json.loads(whole.body)
-        return to_json(payload | sliced(payload["items"], of.limit, of.after))
+        return to_json(payload | of.part.sliced(payload["items"]))
 
-    key = (clutch_id, f"{name_of(query)}.page", *arguments, of.limit, of.after)
+    key = (clutch_id, f"{name_of(query)}.page", *arguments, of.part)
     return tagged(request, await kept(context, key, revision, one_page), JSON_TYPE, revision)
 
 
 async def computed_table(
     of: OfClutch,
     query: Callable[..., dict[str, Any]],
-    rows: Callable[[Any], Rows],
-    columns: Sequence[str],
+    table: Table,
     *arguments: Hashable,
     prefer: str | None = None,
-    paged_by_query: bool = False,
 ) -> Response:
-    """The CSV export of the same: a page of the `rows` of its JSON, which is a page itself where the query takes `limit` and
-    `after` as its last arguments. Raises NotFoundError."""
-    limit, after = (ALL_ITEMS, None) if paged_by_query else (of.limit, of.after)
-    if paged_by_query:
-        arguments = (*arguments, of.limit, of.after)
+    """The CSV export of the same: a page of the rows of its JSON, which goes on where that does. Raises NotFoundError."""
     revision = _revision(of.request, of.clutch_id)
     revision, whole = await _computed(of.request, of.context, of.clutch_id, revision, query, arguments, prefer)
 
     def one_page() -> Page:
-        items, following = sliced_rows(rows(json.loads(whole.body)), limit, after)
-        return encode_page(columns, items, following or whole.next)
+        page = table.sliced(json.loads(whole.body), of.part)
+        return Page(page.body, page.next or whole.next)
 
-    key = (of.clutch_id, f"{name_of(query)}.csv", *arguments, limit, after)
+    key = (of.clutch_id, f"{name_of(query)}.csv", *arguments, of.part)
     return tagged(of.request, await kept(of.context, key, revision, one_page), CSV_TYPE, revision)
 
 
@@ -298,9 +312,9 @@ def _revision(request: Request, clutch_id: str) -> int:
     return revision
 
 
-async def table(request: Request, columns: Sequence[str], make: Callable[[], RowsAndNext]) -> Response:
+async def table(request: Request, make: Callable[[], Page]) -> Response:
     """A GET's answer as CSV that is made again each time, a page of it."""
-    return tagged(request, Answer.of(await run_in_threadpool(lambda: encode_page(columns, *make()))), CSV_TYPE)
+    return tagged(request, Answer.of(await run_in_threadpool(make)), CSV_TYPE)
 
 
 def tagged(request: Request, answer: Answer, media_type: str, revision: int | None = None) -> Response:

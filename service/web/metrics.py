@@ -120,19 +120,14 @@ class Clutches(Collector):
         health = GaugeMetricFamily("clutchlife_clutch_health", "1 when new, 0 at end of life", labels=["clutch"])
         text = "Duty cycles until end of life"
         remaining = GaugeMetricFamily("clutchlife_clutch_remaining_cycles", text, labels=["clutch", "quantile"])
-        after = None
-        while True:
-            items, after = clutch_list.page_by_name(self._database, limit=METRICS_PAGE, after=after)
-            for item in items:
-                name, summary = item["clutch_id"], item["summary"]
-                runs.add_metric([name], item["runs"])
-                if summary is None:
-                    continue
-                if summary["current"]["health"] is not None:
-                    health.add_metric([name], summary["current"]["health"])
-                for quantile, cycles in summary["remaining_cycles"].items():
-                    if cycles is not None:
-                        remaining.add_metric([name, quantile], cycles)
-            if after is None:
-                break
+        for item in clutch_list.every(self._database, at_once=METRICS_PAGE):
+            name, summary = item["clutch_id"], item["summary"]
+            runs.add_metric([name], item["runs"])
+            if summary is None:
+                continue
+            if summary["current"]["health"] is not None:
+                health.add_metric([name], summary["current"]["health"])
+            for quantile, cycles in summary["remaining_cycles"].items():
+                if cycles is not None:
+                    remaining.add_metric([name, quantile], cycles)
         yield from (runs, health, remaining)

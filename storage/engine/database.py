@@ -4,14 +4,18 @@ it without one (`Watch`), and answers that its services share. Made by `opening`
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy import Connection
+from sqlalchemy.exc import OperationalError, ProgrammingError
+
+from storage.engine.errors import DatabaseTooOld, StorageUnavailable
+from storage.migrations.upgrade import current, head
 
 #: [s] How long a transaction waits for the write lock before it gives up with DatabaseBusy. Chosen; no table.
 LOCK_TIMEOUT = 10.0
@@ -106,8 +110,9 @@ class SharedAnswers(ABC):
 class Database(ABC):
     """An open database: its transactions, what is asked of it outside them, and its health. Threads share it.
 
-    `url` is the address by which another process opens it, which may hold a password; `path` its file, None where it is on a
-    server; `journal_mode` is SQLite's. `answers` are those that its services share, None where it has one service.
+    `name` is what messages call it; `found`: it is only read, at the revision that it was found at. `url` is the address by
+    which another process opens it, which may hold a password; `path` its file, None where it is on a server; `journal_mode`
+    is SQLite's. `answers` are those that its services share, None where it has one service.
     """
 
     url: str
@@ -116,9 +121,50 @@ class Database(ABC):
     watch: Watch
     answers: SharedAnswers | None = None
 
+    def __init__(self, name: str, *, found: bool) -> None:
+        self.name = name
+        self._found = found
+        self._closed = False
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """A connection that sees one state of the database until the block ends. Keep it short: a log grows meanwhile.
+
+        Raises DatabaseTooOld where what is asked for came with a later revision than a database was found at.
+        """
+        self._refuse_closed()
+        try:
+            with self._read() as connection:
+                yield connection
+        except (OperationalError, ProgrammingError) as error:
+            if not self._found or (revision := self._revision()) == head():
+                raise
+            kept = "" if self.path is None else ", and keeps a copy of the file beside it"
+            raise DatabaseTooOld(
+                f"{self.name} is at revision {revision}, this needs {head()}: `clutchlife serve` brings it there{kept}"
+            ) from error
+
     @abstractmethod
-    def reading(self) -> AbstractContextManager[Connection]:
-        """A connection that sees one state of the database until the block ends."""
+    def _read(self) -> AbstractContextManager[Connection]:
+        """A transaction that reads."""
+
+    def _revision(self) -> str | None:
+        with self._read() as connection:
+            return current(connection)
+
+    def _refuse_closed(self) -> None:
+        if self._closed:
+            raise StorageUnavailable(f"{self.name} has been closed")
+
+    def where(self: "Opened", check: Callable[[Connection], object]) -> "Opened":
+        """The database itself; closed where the check of what is read of it raises an error."""
+        try:
+            with self.reading() as connection:
+                check(connection)
+        except BaseException:
+            self.close()
+            raise
+        return self
 
     @abstractmethod
     def writing(self, *, of: str | None = None) -> AbstractContextManager[Connection]:
@@ -144,3 +190,6 @@ class Database(ABC):
     @abstractmethod
     def close(self) -> None:
         """Close all connections; any later use raises StorageUnavailable. May be called twice."""
+
+
+Opened = TypeVar("Opened", bound=Database)

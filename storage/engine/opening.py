@@ -22,7 +22,7 @@ def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT, serving: bool
     Raises ValueError on another address, UnfinishedMigration on the target of a migration that has not ended, and what
     `open_file` and `open_server` do.
     """
-    return _complete(_opened(url, lock_timeout=lock_timeout, serving=serving))
+    return _opened(url, lock_timeout=lock_timeout, serving=serving).where(refuse_pending)
 
 
 def open_unfinished(url: str) -> Database:
@@ -36,17 +36,6 @@ def _opened(url: str, *, lock_timeout: float, serving: bool) -> Database:
     return open_file(path_of(url), lock_timeout=lock_timeout, serving=serving)
 
 
-def _complete(database: Database) -> Database:
-    """The database; closed and refused where it is incomplete."""
-    try:
-        with database.reading() as connection:
-            refuse_pending(connection)
-    except BaseException:
-        database.close()
-        raise
-    return database
-
-
 def find_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> Database:
     """Open a database to read it as it is, whatever its revision up to this code's; nothing is made or migrated.
 
@@ -54,8 +43,8 @@ def find_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> Database:
     none.
     """
     if is_on_server(url):
-        return _complete(find_server(address_of(url), lock_timeout=lock_timeout))
-    return _complete(find_file(path_of(url), lock_timeout=lock_timeout))
+        return find_server(address_of(url), lock_timeout=lock_timeout).where(refuse_pending)
+    return find_file(path_of(url), lock_timeout=lock_timeout).where(refuse_pending)
 
 
 def database_exists(url: str) -> bool:

@@ -9,15 +9,13 @@ from fastapi.responses import Response
 from pydantic import Field
 
 from service.alarms.notify import require_address
-from service.lists import from_cursor
 from service.queries import alarms
 from service.run_files.json_run import checked
 from service.schemas import alarm as schemas
 from service.schemas.base import IDENTIFIER_PATTERN, LONGEST_IDENTIFIER
 from service.web import auth
-from service.web.answers import answer, json_answer, json_body, now, taking, until_ended
-from service.web.context import Context, Cursor, Limit
-from service.web.limits import USUAL_ITEMS
+from service.web.answers import Paged, answer, json_answer, json_body, now, taking, until_ended
+from service.web.context import Context
 from service.web.problems import CHANGING, READING, SENDING
 from service.workflows import change_alarms, change_webhooks
 
@@ -43,12 +41,9 @@ OfClutch = Annotated[
 
 
 @router.get("", response_model=schemas.AlarmPage, responses=READING)
-async def list_alarms(
-    request: Request, context: auth.OwnReader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
-) -> Response:
+async def list_alarms(request: Request, context: auth.OwnReader, part: Paged) -> Response:
     """Rules by name. A key that is bound to clutches gets the rules of these clutches."""
-    after, own = from_cursor(cursor), auth.own_clutches(request)
-    return await answer(request, lambda: alarms.page(context.database, limit=limit, after=after, only=own))
+    return await answer(request, partial(alarms.page, context.database, part, only=auth.own_clutches(request)))
 
 
 @router.post(
@@ -65,21 +60,19 @@ async def post_alarm(request: Request, context: auth.OwnIngester) -> Response:
 async def list_events(
     request: Request,
     context: auth.OwnReader,
+    part: Paged,
     state: OfEventState = None,
     alarm_id: OfAlarm = None,
     clutch_id: OfClutch = None,
-    limit: Limit = USUAL_ITEMS,
-    cursor: Cursor = None,
 ) -> Response:
     """Alarms, newest first. A key that is bound to clutches gets those of these clutches."""
-    after, own = from_cursor(cursor), auth.own_clutches(request)
+    own = auth.own_clutches(request)
     if clutch_id is not None:
         auth.require_clutch(request, clutch_id)
         own = frozenset({clutch_id})
-    listed = partial(
-        alarms.events, context.database, limit=limit, after=after, state=state, alarm_id=alarm_id, only=own
+    return await answer(
+        request, partial(alarms.events, context.database, part, state=state, alarm_id=alarm_id, only=own)
     )
-    return await answer(request, listed)
 
 
 @router.get("/events/{event_id}", response_model=schemas.EventOut, responses=READING)
@@ -133,12 +126,9 @@ async def test_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId
 
 
 @webhook_router.get("", response_model=schemas.WebhookPage, responses=READING)
-async def list_webhooks(
-    request: Request, context: auth.Reader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
-) -> Response:
+async def list_webhooks(request: Request, context: auth.Reader, part: Paged) -> Response:
     """Receivers; the addresses are shown without secrets."""
-    after = from_cursor(cursor)
-    return await answer(request, lambda: alarms.receiver_page(context.database, limit=limit, after=after))
+    return await answer(request, partial(alarms.receivers_by_name, context.database, part))
 
 
 @webhook_router.post(
@@ -175,12 +165,9 @@ async def delete_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response
 
 
 @webhook_router.get("/{webhook_id}/deliveries", response_model=schemas.DeliveryPage, responses=READING)
-async def list_deliveries(
-    request: Request, context: auth.Reader, webhook_id: WebhookId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
-) -> Response:
+async def list_deliveries(request: Request, context: auth.Reader, webhook_id: WebhookId, part: Paged) -> Response:
     """The deliveries of a receiver, sent or waiting, newest first."""
-    after = from_cursor(cursor)
-    return await answer(request, lambda: alarms.deliveries(context.database, webhook_id, limit=limit, after=after))
+    return await answer(request, partial(alarms.deliveries, context.database, webhook_id, part))
 
 
 @webhook_router.post("/{webhook_id}/test", response_model=schemas.TestedOut, responses=CHANGING)

@@ -8,7 +8,6 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.lists import from_cursor, page
 from service.queries import clutch_list, runs
 from service.queries.cache import to_json
 from service.queries.degradation import degradation
@@ -18,8 +17,7 @@ from service.schemas.fleet import FleetTotals
 from service.schemas.parameters import Archived, ClutchId, ClutchStateName, Find, Held, Offset, Sort
 from service.schemas.run import ChangePage
 from service.web import answers, auth
-from service.web.context import Context, Cursor, Limit
-from service.web.limits import USUAL_ITEMS
+from service.web.context import Context
 from service.web.middleware import remember
 from service.web.problems import READING, SENDING
 from service.work.workers import CHANGE_SECONDS, Lane
@@ -67,27 +65,20 @@ def _register(context: Context, clutch: ClutchIn) -> tuple[dict[str, object], bo
 async def list_clutches(
     request: Request,
     context: auth.OwnReader,
+    part: answers.Paged,
     archived: Archived = False,
     state: ClutchStateName = None,
     held: Held = False,
     find: Find = "",
     sort: Sort = "worst",
     offset: Offset = 0,
-    limit: Limit = USUAL_ITEMS,
-    cursor: Cursor = None,
 ) -> Response:
     """The clutches of the key, with health and remaining life: the lowest safe bound first, or by name. To read all
     of them, sort by name: then none is missed or repeated.
     """
     choice = Choice(archived=archived, only=auth.own_clutches(request), state=state, held=held, find=find)
-    after = from_cursor(cursor)
-
-    def make() -> bytes:
-        return clutch_list.page_as_json(
-            context.database, context.cache, choice, limit=limit, after=after, offset=offset, sort=sort
-        )
-
-    return await _of_all(request, context, ("clutches", choice, limit, after, offset, sort), make)
+    make = partial(clutch_list.page_as_json, context.database, context.cache, choice, part, offset=offset, sort=sort)
+    return await _of_all(request, context, ("clutches", choice, part, offset, sort), make)
 
 
 @fleet_router.get("/totals", response_model=FleetTotals, responses=READING)
@@ -142,6 +133,6 @@ async def list_changes(of: answers.PageOf) -> Response:
     """The audit trail of the clutch and its runs: who changed what, when and why, newest first."""
 
     def make() -> bytes:
-        return to_json(page(*runs.trail(of.database, of.clutch_id, limit=of.limit, after=of.after)))
+        return to_json(runs.trail(of.database, of.clutch_id, of.part))
 
-    return await answers.clutch_answer(of, "changes", make, of.limit, of.after)
+    return await answers.clutch_answer(of, "changes", make, of.part)

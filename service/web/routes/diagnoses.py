@@ -8,7 +8,6 @@ from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.lists import page
 from service.logging import request_id
 from service.queries import diagnoses
 from service.run_files.json_run import checked
@@ -66,8 +65,7 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
 @router.get("/diagnoses", response_model=DiagnosisPage, responses=READING)
 async def list_diagnoses(of: answers.PageOf) -> Response:
     """Diagnoses without their maps and loops, newest first."""
-    make = partial(diagnoses.page, of.database, of.clutch_id, limit=of.limit, after=of.after)
-    return await answers.answer(of.request, lambda: page(*make()))
+    return await answers.answer(of.request, partial(diagnoses.page, of.database, of.clutch_id, of.part))
 
 
 @router.get("/diagnoses/{diagnosis_id}", response_model=DiagnosisOut, responses=READING)

@@ -3,23 +3,20 @@
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
-from service.lists import ALL_ITEMS, from_cursor, sliced
 from service.queries import fleet_priors, scores
 from service.schemas.fleet import FleetPriorPage, FleetScores
 from service.schemas.life import Method
-from service.web.answers import answer, computed_of_each
+from service.web.answers import WholePaged, answer, computed_of_each
 from service.web.auth import Reader
-from service.web.context import Cursor, Whole
 from service.web.problems import READING
 
 router = APIRouter(prefix="/v1/fleet", tags=["fleet"])
 
 
 @router.get("/priors", response_model=FleetPriorPage, responses=READING)
-async def priors(request: Request, context: Reader, limit: Whole = ALL_ITEMS, cursor: Cursor = None) -> Response:
+async def priors(request: Request, context: Reader, part: WholePaged) -> Response:
     """The priors learned from the clutches of each kind."""
-    after = from_cursor(cursor)
-    return await answer(request, lambda: sliced(fleet_priors.newest(context.database), limit, after))
+    return await answer(request, lambda: part.sliced(fleet_priors.newest(context.database)))
 
 
 @router.get("/scores", response_model=FleetScores, responses=READING)

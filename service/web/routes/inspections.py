@@ -9,7 +9,6 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.errors import TooLargeError, UnsupportedMediaTypeError
-from service.lists import page
 from service.queries import inspections
 from service.run_files.json_run import checked
 from service.schemas.base import MAX_PHOTOGRAPH_BYTES
@@ -73,8 +72,7 @@ async def post_inspection(request: Request, context: Ingester, clutch_id: Clutch
 @router.get("", response_model=InspectionPage, responses=READING)
 async def list_inspections(of: answers.PageOf) -> Response:
     """Inspections by cycles."""
-    make = partial(inspections.page, of.database, of.clutch_id, limit=of.limit, after=of.after)
-    return await answers.answer(of.request, lambda: page(*make()))
+    return await answers.answer(of.request, partial(inspections.page, of.database, of.clutch_id, of.part))
 
 
 @router.get("/{inspection_id}", response_model=InspectionOut, responses=READING)

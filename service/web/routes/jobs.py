@@ -7,16 +7,13 @@ from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.lists import from_cursor, page
 from service.logging import request_id
 from service.queries import jobs
 from service.run_files.json_run import checked
 from service.schemas.diagnosis import JobIn, JobOut, JobPage
 from service.schemas.parameters import JobId, OfState
-from service.web.answers import answer, json_answer, json_body, now, preferred_wait, taking, until_ended
+from service.web.answers import Paged, answer, json_answer, json_body, now, preferred_wait, taking, until_ended
 from service.web.auth import OwnAdmin, OwnReader, name_of_caller, own_clutches, require_clutch
-from service.web.context import Cursor, Limit
-from service.web.limits import USUAL_ITEMS
 from service.web.problems import READING, SENDING
 from service.workflows import ask_job
 from storage.jobs import OPEN
@@ -64,13 +61,9 @@ async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -
 
 
 @router.get("", response_model=JobPage, responses=READING)
-async def list_jobs(
-    request: Request, context: OwnReader, state: OfState = None, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
-) -> Response:
+async def list_jobs(request: Request, context: OwnReader, part: Paged, state: OfState = None) -> Response:
     """Jobs of the key's clutches, newest first."""
-    after, own = from_cursor(cursor), own_clutches(request)
-    listed = partial(jobs.page, context.database, limit=limit, after=after, state=state, only=own)
-    return await answer(request, lambda: page(*listed()))
+    return await answer(request, partial(jobs.page, context.database, part, state=state, only=own_clutches(request)))
 
 
 @router.get("/{job_id}", response_model=JobOut, responses=READING)

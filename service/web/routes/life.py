@@ -1,12 +1,10 @@
 """The routes of remaining life, degradation, Stribeck curves, loops and series."""
 
 import asyncio
-from dataclasses import replace
 
 from fastapi import APIRouter
 from fastapi.responses import Response
 
-from service.lists import ALL_ITEMS, paged
 from service.lives.condition import held_beside
 from service.lives.tracks import CARRIED
 from service.queries import runs, scores
@@ -101,8 +99,7 @@ async def degradation(
 @router.get("/stribeck", response_model=StribeckPage, responses=READING)
 async def stribeck(of: answers.PageOf, prefer: Prefer = None) -> Response:
     """The Stribeck curves of the stationary tests by cycles, and the pressure laws through them (fig. 9)."""
-    whole = replace(of, limit=ALL_ITEMS, after=None)  # the query makes the page
-    return await answers.computed_answer(whole, stribeck_query.curves, of.limit, of.after, prefer=prefer)
+    return await answers.computed_answer(of.whole, stribeck_query.curves, of.part, prefer=prefer)
 
 
 @router.get("/engagement", response_model=EngagementOut, responses=READING)
@@ -133,9 +130,9 @@ async def loops(of: answers.WholeOf) -> Response:
 
     def make() -> bytes:
         found, held = runs.loops(of.database, of.clutch_id)
-        return to_json(held_beside(held) | paged(found, of.limit, of.after))
+        return to_json(held_beside(held) | of.part.sliced(found))
 
-    return await answers.clutch_answer(of, "loops", make, of.limit, of.after)
+    return await answers.clutch_answer(of, "loops", make, of.part)
 
 
 @router.get("/series", response_model=SeriesPage, responses=READING)
@@ -143,6 +140,6 @@ async def series(of: answers.WholeOf, quantity: Quantity = None) -> Response:
     """Flat rows for dashboards and spreadsheets: fitted quantities, indicators of engagements, then predictions."""
 
     def make() -> bytes:
-        return to_json(paged(series_query.series(of.database, of.clutch_id, quantity), of.limit, of.after))
+        return to_json(of.part.sliced(series_query.series(of.database, of.clutch_id, quantity)))
 
-    return await answers.clutch_answer(of, "series", make, quantity, of.limit, of.after)
+    return await answers.clutch_answer(of, "series", make, quantity, of.part)

@@ -10,7 +10,6 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.errors import FieldError, InvalidError
-from service.lists import from_cursor
 from service.queries import rigs
 from service.queries.import_preview import preview
 from service.readers.read_file import reading_of
@@ -28,11 +27,10 @@ from service.schemas.parameters import (
     RigName,
 )
 from service.schemas.rig import Preview, RigIn, RigOut, RigPage
-from service.web.answers import answer, json_answer, json_body, now, taking
+from service.web.answers import Paged, answer, json_answer, json_body, now, taking
 from service.web.auth import Admin, Ingester, OwnIngester, OwnReader, name_of_caller, require_clutch
-from service.web.context import Context, Cursor, Limit
+from service.web.context import Context
 from service.web.files import FILE_BODY, received
-from service.web.limits import USUAL_ITEMS
 from service.web.problems import CHANGING, READING, SENDING
 from service.work.workers import Lane
 from service.workflows.save_rig import save
@@ -56,12 +54,9 @@ EXAMPLE = {
 
 
 @router.get("", response_model=RigPage, responses=READING)
-async def list_rigs(
-    request: Request, context: OwnReader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
-) -> Response:
+async def list_rigs(request: Request, context: OwnReader, part: Paged) -> Response:
     """Rig profiles by name."""
-    after = from_cursor(cursor)
-    return await answer(request, lambda: rigs.page(context.database, limit=limit, after=after))
+    return await answer(request, partial(rigs.page, context.database, part))
 
 
 @router.get("/{name}", response_model=RigOut, responses=READING)

@@ -83,9 +83,9 @@ async def list_runs(of: answers.PageOf, state: State = None, kind: RunKind = Non
     """Receipts by cycles."""
 
     def make() -> bytes:
-        return runs.page_as_json(of.database, of.clutch_id, limit=of.limit, after=of.after, state=state, kind=kind)
+        return runs.page_as_json(of.database, of.clutch_id, of.part, state=state, kind=kind)
 
-    return await answers.clutch_answer(of, "runs", make, state, kind, of.limit, of.after)
+    return await answers.clutch_answer(of, "runs", make, state, kind, of.part)
 
 
 @router.get("/{run_id}", response_model=RunOut, responses=READING_RUN)

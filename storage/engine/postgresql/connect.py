@@ -10,7 +10,8 @@ https://www.postgresql.org/docs/current/runtime-config-client.html, .../errcodes
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from typing import Any
 
 from sqlalchemy import (
@@ -33,7 +34,14 @@ from sqlalchemy.exc import ArgumentError, DataError, DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, StorageUnavailable, UnstorableText
+from storage.engine.errors import (
+    DatabaseBusy,
+    ServiceRuns,
+    StorageError,
+    StorageUnavailable,
+    UnstorableText,
+    translated_by,
+)
 
 #: A lock that was not free in time, a serialization failure, a deadlock, and too many connections.
 LOCK_NOT_FREE = "55P03"
@@ -48,20 +56,12 @@ _READ_ONLY = "25006"
 _UNAVAILABLE = ("08", "28", "3D", "53", "57", "58", "XX")
 
 
-@contextmanager
-def translated(name: str) -> Iterator[None]:
-    """Raise the store's own errors, naming the database, for what driver and pool raise inside; all else passes."""
-    try:
-        yield
-    except (PoolTimeoutError, DBAPIError) as error:
-        own = _store_error(error, name)
-        if own is None:
-            raise
-        raise own from error
+def translated(name: str) -> AbstractContextManager[None]:
+    """Raise the store's own errors, naming the database, for what driver and pool raise inside."""
+    return translated_by(partial(_store_error, name), (PoolTimeoutError, DBAPIError))
 
 
-def _store_error(error: Exception, name: str) -> StorageError | None:
-    """The store's own error, or None where it is the program's (a constraint, bad SQL)."""
+def _store_error(name: str, error: Exception) -> StorageError | None:
     if not isinstance(error, DBAPIError):
         return DatabaseBusy(f"{name}: no free connection ({error})")
     code: str | None = getattr(error.orig, "sqlstate", None)

@@ -29,10 +29,10 @@ from sqlalchemy import (
     text,
 )
 from sqlalchemy.dialects.postgresql import insert
-from sqlalchemy.exc import ProgrammingError, SQLAlchemyError
+from sqlalchemy.exc import SQLAlchemyError
 
 from storage.engine.database import Database, Question, SharedAnswer, SharedAnswers, Snapshot, Watch, granted
-from storage.engine.errors import DatabaseTooOld, ServiceRuns, StorageError, StorageUnavailable
+from storage.engine.errors import ServiceRuns, StorageError, StorageUnavailable
 from storage.engine.integrity import refuse_newer
 from storage.engine.postgresql.connect import (
     SingleStatements,
@@ -183,18 +183,15 @@ class ServerDatabase(Database):
     path = None
     journal_mode = None
 
-    def __init__(self, address: URL, *, lock_timeout: float, writable: bool = True, serving: bool = False) -> None:
+    def __init__(self, address: URL, *, lock_timeout: float, found: bool = False, serving: bool = False) -> None:
+        super().__init__(shown(address), found=found)
         self.url = address.render_as_string(hide_password=False)
-        self.name = shown(address)
         self._address = address
         self._lock_timeout = lock_timeout
-        self._closed = False
         self._engine = make_engine(address, lock_timeout)
         self._readers = self._engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
         # a statement of a writer sees what was committed before the lock was free
-        self._writers = self._engine.execution_options(
-            isolation_level="READ COMMITTED", postgresql_readonly=not writable
-        )
+        self._writers = self._engine.execution_options(isolation_level="READ COMMITTED", postgresql_readonly=found)
         # what every request asks does not wait for connections by which answers are read and written
         watching = make_autocommit_engine(address, lock_timeout, connections=1)
         sharing = make_autocommit_engine(address, lock_timeout, connections=2)
@@ -206,8 +203,7 @@ class ServerDatabase(Database):
         self.answers = ServerAnswers(self._sharing)
 
     @contextmanager
-    def reading(self) -> Iterator[Connection]:
-        self._refuse_closed()
+    def _read(self) -> Iterator[Connection]:
         with translated(self.name), self._readers.begin() as connection:
             yield connection
 
@@ -273,29 +269,6 @@ class ServerDatabase(Database):
             has_server_tables = set(inspect(connection).get_table_names()) >= set(server_tables.tables)
         return None if revision == head() and has_server_tables else revision is not None
 
-    def _refuse_closed(self) -> None:
-        if self._closed:
-            raise StorageUnavailable(f"{self.name} has been closed")
-
-
-class FoundServerDatabase(ServerDatabase):
-    """A database that is only read, at the revision that it was found at. Made by `find_server`."""
-
-    @contextmanager
-    def reading(self) -> Iterator[Connection]:
-        """As every database's; raises DatabaseTooOld where what is asked for came with a later revision."""
-        try:
-            with super().reading() as connection:
-                yield connection
-        except ProgrammingError as error:
-            with super().reading() as connection:
-                revision = current(connection)
-            if revision == head():
-                raise
-            raise DatabaseTooOld(
-                f"{self.name} is at revision {revision}, this needs {head()}: `clutchlife serve` brings it there"
-            ) from error
-
 
 def open_server(address: URL, *, lock_timeout: float, serving: bool = False) -> ServerDatabase:
     """Open a database on a server, make the tables of an empty one and run the migrations that it lacks.
@@ -308,42 +281,34 @@ def open_server(address: URL, *, lock_timeout: float, serving: bool = False) -> 
     with closing(ServerDatabase(address, lock_timeout=lock_timeout)) as database:
         database.migrate()
     database = ServerDatabase(address, lock_timeout=lock_timeout, serving=serving)
-    try:
-        with database.reading() as connection:
-            refuse_newer(current(connection))  # a newer release may have migrated it in between
+
+    def check(connection: Connection) -> None:
+        refuse_newer(current(connection))  # a newer release may have migrated it in between
         database.watch.snapshot()  # makes its connection: a later one waits behind a migration that waits for this service
-    except BaseException:
-        database.close()
-        raise
-    return database
+
+    return database.where(check)
 
 
 def find_server(address: URL, *, lock_timeout: float) -> ServerDatabase:
     """Open a database on a server to read it as it is. Raises DatabaseTooNew, StorageUnavailable where it has no tables."""
-    database = FoundServerDatabase(address, lock_timeout=lock_timeout, writable=False)
-    try:
-        with database.reading() as connection:
-            _refuse_empty(connection, database.name)
-            refuse_newer(current(connection))
-    except BaseException:
-        database.close()
-        raise
-    return database
+    database = ServerDatabase(address, lock_timeout=lock_timeout, found=True)
+
+    def check(connection: Connection) -> None:
+        revision = current(connection)
+        if revision is None:
+            raise StorageUnavailable(f"{database.name} is empty: `clutchlife serve` makes its tables")
+        refuse_newer(revision)
+
+    return database.where(check)
 
 
 def server_has_tables(address: URL, *, lock_timeout: float) -> bool:
     """Whether the database holds this program's tables. Raises StorageUnavailable where there is no such database."""
-    database = ServerDatabase(address, lock_timeout=lock_timeout, writable=False)
-    try:
-        with database.reading() as connection:
-            return current(connection) is not None
-    finally:
-        database.close()
-
-
-def _refuse_empty(connection: Connection, name: str) -> None:
-    if current(connection) is None:
-        raise StorageUnavailable(f"{name} is empty: `clutchlife serve` makes its tables")
+    with (
+        closing(ServerDatabase(address, lock_timeout=lock_timeout, found=True)) as database,
+        database.reading() as connection,
+    ):
+        return current(connection) is not None
 
 
 def _require_utf8(connection: Connection, name: str) -> None:

@@ -23,17 +23,16 @@ import sqlite3
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import BinaryIO
 
 from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool, QueuePool
 
-from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, StorageUnavailable
+from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, StorageUnavailable, translated_by
 
 #: Its owner reads and writes, nobody else does either.
 MODE = 0o600
@@ -66,8 +65,7 @@ _UNAVAILABLE = {
 DRIVER_ERRORS = (PoolTimeoutError, DBAPIError, sqlite3.Error)
 
 
-def store_error(error: Exception, path: Path) -> StorageError | None:
-    """The store's own error for one of DRIVER_ERRORS, or None where it is the program's (a constraint, bad SQL)."""
+def _store_error(path: Path, error: Exception) -> StorageError | None:
     if isinstance(error, PoolTimeoutError):
         return DatabaseBusy(f"{path}: no free connection ({error})")
     origin = error.orig if isinstance(error, DBAPIError) else error
@@ -224,12 +222,7 @@ class WriteLock:
 
     def _opened(self) -> int:
         if self._file is None:
-            try:
-                self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, MODE)
-            except OSError as error:
-                raise StorageUnavailable(
-                    f"{self._path}: the lock of the database cannot be opened ({error})"
-                ) from error
+            self._file = _lock_file(self._path)
         return self._file
 
     def _take(self, file: int, deadline: float) -> None:
@@ -255,7 +248,7 @@ def service_lock(path: Path) -> Iterator[None]:
     Raises ServiceRuns where another holds it, StorageUnavailable where its file cannot be made.
     """
     beside = path.with_name(f"{path.name}-service")
-    with closing(_lock_file(beside)) as file:
+    with open(_lock_file(beside), "rb+") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -269,23 +262,16 @@ def service_lock(path: Path) -> Iterator[None]:
         yield
 
 
-def _lock_file(path: Path) -> BinaryIO:
+def _lock_file(path: Path) -> int:
     try:
-        return open(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, MODE), "rb+")  # noqa: PTH123  (a descriptor)
+        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, MODE)
     except OSError as error:
         raise StorageUnavailable(f"{path}: the lock of the database cannot be opened ({error})") from error
 
 
-@contextmanager
-def translated(path: Path) -> Iterator[None]:
-    """Raise the store's own errors, naming the file, for what driver and pool raise inside; all else passes."""
-    try:
-        yield
-    except DRIVER_ERRORS as error:
-        own = store_error(error, path)
-        if own is None:
-            raise
-        raise own from error
+def translated(path: Path) -> AbstractContextManager[None]:
+    """Raise the store's own errors, naming the file, for what driver and pool raise inside."""
+    return translated_by(partial(_store_error, path), DRIVER_ERRORS)
 
 
 @contextmanager

@@ -17,11 +17,10 @@ from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError
 
 from storage.engine.database import LOCK_TIMEOUT, Database, Question, Snapshot, Watch, granted
-from storage.engine.errors import DatabaseTooOld, StorageUnavailable
+from storage.engine.errors import StorageUnavailable
 from storage.engine.integrity import refuse_newer
 from storage.engine.sqlite.backup import copy, copy_beside, damage
 from storage.engine.sqlite.connect import (
-    DRIVER_ERRORS,
     JOURNAL_MODE,
     WriteLock,
     connect_shared,
@@ -32,7 +31,6 @@ from storage.engine.sqlite.connect import (
     read_only,
     service_lock,
     set_journal_mode,
-    store_error,
     transaction,
     translated,
     wanted_journal_mode,
@@ -142,14 +140,9 @@ class FileWatch(Watch):
     def _first(self, query: str, values: tuple[object, ...]) -> tuple[Any, ...] | None:
         if self._closed:
             raise StorageUnavailable(f"the database {self._path} has been closed")
-        try:
+        with translated(self._path):
             # fetched to the end: an open statement would keep the log from being written back
             rows = self._connection.execute(query, values).fetchall()
-        except DRIVER_ERRORS as error:
-            own = store_error(error, self._path)
-            if own is None:
-                raise
-            raise own from error
         return rows[0] if rows else None
 
 
@@ -160,24 +153,23 @@ class FileDatabase(Database):
     journal_mode: str
     watch: FileWatch
 
-    def __init__(self, path: Path, *, journal_mode: str, lock_timeout: float, writable: bool = True) -> None:
+    def __init__(self, path: Path, *, journal_mode: str, lock_timeout: float, found: bool = False) -> None:
+        super().__init__(str(path), found=found)
         self.path, self.url = path, f"sqlite:///{path.absolute()}"
         self.journal_mode = journal_mode
         self._write_lock = WriteLock(path, lock_timeout)
-        self._closed = False
-        self._engine = make_engine(path, lock_timeout, writable=writable)
+        self._engine = make_engine(path, lock_timeout, writable=not found)
         with translated(path):
-            self.watch = FileWatch(path, lock_timeout, writable=writable)
+            self.watch = FileWatch(path, lock_timeout, writable=not found)
 
     @contextmanager
-    def reading(self) -> Iterator[Connection]:
-        self.refuse_closed()
+    def _read(self) -> Iterator[Connection]:
         with translated(self.path), transaction(self._engine, "BEGIN") as connection:
             yield connection
 
     @contextmanager
     def writing(self, *, of: str | None = None) -> Iterator[Connection]:  # noqa: ARG002  (a file has one writer)
-        self.refuse_closed()
+        self._refuse_closed()
         with (
             self._write_lock.held(),
             translated(self.path),
@@ -191,10 +183,6 @@ class FileDatabase(Database):
         self._engine.dispose()
         self._write_lock.close()
 
-    def refuse_closed(self) -> None:
-        if self._closed:
-            raise StorageUnavailable(f"the database {self.path} has been closed")
-
     def faults(self, *, least_free: int) -> dict[str, str]:
         if self._closed:
             return {"database": "it has been closed"}
@@ -204,40 +192,15 @@ class FileDatabase(Database):
         return damage(connection)
 
 
-class FoundFile(FileDatabase):
-    """A file that is only read, at the revision that it was found at. Made by `find_file`."""
-
-    @contextmanager
-    def reading(self) -> Iterator[Connection]:
-        """As every database's; raises DatabaseTooOld where what is asked for came with a later revision."""
-        with super().reading() as connection:
-            try:
-                yield connection
-            except OperationalError as error:
-                revision = current(connection)
-                if revision == head():
-                    raise
-                raise DatabaseTooOld(
-                    f"{self.path} is at revision {revision}, this needs {head()}: `clutchlife serve` brings it there, "
-                    "and keeps a copy of the file beside it"
-                ) from error
-
-
-def find_file(path: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> FoundFile:
+def find_file(path: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> FileDatabase:
     """Open a file to read it as it is, whatever its revision up to this code's; nothing is made or migrated.
 
     Raises DatabaseTooNew as `open_file` does, StorageUnavailable where there is no such file.
     """
     with translated(path):
         journal_mode = found_journal_mode(path, lock_timeout)
-    database = FoundFile(path, journal_mode=journal_mode, lock_timeout=lock_timeout, writable=False)
-    try:
-        with database.reading() as connection:
-            refuse_newer(current(connection))
-    except BaseException:
-        database.close()
-        raise
-    return database
+    database = FileDatabase(path, journal_mode=journal_mode, lock_timeout=lock_timeout, found=True)
+    return database.where(lambda connection: refuse_newer(current(connection)))
 
 
 def back_up(url: str, target: Path) -> None:

@@ -1,6 +1,6 @@
-"""Ended lives of a fleet's prior state how probably they followed each course of the filters (`laws`, for `lawful`).
+"""Ended lives of a fleet's prior state how probably they followed each course of the filters (`laws`).
 
-Of those that are stored only the first, eq. 6, is known: the others are 0 until the fleet is learned again.
+Of those that are stored it is not known: 0, until the fleet is learned again.
 """
 
 import json
@@ -9,7 +9,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "s0003_laws_of_ended_lives"
-down_revision: str | None = "s0002_lawful_lives"
+down_revision: str | None = "s0001_first_tables"
 
 _prior = sa.table("fleet_prior", *map(sa.column, ("fleet", "version", "left_out", "content")))
 _own = (
@@ -21,11 +21,11 @@ _set = sa.update(_prior).where(*_own).values(content=sa.bindparam("c"))
 
 
 def upgrade() -> None:
-    """Put it in the place of the former."""
+    """Add them to every life."""
     connection = op.get_bind()
     for fleet, version, left_out, stored in connection.execute(sa.select(_prior)).fetchall():
         content = json.loads(stored)
         for life in (*content.get("ended", ()), *content.get("censored", ())):
-            life["laws"] = [life.pop("lawful"), *[0.0] * 5]
+            life.setdefault("laws", [0.0] * 6)
         text = json.dumps(content, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
         connection.execute(_set, {"f": fleet, "v": version, "o": left_out, "c": text})

@@ -15,6 +15,7 @@ import pytest
 
 from models.diagnosis.extension import Extension
 from service.errors import Notice
+from service.lists import WHOLE
 from service.lives.history import Shown
 from service.lives.plausibility.doubts import Judged
 from service.queries import clutch_list, degradation, remaining_life, runs, scores, series, stribeck
@@ -144,7 +145,7 @@ class Bench:
 
     def receipts(self) -> dict[str, dict[str, Any]]:
         """All receipts by run_id."""
-        page = json.loads(runs.page_as_json(self.database, CLUTCH, limit=1000, after=None))
+        page = json.loads(runs.page_as_json(self.database, CLUTCH, WHOLE))
         return {item["run_id"]: item for item in page["items"]}
 
     def answers(self, *, degradation_too: bool = True) -> dict[str, Any]:
@@ -162,7 +163,7 @@ class Bench:
         )
         if degradation_too:
             named["degradation"] = degradation.degradation(database, CLUTCH)
-        named["stribeck"] = stribeck.curves(database, CLUTCH, 1000, None)
+        named["stribeck"] = stribeck.curves(database, CLUTCH, WHOLE)
         named["series"] = series.series(database, CLUTCH, None)
         named["loops"] = runs.loops(database, CLUTCH)[0]
         named["scores"] = scores.of_clutch(database, CLUTCH, method="particle")

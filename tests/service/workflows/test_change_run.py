@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from service.errors import ConflictError, NotFoundError, NotPossibleNowError
+from service.lists import WHOLE
 from service.lives.plausibility import doubts as rules
 from service.lives.plausibility.doubts import Judged
 from service.queries import diagnoses as diagnosis_query
@@ -304,7 +305,7 @@ def revision_of(bench: Bench) -> int:
 
 
 def trail_of(bench: Bench) -> list[dict[str, Any]]:
-    return run_query.trail(bench.database, CLUTCH, limit=1000, after=None)[0]
+    return run_query.trail(bench.database, CLUTCH, WHOLE)["items"]
 
 
 @pytest.mark.slow

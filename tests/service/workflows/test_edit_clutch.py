@@ -1,5 +1,6 @@
 """After a record is edited, every answer is that of a clutch that was registered so; an archived clutch takes in no more."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -7,10 +8,13 @@ from typing import Any
 import pytest
 
 from service.errors import ArchivedError, ConflictError
+from service.lists import WHOLE
 from service.queries import clutch_list
 from service.queries import runs as run_query
+from service.queries.cache import AnswerCache
 from service.schemas.clutch import ClutchEdit, ClutchIn
 from service.workflows import edit_clutch, learn_fleet
+from storage.clutches import Choice
 from storage.engine.opening import open_database
 from tests.service.workflows.benches import AT, CLUTCH, WHO, Bench, assert_same, body, stood_in
 
@@ -76,7 +80,7 @@ def test_a_field_is_replaced_as_a_whole_and_the_trail_says_what_changed(tmp_path
     bench = Bench(tmp_path / "a.db", {"geometry": {"friction_faces": 6, "pressure_factor": 1.1}})
     edit(bench, geometry={"friction_faces": 4}, fluid="ATF")
     edit(bench, geometry={"friction_faces": 4})  # as it is
-    (entry,) = run_query.trail(bench.database, CLUTCH, limit=10, after=None)[0]
+    (entry,) = run_query.trail(bench.database, CLUTCH, WHOLE)["items"]
     assert (entry["action"], entry["run_id"], entry["reason"]) == ("edit", None, "the drawing says so")
     assert entry["before"].keys() == entry["after"].keys() == {"geometry"}
     assert (entry["after"]["geometry"]["friction_faces"], entry["after"]["geometry"]["pressure_factor"]) == (4, 1.0)
@@ -112,15 +116,15 @@ def test_an_archived_clutch_is_left_out_takes_in_no_run_and_still_teaches(tmp_pa
         bench.send(body("test", "b", 1000.0))
     assert bench.send(known)["duplicate"]
     listed = [
-        clutch_list.page_by_name(bench.database, limit=9, after=None, archived=archived)[0]
+        json.loads(clutch_list.page_as_json(bench.database, AnswerCache(1 << 20), Choice(archived=archived), WHOLE))
         for archived in (False, True)
     ]
-    assert [[item["clutch_id"] for item in items] for items in listed] == [[], [CLUTCH]]
+    assert [[item["clutch_id"] for item in page["items"]] for page in listed] == [[], [CLUTCH]]
     assert learn_fleet.lessons_of(learn_fleet._state(bench.database, CLUTCH))[0]["fluid"] == "ATF"
     edit(bench, archived=False)
     assert bench.answers() == before
     bench.send(body("test", "b", 1000.0))
-    actions = [entry["action"] for entry in run_query.trail(bench.database, CLUTCH, limit=10, after=None)[0]]
+    actions = [entry["action"] for entry in run_query.trail(bench.database, CLUTCH, WHOLE)["items"]]
     assert actions == ["unarchive", "archive"]
     bench.close()
 

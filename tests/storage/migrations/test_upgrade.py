@@ -111,6 +111,18 @@ def test_ended_lives_that_were_stored_before_they_had_a_law_can_be_read(tmp_path
     assert [life.to_dict() for life in lives] == [unknown, unknown | {"censored": True}]
 
 
+def test_a_file_of_the_last_step_is_as_it_is(tmp_path: Path) -> None:
+    """Files were brought to this step by way of another that was never released."""
+    path = old_database(tmp_path)
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("UPDATE alembic_version SET version_num = 's0003_laws_of_ended_lives'")
+    with closing(open_database(f"sqlite:///{path}")) as database, database.reading() as connection:
+        assert (clutches.get(connection, CLUTCH) is not None, migrations.current(connection)) == (
+            True,
+            migrations.head(),
+        )
+
+
 def test_steps_are_one_line_and_named_after_their_files() -> None:
     steps = list(ScriptDirectory.from_config(migrations._config()).walk_revisions())
     assert [Path(step.path).stem for step in steps] == [step.revision for step in steps]
