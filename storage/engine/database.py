@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError, ProgrammingError
 
-from storage.engine.errors import DatabaseTooOld, StorageUnavailable
+from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailable
 from storage.migrations.upgrade import current, head
 
 #: [s] How long a transaction waits for the write lock before it gives up with DatabaseBusy. Chosen; no table.
@@ -193,3 +193,17 @@ class Database(ABC):
 
 
 Opened = TypeVar("Opened", bound=Database)
+
+
+@contextmanager
+def translated_by(
+    own: Callable[[Exception], StorageError | None], kinds: tuple[type[Exception], ...]
+) -> Iterator[None]:
+    """Raise the store's own error for what driver and pool raise inside; what has none (a constraint, bad SQL) passes."""
+    try:
+        yield
+    except kinds as error:
+        translated = own(error)
+        if translated is None:
+            raise
+        raise translated from error

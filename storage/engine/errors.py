@@ -1,9 +1,6 @@
 # ruff: noqa: N818 - the names say what is wrong
 """What can go wrong with the store, as the rest of the program sees it, under one base class. Loads no driver."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-
 
 class StorageError(Exception):
     """The base of everything that the store itself raises."""
@@ -51,17 +48,3 @@ class DamagedData(StorageError):
 
 class MissingBlob(DamagedData):
     """A store of raw records does not have what a row names."""
-
-
-@contextmanager
-def translated_by(
-    own: Callable[[Exception], StorageError | None], kinds: tuple[type[Exception], ...]
-) -> Iterator[None]:
-    """Raise the store's own error for what driver and pool raise inside; what has none (a constraint, bad SQL) passes."""
-    try:
-        yield
-    except kinds as error:
-        translated = own(error)
-        if translated is None:
-            raise
-        raise translated from error

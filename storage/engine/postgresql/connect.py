@@ -34,13 +34,13 @@ from sqlalchemy.exc import ArgumentError, DataError, DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry
 
+from storage.engine.database import translated_by
 from storage.engine.errors import (
     DatabaseBusy,
     ServiceRuns,
     StorageError,
     StorageUnavailable,
     UnstorableText,
-    translated_by,
 )
 
 #: A lock that was not free in time, a serialization failure, a deadlock, and too many connections.

@@ -32,7 +32,8 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool, QueuePool
 
-from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, StorageUnavailable, translated_by
+from storage.engine.database import translated_by
+from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, StorageUnavailable
 
 #: Its owner reads and writes, nobody else does either.
 MODE = 0o600
