@@ -40,7 +40,7 @@ from service.schemas.rig import RigOut
 from service.settings import CODE_VERSION
 from storage import assumptions, changes, clutches, diagnoses, inspections, jobs, results, rigs, runs
 from storage.clutches import ClutchRow
-from storage.diagnoses import VerdictRow
+from storage.diagnoses import DiagnosisRow, VerdictRow
 from storage.encoding import Json
 from storage.inspections import InspectionRow, PhotographRow
 from storage.jobs import NewJob
@@ -65,6 +65,14 @@ def clutch(connection: Connection, clutch_id: str) -> ClutchRow:
     row = clutches.get(connection, clutch_id)
     if row is None:
         raise unknown_clutch(clutch_id)
+    return row
+
+
+def diagnosis(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisRow:
+    """The diagnosis of a clutch, or NotFoundError."""
+    row = diagnoses.get(connection, clutch_id, diagnosis_id)
+    if row is None:
+        raise NotFoundError(f"clutch {clutch_id!r} has no diagnosis {diagnosis_id!r}")
     return row
 
 

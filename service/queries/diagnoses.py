@@ -9,7 +9,6 @@ from sqlalchemy import Connection
 
 from service import records
 from service.columns import whole
-from service.errors import NotFoundError
 from service.lists import Part, by_key
 from service.lives.assumptions import BASELINE
 from service.lives.diagnosis.report import empty
@@ -22,6 +21,8 @@ from storage.engine.database import Database
 if TYPE_CHECKING:
     from models.diagnosis.extension import Extension
 
+#: What is said first of a diagnosis, by its row.
+_HEAD = ("diagnosis_id", "clutch_id", "status", "created_at", "finished_at", "revision")
 #: What a list does not show.
 _LARGE = ("maps", "loops", "isolability")
 
@@ -30,10 +31,7 @@ def diagnosis(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str
     """A diagnosis as it is answered. Raises NotFoundError."""
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        row = diagnoses.get(connection, clutch_id, diagnosis_id)
-        if row is None:
-            raise NotFoundError(f"clutch {clutch_id!r} has no diagnosis {diagnosis_id!r}")
-        return _items(connection, clutch_id, [row])[0]
+        return _items(connection, clutch_id, [records.diagnosis(connection, clutch_id, diagnosis_id)])[0]
 
 
 #: The columns of a plan as a table: a row a step.
@@ -79,13 +77,8 @@ def _items(connection: Connection, clutch_id: str, rows: list[DiagnosisRow]) -> 
     latest, changed = diagnoses.last_run_key(connection, clutch_id), changes.last_of_history(connection, clutch_id)
     return [
         (
-            {
-                "diagnosis_id": row.diagnosis_id,
-                "clutch_id": row.clutch_id,
-                "status": row.status,
-                "created_at": row.created_at,
-                "finished_at": row.finished_at,
-                "revision": row.revision,
+            {name: getattr(row, name) for name in _HEAD}
+            | {
                 "as_of_cycles": None if row.as_of_cycles is None else whole(row.as_of_cycles),
                 "stale": latest > row.last_run_key or changed > row.revision,
                 "earlier_life": row.life != life,

@@ -72,7 +72,7 @@ def _simulated(capacity: Capacity, geometry: Geometry) -> dict[str, Any]:
         "engaged": trace.duration is not None,
         "duration_s": trace.duration,
         "energy_kj": trace.energy / 1000,
-        "channels": _channels(trace),
+        "channels": _course(trace) | {"motor_torque_nm": trace.motor_torque.round(6).tolist()},
     }
 
 
@@ -106,10 +106,9 @@ def _comparison(run: IncomingRun, row: dict[str, Any], capacity: Capacity, geome
 
 
 def _beside(beside: Discrepancy, contact: float) -> dict[str, Any]:
-    trace, difference = beside.trace, beside.stop_time_difference
-    columns = {"time_s": trace.time - contact, "pressure_bar": trace.pressure, "speed_rpm": trace.speed}
+    difference = beside.stop_time_difference
     return {
-        "channels": public_channels(columns | {"torque_nm": trace.torque}),
+        "channels": _course(beside.trace, contact),
         "inertia_kg_m2": beside.drive.inertia,
         "motor_torque_limit_nm": beside.drive.limit,
         "stop_time_s": beside.simulated_stop_time,
@@ -153,11 +152,7 @@ class _Tracked:
         return [float(weighted_quantiles(value, posterior.weight, (0.5,))[0]) for value in values]
 
 
-def _channels(trace: Engagement) -> dict[str, list[float]]:
-    columns = {
-        "time_s": trace.time,
-        "pressure_bar": trace.pressure,
-        "speed_rpm": trace.speed,
-        "torque_nm": trace.torque,
-    }
-    return public_channels(columns) | {"motor_torque_nm": trace.motor_torque.round(6).tolist()}
+def _course(trace: Engagement, contact: float = 0.0) -> dict[str, list[float]]:
+    """The channels of a simulated engagement, its time from `contact` [s] on."""
+    columns = {"time_s": trace.time - contact, "pressure_bar": trace.pressure, "speed_rpm": trace.speed}
+    return public_channels(columns | {"torque_nm": trace.torque})

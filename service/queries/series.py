@@ -108,19 +108,13 @@ def _indicators(row: dict[str, Any]) -> Iterator[dict[str, Any]]:
     for quantity, indicator in ALL_INDICATORS.items():
         estimate = row["indicators"][quantity]
         if estimate is not None:
-            of_run = {
-                "cycles": row["cycles"],
-                "time": row["time"],
-                "run_id": row["run_id"],
-                "source": "run",
-                **_NOWHERE,
-            }
-            yield of_run | _row(quantity, indicator.unit, estimate["value"], estimate["sd"])
+            yield _of_run(row, row["time"]) | _row(quantity, indicator.unit, estimate["value"], estimate["sd"])
 
 
-def _of_run(receipt: dict[str, Any]) -> dict[str, Any]:
-    time = receipt["started_at"] or receipt["received_at"]
-    return {"cycles": receipt["cycles"], "time": time, "run_id": receipt["run_id"], "source": "run", **_NOWHERE}
+def _of_run(run: dict[str, Any], time: str | None = None) -> dict[str, Any]:
+    """What a row says of a run, by its receipt, or by a row that has the time."""
+    time = time or run["started_at"] or run["received_at"]
+    return {"cycles": run["cycles"], "time": time, "run_id": run["run_id"], "source": "run", **_NOWHERE}
 
 
 def _row(quantity: str, unit: str, value: float | None, sd: float) -> dict[str, Any]:

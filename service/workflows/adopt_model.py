@@ -11,7 +11,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import records, stored_runs
-from service.errors import NotFoundError, NothingToAdoptError
+from service.errors import NothingToAdoptError
 from service.lives.model_correction import extension_of
 from service.lives.recomputation import Adoption, ClutchState, Results
 from storage import assumptions, changes, clutches, diagnoses, jobs
@@ -28,7 +28,7 @@ def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, adopted_
     """
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        diagnosed = None if diagnosis_id is None else _diagnosed(connection, clutch_id, diagnosis_id)
+        diagnosed = None if diagnosis_id is None else records.diagnosis(connection, clutch_id, diagnosis_id)
         in_force = _in_force(connection, clutch_id, diagnosis_id)
     adoption = None if diagnosed is None else _adoptable(diagnosed)
     if in_force and (adoption is None or _of_present_life(database, clutch_id, adoption)):
@@ -54,11 +54,14 @@ def finish_and_adopt(
     if ended["extension"] is None:
         return False
     with database.reading() as connection:
-        life = _diagnosed(connection, clutch_id, diagnosis_id).life
+        life = records.diagnosis(connection, clutch_id, diagnosis_id).life
     adoption = Adoption(diagnosis_id=diagnosis_id, life=life, extension=extension_of(ended["extension"]))
 
     def finish(connection: Connection) -> None:
-        if changes.last_of_history(connection, clutch_id) > _diagnosed(connection, clutch_id, diagnosis_id).revision:
+        if (
+            changes.last_of_history(connection, clutch_id)
+            > records.diagnosis(connection, clutch_id, diagnosis_id).revision
+        ):
             raise NothingToAdoptError(f"the runs that diagnosis {diagnosis_id!r} is of were changed meanwhile")
         if not jobs.end(connection, diagnosis_id, jobs.FINISHED, at, claimer=claimer):
             raise NothingToAdoptError(f"diagnosis {diagnosis_id!r} was ended meanwhile")
@@ -127,13 +130,6 @@ def _in_force(connection: Connection, clutch_id: str, diagnosis_id: str | None) 
         return newest is None or newest.diagnosis_id is None
     adoption = records.adoption(connection, clutch_id)
     return adoption is not None and adoption.diagnosis_id == diagnosis_id
-
-
-def _diagnosed(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisRow:
-    row = diagnoses.get(connection, clutch_id, diagnosis_id)
-    if row is None:
-        raise NotFoundError(f"clutch {clutch_id!r} has no diagnosis {diagnosis_id!r}")
-    return row
 
 
 def _adoptable(row: DiagnosisRow) -> Adoption:

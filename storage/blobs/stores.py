@@ -12,13 +12,14 @@ import logging
 import os
 import re
 import tempfile
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import timedelta
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from storage.engine.errors import DamagedData, MissingBlob, RawStoreUnavailable
 
@@ -26,13 +27,16 @@ from storage.engine.errors import DamagedData, MissingBlob, RawStoreUnavailable
 MARK = "clutchlife-store"
 
 
-class BlobStore(Protocol):
-    """A store; threads share it. All methods raise RawStoreUnavailable where it is away, full, or has no mark."""
+class BlobStore(ABC):
+    """A store; threads share it. All methods raise RawStoreUnavailable where it is away, full, or has no mark.
 
-    @property
-    def address(self) -> str:
-        """Where it is, without anything secret."""
+    `address` is where it is, without anything secret, `missing` what else may be wrong where it has no mark.
+    """
 
+    address: str
+    missing: str
+
+    @abstractmethod
     def put(self, name: str, data: bytes | bytearray) -> None:
         """Store bytes under a name; they are there, whole, when this returns, and at no time in part.
 
@@ -41,21 +45,41 @@ class BlobStore(Protocol):
 
     def get(self, name: str) -> bytes:
         """The bytes as they are stored. Raises MissingBlob where the store has none of that name."""
+        data = self.read(name)
+        if data is None:
+            self.require_mark()
+            raise MissingBlob(f"there is no blob {name} in {self.address}")
+        return data
 
+    @abstractmethod
+    def read(self, name: str) -> bytes | None:
+        """The same, the mark's too; None where there is none, whether the place is a store or not."""
+
+    @abstractmethod
     def exists(self, name: str) -> bool:
         """Whether there is one of that name."""
 
+    @abstractmethod
     def names(self) -> Iterator[tuple[str, float]]:
         """Each name with the time of its last `put` [s since 1970], also of what an interrupted one has left."""
 
+    @abstractmethod
     def delete(self, name: str) -> None:
         """Remove one; nothing happens where there is none."""
 
     def mark(self) -> str | None:
         """What `set_mark` wrote, None in a place that no database has used yet."""
+        data = self.read(MARK)
+        return None if data is None else data.decode()
 
+    @abstractmethod
     def set_mark(self, mark: str) -> None:
         """Make the place a store that belongs to the database of that mark."""
+
+    def require_mark(self) -> None:
+        """Raise RawStoreUnavailable where the place is no store."""
+        if self.read(MARK) is None:
+            raise RawStoreUnavailable(f"{self.address} is no store of raw records, or {self.missing} {MARK}")
 
 
 def name_of(data: bytes | bytearray) -> str:
@@ -77,37 +101,33 @@ _FOLDER_MODE = 0o700
 _PARTIAL = "partial"
 
 
-class FolderStore:
+class FolderStore(BlobStore):
     """A folder. Made by `opening`."""
+
+    missing = "its disk is not mounted: it has no file"
 
     def __init__(self, root: Path) -> None:
         self._root = root
-
-    @property
-    def address(self) -> str:
-        return f"folder://{self._root}"
+        self.address = f"folder://{root}"
 
     def put(self, name: str, data: bytes | bytearray) -> None:
         with self._usable():
-            self._require_mark()
+            self.require_mark()
             self._write(self._path(name), data)
 
-    def get(self, name: str) -> bytes:
-        with self._usable():
-            try:
-                return self._path(name).read_bytes()
-            except FileNotFoundError:
-                self._require_mark()
-                raise MissingBlob(f"there is no blob {name} in {self.address}") from None
+    def read(self, name: str) -> bytes | None:
+        with self._usable(), suppress(FileNotFoundError, NotADirectoryError):
+            return self._path(name).read_bytes()
+        return None
 
     def exists(self, name: str) -> bool:
         with self._usable():
-            self._require_mark()
+            self.require_mark()
             return self._path(name).is_file()
 
     def names(self) -> Iterator[tuple[str, float]]:
         with self._usable():
-            self._require_mark()
+            self.require_mark()
             for path in self._root.glob("*/*/*"):
                 yield path.name, path.stat().st_mtime
             for path in (self._root / _PARTIAL).glob("*"):
@@ -115,13 +135,8 @@ class FolderStore:
 
     def delete(self, name: str) -> None:
         with self._usable():
-            self._require_mark()
+            self.require_mark()
             self._path(name).unlink(missing_ok=True)
-
-    def mark(self) -> str | None:
-        with self._usable():
-            path = self._root / MARK
-            return path.read_text(encoding="utf-8") if path.is_file() else None
 
     def set_mark(self, mark: str) -> None:
         """Make the folder, where it is not there, and the mark in it."""
@@ -130,7 +145,7 @@ class FolderStore:
             self._write(self._root / MARK, mark.encode())
 
     def _path(self, name: str) -> Path:
-        if name.startswith(f"{_PARTIAL}/"):
+        if name == MARK or name.startswith(f"{_PARTIAL}/"):
             return self._root / name
         return self._root / name[:2] / name[2:4] / name
 
@@ -150,12 +165,6 @@ class FolderStore:
             Path(temporary).unlink(missing_ok=True)
             raise
         _sync(path.parent)
-
-    def _require_mark(self) -> None:
-        if not (self._root / MARK).is_file():
-            raise RawStoreUnavailable(
-                f"{self.address} is no store of raw records, or its disk is not mounted: it has no file {MARK}"
-            )
 
     @contextmanager
     def _usable(self) -> Iterator[None]:
@@ -195,8 +204,10 @@ _log = logging.getLogger("clutchlife")
 _Answer = TypeVar("_Answer")
 
 
-class ObjectStore:
+class ObjectStore(BlobStore):
     """A bucket, or what begins with a prefix in it. Made by `opening`; RawStoreUnavailable where no client is installed."""
+
+    missing = "there is no such bucket: it has no object"
 
     def __init__(self, bucket: str, prefix: str) -> None:
         if find_spec("obstore") is None:
@@ -205,7 +216,7 @@ class ObjectStore:
             )
         from obstore.store import S3Store  # start-up time, optional package
 
-        self._name = f"s3://{bucket}/{prefix}".rstrip("/")
+        self.address = f"s3://{bucket}/{prefix}".rstrip("/")
         plain = os.environ.get("AWS_ENDPOINT_URL_S3", os.environ.get("AWS_ENDPOINT_URL", "")).startswith("http://")
         self._store = S3Store(
             bucket,
@@ -218,21 +229,18 @@ class ObjectStore:
             retry_config={"max_retries": _RETRIES, "retry_timeout": timedelta(seconds=_RETRY_SECONDS)},
         )
 
-    @property
-    def address(self) -> str:
-        return self._name
-
     def put(self, name: str, data: bytes | bytearray) -> None:
         import obstore  # start-up time, optional package
 
         self._request(lambda: obstore.put(self._store, name, bytes(data), use_multipart=False))
 
-    def get(self, name: str) -> bytes:
-        data = self._bytes_of(name)
-        if data is None:
-            self._require_mark()
-            raise MissingBlob(f"there is no blob {name} in {self.address}")
-        return data
+    def read(self, name: str) -> bytes | None:
+        import obstore  # start-up time, optional package
+
+        try:
+            return bytes(self._request(lambda: obstore.get(self._store, name).bytes(), absent=True))
+        except FileNotFoundError:
+            return None
 
     def exists(self, name: str) -> bool:
         import obstore  # start-up time, optional package
@@ -240,7 +248,7 @@ class ObjectStore:
         try:
             self._request(lambda: obstore.head(self._store, name), absent=True)
         except FileNotFoundError:
-            self._require_mark()
+            self.require_mark()
             return False
         return True
 
@@ -258,27 +266,9 @@ class ObjectStore:
 
         self._request(lambda: obstore.delete(self._store, name))
 
-    def mark(self) -> str | None:
-        data = self._bytes_of(MARK)
-        return None if data is None else data.decode()
-
     def set_mark(self, mark: str) -> None:
         """Put the mark's object; the bucket must be there."""
         self.put(MARK, mark.encode())
-
-    def _bytes_of(self, name: str) -> bytes | None:
-        import obstore  # start-up time, optional package
-
-        try:
-            return bytes(self._request(lambda: obstore.get(self._store, name).bytes(), absent=True))
-        except FileNotFoundError:
-            return None
-
-    def _require_mark(self) -> None:
-        if self._bytes_of(MARK) is None:
-            raise RawStoreUnavailable(
-                f"{self.address} is no store of raw records, or there is no such bucket: it has no object {MARK}"
-            )
 
     def _request(self, request: Callable[[], _Answer], *, absent: bool = False) -> _Answer:
         """What the request gives; the client's errors as the store's own, but for what is `absent` where that is expected.
