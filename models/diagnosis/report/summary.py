@@ -139,12 +139,13 @@ def _short(sentences: Sequence[Sentence]) -> list[Sentence]:
     kept = list(sentences)
     for matters in (MAY, SHOULD):
         for place in range(len(kept) - 1, -1, -1):
-            if (
-                sum(len(sentence.text.split()) for sentence in kept) > criteria.MAX_WORDS
-                and kept[place].matters == matters
-            ):
+            if _words(kept) > criteria.MAX_WORDS and kept[place].matters == matters:
                 del kept[place]
     return kept
+
+
+def _words(sentences: Sequence[Sentence]) -> int:
+    return sum(len(sentence.text.split()) for sentence in sentences)
 
 
 def _adequate(report: Report) -> list[Sentence]:
@@ -275,38 +276,42 @@ def _ambiguous(report: Report) -> list[Sentence]:
             if slug not in sure and (estimate := sized.pop(slug, None)) is not None
         ]
         listed.append((" together with ".join(names) or "nothing", probability(item.probability), sizes))
-    certain = [signed(sized[slug]) for slug in sure if slug in sized]
-    words = " ".join([*certain, *(" ".join((name, chance, *sizes)) for name, chance, sizes in listed)]).split()
-    rest = [*_gained(report), *_next(report)]
-    stays = sum(len(sentence.text.split()) for sentence in rest if sentence.matters == MUST)
-    long = len(words) + stays > criteria.MAX_WORDS - 25  # as many words frame the list
-    if long:  # the sizes are in the report's fields
-        brief = [name for name, _, _ in listed[:8]]
-        others = [effect_name(slug) for slug in report.causes if slug not in {*sure, UNCATALOGUED}]
-        left = [name for name in others if not any(name in alternative for alternative in brief)]
-        listed = [
-            (name.partition(", such as ")[0], chance, [size for size in sizes if size == _NO_SIZE])
-            for name, chance, sizes in listed[:8]
+    certain = [Sentence(f"Size: {signed(sized[slug])}.") for slug in sure if slug in sized]
+    rest = [Sentence(_error(report), MAY), *_gained(report), *_next(report)]
+    whole = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in listed]
+    ways = [whole]  # then without sizes, which are in the report's fields, and with fewer probabilities
+    for shown in range(min(len(listed), 8), 0, -1):
+        brief = [
+            f"{name.partition(', such as ')[0]} ({'; '.join((chance, *(size for size in sizes if size == _NO_SIZE)))})"
+            for name, chance, sizes in listed[:shown]
         ]
-    alternatives = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in listed] + (
-        left if long else []
-    )
-    if sure:
-        share = sum(item.probability for item in report.explanations if set(sure) <= set(item.effects))
-        verb = "is at work" if len(sure) == 1 else "are at work"
-        said = f"{conjunction([effect_name(slug) for slug in sure])} {verb} (probability {probability(share)})"
-        sentences = [Sentence(f"{said[0].upper()}{said[1:]}.")]
-        sentences += [Sentence(f"Size: {size}.") for size in certain]
-        if len(alternatives) == 1:
-            sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
-        elif alternatives:
-            sentences.append(Sentence(f"What else is at work is open (with probabilities): {_either(alternatives)}."))
-    else:
+        others = [effect_name(slug) for slug in report.causes if slug not in {*sure, UNCATALOGUED}]
+        ways.append([*brief, *(name for name in others if not any(name in alternative for alternative in brief))])
+    for alternatives in ways:
+        sentences = [*_open(report, sure, certain, alternatives), *rest]
+        if _words([sentence for sentence in sentences if sentence.matters == MUST]) <= criteria.MAX_WORDS:
+            break
+    return sentences
+
+
+def _open(
+    report: Report, sure: Sequence[str], certain: Sequence[Sentence], alternatives: Sequence[str]
+) -> list[Sentence]:
+    """What is certain with its size, and the alternatives in words."""
+    if not sure:
         first = "One explanation stands (with its probability)"
         if len(alternatives) > 1:
             first = "These data cannot distinguish between the following explanations (with probabilities)"
-        sentences = [Sentence(f"The data disagree with the model. {first}: {_either(alternatives)}.")]
-    return [*sentences, Sentence(_error(report), MAY), *rest]
+        return [Sentence(f"The data disagree with the model. {first}: {_either(alternatives)}.")]
+    share = sum(item.probability for item in report.explanations if set(sure) <= set(item.effects))
+    verb = "is at work" if len(sure) == 1 else "are at work"
+    said = f"{conjunction([effect_name(slug) for slug in sure])} {verb} (probability {probability(share)})"
+    sentences = [Sentence(f"{said[0].upper()}{said[1:]}."), *certain]
+    if len(alternatives) == 1:
+        sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
+    elif alternatives:
+        sentences.append(Sentence(f"What else is at work is open (with probabilities): {_either(alternatives)}."))
+    return sentences
 
 
 def _cause_name(slug: str) -> str:

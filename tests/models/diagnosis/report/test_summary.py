@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -277,6 +278,25 @@ def test_notes_on_single_runs_stay_in_the_report() -> None:
     said = summarise(replace(findings(Verdict.UNEXPLAINED_STRUCTURE), notes=notes))
     assert said.endswith("Nothing was known of the oil.")
     assert "sweep" not in said
+
+
+def test_pairs_beside_a_long_test_and_a_reason_against_it_are_shortened() -> None:
+    """Two paragraphs had 107 and 116 words: eight pairs were listed whatever else had to be said."""
+    slugs = [effect.slug for effect in CATALOGUE[:9]]
+    pairs = dict.fromkeys(pairwise(slugs), 0.13)
+    sweep = Step(
+        kind="stationary_stribeck", pressures=(1e5, 4e5), speeds=(2.0944, 206.3), temperature=None, cycles=1, minutes=3
+    )
+    found = findings(Verdict.CAUSE_AMBIGUOUS, *slugs)
+    advice = replace(
+        found.advice[0], test=TRIALS["all_loads_and_60c"].text, steps=(sweep, replace(sweep, kind="dynamic_stribeck"))
+    )
+    why = "The extension is not proposed: its error on held-out runs is larger than the baseline's."
+    said = summarise(replace(found, explanations=explanations_of(pairs), advice=(advice,), not_adoptable=why))
+    assert len(said.split()) <= MAX_WORDS
+    assert all(slug.replace("_", " ") in said for slug in slugs)
+    assert why in said
+    assert 3 <= said.count("(0.1") < 8
 
 
 def test_many_alternatives_are_shortened() -> None:
