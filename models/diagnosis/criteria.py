@@ -90,7 +90,8 @@ CONTRAST_SIZES = (0.001, 0.003, 0.01, 0.03)
 #: is named.
 LIKELY, SURE = 0.5, 0.9
 #: Share of the posterior that may stay unexplored, share of the leader's lead by which a promise may underrate a rival, and
-#: refits at most (time only). Of 101 promises the refit was 1.3 nats below in the median, 4.7 at 95 %.
+#: refits at most from one leader to the next (time only; of all together, they went to rivals, and beside the leader stood
+#: what was never refitted). Of 101 promises the refit was 1.3 nats below in the median, 4.7 at 95 %.
 NEGLIGIBLE, SLACK, MOST_REFITS = 0.01, 0.2, 14
 #: Cosine between changes of torque from which an effect is refitted beside a leader that it resembles. Two of two pressure
 #: offsets at λ = 300 were named a shifted zero; refitted, one is 16 nats better, and had been promised to be 49 worse.

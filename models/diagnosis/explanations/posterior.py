@@ -235,7 +235,8 @@ class Search:
         return value + float(np.logaddexp(done, log_sum(left))) - done
 
     def _up(self) -> None:
-        while self._promises and self.refits < criteria.MOST_REFITS:
+        most = self.refits + criteria.MOST_REFITS
+        while self._promises and self.refits < most:
             weights = self.weights()
             leader = max(self.nodes, key=lambda alternative: weights[alternative])
             slack = criteria.SLACK * max(weights[leader] - weights[NOTHING], 0.0)

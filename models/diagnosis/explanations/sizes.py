@@ -3,16 +3,12 @@
 A size bends with the course over life that is assumed for it: a pressure that grows as ζ^0.5 and one that grows as ζ^1.5
 leave the same trace behind eq. 6 with opposite signs. Nor is it shrunk as the search for causes shrinks it, where most are
 small: that it is there is known by now. So every explanation that stands is refitted under each course of its
-effects (`Effect.courses`), and the courses are weighed by their evidence. About each refit amplitude, smooth shapes and
-the template's discrepancies are jointly normal, with the mean that the discrepancies move it to,
-
-    (a, s, b) ~ N(fit + C g, C),     C = (Jᵀ V⁻¹ J)⁻¹, everything else free, g the gradient of the likelihood there
-
-under each size of the templates' errors and scatter of the gains, weighed by evidence as in `evidence`. The size that is
-stated is that after the last state, a (1 + Σ_k b_k φ_k) e^(f z): what a template calls an amplitude another rig's form of
-the same cause would call a little differently, and no data of torque show it. The draws have no f, for their torque is
-what was measured. Explanations count with their probability, with what may be beside them; what is left to one is nothing
-at work.
+effects (`Effect.courses`), and the courses are weighed by their evidence. About each refit the amplitudes are sampled, and
+smooth shapes and the templates' discrepancies b given them (`amplitudes`), under each size of the templates' errors and
+scatter of the gains, weighed by evidence. The size that is stated is that after the last state,
+a (1 + Σ_k b_k φ_k) e^(f z): what a template calls an amplitude another rig's form of the same cause would call a little
+differently, and no data of torque show it. The draws have no f, for their torque is what was measured. Explanations count
+with their probability, with what may be beside them; what is left to one is nothing at work.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,15 +23,20 @@ from models.diagnosis.effects.fitted_effect import (
     Draw,
     FittedEffect,
     effect_columns,
+    effect_precisions,
     effect_rows,
     smooth_places,
 )
+from models.diagnosis.explanations.amplitudes import Proportional
 from models.diagnosis.explanations.evidence import evidence_of, exactly, off_by, projections_beside, template_errors
 from models.diagnosis.explanations.verdict import Judgement
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import Gram, Projected, gram_of
-from models.gaussian_evidence import log_gain, log_sum
+from models.diagnosis.pooled_fit.projection import gram_of
+from models.gaussian_evidence import log_sum
+
+#: Values of an amplitude that stand for its density.
+_AMPLITUDES = 200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +108,7 @@ class _Component:
 def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator) -> Sizes:
     """The sizes of a judgement's causes, and DRAWS draws or fewer of equal weight; none where nothing was fitted."""
     components = [
-        component for fitted, share in _shares(judgement) for component in _components(problem, fitted, share)
+        component for fitted, share in _shares(judgement) for component in _components(problem, fitted, share, rng)
     ]
     if not components:
         return Sizes(by_slug={})
@@ -123,7 +124,7 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
             effects = component.effects(off)
             for effect, size in zip(effects, component.sizes(effects), strict=True):
                 form = float(np.exp(criteria.SIZE_FORM * rng.standard_normal()))
-                sized.setdefault(effect.effect.slug, []).append((size * form, index))
+                sized.setdefault(effect.effect.slug, []).append((size * form, id(component.fit)))
             samples.append(
                 (trend, index, tuple(effect for effect in effects if effect.effect.slug in judgement.causes))
             )
@@ -153,6 +154,7 @@ def _shares(judgement: Judgement) -> list[tuple[Fit, float]]:
 
 
 def _size(pairs: Sequence[tuple[float, int]]) -> Size:
+    """From samples, each with what is the same for all of one refit."""
     sizes, of = np.array([size for size, _ in pairs]), np.array([index for _, index in pairs])
     likelier = max(float((sizes > 0).mean()), float((sizes < 0).mean()))
     signs = {bool((sizes[of == index] > 0).mean() > 0.5) for index in np.unique(of) if (of == index).mean() > 0.02}
@@ -166,7 +168,7 @@ def _size(pairs: Sequence[tuple[float, int]]) -> Size:
     )
 
 
-def _components(problem: FitProblem, original: Fit, share: float) -> Iterator[_Component]:
+def _components(problem: FitProblem, original: Fit, share: float, rng: np.random.Generator) -> Iterator[_Component]:
     """A fit's effects refitted under each of their courses, weighed by evidence; as they were found where they have none."""
     fitted = replace(original, effects=tuple(_unshrunk(effect) for effect in original.effects))
     courses = list(_courses(problem, fitted))
@@ -176,7 +178,7 @@ def _components(problem: FitProblem, original: Fit, share: float) -> Iterator[_C
     weights = np.exp(logs - logs.max())
     for weight, (_, fitted) in zip((share * weights / weights.sum()).tolist(), courses, strict=True):
         if weight > share / criteria.SIZES_SAMPLED:
-            yield from _components_of(problem, fitted, weight)
+            yield from _components_of(problem, fitted, weight, rng)
 
 
 def _unshrunk(fitted: FittedEffect) -> FittedEffect:
@@ -238,39 +240,39 @@ def _most_alike(fitted: Fit, effect: FittedEffect, kind: Sequence[Tried]) -> int
     return int(np.argmax(along))
 
 
-def _components_of(problem: FitProblem, fitted: Fit, weight: float) -> Iterator[_Component]:
+def _components_of(problem: FitProblem, fitted: Fit, weight: float, rng: np.random.Generator) -> Iterator[_Component]:
     """A refit's components: one for each scatter of the gains and size of the templates' errors that counts."""
     design, free = problem.design, int(problem.priors.free.sum())
     factors, own = template_errors(design, fitted)
     errors = off_by(design, fitted, factors)
-    gram = gram_of(problem, exactly(fitted), errors)
-    supposed = [
-        (projected, np.where(own > 0, *size))
-        for projected in projections_beside(gram, problem.noise)
-        for size in criteria.TEMPLATE_ERRORS
-    ]
-    logs = [projected.evidence + log_gain(projected.info, projected.score, sd) for projected, sd in supposed]
+    gram = replace(gram_of(problem, exactly(fitted), errors), base=free)
+    effects, places = fitted.effects, np.arange(len(fitted.effects))
+    priors = [np.array([np.inf, *(effect_precisions(effect)[1:] ** -0.5)]) for effect in effects]
+    of_shapes, of_errors = [prior.size for prior in priors], [off.shape[1] for off in factors]
+    shapes, of = np.concatenate(priors), np.concatenate([np.repeat(places, of_shapes), np.repeat(places, of_errors)])
+    supposed = []
+    for projected in projections_beside(gram, problem.noise):
+        info = projected.info.copy()
+        info[np.diag_indices(shapes.size)] -= np.where(np.isinf(shapes), 0.0, shapes**-2.0)  # their priors stand in sd
+        for size in criteria.TEMPLATE_ERRORS:
+            sd = np.concatenate([shapes, np.where(own > 0, *size)])
+            one = Proportional(info=info, score=projected.score, sd=sd, of=of, effects=effects)
+            supposed.append((projected.evidence + one.log_integral(), one))
     steady = design.closed & design.rows.steady
     states = design.rows.cycles[steady]
     last, first = steady & (design.rows.cycles == states.max()), steady & (design.rows.cycles == states.min())
-    columns = np.concatenate([*(effect_columns(design, fitted.prediction, e) for e in fitted.effects), errors], axis=1)
-    whole = np.sum([effect_rows(design, fitted.prediction, effect) for effect in fitted.effects], axis=0)
+    columns = np.concatenate([*(effect_columns(design, fitted.prediction, e) for e in effects), errors], axis=1)
+    whole = np.sum([effect_rows(design, fitted.prediction, effect) for effect in effects], axis=0)
     rising = columns[last].mean(axis=0) - columns[first].mean(axis=0)
     trend = float(whole[last].mean() - whole[first].mean())
-    for (projected, sd), log in zip(supposed, logs, strict=True):
-        share = weight * float(np.exp(log - log_sum(logs)))
+    at_end = tuple(own_factors[last].mean(axis=0) for own_factors in factors)
+    total = log_sum([log for log, _ in supposed])
+    for log, one in supposed:
+        share = weight * float(np.exp(log - total))
         if share * criteria.SIZES_SAMPLED >= 1.0:
-            mean, root = _normal(gram, projected, sd, free)
-            at_end = tuple(own_factors[last].mean(axis=0) for own_factors in factors)
-            yield _Component(weight=share, fit=fitted, mean=mean, root=root, trend=(trend, rising), last=at_end)
-
-
-def _normal(gram: Gram, projected: Projected, sd: FloatArray, free: int) -> tuple[FloatArray, FloatArray]:
-    """Mean and root of the covariance of all behind the first `free`, of which the last have deviations sd >= 0."""
-    matrix = gram.with_gains(projected.run_gain, projected.curve_gain)[0]
-    scale = np.concatenate([1 / np.sqrt(np.maximum(np.diag(matrix)[: gram.base], 1e-300)), sd])
-    scaled = matrix[:-1, :-1] * scale[:, None] * scale
-    scaled[np.diag_indices(scale.size)] += np.repeat([0.0, 1.0], [gram.base, sd.size])
-    inverse = np.linalg.pinv(scaled, hermitian=True) * scale[:, None] * scale
-    values, vectors = np.linalg.eigh(inverse[free:, free:])
-    return (inverse @ matrix[:-1, -1])[free:], vectors * np.sqrt(np.maximum(values, 0.0))
+            count = int(np.ceil((_AMPLITUDES * share) ** (1.0 / len(effects))))
+            for given in one.amplitudes(count, rng):
+                mean, root = one.normal(given)
+                rises = rising * one.ratio(given)
+                part = share / count ** len(effects)
+                yield _Component(weight=part, fit=fitted, mean=mean, root=root, trend=(trend, rises), last=at_end)

@@ -31,7 +31,7 @@ from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, starting_laws
 from models.diagnosis.pooled_fit.projection import gram_of, project
-from models.friction.stribeck import GAMMA
+from models.friction.stribeck import GAMMA, torque
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import of_size, study
 
@@ -259,9 +259,14 @@ def test_a_discrepancy_absorbs_what_a_template_misses_as_far_as_its_prior_allows
 
 @pytest.mark.slow
 def test_a_bump_in_speed_is_no_drag():
-    """Friction is higher in a band of speeds: the drag that fits it best has less evidence than structure over speed."""
-    bump = campaign(5, lambda at: 1.2 * np.exp(-0.5 * ((at.velocity - 6.0) / 1.5) ** 2))
-    report = diagnose(bump, rng=np.random.default_rng(1))
+    """Friction is higher in a band of speeds, in proportion to what it is there: no drag, which pressure does not change."""
+
+    def share(at):
+        return 0.06 * np.exp(-0.5 * ((at.velocity - 6.0) / 1.5) ** 2)
+
+    report = diagnose(
+        campaign(5, lambda at: share(at) * torque(at.velocity, at.parameters)), rng=np.random.default_rng(1)
+    )
     assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
     assert report.baseline is not None
     assert report.baseline.where[0].axis == "speed_rpm"

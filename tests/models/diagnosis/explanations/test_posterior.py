@@ -27,6 +27,7 @@ from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline
 from models.diagnosis.raw_records.evidence import FIXED_LINE, RawEvidence
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import study, warmth
+from tests.models.diagnosis.rehearsals import rehearsal
 from tests.models.diagnosis.test_diagnose import warm
 
 # --- The posterior: the same data, the same answer; what is planted leads, what nobody planted does not; ends of the
@@ -242,3 +243,14 @@ def test_gains_that_scatter_are_no_evidence_of_a_temperature() -> None:
         assert temperature_evidence(problem, given.baseline.fit) < 3.0
     warm = study(campaign(5, warmth, temperature=False, gain=0.005))
     assert temperature_evidence(warm.problem, warm.baseline.fit) > 10.0
+
+
+@pytest.mark.slow
+def test_what_stands_beside_a_certain_cause_was_refitted() -> None:
+    """Beside drag, four causes stood by the screen's promise: the refits had gone to rivals before drag led by itself."""
+    posterior = posterior_of(
+        fit_baseline(build_design(rehearsal(14, {"hydrodynamic_drag": 1.0, "torque_zero_shift": 1.5}, tests=3))), ()
+    )
+    standing = [alternative for alternative, share in posterior.probabilities.items() if share > 0.05]
+    assert standing == [Alternative(("hydrodynamic_drag", "squeeze_film"))]  # the simulated rig has a film
+    assert standing[0] in posterior.nodes

@@ -1,0 +1,118 @@
+"""The amplitudes of effects whose shapes and templates' errors act in proportion to them,
+
+    change = a φ + (a/a_f) Σ_k c_k φ_k,     c_k ~ N(0, sd_k²) a shape's or an error's, a_f the fitted amplitude
+
+Given the amplitudes the c are normal. Along an amplitude the density is that of the likeliest c there, with I, s the
+information and the score of (a, c) at the fit, δ = a - a_f and r = a/a_f:
+
+    ln p(a) = s_a δ - I_aa δ²/2 + max_c (r (s_c - I_ca δ)ᵀ c - r² cᵀ I_cc c/2 - Σ c²/(2 sd²))
+
+Were all jointly normal, an effect might vanish, or turn its sign, while its shapes' part explains the data: a film with 15
+nats of evidence was 1.9 ± 1.5 of its unit, and its sign was open. Integrated over the c instead, an effect with many that
+are determined is pulled towards nothing, for c has more room there (docs/appendix/diagnosis.md).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.design.design import IntArray
+from models.diagnosis.effects.fitted_effect import FittedEffect
+from models.gaussian_evidence import independent, log_sum
+
+#: Nodes along an amplitude [-]: over all amplitudes that are likely, and about that of the exact template; deviations that
+#: either reaches.
+_WIDE, _NEAR, _REACH = 401, 49, 8.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proportional:
+    """info [m, m] and score [m] of all amplitudes, shapes and errors, without their priors; their deviations `sd` [m],
+    infinite for an amplitude and 0 for what is not at work; the place `of` [m] their effect, amplitudes before the rest."""
+
+    info: FloatArray
+    score: FloatArray
+    sd: FloatArray
+    of: IntArray
+    effects: tuple[FittedEffect, ...]
+
+    def log_integral(self) -> float:
+        """ln of the integral over all [nats], over √2π for an amplitude; of two the second as if all were normal."""
+        return log_sum(self._along(np.full(len(self.effects), np.nan))[1])
+
+    def amplitudes(self, count: int, rng: np.random.Generator) -> Iterator[FloatArray]:
+        """What is to be added to the fitted amplitudes [e]: `count` values of each, drawn from equally probable strata."""
+        open_ = [np.full(len(self.effects), np.nan)]
+        for place in range(len(self.effects)):
+            further = []
+            for given in open_:
+                steps, logs = self._along(given)
+                gone = np.cumsum(np.exp(logs - logs.max()))
+                shares = (np.arange(count) + rng.random(count)) / count
+                for step in np.interp(shares, (gone - 0.5 * np.diff(gone, prepend=0.0)) / gone[-1], steps).tolist():
+                    more = given.copy()
+                    more[place] = step
+                    further.append(more)
+            open_ = further
+        return iter(open_)
+
+    def ratio(self, given: FloatArray) -> FloatArray:
+        """By how much [m] everything acts more than at the fit where these are added to the amplitudes (not known: NaN)."""
+        fitted = np.array([effect.amplitude for effect in self.effects])
+        return np.where(np.isinf(self.sd), 1.0, np.where(np.isnan(given), 1.0, 1.0 + given / fitted)[self.of])
+
+    def normal(self, given: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mean [m] and root [m, m] of the covariance of all where these are added to the amplitudes."""
+        info, score = self._beside(given)
+        mean, root = np.zeros(score.size), np.zeros(info.shape)
+        mean[np.isinf(self.sd)] = given
+        rest = np.flatnonzero(np.isfinite(self.sd) & (self.sd > 0))
+        sd = self.sd[rest]
+        values, vectors = independent(sd[:, None] * info[np.ix_(rest, rest)] * sd)
+        root[np.ix_(rest, rest)] = sd[:, None] * vectors / np.sqrt(1.0 + values)
+        mean[rest] = root[np.ix_(rest, rest)] @ root[np.ix_(rest, rest)].T @ score[rest]
+        return mean, root
+
+    def _beside(self, given: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Information and score where these are added to the amplitudes (not known: NaN)."""
+        ratio, step = self.ratio(given), np.zeros(self.sd.size)
+        step[np.isinf(self.sd)] = np.nan_to_num(given)
+        return self.info * ratio[:, None] * ratio, (self.score - self.info @ step) * ratio
+
+    def _along(self, given: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Steps [n] along the first amplitude that is not known, and logs [n] of the parts of the integral there [nats]."""
+        place = int(np.flatnonzero(np.isnan(given))[0])
+        info, score = self._beside(given)
+        at_work = self.sd > 0
+        at_work[np.flatnonzero(np.isinf(self.sd))[~np.isnan(given)]] = False
+        mine, others = np.flatnonzero(at_work & (self.of == place)), np.flatnonzero(at_work & (self.of != place))
+        known = info[np.ix_(others, others)] + np.diag(self.sd[others] ** -2.0)
+        absorbed = np.linalg.solve(known, np.column_stack([info[np.ix_(others, mine)], score[others]]))
+        across = info[np.ix_(mine, others)]
+        own, along = info[np.ix_(mine, mine)] - across @ absorbed[:, :-1], score[mine] - across @ absorbed[:, -1]
+        beyond = 0.5 * float(score[others] @ absorbed[:, -1] - np.linalg.slogdet(known)[1])
+        beyond -= float(np.log(self.sd[others][np.isfinite(self.sd[others])]).sum())
+        steps, logs = _along_amplitude(own, along, self.sd[mine[1:]], self.effects[place])
+        return steps, logs + beyond
+
+
+def _along_amplitude(
+    info: FloatArray, score: FloatArray, sd: FloatArray, fitted: FittedEffect
+) -> tuple[FloatArray, FloatArray]:
+    """Steps [n] from the fitted amplitude, and logs [n] of the parts of the integral there [nats]; info, score of (a, c) and
+    sd > 0 of c."""
+    values, vectors = independent(sd[:, None] * info[1:, 1:] * sd)
+    fixed, sloped = vectors.T @ (sd * score[1:]), vectors.T @ (sd * info[1:, 0])
+    # a jointly normal (a, c), and the exact template beside it
+    left = np.array([info[0, 0] - (sloped**2 / (1 + values)).sum(), info[0, 0]])
+    middle = (score[0] - np.array([(sloped * fixed / (1 + values)).sum(), 0.0])) / left
+    low, high = middle - _REACH * left**-0.5, middle + _REACH * left**-0.5
+    steps = np.unique([*np.linspace(low.min(), high.max(), _WIDE), *np.linspace(low[1], high[1], _NEAR)])
+    if fitted.effect.positive:
+        steps = np.array([-fitted.amplitude, *steps[steps > -fitted.amplitude]])
+    squared = np.square(1.0 + steps / fitted.amplitude)[:, None]
+    gain = squared * np.square(fixed - sloped * steps[:, None]) / (1 + squared * values) - np.log1p(values)
+    logs = score[0] * steps - 0.5 * info[0, 0] * np.square(steps) + 0.5 * gain.sum(axis=1)
+    return steps, np.asarray(logs + np.log(np.gradient(steps)) - 0.5 * np.log(2 * np.pi))

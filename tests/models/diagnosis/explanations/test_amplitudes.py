@@ -1,0 +1,62 @@
+"""Amplitudes to which shapes and templates' errors are in proportion, beside a dense sum and what is jointly normal."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.fitted_effect import FittedEffect
+from models.diagnosis.explanations.amplitudes import Proportional
+
+#: Rows of which an amplitude and what is in proportion to it change these [Nm], 1 Nm noise; fitted at an amplitude of 2.
+FORM, OFF = np.linspace(1.0, 2.0, 30), np.linspace(0.0, 3.0, 30) ** 2
+FITTED = FittedEffect(effect=BY_SLUG["oil_change"], amplitude=2.0, shape=(0.0, 0.0, 0.0))
+
+
+def given(sd: float, residual: np.ndarray, fitted: FittedEffect = FITTED) -> Proportional:
+    columns = np.stack([FORM, fitted.amplitude * OFF], axis=1)
+    return Proportional(
+        info=columns.T @ columns,
+        score=columns.T @ residual,
+        sd=np.array([np.inf, sd]),
+        of=np.array([0, 0]),
+        effects=(fitted,),
+    )
+
+
+def dense(sd: float, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Amplitudes and their density where what is in proportion is as it is likeliest, from the rows themselves."""
+    amplitudes, errors = np.linspace(-1.0, 5.0, 601), np.linspace(-6.0, 6.0, 601) * sd
+    model = amplitudes[:, None, None] * (FORM + errors[:, None] * OFF)
+    off = residual + FITTED.amplitude * FORM - model
+    logs = -0.5 * np.square(off).sum(axis=2) - 0.5 * np.square(errors / sd)
+    parts = np.exp(logs.max(axis=1) - logs.max())
+    return amplitudes, parts / parts.sum()
+
+
+@pytest.mark.parametrize("sd", [0.02, 0.3])
+def test_amplitudes_have_the_density_of_a_dense_sum(sd: float) -> None:
+    residual = np.random.default_rng(3).standard_normal(FORM.size) + 0.2 * FORM
+    amplitudes, density = dense(sd, residual)
+    found = FITTED.amplitude + np.concatenate(list(given(sd, residual).amplitudes(400, np.random.default_rng(0))))
+    expected = np.interp((0.05, 0.5, 0.95), np.cumsum(density), amplitudes)
+    np.testing.assert_allclose(np.quantile(found, (0.05, 0.5, 0.95)), expected, atol=0.02)
+
+
+@pytest.mark.parametrize("residual", [0.0, 0.2])
+def test_where_an_amplitude_is_well_determined_the_integral_is_that_of_a_normal(residual: float) -> None:
+    at_work = given(0.01, residual * FORM)
+    whole = at_work.info + np.diag([0.0, 0.01**-2.0])
+    normal = 0.5 * at_work.score @ np.linalg.solve(whole, at_work.score) - 0.5 * np.linalg.slogdet(whole)[1]
+    assert at_work.log_integral() == pytest.approx(normal - np.log(0.01), abs=0.05)
+
+
+def test_an_effect_does_not_vanish_while_what_is_in_proportion_to_it_explains_the_data() -> None:
+    """A shape that only scales the effect, by 1 ± 0.5: as jointly normal, an amplitude of 2 would be 2 ± 1."""
+    columns = np.stack([FORM, FITTED.amplitude * FORM], axis=1)
+    at_work = replace(given(0.5, np.zeros(FORM.size)), info=columns.T @ columns)
+    normal = np.linalg.inv(at_work.info + np.diag([0.0, 0.5**-2.0]))
+    assert normal[0, 0] ** 0.5 == pytest.approx(1.0, abs=0.02)
+    found = FITTED.amplitude + np.concatenate(list(at_work.amplitudes(1000, np.random.default_rng(0))))
+    assert np.mean(np.abs(found) < 0.5) < 0.002  # 0.06 of a normal
