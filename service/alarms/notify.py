@@ -144,7 +144,7 @@ def main() -> None:
             confine(private=task["private"])
             try:
                 answer["sent"] = bool(receiver.notify(body=task["body"], title=task["title"]))
-                answer["problem"] = "the receiver did not take it"
+                answer["problem"] = "the receiver did not accept it"
             except (NotAllowedError, PermissionError) as error:
                 answer["problem"] = f"not asked: {error}"
     sys.stdout.write(json.dumps(answer))

@@ -20,6 +20,7 @@ from service.lives.condition import (
     SHOWN,
     STATE_WORDS,
     bound_in_words,
+    chance_in_words,
     held_in_words,
     lower_bound,
     silence_in_words,
@@ -135,9 +136,9 @@ def _remaining_cycles(rule: AlarmIn, facts: Facts) -> Finding | None:
 
 
 def _left(rule: AlarmIn, cycles: float) -> str:
-    if rule.probability == _SAFE:
+    if rule.probability == _SAFE or cycles < 1.0:
         return bound_in_words(cycles)
-    return f"at most {cycles:,.0f} cycles are left with a probability of {rule.probability:.0%}"
+    return f"{chance_in_words(1.0 - rule.probability)} chance of {cycles:,.0f} or more cycles"
 
 
 def _remaining_days(rule: AlarmIn, facts: Facts) -> Finding | None:
@@ -164,10 +165,10 @@ def _shudder_margin(rule: AlarmIn, facts: Facts) -> Finding | None:
     if not margins:
         return None
     margin, pressure = min(margins)
-    words = f"the friction's slope at {rule.speed_rpm:g} rpm and {bar(pressure):g} bar is {margin:.3g} s/m or more with 95 %"
-    if rule.probability != _SAFE:
-        words = words.replace("or more with 95 %", f"at the quantile {rule.probability:g}")
-    return Finding(value=margin, words=words)
+    chance = f"{chance_in_words(1.0 - rule.probability)} chance of {margin:.3g} s/m or more"
+    return Finding(
+        value=margin, words=f"slope of friction at {rule.speed_rpm:g} rpm and {bar(pressure):g} bar: {chance}"
+    )
 
 
 def _held_runs(_rule: AlarmIn, facts: Facts) -> Finding | None:

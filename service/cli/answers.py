@@ -14,11 +14,13 @@ from service.cli.tables import pressure as pressure_of
 from service.client.clutchlife.transport import Service
 
 Method = Annotated[str | None, typer.Option(help="The filter: particle, ukf or grid")]
-AtCycles = Annotated[float | None, typer.Option(help="Answer with the runs up to these duty cycles only")]
+AtCycles = Annotated[float | None, typer.Option(help="Use only the runs up to these duty cycles")]
 Arguments = Annotated[
     list[str] | None,
     typer.Option(
-        "--query", metavar="NAME=VALUE", help="Any other argument of the route, as NAME=VALUE; may be repeated"
+        "--query",
+        metavar="NAME=VALUE",
+        help="Any other query parameter of the API's request, as NAME=VALUE; may be repeated",
     ),
 ]
 Csv = Annotated[bool, typer.Option("--csv", help="Print the answer as CSV")]
@@ -138,9 +140,9 @@ def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
             yield f"mean COF {cof} as measured at {current['measured_at_cycles']:,.0f} cycles"
         else:
             yield f"mean COF {cof}, {100 * fraction:.0f} % of new{_threshold(criterion)}"
-    if answer["at_least_at"] is not None:
+    if answer["at_least_at"] is not None and answer["at_least"] >= 1.0:
         pace = "planned pace" if answer.get("pace_from") == "request" else "pace of the runs"
-        yield f"at the {pace}: at least until {answer['at_least_at'][:10]}"
+        yield f"at the {pace}: safe until {answer['at_least_at'][:10]}"
     course = answer.get("course")
     described = "" if course is None else f", {_COURSES[course['name']]} ({chance(course['probability'])} sure)"
     effects = ", ".join(answer["model"]["effects"])
@@ -223,7 +225,8 @@ def _block(text: str) -> dict[str, float]:
 
 
 _TRACKED = (
-    "quantity", "bar", "rpm", "Hz", "last", "90 % band there", "initial", "change", "scale, cycles", "exponent", "P(eq. 6)",
+    "quantity", "bar", "rpm", "Hz", "last", "90 % band there", "initial", "change", "scale, cycles", "exponent",
+    "as expected",
 )  # fmt: skip
 _COEFFICIENTS = ("initial", "change", "scale_cycles", "exponent")
 

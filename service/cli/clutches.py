@@ -74,7 +74,7 @@ def list_clutches(
     """List clutches, worst first, with their state and remaining cycles."""
     chosen = {"state": state, "find": find, "archived": "true" if archived else None}
     items = service.pages("/v1/clutches", **{name: value for name, value in chosen.items() if value is not None})
-    columns = ("clutch", "state", "at", "at least", "median", "held")
+    columns = ("clutch", "state", "at", "safe for", "50 % chance of", "held")
     listed(
         items,
         as_json,
@@ -211,7 +211,7 @@ def model(
         current = service.get(address)
     else:
         current = service.put(address, json.dumps({"diagnosis_id": adopt}).encode())
-    print_line(f"{clutch} is tracked under: {_named(current['model'])}")
+    print_line(f"{clutch} is tracked with:  {_named(current['model'])}")
     for version in current["versions"]:
         since = f"  version {version['version']}, {version['adopted_at']}: {_named(version['model'])}"
         print_line(since + (f" by {version['diagnosis_id']}" if version["diagnosis_id"] else ""))

@@ -66,9 +66,9 @@ def restore(
     with errors_in_a_line():
         require_file(database, "put a dump back with pg_restore, while no service runs")
         kept = put_back(database, backup)
-    print_line(f"{backup} is in the place of {database}")
+    print_line(f"{database} now holds the backup {backup}")
     if kept is not None:
-        print_line(f"what was there is kept as {kept}")
+        print_line(f"the old database is kept as {kept}")
 
 
 if TYPE_CHECKING:
@@ -162,9 +162,9 @@ def verify(
         note = f"{count} results were made by release {version}: they can be computed again, and may differ (replay)"
         print_line(note)
     if inspections:
-        print_line(f"{inspections} inspections with {photographs} photographs are checked")
+        print_line(f"{inspections} inspections with {photographs} photographs were checked")
     summary = (
-        f"{runs} runs of {len(ids)} clutches are checked, {len(chosen)} clutches computed again: {findings} findings"
+        f"{runs} runs of {len(ids)} clutches were checked, {len(chosen)} clutches computed again: {findings} findings"
     )
     if findings:
         fail(summary)
@@ -234,7 +234,7 @@ def list_stores(database: Database = DATABASE) -> None:
     for store in stores:
         columns, blobs = numbers.get(store.address, (0, 0))
         used = ", in use" if store.in_use else ""
-        print_line(f"{store.address}: {columns} columns in {blobs} blobs{used}")
+        print_line(f"{store.address}: {columns} columns in {blobs} files{used}")
     if not any(store.in_use for store in stores):
         print_line("new raw records go into the database")
 
@@ -255,7 +255,7 @@ def move(to: Address, database: Database = DATABASE) -> None:
 
 @app.command()
 def relocate(
-    address: Annotated[str, typer.Argument(help="Where they were, as `list` shows it")],
+    address: Annotated[str, typer.Argument(help="The old address, as `list` shows it")],
     to: Address,
     database: Database = DATABASE,
 ) -> None:
@@ -267,14 +267,14 @@ def relocate(
 
     with existing(database) as opened:
         count = look_at(opened, address, to)
-    print_line(f"{count} blobs are looked for there")
+    print_line(f"{count} raw records are looked for there")
 
 
 @app.command()
 def collect(
     database: Database = DATABASE,
     grace_hours: Annotated[
-        float, typer.Option(min=_MIN_GRACE_HOURS, help="Keep blobs that are younger than this many hours")
+        float, typer.Option(min=_MIN_GRACE_HOURS, help="Keep files that are younger than this many hours")
     ] = _GRACE_HOURS,
 ) -> None:
     """Remove blobs that no run names, as interrupted posts and moves leave them. Safe while services run."""
@@ -282,5 +282,5 @@ def collect(
 
     with existing(database) as opened:
         for store in collect_all(opened, grace=grace_hours * _SECONDS_AN_HOUR):
-            line = f"{store.address}: {store.named} blobs in use, {store.removed} removed, {store.new} too new to be removed"
+            line = f"{store.address}: {store.named} files in use, {store.removed} removed, {store.new} too new to be removed"
             print_line(line)

@@ -225,9 +225,10 @@ def _gain(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     if gain["rmse_before_nm"] is not None:
         spread = "" if gain["reduction_percent_sd"] is None else f" ± {number(gain['reduction_percent_sd'], 2)}"
         yield Text(
-            f"On {len(gain['held_out_runs'])} held-out runs: error {number(gain['rmse_before_nm'])} Nm before, "
-            f"{number(gain['rmse_after_nm'])} Nm after ({number(gain['reduction_percent'])}{spread} % less); "
-            f"evidence for the extended model: {_evidence(gain['log_score_gain'])}"
+            f"On {len(gain['held_out_runs'])} runs that were left out of the fit: error "
+            f"{number(gain['rmse_before_nm'])} Nm before, {number(gain['rmse_after_nm'])} Nm after "
+            f"({number(gain['reduction_percent'])}{spread} % less); evidence for the extended model: "
+            f"{_evidence(gain['log_score_gain'])}"
         )
     life = gain["remaining_useful_life"]
     for when, title in (("before", "baseline"), ("after", "extended")):

@@ -94,7 +94,8 @@ def _show(shown: dict[str, Any]) -> None:
         read = column["channel"] is not None
         unit = column["unit"] if read else column["stated_unit"]
         cells = [
-            (column["channel"] or "left out") + (" (check: its title is known in part)" if column["in_part"] else ""),
+            (column["channel"] or "left out")
+            + (" (check: its title was recognised only in part)" if column["in_part"] else ""),
             unit or "",
             *(f"{column[name]:g}" if read else "" for name in ("scale", "offset")),
         ]
@@ -104,9 +105,9 @@ def _show(shown: dict[str, Any]) -> None:
     for warning in shown["warnings"]:
         print_line(f"{warning['code']}: {warning['message']}")
     pieces = f", {len(shown['pieces'])} pieces are cut" if shown["pieces"] else ""
-    cycles = "no cycles" if shown["cycles"] is None else f"{shown['cycles']:g} cycles"
+    cycles = "cycles not known" if shown["cycles"] is None else f"{shown['cycles']:g} cycles"
     out.print(
-        f"{shown['kind'] or 'kind not known'} at {cycles}: {shown['rows']} rows{pieces}, {len(shown['fits'])} curves"
+        f"{shown['kind'] or 'kind not known'}, {cycles}: {shown['rows']} rows{pieces}, {len(shown['fits'])} curves"
     )
     for fit in shown["fits"]:
         mse = "" if fit["mse_percent"] is None else f", MSE {fit['mse_percent']:.2g} %"

@@ -64,7 +64,8 @@ Decimal = Annotated[str | None, typer.Option(help="Decimal sign of text files, .
 Missing = Annotated[
     str | None,
     typer.Option(
-        help="Marks of missing values, such as -9999,n/a: their rows are left out; none: all numbers are measurements"
+        help="Marks of missing values, such as -9999,n/a; rows with such a mark are left out. "
+        "none: every number is a measurement"
     ),
 ]
 

@@ -34,7 +34,7 @@ def chance(value: float | None) -> str:
     """A probability in per cent, never rounded to certainty; "-" where there is none."""
     if value is None:
         return "-"
-    return "> 99 %" if 0.995 < value < 1.0 else "< 1 %" if 0.0 < value < 0.005 else f"{100 * value:.0f} %"
+    return "> 99 %" if value > 0.995 else "< 1 %" if value < 0.005 else f"{100 * value:.0f} %"
 
 
 def with_deviation(value: float | None, deviation: float | None) -> str:

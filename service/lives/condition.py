@@ -47,7 +47,7 @@ RANK_UNKNOWN = 2 * HORIZON
 
 
 def rank_of(summary: Mapping[str, Any]) -> float:
-    """Where a clutch comes in a list: the fewer cycles are left with 95 %, held runs considered, the earlier."""
+    """Where a clutch comes in a list: the fewer cycles it is safe for, held runs considered, the earlier."""
     if summary.get("status", INSUFFICIENT) == INSUFFICIENT:
         return RANK_UNKNOWN
     bound = lower_bound(summary["at_least"], (summary.get("with_held") or {}).get(SHOWN))
@@ -131,7 +131,7 @@ def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str
     """The first state that holds, and why as a clause; no reason where the statement of the remaining life is one."""
     held = summary.get("held", 0)
     if "status" not in summary:
-        return CHECK, held_in_words(held) if held else "no run yet that counts"
+        return CHECK, held_in_words(held) if held else "no run counts yet"
     status = summary["status"]
     worn = status == ENDED and summary["ended"]["reason"] == WORN
     near = None if status in (REACHED, INSUFFICIENT, ENDED) else _near_end(summary)
@@ -187,15 +187,15 @@ def _numbers_in_words(
     if own is not None and own >= 1.0 and among is not None and at_least is not None and at_least < own:
         runs = "the held run counts" if summary.get("held") == 1 else "the held runs count"
         if at_least < 1.0:
-            return f"if {runs}, no further cycle is certain; if not, at least {rounded_down(own)} (95 %)"
-        return f"at least {rounded_down(at_least)} more cycles (95 %) if {runs}, at least {rounded_down(own)} if not"
+            return f"no further cycle is safe if {runs}; {bound_in_words(own)} if not"
+        return f"{bound_in_words(at_least)} if {runs}, for {rounded_down(own)} if not"
     if summary["status"] in (REACHED, INSUFFICIENT, ENDED) or at_least is None or at_least < 1.0:
         return statement_of(summary, at_least)
     until = "" if date is None else f", until {date} at this pace"
-    bound = f"at least {rounded_down(at_least)} more cycles (95 %){until}"
+    bound = f"{bound_in_words(at_least)}{until}"
     if summary["status"] == PassageStatus.MAY_NEVER_REACH.value:
         return _left_open(bound, summary)
-    return f"{bound}; half of such clutches last another {_two_digits(summary['remaining_cycles']['0.5'])} or more"
+    return f"{bound}; 50 % chance of {_two_digits(summary['remaining_cycles']['0.5'])} or more"
 
 
 def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: Mapping[str, Any] | None) -> str:
@@ -302,8 +302,8 @@ def _left_open(bound: str, payload: Mapping[str, Any]) -> str:
 def bound_in_words(at_least: float | None) -> str:
     """The safe bound of the remaining cycles, rounded down to two digits."""
     if at_least is None or at_least < 1.0:
-        return "no further cycle is certain"
-    return f"at least {rounded_down(at_least)} cycles are left with 95 %"
+        return "no further cycle is safe"
+    return f"safe for {rounded_down(at_least)} more {'cycle' if at_least < 2.0 else 'cycles'} (95 %)"
 
 
 def rounded_down(cycles: float) -> str:

@@ -164,7 +164,7 @@ def _require_readings(channels: Mapping[str, FloatArray]) -> None:
     if (pressure * CHANNELS["pressure_bar"].factor >= UNLOADED).any():
         _require_curve(torque, speed, pressure)
     elif not speed.any():
-        _refuse("speed_rpm", speed, "open_at_rest", "at least one plateau must turn where none is loaded")
+        _refuse("speed_rpm", speed, "open_at_rest", "if no plateau is under load, at least one must turn")
     if not torque.any():
         _refuse("torque_nm", torque, "torque_all_zero", "at least one torque must differ from zero")
 

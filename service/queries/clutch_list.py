@@ -25,7 +25,7 @@ WITHIN = (0.0, 1e3, 1e4)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Totals:
-    """Clutches, archived ones too; how many of those in use have at most so many cycles left with 95 %; runs, and
+    """Clutches, archived ones too; how many of those in use are safe for at most so many more cycles (95 %); runs, and
     how many of them are held; ended lives that the fleets' priors know of; diagnoses that wait or run."""
 
     clutches: int

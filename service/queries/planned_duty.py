@@ -168,7 +168,9 @@ class _Counted:
         basis = self.severity.basis.value.replace("_", " ")
         if self.assumed and self.scale.reference is not None:
             recent = f"{self.scale.reference / 1e3:.3g} kJ a cycle of recent duty"
-            message = f"the record counts duty cycles; here a cycle counts by its energy beside the {recent}"
+            message = (
+                f"the clutch's record counts duty cycles; here each cycle counts by its energy, relative to {recent}"
+            )
             return [Notice(code="counted_by_energy", message=message)]
         if self.severity.basis is SeverityBasis.CYCLES:
             why = "the clutch's record counts duty cycles, whatever their severity (`severity.basis`)"

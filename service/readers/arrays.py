@@ -259,8 +259,8 @@ def refuse_counts(shown: str, values: NDArray[Any], stated: Mapping[str, Any]) -
         words = {word.lower() for word in words}
         if number is not None and ((words & _GAINS and number != 1) or (words & _OFFSETS and number != 0)):
             message = (
-                f"{shown} holds whole numbers beside {name} = {number:g}: save its physical values, or name the factor "
-                "scale_factor where it is still to be applied"
+                f"{shown} holds whole numbers beside {name} = {number:g}: save the physical values; if the "
+                "factor is still to be applied, name it scale_factor"
             )
             raise InvalidError.of(message, code="raw_counts")
 

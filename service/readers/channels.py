@@ -100,7 +100,7 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     except InvalidError as error:
         if not error.errors or error.errors[0].value != "nan":
             raise
-        detail = f"{error.detail}: missing=nan leaves such rows out"
+        detail = f"{error.detail}: add missing=nan to leave such rows out"
         raise InvalidError(detail, errors=error.errors, total=error.total) from None
     _refuse_standing(columns)
     return Channels(columns=columns, notices=tuple(notices), counts=counts, line_of=line_of, labels=labels(table.above))
@@ -113,8 +113,8 @@ def _refuse_standing(columns: Mapping[str, FloatArray]) -> None:
         return
     still = np.count_nonzero(np.diff(time_s) == 0)
     message = (
-        f"time_s stands still in {still} of {time_s.size - 1} steps: the clock is coarser than the rows; time=NAME takes a "
-        f"column of finer times, time={NO_TIME} none, where each row is a plateau"
+        f"time_s stands still in {still} of {time_s.size - 1} steps: the clock is coarser than the rows. Name a "
+        f"column of finer times with time=NAME; if each row is a plateau, send time={NO_TIME}"
     )
     raise InvalidError.of(message, code="time_stands", pointer="/channels/time_s")
 
@@ -318,8 +318,8 @@ def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> Notice |
     if not fractions and not (days.all() and np.ptp(times) < 5 and step < 1e-3):
         return None
     message = (
-        f"{column.shown()} may be days, as spreadsheets and MATLAB count dates, or seconds, got {times[0]:.9g} and steps of "
-        f"{step:.3g}: map=time_s:{name} [d], or [s], says which"
+        f"{column.shown()} may be seconds, or days as spreadsheets and MATLAB count them, got {times[0]:.9g} and steps of "
+        f"{step:.3g}: state the unit with map=time_s:{name} [d], or [s]"
     )
     raise InvalidError.of(message, code="missing_unit", pointer="/map")
 
@@ -333,7 +333,11 @@ def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Readin
         if index not in used and (column.title or column.name) and not (reading.time == NO_TIME and _is_time(column))
     ]
     part = [f"{column.channel} from {columns[column.index].shown()}" for column in taken if column.in_part]
-    notices = [Notice(code="name_in_part", message=f"names were understood in part: {', '.join(part)}")] if part else []
+    notices = (
+        [Notice(code="name_in_part", message=f"titles were recognised only in part:  {', '.join(part)}")]
+        if part
+        else []
+    )
     if not others:
         return notices
     more = f" and {len(others) - _MAX_NAMED} more" if len(others) > _MAX_NAMED else ""
@@ -375,12 +379,12 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
         notices.append(_brought(series, leading, kept))
     if invalid:
         shown = ", ".join(f"{name} {count}" for name, count in invalid.items())
-        message = f"samples without a valid value were left out, with all channels at their times: {shown}"
+        message = f"samples without a valid value were left out, in all channels:  {shown}"
         notices.append(Notice(code="invalid_samples", message=message))
     if kept.all():
         return columns
     if not kept.any():
-        message = "no sample is left: the channels have no time in common at which all are valid"
+        message = "no sample is left: at no time are all channels valid"
         raise InvalidError.of(message, code="empty", pointer="/channels")
     return {name: column[kept] for name, column in columns.items()}
 
@@ -424,6 +428,6 @@ def _brought(series: Mapping[str, _Series], leading: str, kept: NDArray[np.bool_
             rates.append(f"{name} ({own.values.size} samples, {step:.6g} s apart, from {own.times[0]:.9g} s)")
     shown = ", ".join(rates)[: 5 * MAX_QUOTED]
     cut = int(np.count_nonzero(~kept))
-    more = f"; {cut} of {kept.size} samples outside the time that all have in common were left out" if cut else ""
-    message = f"brought to the times of {leading} by straight lines between their own samples: {shown}{more}"
+    more = f"; {cut} of {kept.size} samples outside the common time range were left out" if cut else ""
+    message = f"brought to the times of {leading} by linear interpolation: {shown}{more}"
     return Notice(code="brought_to_one_clock", message=message)

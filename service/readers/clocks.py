@@ -72,9 +72,7 @@ def stated_clock(held: Mapping[str, float | str], rows: Callable[[], int], count
             against.append(f"{lasts:g} s for {samples:g} samples")
         if against or counted:
             shown = ", ".join([f"one every {step:g} s", *against, *filter(None, [counted])])[: 3 * MAX_QUOTED]
-            message = (
-                f"what stands beside the rows does not say their times clearly: {shown}; a column of times says them"
-            )
+            message = f"the times of the rows are not clear from the file: {shown}; add a column of times"
             raise InvalidError.of(message, code="ambiguous", pointer="/time")
         return evenly(in_seconds(*first), step, rows())
 

@@ -454,7 +454,7 @@ def _find(columns: Sequence[Column], channel: str, name: str) -> int:
         if matches:
             raise _twice(channel, *(columns[index] for index in matches))
     message = (
-        f"map names for {channel} the column {name[:MAX_QUOTED]!r}, which is not there; there are {_list(columns)}"
+        f"map names for {channel} the column {name[:MAX_QUOTED]!r}, which is not in the file; it has {_list(columns)}"
     )
     raise InvalidError.of(message, code="no_such_column", pointer="/map", value=name)
 
@@ -465,14 +465,14 @@ def _twice(channel: str, *columns: Column) -> InvalidError:
         names = [column.title[:MAX_QUOTED] or column.shown() for column in columns]
     shown = " and ".join(names[:_MAX_NAMED])
     distinct = len(set(names)) == len(names)
-    way = f"map={channel}:NAME chooses one" if distinct else "their names must differ"
+    way = f"choose one with map={channel}:NAME" if distinct else "their names must differ"
     message = f"{channel} must be one column, got {shown}; {way}"
     return InvalidError.of(message, code="ambiguous", pointer=f"/channels/{channel}", value=shown)
 
 
 def several_times(shown: str) -> InvalidError:
     """The error of times in several columns."""
-    message = f"time_s must be one column, got {shown}; time=NAME chooses one"
+    message = f"time_s must be one column, got {shown}; choose one with time=NAME"
     return InvalidError.of(message, code="ambiguous", pointer="/time")
 
 
@@ -516,7 +516,7 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
         own = column.unit or CHANNELS[channel].unit
         factor = number if "/" in scaled[0] else 1 / number
         mapped, others = f"map={channel}:{column.name}", f"[x{1 / factor:g} {own}] or [x1 {own}]"
-        rule = f"may be x{factor:g} {own}: {mapped} [x{factor:g} {own}], {others} says which"
+        rule = f"may be x{factor:g} {own}: state it with {mapped} [x{factor:g} {own}], {others}"
         raise _wrong_unit(channel, column, "missing_unit", rule, "no clear one")
     if choice is None:
         return "s" if column.unit is None and _key(column.name) in _SECONDS else column.unit
@@ -527,7 +527,7 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
         raise _wrong_unit(channel, column, "mixed_units", rule, repr((stated or "")[:MAX_QUOTED]))
     unit = wanted or stated
     if unit is None and not public and (word := _may_state(channel, column.name)):
-        rule = f"may be {word}: map={channel}:{column.name} [{word}], or [{CHANNELS[channel].unit}], says which"
+        rule = f"may be {word}: state it with map={channel}:{column.name} [{word}], or [{CHANNELS[channel].unit}]"
         raise _wrong_unit(channel, column, "missing_unit", rule, "no clear one")
     return unit
 

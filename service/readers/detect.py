@@ -78,8 +78,8 @@ _FOREIGN = {
     b"CPYA": "an Origin project (Origin exports a worksheet as CSV or XLSX)",
     b"\x93NUMPY": "an array of NumPy, which has no titles (numpy.savetxt with header= writes them)",
     b"ARROW1": "an Arrow file (pyarrow, polars and pandas write Parquet as well)",
-    b"[{": "JSON: post it to the address of the runs",
-    b"{": "JSON: post it to the address of the runs",
+    b"[{": "JSON: send it to POST /v1/clutches/ID/runs",
+    b"{": "JSON: send it to POST /v1/clutches/ID/runs",
 }
 #: Suffixes of what is never a record; files in an archive are often accompanied by such.
 _NO_RECORDS = (
@@ -152,7 +152,7 @@ def sniff(path: Path, filename: str, limits: Limits) -> Format:
         if head.startswith(magic) and not (magic == b"BM" and head.isascii()):
             raise InvalidError(f"{shown} must be {FORMATS}, got {foreign}")
     if by_suffix := _SUFFIXES.get(suffix):
-        raise InvalidError(f"{shown} is named as {by_suffix} but does not begin as one")
+        raise InvalidError(f"{shown} is named like {by_suffix} but does not begin like one")
     return Format.TEXT
 
 

@@ -264,7 +264,7 @@ def refuse_factors(above: Sequence[Sequence[str]]) -> None:
             what = (
                 f"the line {row[0][:MAX_QUOTED]!r} holds factors, which may have been applied or not, got {others[0]}"
             )
-            raise InvalidError.of(f"{what}: take it out of a file of physical values", code="raw_counts")
+            raise InvalidError.of(f"{what}: remove this line if the file holds physical values", code="raw_counts")
 
 
 def is_footer(row: Row, other: Row) -> bool:

@@ -45,7 +45,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
 
     notices = []
     if head.startswith(b"UnFinMF"):
-        message = "the MDF4 file was not finalised by its recorder: rows are counted by what it holds"
+        message = "the recorder did not finalise the MDF4 file: the rows in the file were counted"
         notices.append(Notice(code="not_finalised", message=message))
     several = len({group for group, _ in places}) > 1
     columns = tuple(_column(file, group, index, several) for group, index in places)

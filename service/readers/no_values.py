@@ -80,9 +80,10 @@ def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, re
     shown = f"{value:.9g}"
     missing = ",".join([mark for mark in reading.missing.split(",") if mark.strip()] + [shown])
     message = (
-        f"{place(name, row, line_of)} may stand for no value, got {shown}, in {np.count_nonzero(column == value)} of "
+        f"{place(name, row, line_of)} may mark a missing value, got {shown}, in {np.count_nonzero(column == value)} of "
         f"{column.size} rows; half of the others lie between {np.quantile(measured, 0.25):.6g} and "
-        f"{np.quantile(measured, 0.75):.6g}: missing={missing} leaves it out, missing={NO_MISSING} takes it as measured"
+        f"{np.quantile(measured, 0.75):.6g}. To leave these rows out, add missing={missing}; if they were measured, "
+        f"add missing={NO_MISSING}"
     )
     raise InvalidError.of(message, code="no_value", pointer=f"/channels/{name}/{row}", row=row + 1, value=shown)
 

@@ -182,7 +182,7 @@ class Numerals:
         unit = self._units.get(index, "")
         for row, cell in enumerate(cells):
             if self._column(index, "no time", [cell]) is None:
-                rule = f"must be a number in {unit}, as the first" if unit else "must be a number"
+                rule = f"must be a number in {unit}, as in the first row" if unit else "must be a number"
                 if self.decimal and not unit and isinstance(cell, str) and swapped._floats([cell]) is not None:
                     rule = f"must have the decimal sign {self.decimal!r} as before"
                 elif name == "time_s":
@@ -216,8 +216,8 @@ def _shown(cell: Any) -> str:
 def _remedy(shown: str) -> str:
     """What helps where a cell is empty, or holds a word or a sign that may stand for no value."""
     if not shown:
-        return ": fill the cell, or take its row out of the file; missing=empty leaves such rows out"
-    return "" if any(map(str.isdigit, shown)) or "," in shown else f": missing={shown} leaves such rows out"
+        return ": fill the cell, or take its row out of the file; or add missing=empty to leave such rows out"
+    return "" if any(map(str.isdigit, shown)) or "," in shown else f": add missing={shown} to leave such rows out"
 
 
 def empty_cells(name: str, rows: Sequence[int], line_of: LineOf | None, last: int) -> InvalidError:

@@ -132,7 +132,7 @@ def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Lim
             raise _too_much(kind)
         if -ended.returncode in _CRASHES:  # in the C code of its library, which is what the process is for
             crash = _ending(ended.returncode)
-            why = f"it is damaged, or not such a file: the library that reads it ended with {crash}"
+            why = f"it is damaged, or of another type: the library that reads it ended with {crash}"
             raise _unreadable(kind, why, "reader_crashed")
         if ended.returncode:
             raise _unreadable(kind, f"its reader ended with {_ending(ended.returncode)}")

@@ -146,7 +146,7 @@ def only(names: Sequence[str], wanted: str, kind: str) -> int:
         return 0
     shown = ", ".join(repr(name[:MAX_QUOTED]) for name in names[:10]) + (" ..." if len(names) > 10 else "")
     missing = f"has no {kind} {wanted[:MAX_QUOTED]!r}" if wanted else f"holds {len(names)} {kind}s with channels"
-    message = f"the file {missing}: table=NAME chooses one of {shown}"
+    message = f"the file {missing}: choose one with table=NAME, from {shown}"
     raise InvalidError.of(message, code="which_table", pointer="/table")
 
 

@@ -22,7 +22,7 @@ def planned_tests(path: Path, alternative: int) -> list[PlannedTest]:
     text = path.read_text(encoding="utf-8-sig")
     tests = _of_json(path, text) if text.lstrip().startswith("{") else _of_csv(text)
     if alternative not in tests:
-        raise ValueError(f"{path} has {len(tests)} alternatives, not one of number {alternative}")
+        raise ValueError(f"{path} has {len(tests)} alternatives, no alternative {alternative}")
     return [_planned(f"{path}, step {number}", step) for number, step in enumerate(tests[alternative], start=1)]
 
 

@@ -51,7 +51,7 @@ def read_file_run(
     kind, cycles = kind or stated.kind, stated.cycles if cycles is None else cycles
     if kind is None or cycles is None:
         name = "kind" if kind is None else "cycles"
-        where = "no rig was named" if profile is None else f"the rig's profile finds none for {filename!r}"
+        where = "no rig was named" if profile is None else f"the rig's profile finds no cycles for {filename!r}"
         message = f"{name} must be given: {where}"
         raise InvalidError.of(message, code="missing", pointer=f"/query/{name}")
     run = run_of(
@@ -89,7 +89,7 @@ def run_of(
             errors=errors,
         )
     if kind == "stationary_stribeck" and read.counts and _holds_no_dwell(columns):
-        message = "by the recorder's clock nothing is held for a while: each row was taken for a plateau"
+        message = "the recorder's times show no plateaus: each row was taken for a plateau"
         notices.append(Notice(code="counting_clock", message=message))
         columns = {name: column for name, column in columns.items() if name != "time_s"}
         check_arrays(columns)  # a plateau has no negative pressure, which a sample may have
@@ -131,7 +131,7 @@ def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:
 def _way_out(channel: str, notices: Sequence[Notice]) -> str:
     """What helps where a column that was left out may be the missing channel."""
     left_out = next((notice.message for notice in notices if notice.code == LEFT_OUT), "")
-    return f"; {left_out}; map={channel}:NAME takes one of them" if left_out else ""
+    return f"; {left_out}; choose one of them with map={channel}:NAME" if left_out else ""
 
 
 def _holds_no_dwell(columns: Mapping[str, FloatArray]) -> bool:

@@ -108,7 +108,7 @@ class BeforeAndAfter(Answer):
 
 
 class GainOut(Answer):
-    """What the extended model gains on held-out runs."""
+    """What the extended model gains on runs that were left out of the fit."""
 
     held_out_runs: list[str] = Field(description="The runs that were held out")
     rmse_before_nm: Number = Field(description="The baseline's error, RMS, Nm")
@@ -274,7 +274,7 @@ class DiagnosisListed(Answer):
     candidates: list[CandidateOut] = Field(description="The effects that competed, most probable first")
     baseline: MisfitOut = Field(description="The baseline's error")
     extended: MisfitOut = Field(description="The extended model's error")
-    gain: GainOut = Field(description="What the extended model gains on held-out runs")
+    gain: GainOut = Field(description="What the extended model gains on runs that were left out of the fit")
     advice: list[AdviceOut] = Field(description="Tests that would distinguish the remaining explanations")
     visible: list[VisibleOut] = Field(description="The smallest amplitude of each effect that these data would show")
     notes: list[str] = Field(description="Assumptions and omissions")

@@ -241,7 +241,7 @@ class HeldRuns(Answer):
 AtLeast = Annotated[
     float | None,
     Field(
-        description="Safe bound: at least this number of duty cycles is left with a probability of 95 %. The "
+        description="Safe bound: with a probability of 95 % the clutch lasts this number of duty cycles or more. The "
         "lower of the values with and without held runs, at most up to the horizon; null before the "
         "first test"
     ),
@@ -350,7 +350,7 @@ class PlannedBlock(Schema):
     def _complete(self) -> "PlannedBlock":
         """What says nothing without another field is refused with a reason, rather than left out in silence."""
         if self.sd > 0.0 and self.energy_per_cycle_kj is None:
-            raise ValueError("sd needs energy_per_cycle_kj, whose standard deviation it is")
+            raise ValueError("sd needs energy_per_cycle_kj: it is the standard deviation of this energy")
         if self.sd > (self.energy_per_cycle_kj or 0.0):
             raise ValueError("sd must not be larger than energy_per_cycle_kj")
         if self.initial_speed_rpm is None and (self.engagement_duration_s or self.maximum_pressure_bar):

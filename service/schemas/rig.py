@@ -86,7 +86,7 @@ class RigProfile(Schema):
             if twice is not None:
                 raise ValueError(f"each {name} must stand once among the columns, {twice!r} stands twice")
         if not any(column.channel for column in self.columns):
-            raise ValueError("at least one column must be a channel's")
+            raise ValueError("at least one column must hold a channel")
         return self
 
 

@@ -141,7 +141,7 @@ def require_scope(grant: Grant, scope: Scope) -> None:
 def _require_own(grant: Grant, clutch_id: str | None) -> None:
     if grant.clutches is not None and clutch_id not in grant.clutches:
         subject = "all clutches" if clutch_id is None else f"clutch {clutch_id[:80]!r}"
-        raise ForbiddenError(f"the key is bound to some clutches, and this concerns {subject}")
+        raise ForbiddenError(f"the key is limited to some clutches, and the request concerns {subject}")
 
 
 def _stamp(moment: datetime) -> str:

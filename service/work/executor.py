@@ -254,7 +254,7 @@ class Processes(_Elsewhere):
         try:
             answer: tuple[Any, Exception | None] = future.result()
         except BrokenExecutor as error:
-            raise WorkerLostError("the process that computed this ended, and so did each repetition") from error
+            raise WorkerLostError("the process that computed this ended at each attempt") from error
         except Exception as error:  # noqa: BLE001  (an input or a result that cannot be pickled)
             return None, error
         return answer
@@ -451,7 +451,7 @@ class Ending(Enum):
     STORED = "its result is stored"
     NOTHING = "there was nothing to compute"
     FAILED = "loading or computing raised an error"
-    LEFT = "what it follows from had changed at each attempt"
+    LEFT = "its input changed during each attempt"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

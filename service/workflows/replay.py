@@ -86,7 +86,7 @@ def as_job(
 
 
 _STEP = "replays the clutches"
-_LEFT = f"unchanged: runs arrived each of the {MAX_ATTEMPTS} times that it was recomputed; replay it when fewer arrive"
+_LEFT = f"unchanged: runs arrived during each of {MAX_ATTEMPTS} attempts; replay it when fewer runs arrive"
 
 
 def _replaced(database: Database, recorded: Recorded, replayed: Recomputed) -> bool:

@@ -72,7 +72,7 @@ def test_the_tutorial_and_the_tasks_run(tmp_path: Path) -> None:
                 assert done.returncode == 0, f"{name}:\n{done.stdout[-1500:]}\n{done.stderr[-1500:]}"
             said[name] = outputs[0].stdout + outputs[1].stdout
     tutorial = said["tutorial/first-life.md"]
-    assert "cycles are left with 95 %" in tutorial
+    assert "more cycles (95 %)" in tutorial
     assert "The cause is named: oil temperature" in tutorial
     assert "extended (oil_temperature)" in tutorial
     assert '"order a set"' in tutorial

@@ -132,9 +132,9 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
     if not sizes.draws:
         return ""
     if gain is not None and gain.rmse_after > criteria.MOST_WORSE * gain.rmse_before:
-        return "The extension is not proposed: its error on held-out runs is larger than the baseline's."
+        return "The extension is not proposed: its error on left-out runs is larger than the baseline's."
     if gain is not None and gain.log_score_gain < 0:
-        return "The extension is not proposed: held-out runs are less likely with it than without."
+        return "The extension is not proposed: left-out runs are more likely with the baseline."
     return " ".join(
         _unsure(slug, size) for slug, size in sizes.by_slug.items() if size.other_sign > criteria.SIGN_UNDETERMINED
     )
@@ -144,7 +144,7 @@ def _unsure(slug: str, size: Size) -> str:
     effect = BY_SLUG[slug]
     low, high = (number(effect.scale * end) for end in size.interval)
     wrong = f"its sign may be wrong with probability {size.other_sign:.2f}"
-    why = f"it depends on the course over life that is assumed, and {wrong}" if size.courses else wrong
+    why = f"it depends on the assumed course over life, and {wrong}" if size.courses else wrong
     return (
         f"The extension is not proposed: these data do not determine the size of {effect_name(slug)} "
         f"(90 % interval {low} to {high} {effect.unit}); {why}."

@@ -168,8 +168,8 @@ def _adequate(report: Report) -> list[Sentence]:
     if report.scatter is not None and report.scatter.lower > criteria.USUAL_GAIN:
         sentences.append(
             Sentence(
-                "The runs scatter more than usual, which a zero that wanders between runs would also cause: repeat a "
-                "test at once."
+                "The runs scatter more than usual. A zero that drifts between runs would also cause this: repeat a test "
+                "at once."
             )
         )
     sentences += _unseen(report)
@@ -197,7 +197,7 @@ def _unseen(report: Report) -> list[Sentence]:
         sentences = [Sentence(f"{say}: {conjunction(shown)}.")]
     if report.unseen:
         names = conjunction([effect_name(slug) for slug in report.unseen])
-        sentences.append(Sentence(f"These would not have shown at any size: {names}.", SHOULD))
+        sentences.append(Sentence(f"These data cannot show, at any size:  {names}.", SHOULD))
     return sentences
 
 
@@ -299,7 +299,7 @@ def _open(
 ) -> list[Sentence]:
     """What is certain with its size, and the alternatives in words."""
     if not sure:
-        first = "One explanation stands (with its probability)"
+        first = "One explanation remains (with its probability)"
         if len(alternatives) > 1:
             first = "These data cannot distinguish between the following explanations (with probabilities)"
         return [Sentence(f"The data disagree with the model. {first}: {_either(alternatives)}.")]
@@ -310,7 +310,7 @@ def _open(
     if len(alternatives) == 1:
         sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
     elif alternatives:
-        sentences.append(Sentence(f"What else is at work is open (with probabilities): {_either(alternatives)}."))
+        sentences.append(Sentence(f"What else may be at work (with probabilities): {_either(alternatives)}."))
     return sentences
 
 
@@ -375,7 +375,7 @@ def _gained(report: Report) -> list[Sentence]:
     }.get(report.verdict, "the extended model")
     change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} % {way}"
     sentences = [
-        Sentence(f"On held-out runs, the error of {model} is {change}.", SHOULD),
+        Sentence(f"On left-out runs, the error of {model} is {change}.", SHOULD),
         Sentence(_hardest(gain, report.extended)),
     ]
     if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
@@ -399,7 +399,8 @@ def _hardest(gain: Gain, extended: Misfit | None) -> str:
     if hardest.beyond > 0.0:
         kept = f"{number(size * hardest.beyond)} {unit} outside the others' range"
     error = f"{number(hardest.rmse)} Nm RMS (fit: {number(extended.rmse)} Nm)."
-    return f"Held-out runs are predicted worst at {number(size * hardest.value)} {unit}, {kept}: {error}"
+    place = f"{number(size * hardest.value)} {unit}, {kept}"
+    return f"Left-out runs are predicted worst at {place}: {error}"
 
 
 def _next(report: Report) -> list[Sentence]:

@@ -52,14 +52,18 @@ def transmit(
                 fail(f"{error}; {_left(spools)}", EX_DATAERR)
     out.print(str(sent))
     if sent.failed:
-        fail(f"the service did not take {sent.failed} runs; {_left(spools)}", EX_TEMPFAIL)
+        fail(
+            f"the service did not accept {sent.failed} {'run' if sent.failed == 1 else 'runs'}; {_left(spools)}",
+            EX_TEMPFAIL,
+        )
     if sent.refused:
         fail(f"the service refused runs, which stay in {spools[0].folder}. Reasons: clutchlife spool list", EX_DATAERR)
 
 
 def _left(spools: Sequence[Spool]) -> str:
     """How many runs wait, and where."""
-    return f"{sum(len(spool.waiting()) for spool in spools)} runs wait in {spools[0].folder}"
+    count = sum(len(spool.waiting()) for spool in spools)
+    return f"{'1 run waits' if count == 1 else f'{count} runs wait'} in {spools[0].folder}"
 
 
 #: Runs in a row that an otherwise present service does not answer, after which it is taken to be away. Chosen: one run that
@@ -151,7 +155,7 @@ def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Repo
 def _stays(spool: Spool, entry: Entry, sent: Sent, report: Report, reason: str) -> None:
     sent.failed += 1
     spool.note(entry, failures=entry.failures + 1)
-    report(f"not taken, {reason}: {entry.label} stays in the spool, {spool.body(entry)}")
+    report(f"not accepted, {reason}: {entry.label} stays in the spool, {spool.body(entry)}")
 
 
 def _refused(spool: Spool, entry: Entry, error: RefusedError, report: Report) -> None:

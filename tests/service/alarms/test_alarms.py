@@ -60,7 +60,7 @@ def test_a_posted_run_raises_an_alarm_once(life: TestClient) -> None:
     (raised,) = events(life)
     assert raised["state"] == "raised"
     assert raised["value"] < limit == raised["limit"]
-    assert raised["message"].startswith("e: at least ")
+    assert raised["message"].startswith("e: safe for ")
 
 
 def test_a_rule_looks_at_clutches_as_they_are(life: TestClient) -> None:
@@ -167,9 +167,9 @@ def test_a_deleted_rule_clears_what_it_raised(life: TestClient) -> None:
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"quantity": "remaining_cycles", "probability": 0.5, "below": 1e9}, "cycles are left"),
+        ({"quantity": "remaining_cycles", "probability": 0.5, "below": 1e9}, "50 % chance of "),
         ({"quantity": "health", "below": 1.0}, "its health is"),
-        ({"quantity": "shudder_margin", "below": 100.0}, "slope at 100 rpm"),
+        ({"quantity": "shudder_margin", "below": 100.0}, "slope of friction at 100 rpm"),
         ({"quantity": "off_course"}, "off its course"),
         ({"quantity": "held_runs"}, "1 held run waits"),
         ({"quantity": "state"}, "function check"),

@@ -104,7 +104,7 @@ def test_a_plan_is_run_on_the_clutch_that_was_simulated_and_never_twice_the_same
 @pytest.mark.parametrize(
     ("written", "words"),
     [
-        ("nothing", "has 0 alternatives, not one of number 1"),
+        ("nothing", "has 0 alternatives, no alternative 1"),
         (PLAN.replace("4 5", "4 x"), "pressures_bar.1: must be a number"),
         ("{}", "is not a plan as the service answers it"),
     ],

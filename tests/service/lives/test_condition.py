@@ -140,25 +140,25 @@ def test_page_and_answer_say_the_same_of_held_runs_before_a_prediction() -> None
     among = nothing | {"at_least": 0.0}
     known = summary(1800.0, held=1, with_held={"particle": among}, ended=None, **nothing | {"runs_used": 2})
     (warning,) = beside_held(known | {"warnings": ()}, known, among, 1)["warnings"]
-    assert warning["message"].endswith("with them the remaining life is not known: no further cycle is certain")
-    assert "if the held run counts, no further cycle is certain" in top_line(known, disputed=False)["headline"]
+    assert warning["message"].endswith("with them the remaining life is not known: no further cycle is safe")
+    assert "no further cycle is safe if the held run counts" in top_line(known, disputed=False)["headline"]
 
 
 @pytest.mark.parametrize(
     ("known", "disputed", "name", "words"),
     [
         (summary(0.0, status="reached"), True, "failure", "slope, 100 rpm, 5 bar below 0"),
-        (summary(2000.0, held=2), True, "maintenance", "less than 20 % of its life may be left: at least 2,000 cycles"),
+        (summary(2000.0, held=2), True, "maintenance", "less than 20 % of its life may be left: safe for 2,000 more cycles"),
         (summary(9000.0, current={"health": 0.05}), True, "maintenance", "near its limit, slope, 100 rpm, 5 bar below 0"),
-        (summary(9000.0, held=1, with_held={"particle": {"at_least": 3149.0}}), True, "check", "at least 3,100 cycles"),
+        (summary(9000.0, held=1, with_held={"particle": {"at_least": 3149.0}}), True, "check", "safe for 3,100 more cycles"),
         (summary(800.0, status="insufficient_data", runs_used=2), True, "check", "2 of the 3 tests"),
         (summary(9000.0), True, "out_of_specification", "data and model disagree"),
         (summary(9000.0, status="may_never_reach", current={"health": 0.27}), False, "normal", "probability of 94 %"),
         (
             summary(9000.0, status="may_never_reach"), False, "normal",
-            "at least 9,000 cycles are left with 95 %; the tests do not yet show how many more (the end",
+            "safe for 9,000 more cycles (95 %); the tests do not yet show how many more (the end",
         ),
-        ({}, False, "check", "no run yet"),
+        ({}, False, "check", "no run counts yet"),
     ],
     ids=str,
 )  # fmt: skip
@@ -185,37 +185,37 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
     [
         (
             summary(9450.0, pace=PACE), None,
-            "Normal: at least 9,400 more cycles (95 %), until 10 Dec 2026 at this pace; half of such clutches last "
-            "another 9,400 or more",
+            "Normal: safe for 9,400 more cycles (95 %), until 10 Dec 2026 at this pace; 50 % chance of 9,400 or more",
             "Nothing to do: carry on testing.",
         ),
         (
             summary(2000.0, pace=PACE), None,
-            "Maintenance required: less than 20 % of its life may be left; at least 2,000 more cycles (95 %), "
-            "until 3 Dec 2026 at this pace; half of such clutches last another 2,000 or more",
+            "Maintenance required: less than 20 % of its life may be left; safe for 2,000 more cycles (95 %), "
+            "until 3 Dec 2026 at this pace; 50 % chance of 2,000 or more",
             "Replace before 3 Dec 2026.",
         ),
         (summary(2000.0), None, "Maintenance required: ", "Replace it soon."),
         (
             summary(9450.0, status="may_never_reach", pace=PACE), None,
-            "Normal: at least 9,400 more cycles (95 %), until 10 Dec 2026 at this pace; the tests do not yet show",
+            "Normal: safe for 9,400 more cycles (95 %), until 10 Dec 2026 at this pace; the tests do not yet show",
             "Nothing to do: carry on testing.",
         ),
         (summary(0.0, status="reached"), None, "Failure: the end of life is reached: slope", "Replace the clutch."),
         (
             summary(9000.0, **HELD), None,
-            "Function check: 1 run is held and does not count; at least 3,100 more cycles (95 %) if the held run "
-            "counts, at least 9,000 if not",
+            "Function check: 1 run is held and does not count; safe for 3,100 more cycles (95 %) if the held run "
+            "counts, for 9,000 if not",
             "Confirm, correct or withdraw one held run.",
         ),
         (
             summary(9000.0, held=2, with_held={"particle": HELD["with_held"]["particle"] | {"at_least": 0.0}}), None,
-            "Function check: 2 runs are held and do not count; if the held runs count, no further cycle is ",
+            "Function check: 2 runs are held and do not count; no further cycle is safe if the held runs "
+            "count; safe for 9,000 more cycles (95 %) if not",
             "Confirm, correct or withdraw 2 held runs.",
         ),
         (
             summary(800.0, status="insufficient_data", runs_used=2), None,
-            "Function check: 2 of the 3 tests that a prediction needs; the remaining life is not known yet: at least",
+            "Function check: 2 of the 3 tests that a prediction needs; the remaining life is not known yet: safe for",
             "Run one more stationary test: then the remaining life is predicted.",
         ),
         (
@@ -228,7 +228,7 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
             "Function check: 1 of the 3 tests that a prediction needs, 6 more cannot be compared with the first; ",
             "Run 2 more stationary tests, at different cycles, at the pressures and the oil temperature of the first: then",
         ),
-        ({}, None, "Function check: no run yet", "Run 3 more stationary tests, at different cycles: then "),
+        ({}, None, "Function check: no run counts yet", "Run 3 more stationary tests, at different cycles: then "),
         (summary(9000.0), found(["oil_temperature"], adoptable=True), "Out of specification: ", "Adopt the model with oil"),
         (
             summary(9000.0), found(["inertia_torque", "squeeze_film"], ["inertia_torque", "squeeze_film"]),

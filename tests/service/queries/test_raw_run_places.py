@@ -72,7 +72,7 @@ def test_a_run_is_the_same_wherever_its_channels_are(place: str, database_url: s
         assert "raw" not in checks
     if place != DATABASE:
         assert len(blobs(place)) == 2  # speed and torque; time and pressure deflate to little
-    assert "1 runs of 1 clutches are checked" in clutchlife("verify", "--database", database_url)
+    assert "1 runs of 1 clutches were checked" in clutchlife("verify", "--database", database_url)
     clutchlife("replay", "--database", database_url)
 
 
@@ -159,10 +159,10 @@ def test_backup_names_what_it_leaves_out_and_the_commands_say_where_it_is(
     said = clutchlife("backup", str(tmp_path / "a.db"), "--database", database_url)
     assert f"2 raw records are not in it, they are in {in_folder}" in said
     given = ("--database", database_url)
-    assert clutchlife("raw", "list", *given) == f"{in_folder}: 2 columns in 2 blobs, in use\n"
+    assert clutchlife("raw", "list", *given) == f"{in_folder}: 2 columns in 2 files, in use\n"
     assert clutchlife("raw", "move", "--to", in_bucket, *given).strip() == "2 columns are moved"
     listed = clutchlife("raw", "list", *given)
-    assert f"{in_folder}: 0 columns in 0 blobs\n{in_bucket}: 2 columns in 2 blobs, in use\n" == listed
+    assert f"{in_folder}: 0 columns in 0 files\n{in_bucket}: 2 columns in 2 files, in use\n" == listed
     assert "2 too new to be removed" in clutchlife("raw", "collect", *given)
     clutchlife("raw", "collect", "--grace-hours", "0.5", *given, code=64)
     assert clutchlife("raw", "move", "--to", DATABASE, *given).strip() == "2 columns are moved"

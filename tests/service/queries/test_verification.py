@@ -162,7 +162,7 @@ def verify(url: str, *, code: int = 0) -> str:
 def test_a_backup_holds_inspections_and_photographs_and_verify_checks_them(copy: str) -> None:
     with closing(find_database(copy)) as database:
         assert check_inspections(database, "c1") == CheckedInspections(inspections=2, photographs=3, findings=())
-    assert "2 inspections with 3 photographs are checked" in verify(copy)
+    assert "2 inspections with 3 photographs were checked" in verify(copy)
 
 
 @pytest.mark.parametrize(

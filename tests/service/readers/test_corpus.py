@@ -352,7 +352,7 @@ def test_dates_beside_each_channel_are_counted_from_one_moment(tmp_path: Path) -
 def test_the_time_of_a_table_of_one_value_a_row_is_chosen(tmp_path: Path) -> None:
     text = long("Tag,Start time [ms],Time [s],Value", "{channel},{ms},{t},{value}").replace(",0.0,0.0,", ",9.5,0.0,")
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(InvalidError, match="got Start time and Time; time=NAME chooses one"):
+    with pytest.raises(InvalidError, match="got Start time and Time; choose one with time=NAME"):
         read_file(tmp_path / "a.csv", filename="a.csv")
     require_record(tmp_path / "a.csv", Reading(time="Time [s]"))
 
@@ -375,7 +375,7 @@ REFUSED = {
     "units-in-cells-that-differ": (
         "t [s];M\n0;21 Nm\n1;22 mNm\n",
         None,
-        "torque_nm[1] (line 3) must be a number in Nm, as the first, got '22 mNm'",
+        "torque_nm[1] (line 3) must be a number in Nm, as in the first row, got '22 mNm'",
     ),
     "a-unit-in-one-cell": (
         "t [s];M [Nm]\n0;21\n1;22 Nm\n",
@@ -385,7 +385,7 @@ REFUSED = {
     "a-unit-in-all-cells-but-one": (
         "t [s];M\n0;21 Nm\n1;22\n",
         None,
-        "torque_nm[1] (line 3) must be a number in Nm, as the first, got '22'",
+        "torque_nm[1] (line 3) must be a number in Nm, as in the first row, got '22'",
     ),
     "an-unknown-unit": ("t [s];M [10 Nm]\n0;1\n1;2\n", None, "got '10 Nm'; map=torque_nm:M [UNIT] says which it is"),
     "two-zones": (
@@ -409,7 +409,7 @@ REFUSED = {
     "two-torques-understood-in-part": (
         "t [s];p [bar];n [rpm];Torque FZG [Nm];Torque HBM [Nm]\n0;5;100;1;2\n",
         None,
-        "torque_nm must be one column, got Torque FZG and Torque HBM; map=torque_nm:NAME chooses one",
+        "torque_nm must be one column, got Torque FZG and Torque HBM; choose one with map=torque_nm:NAME",
     ),
     "a-clock-in-whole-seconds": (
         "Time,p [bar],n [rpm],M [Nm]\n" + "".join(f"08:00:0{k // 10},5,{k},20\n" for k in range(40)),
@@ -419,7 +419,7 @@ REFUSED = {
     "a-rate-of-more-samples-than-rows": (
         "Sampling rate,1000 Hz\nThinning,1/20\n\n" + ",".join(PLATEAUS) + "\n" + rows(names=PLATEAUS),
         None,
-        "one every 0.001 s, thinning = 1/20; a column of times says them",
+        "one every 0.001 s, thinning = 1/20; add a column of times",
     ),
     "a-counter-of-samples": (
         "fs = 250 Hz\nIndex,"
@@ -442,12 +442,12 @@ REFUSED = {
     "two-times-that-differ": (
         "Timestamp;Time (s);M [Nm]\n" + "".join(f"2026-11-02 08:00:0{s};{2 * s};1\n" for s in range(5)),
         None,
-        "got Timestamp and Time (s); time=NAME chooses one",
+        "got Timestamp and Time (s); choose one with time=NAME",
     ),
     "german-thousands": ("pressure_bar;speed_rpm;torque_nm\n5;800;21\n5;1.100;21\n", None, "may be 1.1 or 1100"),
     "american-thousands": ('pressure_bar,speed_rpm,torque_nm\n5,800,21\n5,"1,100",21\n', None, "may be 1.1 or 1100"),
     "foreign-unit": ("t [s],M [V]\n0,1\n", None, "'V'"),
-    "mapped-foreign-unit": ("t [s],Mz V\n0,1\n", "torque_nm:Mz, V", "not there"),
+    "mapped-foreign-unit": ("t [s],Mz V\n0,1\n", "torque_nm:Mz, V", "not in the file"),
     "mapped-unit-of-another": ("t [s];Kraft, kN\n0;1\n", "torque_nm:Kraft, kN", "'kN'"),
     "turns-or-radians": ("t [s];n [1/s]\n0;1\n", None, "'1/s'"),
     "decimal-commas-between-commas": (HEAD + "\n0,0,5,0,100,0,20,0\n0,1,5,0,100,0,20,0\n", None, "must have 4 cells"),
@@ -464,7 +464,7 @@ REFUSED = {
     "days-of-a-spreadsheet": (
         "Datum;M [Nm]\n46000.25000012;1\n46000.25000023;2\n",
         "time_s:Datum",
-        "map=time_s:Datum [d], or [s], says which",
+        "state the unit with map=time_s:Datum [d], or [s]",
     ),
     "two-tables": ("p [bar],M [Nm]\n5,1\n\nTest 2\np [bar],M [Nm]\n5,2\n", None, "holds 2 tables"),
     "two-records": (HEAD + "\n" + rows() + "\nTest 2\n" + HEAD + "\n" + rows(), None, "holds 2 tables"),
@@ -478,8 +478,8 @@ REFUSED = {
         None,
         "one column must hold the values, got a, b; call it 'value'",
     ),
-    "a-word-for-no-value": (HEAD + "\n0,5,n/a,20\n", None, "got 'n/a': missing=n/a leaves such rows out"),
-    "not-a-number": (HEAD + "\n0,5,NaN,20\n", None, "got nan: missing=nan leaves such rows out"),
+    "a-word-for-no-value": (HEAD + "\n0,5,n/a,20\n", None, "got 'n/a': add missing=n/a to leave such rows out"),
+    "not-a-number": (HEAD + "\n0,5,NaN,20\n", None, "got nan: add missing=nan to leave such rows out"),
     "words-among-rows": (HEAD + "\n" + rows() + "Mittelwert\n" + rows(), None, "line 14 must have 4 cells"),
 }
 
@@ -510,7 +510,7 @@ def test_a_number_that_may_stand_for_no_value_is_refused_until_an_option_settles
     (tmp_path / "a.csv").write_text("\n".join([HEAD, *map(",".join, lines)]) + "\n", encoding="utf-8")
     with pytest.raises(InvalidError, match=rf"{channel}\[11\] \(line 13\)") as caught:
         read_file(tmp_path / "a.csv", filename="a.csv")
-    missing = re.search(r"missing=(\S+) leaves it out", caught.value.detail)
+    missing = re.search(r"add missing=(\S+); if", caught.value.detail)
     assert missing is not None
     read = read_file(tmp_path / "a.csv", filename="a.csv", reading=Reading(missing=missing[1]))
     assert {name: column.tolist() for name, column in read.columns.items()} == {
@@ -601,7 +601,7 @@ def test_a_mapped_title_with_a_unit_that_is_not_clear_is_refused_until_the_map_s
     tmp_path: Path, title: str, unit: str
 ) -> None:
     (tmp_path / "a.csv").write_text(f"t [s];{title}\n0;1\n1;2\n", encoding="utf-8")
-    with pytest.raises(InvalidError, match=rf"may be {unit}: map=torque_nm:.* \[{unit}\]"):
+    with pytest.raises(InvalidError, match=rf"may be {unit}: state it with map=torque_nm:.* \[{unit}\]"):
         read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of(f"torque_nm:{title}"))
     stated = reading_of(f"torque_nm:{title} [{unit}]")
     columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=stated).columns

@@ -168,5 +168,5 @@ def test_a_renamed_picture_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidError, match="PNG picture"):
         read(path)
     path.write_bytes(b"RIFF" + bytes(100))
-    with pytest.raises(InvalidError, match="named as TDMS but does not begin as one"):
+    with pytest.raises(InvalidError, match="named like TDMS but does not begin like one"):
         read(path)

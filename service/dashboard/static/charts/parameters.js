@@ -63,7 +63,7 @@ function rangeOf({ measured, trajectory }) {
 export function parameter({ items, name, pressure, events }) {
   const item = items.find(({ quantity, pressure_bar: level }) => quantity === name && level === pressure);
   if (!item?.coefficients)
-    return { empty: "Too few tests at this pressure to track it: three at different cycles are needed." };
+    return { empty: "Tracking needs three tests at different cycles at this pressure." };
   const { measured, trajectory, coefficients: k } = item;
   const { unit } = PARAMETERS[name];
   const inUnit = unit && ` ${unit.replace("^0.3", "⁰·³")}`;
@@ -71,7 +71,7 @@ export function parameter({ items, name, pressure, events }) {
   const scale = inWords(k.scale_cycles.value, k.scale_cycles.sd, " cycles");
   const x = trajectory.cycles;
   return {
-    note: `Value when new ${initial}, change in the end ${change}, scale ${scale}.`,
+    note: `Value when new ${initial}, total change ${change}, scale ${scale}.`,
     columns: COLUMNS,
     rows: rowsOf(item),
     figure: (c) => ({

@@ -12,7 +12,7 @@ import { RemainingBy } from "../quantities/remaining.js";
 import { shudderMargin } from "../quantities/shudder.js";
 import { read } from "../shared/api.js";
 import { h } from "../shared/dom.js";
-import { aboutCycles, atLeast, estimate, fixed, interval, percent, probability } from "../shared/format.js";
+import { aboutCycles, atLeast, estimate, fixed, likely, percent, probability } from "../shared/format.js";
 import { healthBar } from "../shared/sparkline.js";
 import { firstRun } from "../shared/welcome.js";
 import { heldView } from "./held.js";
@@ -142,7 +142,7 @@ function tiles(clutch, life) {
   const sure = course ? `${probability(course.probability)} sure` : life.runs_used > 2 ? "" : "after three tests";
   return [
     tile("Health", percent(health), health === null ? null : healthBar(health, clutch.state.name)),
-    tile("Remaining cycles", remaining(life), small(remainingNotes(life, status))),
+    tile("Remaining cycles", remaining(life), small(remainingNotes(life))),
     tile("Mean COF", cof, small(`${deviation ? `± ${deviation}; ` : ""}${place}`)),
     tile("Duty cycles so far", fixed(life.as_of_cycles), small(used)),
     tile("How it ages", course ? COURSES[course.name] : "not known yet", small(sure)),
@@ -159,16 +159,17 @@ const COURSES = { eq6: "As expected", slowing: "Slower and slower", accelerating
 
 /**
  * @param {RemainingLife} life
- * @param {string} status
  */
-function remainingNotes(life, status) {
-  const { held_runs: held, back_cast: cast, ended_lives: lives, probability_of_reaching: chance } = life;
-  const open = status === "may_never_reach" ? "the tests do not show the end yet" : atLeast(life.at_least);
-  const lasts = status === "reached" ? "the end of life is reached" : open;
+function remainingNotes(life) {
+  const { status, ended, held_runs: held, back_cast: cast, ended_lives: lives, probability_of_reaching: chance } = life;
+  const predicted = status === "predicted" || status === "may_never_reach";
   const never = chance !== null && chance < 0.995 && status !== "insufficient_data";
   return [
-    ["insufficient_data", "reached", "ended"].includes(status) ? null : `90 %: ${interval(life.remaining_cycles)}`,
-    life.ended ? `ended at ${fixed(life.ended.cycles)} cycles` : lasts,
+    ended ? `ended at ${fixed(ended.cycles)} cycles` : null,
+    status === "reached" ? "the end of life is reached" : null,
+    status === "insufficient_data" ? atLeast(life.at_least) : null,
+    status === "may_never_reach" ? "the tests do not show the end yet" : null,
+    predicted ? likely(life.remaining_cycles) : null,
     never ? `${probability(chance)} chance of an end within ${fixed(life.horizon_cycles)} cycles` : null,
     held ? `${aboutCycles(held.remaining_cycles)} if the held ${held.count === 1 ? "run counts" : "runs count"}` : null,
     cast && cast.of > 0 ? `${cast.held} of ${cast.of} later tests lay inside their forecast` : null,
@@ -190,9 +191,8 @@ const tile = (name, value, more) =>
   h("div", { class: "tile" }, h("dt", {}, name), h("dd", {}, h("span", { class: "big" }, value), more));
 
 /** @param {RemainingLife} life */
-function remaining({ status, remaining_cycles: q, at_least: bound, ended }) {
+function remaining({ status, at_least: bound, ended }) {
   if (ended) return ended.reason === "worn" ? "0" : "–";
   if (status === "insufficient_data") return "–";
-  if (status === "may_never_reach") return atLeast(bound);
-  return status === "reached" ? "0" : aboutCycles(q);
+  return status === "reached" ? "0" : atLeast(bound);
 }

@@ -5,11 +5,10 @@ import { sentence } from "../diagnosis/report.js";
 import { byMeanCof } from "../quantities/criteria.js";
 import { h, table } from "../shared/dom.js";
 import {
-  aboutCycles,
   atLeast,
   estimate,
   fixed,
-  interval,
+  likely,
   moment,
   percent,
   probability,
@@ -102,10 +101,9 @@ function diagnosisText(latest) {
  * @param {RemainingLife} life
  */
 function facts(clutch, life) {
-  const { current, model, remaining_cycles: q } = life;
+  const { current, model } = life;
   const { criterion } = byMeanCof(life);
-  const number = life.status === "may_never_reach" ? atLeast(life.at_least) : aboutCycles(q);
-  const predicted = `${number} (90 %: ${interval(q)})`;
+  const predicted = `${atLeast(life.at_least)}; ${likely(life.remaining_cycles)}`;
   const chance = probability(life.probability_of_reaching);
   const cof = estimate(current.mean_cof, current.mean_cof_sd);
   return [

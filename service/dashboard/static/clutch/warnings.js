@@ -26,7 +26,7 @@ const CODES = {
   },
   held_runs: {
     title: "Runs are held",
-    help: "They do not count until someone confirms, corrects or withdraws them. The safe bound is the lower one of both cases.",
+    help: "They do not count until someone confirms, corrects or withdraws them. The safe bound is the lower one of the two cases.",
   },
   filters_disagree: {
     title: "Two filters disagree",

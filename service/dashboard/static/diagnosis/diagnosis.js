@@ -148,7 +148,7 @@ export class Diagnosis {
       title: `Adopt ${names}?`,
       action: "Adopt it",
       points: [
-        `The clutch will be tracked under the extended model (${names}); every answer will name it.`,
+        `The clutch will be tracked with the extended model (${names}), and every answer will name this model.`,
         "All its predictions, the past ones too, are recomputed from the stored runs.",
         "The runs themselves are not touched, and you can go back to the baseline at any time.",
       ],
@@ -164,7 +164,7 @@ export class Diagnosis {
       action: "Go back",
       points: [
         `Tracking and remaining life will no longer account for ${namesOf(this.model?.effects)}.`,
-        "All predictions are recomputed under the baseline. The runs and the report stay.",
+        "All predictions are recomputed with the baseline. The runs and the report stay.",
       ],
       more: nowAndThen(life && { before: life.after, after: life.before }),
     });

@@ -175,7 +175,7 @@ function gain({ gain: gained }) {
   const bars = gained.remaining_useful_life ? lifeBars(gained.remaining_useful_life) : null;
   const error = errorGain(gained);
   if (error === null && bars === null) return null;
-  return part("Gain on runs held out", error, bars && h("h4", {}, "Remaining cycles"), bars);
+  return part("Gain on runs that were left out of the fit", error, bars && h("h4", {}, "Remaining cycles"), bars);
 }
 
 /** @param {GainOut} gained */
@@ -184,14 +184,14 @@ function errorGain(gained) {
   const count = gained.held_out_runs?.length ?? 0;
   const [before, after] = [gained.rmse_before_nm, gained.rmse_after_nm].map((rmse) => significant(rmse, 3));
   const scores = [
-    scoreText("on the held-out runs", gained.log_score_gain),
+    scoreText("on the runs that were left out of the fit", gained.log_score_gain),
     scoreText("in predicting the last states from the first", gained.prediction_log_score_gain),
   ];
   return h(
     "p",
     { title: scores.filter(Boolean).join("; ") || null },
     h("b", {}, `${fixed(gained.reduction_percent)} % less error`),
-    ` on ${count} held-out ${count === 1 ? "run" : "runs"}: ${before} → ${after} Nm RMS.`,
+    ` on ${count} ${count === 1 ? "run that was" : "runs that were"} left out of the fit: ${before} → ${after} Nm RMS.`,
   );
 }
 
@@ -209,7 +209,7 @@ function where({ baseline }) {
   const rows = axes.slice(0, MOST_ROWS).map(({ axis, strength, p_value: p }) => {
     return [quantity(axis), evidence(strength), p !== null && p < 0.001 ? "< 0.001" : significant(p, 2)];
   });
-  return part("Where the model without an effect falls short", table("Where", ["Along", "Evidence", "p"], rows));
+  return part("Where the baseline model is wrong", table("Where", ["Along", "Evidence", "p"], rows));
 }
 
 /** @param {DiagnosisOut} diagnosis */
@@ -255,7 +255,7 @@ function visible({ visible: all = [] }) {
   return h(
     "details",
     { class: "part" },
-    h("summary", {}, "What these runs would show"),
+    h("summary", {}, "What these runs can show"),
     h("p", { class: "quiet" }, VISIBLE),
     scrolling(label, table(label, ["Effect", "For every shape", "For the most visible", "Unit"], rows)),
   );

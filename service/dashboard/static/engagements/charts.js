@@ -124,7 +124,7 @@ function discrepancyOf({ model }) {
     return "The record does not show what drove the shaft, so no simulated engagement is drawn beside it.";
   const torque = `Model discrepancy: ${percent(model.torque_discrepancy, 1)} of torque (RMS, while both slip)`;
   const { stop_time_difference_s: difference, stop_time_difference_sd_s: sd } = model;
-  if (difference === null) return `${torque}; the model's clutch does not stop the shaft.`;
+  if (difference === null) return `${torque}; in the model, the clutch does not stop the shaft.`;
   const half = sd === null ? "" : ` ± ${significant(HALF_OF_90 * sd, 2)}`;
   return `${torque}; stops ${significant(Math.abs(difference), 3)}${half} s ${difference > 0 ? "later" : "earlier"} than the model.`;
 }

@@ -2,7 +2,7 @@
 // One clutch in the fleet's table.
 
 import { h } from "../shared/dom.js";
-import { aboutCycles, age, atLeast, cycles, fixed, interval, kindName, percent, words } from "../shared/format.js";
+import { age, atLeast, cycles, fixed, kindName, likely, percent, words } from "../shared/format.js";
 import { healthBar, intervalBar, sparkline } from "../shared/sparkline.js";
 import { heldText, stateIcon, STATES, VERDICTS } from "../shared/state.js";
 
@@ -85,12 +85,10 @@ function remaining(summary, scale) {
   if (summary === null) return ["–", small("after three tests")];
   const { ended } = summary;
   if (ended) return [ended.reason === "worn" ? number("0") : "–", small(`ended at ${fixed(ended.cycles)}`)];
-  const [certain, odds] = atLeast(summary.at_least).split(/ (?=with)/);
   if (summary.status === "insufficient_data") return ["–", small(atLeast(summary.at_least))];
   if (summary.status === "reached") return [number("0"), small("reached")];
   const q = summary.remaining_cycles;
-  const likely = `${odds ? `${odds}; ` : ""}half of such clutches: ${aboutCycles(q)} or more (90 %: ${interval(q)})`;
-  return [number(certain), intervalBar(q, scale), small(likely)];
+  return [number(atLeast(summary.at_least)), intervalBar(q, scale), small(likely(q))];
 }
 
 /** @param {ClutchOut} clutch */

@@ -38,7 +38,7 @@ export class Rows {
     this.element = h(
       "table",
       { class: "fleet", role: "table" },
-      h("caption", { class: "hidden" }, "Clutches, the fewest certain cycles first"),
+      h("caption", { class: "hidden" }, "Clutches, the lowest safe bound first"),
       h("thead", { role: "rowgroup" }, h("tr", { role: "row", "aria-rowindex": 1 }, columns)),
       this.above,
       this.body,

@@ -58,7 +58,7 @@ export function reachedText({
   const level = `the limit ${significant(limit, 3)}`;
   if (chance === null) return "too few tests to predict when it is reached";
   const reaches = `it is reached with a probability of ${probability(chance)}`;
-  if (end["0.95"] === 0) return `${level} was passed when new`;
+  if (end["0.95"] === 0) return `${level} was already passed when new`;
   if (end["0.5"] === null) return `${level} may never be reached: ${reaches}`;
   const at = `reached at about ${cycles(end["0.5"], end["0.05"], end["0.95"])} cycles (90 %: ${interval(end)})`;
   return left["0.5"] === 0

@@ -21,13 +21,13 @@ export const LAG = {
     title: "Loop area",
     axis: "loop area, Nm·m/s",
     unit: "Nm·m/s",
-    meaning: "Area of whole closed periods, positive where torque is higher in acceleration",
+    meaning: "Area of the loop over whole periods; positive where torque is higher while the speed rises",
   },
   attractor: {
     title: "Attractor C",
     axis: "attractor C, Nm/s",
     unit: "Nm/s",
-    meaning: "The rate at which friction follows its stationary curve: the lower, the more it lags",
+    meaning: "How fast friction follows its stationary curve; a lower value means a longer lag",
   },
   film_time: {
     title: "Film time",

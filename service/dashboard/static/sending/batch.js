@@ -44,7 +44,7 @@ async function jsonRun(file) {
   if (file.size > MOST_JSON_BYTES) return "too large for JSON; send it as CSV, TDMS, MDF4 or Parquet";
   const run = await content(file);
   if (run === null) return "not a run";
-  if (typeof run.kind !== "string") return "not a run: it does not say its “kind”";
+  if (typeof run.kind !== "string") return "not a run: its “kind” is missing";
   const { channels: _, ...rest } = run;
   return rest;
 }

@@ -180,7 +180,7 @@ export class Importer {
       });
     };
     const select = h("select", { ...label, onchange: choose }, h("option", { value: "" }, "left out"), options);
-    return h("div", {}, select, inPart ? h("p", {}, "Check: its title is known in part.") : null);
+    return h("div", {}, select, inPart ? h("p", {}, "Check: its title was recognised only in part.") : null);
   }
 
   /**

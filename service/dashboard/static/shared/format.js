@@ -108,12 +108,19 @@ export const aboutCycles = (quantiles) =>
   quantiles["0.5"] === null ? "over 1,000,000" : cycles(quantiles["0.5"], quantiles["0.05"], quantiles["0.95"]);
 
 /**
+ * What is likely of remaining cycles: the median and the 90 % interval.
+ * @param {Quantiles} quantiles
+ */
+export const likely = (quantiles) =>
+  `50 % chance of ${aboutCycles(quantiles)} or more; 90 % interval: ${interval(quantiles)}`;
+
+/**
  * The safe bound of remaining cycles, rounded down to two digits.
  * @param {number | null} bound
  */
 export function atLeast(bound) {
-  if (bound === null || bound < 1) return "no further cycle is certain";
-  return `at least ${roundedDown(bound)} with 95 %`;
+  if (bound === null || bound < 1) return "no further cycle is safe";
+  return `safe for ${roundedDown(bound)} (95 %)`;
 }
 
 /**
@@ -138,8 +145,8 @@ export const percent = (share, decimals = 0) => (isNumber(share) ? `${fixed(100 
  */
 export function probability(value) {
   if (!isNumber(value)) return NONE;
-  if (value > 0 && value < 0.005) return "< 1 %";
-  if (value < 1 && value > 0.995) return "> 99 %";
+  if (value < 0.005) return "< 1 %";
+  if (value > 0.995) return "> 99 %";
   return percent(value);
 }
 

@@ -37,7 +37,12 @@ def posterior(given: Study) -> Posterior:
 
 @pytest.mark.parametrize(
     ("gain", "why"),
-    [(GAIN, ""), (None, ""), (WORSE, "less likely with it than without"), (LARGER, "error on held-out runs is larger")],
+    [
+        (GAIN, ""),
+        (None, ""),
+        (WORSE, "more likely with the baseline"),
+        (LARGER, "error on left-out runs is larger"),
+    ],
 )
 def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(
     given: Study, posterior: Posterior, gain: Gain | None, why: str
@@ -83,7 +88,7 @@ def test_why_an_extension_is_not_proposed_is_said(given: Study) -> None:
     assert reason_against(LARGER, Sizes(by_slug={})) == ""  # nothing was fitted
     either = Size(value=1e4, sd=2e4, interval=(-2e4, 4e4), other_sign=0.3, courses=True)
     some = Sizes(draws=(Draw(weight=1.0, laws=given.baseline.fit.laws),), by_slug={"pressure_offset": either})
-    assert "size of pressure offset (90 % interval −0.2 to 0.4 bar); it depends on the course" in reason_against(
+    assert "size of pressure offset (90 % interval −0.2 to 0.4 bar); it depends on the assumed" in reason_against(
         GAIN, some
     )
     positive = replace(

@@ -140,7 +140,7 @@ def test_where_runs_scatter_more_than_usual_the_paragraph_says_what_may_hide_in_
     assert "runs scatter more than usual" not in summarise(replace(found, scatter=usual))
     said = summarise(replace(found, scatter=large))
     assert "(0.84 % of the torque; 90 % interval 0.61 to 1.3 %)" in said
-    assert "which a zero that wanders between runs would also cause: repeat a test at once." in said
+    assert "A zero that drifts between runs would also cause this: repeat a test at once." in said
     assert len(said.split()) <= MAX_WORDS
 
 
@@ -155,10 +155,10 @@ def test_an_adequate_model_names_what_is_left_of_a_credible_set() -> None:
 
 
 def test_why_nothing_may_be_adopted_stands_in_the_paragraph() -> None:
-    why = "The extension is not proposed: its error on held-out runs is larger than the baseline's."
+    why = "The extension is not proposed: its error on left-out runs is larger than the baseline's."
     said = summarise(replace(findings(Verdict.CAUSE_NAMED, "oil_change"), not_adoptable=why))
     assert why in said
-    assert "held-out runs, the error" not in said
+    assert "left-out runs, the error" not in said
 
 
 def test_an_effect_without_an_estimate_is_said_to_have_none() -> None:
@@ -179,7 +179,7 @@ def test_what_these_data_would_show_is_said_with_units_zero_and_pressure_first()
         "The smallest sizes that these data would have shown nine times in ten, in the most (least) visible form: "
         "torque zero shift 3 Nm (6 Nm), pressure offset 0.075 bar (0.15 bar) and running in "
     ) in said
-    assert "These would not have shown at any size: channel delay and stick slip." in said
+    assert "These data cannot show, at any size:  channel delay and stick slip." in said
     said = summarise(replace(found, visible=(visible("oil_temperature", 4.0),)))
     assert "viscosity exponent β of oil temperature 1.4 (2.8)" in said
     some = replace(visible("pressure_offset", 3.0), amplitude=math.inf, least=0.1)  # seen in one of its shapes alone
@@ -203,7 +203,7 @@ def test_a_size_and_the_words_on_its_sign_agree() -> None:
 
 
 def test_no_sentence_stands_twice() -> None:
-    why = "The extension is not proposed: its error on held-out runs is larger than the baseline's."
+    why = "The extension is not proposed: its error on left-out runs is larger than the baseline's."
     found = replace(findings(Verdict.CAUSE_NAMED, "oil_change"), not_adoptable=why, notes=(why,))
     assert summarise(found).count(why) == 1
 
@@ -214,7 +214,7 @@ def test_a_cause_of_all_explanations_is_certain_and_open_is_what_is_beside_it() 
     both = explanations_of({("channel_delay",): 0.55, ("channel_delay", UNCATALOGUED): 0.45})
     said = summarise(replace(found, explanations=both))
     assert "Channel delay is at work (probability above 0.99)." in said
-    assert "What else is at work is open (with probabilities): nothing (0.55), or something that" in said
+    assert "What else may be at work (with probabilities): nothing (0.55), or something that" in said
     assert "cannot distinguish" not in said
     one = explanations_of({("channel_delay", UNCATALOGUED): 1.0})
     said = summarise(replace(found, explanations=one))
@@ -236,7 +236,7 @@ def test_a_certain_cause_with_sized_companions_keeps_to_the_words() -> None:
     )
     steps = (sweep, replace(sweep, kind="dynamic_stribeck", frequency=0.3, temperature=333.15))
     advice = replace(found.advice[0], test=TRIALS["all_loads_and_60c"].text, steps=steps, narrows=0.44)
-    why = "The extension is not proposed: its error on held-out runs is larger than the baseline's."
+    why = "The extension is not proposed: its error on left-out runs is larger than the baseline's."
     changed = replace(
         found, explanations=explanations_of(beside), candidates=stated, advice=(advice,), not_adoptable=why
     )

@@ -97,7 +97,7 @@ def test_what_waits_is_listed_with_its_tries_and_the_last_answer(terminal: Termi
 
 def test_a_run_that_was_corrected_while_the_service_was_away_is_delivered_corrected(terminal: Terminal) -> None:
     terminal.service.instead = away
-    assert "1 runs wait" in terminal.push(body(70000), code=75)
+    assert "1 run waits" in terminal.push(body(70000), code=75)
     output = terminal.push(body(7000), code=75)
     assert "and is kept in " in output
     assert "may be stored" not in output
@@ -171,9 +171,9 @@ def test_only_runs_for_the_address_are_sent_there(terminal: Terminal) -> None:
 
 def test_refusals_end_the_command_as_data_errors_and_absence_as_a_failure_for_now(terminal: Terminal) -> None:
     terminal.service.instead = lambda _request: problem(401, "unauthorized", "a key [is] needed")
-    assert "a key [is] needed; 1 runs wait in" in terminal.push(body(1), code=65)
+    assert "a key [is] needed; 1 run waits in" in terminal.push(body(1), code=65)
     terminal.service.instead = lambda request: None if request.method == "GET" else httpx2.Response(500)
-    assert "the service did not take 1 runs" in terminal.push(body(1), code=75)
+    assert "the service did not accept 1 run;" in terminal.push(body(1), code=75)
     terminal.service.instead = lambda _request: httpx2.Response(200, html="<p>log in</p>")
     assert "a login page or a proxy?" in terminal.push(body(1), code=75)
     assert len(terminal.listed()) == 1
@@ -275,6 +275,6 @@ def test_a_file_whose_reader_cannot_start_waits_in_the_spool(terminal: Terminal)
     terminal.service.instead = lambda request: problem(503, "busy", busy) if "/runs" in request.url.path else None
     record = written(terminal.folder / "a.tdms", b"TDSm")
     told = ("--clutch", "c1", "--url", URL, "--patience", "0")
-    assert "1 runs wait" in terminal("push", record, *told, "--rig", "bench-3", code=75)
+    assert "1 run waits" in terminal("push", record, *told, "--rig", "bench-3", code=75)
     terminal.service.instead = present
     assert "1 stored" in terminal("spool", "send", "--url", URL)
