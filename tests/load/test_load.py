@@ -39,9 +39,6 @@ def test_a_life_is_whole_and_the_same_for_a_seed(tmp_path: Path) -> None:
     assert {Path(str(post.path)).suffix for post in files} == {".gz", ".parquet"}
 
 
-# --- what comes back ---
-
-
 # --- what is made of it ---
 
 

@@ -40,28 +40,29 @@ async def _settled() -> None:
         await asyncio.sleep(0)
 
 
-def run(scenario: Callable[[Revalidation, Worker], Awaitable[None]]) -> None:
-    """The scenario in a loop of its own, with room for two answers of 4 bytes."""
+def scenario(test: Callable[[Revalidation, Worker], Awaitable[None]]) -> Callable[[], None]:
+    """A test in a loop of its own, with room for two answers of 4 bytes."""
 
-    async def whole() -> None:
-        await asyncio.wait_for(scenario(Revalidation(AnswerCache(8)), Worker()), 30)
+    def run() -> None:
+        async def whole() -> None:
+            await asyncio.wait_for(test(Revalidation(AnswerCache(8)), Worker()), 30)
 
-    asyncio.run(whole())
+        asyncio.run(whole())
+
+    return run
 
 
-def test_the_first_answer_is_waited_for_and_made_once() -> None:
-    async def scenario(kept: Revalidation, worker: Worker) -> None:
-        waiting = [asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0)) for _ in range(3)]
-        await _settled()
-        assert not any(task.done() for task in waiting)
-        await worker.gives(1, b"one")
-        assert {task.result() for task in waiting} == {(1, Answer.of(b"one"))}
-        assert await kept.answer("a", 1, worker.compute, wait=0) == (1, Answer.of(b"one"))
-        assert len(worker.asked) == 1
-        assert kept._cache.held("a", 1) == Answer.of(b"one")
-        assert kept._cache.held("a", 2) is None
-
-    run(scenario)
+@scenario
+async def test_the_first_answer_is_waited_for_and_made_once(kept: Revalidation, worker: Worker) -> None:
+    waiting = [asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0)) for _ in range(3)]
+    await _settled()
+    assert not any(task.done() for task in waiting)
+    await worker.gives(1, b"one")
+    assert {task.result() for task in waiting} == {(1, Answer.of(b"one"))}
+    assert await kept.answer("a", 1, worker.compute, wait=0) == (1, Answer.of(b"one"))
+    assert len(worker.asked) == 1
+    assert kept._cache.held("a", 1) == Answer.of(b"one")
+    assert kept._cache.held("a", 2) is None
 
 
 async def _held_at_one(kept: Revalidation, worker: Worker) -> None:
@@ -72,91 +73,85 @@ async def _held_at_one(kept: Revalidation, worker: Worker) -> None:
     assert (await first)[0] == 1
 
 
-def test_who_does_not_wait_gets_the_last_one_while_the_next_is_made() -> None:
-    async def scenario(kept: Revalidation, worker: Worker) -> None:
-        await _held_at_one(kept, worker)
-        for revision in (2, 3):
-            assert await kept.answer("a", revision, worker.compute, wait=0) == (1, Answer.of(b"one"))
-        assert worker.waited_for == [True, False]  # one renewal for both
-        await worker.gives(2, b"two")
-        assert await kept.answer("a", 2, worker.compute, wait=0) == (2, Answer.of(b"two"))
-
-    run(scenario)
+@scenario
+async def test_who_does_not_wait_gets_the_last_one_while_the_next_is_made(kept: Revalidation, worker: Worker) -> None:
+    await _held_at_one(kept, worker)
+    for revision in (2, 3):
+        assert await kept.answer("a", revision, worker.compute, wait=0) == (1, Answer.of(b"one"))
+    assert worker.waited_for == [True, False]  # one renewal for both
+    await worker.gives(2, b"two")
+    assert await kept.answer("a", 2, worker.compute, wait=0) == (2, Answer.of(b"two"))
 
 
-def test_who_waits_does_not_wait_for_a_renewal_that_yields_to_all_others() -> None:
-    async def scenario(kept: Revalidation, worker: Worker) -> None:
-        await _held_at_one(kept, worker)
-        assert await kept.answer("a", 2, worker.compute, wait=0) == (1, Answer.of(b"one"))
+@scenario
+async def test_who_waits_does_not_wait_for_a_renewal_that_yields_to_all_others(
+    kept: Revalidation, worker: Worker
+) -> None:
+    await _held_at_one(kept, worker)
+    assert await kept.answer("a", 2, worker.compute, wait=0) == (1, Answer.of(b"one"))
+    renewal = worker.asked[-1]
+    assert await kept.answer("a", 3, worker.compute, wait=0.01) == (1, Answer.of(b"one"))
+    patient = [asyncio.create_task(kept.answer("a", 3, worker.compute, wait=20)) for _ in range(3)]
+    await _settled()
+    assert worker.waited_for == [True, False, True]  # one for all who wait
+    await worker.gives(2, b"two")
+    assert not any(task.done() for task in patient)  # a revision came while it was made
+    assert worker.waited_for == [True, False, True, True]
+    await worker.gives(3, b"3rd")
+    assert {await task for task in patient} == {(3, Answer.of(b"3rd"))}
+    renewal.set_result((2, b"old"))
+    await _settled()
+    assert kept._cache.held("a", 3) == Answer.of(b"3rd")  # the slower and older one replaces nothing
+
+
+@scenario
+async def test_who_waits_takes_a_quicker_renewal_and_does_not_hear_of_its_failure(
+    kept: Revalidation, worker: Worker
+) -> None:
+    await _held_at_one(kept, worker)
+    for revision, error in ((2, None), (3, LookupError("not there"))):
+        await kept.answer("a", revision, worker.compute, wait=0)
         renewal = worker.asked[-1]
-        assert await kept.answer("a", 3, worker.compute, wait=0.01) == (1, Answer.of(b"one"))
-        patient = [asyncio.create_task(kept.answer("a", 3, worker.compute, wait=20)) for _ in range(3)]
+        patient = asyncio.create_task(kept.answer("a", revision, worker.compute, wait=20))
         await _settled()
-        assert worker.waited_for == [True, False, True]  # one for all who wait
-        await worker.gives(2, b"two")
-        assert not any(task.done() for task in patient)  # a revision came while it was made
-        assert worker.waited_for == [True, False, True, True]
-        await worker.gives(3, b"3rd")
-        assert {await task for task in patient} == {(3, Answer.of(b"3rd"))}
-        renewal.set_result((2, b"old"))
-        await _settled()
-        assert kept._cache.held("a", 3) == Answer.of(b"3rd")  # the slower and older one replaces nothing
-
-    run(scenario)
-
-
-def test_who_waits_takes_the_renewal_where_that_is_quicker_and_does_not_hear_of_its_failure() -> None:
-    async def scenario(kept: Revalidation, worker: Worker) -> None:
-        await _held_at_one(kept, worker)
-        for revision, error in ((2, None), (3, LookupError("not there"))):
-            await kept.answer("a", revision, worker.compute, wait=0)
-            renewal = worker.asked[-1]
-            patient = asyncio.create_task(kept.answer("a", revision, worker.compute, wait=20))
+        if error is None:
+            renewal.set_result((revision, b"idle"))
+            assert await patient == (revision, Answer.of(b"idle"))
+        else:
+            renewal.set_exception(error)
             await _settled()
-            if error is None:
-                renewal.set_result((revision, b"idle"))
-                assert await patient == (revision, Answer.of(b"idle"))
-            else:
-                renewal.set_exception(error)
-                await _settled()
-                assert not patient.done()
-            await worker.gives(revision, b"busy")
-            assert (await patient)[0] == revision
-
-    run(scenario)
+            assert not patient.done()
+        await worker.gives(revision, b"busy")
+        assert (await patient)[0] == revision
 
 
-def test_what_fails_is_told_to_those_who_wait_and_tried_again() -> None:
-    async def scenario(kept: Revalidation, worker: Worker) -> None:
-        first = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
+@scenario
+async def test_what_fails_is_told_to_those_who_wait_and_tried_again(kept: Revalidation, worker: Worker) -> None:
+    first = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
+    await _settled()
+    worker.asked[-1].set_exception(LookupError("not there"))
+    with pytest.raises(LookupError, match="not there"):
+        await first
+    again = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
+    await _settled()
+    await worker.gives(1, b"one")
+    assert (await again)[0] == 1
+    waiting = asyncio.create_task(kept.answer("a", 2, worker.compute, wait=20))
+    await _settled()
+    worker.asked[-1].set_exception(LookupError("not now"))
+    with pytest.raises(LookupError, match="not now"):
+        await waiting
+    assert await kept.answer("a", 2, worker.compute, wait=0) == (1, Answer.of(b"one"))
+
+
+@scenario
+async def test_the_least_lately_asked_for_goes_first(kept: Revalidation, worker: Worker) -> None:
+    for name in "abc":
+        asking = asyncio.create_task(kept.answer(name, 1, worker.compute, wait=0))
         await _settled()
-        worker.asked[-1].set_exception(LookupError("not there"))
-        with pytest.raises(LookupError, match="not there"):
-            await first
-        again = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
-        await _settled()
-        await worker.gives(1, b"one")
-        assert (await again)[0] == 1
-        waiting = asyncio.create_task(kept.answer("a", 2, worker.compute, wait=20))
-        await _settled()
-        worker.asked[-1].set_exception(LookupError("not now"))
-        with pytest.raises(LookupError, match="not now"):
-            await waiting
-        assert await kept.answer("a", 2, worker.compute, wait=0) == (1, Answer.of(b"one"))
-
-    run(scenario)
-
-
-def test_the_least_lately_asked_for_goes_first() -> None:
-    async def scenario(kept: Revalidation, worker: Worker) -> None:
-        for name in "abc":
-            asking = asyncio.create_task(kept.answer(name, 1, worker.compute, wait=0))
-            await _settled()
-            await worker.gives(1, b"four")
-            await asking
-        assert [kept._cache.held(name, 1) is not None for name in "abc"] == [False, True, True]
-
-    run(scenario)
+        await worker.gives(1, b"four")
+        await asking
+    assert [kept._cache.held(name, 1) is not None for name in "abc"] == [False, True, True]
 
 
 def test_answers_begun_elsewhere_are_bounded_too() -> None:
@@ -166,39 +161,35 @@ def test_answers_begun_elsewhere_are_bounded_too() -> None:
     assert [number for number in range(50) if kept.knows(number)] == list(range(40, 50))
 
 
-def test_an_answer_that_is_made_again_and_again_counts_once() -> None:
-    async def scenario(kept: Revalidation, worker: Worker) -> None:
-        kept.begin("other", 1, b"four")
-        for revision in range(1, 20):
-            body = b"four"[: 1 + revision % 4]
-            asking = asyncio.create_task(kept.answer("a", revision, worker.compute, wait=10))
-            await _settled()
-            await worker.gives(revision, body)
-            assert await asking == (revision, Answer.of(body))
-        assert kept.knows("other")
-        kept.begin("third", 1, b"four")
-        assert [name for name in ("other", "a", "third") if kept.knows(name)] == ["a", "third"]
-
-    run(scenario)
-
-
-def test_what_is_being_made_is_not_made_twice_to_make_room() -> None:
-    async def scenario(kept: Revalidation, worker: Worker) -> None:
-        kept.begin("renewed", 1, b"four")
-        assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, Answer.of(b"four"))
-        first = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))
+@scenario
+async def test_an_answer_that_is_made_again_and_again_counts_once(kept: Revalidation, worker: Worker) -> None:
+    kept.begin("other", 1, b"four")
+    for revision in range(1, 20):
+        body = b"four"[: 1 + revision % 4]
+        asking = asyncio.create_task(kept.answer("a", revision, worker.compute, wait=10))
         await _settled()
-        for name in ("a", "b", "c"):
-            kept.begin(name, 1, b"four")
-        second = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))
-        assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, Answer.of(b"four"))
-        await _settled()
-        assert [name for name in ("renewed", "made", "a", "b", "c") if kept.knows(name)] == ["renewed", "made", "c"]
-        await worker.gives(1, b"one")
-        assert await first == await second == (1, Answer.of(b"one"))
-        assert len(worker.asked) == 2
+        await worker.gives(revision, body)
+        assert await asking == (revision, Answer.of(body))
+    assert kept.knows("other")
+    kept.begin("third", 1, b"four")
+    assert [name for name in ("other", "a", "third") if kept.knows(name)] == ["a", "third"]
 
-    run(scenario)
+
+@scenario
+async def test_what_is_being_made_is_not_made_twice_to_make_room(kept: Revalidation, worker: Worker) -> None:
+    kept.begin("renewed", 1, b"four")
+    assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, Answer.of(b"four"))
+    first = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))
+    await _settled()
+    for name in ("a", "b", "c"):
+        kept.begin(name, 1, b"four")
+    second = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))
+    assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, Answer.of(b"four"))
+    await _settled()
+    assert [name for name in ("renewed", "made", "a", "b", "c") if kept.knows(name)] == ["renewed", "made", "c"]
+    await worker.gives(1, b"one")
+    assert await first == await second == (1, Answer.of(b"one"))
+    assert len(worker.asked) == 2
 
 
 def test_a_poll_of_what_is_held_counts_as_asking() -> None:

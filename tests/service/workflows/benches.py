@@ -6,8 +6,8 @@ tested is what happens to held runs, not which are.
 
 import json
 import math
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -101,6 +101,11 @@ def loop_channels() -> dict[str, list[float]]:
     return {"time_s": time, "pressure_bar": [4.0] * len(time), "speed_rpm": speed, "torque_nm": torque}
 
 
+def send_to(database: Database, run: Mapping[str, Any]) -> dict[str, Any]:
+    """Post a run to a database; its receipt."""
+    return ingest(database, CLUTCH, read_run(to_json(run)), received_at=AT)[0]
+
+
 class Bench:
     """A service's database with one clutch, asked without HTTP."""
 
@@ -111,7 +116,7 @@ class Bench:
 
     def send(self, run: Mapping[str, Any]) -> dict[str, Any]:
         """Post a run; its receipt."""
-        return ingest(self.database, CLUTCH, read_run(to_json(run)), received_at=AT)[0]
+        return send_to(self.database, run)
 
     def diagnose(self, diagnosis_id: str, life: str, revision: int = 10**6) -> None:
         """Store a finished diagnosis of a life, whose extension the stand-in applies."""
@@ -182,6 +187,29 @@ class Bench:
     def close(self) -> None:
         """Close the database."""
         self.database.close()
+
+
+def overtaken(
+    monkeypatch: pytest.MonkeyPatch,
+    module: Any,
+    name: str,
+    of: Database,
+    meanwhile: Callable[[Any], object],
+    at: int = 1,
+) -> list[Any]:
+    """Have another process do something with a database after so many calls of a function of a module; what calls gave."""
+    computed, calls = getattr(module, name), list[Any]()
+
+    def called(*arguments: Any) -> Any:
+        outcome = computed(*arguments)
+        calls.append(outcome)
+        if len(calls) == at:
+            with closing(open_database(of.url)) as other:
+                meanwhile(other)
+        return outcome
+
+    monkeypatch.setattr(module, name, called)
+    return calls
 
 
 def without_revision(answer: Any) -> Any:

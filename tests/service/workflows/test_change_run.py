@@ -18,14 +18,10 @@ from service.lives.plausibility.doubts import Judged
 from service.queries import diagnoses as diagnosis_query
 from service.queries import runs as run_query
 from service.queries.raw_run import write_run
-from service.run_files.json_run import read_run
-from service.web.answers import to_json
 from service.workflows import change_run, ingest_run, run_diagnosis
 from service.workflows.adopt_model import finish_and_adopt
-from service.workflows.ingest_run import ingest
 from service.workflows.replay import replay_clutch
 from storage import assumptions, clutches, jobs
-from storage.engine.opening import open_database
 from tests.service.workflows.benches import (
     AT,
     CLUTCH,
@@ -34,6 +30,8 @@ from tests.service.workflows.benches import (
     assert_same,
     assert_same_but_for_held,
     body,
+    overtaken,
+    send_to,
     stood_in,
 )
 from tests.support import one_quick
@@ -243,19 +241,12 @@ def test_two_corrections_at_once_end_as_one_after_the_other(
             bench.send(body("test", f"a{cycles:g}", cycles))
     for name in ("a1000", "a2000"):
         right.withdraw(name)
-    computed, calls = change_run._computed, []
 
-    def overtaken(*arguments: Any) -> Any:
-        outcome = computed(*arguments)
-        calls.append(1)
-        if len(calls) == 1:
-            other = open_database(f"sqlite:///{slipped.database.path}")
-            change_run.withdraw(other, CLUTCH, "a2000", reason="meanwhile", by="local", at=AT)
-            ingest(other, CLUTCH, read_run(to_json(body("test", "new", 3000.0))), received_at=AT)
-            other.close()
-        return outcome
+    def change(other: Any) -> None:
+        change_run.withdraw(other, CLUTCH, "a2000", reason="meanwhile", by="local", at=AT)
+        send_to(other, body("test", "new", 3000.0))
 
-    monkeypatch.setattr(change_run, "_computed", overtaken)
+    calls = overtaken(monkeypatch, change_run, "_computed", slipped.database, change)
     slipped.withdraw("a1000")
     right.send(body("test", "new", 3000.0))
     assert len(calls) == 3  # its own twice, the other's once

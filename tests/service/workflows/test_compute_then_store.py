@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import Connection, text
+from sqlalchemy import text
 from typer.testing import CliRunner
 
 from models.diagnosis.extension import Extension
@@ -32,8 +32,8 @@ from storage.engine.errors import DamagedData
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import FileDatabase
 from storage.jobs import NewJob
-from storage.runs import RunRow
 from tests.service.workflows import stand_in_engine
+from tests.service.workflows.benches import overtaken
 from tests.support import stationary
 
 AT = "2026-11-02T10:00:00+00:00"
@@ -150,26 +150,13 @@ def test_nothing_is_computed_while_the_write_lock_is_held(database: Database, nu
 
 
 def test_a_run_that_comes_while_another_is_computed_counts_for_it(
-    database: Database, url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another process stores a run between computing and storing: the results are those of both, in whatever order."""
-    computed, calls = ingest_run._computed, []
-
-    def overtaken(*arguments: Any) -> Any:
-        outcome = computed(*arguments)
-        calls.append(1)
-        if len(calls) == 1:
-            other = open_database(url)
-            monkeypatch.setattr(ingest_run, "_computed", computed)
-            post(other, 1000.0)
-            monkeypatch.setattr(ingest_run, "_computed", overtaken)
-            other.close()
-        return outcome
-
     post(database, 0.0)
-    monkeypatch.setattr(ingest_run, "_computed", overtaken)
+    calls = overtaken(monkeypatch, ingest_run, "_computed", database, lambda other: post(other, 1000.0))
     post(database, 2000.0)
-    assert len(calls) == 2
+    assert len(calls) == 3  # its own twice, the other's once
     monkeypatch.undo()
     calm = open_database(f"sqlite:///{tmp_path / 'b.db'}")
     edit_clutch.register(calm, ClutchIn(clutch_id="c1"), created_at=AT)
@@ -190,7 +177,7 @@ def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
     attempts = []
     recomputed = stored_runs.recomputed
 
-    def overtaken(recorded: stored_runs.Recorded) -> stored_runs.Recomputed:
+    def recomputed_late(recorded: stored_runs.Recorded) -> stored_runs.Recomputed:
         made = recomputed(recorded)
         if recorded.state.clutch_id == "c1":
             attempts.append(post(database, 1000.0 * (len(attempts) + 1)))
@@ -198,7 +185,7 @@ def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
         return made
 
     with monkeypatch.context() as busy:
-        busy.setattr(stored_runs, "recomputed", overtaken)
+        busy.setattr(stored_runs, "recomputed", recomputed_late)
         replayed = CliRunner().invoke(app, ["replay", "--database", url])
     assert len(attempts) == MAX_ATTEMPTS
     assert replayed.exit_code == 1
@@ -234,14 +221,14 @@ def test_an_adoption_that_is_asked_for_twice_at_once_makes_one_version(
 ) -> None:
     computed = adopt_model._computed
 
-    def overtaken(*arguments: Any) -> Any:
+    def computed_late(*arguments: Any) -> Any:
         monkeypatch.setattr(adopt_model, "_computed", computed)
         adopt(database, "c1", "d1", adopted_at=AT)
         return computed(*arguments)
 
     post(database, 0.0)
     diagnosed(database, "d1")
-    monkeypatch.setattr(adopt_model, "_computed", overtaken)
+    monkeypatch.setattr(adopt_model, "_computed", computed_late)
     adopt(database, "c1", "d1", adopted_at=AT)
     with database.reading() as connection:
         row = assumptions.current_adoption(connection, "c1")
@@ -287,24 +274,18 @@ def test_the_same_run_of_two_threads_is_stored_once(database: Database) -> None:
 
 
 def test_a_run_that_another_process_stores_after_it_was_not_found_is_a_repeat(
-    database: Database, url: str, monkeypatch: pytest.MonkeyPatch
+    database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is looked for twice, before and after its curves are fitted; it comes when it has just not been found again."""
-    get, calls = runs.get, []
+    new_to_other: list[bool] = []
 
-    def overtaken(connection: Connection, clutch_id: str, run_id: str) -> RunRow | None:
-        found = get(connection, clutch_id, run_id)
-        calls.append(found)
-        if len(calls) == 2:
-            other = open_database(url)
-            assert ingest(other, "c1", oil_change(), received_at=AT)[1]
-            other.close()
-        return found
+    def store(other: Database) -> None:
+        new_to_other.append(ingest(other, "c1", oil_change(), received_at=AT)[1])
 
-    monkeypatch.setattr(runs, "get", overtaken)
+    calls = overtaken(monkeypatch, runs, "get", database, store, at=2)
     receipt, new = ingest(database, "c1", oil_change(), received_at=AT)
     assert receipt["duplicate"]
     assert not new
-    assert calls[:2] == [None, None]
+    assert (calls[:2], new_to_other) == ([None, None], [True])
     with database.reading() as connection:
         assert clutches.revision(connection, "c1") == 1

@@ -15,8 +15,7 @@ from service.queries.cache import AnswerCache
 from service.schemas.clutch import ClutchEdit, ClutchIn
 from service.workflows import edit_clutch, learn_fleet
 from storage.clutches import Choice
-from storage.engine.opening import open_database
-from tests.service.workflows.benches import AT, CLUTCH, WHO, Bench, assert_same, body, stood_in
+from tests.service.workflows.benches import AT, CLUTCH, WHO, Bench, assert_same, body, overtaken, send_to, stood_in
 
 HISTORY = (("test", 0.0), ("duty", 400.0), ("loop", 500.0), ("oil_change", 1500.0), ("test", 2000.0))
 
@@ -131,22 +130,11 @@ def test_an_archived_clutch_is_left_out_takes_in_no_run_and_still_teaches(tmp_pa
 
 def test_an_edit_that_is_overtaken_by_a_run_holds_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     edited, right = Bench(tmp_path / "edited.db"), Bench(tmp_path / "right.db", {"end_of_life": {"cof_fraction": 0.8}})
-    computed, calls = edit_clutch._computed, []
-
-    def overtaken(*arguments: Any) -> Any:
-        outcome = computed(*arguments)
-        calls.append(1)
-        if len(calls) == 1:
-            other = Bench.__new__(Bench)
-            other.database = open_database(f"sqlite:///{edited.database.path}")
-            other.send(body("test", "b", 1000.0))
-            other.close()
-        return outcome
-
     for bench in (edited, right):
         bench.send(body("test", "a", 0.0))
     right.send(body("test", "b", 1000.0))
-    monkeypatch.setattr(edit_clutch, "_computed", overtaken)
+    run = body("test", "b", 1000.0)
+    calls = overtaken(monkeypatch, edit_clutch, "_computed", edited.database, lambda other: send_to(other, run))
     edit(edited, end_of_life={"cof_fraction": 0.8})
     assert len(calls) == 2
     assert_same(edited, right)
