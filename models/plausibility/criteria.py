@@ -60,6 +60,8 @@ GROWING = 0.2
 LIKE_GAP_SD, MEMORY = 0.3, 5
 #: A life's first run is made at its start.
 AT_START = 0.5
+#: Share of numbers of cycles that are planned as round ones.
+ROUND = 0.5
 #: Maintenance, or one of equal blocks, within the cycles that are known, and within as many again.
 WITHIN, BEYOND = 0.5, 0.4
 #: The most cycles that clutches see, with the deviation of the logarithm beyond, and the logarithm of their range: a life

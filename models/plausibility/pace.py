@@ -3,10 +3,11 @@
 Runs are taken by ascending cycles, kind by kind. Each is made at the cycles of a run of another kind, or ends a block of
 duty that begins where another run was made or is one of equal blocks, or comes a gap after the one before of its kind:
 
-    p(g) = a Σ r_k [g = g_k] + b Σ r_k LN(g; g_k, σ) + c LN(g; ḡ, Σ) + d / (g log(1e8/1e1))
+    p(g) = a Σ r_k [g = g_k] + R (b Σ r_k LN(g; g_k, σ) + c LN(g; ḡ, Σ) + d / (g log(1e8/1e1)))
 
 with g_k the last few gaps, r_k how recent they are, ḡ their geometric mean, and LN the log normal density. No scale of
-cycles is assumed: the last term gives every gap from 10 to 1e8 its share. Maintenance comes at any time of the life.
+cycles is assumed: the last term gives every gap from 10 to 1e8 its share. Maintenance comes at the cycles of any other run,
+or at any time of the life. R is how much more probable round numbers are (`roundness`).
 """
 
 import math
@@ -21,6 +22,8 @@ from models.plausibility import criteria
 #: Kinds in the order in which they are made at the same cycles; others come last.
 ORDER = ("run_in", "duty_cycles", "maintenance", "stationary_stribeck", "dynamic_stribeck")
 _FREE = ORDER.index("maintenance")
+#: What numbers are rounded to: 1, 2, 2.5, 5 times the powers of ten up to the most cycles.
+_GRAINS = np.outer(10.0 ** np.arange(round(math.log10(criteria.MAX_CYCLES))), (1.0, 2.0, 2.5, 5.0)).ravel()
 _RECENCY = 0.7 ** np.arange(criteria.MEMORY)
 #: The least probability of a run's cycles.
 _LEAST = 1e-30
@@ -31,9 +34,29 @@ def rank_of(kind: str) -> int:
     return ORDER.index(kind) if kind in ORDER else len(ORDER)
 
 
+def roundness(cycles: FloatArray | float, scale: FloatArray | float) -> FloatArray:
+    """How many times as probable cycles are as if any number were, both of one shape; they are rounded by `scale` at most.
+
+    People and rigs plan in round numbers: a share ROUND of all numbers are multiples of 1, 2, 2.5, 5, 10, 20 and so on, each
+    grain G from a thousandth of `scale` on as probable as the others. R = 1 - ROUND + ROUND mean(G [G divides the cycles]).
+    """
+    whole, place = np.unique(np.where(np.isfinite(cycles), cycles, 0.0), return_inverse=True)
+    times = whole[:, None] / _GRAINS
+    up_to = np.concatenate([np.zeros((whole.size, 1)), np.cumsum(_GRAINS * (times == np.rint(times)), axis=1)], axis=1)
+    grains = np.searchsorted(_GRAINS, scale, side="right")
+    place, least = place.reshape(np.shape(cycles)), np.maximum(grains - 12, 0)
+    mean = (up_to[place, grains] - up_to[place, least]) / np.maximum(grains - least, 1)
+    return np.asarray(1.0 - criteria.ROUND + criteria.ROUND * mean)
+
+
 def log_anywhere(cycles: FloatArray | float) -> FloatArray:
-    """log density of a number of cycles of which nothing is known, any shape: even over its logarithm, and falling beyond
-    what clutches last."""
+    """log density of a number of cycles of which nothing is known, any shape: even over its logarithm but for round ones,
+    and falling beyond what clutches last."""
+    return np.asarray(_log_of_any(cycles) + np.log(roundness(cycles, cycles)))
+
+
+def _log_of_any(cycles: FloatArray | float) -> FloatArray:
+    """The same where no number is round."""
     at = np.maximum(cycles, 1.0)
     beyond = np.maximum(np.log(at / criteria.MAX_CYCLES), 0.0) / criteria.BEYOND_SD
     return np.asarray(-np.log(at * criteria.LOG_CYCLES) - 0.5 * beyond**2)
@@ -83,9 +106,12 @@ def _meets(
     length = np.where(is_block, block, 1.0)
     with np.errstate(invalid="ignore"):
         apart = np.abs(cycles[:, :, None] - cycles[:, None, :]) < 0.5
-    joined = (apart & (rank[:, None] > rank)).any(axis=2)
+    free = rank == _FREE
+    joins = np.where(free[:, None], rank != _FREE, rank[:, None] > np.where(free, math.inf, rank))
+    joined = (apart & joins).any(axis=2)
     in_life = _anywhere_in_life(finite)
     meets = np.asarray(criteria.JOINS * joined, dtype=np.float64)
+    meets[:, free] /= np.maximum((finite[:, ~free] >= 0.0).sum(axis=1), 1)[:, None]  # any one of them
     if is_block.any():
         begin = (finite - length)[:, is_block]
         tiled = ((np.abs(begin[:, :, None] - finite[:, None, :]) < 0.5) & np.isfinite(cycles)[:, None, :]).any(axis=2)
@@ -93,6 +119,7 @@ def _meets(
         of_blocks = criteria.TILES * tiled + criteria.STARTS * (np.abs(begin) < 0.5)
         of_blocks += criteria.EQUALS * equal * np.minimum(length[is_block] * in_life[:, is_block], 1.0)
         meets[:, is_block] = of_blocks
+    in_life[:, free] = np.minimum(in_life[:, free] * roundness(finite[:, free], finite[:, free]), 1.0)
     left = np.where(is_block, 1.0 - criteria.TILES - criteria.STARTS - criteria.EQUALS, 1.0 - criteria.JOINS)
     return meets, left, in_life
 
@@ -103,28 +130,27 @@ def _anywhere_in_life(finite: FloatArray) -> FloatArray:
     latest = np.where(finite >= ordered[:, -1:], ordered[:, -2:-1] if finite.shape[1] > 1 else 0.0, ordered[:, -1:])
     share = np.where(finite <= latest, criteria.WITHIN, np.where(finite <= 2.0 * latest, criteria.BEYOND, 0.0))
     rest = np.where(latest >= 1.0, 1.0 - criteria.WITHIN - criteria.BEYOND, 1.0)
-    return np.asarray(share / np.maximum(latest, 1.0) + rest * np.exp(log_anywhere(finite)))
+    return np.asarray(share / np.maximum(latest, 1.0) + rest * np.exp(_log_of_any(finite)))
 
 
 def _by_gaps(cycles: FloatArray) -> FloatArray:
     """p [h, k] of each run's gap to the one before of its kind, in the places of the runs."""
     order = np.argsort(cycles, axis=1)
     ascending = np.take_along_axis(cycles, order, axis=1)
-    count = ascending.shape[1]
-    law = np.empty(ascending.shape)
-    first = ascending[:, 0]
-    law[:, 0] = criteria.AT_START * (first < 0.5) + (1.0 - criteria.AT_START) * np.exp(log_anywhere(first))
-    if count > 1:
-        with np.errstate(invalid="ignore"):
-            gaps = np.diff(ascending, axis=1)
-        law[:, 1:] = _of_gaps(np.where(np.isfinite(gaps), gaps, 0.0))
+    first = ascending[:, :1]
+    with np.errstate(invalid="ignore"):
+        gaps = np.diff(ascending, axis=1)
+    gaps = np.where(np.isfinite(gaps), gaps, 0.0)
+    round_by = roundness(ascending, np.concatenate([first, gaps], axis=1))
+    of_first = (1.0 - criteria.AT_START) * np.exp(_log_of_any(first)) * round_by[:, :1]
+    law = np.concatenate([criteria.AT_START * (first < 0.5) + of_first, _of_gaps(gaps, round_by[:, 1:])], axis=1)
     back = np.empty(law.shape)
     np.put_along_axis(back, order, law, axis=1)
     return back
 
 
-def _of_gaps(gaps: FloatArray) -> FloatArray:
-    """p [h, k] of gaps [h, k], each after those before it."""
+def _of_gaps(gaps: FloatArray, round_by: FloatArray) -> FloatArray:
+    """p [h, k] of gaps [h, k], each after those before it, and as much as the cycles after it are round."""
     sets, count = gaps.shape
     padded = np.concatenate([np.zeros((sets, criteria.MEMORY)), gaps], axis=1)
     places = np.arange(count)[:, None] + criteria.MEMORY - 1 - np.arange(criteria.MEMORY)
@@ -142,10 +168,11 @@ def _of_gaps(gaps: FloatArray) -> FloatArray:
     further = _log_normal(log_gap, grown, criteria.LIKE_GAP_SD)
     like = np.where(growing, (1.0 - criteria.GROWING) * like + criteria.GROWING * further, like)
     similar = _log_normal(log_gap, (weight * log_before).sum(axis=2), 1.5)  # of their order
-    anything = np.exp(log_anywhere(gaps))
-    by_earlier = criteria.SAME_GAP * same + criteria.LIKE_GAP * like + criteria.SIMILAR_GAP * similar
+    anything = np.exp(_log_of_any(gaps))
     rest = 1.0 - criteria.SAME_GAP - criteria.LIKE_GAP - criteria.SIMILAR_GAP
-    law = np.where(total[:, :, 0] > 0, by_earlier + rest * anything, anything)
+    spread = criteria.LIKE_GAP * like + criteria.SIMILAR_GAP * similar + rest * anything
+    earlier = total[:, :, 0] > 0
+    law = criteria.SAME_GAP * same + np.minimum(round_by * np.where(earlier, spread, anything), 1.0 - criteria.SAME_GAP)
     return np.where(gaps < 0.5, 0.02, law)  # it repeats another of its kind
 
 

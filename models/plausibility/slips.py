@@ -69,21 +69,21 @@ class Run:
 
 def slips_of(run: Run, expected: float) -> Iterator[Slip]:
     """All slips of a run; its cycles were most likely `expected` where they are mistaken altogether."""
-    sent = run.sent
+    sent, anywhere = run.sent, float(log_anywhere(run.sent.cycles))
     for name, values in mistyped(sent.cycles).items():
         for cycles in values:
             log_prior = math.log(criteria.DIGIT_SLIP / len(values))
             yield Slip(name=name, log_prior=log_prior, likely=replace(sent, cycles=cycles))
     yield Slip(
         name=OTHER_CYCLES,
-        log_prior=math.log(criteria.OTHER_CYCLES) + float(log_anywhere(sent.cycles)),
+        log_prior=math.log(criteria.OTHER_CYCLES) + anywhere,
         likely=replace(sent, cycles=expected),
     )
     yield from run.slips()
     if sent.log_cof is not None:
         off = (sent.log_cof - math.log(criteria.COF)) / criteria.LOG_COF_SD
         of_any = -0.5 * off * off - math.log(criteria.LOG_COF_SD * math.sqrt(2 * math.pi))
-        own = math.log(criteria.OTHER_CLUTCH) + of_any + float(log_anywhere(sent.cycles))
+        own = math.log(criteria.OTHER_CLUTCH) + of_any + anywhere
         yield Slip(name=OTHER_CLUTCH, log_prior=own, likely=sent)
         yield Slip(name=OTHER_TEST, log_prior=math.log(criteria.OTHER_TEST) + of_any, likely=sent)
 

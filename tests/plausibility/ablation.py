@@ -79,6 +79,7 @@ WITHOUT: dict[str, Patches] = {
     "gaps of one order": _changed(SIMILAR_GAP=_NEVER),
     "gaps before the last": ((pace, "_RECENCY", 1e-12 ** np.arange(criteria.MEMORY)),),
     "gaps that grow": _changed(GROWING=0.0),
+    "round numbers": _changed(ROUND=_NEVER),
     "a first run at the start": _changed(AT_START=_NEVER),
     "maintenance within the life": _changed(WITHIN=0.0, BEYOND=0.0),
     "a most that clutches last": _changed(MAX_CYCLES=1e30),

@@ -54,6 +54,16 @@ def test_swapped_digits_among_earlier_runs_are_seen_by_the_cof() -> None:
     assert bench.answer(stationary(700, run_id="late")).codes == ()
 
 
+@pytest.mark.parametrize("event", ["rebuild", "oil_change"])
+@pytest.mark.parametrize("gap", [250, 500, 900])
+def test_maintenance_at_a_round_number_is_no_zero_too_many(gap: int, event: str) -> None:
+    """A tenth of it is a test's number; the same with a digit more is no round one."""
+    bench = bench_after(range(0, 9 * gap, gap))
+    maintenance = {"kind": "maintenance", "event": event, "run_id": "m", "cycles": 10 * gap}
+    assert bench.answer(maintenance).codes == ()
+    assert bench.answer(maintenance | {"cycles": 55 * gap}).codes == ("cycles_off_pace",)
+
+
 def test_a_far_jump_that_a_duty_block_declares_is_honest() -> None:
     bench = bench_after()
     block = {"kind": "duty_cycles", "run_id": "d", "cycles": 70_000, "duty": {"cycles": 64_000}}
