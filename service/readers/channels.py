@@ -44,13 +44,8 @@ _SECOND_OF_DAY = 1.2e-5
 #: Seconds since 1970 of 2000 and 2100. In nanoseconds, .NET's ticks of that time would be of 1990.
 _OUR_TIME = np.array([9.46e8, 4.1e9])
 #: What computers count since when: Unix, Windows' file times, .NET's ticks.
-_COUNTED = {
-    "ms since 1970": 1e3,
-    "µs since 1970": 1e6,
-    "ns since 1970": 1e9,
-    "100 ns since 1601": 1e7,
-    "100 ns since 0001": 1e7,
-}
+_COUNTED = {"ms since 1970": 1e3, "µs since 1970": 1e6, "ns since 1970": 1e9}
+_COUNTED |= {"100 ns since 1601": 1e7, "100 ns since 0001": 1e7}
 #: Empty cells that show a channel of a lower rate. Chosen: fewer may have been left empty by hand.
 _MIN_GAPS = 4
 #: The share of a clock's steps that go on. Chosen: times that are rounded to half a step stand still at every second.

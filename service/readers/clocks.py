@@ -64,7 +64,8 @@ def stated_clock(held: Mapping[str, float | str], rows: Callable[[], int], count
     def read() -> FloatArray:
         seconds = {one[2]: in_seconds(*one, rate=one not in steps) for one in ways if one[0] > 0}
         stored = {key: step for key, step in seconds.items() if _STORED.search(key)} or seconds
-        step, against = next(iter(stored.values())), [key for key, own in stored.items() if not _alike(own, stored)]
+        step, slowest = next(iter(stored.values())), max(stored.values())
+        against = [] if slowest - min(stored.values()) <= 1e-3 * slowest else list(stored)  # but for rounding
         against += [f"{key} = {value}" for key, value in named.items() if _is_decimation(key, value)]
         samples = next((one[0] for one in _stated(named, _COUNTS)), None)
         lasts = next((in_seconds(*one) for one in _stated(named, _DURATIONS) if one[1]), None)
@@ -78,11 +79,6 @@ def stated_clock(held: Mapping[str, float | str], rows: Callable[[], int], count
 
     counts = bool(steps) and steps[0][:2] in ((1.0, ""), (1.0, "s")) and first[0] == 0
     return Clock((first, *ways, counted), read, counts=counts)
-
-
-def _alike(step: float, others: Mapping[str, float]) -> bool:
-    """Whether a step is that of all others, but for rounding."""
-    return all(abs(step - other) <= 1e-3 * step for other in others.values())
 
 
 def _is_decimation(key: str, value: float | str) -> bool:

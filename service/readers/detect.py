@@ -96,10 +96,8 @@ _HEAD = 4096
 @contextmanager
 def opened(path: Path, limits: Limits) -> Iterator[ByteSource]:
     """The file's bytes, unpacked if it is a gzip file. Reading past the limits raises TooLargeError."""
+    packed, size = is_packed(path), path.stat().st_size
     with path.open("rb") as file:
-        packed = file.read(2) == _GZIP
-        file.seek(0)
-        size = path.stat().st_size
         if not packed and size > limits.most_bytes:
             raise TooLargeError(f"a file must not be larger than {limits.most_bytes} bytes, got {size}")
         yield _Unpacked(file, size, limits) if packed else file

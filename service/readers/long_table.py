@@ -34,26 +34,11 @@ _MAX_LOOKED_AT = 20
 _VALUES = re.compile(r"val(?!id)|wert|reading|messung|数值|値|^y$", re.IGNORECASE)
 #: A column that says which values are valid, and what it says of those that are: in words, by OPC's code, as a flag, which
 #: of a status may also be that of an error.
-_QUALITY, _STATUS = (
-    re.compile(r"quality|valid|qualit|gültig", re.IGNORECASE),
-    re.compile("status|zustand", re.IGNORECASE),
-)
+_QUALITY, _STATUS = (re.compile(names, re.IGNORECASE) for names in ("valid|qualit|gültig", "status|zustand"))
 _GOOD = {"good", "ok", "valid", "192", "192.0", "gut", "gültig", "i.o.", "io", "pass", "passed"}
-_BAD = {
-    "bad",
-    "nok",
-    "invalid",
-    "schlecht",
-    "ungültig",
-    "n.i.o.",
-    "nio",
-    "fail",
-    "failed",
-    "fault",
-    "error",
-    "fehler",
-    "alarm",
-}
+_BAD = {"bad", "nok", "invalid", "schlecht", "ungültig", "n.i.o.", "nio"} | {
+    "fail", "failed", "fault", "error", "fehler", "alarm"
+}  # fmt: skip
 _ON, _OFF = {"true", "1", "1.0"}, {"false", "0", "0.0"}
 _SECOND = np.timedelta64(1, "s")
 

@@ -158,11 +158,5 @@ def is_unit(text: str) -> bool:
 
 def spellings(channel: str) -> str:
     """Examples of the units that a channel may be in, for a message."""
-    examples = {
-        "s": "s, ms, min",
-        "bar": "bar, mbar, MPa, kPa, Pa, psi",
-        "rpm": "rpm, 1/min, rad/s",
-        "Nm": "Nm, N·m, kNm",
-        "°C": "°C, degC, K, °F",
-    }
-    return examples[CHANNELS[channel].unit]
+    examples = ["s, ms, min", "bar, mbar, MPa, kPa, Pa, psi", "rpm, 1/min, rad/s", "Nm, N·m, kNm", "°C, degC, K, °F"]
+    return dict(zip(UNITS, examples, strict=True))[CHANNELS[channel].unit]
