@@ -122,7 +122,7 @@ def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Lim
             raise overdue(kind, limits) from None
         result.seek(0)
         if result.read(len(_STARTED)) != _STARTED and ended.returncode != -signal.SIGTERM:
-            why = f"it ended with {_ending(ended.returncode)} before it looked at the file"
+            why = f"the reader ended with {_ending(ended.returncode)} before it opened the file"
             raise BusyError(f"the reader of {kind} files cannot start here, which is not the file's fault: {why}")
         if ended.returncode == -signal.SIGXCPU:
             raise too_slow(kind, limits)

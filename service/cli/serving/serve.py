@@ -142,7 +142,7 @@ def _allowed(host: str, settings: "Settings") -> str:
         )
     if open_to_readers := missing():
         unkept = " and ".join(open_to_readers)
-        start.warning("this system cannot keep a process that reads a file from outside from %s", unkept)
+        start.warning("on this system, the process that reads the files of recorders still has access to %s", unkept)
     return host
 
 

@@ -12,7 +12,7 @@ import { RemainingBy } from "../quantities/remaining.js";
 import { shudderMargin } from "../quantities/shudder.js";
 import { read } from "../shared/api.js";
 import { h } from "../shared/dom.js";
-import { aboutCycles, atLeast, estimate, fixed, likely, percent, probability } from "../shared/format.js";
+import { aboutCycles, atLeast, estimate, fixed, likely, percent, probability, roundedDown } from "../shared/format.js";
 import { healthBar } from "../shared/sparkline.js";
 import { firstRun } from "../shared/welcome.js";
 import { heldView } from "./held.js";
@@ -142,7 +142,7 @@ function tiles(clutch, life) {
   const sure = course ? `${probability(course.probability)} sure` : life.runs_used > 2 ? "" : "after three tests";
   return [
     tile("Health", percent(health), health === null ? null : healthBar(health, clutch.state.name)),
-    tile("Remaining cycles", remaining(life), small(remainingNotes(life))),
+    tile(predicts(life) ? "Safe for, cycles (95 %)" : "Remaining cycles", remaining(life), small(remainingNotes(life))),
     tile("Mean COF", cof, small(`${deviation ? `± ${deviation}; ` : ""}${place}`)),
     tile("Duty cycles so far", fixed(life.as_of_cycles), small(used)),
     tile("How it ages", course ? COURSES[course.name] : "not known yet", small(sure)),
@@ -162,14 +162,13 @@ const COURSES = { eq6: "As expected", slowing: "Slower and slower", accelerating
  */
 function remainingNotes(life) {
   const { status, ended, held_runs: held, back_cast: cast, ended_lives: lives, probability_of_reaching: chance } = life;
-  const predicted = status === "predicted" || status === "may_never_reach";
   const never = chance !== null && chance < 0.995 && status !== "insufficient_data";
   return [
     ended ? `ended at ${fixed(ended.cycles)} cycles` : null,
     status === "reached" ? "the end of life is reached" : null,
     status === "insufficient_data" ? atLeast(life.at_least) : null,
     status === "may_never_reach" ? "the tests do not show the end yet" : null,
-    predicted ? likely(life.remaining_cycles) : null,
+    predicts(life) ? likely(life.remaining_cycles) : null,
     never ? `${probability(chance)} chance of an end within ${fixed(life.horizon_cycles)} cycles` : null,
     held ? `${aboutCycles(held.remaining_cycles)} if the held ${held.count === 1 ? "run counts" : "runs count"}` : null,
     cast && cast.of > 0 ? `${cast.held} of ${cast.of} later tests lay inside their forecast` : null,
@@ -191,8 +190,11 @@ const tile = (name, value, more) =>
   h("div", { class: "tile" }, h("dt", {}, name), h("dd", {}, h("span", { class: "big" }, value), more));
 
 /** @param {RemainingLife} life */
+const predicts = ({ status }) => status === "predicted" || status === "may_never_reach";
+
+/** @param {RemainingLife} life */
 function remaining({ status, at_least: bound, ended }) {
   if (ended) return ended.reason === "worn" ? "0" : "–";
   if (status === "insufficient_data") return "–";
-  return status === "reached" ? "0" : atLeast(bound);
+  return status === "reached" ? "0" : roundedDown(bound ?? 0);
 }

@@ -239,8 +239,8 @@ function notes({ notes: all = [] }) {
 }
 
 const VISIBLE =
-  "The smallest size of each effect that these runs would have shown: for every shape that the effect can have, and for its " +
-  "most visible shape. No number means that at least one shape would stay hidden at any size.";
+  "The smallest size of each effect that these runs can show: if the effect has its least visible shape, and if it has its " +
+  "most visible shape. No number means that the least visible shape stays hidden at any size.";
 
 /** @param {DiagnosisOut} diagnosis */
 function visible({ visible: all = [] }) {

@@ -127,7 +127,7 @@ export function atLeast(bound) {
  * Cycles, rounded down to two digits.
  * @param {number} value
  */
-function roundedDown(value) {
+export function roundedDown(value) {
   const unit = 10 ** Math.max(0, Math.floor(Math.log10(Math.max(1, value))) - 1);
   return fixed(Math.floor(value / unit) * unit);
 }
