@@ -71,9 +71,6 @@ class Outbox:
             self._thread.join()
         self._pool.shutdown(wait=True, cancel_futures=True)
 
-    def is_working(self) -> bool:
-        return self._thread.is_alive()
-
     def wake(self) -> None:
         """Look now for what is to be sent."""
         with self._change:
