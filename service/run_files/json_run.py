@@ -24,6 +24,8 @@ from service.schemas.run import RUN_IN, DutyRunIn, MaintenanceRunIn
 #: Items of a list and characters of a name of a run that are checked by its schema: more than a message quotes.
 _MAX_SHOWN = 100
 
+#: The character U+0000 as JSON writes it, its backslash no escaped one.
+_NUL = re.compile(rb"(?<!\\)(?:\\\\)*\\u0000")
 #: Byte order marks that are not UTF-8's; that of UTF-16 in little-endian order begins that of UTF-32.
 _MARKS = (
     (codecs.BOM_UTF32_LE, "UTF-32"),
@@ -93,7 +95,10 @@ def _parsed(body: bytes, read: Callable[[Any], Answer]) -> Answer:
         _require_utf8(body)
         message = f"the body: Invalid JSON: {error}"
         raise InvalidError.of(message, code="json_invalid") from None
-    return read(sent)
+    answer = read(sent)
+    if _NUL.search(body):  # PostgreSQL reads no JSON that holds it: stored once, it would fail all that is asked later
+        raise InvalidError.of("the body must not hold the character U+0000", code="null_character")
+    return answer
 
 
 def _too_many_marks(body: bytes, read: Callable[[Any], object]) -> InvalidError:

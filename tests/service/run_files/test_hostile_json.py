@@ -143,3 +143,11 @@ def test_what_is_no_json_is_named() -> None:
         found = refused(body)
         assert found.errors[0].code == "json_invalid"
         assert found.errors[0].message.startswith("the body: Invalid JSON: ")
+
+
+@pytest.mark.parametrize("kept", [r"\\u0000", r"a\\\\u0000", r"\u0001"])
+def test_a_zero_character_is_refused_for_no_database_of_json_reads_it(kept: str) -> None:
+    head = '{"kind":"maintenance","cycles":0,"event":"other","note":"'
+    for note in (r"a\u0000b", r"\\\u0000", r"\n\u0000"):
+        assert "U+0000" in str(refused(f'{head}{note}"}}'.encode()))
+    assert read_run(f'{head}{kept}"}}'.encode()).details["note"] == json.loads(f'"{kept}"')
