@@ -16,7 +16,7 @@ from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.thermal import REFERENCE_FLUX
 from models.diagnosis.explanations.posterior import Posterior, posterior_of
 from models.diagnosis.explanations.verdict import NOTHING
-from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
+from models.diagnosis.pooled_fit.baseline_fit import IndeterminateError, fit_baseline
 from models.diagnosis.report.isolability import visible_of
 from models.diagnosis.report.report import Visible
 from tests.blind.rig.clutch import Law
@@ -69,7 +69,10 @@ def shown(seed: tuple[int, ...], slug: str) -> Shown | str:
     if not all(np.isfinite(part).all() for part in truth):
         return "the effect makes no number of some readings"
     given = campaign(replace(blank, measured=measure(rng, blank.plan, blank.sensor, truth)))
-    seen, beyond = alarmed(given)
+    try:
+        seen, beyond = alarmed(given)
+    except IndeterminateError as lacking:
+        return str(lacking)
     return Shown(seed, slug, stated.amplitude, TIMES * stated.amplitude, seen, beyond)
 
 
