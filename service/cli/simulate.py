@@ -55,7 +55,7 @@ def simulate(
         typer.Option(
             min=0,
             max=500,
-            help="Write the plate's temperature: this many K above the oil at 0.32 W/mm²; default: not written",
+            help="Write the plate's temperature, too; the value is its rise above the oil at 0.32 W/mm², in K",
         ),
     ] = None,
     frequency: Annotated[

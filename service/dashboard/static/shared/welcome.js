@@ -14,7 +14,7 @@ export function welcome() {
     h("h3", {}, "Try it with a simulated clutch"),
     copyable(`clutchlife simulate --seed 7 --out campaign\nclutchlife push campaign --clutch sim-7 --url ${here()}`),
     h("h3", {}, "Connect a rig"),
-    h("p", {}, "Register the clutch; what you leave out takes the reference clutch's values:"),
+    h("p", {}, "Register the clutch; fields that you leave out take the values of the reference clutch:"),
     copyable(`clutchlife register bench3-017 --url ${here()}`),
     h(
       "p",
