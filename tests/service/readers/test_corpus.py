@@ -1068,7 +1068,7 @@ def test_rows_that_a_column_marks_invalid_are_left_out(tmp_path: Path, title: st
 def test_fractions_of_a_day_are_refused_until_the_map_says_what_they_are(tmp_path: Path) -> None:
     lines = [f"{0.33 + row / 86400:.12f},5,{100 + row},20\n" for row in range(ROWS)]
     (tmp_path / "a.csv").write_text("Time,pressure_bar,speed_rpm,torque_nm\n" + "".join(lines), encoding="utf-8")
-    with pytest.raises(InvalidError, match="may be days"):
+    with pytest.raises(InvalidError, match="may be seconds, or days"):
         read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("time_s:Time"))
     read = read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("time_s:Time [d]"))
     np.testing.assert_allclose(np.diff(read.columns["time_s"]), 1, atol=1e-4)
