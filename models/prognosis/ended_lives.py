@@ -53,6 +53,7 @@ from models.tracking.history import later_epochs
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
+from models.tracking.sampling import tempered
 
 _GRID = Grid()
 #: Ends T that are tried, and places of the density that is stated.
@@ -214,15 +215,17 @@ class Kin:
         It holds these as they are (all of those behind `as_of`), under the forms' shares and weighted by the predictive, and
         `ends`. How much the clutch's tests speak for the forms of the kind is evidence against its courses. How well those
         draws agree with the predictive, against an end anywhere, is evidence that the clutch is of the kind, and none for a
-        law against their courses.
+        law against their courses. Where few of them agree it is tempered: one draw is no certainty.
         """
         ahead = own > as_of
         near = ahead & np.isfinite(own)
         left = float(weight[ahead].sum())
         by_form = np.where(ahead, weight * self.lean[form], 0.0)
+        log_agreeing = self.predictive.log_density(np.log(own[near] / self.centre))
+        agreed, evidence = float(by_form[near] @ np.exp(log_agreeing)), float(by_form.sum())
         agreeing = np.zeros(own.size)
-        agreeing[near] = by_form[near] * np.exp(self.predictive.log_density(np.log(own[near] / self.centre)))
-        agreed, evidence = float(agreeing.sum()), float(by_form.sum())
+        if agreed > 0.0:
+            agreeing[near] = tempered(by_form[near], log_agreeing)
         lawful = evidence / (evidence + left * (1.0 - self.lawful)) if agreed > 0.0 else 0.0
         by_law = lawful * _ANYWHERE * agreed / evidence if lawful else 0.0
         by_course = (1.0 - lawful) * math.exp(self.log_odds)
@@ -230,7 +233,7 @@ class Kin:
         of_kind = odds / (1.0 + odds)
         parts = [
             np.where(ahead, 1.0 - of_kind, 1.0) * weight,
-            left * of_kind * lawful * agreeing / (agreed or 1.0),
+            left * of_kind * lawful * agreeing,
             left * of_kind * (1.0 - lawful) * self.weight,
         ]
         return np.concatenate([own, own, self.ends]), np.concatenate(parts)

@@ -38,10 +38,10 @@ from models.prognosis.criteria import BAND, FAR_APART, FEWEST_TESTS, HORIZON
 from models.prognosis.first_passage import first_below, path_places, weighted_quantiles
 from models.tracking.courses import Course, basis
 from models.tracking.posterior import Posterior
-from models.tracking.sampling import systematic
+from models.tracking.sampling import systematic, tempered
 
-#: Combinations that are tried, and how many must count in the end.
-_TRIED, _FEWEST = 3_000, 60
+#: Combinations that are tried.
+_TRIED = 3_000
 
 
 def draw_jointly(
@@ -69,7 +69,7 @@ def draw_jointly(
     for column in range(quantities):
         alone = 1.0 / spread[:, column, column]
         evidence -= _solved(b[:, [column]], scaled[:, [column]], alone[:, None, None])[2]
-    kept = systematic(_tempered(evidence), size, float(rng.random()))
+    kept = systematic(tempered(np.ones(_TRIED), evidence), size, float(rng.random()))
     drawn = mean[kept] + np.linalg.solve(
         np.swapaxes(root[kept], 1, 2), rng.standard_normal((size, 2 * quantities, 1))
     ).squeeze(2)
@@ -107,17 +107,6 @@ def _solved(b: FloatArray, values: FloatArray, weight: FloatArray) -> tuple[Floa
     mean[:, :q] += around
     log_root = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
     return mean, root, np.asarray(0.5 * np.square(half).sum(axis=(1, 2)) - log_root)
-
-
-def _tempered(log_weight: FloatArray) -> FloatArray:
-    """Weights [n] that sum to one, their logarithms shrunk until _FEWEST count."""
-    off = log_weight - log_weight.max()
-    while True:
-        weight = np.exp(off)
-        weight /= weight.sum()
-        if 1.0 / np.square(weight).sum() >= min(_FEWEST, weight.size):
-            return np.asarray(weight)
-        off = 0.8 * off
 
 
 def shrunk_correlation(residuals: FloatArray) -> FloatArray:

@@ -19,12 +19,28 @@ from models.tracking.linear_model import Points, Sums, Terms, conditional, drawn
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 
+#: How many draws must count: fewer are no sample of anything.
+FEWEST = 60
+
 
 def systematic(weight: FloatArray, size: int, offset: float) -> NDArray[np.intp]:
     """Indices [size], ascending, each i drawn weight_i · size times up to rounding; offset uniform in [0, 1)."""
     edges = np.cumsum(weight)
     drawn = np.searchsorted(edges, (np.arange(size) + offset) / size * edges[-1], side="right")
     return np.asarray(np.minimum(drawn, weight.size - 1), dtype=np.intp)
+
+
+def tempered(weight: FloatArray, log_factor: FloatArray) -> FloatArray:
+    """Weights [n] times a factor [n], normalised, its logarithm shrunk until FEWEST count, or half as many as without it."""
+    whole = weight / weight.sum()
+    fewest = min(FEWEST, 0.5 / float(whole @ whole))
+    off = log_factor - log_factor[weight > 0.0].max()
+    while True:
+        counted = whole * np.exp(off)
+        counted /= counted.sum()
+        if 1.0 / float(counted @ counted) >= fewest:
+            return np.asarray(counted)
+        off = 0.8 * off
 
 
 def thinned(sample: Posterior, size: int, offset: float) -> Posterior:

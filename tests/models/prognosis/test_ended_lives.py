@@ -212,6 +212,15 @@ def test_what_is_behind_stays_behind_and_weights_sum_to_one() -> None:
         assert given[ends <= 660.0].sum() == pytest.approx(0.1)
 
 
+def test_one_draw_that_agrees_with_the_ended_lives_is_no_certainty() -> None:
+    """Of a filter whose draws end, where at all, far from where the others did but for one."""
+    kin = said(measured(1_100.0, 0.6), lives())
+    own = np.concatenate([[1_100.0], np.geomspace(2_000.0, 1e6, 199), np.full(300, np.inf)])
+    ends, given = replace(kin, lawful=1.0).together(own, np.full(500, 0.002), np.zeros(500, dtype=np.intp), 660.0)
+    low, high = weighted_quantiles(np.minimum(ends, 1e6), given, (0.05, 0.5))
+    assert high > 1.2 * low
+
+
 @pytest.mark.parametrize("log_odds", [1.0, 20.0])
 def test_courses_that_fit_a_clutch_do_not_take_the_share_of_its_filter(log_odds: float) -> None:
     """Of a kind of which four in five follow eq. 6, as its courses did as well; but where its tests speak against eq. 6."""
