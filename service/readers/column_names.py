@@ -467,6 +467,8 @@ def _twice(channel: str, *columns: Column) -> InvalidError:
     distinct = len(set(names)) == len(names)
     way = f"choose one with map={channel}:NAME" if distinct else "their names must differ"
     message = f"{channel} must be one column, got {shown}; {way}"
+    if channel == "speed_rpm":
+        message += ". It is the sliding speed: where these are the speeds of both sides, send their difference"
     return InvalidError.of(message, code="ambiguous", pointer=f"/channels/{channel}", value=shown)
 
 

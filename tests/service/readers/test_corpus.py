@@ -406,6 +406,11 @@ REFUSED = {
     ),
     "a-factor-behind-a-unit": ("t;M\ns;Nm*10\n0;2.1\n", None, "'Nm*10'"),
     "two-torques": ("t [s];Torque A1 [Nm];Torque A2 [Nm]\n0;1;2\n", None, "torque_nm must be one column"),
+    "speeds-of-both-sides": (
+        "t [s];p [bar];n inner [rpm];n outer [rpm];M [Nm]\n0;5;520;500;20\n",
+        None,
+        "where these are the speeds of both sides, send their difference",
+    ),
     "two-torques-understood-in-part": (
         "t [s];p [bar];n [rpm];Torque FZG [Nm];Torque HBM [Nm]\n0;5;100;1;2\n",
         None,

@@ -62,8 +62,7 @@ function rangeOf({ measured, trajectory }) {
  */
 export function parameter({ items, name, pressure, events }) {
   const item = items.find(({ quantity, pressure_bar: level }) => quantity === name && level === pressure);
-  if (!item?.coefficients)
-    return { empty: "Tracking needs three tests at different cycles at this pressure." };
+  if (!item?.coefficients) return { empty: "Tracking needs three tests at different cycles at this pressure." };
   const { measured, trajectory, coefficients: k } = item;
   const { unit } = PARAMETERS[name];
   const inUnit = unit && ` ${unit.replace("^0.3", "⁰·³")}`;

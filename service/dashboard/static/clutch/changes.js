@@ -306,7 +306,10 @@ async function changeInspection(inspection, action, reason) {
   const { body } = await sendJson("POST", address, { reason });
   const [past, back] = action === "withdraw" ? ["withdrawn", "restore"] : ["restored", "withdraw"];
   const text = `The inspection at ${fixed(body.cycles)} cycles is ${past}.`;
-  return { text, undo: () => changeInspection(body, back, `the ${action === "withdraw" ? "withdrawal" : "restoration"} is undone`) };
+  return {
+    text,
+    undo: () => changeInspection(body, back, `the ${action === "withdraw" ? "withdrawal" : "restoration"} is undone`),
+  };
 }
 
 /**

@@ -4,16 +4,7 @@
 import { sentence } from "../diagnosis/report.js";
 import { byMeanCof } from "../quantities/criteria.js";
 import { h, table } from "../shared/dom.js";
-import {
-  atLeast,
-  estimate,
-  fixed,
-  likely,
-  moment,
-  percent,
-  probability,
-  words,
-} from "../shared/format.js";
+import { atLeast, estimate, fixed, likely, moment, percent, probability, words } from "../shared/format.js";
 import { stateIcon } from "../shared/state.js";
 
 /** @import { Chart } from "../charts/chart.js" */
