@@ -133,7 +133,7 @@ export class Overview {
  * @param {RemainingLife} life
  */
 function tiles(clutch, life) {
-  const { current, model, status, course } = life;
+  const { current, model, course } = life;
   const { health } = current;
   const [cof, deviation] = estimate(current.mean_cof, current.mean_cof_sd).split(" ± ");
   const share = current.fraction_of_initial;
