@@ -150,7 +150,7 @@ def test_a_body_without_end_is_not_read() -> None:
 NO_ADDRESSES = (
     "ftp://example.org/", "file:///etc/passwd", "gopher://x/", "http://", "http:///hook", "example.org", "syslog://",
     "http://exa mple.org/", "http://example.org/\r\nX: 1", "http://example.org:99999/", "http://example.org:0/", "unheard://x",
-    "http://[", "http://a..b/", "json://[\x00", "https://example.org/é",
+    "http://[", "http://a..b/", "json://[\x01", "https://example.org/é",
 )  # fmt: skip
 
 

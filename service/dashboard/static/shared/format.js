@@ -146,7 +146,7 @@ export const percent = (share, decimals = 0) => (isNumber(share) ? `${fixed(100 
 export function probability(value) {
   if (!isNumber(value)) return NONE;
   if (value < 0.005) return "< 1 %";
-  if (value > 0.995) return "> 99 %";
+  if (value >= 0.995) return "> 99 %";
   return percent(value);
 }
 
