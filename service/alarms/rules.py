@@ -24,6 +24,7 @@ from service.lives.condition import (
     held_in_words,
     lower_bound,
     silence_in_words,
+    stated,
 )
 from service.lives.payloads import ENDED, INSUFFICIENT
 from service.schemas.alarm import AlarmIn
@@ -197,7 +198,9 @@ def _state(rule: AlarmIn, facts: Facts) -> Finding | None:
     name = facts.state["name"]
     if name not in (rule.any_of or [other for other in STATE_WORDS if other != NORMAL]):
         return None
-    return Finding(value=None, words=f"{STATE_WORDS[name].lower()}: {facts.state['why']}", mark=name)
+    known = stated(facts.summary)
+    clauses = dict.fromkeys([facts.state["why"], *([known["statement"]] if known else [])])
+    return Finding(value=None, words=f"{STATE_WORDS[name].lower()}: {'; '.join(clauses)}", mark=name)
 
 
 def _silent_hours(_rule: AlarmIn, facts: Facts) -> Finding | None:

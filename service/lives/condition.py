@@ -93,22 +93,26 @@ def lower_bound(at_least: float | None, among: Mapping[str, Any] | None) -> floa
 def _held_warning(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> dict[str, str]:
     """What held runs would make of an answer, by all that it states: where both are unknown the safe bounds may differ."""
     if all(among[name] == payload[name] for name in ("status", "remaining_cycles", "at_least")):
-        effect = "the remaining life would be the same with them"
+        effect = f"the remaining life would be the same with {_them(count)}"
     elif among["status"] == REACHED:
-        effect = "with them the end of life would be reached"
+        effect = f"with {_them(count)} the end of life would be reached"
     elif among["status"] == INSUFFICIENT and among["at_least"] is None:
-        effect = "with them nothing could be predicted"
+        effect = f"with {_them(count)} nothing could be predicted"
     elif among["status"] == INSUFFICIENT:
-        effect = f"with them the remaining life is not known: {bound_in_words(among['at_least'])}"
+        effect = f"with {_them(count)} the remaining life is not known: {bound_in_words(among['at_least'])}"
     else:
-        effect = f"with them {interval_in_words(among['remaining_cycles'])} cycles would remain"
+        effect = f"with {_them(count)} {interval_in_words(among['remaining_cycles'])} cycles would remain"
     return {"code": HELD_RUNS, "message": f"{held_in_words(count)}: {effect}"}
 
 
 def held_beside(count: int) -> dict[str, Any]:
     """What an answer that is without so many held runs says of them: `held_runs`, and a warning where there are some."""
-    message = f"{held_in_words(count)}: this is without them"
+    message = f"{held_in_words(count)}: this is without {_them(count)}"
     return {"held_runs": count, "warnings": [{"code": HELD_RUNS, "message": message}] if count else []}
+
+
+def _them(count: int) -> str:
+    return "it" if count == 1 else "them"
 
 
 def held_in_words(count: int) -> str:
@@ -120,11 +124,10 @@ def state_of(summary: Mapping[str, Any], *, disputed: bool, silent: str | None =
     model disagree, and nobody has acted on it; `silent`: since when its rig has sent nothing, where that is an alarm. The
     name is stored with the clutch whenever the summary is."""
     name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
-    if "status" not in summary:
+    if reason or "status" not in summary:
         return {"name": name, "why": reason}
     among = summary.get("with_held")
-    says = statement_of(summary, lower_bound(summary["at_least"], among and among[SHOWN]))
-    return {"name": name, "why": f"{reason}: {says}" if reason else says}
+    return {"name": name, "why": statement_of(summary, lower_bound(summary["at_least"], among and among[SHOWN]))}
 
 
 def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str | None) -> tuple[str, str]:
@@ -279,14 +282,17 @@ def _near_end(summary: Mapping[str, Any]) -> str | None:
 
 
 def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
-    """What is known of the remaining life as a sentence: its safe bound, and how probable an end is that is left open."""
-    bound = bound_in_words(at_least)
+    """What is known of the remaining life as a sentence: its safe bound, which held runs may lower, and how probable an end
+    is that is left open."""
+    bound, own = bound_in_words(at_least), payload["at_least"]
+    if own is not None and bound != bound_in_words(own):
+        bound += ", if held runs count"
     if (end := payload.get("ended")) is not None:
         return f"ended at {end['cycles']:,.0f} cycles" + (
             "" if end["reason"] == WORN else ", taken out before it was worn"
         )
     if payload["status"] == REACHED:
-        return f"the end of life is reached: {limit_in_words(payload['criterion'])}"
+        return f"the end of life is reached: its limit is {limit_in_words(payload['criterion'])}"
     if payload["status"] == INSUFFICIENT:
         return "the remaining life is not known yet" + (f": {bound}" if payload["runs_used"] else "")
     return _left_open(bound, payload) if payload["status"] == PassageStatus.MAY_NEVER_REACH.value else bound

@@ -241,7 +241,7 @@ class ClutchState(Answer):
         " tests. `out_of_specification`: data and model disagree. `normal`: none of these. If several"
         " apply, the first counts"
     )
-    why: str = Field(description="The reason as a sentence, with the safe bound")
+    why: str = Field(description="The reason as a clause; if the state needs none, the statement of the remaining life")
 
 
 class ClutchOut(Answer):

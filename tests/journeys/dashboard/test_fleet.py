@@ -72,9 +72,10 @@ def test_the_worst_comes_first_with_all_that_is_asked_of_a_row(watched: Watched)
     first = page.locator("tr[data-clutch='worn-out']")
     worn = ONCE.get(f"{watched.url}/v1/clutches/worn-out").json()
     assert first.locator(".state").inner_text().split("\n") == ["Failure", worn["state"]["why"]]
-    assert worn["state"]["why"] == "the end of life is reached: mean COF at 50 % of new"
+    assert worn["state"]["why"] == "the end of life is reached: its limit is mean COF at 50 % of new"
     ageing = page.locator("tr[data-clutch='ageing']")
     said = ONCE.get(f"{watched.url}/v1/clutches/ageing").json()
+    assert (said["state"]["name"], ageing.locator(".state").inner_text()) == ("normal", "Normal")
     assert f"{100 * said['summary']['current']['health']:.0f} %" in ageing.inner_text()
     assert " to " in ageing.locator("td[data-label='Remaining']").inner_text()
     assert re.search(

@@ -172,7 +172,7 @@ def test_a_deleted_rule_clears_what_it_raised(life: TestClient) -> None:
         ({"quantity": "shudder_margin", "below": 100.0}, "slope of friction at 100 rpm"),
         ({"quantity": "off_course"}, "off its course"),
         ({"quantity": "held_runs"}, "1 held run waits"),
-        ({"quantity": "state"}, "function check"),
+        ({"quantity": "state"}, "function check: 1 run is held and does not count; "),
     ],
     ids=lambda part: str(part)[:40],
 )

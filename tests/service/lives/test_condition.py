@@ -12,7 +12,16 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.prognosis.criteria import QUANTILES
-from service.lives.condition import beside_held, bound_in_words, rank_of, recent, state_of, top_line
+from service.lives.condition import (
+    beside_held,
+    bound_in_words,
+    lower_bound,
+    rank_of,
+    recent,
+    state_of,
+    statement_of,
+    top_line,
+)
 from service.lives.criteria import MAX_LINE_POINTS
 from service.lives.history import Event
 from service.lives.payloads import filters_disagree
@@ -69,7 +78,7 @@ def test_two_tests_say_at_least_how_many_cycles_are_left(bench: Bench) -> None:
     life = now(bench)
     assert life["at_least"] > 100.0
     assert life["statement"] == f"the remaining life is not known yet: {bound_in_words(life['at_least'])}"
-    assert life["statement"] in item(bench)["state"]["why"]
+    assert item(bench)["summary"]["statement"] == life["statement"]
 
 
 def test_a_life_of_millions_of_cycles_is_predicted_beyond_a_million(bench: Bench) -> None:
@@ -140,7 +149,7 @@ def test_page_and_answer_say_the_same_of_held_runs_before_a_prediction() -> None
     among = nothing | {"at_least": 0.0}
     known = summary(1800.0, held=1, with_held={"particle": among}, ended=None, **nothing | {"runs_used": 2})
     (warning,) = beside_held(known | {"warnings": ()}, known, among, 1)["warnings"]
-    assert warning["message"].endswith("with them the remaining life is not known: no further cycle is safe")
+    assert warning["message"].endswith("with it the remaining life is not known: no further cycle is safe")
     assert "no further cycle is safe if the held run counts" in top_line(known, disputed=False)["headline"]
 
 
@@ -148,9 +157,9 @@ def test_page_and_answer_say_the_same_of_held_runs_before_a_prediction() -> None
     ("known", "disputed", "name", "words"),
     [
         (summary(0.0, status="reached"), True, "failure", "slope, 100 rpm, 5 bar below 0"),
-        (summary(2000.0, held=2), True, "maintenance", "less than 20 % of its life may be left: safe for 2,000 more cycles"),
+        (summary(2000.0, held=2), True, "maintenance", "less than 20 % of its life may be left"),
         (summary(9000.0, current={"health": 0.05}), True, "maintenance", "near its limit, slope, 100 rpm, 5 bar below 0"),
-        (summary(9000.0, held=1, with_held={"particle": {"at_least": 3149.0}}), True, "check", "safe for 3,100 more cycles"),
+        (summary(9000.0, held=1, with_held={"particle": {"at_least": 3149.0}}), True, "check", "1 run is held"),
         (summary(800.0, status="insufficient_data", runs_used=2), True, "check", "2 of the 3 tests"),
         (summary(9000.0), True, "out_of_specification", "data and model disagree"),
         (summary(9000.0, status="may_never_reach", current={"health": 0.27}), False, "normal", "probability of 94 %"),
@@ -166,6 +175,7 @@ def test_the_first_state_that_holds_is_the_state(known: dict[str, Any], disputed
     state = state_of(known, disputed=disputed)
     assert state["name"] == name
     assert words in state["why"]
+    assert name == "normal" or "safe for" not in state["why"]  # which the remaining cycles say
     assert "may never" not in state["why"]
 
 
@@ -200,7 +210,11 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
             "Normal: safe for 9,400 more cycles (95 %), until 10 Dec 2026 at this pace; the tests do not yet show",
             "Nothing to do: carry on testing.",
         ),
-        (summary(0.0, status="reached"), None, "Failure: the end of life is reached: slope", "Replace the clutch."),
+        (
+            summary(0.0, status="reached"), None,
+            "Failure: the end of life is reached: its limit is slope, 100 rpm, 5 bar below 0",
+            "Replace the clutch.",
+        ),
         (
             summary(9000.0, **HELD), None,
             "Function check: 1 run is held and does not count; safe for 3,100 more cycles (95 %) if the held run "
@@ -356,3 +370,14 @@ def test_a_list_is_made_anew_only_after_a_commit(client: TestClient, monkeypatch
     client.post("/v1/clutches/c1/runs", json=stationary(0))
     later = client.get("/v1/clutches", headers={"If-None-Match": first.headers["etag"]})
     assert (later.status_code, later.json()["items"][0]["runs"], len(made)) == (200, 1, 3)
+
+
+@pytest.mark.parametrize(
+    ("own", "among", "words"),
+    [
+        (9000.0, 0.0, "no further cycle is safe, if held runs count"),
+        (9000.0, 9500.0, "safe for 9,000 more cycles (95 %)"),
+    ],
+)
+def test_a_statement_says_that_held_runs_lower_its_bound(own: float, among: float, words: str) -> None:
+    assert statement_of(summary(own), lower_bound(own, {"at_least": among})) == words

@@ -12,7 +12,7 @@ import { RemainingBy } from "../quantities/remaining.js";
 import { shudderMargin } from "../quantities/shudder.js";
 import { read } from "../shared/api.js";
 import { h } from "../shared/dom.js";
-import { aboutCycles, atLeast, estimate, fixed, likely, percent, probability, roundedDown } from "../shared/format.js";
+import { atLeast, estimate, fixed, likely, percent, probability, roundedDown } from "../shared/format.js";
 import { healthBar } from "../shared/sparkline.js";
 import { firstRun } from "../shared/welcome.js";
 import { heldView } from "./held.js";
@@ -170,7 +170,7 @@ function remainingNotes(life) {
     status === "may_never_reach" ? "the tests do not show the end yet" : null,
     predicts(life) ? likely(life.remaining_cycles) : null,
     never ? `${probability(chance)} chance of an end within ${fixed(life.horizon_cycles)} cycles` : null,
-    held ? `${aboutCycles(held.remaining_cycles)} if the held ${held.count === 1 ? "run counts" : "runs count"}` : null,
+    held ? `if the held ${held.count === 1 ? "run counts" : "runs count"}: ${likely(held.remaining_cycles)}` : null,
     cast && cast.of > 0 ? `${cast.held} of ${cast.of} later tests lay inside their forecast` : null,
     lives > 0 ? `calibrated on ${lives} ended lives` : null,
   ]

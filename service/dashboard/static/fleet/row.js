@@ -31,7 +31,7 @@ export function row(clutch, { scale, group, chosen, choose }) {
   const box = h("input", { type: "checkbox", checked: chosen, "aria-label": `Choose ${clutch.clutch_id}` });
   box.addEventListener("change", () => choose(box.checked));
   const address = `/clutches/${encodeURIComponent(clutch.clutch_id)}`;
-  const label = h("span", {}, STATES[state.name].word, small(state.why));
+  const label = h("span", {}, STATES[state.name].word, state.name !== "normal" && small(state.why));
   return h(
     "tr",
     { role: "row", "data-clutch": clutch.clutch_id, class: group === null ? null : "begins" },
@@ -87,8 +87,14 @@ function remaining(summary, scale) {
   if (ended) return [ended.reason === "worn" ? number("0") : "–", small(`ended at ${fixed(ended.cycles)}`)];
   if (summary.status === "insufficient_data") return ["–", small(atLeast(summary.at_least))];
   if (summary.status === "reached") return [number("0"), small("reached")];
-  const q = summary.remaining_cycles;
-  return [number(atLeast(summary.at_least)), intervalBar(q, scale), small(likely(q))];
+  const { remaining_cycles: q, at_least: bound, held_runs: held } = summary;
+  const lowered = held !== null && (bound ?? Infinity) < (q["0.05"] ?? Infinity);
+  return [
+    number(atLeast(bound)),
+    lowered && small(`if the held ${held.count === 1 ? "run counts" : "runs count"}`),
+    intervalBar(q, scale),
+    small(likely(q)),
+  ];
 }
 
 /** @param {ClutchOut} clutch */

@@ -83,7 +83,7 @@ def test_a_walk_follows_its_cursor(fleet: TestClient, sort: str, order: list[str
 def test_a_clutch_says_its_state_and_why(fleet: TestClient) -> None:
     states = {item["clutch_id"]: item["state"] for item in fleet.get("/v1/clutches").json()["items"]}
     assert states == {
-        "ended": {"name": "failure", "why": "the end of life is reached: mean COF at 50 % of new"},
+        "ended": {"name": "failure", "why": "the end of life is reached: its limit is mean COF at 50 % of new"},
         "ageing": {"name": "normal", "why": "safe for 2,400 more cycles (95 %)"},
         "c1": {"name": "check", "why": "no run counts yet"},
     }
