@@ -47,8 +47,8 @@ from storage.jobs import DIAGNOSIS, FLEET_REFRESH, REPLAY, JobRow
 
 _DESCRIPTION = """Condition monitoring and prognostics of wet friction clutches.
 
-Post the Stribeck tests of a rig; each is fitted, the clutch's degradation is tracked, and the duty cycles that remain until
-its mean coefficient of friction has halved are predicted with their uncertainty."""
+Post the Stribeck tests of a rig. The service fits each test, tracks the clutch's degradation, and predicts, with the
+uncertainty, how many duty cycles remain until the mean coefficient of friction has halved."""
 
 
 def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, Kind]]:

@@ -38,7 +38,7 @@ def _below(path: str) -> str:
     if not _SEGMENTS.fullmatch(path) or {".", ".."} & set(path.split("/")):
         raise ValueError("a path of letters, digits, -, ., _ and ~, such as /clutch")
     if path.split("/")[1:2] and path.split("/")[1] in _OWN:
-        raise ValueError(f"a path that begins with none of the service's own addresses ({', '.join(_OWN)})")
+        raise ValueError(f"a path that does not begin with an address of the service ({', '.join(_OWN)})")
     return path
 
 

@@ -265,7 +265,7 @@ def move(connection: Connection, column: Stored, data: bytes, store: RawStore | 
 def _refuse_removed(connection: Connection, store: RawStore, blobs: Iterable[str]) -> None:
     if not raw_stores.are_kept(connection, store, blobs):
         raise DatabaseBusy(
-            f"raw records of the same content are removed from {store.address}, or it was moved: try again"
+            f"raw records with the same content are being removed from {store.address}, or this store was moved: try again"
         )
 
 

@@ -76,7 +76,9 @@ def decode(data: bytes | bytearray, codec: str, length: int) -> NDArray[np.float
     body = unsealed(data, at_least=_PLANE_SIZES.size)
     sizes = _PLANE_SIZES.unpack_from(body)
     if sum(sizes) + _PLANE_SIZES.size != len(body) or max(sizes) > length:
-        raise DamagedData(f"a column of {length} values is stored in planes of {sizes} bytes, {len(body)} bytes in all")
+        raise DamagedData(
+            f"a stored column of {length} values has parts of {sizes} bytes, but {len(body)} bytes in all"
+        )
     shuffled = read_planes(body[_PLANE_SIZES.size :], sizes, length)
     return np.ascontiguousarray(shuffled.T).view("<f8").reshape(length).astype(np.float64, copy=False)
 
@@ -185,9 +187,9 @@ def _inflate(stored: memoryview, length: int) -> NDArray[np.uint8]:
     try:
         plane = inflater.decompress(stored, length + 1)
     except zlib.error as error:
-        raise DamagedData(f"a column's plane does not inflate: {error}") from error
+        raise DamagedData(f"a part of a stored column cannot be unpacked: {error}") from error
     if len(plane) != length or not inflater.eof:
-        raise DamagedData(f"a column's plane must inflate to {length} bytes, got {len(plane)}")
+        raise DamagedData(f"a part of a stored column must unpack to {length} bytes, got {len(plane)}")
     return np.frombuffer(plane, dtype=np.uint8)
 
 
@@ -266,7 +268,9 @@ def decode_decimals(data: bytes | bytearray, length: int) -> NDArray[np.float64]
     end = sum(sizes) + _HEAD.size
     minus = np.frombuffer(body[end:], dtype="<u4") if end <= len(body) and (len(body) - end) % 4 == 0 else None
     if minus is None or max(sizes) > length or decimals > _MAX_DECIMALS or (minus >= length).any():
-        raise DamagedData(f"{length} decimals are stored in planes of {sizes} bytes, {len(body)} bytes in all")
+        raise DamagedData(
+            f"a stored column of {length} decimals has parts of {sizes} bytes, but {len(body)} bytes in all"
+        )
     planes = read_planes(body[_HEAD.size :], sizes, length)
     folded = np.ascontiguousarray(planes.T).view("<u4").reshape(length).astype(np.int64)
     folded = (folded >> 1) ^ -(folded & 1)

@@ -133,7 +133,7 @@ def transfer(source_url: str, target_url: str) -> Iterator[Transfer]:
     ):
         if current(reader) != head():
             raise DatabaseTooOld(
-                f"{shown(source_url)} is at revision {current(reader)}: `clutchlife serve` brings it here"
+                f"{shown(source_url)} is at revision {current(reader)}: `clutchlife serve` migrates it to {head()}"
             )
         _begin(target, shown(source_url), shown(target_url))
         yield Transfer(source=reader, target=target)
@@ -148,7 +148,7 @@ def _begin(target: Database, source: str, name: str) -> None:
                 raise TargetInUse(f"{name} has rows in {', '.join(used)}: the target of a migration must be empty")
             mark(connection, source)
         elif begun != source:
-            raise TargetInUse(f"{name} holds the beginning of a migration from {begun}, not from {source}")
+            raise TargetInUse(f"{name} holds an unfinished migration from {begun}, not from {source}")
 
 
 def _has_rows(connection: Connection, table: Table) -> bool:

@@ -109,7 +109,7 @@ def confine(private: bool) -> None:
         elif event == "open":
             path = arguments[0]
             if isinstance(path, (str, bytes)) and not _opened(path).startswith(places):
-                raise PermissionError("a file that a sender has no need of")
+                raise PermissionError("a file that no sender needs")
         elif event.startswith(_FORBIDDEN):
             raise PermissionError(event)
 

@@ -112,7 +112,7 @@ def why_not(address: Address, *, private: bool) -> str | None:
         return None
     if private and (address.is_loopback or address.is_private):
         return None
-    return f"{address} is within this machine or a private network: CLUTCHLIFE_PRIVATE_RECEIVERS allows those"
+    return f"{address} is on this machine or in a private network: CLUTCHLIFE_PRIVATE_RECEIVERS=true allows it"
 
 
 def _within(address: Address) -> ipaddress.IPv4Address | None:

@@ -36,7 +36,7 @@ def backup(path: Path, database: Database = DATABASE) -> None:
         left_out = _left_out(path)
     print_line(str(path))
     for address, blobs in left_out.items():
-        line = f"{blobs} raw records are not in it, they are in {address}: copy that now, after the database"
+        line = f"the backup does not contain {blobs} raw records: copy them now from {address}"
         err.print(line, markup=False, soft_wrap=True)
 
 
@@ -64,7 +64,7 @@ def restore(
     from storage.engine.sqlite.backup import restore as put_back  # start-up time
 
     with errors_in_a_line():
-        require_file(database, "put a dump back with pg_restore, while no service runs")
+        require_file(database, "stop the service, then restore a dump with pg_restore")
         kept = put_back(database, backup)
     print_line(f"{database} now holds the backup {backup}")
     if kept is not None:
@@ -159,7 +159,7 @@ def verify(
                     earlier[version] = earlier.get(version, 0) + count
             progress.advance(task)
     for version, count in sorted(earlier.items()):
-        note = f"{count} results were made by release {version}: they can be computed again, and may differ (replay)"
+        note = f"{count} results were computed by release {version}: a replay computes them again and may change them"
         print_line(note)
     if inspections:
         print_line(f"{inspections} inspections with {photographs} photographs were checked")
@@ -226,7 +226,7 @@ Address = Annotated[str, typer.Option("--to", help="database, folder:///path or 
 
 @app.command("list")
 def list_stores(database: Database = DATABASE) -> None:
-    """Show every place in which long raw records are, how many columns and blobs, and which place new ones go to."""
+    """List the stores of long raw records: how much each one holds, and which one takes new records."""
     from storage.blobs import raw_stores  # start-up time
 
     with existing(database) as opened, opened.reading() as connection:
@@ -241,9 +241,9 @@ def list_stores(database: Database = DATABASE) -> None:
 
 @app.command()
 def move(to: Address, database: Database = DATABASE) -> None:
-    """Store new long raw records at an address, and move the stored ones there.
+    """Store new long raw records at another address, and move the stored records there.
 
-    May run beside the service, and be interrupted and repeated. What is left in the former place `collect` removes.
+    The service may run meanwhile. You may interrupt the command and repeat it. `collect` then removes the old copies.
     """
     from service.workflows.raw_records import move as move_all  # start-up time
 
@@ -259,15 +259,15 @@ def relocate(
     to: Address,
     database: Database = DATABASE,
 ) -> None:
-    """Look for the raw records of one store at another address, to which the whole store was copied by other means.
+    """Change the address of a store, after you have copied the whole store to the new address.
 
-    All must be there. A run that comes in meanwhile is refused, or the command is: then copy and try again.
+    If a run arrives meanwhile, the service refuses the run or this command fails: then copy again and repeat.
     """
     from service.workflows.raw_records import relocate as look_at  # start-up time
 
     with existing(database) as opened:
         count = look_at(opened, address, to)
-    print_line(f"{count} raw records are looked for there")
+    print_line(f"{count} raw records are now read from there")
 
 
 @app.command()
@@ -277,7 +277,7 @@ def collect(
         float, typer.Option(min=_MIN_GRACE_HOURS, help="Keep files that are younger than this many hours")
     ] = _GRACE_HOURS,
 ) -> None:
-    """Remove blobs that no run names, as interrupted posts and moves leave them. Safe while services run."""
+    """Remove blobs that no run uses; interrupted requests and moves leave such blobs. Safe while services run."""
     from service.workflows.raw_records import collect as collect_all  # start-up time
 
     with existing(database) as opened:

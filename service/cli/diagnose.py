@@ -166,7 +166,7 @@ def _maps(maps: Mapping[str, Any]) -> Group:
             for (name, columns), table, most in over
         ]
         drawn.append(Group(*grids))
-    legend = Text("Mean residual as a share of the baseline's largest ")
+    legend = Text("Mean residual, relative to the largest of the baseline ")
     legend.append(f"({number(largest[0], 2)} and {number(largest[1], 2)} standard deviations): ")
     for least, mark, above, below in reversed(_MARKS):
         legend.append(mark, style=f"black on color({above})")

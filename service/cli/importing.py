@@ -54,7 +54,12 @@ def import_file(
     if not yes and not typer.confirm(f"Send it to {clutch}?", default=True):
         raise typer.Exit(0)
     if shown["rig"] is None and save is None and not yes:
-        save = typer.prompt("Save this as a rig profile (its name, or nothing)", default="", show_default=False) or None
+        save = (
+            typer.prompt(
+                "Name of a new rig profile for such files (leave it empty to save none)", default="", show_default=False
+            )
+            or None
+        )
     if save is not None:
         _save(service, save, shown)
         given, profile = given | {"rig": save, "map": None}, None

@@ -48,7 +48,7 @@ def inspect(
     inspection = service.get(address)
     _show([inspection])
     if inspection["state"] == "withdrawn":
-        text = "was stored before and withdrawn since: it stays withdrawn until it is restored on the clutch's page"
+        text = "was stored earlier and then withdrawn: it stays withdrawn until you restore it on the clutch's page"
         print_line(f"{inspection['inspection_id']} {text}")
 
 

@@ -48,14 +48,14 @@ def simulate(
     ] = None,
     film: Annotated[
         bool,
-        typer.Option("--film", help="Let friction lag as by the oil film of the reference, too; answer.json says so"),
+        typer.Option("--film", help="Add the lag of friction from the reference's oil film; answer.json says so"),
     ] = False,
     plate_rise: Annotated[
         float | None,
         typer.Option(
             min=0,
             max=500,
-            help="Write the plate's temperature, too; the value is its rise above the oil at 0.32 W/mm², in K",
+            help="Write the plate's temperature too; the value is its rise above the oil at 0.32 W/mm², in K",
         ),
     ] = None,
     frequency: Annotated[
@@ -71,7 +71,7 @@ def simulate(
     plan: Annotated[
         Path | None,
         typer.Option(
-            help="Run this plan of a diagnosis (CSV or JSON) on the clutch in --out; only --alternative goes with it"
+            help="Run this plan of a diagnosis (CSV or JSON) on the clutch in --out; combine it only with --alternative"
         ),
     ] = None,
     alternative: Annotated[int, typer.Option(min=1, help="Number of the alternative to run; 1 is the best")] = 1,

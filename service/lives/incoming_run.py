@@ -137,9 +137,8 @@ def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
 def _require_forward(time: FloatArray) -> None:
     """Refuse a record whose time steps back, for its order is not what it seems, or stands still from row to row."""
     if stands(time):
-        message = (
-            f"time_s stands still in {np.count_nonzero(np.diff(time) == 0)} of {time.size - 1} steps: send finer times"
-        )
+        still = np.count_nonzero(np.diff(time) == 0)
+        message = f"time_s does not advance in {still} of {time.size - 1} steps: send finer times"
         raise InvalidError.of(message, code="time_stands", pointer="/channels/time_s")
     back = np.flatnonzero(np.diff(time) < 0)
     if back.size:

@@ -1,4 +1,4 @@
-"""The remaining life of a clutch as its runs show it, and as it would be with its held runs.
+"""The remaining life of a clutch without its held runs, and with them.
 
 Computed with the results of every run and change, and stored with them as the clutch's summary.
 """

@@ -1,4 +1,4 @@
-"""Receipts, predictions and list summaries as JSON, with their warnings, in public names and units."""
+"""Receipts, predictions and list summaries as JSON, with their warnings, in the names and units of the API."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -64,10 +64,10 @@ def new_extrapolated(series: Series, assumptions: Assumptions, late: NewLater | 
     if (share_of_way(first, initial, fraction * initial) or 0.0) >= 0.5:
         return []
     message = (
-        f"the first test is at {cycles:,.0f} cycles with a mean COF of {first:.3g}; extrapolated back to 0 cycles "
-        f"that is {initial:.3g}. With a probability of {late.probability:.0%} the counter began with another clutch, and "
-        "this one was new at its first test; the forecast weighs both. If so, send maintenance with the event rebuild at "
-        f"{cycles:,.0f} cycles: its life is then counted from there"
+        f"the first test is at {cycles:,.0f} cycles with a mean COF of {first:.3g}; extrapolated to 0 cycles it "
+        f"would be {initial:.3g}. With a probability of {late.probability:.0%} the counter began with another clutch, and "
+        "this clutch was new at its first test. The forecast averages over both cases. If the clutch was new, send "
+        f"maintenance with the event rebuild at {cycles:,.0f} cycles: its life then begins there"
     )
     return [Notice(code=NEW_EXTRAPOLATED, message=message)]
 
@@ -78,8 +78,7 @@ def missed(back_cast: BackCast) -> list[Notice]:
         return []
     message = (
         f"the 90 % intervals of earlier forecasts contained only {back_cast.held} of {back_cast.misses.size} later tests. "
-        "So the interval of the remaining life is wider (distances from its median, on a log scale, times "
-        f"{back_cast.widening:.2g})"
+        "So the interval of the remaining life is wider (on a log scale, {back_cast.widening:.2g} times as wide)"
     )
     return [Notice(code=MISSED_FORECASTS, message=message)]
 
@@ -138,7 +137,7 @@ def other_pressures(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
     if not cofs or any(nearest(level, cofs) is not None for level in reference):
         return []
     measured = ", ".join(f"{bar(level):g}" for level in sorted(reference))
-    message = f"it shares no pressure with the first stationary test ({measured} bar): tracking does not use it"
+    message = f"this test shares no pressure with the first stationary test ({measured} bar): tracking does not use it"
     return [Notice(code=OTHER_PRESSURES, message=message)]
 
 
@@ -159,8 +158,8 @@ def other_oil(life: Life, event: Event) -> list[Notice]:
         return []
     oil, reference = (kelvin - ZERO_CELSIUS for kelvin in (event.oil_temperature, life.reference_oil))
     message = (
-        f"its oil was at {oil:.0f} °C on average, that of the first stationary test at {reference:.0f} °C, more than "
-        f"{OTHER_OIL:g} °C apart: tracking uses it only under an adopted model that corrects for oil temperature"
+        f"the oil was at {oil:.0f} °C on average, and at {reference:.0f} °C in the first stationary test: more than "
+        f"{OTHER_OIL:g} °C apart. Tracking uses this test only with an adopted model that corrects for oil temperature"
     )
     return [Notice(code=OTHER_OIL_TEMPERATURE, message=message)]
 

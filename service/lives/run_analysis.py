@@ -138,7 +138,7 @@ def _analyse_stationary(
         *(notice for level in levels for notice in _fit_warnings(level.fit)),
     ]
     if not has_mean:
-        message = "no pressure of this test gives a mean COF: it is not used as a reference or for tracking"
+        message = "no pressure of this test gives a mean COF: the test is not used as a reference or for tracking"
         warnings.append(Notice(code="no_mean_cof", message=message))
     return Analysis(
         fits=levels,
@@ -171,8 +171,8 @@ def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Notice]:
     if rows >= level.fit.points:
         return []
     message = (
-        f"at {level.fit.pressure / PASCALS_PER_BAR:g} bar: measured pressures scatter by more than {100 * WIDE_LEVEL:g} % "
-        "within what was taken for one level; several may have run together"
+        f"at {level.fit.pressure / PASCALS_PER_BAR:g} bar: the measured pressures of this level scatter by more than "
+        f"{100 * WIDE_LEVEL:g} %; it may contain several levels"
     )
     return [Notice(code="wide_level", message=message)]
 

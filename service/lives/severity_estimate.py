@@ -51,8 +51,8 @@ class SeverityEstimate:
         if probability >= SEVERITY_DOUBTED:
             return []
         message = (
-            f"the tests speak for exponent {self.likeliest:g} of {self.basis.value} ({self.probability.max():.0%}), the "
-            f"clutch's record counts by {in_force:g} ({probability:.0%}): its `severity` can be edited"
+            f"the tests support the exponent {self.likeliest:g} of {self.basis.value} ({self.probability.max():.0%}), but "
+            f"the clutch's record states {in_force:g} ({probability:.0%}): you can edit its `severity`"
         )
         return [Notice(code="severity_exponent", message=message)]
 

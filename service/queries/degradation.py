@@ -225,8 +225,8 @@ def _disagreements(payload: Mapping[str, Any] | None) -> list[Notice]:
     return [
         Notice(
             code="tracks_disagree",
-            message=f"{words[name]} from the Stribeck parameters is {value:+.1f} standard deviations from the one that is "
-            "tracked directly",
+            message=f"{words[name]} from the Stribeck parameters is {value:+.1f} standard deviations from the "
+            "directly tracked one",
         )
         for name, value in payload["disagreement"].items()
         if far_apart(value)

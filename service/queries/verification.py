@@ -64,8 +64,8 @@ def _finding(database: Database, row: RunRow) -> str | None:
         sha256 = row.content_sha256 if sha256 == file.get("content_sha256") else sha256
     if not sha256 == row.content_sha256 == row.receipt["content_sha256"]:
         return (
-            f"run {row.run_id} is not what was sent: the sha256 of its content is {sha256}, stored are "
-            f"{row.content_sha256} and, in its receipt, {row.receipt['content_sha256']}"
+            f"run {row.run_id} differs from what was sent: the sha256 of its content is {sha256}, the stored one is "
+            f"{row.content_sha256}, the one in its receipt {row.receipt['content_sha256']}"
         )
     return None
 
@@ -77,7 +77,7 @@ def _file_finding(file: Stored | None, run_id: str, wanted: str) -> str | None:
         return f"run {run_id} is damaged: {error}"
     if sha256 == wanted:
         return None
-    return f"the file of run {run_id} is not what was sent: its sha256 is {sha256}, stored is {wanted}"
+    return f"the file of run {run_id} differs from what was sent: its sha256 is {sha256}, the stored one is {wanted}"
 
 
 #: Relative difference of two numbers that are the same result. Chosen: libraries of linear algebra differ by 1e-12 among
@@ -212,8 +212,8 @@ def _inspection_finding(row: InspectionRow) -> str | None:
     if sha256 == row.content_sha256 and row.cycles == row.content["cycles"]:
         return None
     return (
-        f"inspection {row.inspection_id} is not what was sent: it is stored at {row.cycles:g} cycles, the sha256 of its "
-        f"content is {sha256}, stored is {row.content_sha256}"
+        f"inspection {row.inspection_id} differs from what was sent: it is stored at {row.cycles:g} cycles, the sha256 of "
+        f"its content is {sha256}, the stored one is {row.content_sha256}"
     )
 
 
@@ -224,5 +224,6 @@ def _photograph_finding(database: Database, row: InspectionRow, photograph: Phot
     if sha256 == photograph.sha256:
         return None
     return (
-        f"photograph {photograph.sha256} of inspection {row.inspection_id} is not what was sent: its sha256 is {sha256}"
+        f"photograph {photograph.sha256} of inspection {row.inspection_id} differs from what was sent: "
+        f"its sha256 is {sha256}"
     )

@@ -108,7 +108,7 @@ def _refuse_standing(columns: Mapping[str, FloatArray]) -> None:
         return
     still = np.count_nonzero(np.diff(time_s) == 0)
     message = (
-        f"time_s stands still in {still} of {time_s.size - 1} steps: the clock is coarser than the rows. Name a "
+        f"time_s does not advance in {still} of {time_s.size - 1} steps: the clock is coarser than the rows. Name a "
         f"column of finer times with time=NAME; if each row is a plateau, send time={NO_TIME}"
     )
     raise InvalidError.of(message, code="time_stands", pointer="/channels/time_s")
@@ -355,7 +355,9 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
     ragged = any(own.times is not None and own.times.size != own.values.size for own in series.values())
     if ragged or (len(sizes) > 1 if same else any(own.times is None for own in series.values())):
         rows = [f"{name} has {own.values.size}{' without times' * (own.times is None)}" for name, own in series.items()]
-        message = f"all channels must have as many rows by one clock, or times of their own, got: {', '.join(rows)}"
+        message = (
+            f"all channels must have the same number of rows, or each channel its own times, got: {', '.join(rows)}"
+        )
         raise InvalidError.of(message, code="ragged")
     columns: dict[str, FloatArray] = {} if lead.times is None else {"time_s": lead.times}
     kept = np.ones(lead.values.size, dtype=np.bool_)

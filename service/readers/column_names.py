@@ -438,7 +438,7 @@ def no_unit(columns: Sequence[tuple[str, Column]], reading: Reading) -> InvalidE
 def remedy(columns: Sequence[Column]) -> str:
     """How to name the columns of channels."""
     example = columns[0].shown() if columns else "NAME"
-    return f"map=torque_nm:{example},... names the columns of the channels, which are {', '.join(CHANNELS)}"
+    return f"name the columns of channels, as in map=torque_nm:{example}; the channels are {', '.join(CHANNELS)}"
 
 
 def _find(columns: Sequence[Column], channel: str, name: str) -> int:
@@ -453,9 +453,7 @@ def _find(columns: Sequence[Column], channel: str, name: str) -> int:
             return matches[0]
         if matches:
             raise _twice(channel, *(columns[index] for index in matches))
-    message = (
-        f"map names for {channel} the column {name[:MAX_QUOTED]!r}, which is not in the file; it has {_list(columns)}"
-    )
+    message = f"map gives {channel} the column {name[:MAX_QUOTED]!r}, but the file has only {_list(columns)}"
     raise InvalidError.of(message, code="no_such_column", pointer="/map", value=name)
 
 
@@ -468,7 +466,7 @@ def _twice(channel: str, *columns: Column) -> InvalidError:
     way = f"choose one with map={channel}:NAME" if distinct else "their names must differ"
     message = f"{channel} must be one column, got {shown}; {way}"
     if channel == "speed_rpm":
-        message += ". It is the sliding speed: where these are the speeds of both sides, send their difference"
+        message += ". It is the sliding speed: if these are the speeds of both sides, send their difference"
     return InvalidError.of(message, code="ambiguous", pointer=f"/channels/{channel}", value=shown)
 
 

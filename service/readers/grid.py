@@ -261,9 +261,7 @@ def refuse_factors(above: Sequence[Sequence[str]]) -> None:
         numbers = [cell for cell in row[1:] if NUMBER.fullmatch(cell.replace(",", "."))]
         others = [cell for cell in numbers if float(cell.replace(",", ".")) != 1]
         if len(numbers) > 1 and others and _FACTORS.match(row[0]):
-            what = (
-                f"the line {row[0][:MAX_QUOTED]!r} holds factors, which may have been applied or not, got {others[0]}"
-            )
+            what = f"the line {row[0][:MAX_QUOTED]!r} holds factors, which the file may have applied or not, got {others[0]}"
             raise InvalidError.of(f"{what}: remove this line if the file holds physical values", code="raw_counts")
 
 

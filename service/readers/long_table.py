@@ -159,8 +159,8 @@ def _value(columns: Sequence[Column], numeric: Sequence[int], names: int, readin
             return places[0]
     shown = ", ".join(columns[index].shown() for index in called or others) or "none"
     message = (
-        f"the table has a row for each value, and {columns[names].shown()} names its channel: one column must hold the "
-        f"values, got {shown}; call it 'value', or save the table with a column for each channel"
+        f"the table has a row for each value, and {columns[names].shown()} names its channel: exactly one column must "
+        f"hold the values, got {shown}. Name this column 'value', or save the table with a column for each channel"
     )
     raise InvalidError.of(message, code="long_table")
 

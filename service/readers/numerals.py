@@ -184,7 +184,7 @@ class Numerals:
             if self._column(index, "no time", [cell]) is None:
                 rule = f"must be a number in {unit}, as in the first row" if unit else "must be a number"
                 if self.decimal and not unit and isinstance(cell, str) and swapped._floats([cell]) is not None:
-                    rule = f"must have the decimal sign {self.decimal!r} as before"
+                    rule = f"must have the decimal sign {self.decimal!r}, like earlier numbers"
                 elif name == "time_s":
                     rule = rule.replace("a number", "a number or a time such as 2026-11-02 07:00:00.5")
                 yield row, rule

@@ -30,7 +30,7 @@ def _of_json(path: Path, text: str) -> dict[int, list[Any]]:
     try:
         return {number: test["steps"] for number, test in enumerate(json.loads(text)["tests"], start=1)}
     except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path} is not a plan as the service answers it ({error})") from None
+        raise ValueError(f"{path} is not a plan of the service ({error})") from None
 
 
 def _of_csv(text: str) -> dict[int, list[Any]]:

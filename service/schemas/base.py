@@ -1,6 +1,6 @@
-"""What all schemas share: bounds on what requests may hold, chosen to refuse mistyped values and overflow, not unusual
-clutches; bases that refuse unknown fields, numbers that are finite, fields that many answers have, and the shape of every
-error (RFC 9457), which `web.problems` makes.
+"""What all schemas share: limits of values, bases that refuse unknown fields, common fields, and the shape of errors.
+
+The limits refuse mistyped values and overflow, not unusual clutches. Errors follow RFC 9457; `web.problems` makes them.
 """
 
 import re

@@ -83,7 +83,9 @@ def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Proto
         def on_headers_complete(self) -> None:
             self._in_head = False
             if len(self.pipeline) >= MAX_AHEAD:
-                self._end_parsing(http.HTTPStatus.TOO_MANY_REQUESTS, f"at most {MAX_AHEAD} requests may be sent ahead")
+                self._end_parsing(
+                    http.HTTPStatus.TOO_MANY_REQUESTS, f"at most {MAX_AHEAD} requests may wait on one connection"
+                )
             super().on_headers_complete()
 
         def on_body(self, body: bytes) -> None:

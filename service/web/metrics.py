@@ -96,9 +96,7 @@ class Present(Collector):
     def collect(self) -> Iterator[Metric]:
         numbers = service_totals(self._database)
         yield GaugeMetricFamily("clutchlife_clutches", "Clutches, archived ones too", value=numbers.clutches)
-        text = (
-            "Clutches in use that are safe for at most so many more cycles (95 %); 0: they may be at their end of life"
-        )
+        text = "Clutches in use that are safe for at most this number of cycles (95 %); 0: they may be at their end of life"
         within = GaugeMetricFamily("clutchlife_clutches_within", text, labels=["cycles"])
         for cycles, count in numbers.within.items():
             within.add_metric([f"{cycles:g}"], count)

@@ -184,7 +184,7 @@ class BodyLimit:
                 async with asyncio.timeout(left):
                     return await receive()
             except TimeoutError:
-                raise TooSlowError(f"{body.taken} bytes of the body arrived in {clock() - begun:.0f} s") from None
+                raise TooSlowError(f"only {body.taken} bytes of the body arrived in {clock() - begun:.0f} s") from None
 
         async def counted() -> Message:
             nonlocal whole

@@ -62,7 +62,7 @@ def finish_and_adopt(
             changes.last_of_history(connection, clutch_id)
             > records.diagnosis(connection, clutch_id, diagnosis_id).revision
         ):
-            raise NothingToAdoptError(f"the runs that diagnosis {diagnosis_id!r} is of were changed meanwhile")
+            raise NothingToAdoptError(f"the runs of diagnosis {diagnosis_id!r} were changed meanwhile")
         if not jobs.end(connection, diagnosis_id, jobs.FINISHED, at, claimer=claimer):
             raise NothingToAdoptError(f"diagnosis {diagnosis_id!r} was ended meanwhile")
         diagnoses.finish(connection, diagnosis_id, at, ended["report"], ended["extension"])

@@ -98,7 +98,9 @@ def ingest_posted(
         packing = beside.submit(channels.packed, path)
         run, file = read(), packing.result()
     if len(file.data) > MAX_FILE_BYTES:
-        raise TooLargeError(f"a file must be kept in at most {MAX_FILE_BYTES} bytes, its packed ones are more")
+        raise TooLargeError(
+            f"a file must have at most {MAX_FILE_BYTES} bytes when it is compressed, got {len(file.data)}"
+        )
     run = replace(run, file={**(run.file or {}), "sha256": file.sha256, "bytes": file.length})
     return ingest(database, clutch_id, run, received_at=received_at, by=by, file=file)
 
@@ -166,8 +168,8 @@ def _stored(connection: Connection, clutch_id: str, run: IncomingRun) -> RunRow 
 def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
     if run.content_sha256 not in (stored.content_sha256, stored.details.get("file", {}).get("content_sha256")):
         raise ConflictError(
-            f"run_id {run.run_id!r} is known with other content: its sha256 is {stored.content_sha256}, "
-            f"that of the content sent is {run.content_sha256}"
+            f"run_id {run.run_id!r} is already stored with other content: the stored sha256 is {stored.content_sha256}, "
+            f"the sha256 of the content sent is {run.content_sha256}"
         )
     return records.receipt(stored) | {"duplicate": True}
 

@@ -32,8 +32,8 @@ from storage.encoding import Json, to_object
 from storage.engine.database import Database
 
 #: Why a refresh leaves a clutch.
-LEFT = "left to the next refresh: runs arrived while its predictions were computed"
-GAVE_WAY = "left to a separate job: another fleet learns first"
+LEFT = "not updated, because runs arrived during the computation: the next refresh updates it"
+GAVE_WAY = "not refreshed here, because another fleet is first: a separate job refreshes it"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

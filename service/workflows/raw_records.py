@@ -61,7 +61,7 @@ def relocate(database: Database, address: str, to: str) -> int:
         raise ValueError(f"{target.address} is no copy of {store.address}: it has the mark of another database")
     with database.writing() as connection:
         if raw_stores.numbers(connection).get(store.address, (0, 0))[1] != count:
-            raise ValueError(f"a run has come in meanwhile: copy all of {store.address} there once more")
+            raise ValueError(f"a run arrived meanwhile: copy all of {store.address} there again")
         raw_stores.set_address(connection, store.store_key, target.address)
     return count
 

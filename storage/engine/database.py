@@ -1,5 +1,6 @@
-"""The open database as the rest of the program holds it, whichever kind it is: its transactions, what every request asks of
-it without one (`Watch`), and answers that its services share. Made by `opening`.
+"""The open database, of either kind: its transactions, cheap checks without one (`Watch`), and answers that services share.
+
+Made by `opening`.
 """
 
 import json
@@ -141,7 +142,7 @@ class Database(ABC):
                 raise
             kept = "" if self.path is None else ", and keeps a copy of the file beside it"
             raise DatabaseTooOld(
-                f"{self.name} is at revision {revision}, this needs {head()}: `clutchlife serve` brings it there{kept}"
+                f"{self.name} is at revision {revision}, this program needs {head()}: `clutchlife serve` migrates it{kept}"
             ) from error
 
     @abstractmethod

@@ -27,8 +27,8 @@ def other_schema(connection: Connection) -> list[str]:
     """How the schema differs from this code's; empty where it does not. Raises DatabaseTooOld on an earlier revision's."""
     if current(connection) != head():
         raise DatabaseTooOld(
-            f"the database is at revision {current(connection)}: its runs are checked at {head()} only, to which "
-            "`clutchlife serve` brings it, with a copy of a file kept beside it"
+            f"the database is at revision {current(connection)}: its runs can be checked only at {head()}. "
+            "`clutchlife serve` migrates it, and keeps a copy of an SQLite file"
         )
     own = _SERVER_TABLES if connection.dialect.name == "postgresql" else ()
     context = MigrationContext.configure(
@@ -64,5 +64,5 @@ def refuse_pending(connection: Connection) -> None:
     source = pending(connection)
     if source is not None:
         raise UnfinishedMigration(
-            f"a migration from {source} into this database has not ended: give `clutchlife migrate` once more"
+            f"a migration from {source} into this database is not finished: run `clutchlife migrate` again"
         )

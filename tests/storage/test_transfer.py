@@ -172,7 +172,7 @@ def test_a_target_with_other_content_and_another_source_are_refused(in_file: str
     fill(other)
     with transfer(in_file, begun):
         pass
-    with pytest.raises(TargetInUse, match=r"the beginning of a migration from the file .*source\.db, not from"):
+    with pytest.raises(TargetInUse, match=r"an unfinished migration from the file .*source\.db, not from"):
         moved(other, begun)
 
 

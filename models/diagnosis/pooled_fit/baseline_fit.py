@@ -229,8 +229,8 @@ def _require_weights(problem: FitProblem, fitted: Fit) -> None:
     noise = min(float(np.median(part)) for part in parts if part.size)
     if not noise >= criteria.LEAST_NOISE_SHARE * design.usual_torque:
         raise IndeterminateError(
-            f"the readings hold no noise ({noise:.1g} Nm about {design.usual_torque:.3g} Nm), as those of a dead channel "
-            "or of a formula do, and nothing can be weighed against it."
+            f"the readings have no noise ({noise:.1g} Nm about {design.usual_torque:.3g} Nm), like a dead channel or "
+            "computed values. Without noise, the diagnosis cannot judge the model."
         )
 
 

@@ -131,7 +131,7 @@ def summarise(report: Report) -> str:
 
 
 def _insufficient(_: Report) -> list[Sentence]:
-    return [Sentence("That is too little to judge the model by.")]
+    return [Sentence("These data are too few to judge the model.")]
 
 
 def _short(sentences: Sequence[Sentence]) -> list[Sentence]:
@@ -193,7 +193,7 @@ def _unseen(report: Report) -> list[Sentence]:
     shown = [_shown(visible) for visible in listed]
     sentences = []
     if shown:
-        say = "The smallest sizes that these data would have shown nine times in ten, in the most (least) visible form"
+        say = "The smallest sizes that these data would show in nine of ten cases, in the most (least) visible form"
         sentences = [Sentence(f"{say}: {conjunction(shown)}.")]
     if report.unseen:
         names = conjunction([effect_name(slug) for slug in report.unseen])
@@ -310,7 +310,7 @@ def _open(
     if len(alternatives) == 1:
         sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
     elif alternatives:
-        sentences.append(Sentence(f"What else may be at work (with probabilities): {_either(alternatives)}."))
+        sentences.append(Sentence(f"Other causes that may be at work (with probabilities): {_either(alternatives)}."))
     return sentences
 
 
@@ -352,7 +352,7 @@ def _error(report: Report) -> str:
             f"{error}, as large as noise alone, but it follows a pattern{f' that depends on {where}' if where else ''}."
         )
     percent = 100 * misfit.unexplained_share
-    share = f"{'less than 0.1' if percent < 0.1 else number(percent)} % of its square is not noise"
+    share = f"{'less than 0.1' if percent < 0.1 else number(percent)} % of the squared error is not noise"
     return f"{error} (noise alone: {number(misfit.noise)} Nm); {share}{f', and depends on {where}' if where else ''}."
 
 

@@ -25,7 +25,7 @@ from service.client.clutchlife.transport import Service, connect
 _PORT = 8000
 _START_SECONDS = 60.0
 HIDDEN_EFFECT = "oil_temperature"
-HIDDEN = "the oil's temperature, whose viscosity acts like a change of speed"
+HIDDEN = "the oil temperature: a change of viscosity acts like a change of speed"
 _HEADER = f"{'cycles':>7} {'mean COF':>16} {'of new':>7} {'remaining':>10} {'90 % interval':>17} {'truth':>7}"
 
 
@@ -64,7 +64,7 @@ def _life(service: Service, seed: int) -> None:
     end = truth.end_of_life()
     service.post("/v1/clutches", json.dumps(simulated.simulated_clutch_body(clutch_id)).encode())
     out.print(f"\nA simulated clutch, {clutch_id}: 7 pressures x 40 speeds a test, 1 % noise.")
-    out.print(f"Hidden in its torque: {HIDDEN}. The service does not know it.", markup=False)
+    out.print(f"Hidden in its torque: {HIDDEN}. The service does not know this effect.", markup=False)
     out.print("Remaining duty cycles until its mean COF has halved:\n")
     out.print(_HEADER, style="bold")
     inside: list[bool] = []
@@ -81,7 +81,7 @@ def _life(service: Service, seed: int) -> None:
                 inside += _inside(prediction, end)
     halved = "it never halves" if end is None else f"it halved at {end:.0f} cycles"
     out.print(
-        f"The truth: {halved}.\nThe 90 % interval contained it {sum(inside)} times out of {len(inside)}.\n"
+        f"The truth: {halved}.\nThe 90 % interval contained the true end {sum(inside)} times out of {len(inside)}.\n"
         "'-' means: too few tests yet, or the end may never come."
     )
     for cycles, surface in life.inspections(seed, run.cycles):

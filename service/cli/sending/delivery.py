@@ -164,8 +164,9 @@ def _refused(spool: Spool, entry: Entry, error: RefusedError, report: Report) ->
     report(f"{entry.label} is refused, {error}; kept: {place}")
     if error.other_content:
         report(
-            f"{entry.label}: the service holds other content under this run_id: it was corrected since, or the name is "
-            f"another run's. It is not sent again: clutchlife runs {spool.clutch_id} shows it, clutchlife correct mends it"
+            f"{entry.label}: the service has other content under this run_id: the stored run was corrected later, or "
+            "another run has this name. The file is not sent again. To see the stored run: "
+            f"clutchlife runs {spool.clutch_id}"
         )
 
 
@@ -175,18 +176,18 @@ def _remarks(receipt: dict[str, Any], name: str, spool: Spool, *, waited: bool) 
     sent_cycles = receipt.get("sent_cycles", cycles)
     lines = []
     if receipt.get("state") == "withdrawn":
-        lines.append(f"{name} was stored before and withdrawn since: it stays withdrawn, and waits no more")
+        lines.append(f"{name} was stored earlier and then withdrawn: it stays withdrawn and is not sent again")
     if receipt.get("state") == "held":
         doubts = "; ".join(str(doubt.get("message")) for doubt in receipt.get("doubts", ()))
         lines.append(f"{name} is held: {doubts}")
     if receipt["duplicate"] and cycles != sent_cycles:
         lines.append(
-            f"{name} was stored before and corrected since, from {sent_cycles:g} to {cycles:g} cycles: it stays "
-            "corrected, and waits no more"
+            f"{name} was stored earlier and then corrected from {sent_cycles:g} to {cycles:g} cycles: it stays "
+            "corrected and is not sent again"
         )
     if not waited:
         lines.append(
-            f"{name} was stored while a newer version of it was pushed: if both are stored, withdraw this one, a run by: "
+            f"{name} was stored while you pushed a newer version: if both are stored, withdraw the old one. For a run: "
             f"clutchlife withdraw {spool.clutch_id} {name}"
         )
     return lines

@@ -41,8 +41,8 @@ from service.run_files import manifest
 
 SPOOL = default_folder()
 _REMEDY = (
-    "Use --kind and --cycles, or --rig with a profile that finds them, or list the file in a "
-    f"{manifest.MANIFEST} beside it, or use clutchlife import, which asks"
+    "Give --kind and --cycles, or name a profile with --rig, or list the file in a "
+    f"{manifest.MANIFEST} beside it, or use clutchlife import, which asks for them"
 )
 SpoolFolder = Annotated[Path, typer.Option("--spool", help="Where runs wait until the service has stored them")]
 
@@ -111,7 +111,11 @@ def _request(
 
 
 def _replacement(spool: Spool, entry: Entry) -> str:
-    stored = "; an attempt got no answer, so it may be stored: if it is, withdraw it" if entry.perhaps_stored else ""
+    stored = (
+        "; one attempt got no answer, so the old version may be stored: if so, withdraw it"
+        if entry.perhaps_stored
+        else ""
+    )
     place = spool.body(entry)
     return f"{entry.label}: replaces the version that waited since {entry.since} and is kept in {place}{stored}"
 

@@ -56,7 +56,7 @@ def _addresses(host: str, port: int) -> list[tuple[int, int, int, str, tuple[str
 
 def _why(error: OSError, host: str, port: int) -> str:
     if error.errno == errno.EADDRINUSE:
-        return f"port {port} at {host} is in use, perhaps by another service: stop it, or give another with --port"
+        return f"port {port} at {host} is in use, perhaps by another service: stop it, or give another port with --port"
     if error.errno == errno.EADDRNOTAVAIL:
         return f"--host {host} is no address of this machine"
     return f"cannot listen at port {port} of {host}: {error.strerror}"

@@ -1,4 +1,4 @@
-"""A diagnosis report in public names and units; every number is finite or null."""
+"""A diagnosis report in the names and units of the API; every number is finite or null."""
 
 from __future__ import annotations
 
@@ -127,12 +127,12 @@ def _remaining(report: Report, before: Mapping[str, Any], after: Mapping[str, An
     if now == then == "0":
         return ""
     if now == "0":
-        return f"Adopting it takes back that the end is reached: a median of about {then} cycles remains."
+        return f"If you adopt it, the end is not reached any more: a median of about {then} cycles remains."
     if then == "0":
-        return f"Adopting it says that the end is reached; without it a median of about {now} cycles remains."
+        return f"If you adopt it, the end is reached; without it, a median of about {now} cycles remains."
     if now == then:
-        return f"Adopting it leaves the median of the remaining life at about {now} cycles."
-    return f"Adopting it changes the median of the remaining life from about {now} to about {then} cycles."
+        return f"If you adopt it, the median of the remaining life stays at about {now} cycles."
+    return f"If you adopt it, the median of the remaining life changes from about {now} to about {then} cycles."
 
 
 def _step(step: Step, origin: float) -> dict[str, Any]:

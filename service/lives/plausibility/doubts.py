@@ -34,8 +34,8 @@ def doubt(verdict: Verdict, sent: Reading, shown: Shown) -> Notice:
         return _of_unit(verdict, shown)
     if slip.name == DEAD_PRESSURE:
         message = (
-            f"pressure says that the clutch is open, and its torque of {shown.open_torque or 0.0:.3g} Nm is that of a "
-            "pressed one: is the pressure sensor connected? Withdraw the run, or confirm it."
+            f"by its pressure the clutch is open, but a torque of {shown.open_torque or 0.0:.3g} Nm needs a closed clutch: "
+            "is the pressure sensor connected? Withdraw the run, or confirm it."
         )
         return Notice(code=DEAD, message=message)
     return _of_cof(verdict, sent)
@@ -72,7 +72,7 @@ def _gap(verdict: Verdict, cycles: float) -> str:
         return (
             f"{_number(cycles)} cycles lie between those of other runs; the last run was at {_number(verdict.latest)}."
         )
-    gap = f"{_number(cycles)} cycles are {_number(cycles - verdict.before)} after the run before"
+    gap = f"{_number(cycles)} cycles are {_number(cycles - verdict.before)} after the previous run"
     usual = verdict.usual_gap
     return f"{gap}." if usual is None else f"{gap}; earlier runs were about {_number(usual)} cycles apart."
 

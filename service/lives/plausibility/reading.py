@@ -1,5 +1,6 @@
-"""Prepares runs for the plausibility judgement: each as sent, and as it would be without each possible slip. Finds dead
-channels too (unplugged, railed, frozen), which a run shows by itself.
+"""Prepares runs for the plausibility judgement: each run as sent, and with each possible mistake corrected.
+
+Finds dead channels too (unplugged, railed, frozen), which a run shows by itself.
 
 What a run shows of friction is taken from its rows when it comes in (`shown_by`) and stored beside it; all else follows from
 the history.
@@ -386,7 +387,7 @@ def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notic
     rows = columns.loaded()
     if torque.size >= FEWEST_ROWS and _spread(torque) <= STILL * float(np.abs(np.median(torque))):
         level = float(np.median(torque))
-        message = f"torque stands still at {level:.4g} Nm whatever pressure and speed do: is the sensor connected?"
+        message = f"torque stays at {level:.4g} Nm although pressure or speed change: is the sensor connected?"
         return [*doubts, Notice(code=DEAD, message=message)]
     if rows.torque.size < FEWEST_ROWS:
         return doubts
@@ -443,7 +444,7 @@ def _speed_stands(speed: FloatArray) -> list[Notice]:
     if fastest > 1.0 and _spread(speed) > SPEED_STILL * fastest:
         return []
     rpm = float(np.median(speed)) / RADIANS_PER_SECOND_PER_RPM
-    message = f"speed stands still at {rpm:.4g} rpm in a dynamic test: is its sensor connected?"
+    message = f"speed stays at {rpm:.4g} rpm in a dynamic test: is its sensor connected?"
     return [Notice(code=DEAD, message=message)]
 
 

@@ -111,7 +111,7 @@ def _series_at(measured: MeasuredLife, quantity: Quantity, criterion: CriterionI
             ", ".join(f"{name} {number:g}" for name, number in place_of(series).items() if number is not None)
             for series in tracks
         )
-        raise NotFoundError(f"{quantity.name} is not measured there; it is at: {places_of}")
+        raise NotFoundError(f"{quantity.name} is not measured at this place, only at: {places_of}")
     return by_pressure[level]
 
 

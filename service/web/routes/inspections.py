@@ -31,7 +31,7 @@ _OF_A_FILE = {
     "Content-Security-Policy": "default-src 'none'; sandbox",
 }
 _KEPT = {
-    "description": "Keep it, and ask each time: under this address it is never another",
+    "description": "The photograph of an address never changes; keep your copy, and ask each time whether you may use it",
     "schema": {"type": "string"},
 }
 _READING_FILE = READING | {

@@ -34,7 +34,7 @@ Prefer = Annotated[
         JobOut,
         {"kind": "replay", "clutch_id": "bench3-017"},
         SENDING,
-        {200: "It has ended within the time that was to be waited"},
+        {200: "The job ended within the waiting time"},
     ),
 )
 async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -> Response:

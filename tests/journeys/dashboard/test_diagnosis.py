@@ -108,7 +108,7 @@ def test_a_rebuild_ends_what_a_diagnosis_said(browser: Browser, url: str) -> Non
     expect(row).to_contain_text("Normal")
     expect(row.locator("td[data-label='Diagnosis']")).to_contain_text("before the rebuild")
     watched.open("/clutches/bench#/diagnosis")
-    page.locator("#diagnosis").get_by_text("this diagnosis is of its earlier life").wait_for()
+    page.locator("#diagnosis").get_by_text("which concerns the earlier life").wait_for()
     expect(page.locator("#head .verdict")).to_contain_text("Normal")
     expect(page.get_by_role("button", name="Adopt the extended model")).to_have_count(0)
     watched.close()

@@ -172,5 +172,5 @@ def test_readings_without_noise_are_said_to_be_none_of_a_sensor() -> None:
     )
     report = look(replace(full, stationary=dead))
     assert report.verdict is Verdict.INSUFFICIENT_DATA
-    assert "hold no noise" in report.summary
+    assert "have no noise" in report.summary
     assert look(full).verdict is Verdict.MODEL_ADEQUATE

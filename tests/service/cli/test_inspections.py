@@ -46,7 +46,7 @@ def test_an_inspection_that_was_withdrawn_and_is_sent_again_is_said_to_stay_so(
     address = f"{LIST}/{stored['inspection_id']}"
     assert client.post(f"{address}/withdraw", json={"reason": "another disc"}).status_code == 200
     shown = terminal(*inspect)
-    assert f"{stored['inspection_id']} was stored before and withdrawn since: it stays withdrawn" in shown
+    assert f"{stored['inspection_id']} was stored earlier and then withdrawn: it stays withdrawn" in shown
     assert client.get(address).json()["state"] == "withdrawn"
 
 

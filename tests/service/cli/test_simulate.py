@@ -106,7 +106,7 @@ def test_a_plan_is_run_on_the_clutch_that_was_simulated_and_never_twice_the_same
     [
         ("nothing", "has 0 alternatives, no alternative 1"),
         (PLAN.replace("4 5", "4 x"), "pressures_bar.1: must be a number"),
-        ("{}", "is not a plan as the service answers it"),
+        ("{}", "is not a plan of the service"),
     ],
 )
 def test_what_is_no_plan_is_refused_in_a_line(tmp_path: Path, written: str, words: str) -> None:

@@ -157,7 +157,7 @@ def test_backup_names_what_it_leaves_out_and_the_commands_say_where_it_is(
     with service(database_url, in_folder) as client:
         assert client.post(RUNS, json=long_run()).status_code == 201
     said = clutchlife("backup", str(tmp_path / "a.db"), "--database", database_url)
-    assert f"2 raw records are not in it, they are in {in_folder}" in said
+    assert f"does not contain 2 raw records: copy them now from {in_folder}" in said
     given = ("--database", database_url)
     assert clutchlife("raw", "list", *given) == f"{in_folder}: 2 columns in 2 files, in use\n"
     assert clutchlife("raw", "move", "--to", in_bucket, *given).strip() == "2 columns are moved"

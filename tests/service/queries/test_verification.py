@@ -77,10 +77,13 @@ def test_nothing_is_found_where_all_is_as_it_was_stored_and_the_file_is_only_rea
 @pytest.mark.parametrize(
     ("tampered", "says"),
     [
-        ("UPDATE run SET cycles = 1001 WHERE run_id = 's1000'", "run s1000 is not what was sent"),
-        ("UPDATE run SET started_at = '2026-01-01T00:00:00+00:00' WHERE run_id = 's0'", "run s0 is not what was sent"),
+        ("UPDATE run SET cycles = 1001 WHERE run_id = 's1000'", "run s1000 differs from what was sent"),
+        (
+            "UPDATE run SET started_at = '2026-01-01T00:00:00+00:00' WHERE run_id = 's0'",
+            "run s0 differs from what was sent",
+        ),
         ("UPDATE channel SET data = zeroblob(9) WHERE run_key = 1 AND position = 0", "run s0 is damaged"),
-        ("DELETE FROM channel WHERE run_key = 1 AND position = 0", "run s0 is not what was sent"),
+        ("DELETE FROM channel WHERE run_key = 1 AND position = 0", "run s0 differs from what was sent"),
     ],
 )
 def test_a_run_that_is_not_what_was_sent_is_named(life: str, tampered: str, says: str) -> None:
@@ -129,7 +132,7 @@ def execute(url: str, statement: str) -> None:
         assert connection.execute(statement).rowcount > 0
 
 
-# --- A stored inspection or photograph that is not what was sent is named; a backup holds them all.
+# --- A stored inspection or photograph that differs from what was sent is named; a backup holds them all.
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +172,7 @@ def test_a_backup_holds_inspections_and_photographs_and_verify_checks_them(copy:
     ("tampered", "says"),
     [
         ("UPDATE photograph SET data = x'00' WHERE rowid = 2", f"photograph {sha256(png(2))}"),
-        ("UPDATE inspection SET content = replace(content, '9.52', '9.25')", "is not what was sent"),
+        ("UPDATE inspection SET content = replace(content, '9.52', '9.25')", "differs from what was sent"),
         ("UPDATE inspection SET cycles = 10 WHERE cycles = 0", "it is stored at 10 cycles"),
     ],
 )
@@ -178,7 +181,7 @@ def test_verify_names_what_is_not_as_it_was_sent(copy: str, tampered: str, says:
         connection.execute(tampered)
     output = verify(copy, code=1)
     assert says in output
-    assert output.count("is not what was sent") == 1
+    assert output.count("differs from what was sent") == 1
 
 
 def test_verify_names_a_photograph_that_is_gone(copy: str) -> None:

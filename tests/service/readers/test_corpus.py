@@ -402,14 +402,14 @@ REFUSED = {
     "a-row-of-factors": (
         "t;M\ns;Nm\nFaktor;1;0,1\n0;210\n1;211\n",
         None,
-        "holds factors, which may have been applied or not",
+        "holds factors, which the file may have applied or not",
     ),
     "a-factor-behind-a-unit": ("t;M\ns;Nm*10\n0;2.1\n", None, "'Nm*10'"),
     "two-torques": ("t [s];Torque A1 [Nm];Torque A2 [Nm]\n0;1;2\n", None, "torque_nm must be one column"),
     "speeds-of-both-sides": (
         "t [s];p [bar];n inner [rpm];n outer [rpm];M [Nm]\n0;5;520;500;20\n",
         None,
-        "where these are the speeds of both sides, send their difference",
+        "if these are the speeds of both sides, send their difference",
     ),
     "two-torques-understood-in-part": (
         "t [s];p [bar];n [rpm];Torque FZG [Nm];Torque HBM [Nm]\n0;5;100;1;2\n",
@@ -419,7 +419,7 @@ REFUSED = {
     "a-clock-in-whole-seconds": (
         "Time,p [bar],n [rpm],M [Nm]\n" + "".join(f"08:00:0{k // 10},5,{k},20\n" for k in range(40)),
         None,
-        "time_s stands still in 36 of 39 steps: the clock is coarser than the rows",
+        "time_s does not advance in 36 of 39 steps: the clock is coarser than the rows",
     ),
     "a-rate-of-more-samples-than-rows": (
         "Sampling rate,1000 Hz\nThinning,1/20\n\n" + ",".join(PLATEAUS) + "\n" + rows(names=PLATEAUS),

@@ -121,7 +121,7 @@ WRONG = [
     (f"{HEADER}\n{ROWS}0.2,5,1\x000,20\n", "line 4 must be text, got a NUL byte"),
     (
         "time_s;torque_nm\n0,5;1,5\n1.5;2\n",
-        r"time_s\[1\] \(line 3\) must have the decimal sign ',' as before, got '1.5'",
+        r"time_s\[1\] \(line 3\) must have the decimal sign ',', like earlier numbers, got '1.5'",
     ),
     ("time_s,time_s,torque_nm\n0,0,1\n1,9,1\n2,18,1\n", "time_s must be one column"),
     ("time_s,torque_nm,M [Nm]\n0,0,1\n", "torque_nm must be one column, got torque_nm and M"),

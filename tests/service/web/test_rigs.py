@@ -255,4 +255,4 @@ def test_verify_finds_a_file_that_was_changed_in_the_database(client: TestClient
         with database.writing() as connection:
             data = table(0).replace(b"Druck", b"Drvck")
             connection.execute(channel.update().where(channel.c.name == FILE).values(codec="as-sent", data=data))
-        assert "is not what was sent" in check_runs(database, "c1").findings[0]
+        assert "differs from what was sent" in check_runs(database, "c1").findings[0]

@@ -290,7 +290,7 @@ def test_a_clutch_that_gets_a_run_whenever_it_is_tracked_anew_is_left_to_the_nex
             busy.setattr(learn_fleet, "track", track_while_a_run_comes)
             printed = CliRunner().invoke(app, ["fleet", "refresh", "--database", url]).stdout
         assert len(attempts) == 3
-        assert "live: left to the next refresh" in printed
+        assert "live: not updated, because runs arrived" in printed
         assert "live: predictions updated" not in printed
         done = refresh(url)
         assert ("live" in done.changed, done.left) == (True, {})

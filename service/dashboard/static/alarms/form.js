@@ -64,7 +64,7 @@ export function askRule(rule, clutchId) {
     limits.hidden = side === null;
     limits.replaceChildren(
       field(limit, `${side === "above" ? "Above" : "Below"}${unit && `, ${unit}`}`),
-      field(share, "Hysteresis, % of the limit: the alarm ends when the value is back by this much"),
+      field(share, "Hysteresis, % of the limit: the alarm ends when the value is within the limit by this much"),
     );
   };
   quantity.addEventListener("change", () => {

@@ -64,7 +64,7 @@ function noteOf(life) {
       : `at about ${cycles(median, end["0.05"], end["0.95"])} cycles (90 %: ${interval(end)})`;
   const reaches = median !== null && life.status === "reached" ? "reached" : "reaches";
   if (criterion.threshold_mean_cof === null || criterion.fraction === null)
-    return `${value}; none of the clutch's end-of-life criteria uses it.`;
+    return `${value}; no end-of-life criterion of the clutch uses mean COF.`;
   const limit = `${fixed(criterion.threshold_mean_cof, 4)}, ${fixed(100 * criterion.fraction)} % of new`;
   return `${value}; it ${reaches} ${limit}, ${when}.`;
 }

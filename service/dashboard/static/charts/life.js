@@ -29,7 +29,9 @@ export function remainingCycles({ life, predictions, events }) {
   const beyond =
     above > 0 ? ` ${above} early ${above === 1 ? "prediction lies" : "predictions lie"} above the chart.` : "";
   const comparison =
-    end === null ? "" : "A perfect prediction would lie on the dashed line, which ends at today's end of life.";
+    end === null
+      ? ""
+      : "A perfect prediction would lie on the dashed line. This line ends at the end of life as predicted today.";
   return {
     note: `The median and the 90 % interval as predicted at that time. ${comparison}${beyond}`,
     columns: [CYCLES, column("remaining cycles"), column("lower, 5 %"), column("upper, 95 %")],

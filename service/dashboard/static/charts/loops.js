@@ -67,7 +67,7 @@ const DIRECTIONS = {
 
 /** @param {LoopItem} loop */
 function lagText({ direction, better_law: law }) {
-  const better = law === null ? "neither law of lag fits clearly better" : `the ${law} fits better`;
+  const better = law === null ? "neither model of the lag fits clearly better" : `the ${law} fits better`;
   return `torque is ${DIRECTIONS[direction] ?? direction}, ${better}`;
 }
 

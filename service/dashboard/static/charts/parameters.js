@@ -138,7 +138,7 @@ export function landscape({ items, name }) {
   const end = (/** @type {Trajectory} */ law) => law.cycles.at(-1) ?? 0;
   const longest = laws.reduce((a, b) => (end(b) > end(a) ? b : a)).cycles;
   return {
-    note: `${PARAMETERS[name].title} at every pressure: points identified, surface tracked. Drag to turn.`,
+    note: `${PARAMETERS[name].title} at every pressure. Points: identified from one test each. Surface: tracked over life. Drag to turn.`,
     columns: COLUMNS,
     rows: own.flatMap(({ item }) => rowsOf(item)),
     figure: (c) => ({

@@ -108,8 +108,8 @@ export function flat(answers) {
   const drawn = drawnOf(answers, chosen, (level) => !byState || level === pressure);
   if (drawn.length === 0) return { empty: "No stationary Stribeck test yet at this pressure." };
   const place = byState
-    ? `At ${pressureText(pressure)}: points measured, lines fitted, from the first test to the last.${leftOut(tests, drawn.length)}`
-    : `After ${fixed(drawn[0].cycles)} cycles, at every pressure: points measured, lines fitted.`;
+    ? `At ${pressureText(pressure)}, from the first test to the last. Points: measured. Lines: fitted.${leftOut(tests, drawn.length)}`
+    : `After ${fixed(drawn[0].cycles)} cycles, at every pressure. Points: measured. Lines: fitted.`;
   /** @param {Drawn} curve */
   const label = (curve) => (byState ? `${fixed(curve.cycles)} cycles` : pressureText(curve.pressure));
   return {

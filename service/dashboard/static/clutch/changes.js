@@ -180,7 +180,7 @@ export async function answerDoubts(answer, runs) {
 async function answerDoubt(answer, run) {
   if (answer === "other") return withdraw(run, "another clutch's run");
   const likely = likelyCycles(run);
-  if (answer === "likely" && likely !== undefined) return correct(run, likely, "a slip, as the doubt asks");
+  if (answer === "likely" && likely !== undefined) return correct(run, likely, "wrong cycles, as the doubt suggests");
   await post(run, "confirm", "");
   return { text: `${named(run)} is confirmed.`, undo: null };
 }

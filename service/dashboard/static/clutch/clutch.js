@@ -155,7 +155,7 @@ async function drawReport() {
 }
 
 function showUnregistered() {
-  const sentence = `No clutch is registered as “${ID}”. It appears here as soon as it is. `;
+  const sentence = `No clutch is registered as “${ID}”. It appears here when it is registered. `;
   const link = h("a", { href: "/" }, "All clutches");
   byId("head").replaceChildren(
     h("div", { class: "notice bad" }, h("h1", {}, "No such clutch"), h("p", {}, sentence, link)),

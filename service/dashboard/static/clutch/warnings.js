@@ -17,16 +17,16 @@ const CODES = {
     help: "Check the run's cycles, its clutch and the sensors. If all is right, the next test shows whether the clutch has changed.",
   },
   not_eq6: {
-    title: "It does not age as expected",
+    title: "The clutch does not age as expected",
     help: "The forecast follows the tests. If you did not expect this, check the cycles and the sensors, or run a diagnosis.",
   },
   missed_forecasts: {
     title: "Earlier forecasts missed",
-    help: "The clutch does not age along one curve. Until it does, the interval of the remaining life is wider.",
+    help: "The clutch does not age along one curve, so the interval of the remaining life is wider for now.",
   },
   held_runs: {
     title: "Runs are held",
-    help: "They do not count until someone confirms, corrects or withdraws them. The safe bound is the lower one of the two cases.",
+    help: "They do not count until someone confirms, corrects or withdraws them. The safe bound is the lower of two: with these runs, and without them.",
   },
   filters_disagree: {
     title: "Two filters disagree",
@@ -34,7 +34,7 @@ const CODES = {
   },
   tracks_disagree: {
     title: "Two predictions disagree",
-    help: "Mean COF is predicted in two ways: directly, and from the four Stribeck parameters. They differ by more than their uncertainty. A diagnosis may show why.",
+    help: "Mean COF is predicted in two ways: directly, and from the four Stribeck parameters. The two predictions differ by more than their uncertainty. A diagnosis may show why.",
   },
 };
 

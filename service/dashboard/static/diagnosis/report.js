@@ -65,8 +65,8 @@ export function report(diagnosis) {
 
 /** @param {DiagnosisOut} diagnosis */
 function outdated({ earlier_life: earlier, stale }) {
-  if (earlier) return h("b", {}, " The clutch has been rebuilt since: this diagnosis is of its earlier life.");
-  return stale ? h("b", {}, " Runs have been added since: run it again.") : null;
+  if (earlier) return h("b", {}, " The clutch was rebuilt after this diagnosis, which concerns the earlier life.");
+  return stale ? h("b", {}, " Runs were added after this diagnosis: start a new one.") : null;
 }
 
 /**
@@ -239,8 +239,8 @@ function notes({ notes: all = [] }) {
 }
 
 const VISIBLE =
-  "The smallest size of each effect that these runs can show: if the effect has its least visible shape, and if it has its " +
-  "most visible shape. No number means that the least visible shape stays hidden at any size.";
+  "For each effect, the smallest size that these runs can show: in its least visible shape, and in its most visible shape. " +
+  "No number means that the least visible shape stays hidden at any size.";
 
 /** @param {DiagnosisOut} diagnosis */
 function visible({ visible: all = [] }) {

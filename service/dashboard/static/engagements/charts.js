@@ -50,7 +50,7 @@ export function indicatorOverLife({ measured, events, name }) {
   if (values.length === 0) return { empty: NO_VALUE };
   const title = titleOf(INDICATORS[name]);
   return {
-    note: `Of ${fixed(values.length)} measured engagements, with 90 % error bars of the records' noise.`,
+    note: `From ${fixed(values.length)} measured engagements. The 90 % error bars come from the noise of the records.`,
     columns: [CYCLES, digitsColumn(title, 4), digitsColumn("standard error", 2)],
     rows: values.map(({ cycles, value, sd }) => [cycles, value, sd]),
     figure: (c) => ({

@@ -158,7 +158,7 @@ async function archive(ids) {
       rows.chosen.delete(id);
     }
   } catch (problem) {
-    byId("picked").after(problemView(problem, "Not all of them were changed. "));
+    byId("picked").after(problemView(problem, "Some of the clutches were not changed. "));
   }
   drawPicked();
   await live.now();

@@ -35,7 +35,7 @@ function outcomeOf({ cycles, state }) {
     : h(
         "p",
         { class: "notice odd", role: "status" },
-        `${named} was stored before and withdrawn since: it stays withdrawn until it is restored in the table.`,
+        `${named} was stored earlier and then withdrawn. It stays withdrawn until you restore it in the table.`,
       );
 }
 

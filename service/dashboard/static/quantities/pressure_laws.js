@@ -74,7 +74,7 @@ export function pressureLaw({ test, name }) {
   const x = curve.map(({ pressure }) => pressure);
   const edge = (/** @type {number} */ sign) => ({ x, y: curve.map(({ value, sd }) => value + sign * HALF_OF_90 * sd) });
   return {
-    note: `After ${fixed(test.cycles)} cycles: points identified with 90 % error bars; the law ${shape}, with its 90 % band.`,
+    note: `After ${fixed(test.cycles)} cycles. Points: identified at each pressure, with 90 % error bars. The law ${shape}; the band around it holds 90 %.`,
     columns: COLUMNS,
     rows,
     figure: (c) => ({

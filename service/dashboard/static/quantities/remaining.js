@@ -17,7 +17,7 @@ const OF_CURVES = ["static_torque_nm", "coulomb_ratio", "stribeck_velocity_m_s",
 const OF_LOOPS = ["attractor", "film_time", "loop_area"];
 const ABOUT =
   "When another quantity reaches its limit. The limit is the clutch's own criterion for this quantity. If there is none, the " +
-  "limit is the same share of the initial value as for mean COF; for a slope it is 0 at 100 rpm.";
+  "limit is the same share of the initial value as for mean COF; for a slope, the limit is 0 at 100 rpm.";
 const ALL = "all";
 
 /**

@@ -102,7 +102,11 @@ export function register(id, options = {}) {
     h("h2", { id: "registration-title" }, "Register a clutch"),
     options.lead ? h("p", { class: "notice" }, options.lead) : "",
     others.length > 0 ? h("p", { class: "buttons start" }, others) : "",
-    h("p", { class: "quiet" }, "These are the values of the reference clutch. Change those that differ on yours."),
+    h(
+      "p",
+      { class: "quiet" },
+      "These are the values of the reference clutch. Change the values that differ on your clutch.",
+    ),
     form(id, options.record ?? null, end, () => dialog.close()),
   );
   return answered(dialog, () => result);

@@ -104,7 +104,7 @@ export class RunFile {
     const own = this.json?.clutch_id;
     this.clutch = id;
     const other = typeof own === "string" && id !== "" && own !== id;
-    this.remark.textContent = other ? `This file says that it is of ${own}, not of ${id}.` : "";
+    this.remark.textContent = other ? `This file names the clutch ${own}, not ${id}.` : "";
   }
 
   /**

@@ -239,7 +239,7 @@ export const seconds = (milliseconds) =>
     : `${Math.round(milliseconds / 60_000)} min`;
 
 export const NOT_A_NUMBER =
-  "Write a number as 25.5 or 25,5; a comma before exactly three digits could be either, so 1,000 is 1000 or 1.0.";
+  "Write a number as 25.5 or 25,5. A comma before exactly three digits is not clear: 1,000 may mean 1000 or 1.0.";
 
 /**
  * A number as it is typed: 25.5 and 25,5 are the same; null where nothing is, undefined where it cannot be read for certain.

@@ -18,7 +18,12 @@ function askForKey(problem) {
       "form",
       { method: "dialog" },
       h("h2", { id: "key-title" }, "This service asks for a key"),
-      h("p", {}, problem.detail || "Its operator creates one, with the scope read to look and ingest to send:"),
+      h(
+        "p",
+        {},
+        problem.detail ||
+          "Its operator creates a key. The scope read allows you to look; the scope ingest also allows you to send:",
+      ),
       h("pre", {}, h("code", {}, "clutchlife key create --scope read")),
       h("label", { for: "key" }, "Key"),
       input,

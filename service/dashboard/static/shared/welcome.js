@@ -40,8 +40,8 @@ export function firstRun(id) {
     h(
       "p",
       {},
-      "The first stationary Stribeck test is the reference that ageing is measured against; ",
-      "from the third on the remaining cycles are predicted.",
+      "The first stationary Stribeck test is the reference: ageing is the change since this test. ",
+      "From the third test on, the service predicts the remaining cycles.",
     ),
   );
 }

@@ -176,7 +176,7 @@ def test_what_these_data_would_show_is_said_with_units_zero_and_pressure_first()
     shown = tuple(visible(slug, size) for slug, size in (*sizes.items(), ("torque_zero_shift", 12.0)))
     said = summarise(replace(found, visible=shown))
     assert (
-        "The smallest sizes that these data would have shown nine times in ten, in the most (least) visible form: "
+        "The smallest sizes that these data would show in nine of ten cases, in the most (least) visible form: "
         "torque zero shift 3 Nm (6 Nm), pressure offset 0.075 bar (0.15 bar) and running in "
     ) in said
     assert "These data cannot show, at any size:  channel delay and stick slip." in said
@@ -214,7 +214,7 @@ def test_a_cause_of_all_explanations_is_certain_and_open_is_what_is_beside_it() 
     both = explanations_of({("channel_delay",): 0.55, ("channel_delay", UNCATALOGUED): 0.45})
     said = summarise(replace(found, explanations=both))
     assert "Channel delay is at work (probability above 0.99)." in said
-    assert "What else may be at work (with probabilities): nothing (0.55), or something that" in said
+    assert "Other causes that may be at work (with probabilities): nothing (0.55), or something that" in said
     assert "cannot distinguish" not in said
     one = explanations_of({("channel_delay", UNCATALOGUED): 1.0})
     said = summarise(replace(found, explanations=one))

@@ -64,7 +64,7 @@ class StandInService:
         run_id = name or digest[:16]
         known = self.stored.get(run_id)
         if known is not None and known != content:
-            return problem(409, "conflict", f"run_id {run_id!r} is known with other content")
+            return problem(409, "conflict", f"run_id {run_id!r} is already stored with other content")
         self.stored[run_id] = content
         receipt = {"run_id": run_id, "duplicate": known is not None} | self.states.get(run_id, {})
         return httpx2.Response(200 if known else 201, json=receipt)

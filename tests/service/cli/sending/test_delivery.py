@@ -142,7 +142,7 @@ def test_a_service_that_answers_nothing_but_looks_is_left_alone_after_two_runs(s
 @pytest.mark.parametrize(
     ("state", "words"),
     [
-        ({"state": "withdrawn", "cycles": 70000, "sent_cycles": 70000}, "withdrawn since"),
+        ({"state": "withdrawn", "cycles": 70000, "sent_cycles": 70000}, "then withdrawn"),
         ({"state": "accepted", "cycles": 7000.0, "sent_cycles": 70000.0}, "from 70000 to 7000 cycles"),
     ],
 )
@@ -169,7 +169,9 @@ def test_an_inspection_waits_while_the_service_is_away_and_is_sent_to_its_own_ad
     sender.service.states[name] = {"state": "withdrawn"}
     sender.spool.add([(sender.folder / "i.json", None)], INSPECTIONS)
     assert sender.send().duplicates == 1
-    assert sender.lines[-1:] == [f"{name} was stored before and withdrawn since: it stays withdrawn, and waits no more"]
+    assert sender.lines[-1:] == [
+        f"{name} was stored earlier and then withdrawn: it stays withdrawn and is not sent again"
+    ]
 
 
 def test_a_run_known_with_other_content_waits_no_more(sender: Sender) -> None:
@@ -220,7 +222,7 @@ def test_a_run_that_is_corrected_while_the_service_takes_it_is_named(sender: Sen
     sender.service.instead = corrected_meanwhile
     sender.push(older)
     assert sender.send().stored == 1
-    assert "stored while a newer version of it was pushed" in sender.lines[0]
+    assert "stored while you pushed a newer version" in sender.lines[0]
     assert contents(sender.spool) == [newer]
     assert sender.spool.replaced() == []
 

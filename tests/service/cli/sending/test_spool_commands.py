@@ -110,7 +110,7 @@ def test_a_replaced_version_that_may_be_stored_is_named(terminal: Terminal) -> N
     terminal.service.instead = lambda request: None if request.method == "GET" else httpx2.Response(504)
     terminal.push(body(70000), code=75)
     terminal.service.instead = present
-    assert "it may be stored: if it is, withdraw it" in terminal.push(body(7000))
+    assert "the old version may be stored: if so, withdraw it" in terminal.push(body(7000))
 
 
 def test_push_names_other_runs_that_wait_in_one_line(terminal: Terminal) -> None:
@@ -267,7 +267,7 @@ def test_a_rigs_files_are_sent_with_its_name_and_what_else_is_given(terminal: Te
 
 def test_without_a_rig_a_record_needs_its_kind_and_cycles(terminal: Terminal) -> None:
     record = written(terminal.folder / "a.csv", b"1,2")
-    assert "Use --kind and --cycles, or --rig" in terminal("push", record, "--clutch", "c1", "--url", URL, code=64)
+    assert "Give --kind and --cycles" in terminal("push", record, "--clutch", "c1", "--url", URL, code=64)
 
 
 def test_a_file_whose_reader_cannot_start_waits_in_the_spool(terminal: Terminal) -> None:

@@ -81,7 +81,7 @@ def test_a_busy_port_is_one_line_before_anything_is_made(tmp_path: Path) -> None
             said = (ended.stdout + ended.stderr).splitlines()
             assert said == [
                 f"clutchlife: port {port} at {'127.0.0.1' if host == every else host} is in use, perhaps by another "
-                "service: stop it, or give another with --port"
+                "service: stop it, or give another port with --port"
             ]
     assert list(tmp_path.iterdir()) == []
 

@@ -17,8 +17,8 @@ def life(median: float) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
-        (0.0, 880.0, "Adopting it takes back that the end is reached: a median of about 880 cycles remains."),
-        (880.0, 0.0, "Adopting it says that the end is reached; without it a median of about 880 cycles remains."),
+        (0.0, 880.0, "If you adopt it, the end is not reached any more: a median of about 880 cycles remains."),
+        (880.0, 0.0, "If you adopt it, the end is reached; without it, a median of about 880 cycles remains."),
         (9000.0, 5700.0, "from about 9,000 to about 5,700 cycles."),
     ],
 )

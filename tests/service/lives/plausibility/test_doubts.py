@@ -37,7 +37,7 @@ def test_a_zero_too_many_is_asked_about() -> None:
     assert answer.codes == ("cycles_off_pace",)
     for part in (
         "70000 cycles",
-        "64000 after the run before",
+        "64000 after the previous run",
         "1000 cycles apart",
         "Is it 7000?",
         "Confirm or correct it.",
