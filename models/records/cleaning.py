@@ -122,7 +122,7 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
     forward = steps[:: max(1, steps.size // SCALE_SAMPLES)]
     forward = forward[forward > 0]
     if forward.size == 0 or time.max() <= time.min():
-        raise UnusableRecordError(f"time must advance, but no interval of the {time.size} samples does")
+        raise UnusableRecordError(f"time must advance, but does not in any of the {time.size} samples")
     period = float(np.median(forward))
     swapped = int(np.count_nonzero(steps < 0))
     if swapped:

@@ -62,7 +62,7 @@ def require_address(url: str, *, private: bool) -> None:
 
 def _require_apprise(url: str, scheme: str) -> None:
     if not scheme or scheme in _LOCAL or has_controls(url):
-        raise wrong_address("url must be a web address such as https://example.org/hook, or one of Apprise's")
+        raise wrong_address("url must be a web address such as https://example.org/hook, or an address of Apprise")
     if importlib.util.find_spec("apprise") is None:
         raise wrong_address(
             f"url begins with {scheme[:20]}://, which needs the extra `notify`: pip install 'clutchlife[notify]'"

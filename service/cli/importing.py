@@ -23,7 +23,9 @@ def import_file(
         Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False, help="A file of the rig's recorder")
     ],
     clutch: Annotated[str, typer.Option(help="The clutch that was tested")],
-    rig: Annotated[str | None, typer.Option(help="The rig profile to read it with; default: the one that fits")] = None,
+    rig: Annotated[
+        str | None, typer.Option(help="The rig profile for the file; default: the profile that fits")
+    ] = None,
     kind: Annotated[str | None, typer.Option(help=f"The kind of run: {' or '.join(_KINDS)}")] = None,
     cycles: Annotated[float | None, typer.Option(min=0, help="Duty cycles since new")] = None,
     channel_map: ChannelMap = None,

@@ -152,7 +152,7 @@ def _run_plan(folder: Path, plan: Path, alternative: int) -> None:
     from service.run_files import plan_file, simulated  # start-up time
 
     if not (folder / manifest.ANSWER).is_file():
-        fail(f"{folder} holds no simulated campaign: simulate one into it first, then run the plan", EX_USAGE)
+        fail(f"{folder} holds no simulated campaign: give the folder in which you simulated the clutch", EX_USAGE)
     answer = json.loads((folder / manifest.ANSWER).read_bytes())
     sizes = {effect["effect"]: effect["size"] for effect in answer["hidden"]}
     clutch = hidden.clutch_for(campaign.simulated_clutch(answer["seed"]), sizes)

@@ -190,7 +190,7 @@ def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:
 def _row_warnings(run: IncomingRun, plateaus: Plateaus) -> list[Notice]:
     if "torque_sd_nm" not in run.channels or plateaus.torque_sd is not None:
         return []
-    message = "torque_sd_nm holds zeros, which no sensor has: the fits were not weighted by it"
+    message = "torque_sd_nm holds zeros, but every sensor has noise: the fits do not use torque_sd_nm as weights"
     return [Notice(code="torque_sd_ignored", message=message)]
 
 

@@ -388,7 +388,7 @@ class Stamps:
             self._zones.add("UTC" if zone or match["utc"] else match["named"] or "")
         if len(self._zones) > 1 and self._zones != {"", "UTC"}:
             shown = " and ".join(sorted(name or "none" for name in self._zones))
-            message = f"the times must be in one zone, or each with its hours from UTC (+01:00), got {shown}"
+            message = f"the times must be in one zone, or each with its offset from UTC (+01:00), got {shown}"
             raise InvalidError.of(message, code="ambiguous_date", pointer="/channels/time_s")
         if zone:
             total -= (1 if zone[0] == "+" else -1) * (int(zone[1:3]) * 60 + int(zone[3:])) * 60 * 10**9

@@ -105,7 +105,7 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[tuple[str, bool]]:
         try:
             text = rest + lines.decode(block, last)
         except UnicodeError:
-            rule = f"or a line soon after it is not {encoding.upper()}, as the file's beginning says: save it as UTF-8"
+            rule = f"or a line soon after it is not {encoding.upper()}, as the file's beginning says: save the file as UTF-8"
             raise wrong_line(line, rule, "not_text") from None
         end = text.rfind("\n") + 1
         if not last and _is_open(text[:end]):

@@ -117,7 +117,7 @@ def _replacement(spool: Spool, entry: Entry) -> str:
         else ""
     )
     place = spool.body(entry)
-    return f"{entry.label}: replaces the version that waited since {entry.since} and is kept in {place}{stored}"
+    return f"{entry.label}: replaces the version that waited since {entry.since}; the old version is kept in {place}{stored}"
 
 
 def _warn_of_others(spool: Spool, digests: set[str]) -> None:
@@ -226,7 +226,7 @@ def empty(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask")] = False,
     spool: SpoolFolder = SPOOL,
 ) -> None:
-    """Show what is in the spool, ask, and delete it for good."""
+    """Show what is in the spool, ask whether to delete it, and then delete it for good."""
     with errors_in_a_line():
         kept = [entry for entry in _kept(spool, clutch) if entry.state != WAITING or not refused]
         if not kept:

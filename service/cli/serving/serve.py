@@ -66,7 +66,7 @@ def serve(
         if processes > 1 and not is_on_server(settings.database):
             raise ValueError(
                 f"--processes {processes} needs a database on a PostgreSQL server: only one service can use "
-                "an SQLite file, and CLUTCHLIFE_WORKERS gives it more processes"
+                "an SQLite file. To give this service more processes, set CLUTCHLIFE_WORKERS"
             )
         # a port that is not free ends the start before anything is made; without a database there are no keys
         first = host if is_loopback(host) or database_exists(settings.database) else LOOPBACK

@@ -391,7 +391,7 @@ REFUSED = {
     "two-zones": (
         "time;M [Nm]\n2026-10-25 02:59:59 CEST;1\n2026-10-25 02:00:00 CET;2\n",
         None,
-        "in one zone, or each with its hours",
+        "in one zone, or each with its offset",
     ),
     "a-factor-in-a-title": (
         "t [s];Torque x10 [Nm]\n0;210\n",

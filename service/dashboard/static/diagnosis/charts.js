@@ -78,7 +78,7 @@ function mapSpec(maps, map) {
     .filter((side) => maps[side]?.[key])
     .map((side) => ({ side, z: columnwise ? turned(maps[side][key], ys) : maps[side][key] }));
   return {
-    note: "Measured minus predicted torque, as a mean, in standard deviations of the noise (σ). Pure noise stays pale. Both pictures use the same scale.",
+    note: "Mean of measured minus predicted torque, in standard deviations of the noise (σ). Pure noise stays pale. Both pictures use the same scale.",
     columns: [{ name: "model" }, column(xName), column(yName, 2), column("residual, sigma", 2)],
     rows: sides.flatMap(({ side, z }) => z.flatMap((row, j) => row.map((value, i) => [side, xs[i], ys[j], value]))),
     figure: (c) => ({
