@@ -54,7 +54,7 @@ def require_usable(profile: RigProfile) -> None:
     elif any(places.count(name) > 1 for name in _MEANING if name != "*"):
         rule = "may hold each of {cycles}, {kind} and {run_id} once"
     elif "{kind}" in places and not profile.kinds:
-        rule = "with {kind} needs kinds, the words that stand for each kind"
+        rule = "with {kind} needs `kinds`: for each kind the words that stand for it"
     if rule is not None:
         message = f"file_name {rule}, got {pattern!r}"
         raise InvalidError.of(message, code="pattern", pointer="/file_name", value=pattern)
