@@ -452,7 +452,7 @@ REFUSED = {
     "german-thousands": ("pressure_bar;speed_rpm;torque_nm\n5;800;21\n5;1.100;21\n", None, "may be 1.1 or 1100"),
     "american-thousands": ('pressure_bar,speed_rpm,torque_nm\n5,800,21\n5,"1,100",21\n', None, "may be 1.1 or 1100"),
     "foreign-unit": ("t [s],M [V]\n0,1\n", None, "'V'"),
-    "mapped-foreign-unit": ("t [s],Mz V\n0,1\n", "torque_nm:Mz, V", "not in the file"),
+    "mapped-foreign-unit": ("t [s],Mz V\n0,1\n", "torque_nm:Mz, V", "but the file has only"),
     "mapped-unit-of-another": ("t [s];Kraft, kN\n0;1\n", "torque_nm:Kraft, kN", "'kN'"),
     "turns-or-radians": ("t [s];n [1/s]\n0;1\n", None, "'1/s'"),
     "decimal-commas-between-commas": (HEAD + "\n0,0,5,0,100,0,20,0\n0,1,5,0,100,0,20,0\n", None, "must have 4 cells"),
@@ -481,7 +481,7 @@ REFUSED = {
     "a-long-table-of-two-values": (
         long("time_s,channel,a,b", "{t},{channel},{value},1"),
         None,
-        "one column must hold the values, got a, b; call it 'value'",
+        "one column must hold the values, got a, b. Name this column 'value'",
     ),
     "a-word-for-no-value": (HEAD + "\n0,5,n/a,20\n", None, "got 'n/a': add missing=n/a to leave such rows out"),
     "not-a-number": (HEAD + "\n0,5,NaN,20\n", None, "got nan: add missing=nan to leave such rows out"),
