@@ -130,7 +130,7 @@ def test_a_killed_migration_goes_on_where_it_was_and_is_used_by_nobody_before(
         process.join()
         assert process.exitcode == -signal.SIGKILL
         with pytest.raises(
-            UnfinishedMigration, match=r"a migration from the file .*source\.db into this database has not"
+            UnfinishedMigration, match=r"a migration from the file .*source\.db into this database is not finished"
         ):
             open_database(target)
         with pytest.raises(UnfinishedMigration):

@@ -99,7 +99,7 @@ def test_a_run_that_was_corrected_while_the_service_was_away_is_delivered_correc
     terminal.service.instead = away
     assert "1 run waits" in terminal.push(body(70000), code=75)
     output = terminal.push(body(7000), code=75)
-    assert "and is kept in " in output
+    assert "; the old version is kept in " in output
     assert "may be stored" not in output
     terminal.service.instead = present
     assert "1 stored now, 0 stored before, 0 refused" in terminal("spool", "send", "--url", URL)
