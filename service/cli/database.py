@@ -163,9 +163,8 @@ def verify(
         print_line(note)
     if inspections:
         print_line(f"{inspections} inspections with {photographs} photographs were checked")
-    summary = (
-        f"{runs} runs of {len(ids)} clutches were checked, {len(chosen)} clutches computed again: {findings} findings"
-    )
+    checked = f"{runs} runs of {len(ids)} clutches were checked"
+    summary = f"{checked}, {len(chosen)} of the clutches computed again: {findings} findings"
     if findings:
         fail(summary)
     print_line(summary)

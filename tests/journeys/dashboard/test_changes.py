@@ -82,6 +82,9 @@ def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server, r
     page.locator("tr[data-clutch='bench']").get_by_role("link", name="1 run held").click()
     settled(page, 1)
 
+    warned = page.locator("#warnings li").filter(has_text="Runs are held")
+    expect(warned).to_contain_text("1 run is held and does not count: ")
+    expect(warned).not_to_contain_text("this is without")  # which the first sentence has said
     ask(held, "Correct the cycles", "a zero too many", cycles=LAST)
     done(page, "Corrected from 70,000 to 7,000 cycles.")
     settled(page, 0)

@@ -79,7 +79,7 @@ def test_the_worst_comes_first_with_all_that_is_asked_of_a_row(watched: Watched)
     assert f"{100 * said['summary']['current']['health']:.0f} %" in ageing.inner_text()
     assert " to " in ageing.locator("td[data-label='Remaining']").inner_text()
     assert re.search(
-        r"safe for [\d,]+ \(95 %\)\s+50 % chance of [\d,]+ or more; 90 % interval: [\d,]+ to",
+        r"safe for [\d,]+ \(95\s%\)\s+50 % chance of [\d,]+ or more; 90 % interval: [\d,]+ to",
         ageing.locator("td[data-label='Remaining']").inner_text(),
     )
     for drawing in (".spark polyline", ".interval .median", ".health .fill"):

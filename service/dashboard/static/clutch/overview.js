@@ -80,7 +80,9 @@ export class Overview {
       reader.forecast(),
       reader.degradation(),
     ]);
-    const odd = lifeWarnings({ warned: [...life.warnings, ...degradation.warnings], tests });
+    // what held runs would change, the remaining life says
+    const further = degradation.warnings.filter(({ code }) => code !== "held_runs");
+    const odd = lifeWarnings({ warned: [...life.warnings, ...further], tests });
     const warned = odd.length > 0 && h("section", { id: "warnings" }, warningsView(odd));
     this.top.replaceChildren(...[heldPart, warned].filter((part) => part !== false));
     this.fan.show(fan({ life: shown, pooled, predictions, events }));

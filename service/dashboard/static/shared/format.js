@@ -120,7 +120,7 @@ export const likely = (quantiles) =>
  */
 export function atLeast(bound) {
   if (bound === null || bound < 1) return "no further cycle is safe";
-  return `safe for ${roundedDown(bound)} (95 %)`;
+  return `safe for ${roundedDown(bound)} (95\u00a0%)`;
 }
 
 /**
