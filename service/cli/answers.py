@@ -91,7 +91,7 @@ def life(
         ),
     ] = None,
     pace: Annotated[
-        float | None, typer.Option(help="Planned duty cycles per hour, idle hours included; gives dates")
+        float | None, typer.Option(help="Planned duty cycles per hour, idle hours counted; then dates are given too")
     ] = None,
     as_json: Json = False,
     as_csv: Csv = False,

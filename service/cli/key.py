@@ -21,7 +21,10 @@ def _now() -> str:
 @app.command()
 def create(
     scope: Annotated[
-        str, typer.Option(help="read, ingest (may add too: runs, clutches, diagnoses) or admin (may change)")
+        str,
+        typer.Option(
+            help="What the key may do: read, ingest (read, and add runs, clutches and diagnoses) or admin (everything)"
+        ),
     ],
     note: Annotated[str, typer.Option(help="Who or what the key is for")] = "",
     clutch: Annotated[

@@ -92,7 +92,9 @@ def correct(
     clutch: ClutchId,
     run: RunId,
     reason: Reason,
-    cycles: Annotated[float | None, typer.Option(min=0, help="Duty cycles since new when the run was made")] = None,
+    cycles: Annotated[
+        float | None, typer.Option(min=0, help="The right number of cycles, from new to this run")
+    ] = None,
     rig: Annotated[str | None, typer.Option(help="Read the run's file again with this rig profile")] = None,
 ) -> None:
     """Correct the cycles of a run, or read its file again with another rig profile."""

@@ -215,7 +215,7 @@ def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: 
     if name == CHECK:
         missing = FEWEST_TESTS - _places(summary)
         tests = "one more stationary test" if missing == 1 else f"{missing} more stationary tests, at different cycles"
-        like_the_first = ", at the pressures and the oil temperature of the first" if _left_out(summary) else ""
+        like_the_first = ", with the pressures and oil of this life's first test" if _left_out(summary) else ""
         return f"Run {tests}{like_the_first}: then the remaining life is predicted."
     if name == NORMAL or diagnosis is None:
         return "Its life has ended: nothing to do." if summary.get("ended") else "Nothing to do: carry on testing."

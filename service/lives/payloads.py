@@ -158,8 +158,8 @@ def other_oil(life: Life, event: Event) -> list[Notice]:
         return []
     oil, reference = (kelvin - ZERO_CELSIUS for kelvin in (event.oil_temperature, life.reference_oil))
     message = (
-        f"the oil was at {oil:.0f} °C on average, and at {reference:.0f} °C in the first stationary test: more than "
-        f"{OTHER_OIL:g} °C apart. Tracking uses this test only with an adopted model that corrects for oil temperature"
+        f"the oil was at {oil:.0f} °C on average in this test, and at {reference:.0f} °C in the first stationary test: more "
+        f"than {OTHER_OIL:g} °C apart. Tracking uses this test only with an adopted model that corrects for oil temperature"
     )
     return [Notice(code=OTHER_OIL_TEMPERATURE, message=message)]
 

@@ -258,9 +258,10 @@ def refuse_counts(shown: str, values: NDArray[Any], stated: Mapping[str, Any]) -
         words, number = set(re.split(r"[\W_]+|(?<=[a-z])(?=[A-Z])", name)), _number(held)
         words = {word.lower() for word in words}
         if number is not None and ((words & _GAINS and number != 1) or (words & _OFFSETS and number != 0)):
+            own = "scale_factor" if words & _GAINS else "add_offset"
             message = (
-                f"{shown} holds whole numbers beside {name} = {number:g}: save the physical values; if the "
-                "factor is still to be applied, name it scale_factor"
+                f"{shown} holds whole numbers, and {name} = {number:g} is stored with them: they may be raw counts. Save "
+                f"the physical values without it, or rename it {own} if it is to be applied"
             )
             raise InvalidError.of(message, code="raw_counts")
 

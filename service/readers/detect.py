@@ -218,7 +218,7 @@ def unpacked(path: Path, name: str, limits: Limits) -> Iterator[Path]:
 
 def too_slow(kind: Format, limits: Limits) -> InvalidError:
     """The error of a file that takes more of a processor's time than it may."""
-    message = f"the {kind} file cannot be read: it took longer than {limits.seconds} s of a processor"
+    message = f"the {kind} file cannot be read: reading it took more than {limits.seconds} s of processor time"
     return InvalidError.of(message, code="too_slow")
 
 

@@ -85,7 +85,7 @@ def _require_type(content: bytes, media_type: MediaType) -> None:
     }
     if not begins[media_type]:
         shown = content[:12].hex(" ") or "nothing"
-        message = f"the body must begin as a file of type {media_type} does, got {shown}"
+        message = f"the file is not of type {media_type}: its first bytes are {shown}"
         raise InvalidError(message, errors=[FieldError(pointer="", code="media_type", message=message, value=shown)])
 
 

@@ -100,7 +100,7 @@ def test_tests_at_the_same_cycles_or_at_other_pressures_are_not_asked_for_again(
     assert shown["state"]["why"].startswith(
         "tests at 1 of the 3 different cycles that a prediction needs, 1 more cannot"
     )
-    assert shown["action"].startswith("Run 2 more stationary tests, at different cycles, at the pressures and the oil")
+    assert shown["action"].startswith("Run 2 more stationary tests, at different cycles, with the pressures and oil")
     for answer in (now(bench, method) for method in METHODS):
         (warning,) = answer["warnings"]
         assert (warning["code"], answer["runs_used"]) == ("tests_left_out", 4)
@@ -240,7 +240,7 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
         (
             summary(0.0, status="insufficient_data", runs_used=1, tests=7, places=1), None,
             "Function check: 1 of the 3 tests that a prediction needs, 6 more cannot be compared with the first; ",
-            "Run 2 more stationary tests, at different cycles, at the pressures and the oil temperature of the first: then",
+            "Run 2 more stationary tests, at different cycles, with the pressures and oil of this life's first test: then",
         ),
         ({}, None, "Function check: no run counts yet", "Run 3 more stationary tests, at different cycles: then "),
         (summary(9000.0), found(["oil_temperature"], adoptable=True), "Out of specification: ", "Adopt the model with oil"),

@@ -818,7 +818,7 @@ def counts(**attributes: float) -> Callable[[h5py.File], object]:
 def test_packed_data_is_unpacked_and_raw_counts_are_refused(tmp_path: Path) -> None:
     columns = read_hdf5(tmp_path / "a.h5", counts(scale_factor=1e-4, add_offset=0.0)).columns
     np.testing.assert_allclose(columns["torque_nm"], RECORD["torque_nm"], rtol=1e-12)
-    with pytest.raises(InvalidError, match=r"torque holds whole numbers beside gain = 0\.0001"):
+    with pytest.raises(InvalidError, match=r"torque holds whole numbers, and gain = 0\.0001"):
         read_hdf5(tmp_path / "b.h5", counts(gain=1e-4))
 
 
@@ -1024,7 +1024,7 @@ def test_whole_numbers_beside_any_factor_are_refused(tmp_path: Path, name: str) 
     field = pa.field("torque", pa.int16(), metadata={"unit": "Nm", name: "0.01"})
     parquet.write_table(pa.table([counts], schema=pa.schema([field])), tmp_path / "a.parquet")
     for file in ("a.tdms", "a.parquet"):
-        with pytest.raises(InvalidError, match=f"beside {name} = 0.01"):
+        with pytest.raises(InvalidError, match=f"and {name} = 0.01 is stored with them"):
             read_file(tmp_path / file, filename=file)
 
 

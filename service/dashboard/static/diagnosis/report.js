@@ -127,12 +127,12 @@ function candidates({ candidates: all = [], causes = [] }) {
 }
 
 /**
- * Log evidence in a word (thresholds of Kass and Raftery, 1, 3 and 5 in natural logarithms); the number under the pointer.
+ * Log evidence in a word (thresholds of Kass and Raftery, 1 and 3 in natural logarithms); the number under the pointer.
  * @param {number | null} value
  */
 function evidence(value) {
   if (value === null) return "–";
-  const word = value < 1 ? "none" : value < 3 ? "weak" : value < 5 ? "moderate" : "strong";
+  const word = value < 0 ? "none" : value < 1 ? "weak" : value < 3 ? "moderate" : "strong";
   return h("span", { title: `log evidence ${fixed(value, 1)}` }, word);
 }
 

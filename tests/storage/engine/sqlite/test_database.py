@@ -80,7 +80,7 @@ def test_a_found_database_is_read_at_its_own_revision_and_never_changed(tmp_path
     with closing(find_database(f"sqlite:///{path}")) as found:
         with found.reading() as connection:
             assert connection.exec_driver_sql("SELECT count(*) FROM clutch").scalar() == 1
-        with pytest.raises(DatabaseTooOld, match=rf"is at revision {OLD}, this needs s\d{{4}}_.*clutchlife serve"):  # noqa: SIM117
+        with pytest.raises(DatabaseTooOld, match=rf"{OLD}, this program needs s\d{{4}}_.*clutchlife serve"):  # noqa: SIM117
             with found.reading() as connection:
                 connection.exec_driver_sql("SELECT later FROM clutch")
         with pytest.raises(StorageUnavailable, match="read-only"), found.writing() as connection:
