@@ -56,7 +56,6 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
         for z in range(1, lives + 1):
             add(SPEED if s > z + 1 else CYCLES, _cosine(s, speed) * _cosine(z, life) * steady)
     for wave in _speed_waves(design, prediction).T:
-        # at even speeds a sine may be 0 at each
         if np.abs(wave).max() > 1e-6 * torque.max():  # at even speeds a sine may be 0 at each
             columns.append(wave)
             axes.append(SPEED)
