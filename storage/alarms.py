@@ -75,17 +75,7 @@ _newest = (
     .order_by(alarm_event.c.event_key.desc())
     .limit(bindparam("most"))
 )
-_clear = (
-    update(alarm_event)
-    .where(alarm_event.c.event_id == bindparam("wanted"))
-    .values(cleared_at=bindparam("at"), content=bindparam("new_content"))
-)
-_reopen = update(alarm_event).where(alarm_event.c.event_id == bindparam("wanted")).values(cleared_at=None)
-_acknowledge = (
-    update(alarm_event)
-    .where(alarm_event.c.event_id == bindparam("wanted"))
-    .values(acknowledged_at=bindparam("at"), acknowledged_by=bindparam("by"), note=bindparam("new_note"))
-)
+_set_event = update(alarm_event).where(alarm_event.c.event_id == bindparam("wanted"))
 _last_heard = (
     select(run.c.clutch_id, func.max(run.c.received_at)).where(among(run.c.clutch_id, "of_clutches"))
 ).group_by(run.c.clutch_id)
@@ -167,17 +157,18 @@ def events(
 
 def clear(connection: Connection, event_id: str, at: str, content: Json) -> None:
     """Note that what raised an alarm is over, with what is said of it from now on."""
-    connection.execute(_clear, {"wanted": event_id, "at": at, "new_content": to_text(content)})
+    connection.execute(_set_event, {"wanted": event_id, "cleared_at": at, "content": to_text(content)})
 
 
 def reopen(connection: Connection, event_id: str) -> None:
     """Note that an alarm is not over: it is as it was, acknowledged or not."""
-    connection.execute(_reopen, {"wanted": event_id})
+    connection.execute(_set_event, {"wanted": event_id, "cleared_at": None})
 
 
 def acknowledge(connection: Connection, event_id: str, *, at: str, by: str, note: str) -> None:
     """Note who has seen an alarm, when, and what they remarked."""
-    connection.execute(_acknowledge, {"wanted": event_id, "at": at, "by": by, "new_note": note})
+    acknowledged = {"acknowledged_at": at, "acknowledged_by": by, "note": note}
+    connection.execute(_set_event, {"wanted": event_id} | acknowledged)
 
 
 def last_heard(connection: Connection, clutch_ids: Collection[str]) -> dict[str, str]:

@@ -203,8 +203,7 @@ def current_fleet_priors(connection: Connection) -> list[FleetPriorRow]:
 
 def count_ended_lives(connection: Connection) -> int:
     """How many ended lives the newest priors of all kinds know of."""
-    number: int = connection.execute(_fleet_ended_lives).scalar_one()
-    return number
+    return int(connection.execute(_fleet_ended_lives).scalar_one())
 
 
 def forget_left_out(connection: Connection, fleet: Json, *, before: int) -> None:

@@ -1,11 +1,11 @@
 """The table of clutches: the current record, the first record, and the summary that lists show."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Select, Text, bindparam, case, func, select, tuple_, update
+from sqlalchemy import Connection, Select, Text, Update, bindparam, case, func, select, tuple_, update
 
 from storage.dialects import among, json_fields
 from storage.encoding import Json, Rows, to_text
@@ -82,29 +82,9 @@ _life_as_disputed = case(
     (clutch.c.disputed == bindparam("life", type_=Text), bindparam("if_disputed", type_=Text)),
     else_=bindparam("else", type_=Text),
 )
-_set_summary = (
-    update(clutch)
-    .where(_of_wanted)
-    .values(rank=bindparam("new_rank"), summary=bindparam("new_summary"), state=_life_as_disputed)
-)
-_set_disputed = (
-    update(clutch).where(_of_wanted).values(disputed=bindparam("new_disputed"), state=bindparam("new_state"))
-)
-_set_silent = update(clutch).where(_of_wanted).values(silent=bindparam("new_silent"), state=bindparam("new_state"))
-_set_record = (
-    update(clutch)
-    .where(_of_wanted)
-    .values(
-        record=bindparam("new_record"),
-        content_sha256=bindparam("new_content"),
-        registered=bindparam("new_registered"),
-        archived=bindparam("new_archived"),
-        searched=bindparam("new_searched"),
-    )
-)
-_bump = update(clutch).where(_of_wanted).values(revision=clutch.c.revision + 1)
-_revision = select(clutch.c.revision).where(_of_wanted)
-_count = select(func.count()).select_from(clutch)
+_set = update(clutch).where(_of_wanted)
+_set_summary, _bump = _set.values(state=_life_as_disputed), _set.values(revision=clutch.c.revision + 1)
+_revision: Select[int] = select(clutch.c.revision).where(_of_wanted)
 _ids = select(clutch.c.clutch_id).order_by(clutch.c.clutch_id)
 _revisions = select(clutch.c.clutch_id, clutch.c.revision).order_by(clutch.c.clutch_id)
 
@@ -190,16 +170,8 @@ def set_record(
     archived: bool,
 ) -> None:
     """Replace a clutch's record, and whether lists leave it out. Raises LookupError on an unknown clutch."""
-    values = {
-        "wanted": clutch_id,
-        "new_record": to_text(record),
-        "new_content": content_sha256,
-        "new_registered": None if registered is None else to_text(registered),
-        "new_archived": int(archived),
-        "new_searched": _searched(clutch_id, record),
-    }
-    if connection.execute(_set_record, values).rowcount != 1:
-        raise LookupError(f"clutch {clutch_id!r} is not stored")
+    fields = {"record": record, "content_sha256": content_sha256, "registered": registered, "archived": archived}
+    _change(connection, _set, clutch_id, _stored.columns(**fields) | {"searched": _searched(clutch_id, record)})
 
 
 def set_summary(
@@ -207,48 +179,40 @@ def set_summary(
 ) -> None:
     """Replace what lists show of a clutch: `state` is its state's name, or `if_disputed` where `life` is in dispute. Raises
     LookupError on an unknown one."""
-    values = {"wanted": clutch_id, "new_rank": rank, "new_summary": to_text(summary)}
-    changed = connection.execute(_set_summary, values | {"life": life, "else": state, "if_disputed": if_disputed})
-    if changed.rowcount != 1:
-        raise LookupError(f"clutch {clutch_id!r} is not stored")
+    states = {"life": life, "else": state, "if_disputed": if_disputed}
+    _change(connection, _set_summary, clutch_id, {"rank": rank, "summary": to_text(summary)} | states)
 
 
 def set_disputed(connection: Connection, clutch_id: str, disputed: str | None, *, state: str) -> None:
     """Note of which life data and model are in dispute, None: of none, and the state that follows. Raises LookupError on an
     unknown clutch."""
-    if (
-        connection.execute(_set_disputed, {"wanted": clutch_id, "new_disputed": disputed, "new_state": state}).rowcount
-        != 1
-    ):
-        raise LookupError(f"clutch {clutch_id!r} is not stored")
+    _change(connection, _set, clutch_id, {"disputed": disputed, "state": state})
 
 
 def set_silent(connection: Connection, clutch_id: str, silent: str | None, *, state: str) -> None:
     """Note since when a clutch's rig has sent nothing, None: it has, and the state that follows. Raises LookupError on an
     unknown clutch."""
-    values = {"wanted": clutch_id, "new_silent": silent, "new_state": state}
-    if connection.execute(_set_silent, values).rowcount != 1:
+    _change(connection, _set, clutch_id, {"silent": silent, "state": state})
+
+
+def _change(connection: Connection, statement: Update, clutch_id: str, columns: Mapping[str, object]) -> None:
+    if connection.execute(statement, {"wanted": clutch_id} | dict(columns)).rowcount != 1:
         raise LookupError(f"clutch {clutch_id!r} is not stored")
 
 
 def bump_revision(connection: Connection, clutch_id: str) -> int:
     """Raise the clutch's revision by one and return it. Raises LookupError on an unknown one."""
-    changed = connection.execute(_bump, {"wanted": clutch_id})
-    if changed.rowcount != 1:
-        raise LookupError(f"clutch {clutch_id!r} is not stored")
-    revision: int = connection.execute(_revision, {"wanted": clutch_id}).scalar_one()
-    return revision
+    _change(connection, _bump, clutch_id, {})
+    return connection.execute(_revision, {"wanted": clutch_id}).scalar_one()
 
 
 def revision(connection: Connection, clutch_id: str) -> int | None:
-    number: int | None = connection.execute(_revision, {"wanted": clutch_id}).scalar_one_or_none()
-    return number
+    return connection.execute(_revision, {"wanted": clutch_id}).scalar_one_or_none()
 
 
 def count(connection: Connection) -> int:
     """How many clutches there are, archived ones too."""
-    number: int = connection.execute(_count).scalar_one()
-    return number
+    return connection.execute(_number).scalar_one()
 
 
 def count_within(connection: Connection, ranks: Sequence[float]) -> dict[float, int]:

@@ -9,7 +9,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Double, bindparam, select, update
 
 from storage.dialects import json_fields
-from storage.encoding import Json, Rows, to_object, to_text
+from storage.encoding import Json, Rows, to_object
 from storage.runs import ACCEPTED
 from storage.tables import adopted_model, diagnosis, run
 
@@ -65,17 +65,7 @@ _same = (
     )
     .order_by(diagnosis.c.diagnosis_key)
 )
-_end = (
-    update(diagnosis)
-    .where(diagnosis.c.diagnosis_id == bindparam("wanted"), diagnosis.c.status == RUNNING)
-    .values(
-        status=bindparam("new_status"),
-        finished_at=bindparam("at"),
-        report=bindparam("new_report"),
-        extension=bindparam("new_extension"),
-        problem=bindparam("new_problem"),
-    )
-)
+_end = update(diagnosis).where(diagnosis.c.diagnosis_id == bindparam("wanted"), diagnosis.c.status == RUNNING)
 _last_run = select(sa.func.max(run.c.run_key)).where(run.c.clutch_id == bindparam("of_clutch"), run.c.state == ACCEPTED)
 
 
@@ -103,15 +93,14 @@ def running(connection: Connection, clutch_id: str, last_run_key: int, *, since:
 
 def finish(connection: Connection, diagnosis_id: str, at: str, report: Json, extension: Json | None) -> bool:
     """Store the report of a running diagnosis; False where it is no longer running."""
-    values = {"new_status": FINISHED, "new_report": to_text(report), "new_problem": None}
-    values["new_extension"] = None if extension is None else to_text(extension)
-    return connection.execute(_end, values | {"wanted": diagnosis_id, "at": at}).rowcount == 1
+    ended = _rows.columns(status=FINISHED, finished_at=at, report=report, extension=extension)
+    return connection.execute(_end, {"wanted": diagnosis_id} | ended).rowcount == 1
 
 
 def fail(connection: Connection, diagnosis_id: str, at: str, problem: str) -> bool:
     """Store why a running diagnosis has no report; False where it is no longer running."""
-    values = {"new_status": FAILED, "new_report": None, "new_extension": None, "new_problem": problem}
-    return connection.execute(_end, values | {"wanted": diagnosis_id, "at": at}).rowcount == 1
+    ended = {"status": FAILED, "finished_at": at, "problem": problem}
+    return connection.execute(_end, {"wanted": diagnosis_id} | ended).rowcount == 1
 
 
 def last_run_key(connection: Connection, clutch_id: str) -> int:
@@ -163,17 +152,15 @@ _verdicts = select(
 def newest(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, VerdictRow]:
     """clutch_id -> its newest finished diagnosis, where it has one."""
     verdicts: dict[str, VerdictRow] = {}
-    for clutch_id, diagnosis_id, life, short, adoptable, adopted in connection.execute(
-        _verdicts, {"wanted": list(clutch_ids)}
-    ):
-        summary = to_object(short)
-        verdicts[clutch_id] = VerdictRow(
-            diagnosis_id=diagnosis_id,
-            life=life,
+    for row in connection.execute(_verdicts, {"wanted": list(clutch_ids)}):
+        summary = to_object(row.short)
+        verdicts[row.clutch_id] = VerdictRow(
+            diagnosis_id=row.diagnosis_id,
+            life=row.life,
             verdict=summary["verdict"],
             causes=tuple(summary["causes"] or ()),
             advice=tuple(summary["advice"] or ()),
-            adoptable=bool(adoptable),
-            adopted=bool(adopted),
+            adoptable=bool(row.adoptable),
+            adopted=bool(row.adopted),
         )
     return verdicts

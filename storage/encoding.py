@@ -306,10 +306,13 @@ class Rows(Generic[Value]):
 
     def values(self, value: Value, **others: object) -> dict[str, Any]:
         """The columns of a row, by name; `others` take the place of the value's own, or come beside them."""
-        columns = {name: getattr(value, name) for name in self.names}
-        for name, (encode, _) in self._coded.items():
-            columns[name] = None if columns[name] is None else encode(columns[name])
-        return columns | others
+        return self.columns(**{name: getattr(value, name) for name in self.names}) | others
+
+    def columns(self, **fields: object) -> dict[str, Any]:
+        """Some fields as their columns have them."""
+        for name in self._coded.keys() & fields.keys():
+            fields[name] = None if fields[name] is None else self._coded[name][0](fields[name])
+        return fields
 
     def reader(self, rows: Result[*tuple[Any, ...]]) -> Callable[[Row[*tuple[Any, ...]]], Value]:
         """What makes a value of each of these rows: where its fields stand is found once for all."""

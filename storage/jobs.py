@@ -84,34 +84,18 @@ _next = (
     .with_for_update(skip_locked=True, of=job)
 )
 _leased = now_in_seconds() + bindparam("lease", type_=Double)
-_claim = (
-    update(job)
-    .where(_wanted)
-    .values(
-        state=RUNNING,
-        attempts=job.c.attempts + 1,
-        claimed_by=bindparam("claimer"),
-        leased_until=_leased,
-        started_at=bindparam("at"),
-        progress=None,
-    )
-)
+_set = update(job).where(_wanted)
+_claim = _set.values(state=RUNNING, attempts=job.c.attempts + 1, leased_until=_leased, progress=None)
 _claimed = and_(_wanted, job.c.state == RUNNING, job.c.claimed_by == bindparam("claimer"))
-_renew = update(job).where(_claimed).values(leased_until=_leased, progress=bindparam("new_progress"))
+_renew = update(job).where(_claimed).values(leased_until=_leased)
 _release = (
     update(job).where(_claimed).values(state=WAITING, attempts=job.c.attempts - 1, claimed_by=None, leased_until=None)
 )
 _release_all = update(job).where(job.c.state == RUNNING).values(leased_until=0.0)
-_set_arguments = update(job).where(_wanted).values(arguments=bindparam("new_arguments"))
-_ended = {
-    "state": bindparam("new_state"),
-    "finished_at": bindparam("at"),
-    "problem": bindparam("new_problem", type_=Text),
-    "progress": func.coalesce(bindparam("new_progress", type_=Text), job.c.progress),
-    "leased_until": None,
-}
-_end_claimed = update(job).where(_claimed).values(**_ended)
-_end_open = update(job).where(_wanted, OPEN_ONLY).values(**_ended)
+_progress = func.coalesce(bindparam("new_progress", type_=Text), job.c.progress)
+_end_claimed, _end_open = (
+    update(job).where(these).values(progress=_progress, leased_until=None) for these in (_claimed, _wanted & OPEN_ONLY)
+)
 
 
 def insert(connection: Connection, row: NewJob) -> None:
@@ -161,15 +145,14 @@ def claim(connection: Connection, claimer: str, kinds: Collection[str], *, lease
     job_id: str | None = connection.execute(_next, {"of_kinds": to_text(list(kinds))}).scalar()
     if job_id is None:
         return None
-    connection.execute(_claim, {"wanted": job_id, "claimer": claimer, "lease": lease, "at": at})
+    connection.execute(_claim, {"wanted": job_id, "claimed_by": claimer, "lease": lease, "started_at": at})
     return get(connection, job_id)
 
 
 def renew(connection: Connection, job_id: str, claimer: str, *, lease: float, progress: Json | None) -> bool:
     """Hold the job for `lease` [s] more; False where it is no longer the claimer's: cancelled, or claimed by another."""
-    values = {"wanted": job_id, "claimer": claimer, "lease": lease}
-    values["new_progress"] = None if progress is None else to_text(progress)
-    return connection.execute(_renew, values).rowcount == 1
+    held = {"wanted": job_id, "claimer": claimer, "lease": lease}
+    return connection.execute(_renew, held | _rows.columns(progress=progress)).rowcount == 1
 
 
 def release(connection: Connection, job_id: str, claimer: str) -> None:
@@ -183,7 +166,7 @@ def release_all(connection: Connection) -> None:
 
 
 def set_arguments(connection: Connection, job_id: str, arguments: Json) -> None:
-    connection.execute(_set_arguments, {"wanted": job_id, "new_arguments": to_text(arguments)})
+    connection.execute(_set, {"wanted": job_id, "arguments": to_text(arguments)})
 
 
 def end(
@@ -200,8 +183,8 @@ def end(
 
     `progress` None: how far it had come stays as it is stored.
     """
-    values = {"wanted": job_id, "new_state": state, "at": at, "new_problem": problem}
-    values["new_progress"] = None if progress is None else to_text(progress)
+    ended = {"wanted": job_id, "state": state, "finished_at": at, "problem": problem}
+    values = ended | {"new_progress": _rows.columns(progress=progress)["progress"]}
     if claimer is not None:
         return connection.execute(_end_claimed, values | {"claimer": claimer}).rowcount == 1
     return connection.execute(_end_open, values).rowcount == 1

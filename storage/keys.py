@@ -37,8 +37,8 @@ _any_active = select(
 )
 _all = select(access_key).order_by(access_key.c.created_at, access_key.c.key_id)
 _of_wanted = access_key.c.key_id == bindparam("wanted")
-_revoke = update(access_key).where(_of_wanted, _active).values(revoked_at=bindparam("at"))
-_use = update(access_key).where(_of_wanted).values(last_used_at=bindparam("at"))
+_set = update(access_key).where(_of_wanted)
+_revoke = _set.where(_active)
 
 
 def insert(connection: Connection, row: KeyRow) -> None:
@@ -63,8 +63,8 @@ def all_keys(connection: Connection) -> list[KeyRow]:
 
 def revoke(connection: Connection, key_id: str, revoked_at: str) -> bool:
     """Revoke a key; False where there is no active key of this id."""
-    return connection.execute(_revoke, {"wanted": key_id, "at": revoked_at}).rowcount == 1
+    return connection.execute(_revoke, {"wanted": key_id, "revoked_at": revoked_at}).rowcount == 1
 
 
 def note_use(connection: Connection, key_id: str, at: str) -> None:
-    connection.execute(_use, {"wanted": key_id, "at": at})
+    connection.execute(_set, {"wanted": key_id, "last_used_at": at})

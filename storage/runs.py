@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Select, Text, bindparam, exists, func, or_, select, tuple_, update
 
 from storage.dialects import ALL_ROWS, Pair, json_text, json_value
-from storage.encoding import Json, Rows, to_text
+from storage.encoding import Json, Rows
 from storage.tables import HELD_ONLY, fit, run
 
 ACCEPTED, HELD, WITHDRAWN = "accepted", "held", "withdrawn"
@@ -132,7 +132,7 @@ _read_again_as = select(run).where(
     _of_clutch, json_text(run.c.details, "file", "content_sha256") == bindparam("of_content")
 )
 _keys = select(run.c.run_id, run.c.run_key).where(_of_clutch)
-_set_results = update(run).where(run.c.run_key == bindparam("wanted"))
+_set = update(run).where(run.c.run_key == bindparam("wanted"))
 
 
 def insert(connection: Connection, row: NewRun) -> int:
@@ -214,13 +214,11 @@ def held(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, int]:
 
 
 def count(connection: Connection) -> int:
-    number: int = connection.execute(_number).scalar_one()
-    return number
+    return int(connection.execute(_number).scalar_one())
 
 
 def count_held(connection: Connection) -> int:
-    number: int = connection.execute(_held_of_all).scalar_one()
-    return number
+    return connection.execute(_held_of_all).scalar_one()
 
 
 def keys(connection: Connection, clutch_id: str) -> dict[str, int]:
@@ -229,24 +227,23 @@ def keys(connection: Connection, clutch_id: str) -> dict[str, int]:
 
 def set_results(connection: Connection, run_key: int, details: Json, receipt: Json, code_version: str) -> None:
     """Replace a run's details and receipt, as a recomputation does. Raises LookupError on an unknown run."""
-    texts = {"details": to_text(details), "receipt": to_text(receipt)}
-    values = {"wanted": run_key, "code_version": code_version} | texts
-    if connection.execute(_set_results, values).rowcount != 1:
-        raise LookupError(f"run {run_key} is not stored")
+    _change(connection, run_key, details=details, receipt=receipt, code_version=code_version)
 
 
 def set_receipt(connection: Connection, run_key: int, receipt: Json) -> None:
     """Replace a run's receipt alone. Raises LookupError on an unknown run."""
-    if connection.execute(_set_results, {"wanted": run_key, "receipt": to_text(receipt)}).rowcount != 1:
-        raise LookupError(f"run {run_key} is not stored")
+    _change(connection, run_key, receipt=receipt)
 
 
 def set_state(
     connection: Connection, run_key: int, *, state: str, cycles: float, sent_cycles: float | None, doubts: Sequence[Any]
 ) -> None:
     """Change whether a run counts, and at which cycles. Raises LookupError on an unknown run."""
-    values = {"state": state, "cycles": cycles, "sent_cycles": sent_cycles, "doubts": to_text(doubts)}
-    if connection.execute(_set_results, {"wanted": run_key} | values).rowcount != 1:
+    _change(connection, run_key, state=state, cycles=cycles, sent_cycles=sent_cycles, doubts=doubts)
+
+
+def _change(connection: Connection, run_key: int, **fields: object) -> None:
+    if connection.execute(_set, {"wanted": run_key} | _stored.columns(**fields)).rowcount != 1:
         raise LookupError(f"run {run_key} is not stored")
 
 

@@ -93,18 +93,8 @@ _claim = (
     .values(due=now_in_seconds() + bindparam("lease", type_=Double), attempts=delivery.c.attempts + 1)
 )
 _claimed = select(delivery).where(_number)
-_end = (
-    update(delivery)
-    .where(_number, WAITING_ONLY)
-    .values(
-        state=bindparam("new_state"),
-        due=now_in_seconds() + bindparam("pause", type_=Double),
-        last_attempt_at=bindparam("at"),
-        delivered_at=bindparam("new_delivered"),
-        status=bindparam("new_status"),
-        problem=bindparam("new_problem"),
-    )
-)
+_paused = now_in_seconds() + bindparam("pause", type_=Double)
+_end = update(delivery).where(_number, WAITING_ONLY).values(due=_paused)
 _release_all = update(delivery).where(WAITING_ONLY, delivery.c.last_attempt_at.is_(None)).values(due=0.0)
 _waiting = select(func.count()).select_from(delivery).where(WAITING_ONLY)
 
@@ -172,8 +162,9 @@ def end(
     pause: float = 0.0,
 ) -> None:
     """Store how an attempt ended: delivered, given up, or (`waiting`) to be tried again after `pause` [s]."""
-    values = {"wanted": delivery_key, "new_state": state, "at": at, "new_status": status, "new_problem": problem}
-    connection.execute(_end, values | {"pause": pause, "new_delivered": at if state == DELIVERED else None})
+    ended = {"state": state, "last_attempt_at": at, "status": status, "problem": problem}
+    delivered = {"delivered_at": at if state == DELIVERED else None}
+    connection.execute(_end, {"wanted": delivery_key, "pause": pause} | ended | delivered)
 
 
 def release_all(connection: Connection) -> None:

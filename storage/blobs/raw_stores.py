@@ -9,10 +9,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, func, select, update
+from sqlalchemy import Connection, bindparam, func, select, update
 
 from storage.dialects import WHOLE, among, upsert
-from storage.encoding import to_text
+from storage.encoding import Rows, to_text
 from storage.tables import channel, raw_removal, raw_store
 
 
@@ -27,6 +27,7 @@ class RawStore:
     removals: int
 
 
+_rows = Rows(RawStore)
 _all = select(raw_store).order_by(raw_store.c.store_key)
 _in_use = select(raw_store).where(raw_store.c.in_use == 1)
 _insert = sa.insert(raw_store)
@@ -78,13 +79,12 @@ _removed_since = (
 
 def all_of(connection: Connection) -> list[RawStore]:
     """All stores that ever were in use, the first first."""
-    return [_row(row) for row in connection.execute(_all)]
+    return _rows.all(connection.execute(_all))
 
 
 def in_use(connection: Connection) -> RawStore | None:
     """The store that long columns of new runs go to, None where they go into the database."""
-    row = connection.execute(_in_use).first()
-    return None if row is None else _row(row)
+    return _rows.first(connection.execute(_in_use))
 
 
 def add(connection: Connection, address: str, mark: str) -> None:
@@ -153,8 +153,3 @@ def are_kept(connection: Connection, store: RawStore, names: Iterable[str]) -> b
     removed = connection.execute(_removed_since, values).scalar_one()
     address = connection.execute(_address, {"of_store": store.store_key}).scalar_one()
     return not removed and address == store.address
-
-
-def _row(row: Row[tuple[object, ...]]) -> RawStore:
-    values = row._asdict()
-    return RawStore(**values | {"in_use": bool(values["in_use"])})
