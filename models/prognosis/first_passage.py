@@ -43,7 +43,8 @@ class FirstPassage:
     """End of life [cycles since new] and remaining life [cycles from `as_of`] by quantile, None beyond the horizon.
 
     `probability_of_reaching` is that of reaching the threshold within the horizon. `initial` is the mean of the value
-    at ζ = 0, `threshold` fraction · initial, `current` the mean and deviation of the value at `as_of`.
+    at ζ = 0, `threshold` fraction · initial, `current` the mean and deviation of the value at `as_of`, where friction is
+    not negative.
     """
 
     as_of: float
@@ -100,7 +101,7 @@ def predict_first_passage(
         status=_status(end, _probability(passages <= as_of, weight)),
         initial=initial,
         threshold=fraction * initial,
-        current=posterior.moments(now),
+        current=posterior.moments(np.maximum(now, 0.0)),
     )
 
 

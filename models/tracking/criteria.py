@@ -74,3 +74,5 @@ FORGET = 0.3
 DOMAIN = 6.0
 #: An innovation counts at most as one of this many deviations in an unscented filter. Chosen; no table.
 OUTLIER = 5.0
+#: The unscented filters start again where courses that end before what is measured have more than this share of the weight.
+MOST_OVER = 0.1

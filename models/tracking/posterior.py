@@ -23,11 +23,10 @@ from models.tracking.prior import Prior
 
 
 class SampleStatus(StrEnum):
-    """Whether a sample stands for the posterior: it does, it is worth few draws, or a test was forced upon it."""
+    """Whether a sample stands for the posterior: it does, or it is worth few draws."""
 
     SOUND = "sound"
     FEW_DRAWS = "few_draws"
-    FORCED = "forced"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,10 +34,9 @@ class Posterior:
     """A weighted sample of eq. 6's coefficients, all arrays [n]; weight >= 0 sums to one.
 
     `scatter` is the deviation from run to run, in the unit of the quantity; where it is `proportional` (None: nowhere), that
-    of a value of the prior's size. `discrepancy` is the deviation of each draw from its course, if there is one; `forced`
-    whether the filter took in a test at once that it could not take in by degrees; `branch` which series of measurements a
-    draw was tracked under, where there are several (`mixture`). From these follow, of every draw, the
-    `course` (`courses.Course`), and log φ and log ε as the priors know them (`courses.coordinates_of`), each [n].
+    of a value of the prior's size. `discrepancy` is the deviation of each draw from its course, if there is one; `branch`
+    which series of measurements a draw was tracked under, where there are several (`mixture`). From these follow, of every
+    draw, the `course` (`courses.Course`), and log φ and log ε as the priors know them (`courses.coordinates_of`), each [n].
     """
 
     weight: FloatArray
@@ -49,7 +47,6 @@ class Posterior:
     scatter: FloatArray
     proportional: NDArray[np.bool_] | None = None
     discrepancy: Discrepancy | None = None
-    forced: bool = False
     branch: NDArray[np.intp] | None = None
     course: NDArray[np.intp] = field(init=False, repr=False, compare=False)
     log_scale: FloatArray = field(init=False, repr=False, compare=False)
@@ -69,8 +66,6 @@ class Posterior:
     @property
     def status(self) -> SampleStatus:
         """Whether the sample stands for the posterior."""
-        if self.forced:
-            return SampleStatus.FORCED
         # a 5 % quantile rests on five draws then
         return SampleStatus.SOUND if self.effective_draws >= 100.0 else SampleStatus.FEW_DRAWS
 
@@ -173,8 +168,6 @@ def mixture(parts: Sequence[tuple[float, Posterior]]) -> Posterior:
 def _joined(columns: Sequence[Any]) -> Any:
     """Columns one after the other, of discrepancies those that have a row a draw; what they share stays."""
     first = columns[0]
-    if isinstance(first, bool):
-        return any(columns)
     if isinstance(first, Discrepancy):
         rows = {name: np.concatenate([getattr(column, name) for column in columns]) for name in BY_DRAW}
         return Discrepancy(span=first.span, at=first.at, **rows)

@@ -90,8 +90,6 @@ def with_linear_terms(
     weight: FloatArray,
     normals: FloatArray,
     rng: np.random.Generator,
-    *,
-    forced: bool = False,
 ) -> Posterior:
     """Points of weights [n] that sum to one, with what is linear drawn given each: ξ0 and Δ by standard normals [n, 2], the
     discrepancy and the steps by `rng`. `solved` is `linear_model.pointwise` of the points."""
@@ -111,5 +109,4 @@ def with_linear_terms(
         scatter=np.exp(points.log_scatter),
         proportional=FORM_PROPORTIONAL[points.form],
         discrepancy=drawn(history, prior, points.size, further, rng),
-        forced=forced,
     )

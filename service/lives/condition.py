@@ -30,11 +30,12 @@ STATE_WORDS = dict(
 )
 #: Verdicts by which data and model disagree.
 DISAGREES = NAMED, AMBIGUOUS, _ = ("cause_named", "cause_ambiguous", "unexplained_structure")
-#: What of a prediction is stored with a clutch.
+#: What of a prediction is stored with a clutch and shown by lists, and all that is stored.
 SUMMARY = (
     "status", "as_of_cycles", "runs_used", "current", "criterion", "remaining_cycles", "at_least",
     "probability_of_reaching", "model", "ended",
 )  # fmt: skip
+STORED = (*SUMMARY, "horizon_cycles", "end_of_life_cycles")
 #: What is said beside a prediction.
 BESIDE = ("at_least", "at_least_at", "held_runs", "statement")
 REACHED = PassageStatus.REACHED.value
@@ -205,7 +206,8 @@ def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: 
     """What to do about a state, in one sentence."""
     held = summary.get("held", 0)
     if name == FAILURE:
-        return "Replace the clutch."
+        unseen = summary["status"] == REACHED and untested_since(summary) is not None
+        return "Run a stationary test, or replace the clutch." if unseen else "Replace the clutch."
     if name == MAINTENANCE:
         return "Replace it soon." if date is None else f"Replace before {date}."
     if name == CHECK and held:
@@ -292,10 +294,18 @@ def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
             "" if end["reason"] == WORN else ", taken out before it was worn"
         )
     if payload["status"] == REACHED:
-        return f"the end of life is reached: its limit is {limit_in_words(payload['criterion'])}"
+        tested = untested_since(payload)
+        since = "reached" if tested is None else f"probably reached since the last test at {tested:,.0f} cycles"
+        return f"the end of life is {since}: its limit is {limit_in_words(payload['criterion'])}"
     if payload["status"] == INSUFFICIENT:
         return "the remaining life is not known yet" + (f": {bound}" if payload["runs_used"] else "")
     return _left_open(bound, payload) if payload["status"] == PassageStatus.MAY_NEVER_REACH.value else bound
+
+
+def untested_since(payload: Mapping[str, Any]) -> float | None:
+    """The cycles of the last test where a reached end is predicted to lie after it: no measurement has seen it."""
+    tested, end = payload["current"]["measured_at_cycles"], payload["end_of_life_cycles"]["0.5"]
+    return tested if tested is not None and end is not None and end > tested else None
 
 
 def _left_open(bound: str, payload: Mapping[str, Any]) -> str:

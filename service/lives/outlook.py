@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from service.errors import NotFoundError
-from service.lives.condition import SHOWN, SUMMARY, recent
+from service.lives.condition import SHOWN, STORED, recent
 from service.lives.engagements import StoredEngagement, engagements_over_life
 from service.lives.history import Event, lives_of, moment_at, order, pace_of
 from service.lives.model_correction import RunReader
@@ -44,12 +44,11 @@ def summarised(state: ClutchState, tracking: Tracking, evidence: Evidence | None
     if evidence is not None:
         payload = payload | by_own_criteria(state, SHOWN, payload, evidence, tracking.filters)
     pace, pooled = pace_of(life.events), life.pooled(state.assumptions())
-    summary = {name: payload[name] for name in SUMMARY} | {
+    summary = {name: payload[name] for name in STORED} | {
         "runs": len(state.events),
         "recent": recent(state.events, pooled),
         "life": life.name,
         "from_cycles": life.origin,
-        "horizon_cycles": payload["horizon_cycles"],
         "tests": life.tests,
         "places": len({measurement.progress for measurement in pooled.measurements}),
         "pace": None if pace is None else {"cycles_per_second": pace, "moment": moment_at(life.events, pace, last)},

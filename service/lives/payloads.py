@@ -322,7 +322,7 @@ def predicted(
     answer = insufficient(assumptions, cycles, series.pressure, fraction) | present
     if not enough:
         return answer
-    mean = max(0.0, passage.current[0])
+    mean = passage.current[0]
     left = mean / passage.initial if passage.initial > 0 else None
     now = {"mean_cof": mean, "mean_cof_sd": passage.current[1], "fraction_of_initial": left}
     return answer | {

@@ -218,8 +218,8 @@ class SampleQuality(Answer):
     """The weighted draws that a prediction is made of."""
 
     effective_draws: float = Field(description="Effective number of draws")
-    status: Literal["sound", "few_draws", "forced"] = Field(
-        description="`forced`: the last test was so unexpected that the particles could not follow it; use `grid`"
+    status: Literal["sound", "few_draws"] = Field(
+        description="`few_draws`: fewer than 100 draws count, the outer quantiles are rough; compare with `grid`"
     )
 
 

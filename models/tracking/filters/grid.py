@@ -19,7 +19,7 @@ from models.tracking.courses import log_scale_at
 from models.tracking.filters import lattice
 from models.tracking.filters.lattice import Frame, Kinds, completed
 from models.tracking.history import History
-from models.tracking.linear_model import Points, evidence, pointwise
+from models.tracking.linear_model import Points, Sums, Terms, evidence, pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
@@ -112,17 +112,26 @@ class Grid:
         offset = rng.random(7)
         count = size * min(max(MANY // max(history.progress.size, 1), 1), OVERSAMPLING)
         uniform = spread_points(count, offset[:5])
+        points, weight, solved = self.points(state, laid, uniform[:, :3], float(offset[5]))
+        sample = with_linear_terms(history, prior, points, solved, weight, ndtri(uniform[:, 3:]), rng)
+        return sample if count == size else thinned(sample, size, float(offset[6]))
+
+    def points(
+        self, state: GridState, laid: Laid, uniform: FloatArray, offset: float
+    ) -> tuple[Points, FloatArray, tuple[Sums, Terms]]:
+        """Points, placed within their cells by uniform numbers [n, 3], their weights [n], which sum to one, and the closed
+        form at each (`linear_model.pointwise`)."""
+        prior, history = state.prior, state.history
         chance = _blended(laid.mass)
-        cell = np.unravel_index(systematic(chance.ravel(), count, float(offset[5])), chance.shape)
-        points, volume = _placed(laid, cell, uniform[:, :3], history.span)
+        cell = np.unravel_index(systematic(chance.ravel(), len(uniform), offset), chance.shape)
+        points, volume = _placed(laid, cell, uniform, history.span)
         solved = pointwise(history, prior, points)
         density = evidence(solved[0], prior) + prior.log_density(
             points.log_scale, points.log_exponent, points.log_scatter
         )
         density += laid.kinds.log_weight[cell[0]]
         weight = np.exp(density - density.max()) * volume / chance[cell]
-        sample = with_linear_terms(history, prior, points, solved, weight / weight.sum(), ndtri(uniform[:, 3:]), rng)
-        return sample if count == size else thinned(sample, size, float(offset[6]))
+        return points, weight / weight.sum(), solved
 
 
 def _blended(mass: FloatArray) -> FloatArray:

@@ -6,12 +6,11 @@ resampling alone would soon leave copies of one particle. After it every particl
 leave the exact marginal posterior over the whole history as it is (iterated batch importance sampling), until seven in
 ten have moved.
 
-A measurement that would starve the cloud at once is introduced by degrees: the cloud passes through targets that lie
-between the old posterior and the new one, their logarithms mixed (1 - β) : β, with resampling and moves in between.
-The last target is the posterior itself, so nothing is approximated.
+Such steps do not lead from "the last runs are outlying" to "the course has changed", nor far. So where the cloud takes a
+new run for outlying, or less than a quarter of it would be left, it starts again from weighted points of the exact
+posterior (`grid`).
 
-Sources: N. Chopin, "A sequential particle filter method for static models", Biometrika 89 (2002) 539-552; P. Del Moral,
-A. Doucet, A. Jasra, "Sequential Monte Carlo samplers", J. R. Statist. Soc. B 68 (2006) 411-436.
+Source: N. Chopin, "A sequential particle filter method for static models", Biometrika 89 (2002) 539-552.
 """
 
 import math
@@ -24,6 +23,7 @@ from scipy.special import ndtri
 from models.arrays import FloatArray
 from models.tracking.courses import FORM_COURSE, SCALE_SIGN, Course, basis, log_form_weight, log_scale_at, place_of
 from models.tracking.criteria import KEPT, MOVED, MOVES
+from models.tracking.filters.grid import Grid, GridState
 from models.tracking.history import History
 from models.tracking.linear_model import Points, evidence, last_outlying, log_outlying, pointwise
 from models.tracking.measurement import Measurement
@@ -67,37 +67,22 @@ class Cloud:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Bridge:
-    """From the posterior of one history to that of the next, which has one measurement more."""
-
-    prior: Prior
-    before: History
-    after: History
-
-    def entered(self, cloud: Cloud, rng: np.random.Generator) -> tuple[Cloud, FloatArray, FloatArray]:
-        """The particles with a flag for the new run, drawn from its posterior given the rest of each; and their log targets
-        before (with the prior of that flag) and after."""
-        as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(cloud.form.size)]))
-        points, table = as_sound.placed(), table_of(self.after, cloud)
-        sums, terms = pointwise(self.after, self.prior, points, table)
-        turned = last_outlying(self.after, self.prior, points, sums, terms, table[-1])
-        others = _log_prior(self.prior, cloud) + _log_alive(self.after, cloud)
-        flag_sound, flag_outlying = log_outlying(self.prior, np.array([[0.0, 1.0]]))
-        sound = evidence(sums, self.prior) + others + flag_sound
-        outlying = evidence(turned, self.prior) + others + flag_outlying
-        total = np.logaddexp(sound, outlying)
-        is_outlying = np.log(rng.random(total.size)) < outlying - total
-        as_sound.outlying[:, -1] = is_outlying
-        after = np.where(is_outlying, outlying, sound)
-        before = cloud.log_target + np.where(is_outlying, flag_outlying, flag_sound)
-        return replace(as_sound, log_weight=cloud.log_weight + total - cloud.log_target), before, after
-
-    def log_before(self, cloud: Cloud, table: FloatArray) -> FloatArray:
-        """The target before the new run, with the prior of its flag; `table` is that of the runs after."""
-        without = replace(cloud, outlying=cloud.outlying[:, :-1])
-        flag = log_outlying(self.prior, cloud.outlying[:, -1:].T)
-        return log_target_of(self.before, self.prior, without, table[:-1]) + flag
+def entered(prior: Prior, history: History, cloud: Cloud, rng: np.random.Generator) -> Cloud:
+    """The particles of all runs of a history but its last, weighted by that one, each with a flag for it drawn from its
+    posterior given the rest of the particle."""
+    as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(cloud.form.size)]))
+    points, table = as_sound.placed(), table_of(history, cloud)
+    sums, terms = pointwise(history, prior, points, table)
+    turned = last_outlying(history, prior, points, sums, terms, table[-1])
+    others = _log_prior(prior, cloud) + _log_alive(history, cloud)
+    flag_sound, flag_outlying = log_outlying(prior, np.array([[0.0, 1.0]]))
+    sound = evidence(sums, prior) + others + flag_sound
+    outlying = evidence(turned, prior) + others + flag_outlying
+    total = np.logaddexp(sound, outlying)
+    is_outlying = np.log(rng.random(total.size)) < outlying - total
+    as_sound.outlying[:, -1] = is_outlying
+    log_weight = cloud.log_weight + total - cloud.log_target
+    return replace(as_sound, log_weight=log_weight, log_target=np.where(is_outlying, outlying, sound))
 
 
 def table_of(history: History, cloud: Cloud) -> FloatArray:
@@ -148,25 +133,21 @@ def effective(log_weight: FloatArray) -> float:
 
 #: In a step, how often another size is tried, and how often the flag of one run, or the law of the scatter, is turned.
 _RESIZED, _TURNED = 0.25, 0.1
-#: Degrees by which a measurement may be introduced, and halvings in the search for each.
-_DEGREES, _HALVINGS = 30, 20
+_GRID = Grid()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticleState:
-    """Everything measured and the particles that stand for it; whether the last measurement was `forced` upon them, more
-    at once than they could follow."""
+    """Everything measured and the particles that stand for it."""
 
     prior: Prior
     history: History
     cloud: Cloud
-    forced: bool = False
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
         cloud = {field.name: getattr(self.cloud, field.name) for field in fields(self.cloud)}
-        lone = {"prior": self.prior.to_array(), "forced": np.array([self.forced], dtype=np.float64)}
-        return lone | self.history.to_arrays() | cloud
+        return {"prior": self.prior.to_array()} | self.history.to_arrays() | cloud
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, FloatArray]) -> "ParticleState":
@@ -174,7 +155,6 @@ class ParticleState:
         return cls(
             prior=Prior.from_array(arrays["prior"]),
             history=History.from_arrays(arrays),
-            forced=bool(arrays["forced"][0]),
             cloud=Cloud(**{field.name: arrays[field.name] for field in fields(Cloud)}),
         )
 
@@ -210,60 +190,47 @@ class Particle:
 
     def update(self, state: ParticleState, measurement: Measurement, rng: np.random.Generator) -> ParticleState:
         """The posterior with one more measurement."""
-        bridge = Bridge(state.prior, state.history, state.history.append(measurement, state.prior))
-        cloud, before, after = bridge.entered(state.cloud, rng)
-        held, degree, forced = 1.0, 0.0, False
-        for attempt in range(_DEGREES):
-            gap = after - before
-            start = cloud.log_weight - held * gap
-            degree = _next_degree(start, gap, degree)
-            if attempt == _DEGREES - 1 and degree < 1.0:
-                degree, forced = 1.0, True
-            log_weight = start + degree * gap
-            cloud = replace(cloud, log_weight=log_weight - log_weight.max())
-            if degree < 1.0 or effective(cloud.log_weight) < 0.5 * self.particles:  # half of the particles
-                cloud, before, after = self._renewed(bridge, cloud, before, after, degree, rng)
-            if degree == 1.0:
-                break
-            held = degree
-        return ParticleState(
-            prior=state.prior, history=bridge.after, cloud=replace(cloud, log_target=after), forced=forced
-        )
+        prior, history = state.prior, state.history.append(measurement, state.prior)
+        cloud = entered(prior, history, state.cloud, rng)
+        enough = effective(cloud.log_weight)
+        if enough < 0.25 * self.particles or weights(cloud.log_weight) @ cloud.outlying[:, -1] > 0.5:
+            cloud = self._from_grid(prior, history, rng)
+        elif enough < 0.5 * self.particles:
+            cloud = self._renewed(prior, history, cloud, rng)
+        return ParticleState(prior=prior, history=history, cloud=cloud)
 
-    def _renewed(
-        self,
-        bridge: Bridge,
-        cloud: Cloud,
-        before: FloatArray,
-        after: FloatArray,
-        degree: float,
-        rng: np.random.Generator,
-    ) -> tuple[Cloud, FloatArray, FloatArray]:
-        """Resampled, and moved by steps of a random walk shaped like the cloud; with both targets of each particle."""
-        weight, span = weights(cloud.log_weight), bridge.after.span
+    def _from_grid(self, prior: Prior, history: History, rng: np.random.Generator) -> Cloud:
+        """Weighted points of the exact posterior."""
+        state, offset = GridState(prior=prior, history=history), rng.random(4)
+        uniform = spread_points(self.particles, offset[:3])
+        points, weight, _ = _GRID.points(state, _GRID.laid(state), uniform, float(offset[3]))
+        cloud = Cloud(
+            points=np.column_stack([points.log_scale, points.log_exponent, points.log_scatter]),
+            form=points.form.astype(np.float64),
+            outlying=points.outlying.T,
+            log_weight=np.log(np.maximum(weight, 1e-300)),
+            log_target=np.zeros(self.particles),
+        )
+        return replace(cloud, log_target=log_target_of(history, prior, cloud, table_of(history, cloud)))
+
+    def _renewed(self, prior: Prior, history: History, cloud: Cloud, rng: np.random.Generator) -> Cloud:
+        """Resampled, and moved by steps of a random walk shaped like the cloud."""
+        weight, span = weights(cloud.log_weight), history.span
         shapes = _shapes(cloud, weight, span)
         chance, log_weight = _kept(cloud.course, weight)
         index = systematic(chance, weight.size, float(rng.random()))
-        cloud, before, after = replace(cloud.taken(index), log_weight=log_weight[index]), before[index], after[index]
+        cloud = replace(cloud.taken(index), log_weight=log_weight[index])
         moved, reach = np.zeros(weight.size, dtype=bool), 1.0
         for _ in range(self.moves):
             proposed, stretch = _proposed(cloud, reach * shapes, span, rng)
-            table = table_of(bridge.after, proposed)
-            offered_after = log_target_of(bridge.after, bridge.prior, proposed, table)
-            offered_before = before if degree == 1.0 else bridge.log_before(proposed, table)
-            gain = degree * (offered_after - after)
-            if degree < 1.0:
-                gain += (1.0 - degree) * (offered_before - before)
-            gain += stretch
-            accepted = np.log(rng.random(weight.size)) < gain
-            cloud = merged(cloud, proposed, accepted)
-            after = np.where(accepted, offered_after, after)
-            before = np.where(accepted, offered_before, before)
+            offered = log_target_of(history, prior, proposed, table_of(history, proposed))
+            accepted = np.log(rng.random(weight.size)) < offered - cloud.log_target + stretch
+            cloud = merged(cloud, replace(proposed, log_target=offered), accepted)
             moved |= accepted
             reach *= 0.5 if accepted.mean() < 0.2 else 1.0  # where few are accepted
             if moved.mean() >= MOVED:
                 break
-        return cloud, before, after
+        return cloud
 
     def posterior(self, state: ParticleState, size: int, rng: np.random.Generator) -> Posterior:
         """`size` draws of equal weight: systematic over the particles, with evenly spread draws of (ξ0, Δ)."""
@@ -271,7 +238,7 @@ class Particle:
         points = cloud.taken(systematic(weights(cloud.log_weight), size, float(offset[2]))).placed()
         solved, weight = pointwise(state.history, state.prior, points), np.full(size, 1.0 / size)
         normals = spread_normals(size, offset[:2])
-        return with_linear_terms(state.history, state.prior, points, solved, weight, normals, rng, forced=state.forced)
+        return with_linear_terms(state.history, state.prior, points, solved, weight, normals, rng)
 
 
 def _places(cloud: Cloud, span: float) -> FloatArray:
@@ -320,18 +287,6 @@ def _proposed(cloud: Cloud, shapes: FloatArray, span: float, rng: np.random.Gene
     run = rng.integers(runs, size=turned.size)
     outlying[turned, run] = 1.0 - outlying[turned, run]
     return replace(cloud, points=points, form=form, outlying=outlying), stretch
-
-
-def _next_degree(start: FloatArray, gap: FloatArray, degree: float) -> float:
-    """The largest β, 1 if possible, at which weights start + β · gap do not starve the cloud."""
-    enough = 0.25 * start.size
-    if effective(start + gap) >= enough:
-        return 1.0
-    low, high = degree, 1.0
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if effective(start + middle * gap) >= enough else (low, middle)
-    return low if low > degree else degree + (1.0 - degree) * 2.0**-_HALVINGS
 
 
 def _root(covariance: FloatArray) -> FloatArray:

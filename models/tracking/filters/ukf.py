@@ -32,6 +32,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction
@@ -39,11 +40,12 @@ from models.tracking.courses import (
     FORM_COURSE,
     FORM_PROPORTIONAL,
     FORM_SIZE,
+    SCALE_SIGN,
     coefficients_at,
     log_scale_at,
     place_of,
 )
-from models.tracking.criteria import DOMAIN, FORGET, OUTLIER
+from models.tracking.criteria import DOMAIN, FORGET, MOST_OVER, OUTLIER
 from models.tracking.discrepancy import PAST, at_end, drawn
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState, log_likelihood_of, table_of
@@ -248,7 +250,7 @@ def definite(covariance: FloatArray) -> FloatArray:
 #: The grid that starts the filter, and the draws from it whose moments are taken: as many again for every so many events,
 #: each of which has a moment of its own.
 _ARRAYS = ("form", "log_weight", "mean", "covariance", "scatter")
-_STARTER, _DRAWS = Grid(nodes=13, rows=13, levels=7), 1_000
+_STARTER, _DRAWS = Grid(nodes=13, rows=13, levels=7), 3_000
 #: Draws of the prior before the start. Chosen: of 6,000, three measurements leave 190 or more that count, 740 in the median.
 _PRIOR = Particle(particles=6_000)
 
@@ -351,9 +353,7 @@ class Ukf:
         log_weight = state.log_weight + step.log_likelihood
         squared_innovation = float(_weights(log_weight) @ step.squared_innovation)
         squared_innovation = (1.0 - FORGET) * state.squared_innovation + FORGET * squared_innovation
-        if squared_innovation > 4.0:
-            return _started(prior, history)
-        return replace(
+        updated = replace(
             state,
             history=history,
             squared_innovation=squared_innovation,
@@ -362,6 +362,9 @@ class Ukf:
             covariance=step.covariance,
             scatter=step.scatter,
         )
+        if squared_innovation > 4.0 or _over(updated) > MOST_OVER:
+            return _started(prior, history)
+        return updated
 
     def posterior(self, state: UkfState, size: int, rng: np.random.Generator) -> Posterior:
         """`size` evenly spread draws of equal weight from the normals, those left out whose course would have ended before
@@ -396,6 +399,18 @@ class Ukf:
         )
 
 
+def _over(state: UkfState) -> float:
+    """The share of the weight on courses that end before the last measurement, which none of them can."""
+    gap, (centre, unit) = state.history.span - state.reference, _units(state.prior, state.mean.shape[1])
+    if gap <= 0.0:
+        return 0.0
+    ends = np.flatnonzero(SCALE_SIGN[FORM_COURSE[state.normals.form]] < 0.0)
+    place = slice(2, 4)  # the sum of log τ and log ε
+    mean = (centre[place] + unit[place] * state.mean[ends, place]).sum(axis=1)
+    variance = unit[place] @ state.covariance[ends, place, place] @ unit[place]
+    return float(_weights(state.log_weight)[ends] @ ndtr((math.log(gap) - mean) / np.sqrt(variance)))
+
+
 def _before_the_start(prior: Prior, history: History, size: int, rng: np.random.Generator) -> Posterior:
     """`size` draws given a few measurements: of evenly spread ones of the prior, by the evidence."""
     cloud = _PRIOR.start(prior).cloud
@@ -425,8 +440,8 @@ def _started(prior: Prior, history: History) -> UkfState:
         ),
     )
     shares = np.bincount(form, weights=draws.weight, minlength=FORM_SIZE.size)
-    enough = np.bincount(form, minlength=FORM_SIZE.size) > 3 * points.shape[1]
-    kept = np.flatnonzero((shares > 0.02) & (enough | (shares == shares.max())))
+    enough = np.bincount(form, minlength=FORM_SIZE.size) > 2 * points.shape[1]
+    kept = np.flatnonzero(enough | (shares == shares.max()))
     moments = [_moments(points[form == kind], draws.weight[form == kind]) for kind in kept]
     log_scatter = np.log(draws.scatter)
     variance = [math.exp(2.0 * np.average(log_scatter[form == k], weights=draws.weight[form == k])) for k in kept]

@@ -124,7 +124,8 @@ def _mean_cof(
     tracked = advance(method, series, assumptions, carried, len(series.measurements))
     sample = drawn(method, series, assumptions, tracked)
     end = end_of_life(sample, series, assumptions, tracked, cycles, fraction, horizon)
-    return (end.ends, end.weight), (track_paths(sample, at, offset_of(series, assumptions)), sample.weight)
+    values = np.maximum(track_paths(sample, at, offset_of(series, assumptions)), 0.0)
+    return (end.ends, end.weight), (values, sample.weight)
 
 
 def _paths(measured: MeasuredLife, quantity: Quantity, series: Series, progress: FloatArray) -> Sample | None:

@@ -139,7 +139,9 @@ def summary(left: float | None, **other: Any) -> dict[str, Any]:
     }
     return {
         "status": "predicted", "as_of_cycles": 10_000, "from_cycles": 0, "runs_used": 9, "at_least": left,
-        "remaining_cycles": quantiles, "current": {"health": 0.5}, "criterion": criterion, "held": 0, "with_held": None,
+        "remaining_cycles": quantiles, "current": {"health": 0.5, "measured_at_cycles": 9_000},
+        "end_of_life_cycles": dict.fromkeys(quantiles, None if left is None else 9000 + left),
+        "criterion": criterion, "held": 0, "with_held": None,
         "probability_of_reaching": 0.94, **other,
     }  # fmt: skip
 
@@ -214,6 +216,11 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
             summary(0.0, status="reached"), None,
             "Failure: the end of life is reached: its limit is slope, 100 rpm, 5 bar below 0",
             "Replace the clutch.",
+        ),
+        (
+            summary(0.0, status="reached", end_of_life_cycles={"0.5": 9_700.0}), None,
+            "Failure: the end of life is probably reached since the last test at 9,000 cycles: its limit is slope",
+            "Run a stationary test, or replace the clutch.",
         ),
         (
             summary(9000.0, **HELD), None,

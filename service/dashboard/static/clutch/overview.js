@@ -167,7 +167,7 @@ function remainingNotes(life) {
   const never = chance !== null && chance < 0.995 && status !== "insufficient_data";
   return [
     ended ? `ended at ${fixed(ended.cycles)} cycles` : null,
-    status === "reached" ? "the end of life is reached" : null,
+    status === "reached" ? life.statement : null,
     status === "insufficient_data" ? atLeast(life.at_least) : null,
     status === "may_never_reach" ? "the tests do not show the end yet" : null,
     predicts(life) ? likely(life.remaining_cycles) : null,
