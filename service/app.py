@@ -14,7 +14,7 @@ from service.alarms.outbox import Outbox
 from service.dashboard import assets, site
 from service.dashboard import pages as dashboard
 from service.queries.cache import AnswerCache
-from service.settings import CODE_VERSION, Settings
+from service.settings import CODE_VERSION, MIB, Settings
 from service.web import openapi, problems
 from service.web.answers import now
 from service.web.context import Context
@@ -99,7 +99,8 @@ def create_app(settings: Settings) -> FastAPI:
             in_processes(database, settings.workers, log, note) if settings.workers else in_threads(database, note)
         )
         queue = JobQueue(database, settings, _kinds(database, workers))
-        readiness = Readiness(database, workers, queue, Needs(disk=settings.least_free, memory=settings.least_memory))
+        needs = Needs(disk=settings.least_free_mb * MIB, memory=settings.least_memory_mb * MIB)
+        readiness = Readiness(database, workers, queue, needs)
         outbox = Outbox(database, settings)
         try:
             workers.warm()
@@ -160,8 +161,8 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(Polls)
     app.add_middleware(
         BodyLimit,
-        most=settings.most_body_bytes,
-        most_file=settings.most_file_bytes,
+        most=settings.max_body_mb * MIB,
+        most_file=settings.max_file_mb * MIB,
         seconds=settings.body_seconds,
     )
     app.add_middleware(Encodings)

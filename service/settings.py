@@ -18,7 +18,8 @@ CODE_VERSION = version("clutchlife")
 
 PREFIX = "CLUTCHLIFE_"
 DATABASE_VARIABLE = f"{PREFIX}DATABASE"
-_MIB = 2**20
+#: Bytes of what settings count by.
+MIB = 2**20
 #: How alike a name must be to that of a setting (2 x signs in common / signs of both) to be one misspelt. Tried: seven
 #: slips are alike by 0.93 to 0.98, eight names of commands and orchestrators by at most 0.81. See its tests.
 _ALIKE = 0.9
@@ -174,31 +175,6 @@ class Settings(BaseSettings):
 
     def shown(self) -> dict[str, Any]:
         return self.model_dump() | {"database": redacted(self.database)}
-
-    @property
-    def most_body_bytes(self) -> int:
-        """Bytes of a request's body."""
-        return self.max_body_mb * _MIB
-
-    @property
-    def most_file_bytes(self) -> int:
-        """Bytes of a posted file."""
-        return self.max_file_mb * _MIB
-
-    @property
-    def least_free(self) -> int:
-        """Bytes that must be free on the disk."""
-        return self.least_free_mb * _MIB
-
-    @property
-    def least_memory(self) -> int:
-        """Bytes of memory that must be left."""
-        return self.least_memory_mb * _MIB
-
-    @property
-    def diagnosis_bytes(self) -> int:
-        """Bytes of address space of one diagnosis."""
-        return self.diagnosis_memory_mb * _MIB
 
 
 def redacted(address: str) -> str:

@@ -29,7 +29,7 @@ from service.lives.recomputation import (
     computed_again,
     computed_aside,
 )
-from service.lives.run_analysis import Analysis, analyse
+from service.lives.run_analysis import analyse
 from service.schemas.clutch import ClutchIn
 from service.settings import CODE_VERSION
 from storage import channels, results, runs
@@ -210,7 +210,7 @@ def recomputed(recorded: Recorded) -> Recomputed:
         measured[row.run_id] = {"speed_range": analysis.speed_range, "oil_temperature": analysis.oil_temperature}
         shown, _ = doubts_alone(sent, analysis, state.geometry)
         details[row.run_id] = analysis.kept_beside(sent) | ({} if shown is None else {"shown": shown.to_list()})
-        receipts[row.run_id] = _receipt(row, analysis)
+        receipts[row.run_id] = receipt(row.clutch_id, incoming(row, {}), analysis, received_at=row.received_at)
         levels[row.run_id] = analysis.fits
     events = order([replace(event, **measured[event.run_id]) for event in state.events])
     held = tuple(replace(event, **measured[event.run_id]) for event in state.held)
@@ -246,16 +246,3 @@ def store_recomputed(connection: Connection, clutch_id: str, again: Recomputed) 
         results.write_fits(connection, run_key, records.fit_rows(again.levels[run_id], again.aside.get(run_id, {})))
         runs.set_results(connection, run_key, again.details[run_id], again.receipts[run_id], CODE_VERSION)
     records.store(connection, clutch_id, again.results)
-
-
-def _receipt(row: RunRow, analysis: Analysis) -> Receipt:
-    """The receipt again, its mean COFs, loops and warnings of the history yet to come."""
-    return receipt(
-        row.clutch_id,
-        incoming(row, {}),
-        received_at=row.received_at,
-        levels=analysis.fits,
-        cofs={},
-        warnings=analysis.warnings,
-        engagement=analysis.engagement,
-    )

@@ -23,7 +23,8 @@ from service.lives.condition import SHOWN, state_of
 from service.lives.history import STATIONARY
 from service.lives.payloads import OFF_TRACK
 from service.lives.plausibility.doubts import OFF_COURSE
-from service.schemas.alarm import AlarmIn
+from service.schemas.alarm import AlarmIn, EventOut
+from service.schemas.base import of_row
 from service.schemas.clutch import ClutchIn
 from storage import alarms, clutches, diagnoses, results, runs, webhooks
 from storage.alarms import AlarmRow, EventRow, NewEvent
@@ -74,19 +75,8 @@ def rule_of(row: AlarmRow) -> AlarmIn:
 
 
 def event_out(row: EventRow) -> dict[str, Any]:
-    return {
-        "event_id": row.event_id,
-        "alarm_id": row.alarm_id,
-        "clutch_id": row.clutch_id,
-        "quantity": row.quantity,
-        **{name: value for name, value in row.content.items() if name != _ENDED_LIFE},
-        "state": row.state,
-        "raised_at": row.raised_at,
-        "acknowledged_at": row.acknowledged_at,
-        "acknowledged_by": row.acknowledged_by,
-        "note": row.note,
-        "cleared_at": row.cleared_at,
-    }
+    said = {name: value for name, value in row.content.items() if name != _ENDED_LIFE}
+    return of_row(EventOut, row, **said)
 
 
 def to_receivers(connection: Connection, kind: str, event: EventRow, receivers: Iterable[WebhookRow]) -> list[str]:

@@ -1,6 +1,5 @@
 """`clutchlife alarms`: what rules have raised, and that somebody has seen it."""
 
-import json
 from typing import Annotated, Any
 
 import typer
@@ -22,8 +21,7 @@ def alarms(
 ) -> None:
     """List raised alarms, newest first, or acknowledge one."""
     if acknowledge is not None:
-        body = json.dumps({"note": note}).encode()
-        items = iter([service.post(f"/v1/alarms/events/{acknowledge}/acknowledge", body)])
+        items = iter([service.post(f"/v1/alarms/events/{acknowledge}/acknowledge", {"note": note})])
     elif rules:
         items = service.pages("/v1/alarms")
     else:

@@ -108,8 +108,7 @@ def life(
         return
     if as_csv:
         fail("--csv is not available for planned duty; use --json", EX_USAGE)
-    body = json.dumps(_programme(plan, block or [], pace)).encode()
-    answer = service.post(f"{address}/forecast?{urlencode(arguments)}", body)
+    answer = service.post(f"{address}/forecast?{urlencode(arguments)}", _programme(plan, block or [], pace))
     if as_json:
         out.print_json(json.dumps(answer))
     else:

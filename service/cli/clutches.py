@@ -57,7 +57,7 @@ def register(
         raise ValueError(f"{record} must hold a JSON object")  # noqa: TRY004  (a wrong file, not a wrong call)
     for assignment in set_fields or ():
         _assign(fields, {}, assignment)
-    service.post("/v1/clutches", json.dumps(fields | {"clutch_id": clutch}).encode())
+    service.post("/v1/clutches", fields | {"clutch_id": clutch})
     print_line(f"{clutch} is registered; send runs with: clutchlife push FILES --clutch {clutch}")
 
 
@@ -157,7 +157,7 @@ def edit(
     fields: dict[str, Any] = {}
     for assignment in set_fields:
         _assign(fields, record, assignment)
-    changed = service.patch(address, json.dumps(fields | {"reason": reason}).encode())
+    changed = service.patch(address, fields | {"reason": reason})
     for name in fields:
         print_line(f"{clutch}: {name} = {json.dumps(changed[name])}")
 
@@ -170,8 +170,7 @@ def archive(
     reason: Reason = "",
 ) -> None:
     """Archive a finished clutch: lists omit it, it takes no more runs, and its fleet still learns from it."""
-    body = json.dumps({"archived": not undo, "reason": reason}).encode()
-    changed = service.patch(f"/v1/clutches/{clutch}", body)
+    changed = service.patch(f"/v1/clutches/{clutch}", {"archived": not undo, "reason": reason})
     print_line(f"{clutch} is {'archived' if changed['archived'] else 'in use'}")
 
 
@@ -207,10 +206,8 @@ def model(
     if adopt is not None and baseline:
         fail("use --adopt or --baseline, not both", EX_USAGE)
     address = f"/v1/clutches/{clutch}/model"
-    if adopt is None and not baseline:
-        current = service.get(address)
-    else:
-        current = service.put(address, json.dumps({"diagnosis_id": adopt}).encode())
+    changes = adopt is not None or baseline
+    current = service.put(address, {"diagnosis_id": adopt}) if changes else service.get(address)
     print_line(f"{clutch} is tracked with:  {_named(current['model'])}")
     for version in current["versions"]:
         since = f"  version {version['version']}, {version['adopted_at']}: {_named(version['model'])}"

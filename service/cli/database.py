@@ -119,11 +119,7 @@ def verify(
 
     Prints one line for each fault, and ends with 1 if there is any. Works beside a running service and on a backup.
     """
-    from service.queries.verification import (  # start-up time
-        check_inspections,  # start-up time
-        check_results,  # start-up time
-        check_runs,  # start-up time
-    )
+    from service.queries import verification  # start-up time
     from service.work.background import use_one_blas_thread  # start-up time
     from storage import clutches  # start-up time
     from storage.engine.integrity import other_schema  # start-up time
@@ -147,13 +143,13 @@ def verify(
         chosen = set(ids if sample is None else random.sample(ids, min(sample, len(ids))))
         task = progress.add_task("verifying", total=len(ids))
         for clutch_id in ids:
-            content = check_runs(opened, clutch_id)
+            content = verification.check_runs(opened, clutch_id)
             runs += content.runs
-            surfaces = check_inspections(opened, clutch_id)
+            surfaces = verification.check_inspections(opened, clutch_id)
             inspections, photographs = inspections + surfaces.inspections, photographs + surfaces.photographs
             findings += tell(content.findings) + tell(surfaces.findings)
             if clutch_id in chosen and not content.findings:
-                results = check_results(opened, clutch_id)
+                results = verification.check_results(opened, clutch_id)
                 findings += tell(results.findings)
                 for version, count in results.earlier.items():
                     earlier[version] = earlier.get(version, 0) + count
@@ -179,10 +175,7 @@ def migrate(
     If it was interrupted, repeat the command: it goes on where it stopped. No service uses the target until all tables
     are the same on both sides.
     """
-    from service.queries.verification import (  # start-up time
-        check_inspections,  # start-up time
-        check_runs,  # start-up time
-    )
+    from service.queries import verification  # start-up time
     from service.work.progress import progress  # start-up time
     from storage import clutches  # start-up time
     from storage.transfer import transfer  # start-up time
@@ -202,8 +195,8 @@ def migrate(
             with progress(err, "checking clutches") as advance:
                 advance(0, total=len(ids))
                 for clutch_id in ids:
-                    findings += check_runs(moving.target, clutch_id).findings
-                    findings += check_inspections(moving.target, clutch_id).findings
+                    findings += verification.check_runs(moving.target, clutch_id).findings
+                    findings += verification.check_inspections(moving.target, clutch_id).findings
                     advance()
             for finding in findings:
                 print_line(finding)

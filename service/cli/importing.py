@@ -1,6 +1,5 @@
 """`clutchlife import`: a rig's file as it would be read, asked about where that is open, sent, and kept as a rig profile."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -156,7 +155,7 @@ def _choice(question: str, values: list[str]) -> str:
 def _save(service: Service, name: str, shown: dict[str, Any]) -> None:
     """Keep how the file was read under a name."""
     body = shown["profile"] | {"name": name, "kind": shown["profile"]["kind"] or shown["kind"]}
-    service.post("/v1/rigs", json.dumps(body).encode())
+    service.post("/v1/rigs", body)
     pattern = body["file_name"]
     cycles = f"file names such as {pattern} give the cycles" if pattern else "give the cycles with each file"
     print_line(f"saved as rig profile {name}; {cycles}")

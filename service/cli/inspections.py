@@ -1,6 +1,5 @@
 """`clutchlife inspect`, `inspections`: what was found on a clutch's friction surface, sent and listed."""
 
-import json
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
@@ -41,7 +40,7 @@ def inspect(
     if at is not None:
         body["performed_at"] = at.astimezone().isoformat()
     address = f"/v1/clutches/{clutch}/inspections"
-    inspection = service.post(address, json.dumps(body).encode())
+    inspection = service.post(address, body)
     address = f"{address}/{inspection['inspection_id']}"
     for path, media_type in photographs.items():
         service.post_photograph(f"{address}/photographs", path, media_type)

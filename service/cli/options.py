@@ -117,16 +117,13 @@ def read_only(url: str) -> Iterator["Opened"]:
 @contextmanager
 def executor(scheduler: str) -> Iterator["Executor"]:
     """The executor of an option, closed at the end; that it cannot be used ends the command with a line."""
-    from service.work.executor import (
-        ExecutorUnavailableError,  # start-up time: few commands compute
-        executor_of,  # start-up time: few commands compute
-    )
+    from service.work import executor as executors  # start-up time: few commands compute
 
     with errors_in_a_line():
         try:
-            with executor_of(scheduler) as made:
+            with executors.executor_of(scheduler) as made:
                 yield made
-        except ExecutorUnavailableError as error:
+        except executors.ExecutorUnavailableError as error:
             fail(str(error), EX_TEMPFAIL)
 
 

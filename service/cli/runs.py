@@ -81,8 +81,7 @@ def confirm(
     if not runs:
         print_line(f"{clutch} has no {f'runs held for {doubt}' if doubt else 'held runs'}")
         return
-    body = json.dumps({"run_ids": runs, "reason": reason}).encode()
-    for receipt in service.post(f"/v1/clutches/{clutch}/runs/confirm", body)["items"]:
+    for receipt in service.post(f"/v1/clutches/{clutch}/runs/confirm", {"run_ids": runs, "reason": reason})["items"]:
         _show(receipt)
 
 
@@ -101,11 +100,11 @@ def correct(
     if (cycles is None) == (rig is None):
         raise typer.BadParameter("use --cycles or --rig")
     change = {"rig": rig} if cycles is None else {"cycles": cycles}
-    _show(service.patch(f"/v1/clutches/{clutch}/runs/{run}", json.dumps(change | {"reason": reason}).encode()))
+    _show(service.patch(f"/v1/clutches/{clutch}/runs/{run}", change | {"reason": reason}))
 
 
 def _post(service: Service, address: str, content: dict[str, Any]) -> dict[str, Any]:
-    receipt = service.post(address, json.dumps(content).encode())
+    receipt = service.post(address, content)
     _show(receipt)
     return receipt
 

@@ -19,10 +19,10 @@ from service.columns import ZERO_CELSIUS, bar, whole
 from service.errors import Notice
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
 from service.lives.criteria import EQ_6_DOUBTED, OTHER_OIL
-from service.lives.engagements import Engagement, engagement_item
+from service.lives.engagements import engagement_item
 from service.lives.history import WORN, ByPressure, Event, Life, Series, latest_before, nearest
 from service.lives.incoming_run import IncomingRun
-from service.lives.run_analysis import LevelFit, Value
+from service.lives.run_analysis import Analysis, LevelFit, Value
 from service.settings import CODE_VERSION
 
 #: The warning of a last test that lies far off what the tests before it predict.
@@ -185,14 +185,13 @@ _OF_A_FILE = ("filename", "sha256", "bytes", "rig")
 def receipt(
     clutch_id: str,
     run: IncomingRun,
+    analysis: Analysis,
     *,
     received_at: str,
-    levels: Sequence[LevelFit],
-    cofs: ByPressure,
+    cofs: ByPressure | None = None,
     loops: Sequence[Loop] = (),
-    warnings: Sequence[Notice],
-    engagement: Engagement | None = None,
 ) -> dict[str, Any]:
+    """The receipt of a run by itself; its mean COFs and loops where they are known already."""
     return {
         "clutch_id": clutch_id,
         "run_id": run.run_id,
@@ -204,10 +203,10 @@ def receipt(
         "content_sha256": run.content_sha256,
         "duplicate": False,
         "file": None if run.file is None else {name: run.file[name] for name in _OF_A_FILE},
-        "warnings": [*(run.file or {}).get("warnings", ()), *notice_items(warnings)],
-        "fits": fit_items(levels, cofs),
+        "warnings": [*(run.file or {}).get("warnings", ()), *notice_items(analysis.warnings)],
+        "fits": fit_items(analysis.fits, cofs or {}),
         "loops": loop_items(loops),
-        "engagement": None if engagement is None else engagement_item(engagement),
+        "engagement": None if analysis.engagement is None else engagement_item(analysis.engagement),
         "duty": run.details.get("duty"),
         "event": run.details.get("event"),
         "reason": run.details.get("reason"),

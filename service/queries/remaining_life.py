@@ -14,7 +14,7 @@ from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.condition import beside_held
 from service.lives.outlook import Evidence, measured_life, with_held
 from service.lives.payloads import ended, filters_disagree, notice_items
-from service.lives.quantities.ends import criteria_answer, criterion_end
+from service.lives.quantities.ends import GIVEN, criteria_answer, criterion_end
 from service.lives.quantities.measured import (
     SLOPE_SPEEDS,
     ChosenLife,
@@ -32,8 +32,6 @@ from storage.engine.database import Database
 
 #: What `criteria_of` says of a clutch whose life ends by mean COF alone.
 NO_CRITERIA = b"[]"
-#: What a criterion says of itself.
-_GIVEN = ("quantity", "pressure_bar", "speed_rpm", "frequency_hz", "fraction", "below", "above")
 
 
 def criteria_of(database: Database, clutch_id: str) -> bytes:
@@ -123,7 +121,7 @@ def _with_held(
 def _criteria(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The one criterion of a stored prediction, as `criteria` lists it: mean COF, which is surely the first."""
     criterion, current = payload["criterion"], payload["current"]
-    given = {name: criterion.get(name) for name in _GIVEN}
+    given = {name: criterion.get(name) for name in GIVEN}
     return [
         given
         | {"initial": criterion["initial_mean_cof"], "limit": criterion["threshold_mean_cof"]}

@@ -6,17 +6,6 @@ from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from models.prognosis.criteria import QUANTILES
 from service.schemas import base
-from service.schemas.base import (
-    Answer,
-    Identifier,
-    Name,
-    NotNegativeNumber,
-    PositiveNumber,
-    Reason,
-    Schema,
-    Title,
-    page_of,
-)
 
 WatchedQuantity = Literal[
     "remaining_cycles", "remaining_days", "health", "shudder_margin", "held_runs", "off_course", "verdict", "state",
@@ -53,19 +42,19 @@ EventState = Literal["raised", "acknowledged", "cleared"]
 _Address = Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_ADDRESS, strip_whitespace=True)]
 
 
-class KindIn(Schema):
+class KindIn(base.Schema):
     """A kind of clutch. Omitted fields match everything."""
 
-    friction_material: Name | None = Field(default=None, description="The friction material")
-    reaction_plate: Name | None = Field(default=None, description="The reaction plate's material")
-    fluid: Name | None = Field(default=None, description="The fluid")
+    friction_material: base.Name | None = Field(default=None, description="The friction material")
+    reaction_plate: base.Name | None = Field(default=None, description="The reaction plate's material")
+    fluid: base.Name | None = Field(default=None, description="The fluid")
 
 
-class AlarmIn(Schema):
+class AlarmIn(base.Schema):
     """A rule: when an alarm is raised, of which clutches."""
 
-    name: Title = Field(default="", description="Name for people")
-    clutch_id: Identifier | None = Field(default=None, description="The clutch; default: all clutches")
+    name: base.Title = Field(default="", description="Name for people")
+    clutch_id: base.Identifier | None = Field(default=None, description="The clutch; default: all clutches")
     kind: KindIn | None = Field(default=None, description="Only clutches of this kind")
     quantity: WatchedQuantity = Field(
         description="The watched quantity: `remaining_cycles` (to the first criterion that ends the life), "
@@ -84,10 +73,10 @@ class AlarmIn(Schema):
         description="States or verdicts that raise the alarm; default: every state but `normal`, or every verdict"
         " with a disagreement of data and model",
     )
-    speed_rpm: Annotated[PositiveNumber, Field(le=base.MAX_SPEED_RPM)] = Field(
+    speed_rpm: Annotated[base.PositiveNumber, Field(le=base.MAX_SPEED_RPM)] = Field(
         default=100.0, description="Speed at which the shudder margin is taken, rpm"
     )
-    hysteresis: Annotated[NotNegativeNumber, Field(le=1.0)] = Field(
+    hysteresis: Annotated[base.NotNegativeNumber, Field(le=1.0)] = Field(
         default=0.1, description="How far the value must come back before the alarm is cleared, as a share of the limit"
     )
     enabled: bool = Field(default=True, strict=True, description="Whether the rule is in use")
@@ -126,17 +115,17 @@ class AlarmOut(AlarmIn):
     saved_by: str = Field(description="Who saved it")
 
 
-AlarmPage = page_of("AlarmPage", AlarmOut, "Rules by name.", "The rules")
+AlarmPage = base.page_of("AlarmPage", AlarmOut, "Rules by name.", "The rules")
 
 
-class EventOut(Answer):
+class EventOut(base.Answer):
     """An alarm that was raised."""
 
     event_id: str = Field(description="The alarm's name")
     alarm_id: str = Field(description="The rule that raised it; it may have been deleted since")
-    name: str = Field(description="The rule's name at that time")
     clutch_id: str = Field(description="The clutch")
     quantity: WatchedQuantity = Field(description="What is watched")
+    name: str = Field(description="The rule's name at that time")
     value: float | None = Field(description="The value that raised it; null if it is not a number")
     limit: float | None = Field(description="The limit that it passed; null if the rule has none")
     message: str = Field(description="The alarm in a sentence")
@@ -149,16 +138,16 @@ class EventOut(Answer):
     cleared_at: str | None = Field(description="When the alarm was cleared")
 
 
-EventPage = page_of("EventPage", EventOut, "Alarms, newest first.", "The alarms")
+EventPage = base.page_of("EventPage", EventOut, "Alarms, newest first.", "The alarms")
 
 
-class AcknowledgeIn(Schema):
+class AcknowledgeIn(base.Schema):
     """An alarm is acknowledged."""
 
-    note: Reason = Field(default="", description="A remark")
+    note: base.Reason = Field(default="", description="A remark")
 
 
-class WebhookIn(Schema):
+class WebhookIn(base.Schema):
     """A receiver of alarms."""
 
     url: _Address = Field(
@@ -169,8 +158,8 @@ class WebhookIn(Schema):
         default=None,
         description="Secret that signs the requests; default: the service makes one and shows it once, in this answer",
     )
-    name: Title = Field(default="", description="Name for people")
-    clutch_id: Identifier | None = Field(default=None, description="Only alarms of this clutch")
+    name: base.Title = Field(default="", description="Name for people")
+    clutch_id: base.Identifier | None = Field(default=None, description="Only alarms of this clutch")
     cleared: bool = Field(
         default=False, strict=True, description="Whether the receiver also gets a message when an alarm is cleared"
     )
@@ -182,7 +171,7 @@ class WebhookIn(Schema):
         return self
 
 
-class WebhookOut(Answer):
+class WebhookOut(base.Answer):
     """A receiver; its address without passwords."""
 
     webhook_id: str = Field(description="The receiver's name")
@@ -195,10 +184,10 @@ class WebhookOut(Answer):
     created_by: str = Field(description="Who made it")
 
 
-WebhookPage = page_of("WebhookPage", WebhookOut, "Receivers by name.", "The receivers")
+WebhookPage = base.page_of("WebhookPage", WebhookOut, "Receivers by name.", "The receivers")
 
 
-class DeliveryOut(Answer):
+class DeliveryOut(base.Answer):
     """A message to a receiver, sent or waiting."""
 
     delivery_id: str = Field(description="Its name, the header `Clutchlife-Delivery`; the same at each attempt")
@@ -216,10 +205,10 @@ class DeliveryOut(Answer):
     next_attempt_at: str | None = Field(description="Time of the next attempt; null if there is none")
 
 
-DeliveryPage = page_of("DeliveryPage", DeliveryOut, "Deliveries, newest first.", "The deliveries")
+DeliveryPage = base.page_of("DeliveryPage", DeliveryOut, "Deliveries, newest first.", "The deliveries")
 
 
-class TestedOut(Answer):
+class TestedOut(base.Answer):
     """The result of a test at each receiver."""
 
     deliveries: list[DeliveryOut] = Field(

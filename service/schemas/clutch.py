@@ -8,21 +8,6 @@ from models.clutch import Geometry
 from models.degradation.severity import Severity, SeverityBasis
 from service.columns import whole
 from service.schemas import base
-from service.schemas.base import (
-    Answer,
-    ClutchName,
-    Identifier,
-    Name,
-    NotNegativeNumber,
-    Origin,
-    PositiveNumber,
-    Reason,
-    Revision,
-    RunCycles,
-    RunName,
-    Schema,
-    page_of,
-)
 from service.schemas.life import (
     AtLeast,
     AtLeastAt,
@@ -41,17 +26,17 @@ WholeNumber = Annotated[
     int, Field(strict=True), BeforeValidator(lambda sent: whole(sent) if isinstance(sent, float) else sent)
 ]
 TorqueFilter = Annotated[
-    Annotated[NotNegativeNumber, Field(le=base.MAX_TORQUE_FILTER_MS)] | None,
+    Annotated[base.NotNegativeNumber, Field(le=base.MAX_TORQUE_FILTER_MS)] | None,
     Field(
         description="Time constant of the torque channel's first-order low-pass, ms; null: not known. In sampled "
         "tests, pressure and speed are filtered in the same way"
     ),
 ]
-Length = Annotated[PositiveNumber, Field(ge=base.MIN_LENGTH_MM, le=base.MAX_LENGTH_MM)]
-PressureFactor = Annotated[PositiveNumber, Field(ge=base.MIN_PRESSURE_FACTOR, le=base.MAX_PRESSURE_FACTOR)]
+Length = Annotated[base.PositiveNumber, Field(ge=base.MIN_LENGTH_MM, le=base.MAX_LENGTH_MM)]
+PressureFactor = Annotated[base.PositiveNumber, Field(ge=base.MIN_PRESSURE_FACTOR, le=base.MAX_PRESSURE_FACTOR)]
 
 
-class GeometryIn(Schema):
+class GeometryIn(base.Schema):
     """The friction disc."""
 
     inner_diameter_mm: Length = Field(default=99.0, description="Inner diameter of the lining, mm")
@@ -83,11 +68,15 @@ class GeometryIn(Schema):
         )
 
 
-class OilIn(Schema):
+class OilIn(base.Schema):
     """The oil's kinematic viscosity."""
 
-    kinematic_viscosity_40c_cst: PositiveNumber = Field(default=56.0, description="Kinematic viscosity at 40 °C, cSt")
-    kinematic_viscosity_100c_cst: PositiveNumber = Field(default=9.3, description="Kinematic viscosity at 100 °C, cSt")
+    kinematic_viscosity_40c_cst: base.PositiveNumber = Field(
+        default=56.0, description="Kinematic viscosity at 40 °C, cSt"
+    )
+    kinematic_viscosity_100c_cst: base.PositiveNumber = Field(
+        default=9.3, description="Kinematic viscosity at 100 °C, cSt"
+    )
 
     @model_validator(mode="after")
     def _thins_when_warm(self) -> Self:
@@ -99,7 +88,7 @@ class OilIn(Schema):
         return self
 
 
-class EndOfLifeIn(Schema):
+class EndOfLifeIn(base.Schema):
     """The end-of-life criterion."""
 
     cof_fraction: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False, strict=True)] = Field(
@@ -112,13 +101,13 @@ class EndOfLifeIn(Schema):
     )
 
 
-class SeverityIn(Schema):
+class SeverityIn(base.Schema):
     """How much a duty cycle ages the clutch: the argument of eq. 6."""
 
     basis: Literal["cycles", "sliding_distance", "dissipated_energy"] = Field(
         default="cycles", description="What eq. 6 counts: duty cycles, sliding distance or dissipated energy"
     )
-    exponent: Annotated[NotNegativeNumber, Field(le=base.MAX_SEVERITY_EXPONENT)] = Field(
+    exponent: Annotated[base.NotNegativeNumber, Field(le=base.MAX_SEVERITY_EXPONENT)] = Field(
         default=1.0, description="Exponent of a duty cycle's distance or energy"
     )
 
@@ -126,19 +115,19 @@ class SeverityIn(Schema):
         return Severity(basis=SeverityBasis(self.basis), exponent=self.exponent)
 
 
-class ClutchIn(Schema):
+class ClutchIn(base.Schema):
     """A clutch as it is registered."""
 
-    clutch_id: Identifier = Field(description="The clutch's name; safe in an address, 128 characters at most")
+    clutch_id: base.Identifier = Field(description="The clutch's name; safe in an address, 128 characters at most")
     geometry: GeometryIn = Field(default=GeometryIn(), description="The friction disc")
     oil: OilIn = Field(default=OilIn(), description="The oil")
     end_of_life: EndOfLifeIn = Field(default=EndOfLifeIn(), description="The end-of-life criterion")
-    friction_material: Name = Field(default="paper", description="The friction material")
-    reaction_plate: Name = Field(default="steel", description="The reaction plate's material")
-    fluid: Name = Field(default="ATF", description="The fluid")
+    friction_material: base.Name = Field(default="paper", description="The friction material")
+    reaction_plate: base.Name = Field(default="steel", description="The reaction plate's material")
+    fluid: base.Name = Field(default="ATF", description="The fluid")
     severity: SeverityIn = Field(default=SeverityIn(), description="How much a duty cycle ages the clutch")
     torque_filter_ms: TorqueFilter = None
-    origin: Origin = "measured"
+    origin: base.Origin = "measured"
 
     @property
     def torque_filter(self) -> float:
@@ -150,20 +139,20 @@ class ClutchIn(Schema):
 _STAYS: Any = None
 
 
-class ClutchEdit(Schema):
+class ClutchEdit(base.Schema):
     """The fields of a clutch's record to change. Each is replaced as a whole; omitted fields stay."""
 
-    reason: Reason = Field(default="", description="Reason; required if the record changes")
+    reason: base.Reason = Field(default="", description="Reason; required if the record changes")
     archived: bool = Field(default=_STAYS, strict=True, description="Whether the clutch is archived: lists omit it")
     geometry: GeometryIn = Field(default=_STAYS, description="The friction disc")
     oil: OilIn = Field(default=_STAYS, description="The oil")
     end_of_life: EndOfLifeIn = Field(default=_STAYS, description="The end-of-life criterion")
-    friction_material: Name = Field(default=_STAYS, description="The friction material")
-    reaction_plate: Name = Field(default=_STAYS, description="The reaction plate's material")
-    fluid: Name = Field(default=_STAYS, description="The fluid")
+    friction_material: base.Name = Field(default=_STAYS, description="The friction material")
+    reaction_plate: base.Name = Field(default=_STAYS, description="The reaction plate's material")
+    fluid: base.Name = Field(default=_STAYS, description="The fluid")
     severity: SeverityIn = Field(default=_STAYS, description="How much a duty cycle ages the clutch")
     torque_filter_ms: TorqueFilter = None
-    origin: Origin = Field(default=_STAYS)
+    origin: base.Origin = Field(default=_STAYS)
 
     @model_validator(mode="after")
     def _says_why(self) -> Self:
@@ -177,7 +166,7 @@ class ClutchEdit(Schema):
         return self.model_dump(mode="json", include=given)
 
 
-class ClutchSummary(Answer):
+class ClutchSummary(base.Answer):
     """Current health and remaining life, as lists show them; null while unknown."""
 
     status: str = Field(description="The status of `/remaining-useful-life`")
@@ -197,30 +186,30 @@ class ClutchSummary(Answer):
     ended: DeclaredEnd | None = Field(description="The declared end of the present life; null while it goes on")
 
 
-class LastRun(Answer):
+class LastRun(base.Answer):
     """The run that was made last."""
 
-    run_id: RunName
+    run_id: base.RunName
     kind: str = Field(description="The kind of run")
-    cycles: RunCycles
+    cycles: base.RunCycles
     at: str = Field(description="When it was made, or received if that is unknown; UTC, ISO 8601")
 
 
-class Recent(Answer):
+class Recent(base.Answer):
     """The recent history of a clutch."""
 
     last_run: LastRun = Field(description="The run that was made last")
     mean_cof: list[float] = Field(description="Mean COF of the present life, thinned to at most 32 values")
 
 
-class AdvisedTest(Answer):
+class AdvisedTest(base.Answer):
     """The most informative next test."""
 
     test: str = Field(description="The test in a sentence")
     separates: list[str] = Field(description="The two effects that it distinguishes; `baseline` stands for none")
 
 
-class LatestDiagnosis(Answer):
+class LatestDiagnosis(base.Answer):
     """The newest finished diagnosis."""
 
     diagnosis_id: str = Field(description="The diagnosis' name")
@@ -232,7 +221,7 @@ class LatestDiagnosis(Answer):
     earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
 
 
-class ClutchState(Answer):
+class ClutchState(base.Answer):
     """The state of a clutch after NAMUR NE 107."""
 
     name: base.StateName = Field(
@@ -244,10 +233,10 @@ class ClutchState(Answer):
     why: str = Field(description="The reason as a clause; if the state needs none, the statement of the remaining life")
 
 
-class ClutchOut(Answer):
+class ClutchOut(base.Answer):
     """A registered clutch."""
 
-    clutch_id: ClutchName
+    clutch_id: base.ClutchName
     geometry: GeometryIn = Field(description="The friction disc")
     oil: OilIn = Field(description="The oil")
     end_of_life: EndOfLifeIn = Field(description="The end-of-life criterion")
@@ -256,10 +245,10 @@ class ClutchOut(Answer):
     fluid: str = Field(description="The fluid")
     severity: SeverityIn = Field(description="How much a duty cycle ages the clutch")
     torque_filter_ms: TorqueFilter
-    origin: Origin
+    origin: base.Origin
     archived: bool = Field(description="Whether the clutch is archived: lists omit it, and it takes no more runs")
     created_at: str = Field(description="When it was registered; UTC, ISO 8601")
-    revision: Revision
+    revision: base.Revision
     state: ClutchState = Field(description="What the state demands")
     headline: str = Field(
         description="One line: the state in words, the safe bound with its date at this pace, and the median"
@@ -272,6 +261,6 @@ class ClutchOut(Answer):
     diagnosis: LatestDiagnosis | None = Field(description="The newest finished diagnosis; null without one")
 
 
-ClutchPage = page_of(
+ClutchPage = base.page_of(
     "ClutchPage", ClutchOut, "Clutches, the lowest safe bound first or by name.", "The clutches of this page"
 )

@@ -4,16 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.schemas.base import (
-    LONGEST_DIAGNOSIS_ID,
-    Answer,
-    ClutchName,
-    Identifier,
-    Revision,
-    Schema,
-    VerdictName,
-    page_of,
-)
+from service.schemas import base
 from service.schemas.life import ModelName
 
 Number = float | None
@@ -23,7 +14,7 @@ JobState = Literal["waiting", "running", "finished", "failed", "cancelled"]
 DiagnosisName = Annotated[str, Field(description="The diagnosis' name")]
 
 
-class DiagnosisIn(Schema):
+class DiagnosisIn(base.Schema):
     """A request for a diagnosis."""
 
     adopt: Annotated[bool, Field(strict=True)] = Field(
@@ -34,15 +25,15 @@ class DiagnosisIn(Schema):
     )
 
 
-class ModelIn(Schema):
+class ModelIn(base.Schema):
     """A request to adopt a model."""
 
-    diagnosis_id: Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_DIAGNOSIS_ID)] | None = Field(
+    diagnosis_id: Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_DIAGNOSIS_ID)] | None = Field(
         description="The diagnosis whose extended model is adopted; null returns to the baseline"
     )
 
 
-class Amplitude(Answer):
+class Amplitude(base.Answer):
     """An effect's amplitude in engineering units."""
 
     name: str = Field(description="What the amplitude is")
@@ -52,7 +43,7 @@ class Amplitude(Answer):
     interval: list[Number] = Field(default_factory=list, description="Its 90 % interval, lower and upper end")
 
 
-class ExplanationOut(Answer):
+class ExplanationOut(base.Answer):
     """A possible explanation of the data. Explanations exclude each other, and their probabilities sum to one."""
 
     effects: list[str] = Field(
@@ -65,7 +56,7 @@ class ExplanationOut(Answer):
     )
 
 
-class CandidateOut(Answer):
+class CandidateOut(base.Answer):
     """An effect that competed with the others and with the baseline."""
 
     effect: str = Field(description="The effect's slug")
@@ -83,7 +74,7 @@ class CandidateOut(Answer):
     )
 
 
-class WhereOut(Answer):
+class WhereOut(base.Answer):
     """An axis on which the residuals depend."""
 
     axis: str = Field(description="A channel, or `test_clock_s`, `cycles` or `loop_phase`")
@@ -91,7 +82,7 @@ class WhereOut(Answer):
     p_value: Number = Field(description="Probability of such a dependence by chance")
 
 
-class MisfitOut(Answer):
+class MisfitOut(base.Answer):
     """The error of a model."""
 
     rmse_nm: Number = Field(description="Root mean square of the residuals, Nm")
@@ -100,14 +91,14 @@ class MisfitOut(Answer):
     where: list[WhereOut] = Field(description="The axes on which the residuals depend, strongest first")
 
 
-class BeforeAndAfter(Answer):
+class BeforeAndAfter(base.Answer):
     """Remaining useful life under both models, in the form of `/remaining-useful-life`."""
 
     before: dict[str, object] = Field(description="Under the baseline")
     after: dict[str, object] = Field(description="Under the extended model")
 
 
-class GainOut(Answer):
+class GainOut(base.Answer):
     """What the extended model gains on runs that were left out of the fit."""
 
     held_out_runs: list[str] = Field(description="The runs that were held out")
@@ -126,7 +117,7 @@ class GainOut(Answer):
     remaining_useful_life: BeforeAndAfter = Field(description="Remaining useful life under both models")
 
 
-class AdviceOut(Answer):
+class AdviceOut(base.Answer):
     """A test that would distinguish two effects, or an effect from the baseline."""
 
     key: str = Field(description="Code of the test, for programs")
@@ -144,7 +135,7 @@ class AdviceOut(Answer):
     steps: list["PlanStep"] = Field(default_factory=list, description="The steps for the rig, in order")
 
 
-class PlanStep(Answer):
+class PlanStep(base.Answer):
     """One test of a plan."""
 
     kind: str = Field(description="`stationary_stribeck` or `dynamic_stribeck`")
@@ -161,16 +152,16 @@ class PlanStep(Answer):
     minutes: Number = Field(description="Minutes on the rig")
 
 
-class PlanOut(Answer):
+class PlanOut(base.Answer):
     """The tests that a diagnosis advises as a protocol: at most three alternatives, each with its steps in order."""
 
-    clutch_id: ClutchName
+    clutch_id: base.ClutchName
     diagnosis_id: DiagnosisName
     relation: Literal["alternatives"] = Field(description="How to use the tests: one of them is enough")
     tests: list[AdviceOut] = Field(description="The tests, best first: alternatives, each with its steps in order")
 
 
-class VisibleOut(Answer):
+class VisibleOut(base.Answer):
     """The smallest amplitude of an effect that these data would show with 90 % probability."""
 
     effect: str = Field(description="The effect's slug")
@@ -182,7 +173,7 @@ class VisibleOut(Answer):
     unit: str = Field(description="Its unit")
 
 
-class PairOut(Answer):
+class PairOut(base.Answer):
     """Two effects: whether these tests could distinguish them, and the test that would."""
 
     effects: list[str] = Field(description="Their slugs")
@@ -197,14 +188,14 @@ class PairOut(Answer):
     with_test: Number = Field(description="The probability with that test added")
 
 
-class IsolabilityOut(Answer):
+class IsolabilityOut(base.Answer):
     """Which causes these tests could distinguish. This depends on the design of the tests only, not on their results."""
 
     pairs: list[PairOut] = Field(description="The pairs of effects that these tests can show, hardest first")
     unseen: list[str] = Field(description="The slugs of the effects that these tests cannot show at all")
 
 
-class Axes(Answer):
+class Axes(base.Answer):
     """The axes of the residual maps."""
 
     pressure_bar: list[float] = Field(description="Line pressure, bar")
@@ -212,14 +203,14 @@ class Axes(Answer):
     cycles: list[float] = Field(description="Duty cycles since new")
 
 
-class ResidualMap(Answer):
+class ResidualMap(base.Answer):
     """Mean residuals, in standard deviations."""
 
     speed_pressure: Table = Field(description="One row per pressure, one column per speed")
     pressure_cycles: Table = Field(description="One row per count of cycles, one column per pressure")
 
 
-class MapsOut(Answer):
+class MapsOut(base.Answer):
     """Residual maps of both models."""
 
     axes: Axes = Field(description="Their axes")
@@ -227,7 +218,7 @@ class MapsOut(Answer):
     after: ResidualMap = Field(description="Under the extended model")
 
 
-class LoopTraceOut(Answer):
+class LoopTraceOut(base.Answer):
     """A friction loop over one period: measured, and of both models."""
 
     pressure_bar: float = Field(description="Line pressure, bar")
@@ -239,17 +230,17 @@ class LoopTraceOut(Answer):
     extended_nm: Numbers = Field(description="Torque under the extended model, Nm")
 
 
-class DiagnosisListed(Answer):
+class DiagnosisListed(base.Answer):
     """A diagnosis without its maps and loops. It has no verdict while it runs, or if it failed."""
 
     diagnosis_id: DiagnosisName
-    clutch_id: ClutchName
+    clutch_id: base.ClutchName
     status: Literal["running", "finished", "failed"] = Field(
         description="Whether it still runs, has finished, or failed"
     )
     created_at: str = Field(description="When it was requested; UTC, ISO 8601")
     finished_at: str | None = Field(description="When it ended; UTC, ISO 8601")
-    revision: Revision
+    revision: base.Revision
     as_of_cycles: Number = Field(description="Duty cycles since new of the latest run in it")
     stale: bool = Field(description="Whether runs were posted since")
     earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
@@ -261,7 +252,7 @@ class DiagnosisListed(Answer):
     adopted: bool = Field(description="Whether its model is the current one")
     problem: str | None = Field(description="Why it failed")
     code_version: str = Field(description="The release that computed it")
-    verdict: VerdictName | None = Field(description="The verdict")
+    verdict: base.VerdictName | None = Field(description="The verdict")
     causes: list[str] = Field(
         description="Slugs of the named causes, or of those that these data cannot distinguish; `uncatalogued`: "
         "something that is not in the catalogue"
@@ -291,10 +282,10 @@ class DiagnosisOut(DiagnosisListed):
     )
 
 
-DiagnosisPage = page_of("DiagnosisPage", DiagnosisListed, "Diagnoses, newest first.", "The diagnoses of this page")
+DiagnosisPage = base.page_of("DiagnosisPage", DiagnosisListed, "Diagnoses, newest first.", "The diagnoses of this page")
 
 
-class ModelVersion(Answer):
+class ModelVersion(base.Answer):
     """A model that was adopted."""
 
     version: int = Field(description="Its number, from 1")
@@ -303,26 +294,26 @@ class ModelVersion(Answer):
     model: ModelName = Field(description="The model")
 
 
-class ModelOut(Answer):
+class ModelOut(base.Answer):
     """The current model of tracking and remaining life, and all adopted versions. After a rebuild the baseline is the
     current model again.
     """
 
-    clutch_id: ClutchName
+    clutch_id: base.ClutchName
     model: ModelName = Field(description="The model in force")
     version: int = Field(description="Its number; 0 if none was adopted")
     diagnosis_id: str | None = Field(description="The diagnosis that it comes from; null: the baseline")
     versions: list[ModelVersion] = Field(description="All adopted models, newest first")
 
 
-class JobIn(Schema):
+class JobIn(base.Schema):
     """A job to start."""
 
     kind: Literal["replay", "fleet_refresh"] = Field(
         description="`replay`: compute results again from the raw runs; `fleet_refresh`: learn the priors that "
         "clutches of a kind share"
     )
-    clutch_id: Identifier | None = Field(
+    clutch_id: base.Identifier | None = Field(
         default=None, description="The clutch to replay; default: all. A fleet refresh always concerns all"
     )
 
@@ -333,7 +324,7 @@ class JobIn(Schema):
         return self
 
 
-class JobProgress(Answer):
+class JobProgress(base.Answer):
     """The progress of a job."""
 
     step: str = Field(description="What it does")
@@ -341,14 +332,14 @@ class JobProgress(Answer):
     of: int | None = Field(default=None, description="Total number of steps")
 
 
-class LeftClutch(Answer):
+class LeftClutch(base.Answer):
     """A clutch that keeps its former results."""
 
-    clutch_id: ClutchName
+    clutch_id: base.ClutchName
     reason: str = Field(description="Why")
 
 
-class JobResult(Answer):
+class JobResult(base.Answer):
     """The result of a replay or a fleet refresh."""
 
     replayed: int | None = Field(default=None, description="Clutches whose results were recomputed, of a replay")
@@ -358,7 +349,7 @@ class JobResult(Answer):
     reasons: list[LeftClutch] = Field(description="The reasons, for the first 20 of them")
 
 
-class JobOut(Answer):
+class JobOut(base.Answer):
     """A job, which a service computes when its turn comes. The job of a diagnosis has the diagnosis' name."""
 
     job_id: str = Field(description="The job's name")
@@ -377,4 +368,4 @@ class JobOut(Answer):
     result: JobResult | None = Field(description="Its result; null before its end, and for a diagnosis")
 
 
-JobPage = page_of("JobPage", JobOut, "A page of jobs, newest first.", "The jobs")
+JobPage = base.page_of("JobPage", JobOut, "A page of jobs, newest first.", "The jobs")

@@ -5,32 +5,16 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, StringConstraints, TypeAdapter, model_validator
 
 from service.schemas import base
-from service.schemas.base import (
-    Answer,
-    ClutchName,
-    Column,
-    Cycles,
-    Identifier,
-    NotNegativeNumber,
-    Origin,
-    PositiveNumber,
-    Reason,
-    RunCycles,
-    RunName,
-    Schema,
-    StartedAt,
-    page_of,
-)
 
 
-class IndicatorEstimate(Answer):
+class IndicatorEstimate(base.Answer):
     """A value with its standard error from noise."""
 
     value: float = Field(description="The value")
     sd: float = Field(description="Its standard error")
 
 
-class Indicators(Answer):
+class Indicators(base.Answer):
     """The indicators of one engagement; null if the record does not determine one."""
 
     stop_time_s: IndicatorEstimate | None = Field(description="From 10 % of the highest torque to standstill, s")
@@ -48,7 +32,7 @@ class Indicators(Answer):
     )
 
 
-class ReceivedEngagement(Answer):
+class ReceivedEngagement(base.Answer):
     """The measured engagement of a block of duty; null if it was not evaluated."""
 
     status: str = Field(
@@ -63,40 +47,42 @@ class ReceivedEngagement(Answer):
     indicators: Indicators = Field(description="The indicators, each with its standard error")
 
 
-Pressure = Annotated[Column, Field(description="Line pressure, bar")]
-Speed = Annotated[Column, Field(description="Sliding speed, rpm")]
-Torque = Annotated[Column, Field(description="Friction torque, Nm")]
-OilTemperature = Annotated[Column | None, Field(description="Oil temperature, °C")]
+Pressure = Annotated[base.Column, Field(description="Line pressure, bar")]
+Speed = Annotated[base.Column, Field(description="Sliding speed, rpm")]
+Torque = Annotated[base.Column, Field(description="Friction torque, Nm")]
+OilTemperature = Annotated[base.Column | None, Field(description="Oil temperature, °C")]
 FrontTemperature = Annotated[
-    Column | None,
+    base.Column | None,
     Field(description="Temperature of the reaction plate at its front, or at the only measured place, °C"),
 ]
-RearTemperature = Annotated[Column | None, Field(description="Temperature of the reaction plate at its rear, °C")]
+RearTemperature = Annotated[base.Column | None, Field(description="Temperature of the reaction plate at its rear, °C")]
 
 
 EndReason = Literal["worn", "other"]
-GivenReason = Annotated[Reason, StringConstraints(min_length=1)]
+GivenReason = Annotated[base.Reason, StringConstraints(min_length=1)]
 
 
-class StationaryChannels(Schema):
+class StationaryChannels(base.Schema):
     """The channels of a stationary test: one value per plateau, or with `time_s` the raw record."""
 
     pressure_bar: Pressure
     speed_rpm: Speed
     torque_nm: Torque
-    torque_sd_nm: Column | None = Field(
+    torque_sd_nm: base.Column | None = Field(
         default=None, description="Standard deviation of each plateau's mean torque, Nm"
     )
     oil_temperature_c: OilTemperature = None
     plate_temperature_front_c: FrontTemperature = None
     plate_temperature_rear_c: RearTemperature = None
-    time_s: Column | None = Field(default=None, description="Time of each sample, s; without it, rows are plateaus")
+    time_s: base.Column | None = Field(
+        default=None, description="Time of each sample, s; without it, rows are plateaus"
+    )
 
 
-class DynamicChannels(Schema):
+class DynamicChannels(base.Schema):
     """The sampled record of a dynamic test or of an engagement."""
 
-    time_s: Column = Field(description="Time of each sample, s")
+    time_s: base.Column = Field(description="Time of each sample, s")
     pressure_bar: Pressure
     speed_rpm: Speed
     torque_nm: Torque
@@ -105,33 +91,35 @@ class DynamicChannels(Schema):
     plate_temperature_rear_c: RearTemperature = None
 
 
-class Duty(Schema):
+class Duty(base.Schema):
     """The block of engagements that ends at the run's `cycles`."""
 
-    cycles: Annotated[PositiveNumber, Field(le=base.MAX_CYCLES)] = Field(description="Duty cycles in the block")
-    energy_per_cycle_kj: NotNegativeNumber | None = Field(
+    cycles: Annotated[base.PositiveNumber, Field(le=base.MAX_CYCLES)] = Field(description="Duty cycles in the block")
+    energy_per_cycle_kj: base.NotNegativeNumber | None = Field(
         default=None, description="Energy dissipated in a duty cycle, kJ"
     )
-    initial_speed_rpm: NotNegativeNumber | None = Field(
+    initial_speed_rpm: base.NotNegativeNumber | None = Field(
         default=None, description="Sliding speed at the start of an engagement, rpm"
     )
-    engagement_duration_s: NotNegativeNumber | None = Field(
+    engagement_duration_s: base.NotNegativeNumber | None = Field(
         default=None, description="Time from contact to standstill, s"
     )
-    maximum_pressure_bar: NotNegativeNumber | None = Field(
+    maximum_pressure_bar: base.NotNegativeNumber | None = Field(
         default=None, description="Highest line pressure of an engagement, bar"
     )
 
 
-class RunBase(Schema):
+class RunBase(base.Schema):
     """Fields of every run."""
 
-    run_id: Identifier | None = Field(default=None, description="The run's name; default: derived from the content")
-    cycles: Cycles = Field(description="Duty cycles since new when the run is made")
-    started_at: Annotated[StartedAt, Field(strict=True)] | None = Field(
+    run_id: base.Identifier | None = Field(
+        default=None, description="The run's name; default: derived from the content"
+    )
+    cycles: base.Cycles = Field(description="Duty cycles since new when the run is made")
+    started_at: Annotated[base.StartedAt, Field(strict=True)] | None = Field(
         default=None, description="When it was started: ISO 8601 with a time zone"
     )
-    origin: Origin = "measured"
+    origin: base.Origin = "measured"
 
 
 class StationaryRunIn(RunBase):
@@ -181,7 +169,7 @@ RunIn = Annotated[StationaryRunIn | DynamicRunIn | DutyRunIn | MaintenanceRunIn,
 RUN_IN: TypeAdapter[StationaryRunIn | DynamicRunIn | DutyRunIn | MaintenanceRunIn] = TypeAdapter(RunIn)
 
 
-class Warned(Answer):
+class Warned(base.Answer):
     """A warning; it does not stop the run."""
 
     code: str = Field(description="Code of the warning, for programs")
@@ -196,30 +184,30 @@ class Doubt(Warned):
     )
 
 
-class Withdrawal(Schema):
+class Withdrawal(base.Schema):
     """Why a run or an inspection is withdrawn or restored."""
 
     reason: GivenReason = Field(description="Why")
 
 
-class Confirmation(Schema):
+class Confirmation(base.Schema):
     """Why a held run is accepted."""
 
-    reason: Reason = Field(default="", description="Why")
+    reason: base.Reason = Field(default="", description="Why")
 
 
-class Confirmations(Schema):
+class Confirmations(base.Schema):
     """Held runs to accept together, and the reason."""
 
-    run_ids: list[Identifier] = Field(min_length=1, max_length=base.MAX_CONFIRMED, description="The runs")
-    reason: Reason = Field(default="", description="Why")
+    run_ids: list[base.Identifier] = Field(min_length=1, max_length=base.MAX_CONFIRMED, description="The runs")
+    reason: base.Reason = Field(default="", description="Why")
 
 
-class Correction(Schema):
+class Correction(base.Schema):
     """A correction: the true cycles of a run, or the rig profile to read its file again, and the reason."""
 
-    cycles: Cycles | None = Field(default=None, description="Duty cycles since new when the run was made")
-    rig: Identifier | None = Field(default=None, description="The rig profile to read the kept file with")
+    cycles: base.Cycles | None = Field(default=None, description="Duty cycles since new when the run was made")
+    rig: base.Identifier | None = Field(default=None, description="The rig profile to read the kept file with")
     reason: GivenReason = Field(description="Why")
 
     @model_validator(mode="after")
@@ -229,7 +217,7 @@ class Correction(Schema):
         return self
 
 
-class Parameters(Answer):
+class Parameters(base.Answer):
     """The four Stribeck parameters of eq. 3."""
 
     static_torque_nm: float = Field(description="Static torque M_s, Nm")
@@ -238,7 +226,7 @@ class Parameters(Answer):
     viscous_coefficient: float = Field(description="Viscous coefficient C_v, Nm/(m/s)^0.3")
 
 
-class Fit(Answer):
+class Fit(base.Answer):
     """The fitted Stribeck curve of one pressure (eq. 4, 5)."""
 
     pressure_bar: float = Field(description="Line pressure, bar")
@@ -258,7 +246,7 @@ class Fit(Answer):
     message: str = Field(description="The fit in a sentence")
 
 
-class Loop(Answer):
+class Loop(base.Answer):
     """A friction loop at one pressure; a value is null if the record does not determine it."""
 
     pressure_bar: float = Field(description="Line pressure, bar")
@@ -292,7 +280,7 @@ State = Annotated[
 ]
 
 
-class ReceivedFile(Answer):
+class ReceivedFile(base.Answer):
     """The file of a run, which is kept: `/runs/{run_id}/file` returns it."""
 
     filename: str = Field(description="The sender's name for it")
@@ -301,15 +289,15 @@ class ReceivedFile(Answer):
     rig: str | None = Field(description="The rig profile that was used; null: no saved profile")
 
 
-class Receipt(Answer):
+class Receipt(base.Answer):
     """The evaluation of a stored run."""
 
-    clutch_id: ClutchName
-    run_id: RunName
+    clutch_id: base.ClutchName
+    run_id: base.RunName
     kind: str = Field(description="The kind of run")
-    cycles: RunCycles
+    cycles: base.RunCycles
     started_at: str | None = Field(description="When it was started, ISO 8601")
-    origin: Origin
+    origin: base.Origin
     received_at: str = Field(description="When it was stored; UTC, ISO 8601")
     content_sha256: str = Field(description="Hash of the content without the name")
     duplicate: bool = Field(description="Whether the run was stored before this request")
@@ -337,7 +325,7 @@ Action = Literal[
 ]  # fmt: skip
 
 
-class Change(Answer):
+class Change(base.Answer):
     """An entry of the audit trail."""
 
     at: str = Field(description="When; UTC, ISO 8601")
@@ -355,7 +343,7 @@ class Change(Answer):
     after: dict[str, Any] = Field(description="The changed fields after")
 
 
-ChangePage = page_of("ChangePage", Change, "The audit trail, newest first.", "The entries of this page")
+ChangePage = base.page_of("ChangePage", Change, "The audit trail, newest first.", "The entries of this page")
 
 
 class RunOut(Receipt):
@@ -373,4 +361,4 @@ class RunOut(Receipt):
     )
 
 
-RunPage = page_of("RunPage", Receipt, "Receipts by cycles.", "The receipts of this page")
+RunPage = base.page_of("RunPage", Receipt, "Receipts by cycles.", "The receipts of this page")

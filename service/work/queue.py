@@ -19,7 +19,7 @@ from typing import Any
 
 from service.errors import BusyError
 from service.logging import request_id
-from service.settings import Settings
+from service.settings import MIB, Settings
 from service.work.process import AwayError, Child, FailedError, Work, running
 from storage import jobs
 from storage.encoding import Json
@@ -50,7 +50,7 @@ def diagnosis_work(job: JobRow, settings: Settings) -> Work:
         "last_run_key": job.arguments["last_run_key"],
         "isolability": job.arguments.get("isolability", False),  # jobs of 1.0.0 have none
         "engine": settings.engine,
-        "bytes": settings.diagnosis_bytes,
+        "bytes": settings.diagnosis_memory_mb * MIB,
         "processor_seconds": settings.diagnosis_seconds,
     }
     return Work(

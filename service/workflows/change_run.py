@@ -233,15 +233,7 @@ def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
     """A run and its clutch, the run as its file is read again. Raises InvalidError where it cannot be evaluated so."""
     analysis = analyse(run, loaded.state.geometry, loaded.state.record.torque_filter)
     run_id, received_at = run.run_id, loaded.row.received_at
-    answer = receipt(
-        loaded.row.clutch_id,
-        run,
-        received_at=received_at,
-        levels=analysis.fits,
-        cofs={},
-        warnings=analysis.warnings,
-        engagement=analysis.engagement,
-    )
+    answer = receipt(loaded.row.clutch_id, run, analysis, received_at=received_at)
     shown, odd = doubts_alone(run, analysis, loaded.state.geometry)
     return replace(
         loaded,

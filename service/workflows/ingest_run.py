@@ -186,12 +186,10 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
     answer = receipt(
         before.clutch_id,
         arrival.run,
+        arrival.analysis,
         received_at=arrival.received_at,
-        levels=arrival.analysis.fits,
         cofs=event.cofs,
         loops=_own_loops(state, event, levels, arrival.run),
-        warnings=arrival.analysis.warnings,
-        engagement=arrival.analysis.engagement,
     )
     judged = Judged()
     if not arrival.odd:

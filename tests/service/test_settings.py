@@ -15,13 +15,13 @@ EARLIER = {
     "CLUTCHLIFE_DATABASE": ("sqlite:///other.db", "database", "sqlite:///other.db"),
     "CLUTCHLIFE_ROOT_PATH": ("a/clutch/", "root_path", "/a/clutch"),
     "CLUTCHLIFE_WORKERS": ("0", "workers", 0),
-    "CLUTCHLIFE_MAX_BODY_MB": ("3", "most_body_bytes", 3 << 20),
+    "CLUTCHLIFE_MAX_BODY_MB": ("3", "max_body_mb", 3),
     "CLUTCHLIFE_BODY_SECONDS": ("7", "body_seconds", 7),
     "CLUTCHLIFE_REQUESTS_PER_SECOND": ("8", "requests_per_second", 8),
     "CLUTCHLIFE_REQUESTS_AT_ONCE": ("9", "requests_at_once", 9),
     "CLUTCHLIFE_CONNECTIONS_AT_ONCE": ("9", "connections_at_once", 9),
     "CLUTCHLIFE_DIAGNOSIS_SECONDS": ("10", "diagnosis_seconds", 10),
-    "CLUTCHLIFE_DIAGNOSIS_MEMORY_MB": ("11", "diagnosis_bytes", 11 << 20),
+    "CLUTCHLIFE_DIAGNOSIS_MEMORY_MB": ("11", "diagnosis_memory_mb", 11),
 }
 
 

@@ -1,6 +1,5 @@
 """`clutchlife demo`: a simulated life, posted run by run to a service of its own, with the prognosis as it sharpens."""
 
-import json
 import os
 import socket
 import subprocess
@@ -62,7 +61,7 @@ def _life(service: Service, seed: int) -> None:
 
     clutch_id, truth = f"sim-{seed}", campaign.simulated_clutch(seed)
     end = truth.end_of_life()
-    service.post("/v1/clutches", json.dumps(simulated.simulated_clutch_body(clutch_id)).encode())
+    service.post("/v1/clutches", simulated.simulated_clutch_body(clutch_id))
     out.print(f"\nA simulated clutch, {clutch_id}: 7 pressures x 40 speeds a test, 1 % noise.")
     out.print(f"Hidden in its torque: {HIDDEN}. The service does not know this effect.", markup=False)
     out.print("Remaining duty cycles until its mean COF has halved:\n")
@@ -72,8 +71,7 @@ def _life(service: Service, seed: int) -> None:
         task = progress.add_task("run-in", total=end)
         for run in life.runs(seed):
             progress.update(task, description=f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles")
-            body = json.dumps(simulated.simulated_body(run)).encode()
-            service.post(f"/v1/clutches/{clutch_id}/runs", body)
+            service.post(f"/v1/clutches/{clutch_id}/runs", simulated.simulated_body(run))
             progress.update(task, completed=run.cycles)
             if run.plateaus is not None:
                 prediction = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life")
@@ -85,8 +83,7 @@ def _life(service: Service, seed: int) -> None:
         "'-' means: too few tests yet, or the end may never come."
     )
     for cycles, surface in life.inspections(seed, run.cycles):
-        body = json.dumps(simulated.simulated_inspection(surface, cycles)).encode()
-        service.post(f"/v1/clutches/{clutch_id}/inspections", body)
+        service.post(f"/v1/clutches/{clutch_id}/inspections", simulated.simulated_inspection(surface, cycles))
     _diagnosed(service, clutch_id, end)
 
 

@@ -169,7 +169,7 @@ def _register(service: Service, clutch_id: str, record: dict[str, Any] | None) -
     if record is None:
         service.get(f"/v1/clutches/{clutch_id}")
     else:
-        service.post("/v1/clutches", json.dumps(record).encode())
+        service.post("/v1/clutches", record)
 
 
 app = typer.Typer(help="Runs that wait to be sent, or were refused.", no_args_is_help=True)

@@ -71,7 +71,7 @@ class Client:
 
     def register(self, clutch_id: str, **record: Any) -> Answer:
         """Register a clutch; what is left out has the reference's values. The same again changes nothing."""
-        return self.service.post("/v1/clutches", _body({"clutch_id": clutch_id, **record}))
+        return self.service.post("/v1/clutches", {"clutch_id": clutch_id, **record})
 
     # --- runs ---
 
@@ -95,19 +95,18 @@ class Client:
         if isinstance(run, (str, Path)):
             path = Path(run)
             if path.suffix == _JSON_SUFFIX:
-                return self.service.post(address, _body(json.loads(path.read_bytes()) | _content(fields)))
+                return self.service.post(address, json.loads(path.read_bytes()) | _content(fields))
             given = {"filename": path.name} | {name: value for name, value in fields.items() if value is not None}
             profile = given.pop("profile", None)
             parameters = {name: str(value) for name, value in given.items()}
             if profile is not None:
                 return self.service.post_form(f"{address}/file", path, profile, parameters)
             return self.service.post_file(f"{address}/file", path, parameters)
-        return self.service.post(address, _body(_content({**({} if run is None else run), **fields})))
+        return self.service.post(address, _content({**({} if run is None else run), **fields}))
 
     def confirm(self, clutch_id: str, *run_ids: str, reason: str = "") -> Answer:
         """Accept held runs as they were sent, all of them in one step; their receipts are in `items`."""
-        body = _body({"run_ids": run_ids, "reason": reason})
-        return self.service.post(f"{_clutch(clutch_id)}/runs/confirm", body)
+        return self.service.post(f"{_clutch(clutch_id)}/runs/confirm", {"run_ids": run_ids, "reason": reason})
 
     # --- what is known ---
 
@@ -118,7 +117,7 @@ class Client:
     def forecast(self, clutch_id: str, programme: Any, **fields: Any) -> Answer:
         """Remaining life under planned duty: `programme=[{"cycles": 5000, "energy_per_cycle_kj": 25}]`."""
         address = f"{_clutch(clutch_id)}/remaining-useful-life/forecast"
-        return self.service.post(address, _body({"programme": list(programme), **fields}))
+        return self.service.post(address, {"programme": list(programme), **fields})
 
     def degradation(self, clutch_id: str, **arguments: Any) -> Answer:
         """The coefficients of every tracked quantity's course, with their uncertainty."""
@@ -154,7 +153,7 @@ class Client:
 
     def adopt(self, clutch_id: str, diagnosis_id: str | None) -> Answer:
         """Track a clutch under a diagnosis's extended model; None: under the baseline again."""
-        return self.service.put(f"{_clutch(clutch_id)}/model", _body({"diagnosis_id": diagnosis_id}))
+        return self.service.put(f"{_clutch(clutch_id)}/model", {"diagnosis_id": diagnosis_id})
 
     # --- alarms ---
 
@@ -164,7 +163,7 @@ class Client:
 
     def add_alarm(self, quantity: str, **rule: Any) -> Answer:
         """Make a rule: `add_alarm("remaining_cycles", clutch_id="e", below=4000)`."""
-        return self.service.post("/v1/alarms", _body({"quantity": quantity, **rule}))
+        return self.service.post("/v1/alarms", {"quantity": quantity, **rule})
 
     def events(self, **arguments: Any) -> Any:
         """What rules have raised as a table, newest first; `state="open"`: what is not over."""
@@ -172,7 +171,7 @@ class Client:
 
     def acknowledge(self, event_id: str, note: str = "") -> Answer:
         """Say that somebody has seen an alarm."""
-        return self.service.post(f"/v1/alarms/events/{quote(event_id, safe='')}/acknowledge", _body({"note": note}))
+        return self.service.post(f"/v1/alarms/events/{quote(event_id, safe='')}/acknowledge", {"note": note})
 
     def _table(self, address: str, *, row_of: str | None = None, without: Sequence[str] = (), **arguments: Any) -> Any:
         return table(self.service.pages(address, **arguments), self.frames, row_of=row_of, without=without)
@@ -191,7 +190,7 @@ def diagnosed(
     address = f"{_clutch(clutch_id)}/diagnoses"
     deadline = time.monotonic() + wait
     report = service.post(
-        address, _body({"adopt": adopt, "isolability": isolability}), prefer=f"wait={int(min(_WAIT, max(0.0, wait)))}"
+        address, {"adopt": adopt, "isolability": isolability}, prefer=f"wait={int(min(_WAIT, max(0.0, wait)))}"
     )
     while report["status"] == "running":
         if time.monotonic() > deadline:
@@ -213,15 +212,3 @@ def _content(fields: Mapping[str, Any]) -> dict[str, Any]:
     if "channels" in stated:
         stated["channels"] = columns(stated["channels"])
     return stated
-
-
-def _body(content: Mapping[str, Any]) -> bytes:
-    return json.dumps(content, default=_plain).encode()
-
-
-def _plain(value: Any) -> Any:
-    """A number or a time of numpy, pandas or the standard library, as JSON takes it."""
-    for convert in ("tolist", "isoformat"):
-        if hasattr(value, convert):
-            return getattr(value, convert)()
-    raise TypeError(f"{type(value).__name__} cannot be sent as JSON")

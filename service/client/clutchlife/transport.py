@@ -43,18 +43,18 @@ class Service:
     patience: float = 60.0
     on_wait: Callable[[str, float], None] = lambda _reason, _seconds: None
 
-    def post(self, path: str, body: bytes, *, prefer: str | None = None) -> dict[str, Any]:
-        """The answer to a JSON body; raises ServiceAwayError or RefusedError."""
+    def post(self, path: str, content: Mapping[str, Any], *, prefer: str | None = None) -> dict[str, Any]:
+        """The answer to a body of JSON; raises ServiceAwayError or RefusedError."""
         headers = JSON if prefer is None else JSON | {"Prefer": prefer}
-        return self._answer("POST", path, content=body, headers=headers)
+        return self._answer("POST", path, content=_body(content), headers=headers)
 
-    def put(self, path: str, body: bytes) -> dict[str, Any]:
-        """The answer to a JSON body that replaces what is at `path`; raises as `post` does."""
-        return self._answer("PUT", path, content=body, headers=JSON)
+    def put(self, path: str, content: Mapping[str, Any]) -> dict[str, Any]:
+        """The answer to a body of JSON that replaces what is at `path`; raises as `post` does."""
+        return self._answer("PUT", path, content=_body(content), headers=JSON)
 
-    def patch(self, path: str, body: bytes) -> dict[str, Any]:
-        """The answer to a JSON body that changes what is at `path`; raises as `post` does."""
-        return self._answer("PATCH", path, content=body, headers=JSON)
+    def patch(self, path: str, content: Mapping[str, Any]) -> dict[str, Any]:
+        """The answer to a body of JSON that changes what is at `path`; raises as `post` does."""
+        return self._answer("PATCH", path, content=_body(content), headers=JSON)
 
     def pages(self, path: str, **params: Any) -> Iterator[dict[str, Any]]:
         """The items of a list, page by page; raises as `post` does."""
@@ -156,6 +156,18 @@ class Service:
             if "data" in request:
                 return self.http.request(method, path, files={"file": (file.name, opened)}, **request)
             return self.http.request(method, path, content=opened, **request)
+
+
+def _body(content: Mapping[str, Any]) -> bytes:
+    return json.dumps(content, default=_plain).encode()
+
+
+def _plain(value: Any) -> Any:
+    """A number or a time of numpy, pandas or the standard library, as JSON takes it."""
+    for convert in ("tolist", "isoformat"):
+        if hasattr(value, convert):
+            return getattr(value, convert)()
+    raise TypeError(f"{type(value).__name__} cannot be sent as JSON")
 
 
 def connect(url: str, *, key: str | None = None, timeout: float = 60.0) -> httpx2.Client:

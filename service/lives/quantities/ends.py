@@ -144,7 +144,7 @@ def _paths(measured: MeasuredLife, quantity: Quantity, series: Series, progress:
 #: Draws of the first of several ends.
 _DRAWS = 2_000
 #: What a criterion says of itself.
-_GIVEN = ("quantity", "pressure_bar", "speed_rpm", "frequency_hz", "fraction", "below", "above")
+GIVEN = ("quantity", "pressure_bar", "speed_rpm", "frequency_hz", "fraction", "below", "above")
 
 
 def criteria_answer(measured: MeasuredLife, ends: Sequence[CriterionEnd], current: Mapping[str, Any]) -> dict[str, Any]:
@@ -207,7 +207,7 @@ def _item(end: CriterionEnd, now: float, first: float) -> dict[str, Any]:
 
 
 def _given(end: CriterionEnd) -> dict[str, Any]:
-    given = {name: getattr(end.criterion, name) for name in _GIVEN}
+    given = {name: getattr(end.criterion, name) for name in GIVEN}
     return given | {"initial": end.initial, "limit": _limit(end)}
 
 

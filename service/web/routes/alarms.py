@@ -17,7 +17,7 @@ from service.web import auth
 from service.web.answers import Paged, answer, json_answer, json_body, now, taking, until_ended
 from service.web.context import Context
 from service.web.problems import CHANGING, READING, SENDING
-from service.workflows import change_alarms, change_webhooks
+from service.workflows import change_alarms
 
 router = APIRouter(prefix="/v1/alarms", tags=["alarms"])
 webhook_router = APIRouter(prefix="/v1/webhooks", tags=["alarms"])
@@ -142,10 +142,10 @@ async def post_webhook(request: Request, context: auth.Admin) -> Response:
     """Add a receiver. Without a secret, the service makes one and shows it once."""
     receiver = checked(schemas.WebhookIn, await json_body(request))
     private = await run_in_threadpool(
-        change_webhooks.inside_allowed, context.database, context.settings.private_receivers
+        change_alarms.inside_allowed, context.database, context.settings.private_receivers
     )
     await run_in_threadpool(require_address, receiver.url, private=private)
-    add = partial(change_webhooks.add, by=auth.name_of_caller(request), at=now())
+    add = partial(change_alarms.add_receiver, by=auth.name_of_caller(request), at=now())
     row = await run_in_threadpool(add, context.database, receiver)
     made = None if receiver.secret else row.secret
     return json_answer(alarms.receiver_out(row, secret=made), 201, Location=f"/v1/webhooks/{row.webhook_id}")
@@ -160,7 +160,7 @@ async def read_webhook(request: Request, context: auth.Reader, webhook_id: Webho
 @webhook_router.delete("/{webhook_id}", status_code=204, response_class=Response, responses=READING)
 async def delete_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
     """Delete a receiver, its secret and its deliveries. Waiting deliveries are not sent."""
-    await run_in_threadpool(change_webhooks.remove, context.database, webhook_id)
+    await run_in_threadpool(change_alarms.remove_receiver, context.database, webhook_id)
     return Response(status_code=204)
 
 
@@ -173,7 +173,7 @@ async def list_deliveries(request: Request, context: auth.Reader, webhook_id: We
 @webhook_router.post("/{webhook_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
 async def test_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
     """Send a test to a receiver, and report the result."""
-    names = await run_in_threadpool(change_webhooks.test, context.database, webhook_id, at=now())
+    names = await run_in_threadpool(change_alarms.test_receiver, context.database, webhook_id, at=now())
     return await _tested(context, names)
 
 

@@ -14,22 +14,7 @@ from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from typing import Any
 
-from sqlalchemy import (
-    URL,
-    BigInteger,
-    Column,
-    Connection,
-    Engine,
-    Executable,
-    MetaData,
-    RowMapping,
-    Table,
-    create_engine,
-    event,
-    make_url,
-    text,
-    update,
-)
+import sqlalchemy as sa
 from sqlalchemy.exc import ArgumentError, DataError, DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry
@@ -107,10 +92,10 @@ def is_on_server(url: str) -> bool:
     return url.startswith(f"{SCHEME}://")
 
 
-def address_of(url: str) -> URL:
+def address_of(url: str) -> sa.URL:
     """The address in its parts; ValueError, which says nothing of a password, where a part is missing or wrong."""
     try:
-        address = make_url(url)
+        address = sa.make_url(url)
     except (ArgumentError, ValueError):
         raise ValueError(f"the database must be given as {SCHEME}://user@host/database") from None
     if "@" in (address.host or ""):
@@ -120,33 +105,33 @@ def address_of(url: str) -> URL:
     return address
 
 
-def shown(address: URL) -> str:
+def shown(address: sa.URL) -> str:
     """The address as logs and errors may show it: without the password and the options, one of which may be a password."""
     place = address.host or "local socket"
     return f"PostgreSQL database {address.database} ({place}{'' if address.port is None else f':{address.port}'})"
 
 
-def make_engine(address: URL, lock_timeout: float) -> Engine:
+def make_engine(address: sa.URL, lock_timeout: float) -> sa.Engine:
     """An engine on the database. Raises StorageUnavailable where the driver is not installed."""
     # a server that was started again has ended the connections that were kept
     return _engine(address, lock_timeout, pool_size=_KEPT, max_overflow=_MORE, pool_pre_ping=True)
 
 
-def make_autocommit_engine(address: URL, lock_timeout: float, *, connections: int) -> Engine:
+def make_autocommit_engine(address: sa.URL, lock_timeout: float, *, connections: int) -> sa.Engine:
     """An engine for single statements, by so many connections, which are kept: no transaction, and no look at whether a
     connection is still there, each of which would be a way to the server and back."""
     return _engine(address, lock_timeout, pool_size=connections, max_overflow=0, isolation_level="AUTOCOMMIT")
 
 
-def _engine(address: URL, lock_timeout: float, **options: Any) -> Engine:
+def _engine(address: sa.URL, lock_timeout: float, **options: Any) -> sa.Engine:
     unsaid = {name: value for name, value in _CONNECTION.items() if name not in address.query}
     try:
-        engine = create_engine(address, connect_args=unsaid, pool_timeout=lock_timeout, **options)
+        engine = sa.create_engine(address, connect_args=unsaid, pool_timeout=lock_timeout, **options)
     except ModuleNotFoundError as error:
         raise StorageUnavailable("PostgreSQL needs a driver: pip install clutchlife[postgresql]") from error
     session = _SESSION.format(lock_timeout=max(1, round(1000 * lock_timeout)))
 
-    @event.listens_for(engine, "connect")
+    @sa.event.listens_for(engine, "connect")
     def prepare(connection: Any, _: ConnectionPoolEntry) -> None:
         connection.execute(session)
         connection.commit()
@@ -154,23 +139,23 @@ def _engine(address: URL, lock_timeout: float, **options: Any) -> Engine:
     return engine
 
 
-server_tables = MetaData()
+server_tables = sa.MetaData()
 #: One row: how many transactions that changed something were committed. Each raises it as its last statement, while it alone
 #: writes, so that who reads a number also sees all that was committed up to it; the numbers of a sequence do not promise it.
 #: PostgreSQL's alone: SQLite has `PRAGMA data_version`.
-commits = Table("commits", server_tables, Column("number", BigInteger, primary_key=True, autoincrement=False))
-count_commit = update(commits).values(number=commits.c.number + 1)
+commits = sa.Table("commits", server_tables, sa.Column("number", sa.BigInteger, primary_key=True, autoincrement=False))
+count_commit = sa.update(commits).values(number=commits.c.number + 1)
 
 
 class SingleStatements:
     """Threads share it. `engine` is one of `connect.make_autocommit_engine`, `name` that of the database in errors."""
 
-    def __init__(self, engine: Engine, name: str) -> None:
+    def __init__(self, engine: sa.Engine, name: str) -> None:
         self._engine = engine
         self._name = name
         self._closed = False
 
-    def rows(self, statement: Executable, values: dict[str, Any]) -> Sequence[RowMapping]:
+    def rows(self, statement: sa.Executable, values: dict[str, Any]) -> Sequence[sa.RowMapping]:
         """The rows that a statement returns, none where it returns none. After a lost connection it is run once more.
 
         Raises StorageUnavailable where the server cannot be reached, or when this was closed, and DatabaseBusy where no
@@ -192,7 +177,7 @@ class SingleStatements:
         self._closed = True
         self._engine.dispose()
 
-    def _run(self, statement: Executable, values: dict[str, Any]) -> Sequence[RowMapping]:
+    def _run(self, statement: sa.Executable, values: dict[str, Any]) -> Sequence[sa.RowMapping]:
         with self._engine.connect() as connection:
             result = connection.execute(statement, values)
             return result.mappings().all() if result.returns_rows else ()
@@ -209,11 +194,11 @@ WRITE_KEY, SERVICE_KEY = _PROGRAM | 1, _PROGRAM | 2
 #: one. Two things of the same hash wait for each other, which harms nothing.
 _OF_ONE = int.from_bytes(b"CLUT")
 
-_lock_all = text(f"SELECT pg_advisory_xact_lock({WRITE_KEY})")
-_lock_one = text(f"SELECT pg_advisory_xact_lock_shared({WRITE_KEY}), pg_advisory_xact_lock({_OF_ONE}, :hash)")
+_lock_all = sa.text(f"SELECT pg_advisory_xact_lock({WRITE_KEY})")
+_lock_one = sa.text(f"SELECT pg_advisory_xact_lock_shared({WRITE_KEY}), pg_advisory_xact_lock({_OF_ONE}, :hash)")
 
 
-def write_lock(connection: Connection, of: str | None) -> None:
+def write_lock(connection: sa.Connection, of: str | None) -> None:
     """Have the transaction wait until it is the only one that writes `of` something, or at all, and remain so to its end."""
     if of is None:
         connection.execute(_lock_all)
@@ -222,11 +207,11 @@ def write_lock(connection: Connection, of: str | None) -> None:
         connection.execute(_lock_one, {"hash": hashed})
 
 
-def hold_service_lock(engine: Engine, name: str) -> None:
+def hold_service_lock(engine: sa.Engine, name: str) -> None:
     """Have every connection of a service hold the services' lock, which many may: also those that are made after the server
     was started again. Raises DatabaseBusy from then on where a migration takes longer than a connection waits for locks."""
 
-    @event.listens_for(engine, "connect")
+    @sa.event.listens_for(engine, "connect")
     def hold(connection: Any, _: ConnectionPoolEntry) -> None:
         try:
             connection.execute(f"SELECT pg_advisory_lock_shared({SERVICE_KEY})")
@@ -238,7 +223,7 @@ def hold_service_lock(engine: Engine, name: str) -> None:
 
 
 @contextmanager
-def migration_lock(address: URL, lock_timeout: float) -> Iterator[None]:
+def migration_lock(address: sa.URL, lock_timeout: float) -> Iterator[None]:
     """Held inside: the lock under which no service runs. Raises ServiceRuns where one does not end within the time [s]."""
     name = shown(address)
     engine = make_engine(address, lock_timeout)

@@ -14,20 +14,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager, nullcontext
 
-from sqlalchemy import (
-    URL,
-    BigInteger,
-    Column,
-    Connection,
-    LargeBinary,
-    Table,
-    Text,
-    bindparam,
-    inspect,
-    or_,
-    select,
-    text,
-)
+import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -49,28 +36,28 @@ from storage.engine.postgresql.connect import (
 )
 from storage.migrations.upgrade import current, head, upgrade
 
-shared_answer = Table(
+shared_answer = sa.Table(
     "shared_answer",
     server_tables,
-    Column("clutch_id", Text, primary_key=True),
-    Column("name", Text, primary_key=True),
-    Column("release", Text, nullable=False),
-    Column("revision", BigInteger, nullable=False),
-    Column("body", LargeBinary, nullable=False),
+    sa.Column("clutch_id", sa.Text, primary_key=True),
+    sa.Column("name", sa.Text, primary_key=True),
+    sa.Column("release", sa.Text, nullable=False),
+    sa.Column("revision", sa.BigInteger, nullable=False),
+    sa.Column("body", sa.LargeBinary, nullable=False),
     prefixes=["UNLOGGED"],
 )
 
-_newest = select(shared_answer).where(
-    shared_answer.c.clutch_id == bindparam("clutch"),
-    shared_answer.c.name == bindparam("asked"),
-    shared_answer.c.release == bindparam("by"),
+_newest = sa.select(shared_answer).where(
+    shared_answer.c.clutch_id == sa.bindparam("clutch"),
+    shared_answer.c.name == sa.bindparam("asked"),
+    shared_answer.c.release == sa.bindparam("by"),
 )
 _new = insert(shared_answer)
 #: Another build's answer is replaced, whatever its revision: a clutch has one row of a name.
 _keep = _new.on_conflict_do_update(
     index_elements=["clutch_id", "name"],
     set_={name: _new.excluded[name] for name in ("release", "revision", "body")},
-    where=or_(
+    where=sa.or_(
         shared_answer.c.release != _new.excluded["release"], shared_answer.c.revision <= _new.excluded["revision"]
     ),
 )
@@ -90,7 +77,7 @@ class ServerAnswers(SharedAnswers):
         self._statements.rows(_keep, {column.name: getattr(answer, column.name) for column in shared_answer.columns})
 
 
-_SNAPSHOT = text("""
+_SNAPSHOT = sa.text("""
 SELECT (SELECT number FROM commits) AS version,
        EXISTS (SELECT 1 FROM access_key) AS keys_are_needed,
        (SELECT json_object_agg(clutch_id, revision) FROM clutch WHERE clutch_id = ANY(:clutches)) AS revisions,
@@ -174,7 +161,7 @@ class ServerWatch(Watch):
 
 
 #: A transaction that changed nothing has no number and is not counted.
-_COUNT = count_commit.where(text("pg_current_xact_id_if_assigned() IS NOT NULL"))
+_COUNT = count_commit.where(sa.text("pg_current_xact_id_if_assigned() IS NOT NULL"))
 
 
 class ServerDatabase(Database):
@@ -183,7 +170,7 @@ class ServerDatabase(Database):
     path = None
     journal_mode = None
 
-    def __init__(self, address: URL, *, lock_timeout: float, found: bool = False, serving: bool = False) -> None:
+    def __init__(self, address: sa.URL, *, lock_timeout: float, found: bool = False, serving: bool = False) -> None:
         super().__init__(shown(address), found=found)
         self.url = address.render_as_string(hide_password=False)
         self._address = address
@@ -203,12 +190,12 @@ class ServerDatabase(Database):
         self.answers = ServerAnswers(self._sharing)
 
     @contextmanager
-    def _read(self) -> Iterator[Connection]:
+    def _read(self) -> Iterator[sa.Connection]:
         with translated(self.name), self._readers.begin() as connection:
             yield connection
 
     @contextmanager
-    def writing(self, *, of: str | None = None) -> Iterator[Connection]:
+    def writing(self, *, of: str | None = None) -> Iterator[sa.Connection]:
         self._refuse_closed()
         with translated(self.name), self._writers.begin() as connection:
             write_lock(connection, of)
@@ -228,7 +215,7 @@ class ServerDatabase(Database):
             return {"database": f"the database is at revision {revision}, this release needs {head()}"}
         return {"database": "the server is a standby, which is only read"} if standby else {}
 
-    def damage(self, connection: Connection) -> list[str]:  # noqa: ARG002  (pages are the server's: pg_amcheck)
+    def damage(self, connection: sa.Connection) -> list[str]:  # noqa: ARG002  (pages are the server's: pg_amcheck)
         """Nothing: the server refuses rows that refer to missing ones, and checks its pages itself."""
         return []
 
@@ -266,11 +253,11 @@ class ServerDatabase(Database):
         with self.reading() as connection:
             _require_utf8(connection, self.name)
             revision = current(connection)
-            has_server_tables = set(inspect(connection).get_table_names()) >= set(server_tables.tables)
+            has_server_tables = set(sa.inspect(connection).get_table_names()) >= set(server_tables.tables)
         return None if revision == head() and has_server_tables else revision is not None
 
 
-def open_server(address: URL, *, lock_timeout: float, serving: bool = False) -> ServerDatabase:
+def open_server(address: sa.URL, *, lock_timeout: float, serving: bool = False) -> ServerDatabase:
     """Open a database on a server, make the tables of an empty one and run the migrations that it lacks.
 
     Raises DatabaseTooNew on that of a newer release, StorageUnavailable where it cannot be used or is not in UTF-8,
@@ -282,18 +269,18 @@ def open_server(address: URL, *, lock_timeout: float, serving: bool = False) -> 
         database.migrate()
     database = ServerDatabase(address, lock_timeout=lock_timeout, serving=serving)
 
-    def check(connection: Connection) -> None:
+    def check(connection: sa.Connection) -> None:
         refuse_newer(current(connection))  # a newer release may have migrated it in between
         database.watch.snapshot()  # makes its connection: a later one waits behind a migration that waits for this service
 
     return database.where(check)
 
 
-def find_server(address: URL, *, lock_timeout: float) -> ServerDatabase:
+def find_server(address: sa.URL, *, lock_timeout: float) -> ServerDatabase:
     """Open a database on a server to read it as it is. Raises DatabaseTooNew, StorageUnavailable where it has no tables."""
     database = ServerDatabase(address, lock_timeout=lock_timeout, found=True)
 
-    def check(connection: Connection) -> None:
+    def check(connection: sa.Connection) -> None:
         revision = current(connection)
         if revision is None:
             raise StorageUnavailable(f"{database.name} is empty: `clutchlife serve` makes its tables")
@@ -302,7 +289,7 @@ def find_server(address: URL, *, lock_timeout: float) -> ServerDatabase:
     return database.where(check)
 
 
-def server_has_tables(address: URL, *, lock_timeout: float) -> bool:
+def server_has_tables(address: sa.URL, *, lock_timeout: float) -> bool:
     """Whether the database holds this program's tables. Raises StorageUnavailable where there is no such database."""
     with (
         closing(ServerDatabase(address, lock_timeout=lock_timeout, found=True)) as database,
@@ -311,7 +298,7 @@ def server_has_tables(address: URL, *, lock_timeout: float) -> bool:
         return current(connection) is not None
 
 
-def _require_utf8(connection: Connection, name: str) -> None:
+def _require_utf8(connection: sa.Connection, name: str) -> None:
     encoding = connection.exec_driver_sql("SHOW server_encoding").scalar_one()
     if encoding != "UTF8":
         raise StorageUnavailable(f"{name} is encoded in {encoding}, it must be made with ENCODING 'UTF8'")

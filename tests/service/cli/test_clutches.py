@@ -72,7 +72,7 @@ def test_alarms_are_listed_and_acknowledged(server: Server) -> None:
     at = ("--url", server.url)
     assert "no alarm" in clutchlife("alarms", "--clutch", "worn", *at)
     with Client(server.url) as client:
-        client.service.post("/v1/alarms", json.dumps({"clutch_id": "worn", "quantity": "state"}).encode())
+        client.service.post("/v1/alarms", {"clutch_id": "worn", "quantity": "state"})
     (event,) = json.loads(clutchlife("alarms", "--json", *at))
     assert "worn: failure" in clutchlife("alarms", *at)
     assert "acknowledged" in clutchlife("alarms", "--acknowledge", event["event_id"], "--note", "seen", *at)

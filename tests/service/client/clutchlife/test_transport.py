@@ -97,7 +97,7 @@ def test_a_wait_beyond_its_patience_is_not_begun(clock: Clock) -> None:
 @pytest.mark.usefixtures("clock")
 def test_it_tells_whether_a_lost_request_may_have_been_carried_out(answer: Served, perhaps: bool) -> None:
     with pytest.raises(ServiceAwayError) as raised:
-        service(answer, patience=5).post("/x", b"{}")
+        service(answer, patience=5).post("/x", {})
     assert raised.value.perhaps_stored is perhaps
 
 
