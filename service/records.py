@@ -34,8 +34,8 @@ from service.lives.run_analysis import LevelFit, Value
 from service.lives.tracks import CARRIED, States, Tracked
 from service.logging import request_id
 from service.schemas.base import of_row
-from service.schemas.clutch import ClutchIn
-from service.schemas.inspection import PhotographOut
+from service.schemas.clutch import ClutchIn, LatestDiagnosis
+from service.schemas.inspection import InspectionOut, PhotographOut
 from service.schemas.rig import RigOut
 from service.settings import CODE_VERSION
 from storage import assumptions, changes, clutches, diagnoses, inspections, jobs, results, rigs, runs
@@ -426,15 +426,15 @@ def latest_diagnosis(row: ClutchRow, verdict: VerdictRow | None) -> dict[str, An
     if verdict is None:
         return None
     earlier = verdict.life != row.summary.get("life", "")
-    return {
-        "diagnosis_id": verdict.diagnosis_id,
-        "verdict": verdict.verdict,
-        "causes": list(verdict.causes),
-        "advice": {name: verdict.advice[0][name] for name in ("test", "separates")} if verdict.advice else None,
-        "adoptable": verdict.adoptable and not earlier,
-        "adopted": verdict.adopted and not earlier,
-        "earlier_life": earlier,
-    }
+    return of_row(
+        LatestDiagnosis,
+        verdict,
+        causes=list(verdict.causes),
+        advice={name: verdict.advice[0][name] for name in ("test", "separates")} if verdict.advice else None,
+        adoptable=verdict.adoptable and not earlier,
+        adopted=verdict.adopted and not earlier,
+        earlier_life=earlier,
+    )
 
 
 def condition(row: ClutchRow) -> dict[str, str]:
@@ -472,16 +472,13 @@ def inspection_hash(content: Mapping[str, Any]) -> str:
 def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) -> list[dict[str, Any]]:
     photographs = inspections.photographs(connection, [row.inspection_key for row in rows])
     return [
-        {"clutch_id": row.clutch_id, "inspection_id": row.inspection_id}
-        | row.content
-        | {
-            "content_sha256": row.content_sha256,
-            "received_at": row.received_at,
-            "received_by": row.received_by,
-            "state": row.state,
-            "duplicate": False,
-            "photographs": [photograph_answer(photograph) for photograph in photographs[row.inspection_key]],
-        }
+        of_row(
+            InspectionOut,
+            row,
+            **row.content,
+            duplicate=False,
+            photographs=[photograph_answer(photograph) for photograph in photographs[row.inspection_key]],
+        )
         for row in rows
     ]
 

@@ -11,7 +11,7 @@ from scipy.special import ndtri
 
 from models.clutch import Geometry
 from models.friction.slope import slope_gradient
-from models.friction.stribeck import StribeckParameters, slope
+from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, slope
 from models.prognosis.first_passage import PassageStatus
 from service.columns import RADIANS_PER_SECOND_PER_RPM, bar
 from service.lives.condition import (
@@ -99,12 +99,7 @@ def slope_quantile(rule: AlarmIn, fit: FitRow, geometry: Geometry) -> float | No
 
     dμ/dv = (dS/dv) / (torque of a unit COF), sd = √(gᵀ Σ g) / (torque of a unit COF), as `models.friction.slope` has them.
     """
-    parameters = StribeckParameters(
-        static_torque=fit.static_torque,
-        coulomb_ratio=fit.coulomb_ratio,
-        stribeck_velocity=fit.stribeck_velocity,
-        viscous_coefficient=fit.viscous_coefficient,
-    )
+    parameters = StribeckParameters(**{name: getattr(fit, name) for name in PARAMETER_NAMES})
     velocity = geometry.sliding_velocity(np.array(rule.speed_rpm * RADIANS_PER_SECOND_PER_RPM))
     gradient = slope_gradient(float(velocity), parameters)
     variance = float(gradient @ np.reshape(fit.unbiased_covariance or fit.covariance, (4, 4)) @ gradient)

@@ -7,7 +7,7 @@ from typing import Any
 from service.alarms import raising, receivers
 from service.errors import found
 from service.lists import Part, by_key, by_name
-from service.schemas.alarm import DeliveryOut
+from service.schemas.alarm import AlarmOut, DeliveryOut
 from service.schemas.base import of_row
 from storage import alarms, webhooks
 from storage.alarms import AlarmRow
@@ -16,8 +16,7 @@ from storage.webhooks import DeliveryRow, WebhookRow
 
 
 def rule_out(row: AlarmRow) -> dict[str, Any]:
-    rule = raising.rule_of(row).model_dump(mode="json")
-    return rule | {"alarm_id": row.alarm_id, "saved_at": row.saved_at, "saved_by": row.saved_by}
+    return of_row(AlarmOut, row, **raising.rule_of(row).model_dump(mode="json"))
 
 
 def page(database: Database, part: Part, *, only: Collection[str] | None = None) -> dict[str, Any]:

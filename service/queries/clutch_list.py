@@ -15,6 +15,8 @@ from service import records
 from service.lists import Part, by_name, page_as_bytes
 from service.lives.condition import STATES, stated
 from service.queries.cache import AnswerCache, to_json
+from service.schemas.base import of_row
+from service.schemas.clutch import ClutchOut
 from storage import assumptions, clutches, diagnoses, jobs, runs
 from storage.clutches import Choice, ClutchRow
 from storage.engine.database import Database
@@ -145,14 +147,6 @@ def _shown(
 
 
 def _item(row: ClutchRow, held: int, diagnosis: dict[str, Any] | None, state: dict[str, Any]) -> dict[str, Any]:
-    return records.record(row).model_dump(mode="json") | {
-        "archived": row.archived,
-        "created_at": row.created_at,
-        "revision": row.revision,
-        **state,
-        "runs": row.summary.get("runs", 0),
-        "held": held,
-        "summary": stated(row.summary),
-        "recent": row.summary.get("recent"),
-        "diagnosis": diagnosis,
-    }
+    said = {"runs": row.summary.get("runs", 0), "recent": row.summary.get("recent"), "summary": stated(row.summary)}
+    beside = state | said | {"held": held, "diagnosis": diagnosis}
+    return of_row(ClutchOut, row, **records.record(row).model_dump(mode="json") | beside)

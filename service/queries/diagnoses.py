@@ -13,6 +13,8 @@ from service.lists import Part, by_key
 from service.lives.assumptions import BASELINE
 from service.lives.diagnosis.report import empty
 from service.lives.model_correction import extension_of
+from service.schemas.base import of_row
+from service.schemas.diagnosis import ModelVersion
 from storage import assumptions, changes, diagnoses
 from storage.assumptions import AdoptedRow
 from storage.diagnoses import DiagnosisRow
@@ -108,13 +110,7 @@ def model(database: Database, clutch_id: str) -> dict[str, Any]:
             "version": rows[0].version if rows else 0,
             "diagnosis_id": None if in_force is None else in_force.diagnosis_id,
             "versions": [
-                {
-                    "version": row.version,
-                    "diagnosis_id": row.diagnosis_id,
-                    "adopted_at": row.adopted_at,
-                    "model": _name(_extension(connection, clutch_id, row)),
-                }
-                for row in rows
+                of_row(ModelVersion, row, model=_name(_extension(connection, clutch_id, row))) for row in rows
             ],
         }
 

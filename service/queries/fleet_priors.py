@@ -10,6 +10,8 @@ from models.degradation.severity import SeverityBasis
 from models.prognosis.criteria import FEWEST_SEVERITIES
 from models.prognosis.ended_lives import EndedLife, severity_exponent
 from models.prognosis.fleet import FleetPrior
+from service.schemas.base import of_row
+from service.schemas.fleet import FleetPriorOut
 from storage import assumptions
 from storage.assumptions import FleetPriorRow
 from storage.engine.database import Database
@@ -38,17 +40,17 @@ def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
 
 def _item(row: FleetPriorRow) -> dict[str, Any]:
     """A prior as it goes out: medians, and the factor or share by which two thirds of the clutches stay within."""
-    return {
-        "kind": row.fleet,
-        "version": row.version,
-        "created_at": row.created_at,
-        "clutches": len(row.members),
-        "members": list(row.members),
-        "population": _population(FleetPrior.from_dict(row.content)),
-        "ended_lives": len(row.content.get("ended", ())),
-        "censored_lives": len(row.content.get("censored", ())),
-        "severity_exponent": _severity_exponent(row),
-    }
+    return of_row(
+        FleetPriorOut,
+        row,
+        kind=row.fleet,
+        clutches=len(row.members),
+        members=list(row.members),
+        population=_population(FleetPrior.from_dict(row.content)),
+        ended_lives=len(row.content.get("ended", ())),
+        censored_lives=len(row.content.get("censored", ())),
+        severity_exponent=_severity_exponent(row),
+    )
 
 
 def _severity_exponent(row: FleetPriorRow) -> dict[str, float] | None:
