@@ -304,7 +304,7 @@ def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
 
 def untested_since(payload: Mapping[str, Any]) -> float | None:
     """The cycles of the last test where a reached end is predicted to lie after it: no measurement has seen it."""
-    tested, end = payload["current"]["measured_at_cycles"], payload["end_of_life_cycles"]["0.5"]
+    tested, end = payload["current"]["measured_at_cycles"], payload.get("end_of_life_cycles", {}).get("0.5")
     return tested if tested is not None and end is not None and end > tested else None
 
 

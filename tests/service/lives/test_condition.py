@@ -295,6 +295,12 @@ def test_a_clutch_that_shudders_is_no_longer_normal(tmp_path: Path) -> None:
     assert states[1]["name"] in ("failure", "maintenance")
 
 
+def test_a_summary_that_was_stored_without_the_end_still_has_a_line() -> None:
+    stored = summary(0.0, status="reached")
+    del stored["end_of_life_cycles"]
+    assert top_line(stored, disputed=False)["headline"].startswith("Failure: the end of life is reached")
+
+
 def test_a_trajectory_goes_on_as_far_as_is_asked(bench: Bench) -> None:
     for cycles in (0.0, 1000.0, 2000.0):
         bench.send(body("test", f"t{cycles:g}", cycles))
