@@ -160,18 +160,11 @@ def create_app(settings: Settings) -> FastAPI:
     openapi.install(app, settings.root_path)
     app.add_middleware(Polls)
     app.add_middleware(
-        BodyLimit,
-        most=settings.max_body_mb * MIB,
-        most_file=settings.max_file_mb * MIB,
-        seconds=settings.body_seconds,
+        BodyLimit, most=settings.max_body_mb * MIB, most_file=settings.max_file_mb * MIB, seconds=settings.body_seconds
     )
     app.add_middleware(Encodings)
     app.add_middleware(Heads)
-    app.add_middleware(
-        Shares,
-        per_second=settings.requests_per_second,
-        at_once=settings.requests_at_once,
-    )
+    app.add_middleware(Shares, per_second=settings.requests_per_second, at_once=settings.requests_at_once)
     app.add_middleware(Edge, metrics=metrics)
     app.add_middleware(RootPath, root=settings.root_path)
     return app

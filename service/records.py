@@ -237,12 +237,7 @@ def store_judged(
         doubts = tuple(notice_items(judged.doubts.get(event.run_id, ())))
         after = replace(row, state=new_state, doubts=doubts)
         runs.set_state(
-            connection,
-            row.run_key,
-            state=new_state,
-            cycles=row.cycles,
-            sent_cycles=row.sent_cycles,
-            doubts=doubts,
+            connection, row.run_key, state=new_state, cycles=row.cycles, sent_cycles=row.sent_cycles, doubts=doubts
         )
         if event.run_id in aside:
             results.write_fits(connection, row.run_key, fit_rows(levels.get(event.run_id, ()), aside[event.run_id]))

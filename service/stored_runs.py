@@ -20,15 +20,7 @@ from service.lives.model_correction import RunReader
 from service.lives.outlook import Evidence, engagement_rows, needs_evidence, summarised
 from service.lives.payloads import receipt
 from service.lives.plausibility.doubts import doubts_alone
-from service.lives.recomputation import (
-    ClutchState,
-    Levels,
-    Receipt,
-    Results,
-    Tracking,
-    computed_again,
-    computed_aside,
-)
+from service.lives.recomputation import ClutchState, Levels, Receipt, Results, Tracking, computed_again, computed_aside
 from service.lives.run_analysis import analyse
 from service.schemas.clutch import ClutchIn
 from service.settings import CODE_VERSION

@@ -292,12 +292,7 @@ alarm_event = Table(
     Column("cleared_at", TEXT),
     UniqueConstraint("event_id", name="alarm_event_once"),
     Index(
-        "alarm_event_open",
-        "clutch_id",
-        "alarm_id",
-        unique=True,
-        sqlite_where=NOT_CLEARED,
-        postgresql_where=NOT_CLEARED,
+        "alarm_event_open", "clutch_id", "alarm_id", unique=True, sqlite_where=NOT_CLEARED, postgresql_where=NOT_CLEARED
     ),
 )
 

@@ -157,11 +157,7 @@ def silence_in_words(since: str) -> str:
 
 
 def top_line(
-    summary: Mapping[str, Any],
-    *,
-    disputed: bool,
-    diagnosis: Mapping[str, Any] | None = None,
-    silent: str | None = None,
+    summary: Mapping[str, Any], *, disputed: bool, diagnosis: Mapping[str, Any] | None = None, silent: str | None = None
 ) -> dict[str, str]:
     """What stands first on a clutch's page and in `clutchlife status`: `headline`, its state in words, the safe bound with
     its date at this pace, and the median; `action`, one sentence of what to do. `diagnosis`: the newest one as it goes out.

@@ -377,11 +377,7 @@ def nearest_pressure(level: float, pressures: Sequence[float]) -> float | None:
 
 
 def duty_block(
-    end: float,
-    cycles: float | None,
-    energy_kj: float | None,
-    speed_rpm: float | None,
-    duration_s: float | None,
+    end: float, cycles: float | None, energy_kj: float | None, speed_rpm: float | None, duration_s: float | None
 ) -> Block | None:
     """A block of duty in SI units, None where a run is none."""
     if cycles is None:

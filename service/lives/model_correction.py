@@ -89,11 +89,7 @@ def extension_of(content: Mapping[str, Any]) -> Extension:
 
 
 def corrected_cofs(
-    extension: Extension,
-    record: ClutchIn,
-    life: Life,
-    runs: Sequence[CampaignRun],
-    tests: Iterable[StationaryRun],
+    extension: Extension, record: ClutchIn, life: Life, runs: Sequence[CampaignRun], tests: Iterable[StationaryRun]
 ) -> dict[str, Corrected]:
     """run_id -> pressure [Pa] -> mean COF, its deviation, and mean COF under each draw, of the `tests` from which the
     extension takes something.

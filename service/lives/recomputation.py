@@ -279,12 +279,7 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
                 shown = predictions[life.events[index].cycles, SHOWN].payload
                 odd = [warning for warning in shown["warnings"] if warning["code"] == OFF_TRACK]
                 warnings[life.events[index].run_id] = odd
-    return Tracking(
-        predictions=tuple(predictions.values()),
-        filters=filters,
-        warnings=warnings,
-        again=carried is None,
-    )
+    return Tracking(predictions=tuple(predictions.values()), filters=filters, warnings=warnings, again=carried is None)
 
 
 def _carried(state: ClutchState, life: Life, whole: Series, newest: Event) -> States | None:

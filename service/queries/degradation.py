@@ -77,11 +77,7 @@ def degradation(
     held = held_beside(len(chosen.held))
     head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}
     if measured is None or (wanted is None and not measured.life.reference):
-        nothing: dict[str, Any] = {
-            "items": [],
-            "rebuilt": None,
-            "severity_estimate": None,
-        }
+        nothing: dict[str, Any] = {"items": [], "rebuilt": None, "severity_estimate": None}
         return head | nothing | held | chosen.assumptions.named() | {"next": None}
     estimate = None
     if wanted is None:

@@ -65,12 +65,7 @@ def remaining_life(
         now = at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf)
         earlier = not now and bool(row.summary.get("held"))
         state = records.state(connection, clutch_id, carried=carried_on) if stored is None or earlier else None
-    head = {
-        "clutch_id": clutch_id,
-        "method": method,
-        "revision": row.revision,
-        "origin": row.record["origin"],
-    }
+    head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": row.record["origin"]}
     summary, count = row.summary if now else {}, row.summary.get("held", 0)
     among = (summary.get("with_held") or {}).get(method)
     if state is not None:
@@ -216,11 +211,7 @@ def _by_criteria(state: ClutchState, chosen: ChosenLife, evidence: Evidence, req
 
 
 def _wanted(
-    record: EndOfLifeIn,
-    measured: MeasuredLife,
-    quantity: str | None,
-    criterion: str | None,
-    pressure_bar: float | None,
+    record: EndOfLifeIn, measured: MeasuredLife, quantity: str | None, criterion: str | None, pressure_bar: float | None
 ) -> Sequence[CriterionIn]:
     own = record.criteria or (CriterionIn(quantity="mean_cof", fraction=record.cof_fraction),)
     if quantity is None and criterion is None and pressure_bar is None:

@@ -42,10 +42,7 @@ def surface(database: Database, clutch_id: str) -> dict[str, Any]:
 
 
 def surfaces(
-    events: Sequence[Event],
-    assumptions: Assumptions,
-    fits: Mapping[str, Sequence[LevelFit]],
-    geometry: Geometry,
+    events: Sequence[Event], assumptions: Assumptions, fits: Mapping[str, Sequence[LevelFit]], geometry: Geometry
 ) -> dict[str, Any]:
     """Parameters over cycles [k] by pressure [p], torque over cycles, pressure and speed [v], of the present life; with too
     few tests for a track at the cycles of these alone.

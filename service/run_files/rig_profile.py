@@ -72,9 +72,7 @@ def named(profile: RigProfile, filename: str, cells: Mapping[str, str]) -> Named
         beside = {label.strip().rstrip(":=").strip().casefold(): text for label, text in cells.items()}
         cycles = _count(beside.get(profile.cycles_cell.strip().rstrip(":=").strip().casefold()))
     return Named(
-        kind=words.get((groups.get("kind") or "").casefold(), profile.kind),
-        cycles=cycles,
-        run_id=groups.get("run_id"),
+        kind=words.get((groups.get("kind") or "").casefold(), profile.kind), cycles=cycles, run_id=groups.get("run_id")
     )
 
 

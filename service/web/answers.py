@@ -214,11 +214,7 @@ async def computed_answer(
 
 
 async def computed_table(
-    of: OfClutch,
-    query: Callable[..., dict[str, Any]],
-    table: Table,
-    *arguments: Hashable,
-    prefer: str | None = None,
+    of: OfClutch, query: Callable[..., dict[str, Any]], table: Table, *arguments: Hashable, prefer: str | None = None
 ) -> Response:
     """The CSV export of the same: a page of the rows of its JSON, which goes on where that does. Raises NotFoundError."""
     revision = _revision(of.request, of.clutch_id)

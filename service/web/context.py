@@ -106,7 +106,6 @@ AtCycles = Annotated[
 Prefer = Annotated[
     str | None,
     Header(
-        max_length=200,
-        description="`wait=SECONDS`: how long to wait for the newest answer while the service is busy",
+        max_length=200, description="`wait=SECONDS`: how long to wait for the newest answer while the service is busy"
     ),
 ]

@@ -33,9 +33,7 @@ def _header(description: str, example: object) -> Json:
 
 
 _TAG = {"ETag": _header("A strong entity tag: it changes when and only when the answer does", '"9f86d081884c7d65"')}
-_READ = _TAG | {
-    "Cache-Control": _header("Keep it, and ask each time whether it still holds", "no-cache"),
-}
+_READ = _TAG | {"Cache-Control": _header("Keep it, and ask each time whether it still holds", "no-cache")}
 _REVISION = {"Clutchlife-Revision": _header("The clutch's revision that the answer is of", "17")}
 _LINK = {
     "Link": _header('The next page, `rel="next"`; absent on the last', '</v1/clutches?cursor=WzEsIiJd>; rel="next"')
@@ -54,10 +52,7 @@ _OF_STATUS = {
     "415": {"Accept-Encoding": _header("The encodings of a body that are taken", "gzip")},
     "503": {"Retry-After": _header("Seconds after which to try again", "1")},
 }
-_UNCHANGED = {
-    "description": "Unchanged: `If-None-Match` names the present answer",
-    "headers": _TAG | _ID,
-}
+_UNCHANGED = {"description": "Unchanged: `If-None-Match` names the present answer", "headers": _TAG | _ID}
 
 
 def install(app: FastAPI, root: str) -> None:

@@ -480,9 +480,7 @@ def in_rounds(
         again: list[str] = []
 
         def items(
-            names: Iterable[str] = names,
-            sent: dict[int, tuple[str, Item]] = sent,
-            ended: list[Ended[Result]] = ended,
+            names: Iterable[str] = names, sent: dict[int, tuple[str, Item]] = sent, ended: list[Ended[Result]] = ended
         ) -> Iterator[Item]:
             index = 0
             for name in names:

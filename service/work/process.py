@@ -24,10 +24,7 @@ from storage.encoding import Json, to_text
 _TAIL = 8000
 #: Memory that arrays gave back is kept for the next ones: having it mapped again each time takes as long as what is
 #: computed in it.
-_MEMORY = {
-    "MALLOC_MMAP_THRESHOLD_": str(32 << 20),
-    "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
-}
+_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 << 20), "MALLOC_TRIM_THRESHOLD_": str(1 << 30)}
 #: With this begins a line that says how far the job has come, JSON; its last line is the answer.
 PROGRESS = b"progress "
 #: The status with which a process ends that the database was away from: the job is to be done again.

@@ -245,12 +245,7 @@ def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
         levels={**loaded.levels, run_id: analysis.fits},
         receipts={**loaded.receipts, run_id: answer},
         again=Arrival(
-            run=run,
-            sampled="time_s" in run.channels,
-            analysis=analysis,
-            shown=shown,
-            odd=odd,
-            received_at=received_at,
+            run=run, sampled="time_s" in run.channels, analysis=analysis, shown=shown, odd=odd, received_at=received_at
         ),
     )
 
@@ -403,12 +398,7 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
     clutch_id = request.clutch_id
     for row in changed.rows:
         runs.set_state(
-            connection,
-            row.run_key,
-            state=row.state,
-            cycles=row.cycles,
-            sent_cycles=row.sent_cycles,
-            doubts=row.doubts,
+            connection, row.run_key, state=row.state, cycles=row.cycles, sent_cycles=row.sent_cycles, doubts=row.doubts
         )
         if loaded.again is not None:
             analysis = loaded.again.analysis

@@ -336,13 +336,7 @@ def _levels(database: Database, state: ClutchState, event: Event, arrival: Arriv
 
 
 def _store(
-    connection: Connection,
-    clutch_id: str,
-    arrival: Arrival,
-    columns: channels.Encoded,
-    outcome: _Outcome,
-    *,
-    by: str,
+    connection: Connection, clutch_id: str, arrival: Arrival, columns: channels.Encoded, outcome: _Outcome, *, by: str
 ) -> dict[str, Any]:
     """The run, its channels and fits, and what it changes; the revision moves on. Returns the receipt."""
     run = arrival.run

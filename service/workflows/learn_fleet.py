@@ -136,12 +136,7 @@ def _names(database: Database, of: str | None) -> list[str]:
 
 
 def _learned(
-    database: Database,
-    of: str | None,
-    now: str,
-    at_once: AtOnce,
-    executor: Executor,
-    advance: Callable[[], object],
+    database: Database, of: str | None, now: str, at_once: AtOnce, executor: Executor, advance: Callable[[], object]
 ) -> set[str]:
     """The fleets, by key, of which a new version was learned and stored."""
     fresh: set[str] = set()

@@ -9,17 +9,7 @@ from typing import Any, TypeVar
 
 import httpx2
 
-from .answers import (
-    RefusedError,
-    ServiceAwayError,
-    content,
-    csv,
-    image,
-    passing,
-    perhaps_stored,
-    problem,
-    retry_after,
-)
+from .answers import RefusedError, ServiceAwayError, content, csv, image, passing, perhaps_stored, problem, retry_after
 
 #: What is read of a response.
 Answer = TypeVar("Answer")
@@ -67,11 +57,7 @@ class Service:
             cursor = {"cursor": page["next"]}
 
     def post_file(
-        self,
-        path: str,
-        file: Path,
-        parameters: Mapping[str, str] | None,
-        wanted: Callable[[], bool] = lambda: True,
+        self, path: str, file: Path, parameters: Mapping[str, str] | None, wanted: Callable[[], bool] = lambda: True
     ) -> dict[str, Any]:
         """The answer to a run's file, or to a JSON body where there are no parameters; raises as `post` does.
 

@@ -9,15 +9,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.campaign import (
-    Campaign,
-    DutyRun,
-    DynamicRun,
-    EventKind,
-    MaintenanceEvent,
-    Oil,
-    StationaryRun,
-)
+from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, Oil, StationaryRun
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, Record
 from models.records.torque_filter import filtered_as_torque

@@ -122,10 +122,7 @@ def columns_of(run: IncomingRun, analysis: Analysis) -> Columns | None:
         return None
     samples = SampledChannels(run.channels)
     return Columns(
-        pressure=samples.pressure,
-        speed=samples.speed,
-        torque=samples.torque,
-        oil_temperature=samples.oil_temperature,
+        pressure=samples.pressure, speed=samples.speed, torque=samples.torque, oil_temperature=samples.oil_temperature
     )
 
 

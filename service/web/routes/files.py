@@ -84,12 +84,7 @@ async def post_run_file(
     return Response(content=to_text(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
 
-_READING_FILE = READING | {
-    200: {
-        "content": FILE_CONTENT,
-        "description": "The file as it was sent",
-    }
-}
+_READING_FILE = READING | {200: {"content": FILE_CONTENT, "description": "The file as it was sent"}}
 
 
 @router.get("/{run_id}/file", response_class=Response, responses=_READING_FILE)

@@ -20,13 +20,7 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from storage.engine.database import translated_by
-from storage.engine.errors import (
-    DatabaseBusy,
-    ServiceRuns,
-    StorageError,
-    StorageUnavailable,
-    UnstorableText,
-)
+from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, StorageUnavailable, UnstorableText
 
 #: A lock that was not free in time, a serialization failure, a deadlock, and too many connections.
 LOCK_NOT_FREE = "55P03"
@@ -69,12 +63,7 @@ SCHEME = "postgresql+psycopg"
 _KEPT, _MORE = 4, 12
 #: What libpq is told where the address does not say: how long [s] a connection may take to be made, after how long [ms] a
 #: server whose machine is lost counts as gone, and how often [s] one that says nothing is asked. Chosen; no table.
-_CONNECTION = {
-    "connect_timeout": 10,
-    "keepalives_idle": 30,
-    "keepalives_interval": 10,
-    "tcp_user_timeout": 60_000,
-}
+_CONNECTION = {"connect_timeout": 10, "keepalives_idle": 30, "keepalives_interval": 10, "tcp_user_timeout": 60_000}
 #: Settings of every session. Where the machine of a writer is lost, the server notices within a minute and ends its
 #: transaction, and with it the lock. What is acknowledged is on the disk, unless a server promises more (replicas).
 _SESSION = """

@@ -170,11 +170,7 @@ class FileDatabase(Database):
     @contextmanager
     def writing(self, *, of: str | None = None) -> Iterator[Connection]:  # noqa: ARG002  (a file has one writer)
         self._refuse_closed()
-        with (
-            self._write_lock.held(),
-            translated(self.path),
-            transaction(self._engine, "BEGIN IMMEDIATE") as connection,
-        ):
+        with self._write_lock.held(), translated(self.path), transaction(self._engine, "BEGIN IMMEDIATE") as connection:
             yield connection
 
     def close(self) -> None:
