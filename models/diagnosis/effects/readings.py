@@ -174,7 +174,8 @@ def _pressure_offset_change(scene: Scene, amplitude: float, shape: Shape) -> Flo
         life = life_of(scene)
         share = life ** math.exp(log_power) if course == OFFSET_GROWING else flattening(life, value)
     pressed = np.maximum(scene.points.pressure + amplitude * share, 0.0)  # nothing pulls the plates apart
-    return np.asarray(scene.curve_at(pressure=pressed) - scene.curve, dtype=np.float64)
+    as_read = scene.curve_at(pressure=scene.points.pressure)  # by the same law below the lowest level
+    return np.asarray(scene.curve_at(pressure=pressed) - as_read, dtype=np.float64)
 
 
 PRESSURE_OFFSET = Effect(

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm, t
 
-from models.diagnosis.baseline.laws import Scene
+from models.diagnosis.baseline.laws import Scene, scene_of
 from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.campaign import Oil
 from models.diagnosis.criteria import DISCREPANCY_SD
@@ -40,6 +40,16 @@ from tests.models.diagnosis.fitted import of_size, study
 def scene() -> Scene:
     design = build_design(campaign(1))
     return predict(design, starting_laws(design, frame_of(design))).scene
+
+
+@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.slug)
+def test_no_amplitude_no_change_where_pressure_scatters_about_its_levels(effect: Effect, scene: Scene) -> None:
+    """Half of the rows of the lowest level lie below it, where M̄_c's law ends."""
+    rng = np.random.default_rng(1)
+    pressure = scene.points.pressure + 2_000.0 * rng.standard_normal(scene.points.pressure.size)
+    scattered = scene_of(scene.laws, replace(scene.points, pressure=pressure), scene.facts)
+    for tried in effect.grid(scene.facts):
+        assert np.abs(effect.change(scattered, 0.0, tried.shape)).max() < 1e-9
 
 
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.slug)
