@@ -69,7 +69,7 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
         only(knowing, "", "group")
     if not sources:
         hint = (
-            f": {', '.join(unread[:10])} can be read by MATLAB alone; save columns as arrays or in a struct"
+            f": only MATLAB can read {', '.join(unread[:10])}. Save the channels as arrays, or as a struct of arrays"
             if unread
             else ""
         )
@@ -82,7 +82,11 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
         return [_values(sources[index]) for index in taken]
 
-    notices = (Notice(code="not_read", message=f"only MATLAB reads {', '.join(unread[:10])}"),) if unread else ()
+    notices = (
+        (Notice(code="not_read", message=f"left out, because only MATLAB can read it: {', '.join(unread[:10])}"),)
+        if unread
+        else ()
+    )
     return Table(
         columns=tuple(source.column for source in sources),
         read=read,
@@ -260,8 +264,8 @@ def refuse_counts(shown: str, values: NDArray[Any], stated: Mapping[str, Any]) -
         if number is not None and ((words & _GAINS and number != 1) or (words & _OFFSETS and number != 0)):
             own = "scale_factor" if words & _GAINS else "add_offset"
             message = (
-                f"{shown} holds whole numbers, and {name} = {number:g} is stored with them: they may be raw counts. Save "
-                f"the physical values without it, or rename it {own} if it is to be applied"
+                f"{shown} holds whole numbers beside {name} = {number:g}: raw counts or physical values? For raw counts, "
+                f"rename {name} to {own}, and the service applies it; for physical values, delete {name}"
             )
             raise InvalidError.of(message, code="raw_counts")
 

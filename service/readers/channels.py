@@ -186,7 +186,9 @@ def _add_parts(times: FloatArray, parts: Mapping[str, tuple[FloatArray, float]])
         seconds = factor * values
         if ((seconds >= 0) & (seconds < 1)).all() and (np.diff(times + seconds) > 0).all():
             times += seconds - seconds[0]
-            return Notice(code="parts_of_seconds", message=f"the part of the second was added to time_s from {name}")
+            return Notice(
+                code="parts_of_seconds", message=f"time_s has whole seconds: the fractions in {name} were added"
+            )
     return None
 
 
@@ -282,7 +284,7 @@ def _numbers(column: Taken, values: NDArray[Any], start: Any) -> tuple[FloatArra
         return np.where(np.isnat(since), np.nan, since / _SECOND), valid
     if values.dtype.kind not in "iuf" or values.ndim != 1:
         shown = f"values of type {values.dtype}" if values.ndim == 1 else f"{values.ndim} dimensions"
-        message = f"{column.channel} must be numbers, got {shown}"
+        message = f"{column.channel} must be a column of numbers, got {shown}"
         raise InvalidError.of(message, code="not_a_number", pointer=f"/channels/{column.channel}")
     numbers = np.array(values, dtype=np.float64) if values.dtype != np.float64 or not values.flags.writeable else values
     column.conversion.apply(numbers)
@@ -301,7 +303,9 @@ def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> Notice |
         if times.size and times.min() / factor > first and times.max() / factor < last:
             times -= times[0]
             times /= factor
-            return Notice(code="unit_found", message=f"{column.shown()} was read as {unit}")
+            return Notice(
+                code="unit_found", message=f"{column.shown()} states no unit; its values were read as times in {unit}"
+            )
     name = column.title or column.name
     if "time_s" not in choices_of(reading):
         raise no_unit([("time_s", column)], reading)
@@ -313,8 +317,8 @@ def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> Notice |
     if not fractions and not (days.all() and np.ptp(times) < 5 and step < 1e-3):
         return None
     message = (
-        f"{column.shown()} may be seconds, or days as spreadsheets and MATLAB count them, got {times[0]:.9g} and steps of "
-        f"{step:.3g}: state the unit with map=time_s:{name} [d], or [s]"
+        f"{column.shown()} states no unit: it begins at {times[0]:.9g} in steps of {step:.3g}, in seconds or days. "
+        f"State the unit with map=time_s:{name} [s], or [d]"
     )
     raise InvalidError.of(message, code="missing_unit", pointer="/map")
 
@@ -329,14 +333,19 @@ def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Readin
     ]
     part = [f"{column.channel} from {columns[column.index].shown()}" for column in taken if column.in_part]
     notices = (
-        [Notice(code="name_in_part", message=f"titles were recognised only in part:  {', '.join(part)}")]
+        [
+            Notice(
+                code="name_in_part",
+                message=f"only a part of these titles was recognised, so check them: {', '.join(part)}",
+            )
+        ]
         if part
         else []
     )
     if not others:
         return notices
     more = f" and {len(others) - _MAX_NAMED} more" if len(others) > _MAX_NAMED else ""
-    message = f"columns that are no channel were left out: {', '.join(others[:_MAX_NAMED])}{more}"
+    message = f"columns left out, because their titles name no channel: {', '.join(others[:_MAX_NAMED])}{more}"
     return [*notices, Notice(code=LEFT_OUT, message=message)]
 
 
@@ -355,9 +364,7 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
     ragged = any(own.times is not None and own.times.size != own.values.size for own in series.values())
     if ragged or (len(sizes) > 1 if same else any(own.times is None for own in series.values())):
         rows = [f"{name} has {own.values.size}{' without times' * (own.times is None)}" for name, own in series.items()]
-        message = (
-            f"all channels must have the same number of rows, or each channel its own times, got: {', '.join(rows)}"
-        )
+        message = f"channels without times of their own must have the same number of rows, got: {', '.join(rows)}"
         raise InvalidError.of(message, code="ragged")
     columns: dict[str, FloatArray] = {} if lead.times is None else {"time_s": lead.times}
     kept = np.ones(lead.values.size, dtype=np.bool_)
@@ -376,12 +383,14 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
         notices.append(_brought(series, leading, kept))
     if invalid:
         shown = ", ".join(f"{name} {count}" for name, count in invalid.items())
-        message = f"samples without a valid value were left out, in all channels:  {shown}"
+        message = f"samples with invalid values were left out of all channels; invalid values: {shown}"
         notices.append(Notice(code="invalid_samples", message=message))
     if kept.all():
         return columns
     if not kept.any():
-        message = "no sample is left: at no time are all channels valid"
+        message = (
+            "no sample is left: at each time at least one channel has no valid value. Send channels recorded together"
+        )
         raise InvalidError.of(message, code="empty", pointer="/channels")
     return {name: column[kept] for name, column in columns.items()}
 
@@ -399,7 +408,7 @@ def _resampled(
     assert own.times is not None  # noqa: S101 (seen to by the caller)
     assert lead.times is not None  # noqa: S101
     if own.times.size == 0 or not (np.diff(own.times) > 0).all():
-        message = f"{name} is sampled by a clock of its own, whose times must increase"
+        message = f"{name} has times of its own, which must increase from row to row"
         raise InvalidError.of(message, code="time_backwards", pointer=f"/channels/{name}")
     after = np.clip(np.searchsorted(own.times, lead.times), 1, max(own.times.size - 1, 1))
     valid = None
@@ -425,6 +434,10 @@ def _brought(series: Mapping[str, _Series], leading: str, kept: NDArray[np.bool_
             rates.append(f"{name} ({own.values.size} samples, {step:.6g} s apart, from {own.times[0]:.9g} s)")
     shown = ", ".join(rates)[: 5 * MAX_QUOTED]
     cut = int(np.count_nonzero(~kept))
-    more = f"; {cut} of {kept.size} samples outside the common time range were left out" if cut else ""
-    message = f"brought to the times of {leading} by linear interpolation: {shown}{more}"
+    more = (
+        f". {cut} of {kept.size} samples were left out, because not all channels were recorded at their times"
+        if cut
+        else ""
+    )
+    message = f"interpolated to the times of {leading}: {shown}{more}"
     return Notice(code="brought_to_one_clock", message=message)

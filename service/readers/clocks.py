@@ -11,7 +11,7 @@ import numpy as np
 from models.arrays import FloatArray
 from service.errors import MAX_QUOTED, InvalidError
 from service.readers.table import Clock
-from service.readers.unit_table import conversion
+from service.readers.unit_table import conversion, spellings
 
 #: Names of steps beside a unit of time, and of a count or something else without.
 _COUNTED = "cycle|zyklus|takt|interval|intervall|intervalo|period|サイクル"
@@ -73,7 +73,7 @@ def stated_clock(held: Mapping[str, float | str], rows: Callable[[], int], count
             against.append(f"{lasts:g} s for {samples:g} samples")
         if against or counted:
             shown = ", ".join([f"one every {step:g} s", *against, *filter(None, [counted])])[: 3 * MAX_QUOTED]
-            message = f"the times of the rows are not clear from the file: {shown}; add a column of times"
+            message = f"the file states its sampling in contradictory ways: {shown}. Add a column of times"
             raise InvalidError.of(message, code="ambiguous", pointer="/time")
         return evenly(in_seconds(*first), step, rows())
 
@@ -117,6 +117,7 @@ def in_seconds(number: float, unit: str, key: str, *, rate: bool = False) -> flo
     known = None if rate else conversion("time_s", unit or "s")
     factor = _HERTZ.get(unit.lower()) if rate else None if known is None else known.factor
     if factor is None:
-        message = f"the unit of {key[:MAX_QUOTED]} must be known, got {unit[:MAX_QUOTED]!r}"
+        allowed = "Hz, kHz, samples/s" if rate else spellings("time_s")
+        message = f"the unit of {key[:MAX_QUOTED]} must be one of {allowed}, got {unit[:MAX_QUOTED]!r}"
         raise InvalidError.of(message, code="unknown_unit")
     return 1 / (number * factor) if rate else number * factor

@@ -432,7 +432,7 @@ def no_unit(columns: Sequence[tuple[str, Column]], reading: Reading) -> InvalidE
     way = ",".join(f"{channel}:{title}" for channel, title in {**named, **titles}.items())
     own = ", ".join(CHANNELS[channel].unit for channel in titles)
     message = "; ".join(error.message for error in errors)
-    return InvalidError(f"{message}, in brackets or in a unit row; map={way} takes it for {own}", errors=errors)
+    return InvalidError(f"{message}, in brackets or in a unit row. If the unit is {own}, add map={way}", errors=errors)
 
 
 def remedy(columns: Sequence[Column]) -> str:
@@ -463,10 +463,10 @@ def _twice(channel: str, *columns: Column) -> InvalidError:
         names = [column.title[:MAX_QUOTED] or column.shown() for column in columns]
     shown = " and ".join(names[:_MAX_NAMED])
     distinct = len(set(names)) == len(names)
-    way = f"choose one with map={channel}:NAME" if distinct else "their names must differ"
+    way = f"choose one with map={channel}:NAME" if distinct else "give the columns different names"
     message = f"{channel} must be one column, got {shown}; {way}"
     if channel == "speed_rpm":
-        message += ". It is the sliding speed: if these are the speeds of both sides, send their difference"
+        message += ". It is the sliding speed: if the columns hold the speeds of both sides, send the difference"
     return InvalidError.of(message, code="ambiguous", pointer=f"/channels/{channel}", value=shown)
 
 
@@ -516,14 +516,14 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
         own = column.unit or CHANNELS[channel].unit
         factor = number if "/" in scaled[0] else 1 / number
         mapped, others = f"map={channel}:{column.name}", f"[x{1 / factor:g} {own}] or [x1 {own}]"
-        rule = f"may be x{factor:g} {own}: state it with {mapped} [x{factor:g} {own}], {others}"
+        rule = f"may contain a factor: state it with {mapped} [x{factor:g} {own}], {others}"
         raise _wrong_unit(channel, column, "missing_unit", rule, "no clear one")
     if choice is None:
         return "s" if column.unit is None and _key(column.name) in _SECONDS else column.unit
     stated = column.unit or (None if public or scaled else unit_in_title(channel, column.name))
     differ = stated not in (None, choice.stated) and wanted and not scaled and is_unit(stated or "")
     if differ and conversion(channel, stated or "") != conversion(channel, wanted or ""):
-        rule = f"must be {wanted}, as its profile or map says"
+        rule = f"must be {wanted}, as the rig profile or map says"
         raise _wrong_unit(channel, column, "mixed_units", rule, repr((stated or "")[:MAX_QUOTED]))
     unit = wanted or stated
     if unit is None and not public and (word := _may_state(channel, column.name)):
@@ -540,11 +540,11 @@ def _conversion(channel: str, column: Column, choice: Choice | None, unit: str |
     own, public = CHANNELS[channel].unit, _key(column.name) == channel
     converted = Conversion() if unit is None else conversion(channel, unit)
     if converted is None:
-        rule = f"must be a known one ({spellings(channel)})"
-        way = "" if is_unit(unit or "") else f"; map={channel}:{column.shown()} [UNIT] says which it is"
+        rule = f"must be one of {spellings(channel)}"
+        way = "" if is_unit(unit or "") else f"; state it with map={channel}:{column.shown()} [UNIT]"
         raise _wrong_unit(channel, column, "unknown_unit", rule, repr((unit or "")[:MAX_QUOTED]) + way)
     if public and not converted.is_identity() and choice is None:
-        rule = f"is in {own} by its name"
+        rule = f"must be {own}, as the title says"
         raise _wrong_unit(channel, column, "mixed_units", rule, repr((unit or "")[:MAX_QUOTED]))
     if choice is not None:
         converted = Conversion(converted.factor * choice.factor, converted.offset * choice.factor + choice.offset)

@@ -71,7 +71,7 @@ _FOREIGN = {
     b"\x28\xb5\x2f\xfd": "a Zstandard archive (gzip is accepted)",
     b"BZh": "a bzip2 archive (gzip is accepted)",
     b"\xfd7zXZ": "an xz archive (gzip is accepted)",
-    _GZIP: "packed with gzip twice",
+    _GZIP: "a file packed twice with gzip (unpack it once)",
     b"DIAEXT": "the header of a DIAdem file (DIAdem and its libraries save it as TDMS or CSV)",
     b"|CF,": "an imc FAMOS file (FAMOS exports CSV, XLSX and MATLAB files)",
     b"IGOR": "an Igor Pro text file (Igor saves waves as delimited text with their names)",
@@ -150,7 +150,9 @@ def sniff(path: Path, filename: str, limits: Limits) -> Format:
         if head.startswith(magic) and not (magic == b"BM" and head.isascii()):
             raise InvalidError(f"{shown} must be {FORMATS}, got {foreign}")
     if by_suffix := _SUFFIXES.get(suffix):
-        raise InvalidError(f"{shown} is named like {by_suffix} but does not begin like one")
+        raise InvalidError(
+            f"{shown} is not a {by_suffix} file, although its name says so: correct the name, or export the file again"
+        )
     return Format.TEXT
 
 
@@ -218,10 +220,12 @@ def unpacked(path: Path, name: str, limits: Limits) -> Iterator[Path]:
 
 def too_slow(kind: Format, limits: Limits) -> InvalidError:
     """The error of a file that takes more of a processor's time than it may."""
-    message = f"the {kind} file cannot be read: reading it took more than {limits.seconds} s of processor time"
+    message = f"reading the {kind} file took more than {limits.seconds} s of processor time: send it in smaller parts"
     return InvalidError.of(message, code="too_slow")
 
 
 def overdue(kind: Format, limits: Limits) -> BusyError:
     """The error of a file that was waited for too long, though its reader has not used the time that it may."""
-    return BusyError(f"the {kind} file was not read within {limits.wall_seconds} s: the machine is too busy")
+    return BusyError(
+        f"the {kind} file was not read within {limits.wall_seconds} s, because the service is busy: send it again later"
+    )

@@ -123,7 +123,8 @@ class DataRows:
 
     def _leave_out(self, rows: Sequence[Row], where: str) -> None:
         first = " ".join(shown(rows[0])).strip()[:MAX_QUOTED]
-        message = f"{len(rows)} lines {where} the table were left out, the first: {first!r}"
+        lines = "1 line" if len(rows) == 1 else f"{len(rows)} lines"
+        message = f"left out: {lines} {where} the table, beginning with {first!r}"
         self.notices.append(Notice(code="lines_left_out", message=message))
 
 
@@ -169,7 +170,7 @@ def _counted(columns: Sequence[Column], head: Sequence[Sequence[str]]) -> str:
             continue
         steps = {int(b) - int(a) for a, b in pairwise(cell[:15] for cell in cells)}
         if len(steps) == 1 and max(steps) > 1:
-            return f"{column.shown()} counts in steps of {max(steps)}"
+            return f"{column.shown()} rises by {max(steps)} a row"
     return ""
 
 
@@ -261,8 +262,8 @@ def refuse_factors(above: Sequence[Sequence[str]]) -> None:
         numbers = [cell for cell in row[1:] if NUMBER.fullmatch(cell.replace(",", "."))]
         others = [cell for cell in numbers if float(cell.replace(",", ".")) != 1]
         if len(numbers) > 1 and others and _FACTORS.match(row[0]):
-            what = f"the line {row[0][:MAX_QUOTED]!r} holds factors, which the file may have applied or not, got {others[0]}"
-            raise InvalidError.of(f"{what}: remove this line if the file holds physical values", code="raw_counts")
+            what = f"the line {row[0][:MAX_QUOTED]!r} holds factors, such as {others[0]}: are the values already multiplied?"
+            raise InvalidError.of(f"{what} If so, delete this line; if not, multiply them first", code="raw_counts")
 
 
 def is_footer(row: Row, other: Row) -> bool:

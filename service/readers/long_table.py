@@ -96,7 +96,7 @@ def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
         return [cells[value][list(rows.values())[index]] for index in taken]
 
     message = (
-        f"the table has a row for each value: the {len(rows)} channels in {columns[best].shown()} were read as columns"
+        f"each row holds one value: the {len(rows)} channels named in {columns[best].shown()} were read as columns"
     )
     wide = replace(
         table,
@@ -159,8 +159,8 @@ def _value(columns: Sequence[Column], numeric: Sequence[int], names: int, readin
             return places[0]
     shown = ", ".join(columns[index].shown() for index in called or others) or "none"
     message = (
-        f"the table has a row for each value, and {columns[names].shown()} names its channel: exactly one column must "
-        f"hold the values, got {shown}. Name this column 'value', or save the table with a column for each channel"
+        f"each row holds one value, of the channel named in {columns[names].shown()}. The column of values is not clear, "
+        f"got {shown}: name one column 'value', or save the table with a column for each channel"
     )
     raise InvalidError.of(message, code="long_table")
 

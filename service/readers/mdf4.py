@@ -45,7 +45,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
 
     notices = []
     if head.startswith(b"UnFinMF"):
-        message = "the recorder did not finalise the MDF4 file: the rows in the file were counted"
+        message = "the recorder did not close the MDF4 file: all rows up to its end were read"
         notices.append(Notice(code="not_finalised", message=message))
     several = len({group for group, _ in places}) > 1
     columns = tuple(_column(file, group, index, several) for group, index in places)
@@ -96,7 +96,7 @@ def _values(file: Any, place: tuple[int, int], channel: str) -> NDArray[Any]:
     signal = file.get(group=group, index=index, ignore_invalidation_bits=True)
     rows = int(file.groups[group].channel_group.cycles_nr)
     if len(signal.samples) != rows:
-        raise cut_short(f"{channel} must have the {rows} rows that its group states, got {len(signal.samples)}")
+        raise cut_short(f"{channel} has {len(signal.samples)} rows, and the file states {rows}")
     samples, invalid = signal.samples, signal.invalidation_bits
     return samples if invalid is None else np.ma.MaskedArray(samples, mask=np.asarray(invalid, dtype=np.bool_))
 
@@ -110,8 +110,8 @@ def _refuse_formula(file: Any, group: int, index: int) -> None:
     channel = file.groups[group].channels[index]
     if _has_formula(channel.conversion):
         message = (
-            f"{channel.name[:MAX_QUOTED]} is converted by a formula (MDF4 algebraic conversion), which is not computed "
-            "here: record it with a linear, rational or tabular conversion, or export its physical values"
+            f"{channel.name[:MAX_QUOTED]} needs a formula (MDF4 algebraic conversion), which the service does not compute: "
+            "record it with a linear, rational or tabular conversion, or export its physical values"
         )
         raise InvalidError.of(message, code="algebraic_conversion")
 

@@ -80,10 +80,10 @@ def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, re
     shown = f"{value:.9g}"
     missing = ",".join([mark for mark in reading.missing.split(",") if mark.strip()] + [shown])
     message = (
-        f"{place(name, row, line_of)} may mark a missing value, got {shown}, in {np.count_nonzero(column == value)} of "
-        f"{column.size} rows; half of the others lie between {np.quantile(measured, 0.25):.6g} and "
-        f"{np.quantile(measured, 0.75):.6g}. To leave these rows out, add missing={missing}; if they were measured, "
-        f"add missing={NO_MISSING}"
+        f"{place(name, row, line_of)} is {shown}, as in {np.count_nonzero(column == value)} of {column.size} rows. Is this "
+        f"the mark of a missing value? Half of the other values lie between {np.quantile(measured, 0.25):.6g} and "
+        f"{np.quantile(measured, 0.75):.6g}. To leave these rows out, add missing={missing}; to use them, add "
+        f"missing={NO_MISSING}"
     )
     raise InvalidError.of(message, code="no_value", pointer=f"/channels/{name}/{row}", row=row + 1, value=shown)
 
@@ -166,8 +166,8 @@ def without_totals(
             kept[end - len(made_of) : end] = False
             line = end - len(made_of)
             where = f"line {table.line_of(line)}" if table.line_of else f"row {line + 1}"
-            rows_of = f"the {', '.join(made_of)} of the rows above"
-            message = f"{len(made_of)} rows, from {where} on, were left out: they are {rows_of}"
+            noun, rows_of = "row" if len(made_of) == 1 else "rows", f"the {', '.join(made_of)} of the rows above"
+            message = f"left out: {len(made_of)} {noun} from {where} on, {rows_of}"
             notices.append(Notice(code="lines_left_out", message=message))
     if not notices:
         return dict(columns), table

@@ -184,7 +184,7 @@ class Numerals:
             if self._column(index, "no time", [cell]) is None:
                 rule = f"must be a number in {unit}, as in the first row" if unit else "must be a number"
                 if self.decimal and not unit and isinstance(cell, str) and swapped._floats([cell]) is not None:
-                    rule = f"must have the decimal sign {self.decimal!r}, like earlier numbers"
+                    rule = f"must have the decimal sign {self.decimal!r}, as earlier numbers have"
                 elif name == "time_s":
                     rule = rule.replace("a number", "a number or a time such as 2026-11-02 07:00:00.5")
                 yield row, rule
@@ -216,8 +216,8 @@ def _shown(cell: Any) -> str:
 def _remedy(shown: str) -> str:
     """What helps where a cell is empty, or holds a word or a sign that may stand for no value."""
     if not shown:
-        return ": fill the cell, or take its row out of the file; or add missing=empty to leave such rows out"
-    return "" if any(map(str.isdigit, shown)) or "," in shown else f": add missing={shown} to leave such rows out"
+        return ": fill the cell, or add missing=empty to leave out such rows"
+    return "" if any(map(str.isdigit, shown)) or "," in shown else f": add missing={shown} to leave out such rows"
 
 
 def empty_cells(name: str, rows: Sequence[int], line_of: LineOf | None, last: int) -> InvalidError:
@@ -248,8 +248,8 @@ def _doubtful(name: str, row: int, cell: str, line_of: LineOf | None) -> Invalid
     sign, other = (",", ".") if "," in cell else (".", ",")
     as_decimal, as_thousands = f"{float(cell.replace(sign, '.')):.9g}", cell.replace(sign, "")
     message = (
-        f"{place(name, row, line_of)} may be {as_decimal} or {as_thousands}, got {cell!r}: every {sign!r} of the file "
-        f"stands before exactly three digits; decimal={sign} reads {as_decimal}, decimal={other} reads {as_thousands}"
+        f"{place(name, row, line_of)} may be {as_decimal} or {as_thousands}, got {cell!r}. Add decimal={sign} if it is "
+        f"{as_decimal}, or decimal={other} if it is {as_thousands}"
     )
     return InvalidError.of(message, code="ambiguous_number", pointer="/decimal", row=row + 1, value=cell)
 

@@ -62,7 +62,7 @@ def _in_archive(path: Path, reading: Reading, limits: Limits, answer: sandbox.An
     def read(name: str, table: str) -> Any:
         with unpacked(path, name, limits) as plain:
             if sniff(plain, name, limits) is Format.ZIP:
-                raise InvalidError(f"{name!r} is an archive in an archive: send it by itself")
+                raise InvalidError(f"{name!r} is an archive inside the archive: unpack it and send its file")
             return _read(plain, name, replace(reading, table=table), limits, answer)
 
     names = members(path, limits)

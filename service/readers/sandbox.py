@@ -68,7 +68,7 @@ def read_isolated(kind: Format, path: Path, answer: Answer, *, reading: Reading,
     needs more memory than is allowed or holds more values; BusyError where its reader is not installed or cannot start, is
     overdue without having used its time of a processor, or was ended by somebody else.
     """
-    if missing := not_installed(kind, f"{kind} is not read here"):
+    if missing := not_installed(kind, f"this service cannot read {kind} files"):
         raise BusyError(missing, errors=[FieldError(pointer="", code="format_not_installed", message=missing)])
     if not is_packed(path):
         return _run(kind, path, answer, reading, limits)
@@ -86,7 +86,7 @@ def not_installed(kind: Format, consequence: str) -> str | None:
     if find_spec(package) is not None:
         return None
     command = f"pip install -e '.[{extra}]'" if extra else "pip install -e ."
-    return f"{consequence}: its library is missing, install it in the checkout where the service runs: {command}"
+    return f"{consequence}, because a library is missing. To install it where the service runs: {command}"
 
 
 def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Limits) -> Any:
@@ -122,17 +122,17 @@ def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Lim
             raise overdue(kind, limits) from None
         result.seek(0)
         if result.read(len(_STARTED)) != _STARTED and ended.returncode != -signal.SIGTERM:
-            why = f"the reader ended with {_ending(ended.returncode)} before it opened the file"
-            raise BusyError(f"the reader of {kind} files cannot start here, which is not the file's fault: {why}")
+            why = f"the reader of {kind} files ended with {_ending(ended.returncode)} before it opened the file"
+            raise BusyError(f"{why}. The file is not the cause: see the service's log")
         if ended.returncode == -signal.SIGXCPU:
             raise too_slow(kind, limits)
         if ended.returncode == -signal.SIGTERM:
-            raise BusyError("the service is ending: send the file again in a little while")
+            raise BusyError("the service is shutting down: send the file again later")
         if ended.returncode == -signal.SIGABRT and kind is Format.WORKBOOK:  # how a library in Rust ends without memory
             raise _too_much(kind)
         if -ended.returncode in _CRASHES:  # in the C code of its library, which is what the process is for
             crash = _ending(ended.returncode)
-            why = f"it is damaged, or of another type: the library that reads it ended with {crash}"
+            why = f"it is damaged or of another type (the library for it ended with {crash})"
             raise _unreadable(kind, why, "reader_crashed")
         if ended.returncode:
             raise _unreadable(kind, f"its reader ended with {_ending(ended.returncode)}")
@@ -152,7 +152,7 @@ def _ending(code: int) -> str:
 
 
 def _too_much(kind: Format) -> TooLargeError:
-    return TooLargeError(f"the {kind} file needs more memory than reading a file may take")
+    return TooLargeError(f"reading the {kind} file takes more memory than the service allows: send it in smaller parts")
 
 
 def _answer(result: BinaryIO, kind: Format, wanted: str, limits: Limits) -> Any:

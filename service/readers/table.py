@@ -152,5 +152,5 @@ def only(names: Sequence[str], wanted: str, kind: str) -> int:
 
 def cut_short(defect: str) -> InvalidError:
     """The error of a file whose end is missing."""
-    message = f"the file is cut off: {defect}"
+    message = f"the end of the file is missing: {defect}. Send the complete file"
     return InvalidError.of(message, code="truncated")

@@ -79,7 +79,7 @@ def _scaled(channel: Any, scales: Mapping[str, str]) -> NDArray[Any]:
     """A channel's physical values; raises InvalidError on a scale for which npTDMS would give raw counts."""
     if unknown := set(scales.values()) - _SCALES:
         name, kind = channel.name[:MAX_QUOTED], min(unknown)[:MAX_QUOTED]
-        message = f"{name} is scaled by {kind!r}, which is not known: save its physical values"
+        message = f"{name} has the scale {kind!r}, which the service cannot apply: save the physical values"
         raise InvalidError.of(message, code="raw_counts")
     values: NDArray[Any] = channel[:]
     return values

@@ -72,7 +72,9 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
     if len(first) == _BLOCK and b"\n" in first and b"\0" not in first:
         first = first[: first.rindex(b"\n") + 1]
     if not first.strip():
-        raise wrong_line(1, "is empty, and no header came after it", "no_header")
+        raise wrong_line(
+            1, "is empty, and so is the rest of the file: send a file with a header and rows of numbers", "no_header"
+        )
     try:
         form = _form(first, reading, limits)
     except InvalidError:
@@ -105,7 +107,7 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[tuple[str, bool]]:
         try:
             text = rest + lines.decode(block, last)
         except UnicodeError:
-            rule = f"or a line soon after it is not {encoding.upper()}, as the file's beginning says: save the file as UTF-8"
+            rule = f"or a line soon after it is not {encoding.upper()}, unlike the lines before: save the file as UTF-8"
             raise wrong_line(line, rule, "not_text") from None
         end = text.rfind("\n") + 1
         if not last and _is_open(text[:end]):
@@ -304,7 +306,9 @@ class _Body:
                 part.append(column)
             self._rows += columns[0].size
             if self._rows > most:
-                raise TooLargeError(f"a file of {len(channels)} channels must not have more than {most} rows")
+                raise TooLargeError(
+                    f"a file of {len(channels)} channels must not have more than {most} rows: send it in parts"
+                )
         self.data.end()
         joined = []
         while parts:
@@ -410,5 +414,5 @@ class _Body:
         line = (self._separator.strip() or " ").join(cells)[:MAX_QUOTED]
         message = f"line {self.line_of(row)} must have {self._width} cells, got {len(cells)}: {line!r}"
         if recognised(cells, ()) > 1:
-            message += ": another table begins there, send it in a file of its own"
+            message += ". If another table begins there, send it in a separate file"
         return FieldError(pointer="", row=row + 1, value=line, code="ragged", message=message)

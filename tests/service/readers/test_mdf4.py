@@ -54,7 +54,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ("name", "where"), one_quick([("formula", "torque_nm"), ("clock", "time"), ("ranges", "torque_nm")])
 )
 def test_a_formula_in_a_file_is_refused_and_named(folder: Path, name: str, where: str) -> None:
-    with pytest.raises(InvalidError, match="converted by a formula") as caught:
+    with pytest.raises(InvalidError, match="needs a formula") as caught:
         read_file(folder / f"{name}.mf4", filename=f"{name}.mf4", reading=reading_of("torque_nm:torque_nm"))
     assert where in caught.value.detail
     assert caught.value.errors[0].code == "algebraic_conversion"

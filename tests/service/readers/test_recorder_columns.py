@@ -126,7 +126,7 @@ def test_two_lengths_without_times_are_refused_by_name(tmp_path: Path) -> None:
     columns = record(100)
     slow = {"oil_temperature_c": columns.pop("oil_temperature_c")[:10]}
     with pytest.raises(
-        InvalidError, match=r"each channel its own times, got: (?=.*torque_nm has 100)(?=.*oil_temperature_c has 10)"
+        InvalidError, match=r"the same number of rows, got: (?=.*torque_nm has 100)(?=.*oil_temperature_c has 10)"
     ):
         read(write_tdms(tmp_path / "a.tdms", {"torque_nm": columns["torque_nm"]}, units=UNITS, more=slow))
 
@@ -168,5 +168,5 @@ def test_a_renamed_picture_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidError, match="PNG picture"):
         read(path)
     path.write_bytes(b"RIFF" + bytes(100))
-    with pytest.raises(InvalidError, match="named like TDMS but does not begin like one"):
+    with pytest.raises(InvalidError, match="is not a TDMS file, although its name says so"):
         read(path)

@@ -105,7 +105,7 @@ def test_a_map_names_columns_and_leaves_the_others_out(tmp_path: Path) -> None:
 
 WRONG = [
     ("", "must not be empty"),
-    ("\n\n", "no header"),
+    ("\n\n", "send a file with a header"),
     ("1,2,3,4\n5,6,7,8\n", "line 1 must be a header"),
     (f"{HEADER}\n", "time_s must not be empty"),
     (f"{HEADER}\n{ROWS}end of data\n0.2,5,100,20\n", r"line 4 must have 4 cells, got 1: 'end of data'"),
@@ -121,14 +121,14 @@ WRONG = [
     (f"{HEADER}\n{ROWS}0.2,5,1\x000,20\n", "line 4 must be text, got a NUL byte"),
     (
         "time_s;torque_nm\n0,5;1,5\n1.5;2\n",
-        r"time_s\[1\] \(line 3\) must have the decimal sign ',', like earlier numbers, got '1.5'",
+        r"time_s\[1\] \(line 3\) must have the decimal sign ',', as earlier numbers have, got '1.5'",
     ),
     ("time_s,time_s,torque_nm\n0,0,1\n1,9,1\n2,18,1\n", "time_s must be one column"),
     ("time_s,torque_nm,M [Nm]\n0,0,1\n", "torque_nm must be one column, got torque_nm and M"),
     ("time_s,Drehmoment\n0,1\n", r"torque_nm \(column 'Drehmoment'\): the unit must be stated"),
-    ("time_s,Drehmoment [furlong]\n0,1\n", "torque_nm .*the unit must be a known one.*'furlong'"),
+    ("time_s,Drehmoment [furlong]\n0,1\n", "torque_nm .*the unit must be one of Nm.*'furlong'"),
     ("time_s,n [mPa]\n0,1\n", "speed_rpm .*'mPa'"),
-    ("time_s,torque_nm\ns,kNm\n0,1\n", "torque_nm: the unit is in Nm by its name, got 'kNm'"),
+    ("time_s,torque_nm\ns,kNm\n0,1\n", "torque_nm: the unit must be Nm, as the title says, got 'kNm'"),
     ("t [s],M [Nm]\ns,kNm\n0,1\n", "must be in one unit, got 'Nm' and 'kNm'"),
     (",".join(["torque_nm"] * 2_000_000) + "\n", "line 1 must not be longer than 65536 bytes"),
     (",".join("a" * 2000) + "\n" + ",".join("1" * 2000) + "\n", "more than 1000 columns, got 2000"),
@@ -137,7 +137,7 @@ WRONG = [
     (bytes(range(256)) * 400, "NUL"),
     (b"PK\x03\x04" + bytes(100), "ZIP archive cannot be read"),
     (gzip.compress(HEADER.encode(), mtime=0)[:-6], "cannot be unpacked"),
-    (gzip.compress(gzip.compress(HEADER.encode(), mtime=0), mtime=0), "gzip twice"),
+    (gzip.compress(gzip.compress(HEADER.encode(), mtime=0), mtime=0), "twice with gzip"),
     ("\ufeff".encode("utf-16-le") + b"\x00\xd8" * 4000, "UTF-16"),
 ]
 
