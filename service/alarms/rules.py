@@ -23,6 +23,7 @@ from service.lives.condition import (
     chance_in_words,
     held_in_words,
     lower_bound,
+    pace_in_words,
     silence_in_words,
     stated,
 )
@@ -142,14 +143,14 @@ def _remaining_days(rule: AlarmIn, facts: Facts) -> Finding | None:
     if value is None or math.isinf(value) or pace is None:
         return None
     days = value / pace["cycles_per_second"] / _SECONDS_PER_DAY
-    return Finding(value=days, words=f"{_left(rule, value)}, {days:,.3g} days at the pace of its runs")
+    return Finding(value=days, words=f"{_left(rule, value)}: {pace_in_words(pace, value)}")
 
 
 def _health(_rule: AlarmIn, facts: Facts) -> Finding | None:
     health = (facts.summary.get("current") or {}).get("health")
     if health is None or facts.summary.get("status") == ENDED:
         return None
-    return Finding(value=float(health), words=f"its health is {health:.0%}")
+    return Finding(value=float(health), words=f"health {health:.0%}")
 
 
 def _shudder_margin(rule: AlarmIn, facts: Facts) -> Finding | None:
@@ -176,7 +177,7 @@ def _held_runs(_rule: AlarmIn, facts: Facts) -> Finding | None:
 
 def _off_course(_rule: AlarmIn, facts: Facts) -> Finding | None:
     why = facts.off_course()
-    return None if why is None else Finding(value=None, words=f"off its course: {why}")
+    return None if why is None else Finding(value=None, words=f"off course: {why}")
 
 
 def _verdict(rule: AlarmIn, facts: Facts) -> Finding | None:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 from urllib.parse import urlencode
@@ -140,13 +141,19 @@ def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
         else:
             yield f"mean COF {cof}, {100 * fraction:.0f} % of new{_threshold(criterion)}"
     if answer["at_least_at"] is not None and answer["at_least"] >= 1.0:
-        pace = "planned pace" if answer.get("pace_from") == "request" else "pace of the runs"
-        yield f"at the {pace}: safe until {answer['at_least_at'][:10]}"
+        pace = "planned pace" if answer.get("pace_from") == "request" else "pace so far"
+        since = answer["counted_from"]
+        days = (datetime.fromisoformat(answer["at_least_at"]) - datetime.fromisoformat(since)).days
+        shown = "less than a day" if days < 1 else "1 day" if days == 1 else f"{days:,} days"
+        yield f"safe for {shown} at the {pace}, counted from the last run on {since[:10]}"
     course = answer.get("course")
     described = "" if course is None else f", {_COURSES[course['name']]} ({chance(course['probability'])} sure)"
     effects = ", ".join(answer["model"]["effects"])
     model = f"{answer['model']['name']} ({effects})" if effects else answer["model"]["name"]
-    yield f"{answer['runs_used']} tests, method {answer['method']}, model {model}{described}"
+    tests = "1 test" if answer["runs_used"] == 1 else f"{answer['runs_used']} tests"
+    yield f"{tests}, method {answer['method']}, model {model}{described}"
+    if (lives := answer.get("ended_lives", 0)) > 0:
+        yield f"calibrated on {lives} ended {'life' if lives == 1 else 'lives'}"
     if answer.get("pace_cycles_per_hour") is not None:
         source = {"request": "as planned", "runs": "as of the dated runs"}[answer["pace_from"]]
         yield f"{number(answer['pace_cycles_per_hour'])} cycles an hour, {source}"
@@ -192,8 +199,12 @@ def _quantiles(answer: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, An
     if "remaining_blocks" in answer:
         yield "remaining blocks", answer["remaining_blocks"], number
         yield "under recent duty", answer["recent_duty_cycles"], cycles
-    if answer.get("end_of_life_at") is not None:
-        yield "date (UTC)", answer["end_of_life_at"], lambda date: "-" if date is None else date[:10]
+    if answer.get("end_of_life_at") is not None and answer["counted_from"] is not None:
+        yield (
+            f"date, counted from {answer['counted_from'][:10]}",
+            answer["end_of_life_at"],
+            lambda date: "-" if date is None else date[:10],
+        )
 
 
 def _programme(plan: Path | None, blocks: list[str], pace: float | None) -> dict[str, Any]:

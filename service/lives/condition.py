@@ -16,6 +16,7 @@ from service.lives.criteria import LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, SO
 from service.lives.history import WORN, Event, Series, date_of
 from service.lives.payloads import ENDED, INSUFFICIENT, interval_in_words
 
+_SECONDS_PER_DAY = 86_400.0
 #: The states of a clutch after NAMUR NE 107; the first that holds is its state.
 STATES = FAILURE, MAINTENANCE, CHECK, OUT_OF_SPECIFICATION, NORMAL = (
     "failure",
@@ -37,7 +38,7 @@ SUMMARY = (
 )  # fmt: skip
 STORED = (*SUMMARY, "horizon_cycles", "end_of_life_cycles")
 #: What is said beside a prediction.
-BESIDE = ("at_least", "at_least_at", "held_runs", "statement")
+BESIDE = ("at_least", "at_least_at", "counted_from", "held_runs", "statement")
 REACHED = PassageStatus.REACHED.value
 #: The filter whose predictions lists and receipts show.
 SHOWN = "particle"
@@ -66,14 +67,29 @@ def beside_held(
         held = {"count": count} | {name: among[name] for name in ("status", "remaining_cycles")}
         warnings.append(_held_warning(payload, among, count))
     at_least = lower_bound(payload["at_least"], among)
-    at, statement = _at_pace(summary, at_least), statement_of(payload, at_least)
-    return {"at_least": at_least, "at_least_at": at, "held_runs": held, "statement": statement, "warnings": warnings}
+    at, since = None, None
+    if at_least is not None and (pace := summary.get("pace")) is not None:
+        at, since = date_of(pace["moment"] + at_least / pace["cycles_per_second"]), date_of(pace["moment"])
+    return {
+        "at_least": at_least,
+        "at_least_at": at,
+        "counted_from": since,
+        "held_runs": held,
+        "statement": statement_of(payload, at_least),
+        "warnings": warnings,
+    }
 
 
-def _at_pace(summary: Mapping[str, Any], at_least: float | None) -> str | None:
-    """When the safe bound is used up at the pace of the runs, ISO 8601; None where either is unknown."""
-    pace = summary.get("pace")
-    return None if pace is None or at_least is None else date_of(pace["moment"] + at_least / pace["cycles_per_second"])
+def pace_in_words(pace: Mapping[str, float] | None, cycles: float | None) -> str | None:
+    """Cycles as days at the pace of the runs, and the day that they count from: no answer depends on today's date, which may
+    be long after the last run. None where either is unknown."""
+    since = None if pace is None or cycles is None else date_of(pace["moment"])
+    if pace is None or cycles is None or since is None:
+        return None
+    days = cycles / pace["cycles_per_second"] / _SECONDS_PER_DAY
+    shown = "less than a day" if days < 1.0 else "1 day" if days < 2.0 else f"{rounded_down(days)} days"
+    day = datetime.fromisoformat(since)
+    return f"{shown} at the pace so far, counted from the last run on {day.day} {day:%b %Y}"
 
 
 def stated(summary: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -159,28 +175,28 @@ def silence_in_words(since: str) -> str:
 def top_line(
     summary: Mapping[str, Any], *, disputed: bool, diagnosis: Mapping[str, Any] | None = None, silent: str | None = None
 ) -> dict[str, str]:
-    """What stands first on a clutch's page and in `clutchlife status`: `headline`, its state in words, the safe bound with
-    its date at this pace, and the median; `action`, one sentence of what to do. `diagnosis`: the newest one as it goes out.
+    """What stands first on a clutch's page and in `clutchlife status`: `headline`, its state in words, the safe bound in
+    cycles and days, and the median; `action`, one sentence of what to do. `diagnosis`: the newest one as it goes out.
     """
     name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
     words = STATE_WORDS[name]
     if "status" not in summary:
-        return {"headline": f"{words}: {reason}", "action": _action(name, summary, None, diagnosis)}
+        return {"headline": f"{words}: {reason}", "action": _action(name, summary, "soon", diagnosis)}
     among = (summary.get("with_held") or {}).get(SHOWN)
     at_least = lower_bound(summary["at_least"], among)
-    at = _at_pace(summary, at_least)
-    date = None if at is None else _day_in_words(at)
-    says = _numbers_in_words(summary, among, at_least, date)
+    paced = pace_in_words(summary.get("pace"), at_least)
+    soon = "now" if at_least is not None and at_least < 1.0 else "soon" if paced is None else f"within {paced}"
+    says = _numbers_in_words(summary, among, at_least, paced)
     return {
         "headline": f"{words}: {reason}; {says}" if reason else f"{words}: {says}",
-        "action": _action(name, summary, date, diagnosis),
+        "action": _action(name, summary, soon, diagnosis),
     }
 
 
 def _numbers_in_words(
-    summary: Mapping[str, Any], among: Mapping[str, Any] | None, at_least: float | None, date: str | None
+    summary: Mapping[str, Any], among: Mapping[str, Any] | None, at_least: float | None, paced: str | None
 ) -> str:
-    """The safe bound, its date and the median; else the statement, where there is no number to give.
+    """The safe bound, its days and the median; else the statement, where there is no number to give.
 
     `among`: the prediction with the held runs; where they lower the bound, both are said."""
     own = summary["at_least"]
@@ -191,21 +207,20 @@ def _numbers_in_words(
         return f"{bound_in_words(at_least)} if {runs}, for {rounded_down(own)} if not"
     if summary["status"] in (REACHED, INSUFFICIENT, ENDED) or at_least is None or at_least < 1.0:
         return statement_of(summary, at_least)
-    until = "" if date is None else f", until {date} at this pace"
-    bound = f"{bound_in_words(at_least)}{until}"
+    bound = bound_in_words(at_least) + ("" if paced is None else f": {paced}")
     if summary["status"] == PassageStatus.MAY_NEVER_REACH.value:
         return _left_open(bound, summary)
     return f"{bound}; 50 % chance of {_two_digits(summary['remaining_cycles']['0.5'])} or more"
 
 
-def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: Mapping[str, Any] | None) -> str:
-    """What to do about a state, in one sentence."""
+def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping[str, Any] | None) -> str:
+    """What to do about a state, in one sentence; `soon`: how soon."""
     held = summary.get("held", 0)
     if name == FAILURE:
         unseen = summary["status"] == REACHED and untested_since(summary) is not None
         return "Run a stationary test, or replace the clutch." if unseen else "Replace the clutch."
     if name == MAINTENANCE:
-        return "Replace it soon." if date is None else f"Replace before {date}."
+        return f"Replace {soon}."
     if name == CHECK and held:
         return "Confirm, correct or withdraw " + ("one held run." if held == 1 else f"{held} held runs.")
     if name == CHECK and summary.get("status", INSUFFICIENT) != INSUFFICIENT:
@@ -241,11 +256,6 @@ def _decides(separates: Sequence[str]) -> str:
 
 def _cause_in_words(slug: str) -> str:
     return "a cause outside the catalogue" if slug == "uncatalogued" else slug.replace("_", " ")
-
-
-def _day_in_words(moment: str) -> str:
-    day = datetime.fromisoformat(moment)
-    return f"{day.day} {day:%b %Y}"
 
 
 def _tests(summary: Mapping[str, Any]) -> str:

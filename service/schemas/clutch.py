@@ -11,6 +11,7 @@ from service.schemas import base
 from service.schemas.life import (
     AtLeast,
     AtLeastAt,
+    CountedFrom,
     Criterion,
     CriterionIn,
     Current,
@@ -177,6 +178,7 @@ class ClutchSummary(base.Answer):
     remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
     at_least: AtLeast
     at_least_at: AtLeastAt
+    counted_from: CountedFrom
     held_runs: Held
     statement: Statement
     probability_of_reaching: float | None = Field(
@@ -251,7 +253,7 @@ class ClutchOut(base.Answer):
     revision: base.Revision
     state: ClutchState = Field(description="What the state demands")
     headline: str = Field(
-        description="One line: the state in words, the safe bound with its date at this pace, and the median"
+        description="One line: the state in words, the safe bound in cycles and in days at the pace so far, and the median"
     )
     action: str = Field(description="One sentence: what to do now")
     runs: int = Field(description="Number of runs that count, without held and withdrawn ones")

@@ -250,8 +250,12 @@ AtLeastAt = Annotated[
     str | None,
     Field(
         description="Date of the safe bound at the requested pace, or at the pace that `started_at` of the "
-        "present life's runs shows; UTC, ISO 8601; null without a pace, or for an earlier time"
+        "present life's runs shows, counted from the last run: it may be past. UTC, ISO 8601; null without a pace, or "
+        "for an earlier time"
     ),
+]
+CountedFrom = Annotated[
+    str | None, Field(description="Date of the last run, from which `at_least_at` counts; null where that is null")
 ]
 Held = Annotated[
     HeldRuns | None,
@@ -289,6 +293,7 @@ class RemainingLife(Answer):
     end_of_life_cycles: Quantiles = Field(description="Quantiles of the duty cycles since new at the end of life")
     at_least: AtLeast
     at_least_at: AtLeastAt
+    counted_from: CountedFrom
     held_runs: Held
     statement: Statement
     probability_of_reaching: float | None = Field(

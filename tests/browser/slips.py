@@ -25,7 +25,7 @@ ANSWERS = [
 #: When something was stored, and how many changes there were.
 TIMES = {"revision", "created_at", "received_at"}
 #: What says that runs are held, and what follows from it while they are.
-OF_HELD_RUNS = {"held_runs", "at_least", "at_least_at", "state", "statement", "warnings", "items"}
+OF_HELD_RUNS = {"held_runs", "at_least", "at_least_at", "counted_from", "state", "statement", "warnings", "items"}
 LAST = 7000
 PRESSURES = (4.0, 5.0, 6.0)
 #: Of the first test; the others follow as their cycles do, 1,000 an hour.

@@ -168,9 +168,9 @@ def test_a_deleted_rule_clears_what_it_raised(life: TestClient) -> None:
     ("fields", "words"),
     [
         ({"quantity": "remaining_cycles", "probability": 0.5, "below": 1e9}, "50 % chance of "),
-        ({"quantity": "health", "below": 1.0}, "its health is"),
+        ({"quantity": "health", "below": 1.0}, "health "),
         ({"quantity": "shudder_margin", "below": 100.0}, "slope of friction at 100 rpm"),
-        ({"quantity": "off_course"}, "off its course"),
+        ({"quantity": "off_course"}, "off course"),
         ({"quantity": "held_runs"}, "1 held run waits"),
         ({"quantity": "state"}, "function check: 1 run is held and does not count; "),
     ],
@@ -200,6 +200,8 @@ def test_days_are_counted_at_the_pace_of_the_runs(client: TestClient) -> None:
     rule(client, quantity="remaining_days", below=1000)
     (raised,) = events(client)
     assert raised["value"] == pytest.approx(at_least(client) / 1000, rel=1e-6)
+    last = f"{len(CYCLES)} Jan 2026"
+    assert f"days at the pace so far, counted from the last run on {last} (limit: 1,000 days)" in raised["message"]
 
 
 def test_a_new_verdict_is_an_alarm(life: TestClient) -> None:
@@ -337,7 +339,7 @@ def test_the_test_button_says_how_it_went(life: TestClient, receiver: Receiver) 
     receiver.status = 503
     failed = life.post(f"/v1/webhooks/{name}/test").json()
     assert failed["deliveries"][0]["state"] == "failed"
-    assert failed["deliveries"][0]["problem"] == "it answered 503"
+    assert failed["deliveries"][0]["problem"] == "the receiver answered 503"
 
 
 def test_a_receiver_of_one_clutch_learns_of_no_other(life: TestClient, receiver: Receiver) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from service.cli import answers
 from tests.service.cli.conftest import Terminal
 from tests.support import stationary
 
@@ -32,6 +33,9 @@ def test_remaining_life_is_a_table_of_quantiles(terminal: Terminal, client: Test
     assert ("over 1,000,000" if median is None else f"{median:,.0f}") in row
     assert json.loads(terminal("life", "c1", "--json")) == answer
     assert "method grid" in terminal("life", "c1", "--method", "grid", "--pressure", "5")
+    assert "calibrated" not in shown
+    calibrated = [(count, list(answers._lines(answer | {"ended_lives": count}))) for count in (1, 2)]
+    assert all(f"calibrated on {count} ended" in "\n".join(lines) for count, lines in calibrated)
     rows = list(csv.DictReader(io.StringIO(terminal("life", "c1", "--csv", "--at-cycles", "2000"))))
     assert {row["as_of_cycles"] for row in rows} == {"2000"}
 
@@ -43,13 +47,20 @@ def test_planned_duty_by_block_and_by_file_is_the_same(terminal: Terminal, clien
     (tmp_path / "plan.json").write_text('{"programme": [{"cycles": 5000, "energy_per_cycle_kj": 36, "sd": 2}]}')
     shown = terminal("life", "c1", "--block", "5000:36:2", "--pace", "120")
     assert shown == terminal("life", "c1", "--plan", tmp_path / "plan.json", "--pace", "120")
-    for words in ("remaining blocks", "under recent duty", "date (UTC)", "120 cycles an hour, as planned"):
+    for words in ("remaining blocks", "under recent duty", "date, counted from 2", "120 cycles an hour, as planned"):
         assert words in shown, words
     answer = json.loads(terminal("life", "c1", "--block", "5000:36:2", "--json"))
     # twice the energy of the blocks so far: half the cycles, by the middle of the distribution
     assert answer["block_severity"][0] == pytest.approx(2.0, rel=0.02)
     assert answer["pace_cycles_per_hour"] is None
-    assert "date (UTC)" not in terminal("life", "c1", "--block", "5000:36:2")
+    for pace, days in (
+        (120.0, "less than a day"),
+        (answer["at_least"] / 35, "1 day"),
+        (answer["at_least"] / 61, "2 days"),
+    ):
+        shown = terminal("life", "c1", "--block", "5000:36:2", "--pace", pace)
+        assert f"safe for {days} at the planned pace, counted from the last run on 2" in shown
+    assert "counted from" not in terminal("life", "c1", "--block", "5000:36:2")
 
 
 def test_the_tables_hold_every_item_of_the_answer_on_a_line(terminal: Terminal, client: TestClient) -> None:

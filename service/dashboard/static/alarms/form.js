@@ -14,7 +14,7 @@ import { fixed, NOT_A_NUMBER, numberOf, percent, significant, words } from "../s
 /** @type {Record<Watched, { title: string, side: "below" | "above" | null, unit: string, limit: string }>} */
 export const WATCHED = {
   remaining_cycles: { title: "Remaining cycles, safe bound", side: "below", unit: "cycles", limit: "4000" },
-  remaining_days: { title: "Remaining days at this pace", side: "below", unit: "days", limit: "14" },
+  remaining_days: { title: "Remaining days at the pace so far", side: "below", unit: "days", limit: "14" },
   health: { title: "Health", side: "below", unit: "", limit: "0.2" },
   shudder_margin: { title: "Shudder margin dμ/dv", side: "below", unit: "s/m", limit: "0" },
   held_runs: { title: "Held runs", side: "above", unit: "", limit: "0" },

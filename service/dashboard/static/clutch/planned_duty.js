@@ -229,7 +229,8 @@ function shown(life) {
     ["Remaining blocks", ...numbers(blocks, 1)],
     ["Cycles under recent duty", ...numbers(recent, 0)],
   ];
-  if (dates !== null) rows.push(["End of life", ...SHOWN.map((quantile) => dates[quantile]?.slice(0, 10) ?? "–")]);
+  if (dates !== null && life.counted_from !== null)
+    rows.push([`End of life, counted from the last run on ${life.counted_from.slice(0, 10)}`, ...SHOWN.map((quantile) => dates[quantile]?.slice(0, 10) ?? "–")]);
   const columns = ["Probability", ...SHOWN.map((quantile) => `${significant(100 * Number(quantile))} %`)];
   const notes = life.warnings.map(({ message }) => h("p", { class: "quiet" }, message));
   return [
