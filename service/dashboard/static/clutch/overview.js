@@ -174,7 +174,7 @@ function remainingNotes(life) {
     never ? `${probability(chance)} chance of an end within ${fixed(life.horizon_cycles)} cycles` : null,
     held ? `if the held ${held.count === 1 ? "run counts" : "runs count"}: ${likely(held.remaining_cycles)}` : null,
     cast && cast.of > 0 ? `${cast.held} of ${cast.of} later tests lay inside their forecast` : null,
-    lives > 0 ? `calibrated on ${lives} ended lives` : null,
+    lives > 0 ? `calibrated on ${lives} ended ${lives === 1 ? "life" : "lives"}` : null,
   ]
     .filter((note) => note !== null)
     .join("; ");

@@ -29,8 +29,8 @@ const CODES = {
     help: "They do not count until someone confirms, corrects or withdraws them. The safe bound is the lower of two: with these runs, and without them.",
   },
   filters_disagree: {
-    title: "Two filters disagree",
-    help: "Two methods compute different remaining lives from the same tests. Plan with the lowest bound, and test again soon.",
+    title: "Two methods disagree",
+    help: "They compute different remaining lives from the same tests.",
   },
   tracks_disagree: {
     title: "Two predictions disagree",

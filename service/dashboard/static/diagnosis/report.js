@@ -218,7 +218,7 @@ function advice({ advice: tests = [], clutch_id: clutch, diagnosis_id: name }) {
   const items = tests.map(({ test, separates, narrows }) => {
     const [cause, other] = separates.map((effect) => words(effect).toLowerCase());
     const use = narrows
-      ? `leaves ${percent(narrows)} of the uncertainty about the size of ${cause}`
+      ? `narrows the size of ${cause} to ${percent(narrows)} of its present uncertainty`
       : `distinguishes ${cause} from ${other === "baseline" ? "no effect at all" : other}`;
     return h("li", {}, h("b", {}, test), h("span", { class: "quiet" }, `: ${use}`));
   });

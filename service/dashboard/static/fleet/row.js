@@ -46,7 +46,7 @@ export function row(clutch, { scale, group, chosen, choose }) {
       small(`${clutch.friction_material} on ${clutch.reaction_plate}`),
     ),
     cell("Health", ...health(summary, state.name)),
-    cell("Remaining", ...remaining(summary, scale)),
+    cell("Remaining", ...remaining(summary, state.name, scale)),
     cell("Mean COF", ...meanCof(clutch)),
     cell("Last run", ...lastRun(clutch), held(clutch, address)),
     cell("Diagnosis", ...diagnosis(clutch, address)),
@@ -78,13 +78,19 @@ function health(summary, state) {
 }
 
 /**
+ * A failure's state says already where the life ended.
  * @param {ClutchSummary | null} summary
+ * @param {StateName} state
  * @param {number} scale
  */
-function remaining(summary, scale) {
+function remaining(summary, state, scale) {
   if (summary === null) return ["–", small("after three tests")];
   const { ended } = summary;
-  if (ended) return [ended.reason === "worn" ? number("0") : "–", small(`ended at ${fixed(ended.cycles)}`)];
+  if (ended)
+    return [
+      ended.reason === "worn" ? number("0") : "–",
+      state !== "failure" && small(`ended at ${fixed(ended.cycles)} cycles`),
+    ];
   if (summary.status === "insufficient_data") return ["–", small(atLeast(summary.at_least))];
   if (summary.status === "reached") return [number("0"), small("reached")];
   const { remaining_cycles: q, at_least: bound, held_runs: held } = summary;

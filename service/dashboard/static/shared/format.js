@@ -96,7 +96,7 @@ export function cycles(value, low = null, high = null) {
 export function interval(quantiles) {
   const [low, high] = [quantiles["0.05"], quantiles["0.95"]];
   if (low === null && high === null) return NONE;
-  if (high === null) return `over ${roundedDown(low ?? 0)}`;
+  if (high === null) return `${roundedDown(low ?? 0)} to over 1,000,000`;
   return `${cycles(low, low, high)} to ${cycles(high, low, high)}`;
 }
 

@@ -49,7 +49,7 @@ def test_they_share_one_scale(bars: Module) -> None:
 
 def test_an_end_that_is_not_in_sight_is_marked(bars: Module) -> None:
     result = show(bars, BEFORE, AFTER | {"0.75": None, "0.95": None})
-    assert "(90 %: over 3,000)" in result["text"]
+    assert "(90 %: 3,000 to over 1,000,000)" in result["text"]
     assert result["html"].count('class="beyond"') == 1
     # the scale then goes 1.6 times as far as the median
     assert medians(result["html"])[1] == pytest.approx(WIDTH * 4000 / (1.05 * 1.6 * 4000), abs=0.06)
