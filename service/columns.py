@@ -182,7 +182,7 @@ def _numbers(name: str, values: Sequence[Any], errors: _Errors) -> FloatArray | 
     except OverflowError:
         for index, value in enumerate(values):
             if isinstance(value, int) and abs(value) > 1e300:
-                errors.add_row(name, index, value, "out_of_range", "must be a number that fits 64 bits")
+                errors.add_row(name, index, value, "out_of_range", "must be smaller than 1e308")
         return None
 
 

@@ -80,7 +80,7 @@ def unknown_clutch(clutch_id: str) -> NotFoundError:
     )
 
 
-class ConflictError(ServiceError, status=409, slug="conflict", title="This name is taken by other content"):
+class ConflictError(ServiceError, status=409, slug="conflict", title="The name already has other content"):
     """An object of that name exists and has other content."""
 
 

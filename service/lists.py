@@ -33,7 +33,7 @@ def from_cursor(cursor: str | None) -> Place | None:
     except (ValueError, TypeError, OverflowError, RecursionError, binascii.Error):
         place = (math.nan, "")
     if not math.isfinite(place[0]):
-        message = "cursor must be the `next` of an earlier page"
+        message = "cursor must be the `next` of the previous page"
         shown = cursor[:80]
         error = FieldError(pointer="/query/cursor", code="cursor", message=f"{message}, got {shown!r}", value=shown)
         raise InvalidError(error.message, errors=[error])

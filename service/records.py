@@ -254,7 +254,7 @@ def attempts(clutch_id: str) -> Iterator[int]:
     """The numbers of the attempts to compute and store, from 1; raises BusyError where the clutch has changed at each."""
     yield from range(1, MAX_ATTEMPTS + 1)
     raise BusyError(
-        f"clutch {clutch_id!r} was changed by other requests {MAX_ATTEMPTS} times meanwhile: try again later"
+        f"clutch {clutch_id!r} was changed by other requests {MAX_ATTEMPTS} times during this request: send it again"
     )
 
 

@@ -169,14 +169,14 @@ def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
     smooth = median_filter(speed, 5, mode="nearest")
     highest = float(smooth.max())
     if highest < criteria.LEAST_SPEED:
-        rule = f"the shaft must slip, the highest speed is {highest:.3g} rad/s, below {criteria.LEAST_SPEED:g} rad/s"
+        rule = f"the shaft must turn at {_rpm(criteria.LEAST_SPEED)} or more, got at most {_rpm(highest)}"
         return Refusal(status=SlipStatus.NO_SLIP, message=rule)
     fast, slow = smooth >= 0.5 * highest, smooth <= criteria.SLOW * highest
     first = int(np.argmax(fast))
     rest = first + int(np.argmax(slow[first:]))
     if not slow[rest]:
         least = 100 * float(smooth[first:].min()) / highest
-        return _never_ends(f"the lowest speed is {least:.3g} % of the highest")
+        return _never_ends(f"the lowest speed is {least:.3g} %")
     slowing = int(np.flatnonzero(fast[:rest])[-1])
     turning = np.flatnonzero(smooth[rest:] > 2 * criteria.SLOW * highest)
     leaves = rest + int(turning[0]) if turning.size else time.size
@@ -184,7 +184,7 @@ def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
     latest = min(2 * rest - slowing + 2, leaves - 1)
     end, zero = _rest(time[window], speed[window], float(time[slowing]), float(time[latest]))
     if abs(zero) > criteria.LARGEST_ZERO * highest:
-        return _never_ends(f"speed stays at {100 * zero / highest:.3g} % of the highest")
+        return _never_ends(f"speed stays at {100 * zero / highest:.3g} %")
     again = None
     if turning.size:
         still = np.flatnonzero(speed[rest:leaves] - zero <= criteria.LARGEST_ZERO * highest)
@@ -192,9 +192,14 @@ def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
     return Standstill(fast=first, slowing=slowing, rest=rest, end=end, zero=zero, again=again)
 
 
+def _rpm(speed: float) -> str:
+    """A speed [rad/s] as it is shown."""
+    return f"{30.0 * speed / math.pi:.3g} rpm"
+
+
 def _never_ends(reason: str) -> Refusal:
     stands = 100 * criteria.LARGEST_ZERO
-    rule = f"slip must end in the record: {reason}; a shaft stands within {stands:g} % of its highest speed"
+    rule = f"slip must end within the record, at {stands:g} % of the highest speed or less: {reason}"
     return Refusal(status=SlipStatus.SLIP_NEVER_ENDS, message=rule)
 
 
@@ -313,7 +318,7 @@ def slip_of(record: Record) -> Slip | Refusal:
     gap = float(np.diff(slipping).max())
     if gap > criteria.LONGEST_GAP * duration:
         most = 100 * criteria.LONGEST_GAP
-        rule = f"samples are missing for {gap:.3g} s of a slip of {duration:.3g} s, more than {most:g} %"
+        rule = f"samples are missing for {gap:.3g} s of a slip of {duration:.3g} s: record it without gaps above {most:g} %"
         return Refusal(status=SlipStatus.GAP, message=rule)
     return Slip(
         time=record.time,
@@ -346,10 +351,10 @@ def _unusable(record: Record) -> Refusal | None:
         return Refusal(status=SlipStatus.SAMPLED_TOO_SLOWLY, message=rule)
     if float(record.pressure.max()) < UNLOADED:
         highest = float(record.pressure.max()) / 1e5
-        rule = f"the clutch must be loaded, the highest pressure is {highest:.3g} bar"
+        rule = f"the clutch must be under pressure, but the highest pressure is {highest:.3g} bar"
         return Refusal(status=SlipStatus.NO_PRESSURE, message=rule)
     if float(np.ptp(record.torque)) == 0.0:
-        rule = f"torque must rise, it is {record.torque[0]:g} Nm throughout"
+        rule = f"torque must rise, but is {record.torque[0]:g} Nm in all samples"
         return Refusal(status=SlipStatus.NO_TORQUE, message=rule)
     return None
 
@@ -379,7 +384,7 @@ def _contact_of(time: FloatArray, torque: FloatArray, slowing: int) -> _Contact 
     noise = float(np.median(np.abs(np.diff(torque, 2)))) / (_NORMAL_QUARTILE * math.sqrt(6))
     never_open = abs(low) > 0.2 * (highest - low)  # above a sensor's zero and an open clutch's drag together
     if highest - low <= criteria.LEAST_RISE * noise and not (never_open and highest > criteria.LEAST_RISE * noise):
-        rule = f"torque must rise above its noise of {noise:.3g} Nm, it rises by {highest - low:.3g} Nm"
+        rule = f"torque must rise above its noise of {noise:.3g} Nm, but rises by only {highest - low:.3g} Nm"
         return Refusal(status=SlipStatus.NO_TORQUE, message=rule)
     rising = slice(0, highest_row + 1)
     if not never_open:
@@ -390,8 +395,8 @@ def _contact_of(time: FloatArray, torque: FloatArray, slowing: int) -> _Contact 
             zero = Estimate(value=float(quiet.mean()), sd=float(quiet.std(ddof=1)) / math.sqrt(quiet.size))
             return _start_of(time[rising], torque[rising] - zero.value, highest - zero.value, zero)
     rule = (
-        "the record must begin before contact: torque is never near zero before it rises, "
-        f"the lowest is {low:.3g} Nm and the highest {highest:.3g} Nm"
+        "the record must begin before contact, with a torque near zero, "
+        f"but the lowest torque is {low:.3g} Nm and the highest {highest:.3g} Nm"
     )
     return Refusal(status=SlipStatus.STARTS_IN_CONTACT, message=rule)
 

@@ -430,7 +430,7 @@ def _message(folded: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str,
     parts = []
     if undetermined and folded.distinct < len(PARAMETER_NAMES):
         parts.append(
-            f"{folded.distinct} distinct speeds cannot determine four parameters: {', '.join(undetermined)} undetermined."
+            f"Too few different speeds ({folded.distinct}) to determine {', '.join(undetermined)}: test more speeds."
         )
     elif undetermined:
         parts.append(f"The measured speeds and torques do not determine {', '.join(undetermined)}.")
@@ -439,7 +439,7 @@ def _message(folded: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str,
     if not parts:
         parts.append("All four parameters are determined.")
     if noise.inflated[row]:
-        parts.append("The residuals exceed the given torque_sd, and uncertainties follow the residuals.")
+        parts.append("The residuals are larger than torque_sd_nm, so the uncertainties come from the residuals.")
     if noise.assumed[row]:
-        parts.append(f"Too few points to estimate noise: {ASSUMED_NOISE:.0%} of the torque is assumed.")
+        parts.append(f"Too few points to estimate the noise: {ASSUMED_NOISE:.0%} of the torque is assumed.")
     return " ".join(parts)

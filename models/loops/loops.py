@@ -166,10 +166,10 @@ def _message(status: LoopStatus, area: Area, attractor: LagFit | None, film: Lag
     """A sentence or two for a person."""
     sentence = {
         LoopStatus.DETERMINED: "The attractor is determined.",
-        LoopStatus.UNRESOLVED: "The record shows no lag by the attractor law beyond its noise: C is bounded from below.",
-        LoopStatus.AGAINST_THE_LAW: "Torque lags against what the attractor law can give on this stationary curve.",
-        LoopStatus.NO_CURVE: "There is no stationary curve of such torque at this pressure: the lag laws were not fitted.",
-        LoopStatus.REVERSES: "The speed changes sign: the lag laws, which hold while sliding, were not fitted.",
+        LoopStatus.UNRESOLVED: "The lag is too small for this noise: the attractor C has only a lower bound.",
+        LoopStatus.AGAINST_THE_LAW: "The loop turns against the attractor law: is a channel delayed?",
+        LoopStatus.NO_CURVE: "No lag was fitted: there is no stationary test with such torques at this pressure.",
+        LoopStatus.REVERSES: "No lag was fitted, because the speed changes sign.",
         LoopStatus.NO_PERIOD: "",
     }[status]
     parts = [sentence]

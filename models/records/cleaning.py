@@ -143,7 +143,9 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
         period = float(steps.mean(where=regular))
         scatter = float(steps.std(where=regular, mean=period)) / period
         if scatter > 0.01 or swapped or repeated:
-            sentence = f"Sampling intervals scatter by {scatter:.1%}; {repeated} repeated and {swapped} swapped times."
+            sentence = (
+                f"The sampling interval scatters by {scatter:.1%}. Times repeated: {repeated}, swapped: {swapped}."
+            )
             notes.append(("clock_jitter", sentence))
     lost = round((time[-1] - time[0]) / period) + 1 - time.size
     gaps = np.flatnonzero(steps > 1.5 * period)

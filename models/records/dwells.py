@@ -241,11 +241,11 @@ def _crest(channels: tuple[_Channel, ...], before: Dwell, dwell: Dwell, followin
 
 
 _SENTENCES = {
-    "overshoot": "{n} crests of overshoots left out, beginning at {at} s.",
-    "no_pressure": "{n} stretches without pressure left out, beginning at {at} s.",
-    "standstill": "{n} stretches at standstill left out, beginning at {at} s.",
-    "dwell_too_short": "{n} dwells of fewer than 8 averages left out, beginning at {at} s.",
-    "not_steady": "{n} stretches left out whose speed or pressure changes slowly throughout, beginning at {at} s.",
+    "overshoot": "Left out: {n} overshoots, at {at} s.",
+    "no_pressure": "Left out: {n} stretches without pressure, from {at} s on.",
+    "standstill": "Left out: {n} stretches at standstill, from {at} s on.",
+    "dwell_too_short": "Left out: {n} plateaus that are too short, from {at} s on.",
+    "not_steady": "Left out: {n} stretches in which speed or pressure drifts, from {at} s on.",
 }
 
 

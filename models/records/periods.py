@@ -107,7 +107,9 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
         return fitted
     if not (fitted.noise < 0.15 * fitted.amplitude and fitted.outliers <= 0.2 * t.size):
         miss = fitted.noise / max(fitted.amplitude, 1e-3 * fitted.noise, 1e-300)
-        return f"The speed does not swing periodically: the error of its best fit is {miss:.0%} of its swing (RMS)."
+        return (
+            f"The speed does not swing periodically: a periodic fit leaves an error of {miss:.0%} of the swing (RMS)."
+        )
     return _with_corners(t, y, fitted)
 
 

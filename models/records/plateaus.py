@@ -68,7 +68,7 @@ def cut_plateaus(record: Sampled, torque_filter: float = 0.0) -> PlateauCut:
     if not dwells:
         reasons = " ".join(sentence for _, sentence in left_out)
         raise UnusableRecordError(
-            f"the record has no steady dwell in motion and, where it has any, under pressure. {reasons}".rstrip()
+            f"the record must hold plateaus: speed and pressure both steady, neither at zero. {reasons}".rstrip()
         )
     duration = np.array([blocks.time[dwell.stop - 1] - blocks.time[dwell.start] + blocks.duration for dwell in dwells])
     transients = fit_transients(_stretches(blocks, dwells), blocks.duration)

@@ -69,7 +69,9 @@ def _require_apprise(url: str, scheme: str) -> None:
         )
     reply = _exchange({"url": url, "private": False})
     if not reply.get("understood"):
-        raise wrong_address(f"url is no address that Apprise understands ({scheme[:20]}://)")
+        raise wrong_address(
+            f"url is not an address that Apprise can send to: see Apprise's documentation of {scheme[:20]}://"
+        )
 
 
 def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool) -> Attempt:
@@ -81,7 +83,7 @@ def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
     title = f"Clutchlife: {event['name'] or event['quantity'].replace('_', ' ')}" + (" is over" if over else "")
     task = {"url": url, "title": title, "body": event["message"], "private": private}
     reply = _exchange(task)
-    return Attempt() if reply.get("sent") else Attempt(problem=reply.get("problem", "it could not be sent"))
+    return Attempt() if reply.get("sent") else Attempt(problem=reply.get("problem", "the message could not be sent"))
 
 
 def _exchange(task: dict[str, Any]) -> dict[str, Any]:
@@ -93,7 +95,7 @@ def _exchange(task: dict[str, Any]) -> dict[str, Any]:
         )
         reply: dict[str, Any] = json.loads(done.stdout)
     except subprocess.TimeoutExpired:
-        return {"problem": f"it was not sent within {_SECONDS:g} s"}
+        return {"problem": f"the message was not sent within {_SECONDS:g} s"}
     except ValueError:
         return {}
     return reply
@@ -109,7 +111,7 @@ def confine(private: bool) -> None:
         elif event == "open":
             path = arguments[0]
             if isinstance(path, (str, bytes)) and not _opened(path).startswith(places):
-                raise PermissionError("a file that no sender needs")
+                raise PermissionError("the sender tried to read a file that it does not need")
         elif event.startswith(_FORBIDDEN):
             raise PermissionError(event)
 
@@ -123,11 +125,11 @@ def _opened(path: str | bytes) -> str:
 
 def _require_connectable(address: Any, *, private: bool) -> None:
     if not isinstance(address, tuple):
-        raise PermissionError("a socket of this machine")
+        raise PermissionError("the sender tried to use a local socket")
     try:
         reason = why_not(ipaddress.ip_address(str(address[0]).partition("%")[0]), private=private)
     except ValueError:
-        reason = "a name that was not resolved"
+        reason = "the sender used a name in place of an address"
     if reason is not None:
         raise NotAllowedError(reason)
 
@@ -146,7 +148,7 @@ def main() -> None:
                 answer["sent"] = bool(receiver.notify(body=task["body"], title=task["title"]))
                 answer["problem"] = "the receiver did not accept it"
             except (NotAllowedError, PermissionError) as error:
-                answer["problem"] = f"not asked: {error}"
+                answer["problem"] = f"not sent: {error}"
     sys.stdout.write(json.dumps(answer))
 
 

@@ -25,7 +25,7 @@ from service.settings import CODE_VERSION
 #: [s] An attempt may take in all. Chosen: a receiver answers in a second; one that does not is tried again.
 ATTEMPT_SECONDS = 10.0
 _PORTS = {"http": 80, "https": 443}
-_TIMED_OUT = f"it did not answer within {ATTEMPT_SECONDS:g} s"
+_TIMED_OUT = f"the receiver did not answer within {ATTEMPT_SECONDS:g} s"
 #: Parts of a path that look like a token: that long, and with a digit.
 _TOKEN = re.compile(r"(?=[^/]*\d)[^/]{16,}")
 
@@ -98,7 +98,7 @@ def allowed(host: str, port: int, *, private: bool) -> tuple[Any, ...]:
         if reason is None:
             return address
         reasons.append(reason)
-    raise NotAllowedError(reasons[0] if reasons else "the name has no address")
+    raise NotAllowedError(reasons[0] if reasons else "the name of the receiver has no address")
 
 
 def why_not(address: Address, *, private: bool) -> str | None:
@@ -112,7 +112,7 @@ def why_not(address: Address, *, private: bool) -> str | None:
         return None
     if private and (address.is_loopback or address.is_private):
         return None
-    return f"{address} is on this machine or in a private network: CLUTCHLIFE_PRIVATE_RECEIVERS=true allows it"
+    return f"{address} is on this machine or in a private network: to allow this, set CLUTCHLIFE_PRIVATE_RECEIVERS=true"
 
 
 def _within(address: Address) -> ipaddress.IPv4Address | None:
@@ -156,7 +156,7 @@ def post(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
             headers["Authorization"] = f"Basic {base64.b64encode(user.encode()).decode()}"
         status = _status(parts, address, body, headers, deadline)
     except NotAllowedError as error:
-        return Attempt(problem=f"not asked: {error}")
+        return Attempt(problem=f"not sent: {error}")
     except InvalidError as error:
         return Attempt(problem=error.detail)
     except (OSError, http.client.HTTPException, ValueError) as error:
@@ -165,8 +165,10 @@ def post(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
     if 200 <= status < 300:
         return Attempt(status=status)
     if 300 <= status < 400:
-        return Attempt(status=status, problem=f"it answered {status}: redirects are not followed")
-    return Attempt(status=status, problem=f"it answered {status}")
+        return Attempt(
+            status=status, problem=f"the receiver answered {status}, a redirect: give the address that it leads to"
+        )
+    return Attempt(status=status, problem=f"the receiver answered {status}")
 
 
 def _status(parts: SplitResult, address: tuple[Any, ...], body: bytes, headers: dict[str, str], deadline: float) -> int:
@@ -200,9 +202,9 @@ def _cut(raw: socket.socket) -> None:
 def _in_words(error: Exception) -> str:
     """An error without what it may quote of the address."""
     if isinstance(error, socket.gaierror):
-        return "its name is not known"
+        return "the name of the receiver is not known"
     if isinstance(error, ssl.SSLCertVerificationError):
-        return f"its certificate is not valid: {error.verify_message}"
+        return f"the certificate of the receiver is not valid: {error.verify_message}"
     if isinstance(error, OSError) and error.strerror:
         return f"no connection: {error.strerror}"
-    return f"no answer ({type(error).__name__})"
+    return f"the receiver gave no valid answer ({type(error).__name__})"

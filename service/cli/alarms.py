@@ -29,7 +29,7 @@ def alarms(
         given = {name: value for name, value in chosen.items() if value is not None}
         items = service.pages("/v1/alarms/events", **given)
     if rules and acknowledge is None:
-        listed(items, as_json, _show_rules, "there is no rule")
+        listed(items, as_json, _show_rules, "no alarm rule exists: add one on the page Alarms")
     else:
         listed(items, as_json, _show_events, "no alarm is raised")
 

@@ -105,7 +105,7 @@ def status(clutch: ClutchId, as_json: Json = False, url: Url = URL, key: Key = N
         with Client(url, key, patience=patience) as client:
             item = client.clutch(clutch)
     except (ClutchlifeError, httpx2.InvalidURL, ValueError, OSError) as error:
-        err.print(f"clutchlife: unknown: {error}", markup=False, soft_wrap=True)
+        err.print(f"clutchlife: the state is unknown: {error}", markup=False, soft_wrap=True)
         raise typer.Exit(UNKNOWN) from None
     if as_json:
         out.print_json(json.dumps(item))
@@ -189,7 +189,7 @@ def _assign(fields: dict[str, Any], record: dict[str, Any], assignment: str) -> 
         return
     whole = fields.get(field, record.get(field, {}))
     if not isinstance(whole, dict):
-        fail(f"{field} has no parts that could be set", EX_USAGE)
+        fail(f"{field} is a single value: set it as {field}=VALUE", EX_USAGE)
     fields[field] = whole | {part: value}
 
 
@@ -208,7 +208,7 @@ def model(
     address = f"/v1/clutches/{clutch}/model"
     changes = adopt is not None or baseline
     current = service.put(address, {"diagnosis_id": adopt}) if changes else service.get(address)
-    print_line(f"{clutch} is tracked with:  {_named(current['model'])}")
+    print_line(f"{clutch} is tracked with: {_named(current['model'])}")
     for version in current["versions"]:
         since = f"  version {version['version']}, {version['adopted_at']}: {_named(version['model'])}"
         print_line(since + (f" by {version['diagnosis_id']}" if version["diagnosis_id"] else ""))

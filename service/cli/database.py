@@ -226,7 +226,7 @@ def list_stores(database: Database = DATABASE) -> None:
     for store in stores:
         columns, blobs = numbers.get(store.address, (0, 0))
         used = ", in use" if store.in_use else ""
-        print_line(f"{store.address}: {columns} columns in {blobs} files{used}")
+        print_line(f"{store.address}: {columns} channels in {blobs} files{used}")
     if not any(store.in_use for store in stores):
         print_line("new raw records go into the database")
 
@@ -240,9 +240,9 @@ def move(to: Address, database: Database = DATABASE) -> None:
     from service.workflows.raw_records import move as move_all  # start-up time
 
     with existing(database) as opened, Progress(console=err, transient=True) as progress:
-        task = progress.add_task("moving columns", total=None)
+        task = progress.add_task("moving channels", total=None)
         moved = move_all(opened, to, tell=lambda count: progress.update(task, completed=count))
-    print_line(f"{moved} columns are moved")
+    print_line(f"{moved} channels were moved")
 
 
 @app.command()
@@ -259,7 +259,7 @@ def relocate(
 
     with existing(database) as opened:
         count = look_at(opened, address, to)
-    print_line(f"{count} raw records are now read from there")
+    print_line(f"{count} raw records are now read from {to}")
 
 
 @app.command()
@@ -269,7 +269,7 @@ def collect(
         float, typer.Option(min=_MIN_GRACE_HOURS, help="Keep files that are younger than this many hours")
     ] = _GRACE_HOURS,
 ) -> None:
-    """Remove blobs that no run uses; interrupted requests and moves leave such blobs. Safe while services run."""
+    """Remove files of raw records that no run uses, as interrupted requests leave them. Safe while services run."""
     from service.workflows.raw_records import collect as collect_all  # start-up time
 
     with existing(database) as opened:

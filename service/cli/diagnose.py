@@ -86,7 +86,7 @@ def _use(advice: Mapping[str, Any]) -> str:
     """What a test is good for: it narrows the size of a cause that is named, or distinguishes two."""
     cause, other = map(_spelt, advice["separates"])
     if advice["narrows"]:
-        return f"leaves {100 * advice['narrows']:.0f} % of the uncertainty about the size of {cause}"
+        return f"narrows the size of {cause} to {100 * advice['narrows']:.0f} % of its present uncertainty"
     against = "no effect at all" if other == "baseline" else other
     return f"distinguishes {cause} from {against}; expected evidence: {_evidence(advice['nats'])}"
 
@@ -112,8 +112,8 @@ def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
 def _visible(visible: Sequence[Mapping[str, Any]]) -> Table:
     """From which size on an effect would be seen: in any of its forms, and in the one that shows best."""
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("smallest visible size", "for every shape", "for the most visible"):
-        table.add_column(name, justify="left" if name == "smallest visible size" else "right")
+    for name in ("smallest visible size of", "in every shape", "in the most visible shape"):
+        table.add_column(name, justify="left" if name == "smallest visible size of" else "right")
     for item in visible:
         sizes = (
             "at no size" if size is None else _in_unit(number(size), item["unit"])
@@ -166,8 +166,8 @@ def _maps(maps: Mapping[str, Any]) -> Group:
             for (name, columns), table, most in over
         ]
         drawn.append(Group(*grids))
-    legend = Text("Mean residual, relative to the largest of the baseline ")
-    legend.append(f"({number(largest[0], 2)} and {number(largest[1], 2)} standard deviations): ")
+    legend = Text("Mean residual as a share of the largest one of the baseline ")
+    legend.append(f"(over rpm {number(largest[0], 2)}, over cycles {number(largest[1], 2)} standard deviations): ")
     for least, mark, above, below in reversed(_MARKS):
         legend.append(mark, style=f"black on color({above})")
         legend.append(_below(mark), style=f"black on color({below})")

@@ -53,6 +53,8 @@ def list_keys(database: Database = DATABASE) -> None:
 
     with read_only(database) as opened, opened.reading() as connection:
         rows = keys.all_keys(connection)
+    if not rows:
+        print_line("no key exists")
     for row in rows:
         used = "never used" if row.last_used_at is None else f"used {row.last_used_at}"
         clutches = "" if row.clutches is None else f"  only {', '.join(row.clutches)}"
@@ -76,4 +78,4 @@ def revoke(key_id: str, database: Database = DATABASE) -> None:
     with existing(database) as opened, opened.writing() as connection:
         done = keys.revoke(connection, key_id, _now())
     if not done:
-        fail(f"there is no active key {key_id!r}")
+        fail(f"there is no active key {key_id!r}: see clutchlife key list")

@@ -133,7 +133,7 @@ def require_database(url: str) -> None:
     from storage.engine.opening import database_exists  # start-up time: most commands open no database
 
     if not database_exists(url):
-        fail(f"there is no database at {redacted(url)}", EX_USAGE)
+        fail(f"there is no database at {redacted(url)}: name it with --database", EX_USAGE)
 
 
 def require_file(url: str, instead: str) -> None:

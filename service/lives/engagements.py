@@ -68,7 +68,7 @@ def engagement_notes(engagement: Engagement) -> list[tuple[str, str]]:
     """A code and a sentence where a record that was sent holds no engagement."""
     if not isinstance(engagement, Refusal):
         return []
-    return [(NO_ENGAGEMENT, f"the record of the engagement is kept and not evaluated: {engagement.message}")]
+    return [(NO_ENGAGEMENT, f"the engagement is stored but not evaluated: {engagement.message}")]
 
 
 def engagement_item(engagement: Engagement) -> dict[str, Any]:

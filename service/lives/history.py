@@ -312,7 +312,7 @@ def require_within_ends(events: Sequence[Event]) -> None:
         later = "a second end" if event.end else f"{event.kind} {event.run_id!r}"
         raise LifeEndedError(
             f"{later} at {event.cycles:g} cycles is after the declared end at {end.cycles:g} cycles (run {end.run_id!r}): "
-            "declare the end there or later, post a rebuild, correct the cycles, or withdraw the end"
+            f"declare the end at {event.cycles:g} cycles or later, post a rebuild, correct the cycles, or withdraw the end"
         )
 
 

@@ -47,10 +47,10 @@ def not_eq_6(courses: Sequence[CourseShare]) -> list[Notice]:
     if any(share.name is CourseName.EQ_6 and share.probability >= EQ_6_DOUBTED for share in courses):
         return []
     named = [share for share in courses if share.name is not CourseName.EQ_6]
-    others = ", ".join(f"{share.name.value}: {share.probability:.0%}" for share in named)
+    others = ", ".join(f"{share.name.value.replace('_', ' ')}: {share.probability:.0%}" for share in named)
     message = (
-        f"the clutch does not age as the usual law says ({others}). The forecast follows the course of the tests "
-        "and allows for further changes"
+        f"the clutch does not age by the usual law ({others}). The forecast follows the trend of the tests and allows for "
+        "further changes"
     )
     return [Notice(code=NOT_EQ_6, message=message)]
 
@@ -78,7 +78,7 @@ def missed(back_cast: BackCast) -> list[Notice]:
         return []
     message = (
         f"the 90 % intervals of earlier forecasts contained only {back_cast.held} of {back_cast.misses.size} later tests. "
-        "So the interval of the remaining life is wider (on a log scale, {back_cast.widening:.2g} times as wide)"
+        f"The interval of the remaining life is therefore {back_cast.widening:.2g} times as wide, on a logarithmic scale"
     )
     return [Notice(code=MISSED_FORECASTS, message=message)]
 
@@ -92,9 +92,7 @@ def filters_disagree(answers: Mapping[str, Mapping[str, Any]]) -> list[Notice]:
     if all(low <= median <= high for low, _, high in ends for _, median, _ in ends):
         return []
     intervals = "; ".join(f"{interval_in_words(given)} by {method}" for method, given in predictions.items())
-    message = (
-        f"two filters disagree about the cycles that remain: {intervals}. Plan with the lowest, and test again soon"
-    )
+    message = f"the methods disagree about the remaining cycles: {intervals}. Plan with the lowest, and test again soon"
     return [Notice(code=FILTERS_DISAGREE, message=message)]
 
 
@@ -117,7 +115,7 @@ def off_track(posterior: Posterior, measurements: Sequence[Measurement], prior: 
     size = f"{abs(deviations):.1f}" if math.isfinite(deviations) else "very many"
     message = (
         f"the last test's mean COF of {measurements[-1].value:.4g} is {size} standard deviations {side} its prediction from "
-        "the earlier tests. Either the run is an outlier, or the clutch has changed"
+        "the earlier tests. Repeat the test: if the value stays, the clutch has changed"
     )
     return [Notice(code=OFF_TRACK, message=message)]
 
@@ -127,7 +125,7 @@ def late_arrival(cycles: float, latest: float) -> list[Notice]:
     if cycles >= latest:
         return []
     message = (
-        f"the run is at {cycles:g} cycles, before the latest known run at {latest:g}: the whole life was tracked again"
+        f"this run at {cycles:g} cycles arrived after one at {latest:g}: the results of this life were computed again"
     )
     return [Notice(code=LATE, message=message)]
 
@@ -137,7 +135,9 @@ def other_pressures(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
     if not cofs or any(nearest(level, cofs) is not None for level in reference):
         return []
     measured = ", ".join(f"{bar(level):g}" for level in sorted(reference))
-    message = f"this test shares no pressure with the first stationary test ({measured} bar): tracking does not use it"
+    message = (
+        f"this test has no pressure of the first test ({measured} bar), so it does not count for the remaining life"
+    )
     return [Notice(code=OTHER_PRESSURES, message=message)]
 
 
@@ -145,9 +145,10 @@ def left_out(tests: int, runs: int) -> list[Notice]:
     """The warning of a life of so many tests of which only these `runs` can be compared with the first."""
     if runs >= tests:
         return []
+    verb = "does" if tests - runs == 1 else "do"
     message = (
-        f"{tests - runs} of {tests} tests do not count: they share no pressure with the first test, or their oil was more "
-        f"than {OTHER_OIL:g} °C warmer or colder; each receipt says which"
+        f"{tests - runs} of {tests} tests {verb} not count: the pressures differ from those of the first test, or the "
+        f"oil temperature by more than {OTHER_OIL:g} °C. The warnings of each run say which"
     )
     return [Notice(code=TESTS_LEFT_OUT, message=message)]
 
@@ -158,8 +159,8 @@ def other_oil(life: Life, event: Event) -> list[Notice]:
         return []
     oil, reference = (kelvin - ZERO_CELSIUS for kelvin in (event.oil_temperature, life.reference_oil))
     message = (
-        f"the oil was at {oil:.0f} °C on average in this test, and at {reference:.0f} °C in the first stationary test: more "
-        f"than {OTHER_OIL:g} °C apart. Tracking uses this test only with an adopted model that corrects for oil temperature"
+        f"the mean oil temperature was {oil:.0f} °C in this test and {reference:.0f} °C in the first, more than "
+        f"{OTHER_OIL:g} °C apart. The test counts only under an adopted model that corrects for oil temperature"
     )
     return [Notice(code=OTHER_OIL_TEMPERATURE, message=message)]
 

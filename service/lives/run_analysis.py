@@ -90,7 +90,7 @@ def analyse(run: IncomingRun, geometry: Geometry, torque_filter: float) -> Analy
         cut = cut_plateaus(SampledChannels(run.channels), torque_filter)
     except ValueError as error:
         message = (
-            f"time_s, pressure_bar, speed_rpm, torque_nm: {error} Where each row of a file is a plateau: time=none."
+            f"time_s, pressure_bar, speed_rpm, torque_nm: {error} If each row of the file is a plateau, add time=none."
         )
         errors = [FieldError(pointer="/channels/torque_nm", code="no_plateau", message=message)]
         raise InvalidError(message, errors=errors) from None
@@ -138,7 +138,9 @@ def _analyse_stationary(
         *(notice for level in levels for notice in _fit_warnings(level.fit)),
     ]
     if not has_mean:
-        message = "no pressure of this test gives a mean COF: the test is not used as a reference or for tracking"
+        message = (
+            f"without a mean COF this test does not count for the remaining life: test {FEWEST_SPEEDS} speeds or more"
+        )
         warnings.append(Notice(code="no_mean_cof", message=message))
     return Analysis(
         fits=levels,
@@ -171,8 +173,8 @@ def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Notice]:
     if rows >= level.fit.points:
         return []
     message = (
-        f"at {level.fit.pressure / PASCALS_PER_BAR:g} bar: the measured pressures of this level scatter by more than "
-        f"{100 * WIDE_LEVEL:g} %; it may contain several levels"
+        f"at {level.fit.pressure / PASCALS_PER_BAR:g} bar the pressures scatter by more than {100 * WIDE_LEVEL:g} %. "
+        "Were several pressures tested here? Keep them further apart"
     )
     return [Notice(code="wide_level", message=message)]
 
@@ -180,17 +182,20 @@ def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Notice]:
 def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:
     below = f"below {UNLOADED / PASCALS_PER_BAR:g} bar"
     if under_load is None:
-        message = f"the clutch was open, all pressures lie {below}: no curve is fitted, and only a diagnosis uses it"
+        message = (
+            f"the clutch was open (all pressures {below}): no curve is fitted, and only a diagnosis uses this test"
+        )
         return [Notice(code="open_clutch", message=message)]
     left_out = plateaus.torque.size - under_load.torque.size
-    message = f"{left_out} plateaus {below} were left out of the fits"
+    noun = "plateau" if left_out == 1 else "plateaus"
+    message = f"left out of the fits: {left_out} {noun} {below}"
     return [Notice(code="unloaded_plateaus", message=message)] if left_out else []
 
 
 def _row_warnings(run: IncomingRun, plateaus: Plateaus) -> list[Notice]:
     if "torque_sd_nm" not in run.channels or plateaus.torque_sd is not None:
         return []
-    message = "torque_sd_nm holds zeros, but every sensor has noise: the fits do not use torque_sd_nm as weights"
+    message = "torque_sd_nm contains zeros, although every sensor has noise, so the fits do not use it"
     return [Notice(code="torque_sd_ignored", message=message)]
 
 
@@ -200,6 +205,6 @@ def _fit_warnings(fit: StribeckFit) -> list[Notice]:
         return [Notice(code="undetermined", message=f"{at}: {fit.message}")]
     poor = fit.rmse > POOR_FIT * float(fit.parameters.static_torque)
     if not fit.acceptable and fit.mse_percent is not None and poor:
-        message = f"{at}: the percentage MSE is {fit.mse_percent:.3g} %, 5 % or more, with an RMSE of {fit.rmse:.3g} Nm"
+        message = f"{at}: the fit is poor: MSE {fit.mse_percent:.3g} % (limit: 5 %), RMSE {fit.rmse:.3g} Nm"
         return [Notice(code="poor_fit", message=message)]
     return []

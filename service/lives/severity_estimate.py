@@ -50,9 +50,10 @@ class SeverityEstimate:
         probability = float(self.probability[SEVERITY_EXPONENTS.index(in_force)])
         if probability >= SEVERITY_DOUBTED:
             return []
+        work = self.basis.value.replace("_", " ")
         message = (
-            f"the tests support the exponent {self.likeliest:g} of {self.basis.value} ({self.probability.max():.0%}), but "
-            f"the clutch's record states {in_force:g} ({probability:.0%}): you can edit its `severity`"
+            f"by the tests, wear grows with {work} to the power of {self.likeliest:g} (probability "
+            f"{self.probability.max():.0%}), but `severity` of the clutch states {in_force:g} ({probability:.0%})"
         )
         return [Notice(code="severity_exponent", message=message)]
 

@@ -38,7 +38,9 @@ def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id:
         measured = stored_runs.engagements(connection, clutch_id)
     happened = [event for event in state.events if at_cycles is None or event.cycles <= at_cycles]
     if not lives_of(happened):
-        raise NotFoundError("there is no stationary test up to these cycles, so no engagement can be simulated")
+        raise NotFoundError(
+            "no engagement can be simulated: there is no stationary test up to these cycles. Ask for later cycles"
+        )
     tracked = _Tracked(life=lives_of(happened)[-1], assumptions=state.assumptions(), fits=levels)
     cycles = happened[-1].cycles if at_cycles is None else at_cycles
     row = _compared_row(measured, tracked.life, run_id)
@@ -83,7 +85,7 @@ def _compared_row(measured: Sequence[dict[str, Any]], life: Life, run_id: str | 
         return rows[-1] if rows else None
     row = next((row for row in rows if row["run_id"] == run_id), None)
     if row is None:
-        raise NotFoundError(f"run {run_id!r} has no evaluated engagement of this life up to these cycles")
+        raise NotFoundError(f"run {run_id!r} is no evaluated engagement of this life up to these cycles")
     return row
 
 
@@ -136,7 +138,10 @@ class _Tracked:
                     at.setdefault(series.pressure, {})[name] = self._medians(series, moments)
         complete = {level: values for level, values in at.items() if len(values) == len(PARAMETER_NAMES)}
         if not complete:
-            raise NotFoundError("no stationary test up to these cycles determines all four Stribeck parameters")
+            raise NotFoundError(
+                "no engagement can be simulated: no test up to these cycles determines all four Stribeck parameters. Send "
+                "one over more speeds"
+            )
         return [
             {
                 level: StribeckParameters(**{name: max(median[place], 0.0) for name, median in values.items()})

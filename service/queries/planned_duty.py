@@ -169,20 +169,20 @@ class _Counted:
         if self.assumed and self.scale.reference is not None:
             recent = f"{self.scale.reference / 1e3:.3g} kJ a cycle of recent duty"
             message = (
-                f"the clutch's record counts duty cycles; here each cycle counts by its energy, relative to {recent}"
+                f"each planned cycle counts by its energy, relative to {recent}; the clutch's own runs count by cycles"
             )
             return [Notice(code="counted_by_energy", message=message)]
         if self.severity.basis is SeverityBasis.CYCLES:
-            why = "the clutch's record counts duty cycles, whatever their severity (`severity.basis`)"
+            why = "`severity.basis` of the clutch is cycles, so energies are not used"
         elif self.scale.reference is None:
-            why = f"no duty run of this life states a {basis} to compare with"
+            why = f"no duty run of this life states the {basis}, so there is nothing to compare with"
         else:
             none = np.zeros(1)
             unstated = [str(n) for n, block in enumerate(blocks, start=1) if self._work(block, 0.1, none) is None]
             if not unstated:
                 return []
             why = f"block {', '.join(unstated)} of the programme states no {basis}"
-        return [Notice(code="severity_not_counted", message=f"{why}: its cycles count as those of recent duty")]
+        return [Notice(code="severity_not_counted", message=f"{why}: planned cycles count like those of recent duty")]
 
     def _work(self, block: PlannedBlock, cof: float, normals: FloatArray) -> FloatArray | None:
         """The energy [J] or slid angle [rad] of a cycle, by draw [n]; None where the block states none."""

@@ -61,7 +61,7 @@ def parquet_writer() -> str:
     try:
         return f"{_PACKAGE} {version(_PACKAGE)}"
     except PackageNotFoundError:
-        message = f"this service cannot write Parquet: run pip install -e '.[{_EXTRA}]', or accept application/json"
+        message = f"this service cannot write Parquet: run pip install -e '.[{_EXTRA}]', or ask for application/json"
         raise NotAcceptableError(message) from None
 
 

@@ -52,12 +52,14 @@ def surfaces(
     history = lives_of(events)
     speed_range = history[-1].speed_range if history else None
     if speed_range is None:
-        raise NotFoundError("there are no surfaces without a stationary test")
+        raise NotFoundError("there are no surfaces, because this life has no stationary test: send one")
     life = history[-1]
     tracks = parameter_tracks(life, assumptions, tests_of(life, fits))
     levels = sorted(level for level in life.reference if all((name, level) in tracks for name in PARAMETER_NAMES))
     if not levels:
-        raise NotFoundError("no stationary test determines all four Stribeck parameters: there are no surfaces")
+        raise NotFoundError(
+            "there are no surfaces, because no test determines all four Stribeck parameters: send one over more speeds"
+        )
     tested = np.unique([event.cycles for event in life.events if event.cofs])
     enough = tested.size >= FEWEST_TESTS  # fewer say nothing of what lies between or behind them
     cycles = np.linspace(life.origin, life.events[-1].cycles, CYCLES) if enough else tested

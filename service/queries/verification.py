@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import records, stored_runs
+from service.columns import bar
 from service.errors import InvalidError
 from service.lives.assumptions import ALL_PRESSURES
 from service.lives.incoming_run import content_hash
@@ -115,8 +116,8 @@ def check_results(database: Database, clutch_id: str) -> CheckedResults:
 
 def _compared(clutch_id: str, stored: _Results, again: Mapping[str, Any]) -> CheckedResults:
     earlier = Counter(version for version, _ in stored.values() if version != CODE_VERSION)
-    lines = [f"{name} is stored and does not follow from the runs" for name in stored.keys() - again.keys()]
-    lines += [f"{name} follows from the runs and is not stored" for name in again.keys() - stored.keys()]
+    lines = [f"{name} is stored, but the runs do not give it" for name in stored.keys() - again.keys()]
+    lines += [f"{name} is missing, although the runs give it" for name in again.keys() - stored.keys()]
     for name in stored.keys() & again.keys():
         version, result = stored[name]
         place = _difference(result, again[name]) if version == CODE_VERSION else None
@@ -154,7 +155,7 @@ def _recomputed(computed: stored_runs.Recomputed) -> dict[str, Any]:
 
 
 def _fit(run_id: str, pressure: float) -> str:
-    return f"the fit of run {run_id} at {pressure:g} Pa"
+    return f"the fit of run {run_id} at {bar(pressure):g} bar"
 
 
 def _prediction(method: str, cycles: float) -> str:

@@ -40,6 +40,8 @@ _OF_THE_END = ("missing", "ragged", "empty")
 Answer = TypeVar("Answer")
 Body = TypeVar("Body", bound=pydantic.BaseModel)
 
+#: Errors whose rule is about a field's name, not its value.
+_WITHOUT_VALUE = ("union_tag_not_found", "extra_forbidden")
 _KINDS = ("stationary_stribeck", "dynamic_stribeck", "duty_cycles", "run_in", "maintenance")
 
 
@@ -93,7 +95,7 @@ def _parsed(body: bytes, read: Callable[[Any], Answer]) -> Answer:
         sent = pydantic_core.from_json(body)
     except ValueError as error:
         _require_utf8(body)
-        message = f"the body: Invalid JSON: {error}"
+        message = f"the body must be valid JSON: {error}"
         raise InvalidError.of(message, code="json_invalid") from None
     answer = read(sent)
     if _NUL.search(body):  # PostgreSQL reads no JSON that holds it: stored once, it would fail all that is asked later
@@ -119,7 +121,7 @@ def _too_many_marks(body: bytes, read: Callable[[Any], object]) -> InvalidError:
                     return InvalidError(f"{errors[0].message}; {total} errors or more", errors=errors, total=total)
     except ValueError:
         pass  # nested too deeply, or no JSON from its beginning on
-    message = f"the body must not hold more than {MAX_MARKS} quotation marks and opening brackets, got more"
+    message = f"the body must not hold more than {MAX_MARKS} quotation marks and brackets: send a long record as a file"
     return InvalidError.of(message, code="too_many_marks")
 
 
@@ -138,10 +140,10 @@ def _in_utf8(body: bytes) -> bytes:
     """
     for mark, name in _MARKS:
         if body.startswith(mark):
-            raise _other_encoding(f"it begins with the byte order mark of {name}")
+            raise _other_encoding(f"the body begins with the byte order mark of {name}")
     body = body.removeprefix(codecs.BOM_UTF8)
     if (zero := body[:4].find(0)) >= 0:
-        raise _other_encoding(f"its byte {zero + 1} is zero, as in UTF-{32 if body[:4].count(0) == 3 else 16}")
+        raise _other_encoding(f"byte {zero + 1} is zero, as in UTF-{32 if body[:4].count(0) == 3 else 16}")
     return body
 
 
@@ -157,7 +159,7 @@ def _require_utf8(body: bytes) -> None:
 
 
 def _other_encoding(why: str) -> InvalidError:
-    message = f"the body: JSON must be sent as UTF-8; {why}"
+    message = f"the body must be JSON in UTF-8: {why}"
     return InvalidError.of(message, code="encoding")
 
 
@@ -198,6 +200,7 @@ def _field_error(loc: tuple[int | str, ...], code: str, rule: str, value: object
     name = ".".join(str(part) for part in place) or "the body"
     shown = "" if code == "missing" else repr(value)[:MAX_QUOTED]
     rule = rule_in_words(code, rule)
-    message = f"{name}: {rule}" + (f", got {shown}" if shown and "got" not in rule else "")
+    said = shown and "got" not in rule and code not in _WITHOUT_VALUE
+    message = f"{name}: {rule}" + (f", got {shown}" if said else "")
     row = place[-1] + 1 if place and isinstance(place[-1], int) else None
     return FieldError(pointer=pointer, code=code, message=message, row=row, value=shown)

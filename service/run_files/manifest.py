@@ -69,7 +69,7 @@ def find(paths: Iterable[Path]) -> list[RunFile]:
             listed = {} if path.suffix == ".json" else _listed(path.parent)
             runs.append(RunFile(path=path, parameters=listed.get(path)))
         else:
-            raise FileNotFoundError(f"{path} is not there")
+            raise FileNotFoundError(f"{path} does not exist")
     return runs
 
 
@@ -127,18 +127,18 @@ def _listed(folder: Path) -> dict[Path, dict[str, str]]:
 def _entry(manifest: Path, index: int, entry: object) -> tuple[Path, dict[str, str]]:
     at = f"{manifest}[{index}]"
     if not isinstance(entry, dict) or not set(_NEEDED) <= entry.keys() <= {*_NEEDED, *_OPTIONAL}:
-        rule = f"must hold {', '.join(_NEEDED)} and at most {', '.join(_OPTIONAL)}"
+        rule = f"must have the fields {', '.join(_NEEDED)}, and may have {', '.join(_OPTIONAL)}"
         raise ValueError(f"{at} {rule}, got {str(entry)[:80]}")
     cycles = entry["cycles"]
     if isinstance(cycles, bool) or not isinstance(cycles, int | float) or not 0 <= cycles < _MAX_CYCLES:
-        raise ValueError(f"{at}: cycles must be a number that is not negative, got {cycles!r}")
+        raise ValueError(f"{at}: cycles must be a number of 0 or more, got {cycles!r}")
     for name in entry.keys() - {"cycles"}:
         if not isinstance(entry[name], str) or not entry[name]:
             raise ValueError(f"{at}: {name} must be a text, got {entry[name]!r}")
     file = manifest.parent / entry["file"]
     _require_within(manifest.parent, file, at)
     if not file.is_file():
-        raise FileNotFoundError(f"{at}: {file} is not there")
+        raise FileNotFoundError(f"{at}: the file {file} does not exist")
     parameters = {name: entry[name] for name in ("kind", *_OPTIONAL) if name in entry}
     return file, parameters | {"cycles": repr(float(cycles)), "filename": file.name}
 

@@ -21,8 +21,10 @@ def planned_tests(path: Path, alternative: int) -> list[PlannedTest]:
     """The steps of one of a plan's alternatives, from 1. Raises ValueError that names what is wrong, OSError."""
     text = path.read_text(encoding="utf-8-sig")
     tests = _of_json(path, text) if text.lstrip().startswith("{") else _of_csv(text)
+    if not tests:
+        raise _no_plan(path, "it has no tests")
     if alternative not in tests:
-        raise ValueError(f"{path} has {len(tests)} alternatives, no alternative {alternative}")
+        raise ValueError(f"--alternative must be 1 to {len(tests)}, as {path} has them, got {alternative}")
     return [_planned(f"{path}, step {number}", step) for number, step in enumerate(tests[alternative], start=1)]
 
 
@@ -30,7 +32,11 @@ def _of_json(path: Path, text: str) -> dict[int, list[Any]]:
     try:
         return {number: test["steps"] for number, test in enumerate(json.loads(text)["tests"], start=1)}
     except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path} is not a plan of the service ({error})") from None
+        raise _no_plan(path, str(error)) from None
+
+
+def _no_plan(path: Path, why: str) -> ValueError:
+    return ValueError(f"{path} is not a plan of a diagnosis ({why}): save one with clutchlife diagnose ID --plan FILE")
 
 
 def _of_csv(text: str) -> dict[int, list[Any]]:

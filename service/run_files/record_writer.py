@@ -41,7 +41,7 @@ def require_writer(kind: RecordFormat) -> None:
     """Raises ValueError where the package that writes a format is not installed; names the extra that installs it."""
     if kind not in _NEEDING:
         return
-    if missing := not_installed(_NEEDING[kind], f"{_NEEDING[kind]} is not written here"):
+    if missing := not_installed(_NEEDING[kind], f"{_NEEDING[kind]} files cannot be written"):
         raise ValueError(missing)
 
 

@@ -40,9 +40,8 @@ def require_usable(profile: RigProfile) -> None:
     """Raise InvalidError where a unit is none of its channel or the pattern of names cannot be used."""
     for number, column in enumerate(profile.columns):
         if column.channel and column.unit and conversion(column.channel, column.unit) is None:
-            message = (
-                f"columns.{number}.unit: {column.channel} is in one of {spellings(column.channel)}, got {column.unit!r}"
-            )
+            allowed = spellings(column.channel)
+            message = f"columns.{number}.unit must be one of {allowed} for {column.channel}, got {column.unit!r}"
             raise InvalidError.of(message, code="unknown_unit", pointer=f"/columns/{number}/unit", value=column.unit)
     pattern = profile.file_name
     if pattern is None:
@@ -54,7 +53,7 @@ def require_usable(profile: RigProfile) -> None:
     elif any(places.count(name) > 1 for name in _MEANING if name != "*"):
         rule = "may hold each of {cycles}, {kind} and {run_id} once"
     elif "{kind}" in places and not profile.kinds:
-        rule = "with {kind} needs `kinds`: for each kind the words that stand for it"
+        rule = "has {kind}, so `kinds` must list the words for each kind of run"
     if rule is not None:
         message = f"file_name {rule}, got {pattern!r}"
         raise InvalidError.of(message, code="pattern", pointer="/file_name", value=pattern)

@@ -51,7 +51,11 @@ def read_file_run(
     kind, cycles = kind or stated.kind, stated.cycles if cycles is None else cycles
     if kind is None or cycles is None:
         name = "kind" if kind is None else "cycles"
-        where = "no rig was named" if profile is None else f"the rig's profile finds no cycles for {filename!r}"
+        where = (
+            "no rig profile was named, which could find it"
+            if profile is None
+            else f"the rig profile finds no {name} for {filename!r}"
+        )
         message = f"{name} must be given: {where}"
         raise InvalidError.of(message, code="missing", pointer=f"/query/{name}")
     run = run_of(
@@ -89,7 +93,10 @@ def run_of(
             errors=errors,
         )
     if kind == "stationary_stribeck" and read.counts and _holds_no_dwell(columns):
-        message = "the recorder's times show no plateaus: each row was taken for a plateau"
+        message = (
+            "the times in the file only count the rows, so each row was read as a plateau. If the rows are samples, send "
+            "the samples' times"
+        )
         notices.append(Notice(code="counting_clock", message=message))
         columns = {name: column for name, column in columns.items() if name != "time_s"}
         check_arrays(columns)  # a plateau has no negative pressure, which a sample may have

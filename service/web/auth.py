@@ -57,6 +57,7 @@ class Grant:
     key_id: str | None = None
 
 
+_MAKE_ONE = "make a key with clutchlife key create"
 _LOCAL_GRANT = Grant(name=LOCAL, scope="admin")
 
 
@@ -98,9 +99,9 @@ def identify(snapshot: Snapshot, caller: Caller) -> Grant:
         raise UnauthorizedError("send a key as: Authorization: Bearer KEY")
     key = snapshot.key
     if key is None:
-        raise UnauthorizedError("the key is not known, or was revoked")
+        raise UnauthorizedError("the key is unknown or was revoked: ask for a new one")
     if key.expires_at is not None and key.expires_at <= _stamp(datetime.now(UTC)):
-        raise UnauthorizedError(f"the key expired at {key.expires_at}")
+        raise UnauthorizedError(f"the key expired at {key.expires_at}: ask for a new one")
     return _grant(key)
 
 
@@ -135,13 +136,13 @@ def _grant(key: GrantedKey) -> Grant:
 def require_scope(grant: Grant, scope: Scope) -> None:
     """Raise ForbiddenError where the scope is not among those granted."""
     if SCOPES.index(grant.scope) < SCOPES.index(scope):
-        raise ForbiddenError(f"this needs the scope {scope}, the key has {grant.scope}")
+        raise ForbiddenError(f"the key has the scope {grant.scope}, and this request needs {scope}")
 
 
 def _require_own(grant: Grant, clutch_id: str | None) -> None:
     if grant.clutches is not None and clutch_id not in grant.clutches:
         subject = "all clutches" if clutch_id is None else f"clutch {clutch_id[:80]!r}"
-        raise ForbiddenError(f"the key is limited to some clutches, and the request concerns {subject}")
+        raise ForbiddenError(f"the key is for certain clutches only, and this request is about {subject}")
 
 
 def _stamp(moment: datetime) -> str:
@@ -155,16 +156,18 @@ def _digest(text: str) -> str:
 def _require_loopback(caller: Caller) -> None:
     if caller.proxy is not None:
         raise ForbiddenError(
-            f"no key exists: a request with {caller.proxy} came through a proxy. Make a key, "
-            "or serve with --insecure-local"
+            f"no key exists, so a request through a proxy ({caller.proxy}) has no access: {_MAKE_ONE}, or serve with "
+            "--insecure-local"
         )
     if caller.address is not None and not is_loopback(caller.address):
-        raise ForbiddenError(f"no key exists: only this machine has access, not {caller.address}")
+        raise ForbiddenError(f"no key exists, so only this machine has access, not {caller.address}: {_MAKE_ONE}")
     host = (caller.host or "").strip()
     if not is_loopback(_name(host)):
-        raise ForbiddenError(f"no key exists: the service answers as localhost only, not as {host[:80]!r}")
+        raise ForbiddenError(
+            f"no key exists, so the service answers at localhost only, not at {host[:80]!r}: {_MAKE_ONE}"
+        )
     if caller.origin is not None and caller.origin.partition("://")[2] != host:
-        raise ForbiddenError(f"no key exists: a page of {caller.origin[:80]!r} has no access")
+        raise ForbiddenError(f"no key exists, so a page of {caller.origin[:80]!r} has no access: {_MAKE_ONE}")
 
 
 def _name(host: str) -> str:

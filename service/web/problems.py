@@ -100,9 +100,9 @@ def _storage_error(_: Request, error: Exception) -> Response:
         return refused(InvalidError, str(error))
     _log.error("storage: %s", error)
     if isinstance(error, RawStoreUnavailable):
-        return problem(503, "raw-records", "The store of raw records cannot be used", f"{error}; nothing was changed")
+        return problem(503, "raw-records", "The store of raw records cannot be used", f"{error}. Nothing was changed")
     slug, title = ("busy", "Busy") if isinstance(error, DatabaseBusy) else ("storage", "The database cannot be used")
-    return problem(503, slug, title, "nothing was changed; try again, or see the service's log")
+    return problem(503, slug, title, "nothing was changed: send the request again, or see the service's log")
 
 
 def _request_error(_: Request, error: Exception) -> Response:
@@ -138,9 +138,8 @@ def _system_error(request: Request, error: Exception) -> Response:
         return unexpected(request, error)
     _log.error("%s %s: %s", request.method, route_of(request), error)
     detail = (
-        f"the service's disk has no room for the file ({error.strerror}): nothing was stored; make room and send it again. "
-        "The parts of a form are kept in the system's folder of temporary files, which may be small: send the file as the "
-        "request's body, which is kept beside the database"
+        f"the service's disk has no room for the file ({error.strerror}). Nothing was stored: make room and send it again. "
+        "A form also needs room in the system's temporary folder; a file sent as the request's body does not"
     )
     return problem(NoRoomError.status, NoRoomError.slug, NoRoomError.title, detail)
 
@@ -148,7 +147,7 @@ def _system_error(request: Request, error: Exception) -> Response:
 def unexpected(request: Request, error: Exception) -> Response:
     """The answer for an error of the program, which the log says all of and the answer nothing."""
     _log.error("%s %s", request.method, route_of(request), exc_info=error)
-    return problem(500, ServiceError.slug, ServiceError.title, "the service's log says more")
+    return problem(500, ServiceError.slug, ServiceError.title, "the service's log describes this error")
 
 
 #: For the API's description: which problems an address may answer with.

@@ -102,7 +102,7 @@ class Readiness:
 
     def _fault_of_workers(self) -> str | None:
         if not self._jobs.is_working():
-            return "a thread that does jobs has ended"
+            return "a thread that runs jobs has ended: restart the service"
         ended = self._workers.ended()
         if not ended:
             return None

@@ -57,7 +57,7 @@ def main() -> None:
     try:
         ended = diagnosed(task, process.say)
     except MemoryError:
-        ended = {"problem": f"it needs more than {task.bytes // 2**20} MB of memory"}
+        ended = {"problem": f"the diagnosis needs more than {task.bytes // 2**20} MB of memory"}
     process.answer(ended)
 
 

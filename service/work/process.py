@@ -67,7 +67,7 @@ class Child:
         except subprocess.TimeoutExpired:
             if time.monotonic() < self._deadline:
                 return False
-            raise FailedError(f"it took longer than {self._work.longest:g} s by the clock") from None
+            raise FailedError(f"the computation took longer than {self._work.longest:g} s") from None
         return True
 
     def progress(self) -> Json | None:
@@ -79,7 +79,7 @@ class Child:
         """What it wrote at its end. Raises FailedError, AwayError; what it complained of is logged under its `name`."""
         code = self._process.returncode
         if code == -signal.SIGXCPU:
-            raise FailedError(f"it took longer than {self._work.processor_seconds} s of processor time")
+            raise FailedError(f"the computation took longer than {self._work.processor_seconds} s of processor time")
         self._errors.seek(max(0, self._errors.seek(0, os.SEEK_END) - _TAIL))
         output = self._errors.read().decode(errors="replace")
         if output:
@@ -88,14 +88,14 @@ class Child:
         if code == AWAY:
             raise AwayError
         if code != 0:
-            raise FailedError(f"its process ended with {_ending(code)}: see the log")
+            raise FailedError(f"the computation ended with {_ending(code)}: see the service's log")
         try:
             written = json.loads(self._lines()[-1])
         except (ValueError, IndexError):
             written = None
         if not isinstance(written, dict):
             _log.error("%s: its process gave no readable answer", name)
-            raise FailedError("its process gave no readable answer")
+            raise FailedError("the computation gave no readable answer: see the service's log")
         return written
 
     def _lines(self) -> list[bytes]:

@@ -84,9 +84,9 @@ def workflow_work(function: str) -> Callable[[JobRow, Settings], Work]:
 #: How often a job is begun at most. Chosen: whatever ends the service once, as an operator may, is not the job's fault; what
 #: ends it three times is.
 MAX_ATTEMPTS = 3
-GIVEN_UP = f"the service or its database ended {MAX_ATTEMPTS} times while it ran"
-UNSTORED = "its end could not be stored: see the service's log"
-UNDONE = "it could not be done: see the service's log"
+GIVEN_UP = f"the service or its database stopped {MAX_ATTEMPTS} times during this job"
+UNSTORED = "the result could not be stored: see the service's log"
+UNDONE = "an error stopped the job: see the service's log"
 #: A lease is prolonged so many times before it would run out. Chosen: a database that is away for some seconds loses none.
 RENEWALS_A_LEASE = 10
 #: [s] Between two looks whether the service is to stop. Chosen: nobody waits for it.

@@ -47,7 +47,7 @@ CHANGE_SECONDS = 600.0
 _LAST_SECONDS = 15.0
 #: [s] Between two looks at all processes, and at an idle one.
 _LOOK = 0.5
-ENDING = "the service is ending"
+ENDING = "the service is shutting down: send the request again later"
 
 
 class Lane(Enum):
@@ -292,7 +292,7 @@ class Workers:
         except _LostError:
             waited = time.monotonic() - call.queued_at
             again = not (call.retried or call.answer.done() or waited > call.patience)
-            error = BusyError("the process that worked on this has ended: ask again in a little while")
+            error = BusyError("the process for this request ended unexpectedly: send the request again")
         except BaseException as raised:  # noqa: BLE001  (raised again for who asked)
             error = raised
         with self._lock:
@@ -346,11 +346,17 @@ class Workers:
                     self._count(call.lane, -1)
                 refused += late
         for call in refused:
-            _answer(call, BusyError(f"it has waited for {now - call.queued_at:.0f} s: ask again in a little while"))
+            _answer(
+                call,
+                BusyError(f"the service is busy: the request waited {now - call.queued_at:.0f} s. Send it again later"),
+            )
         for made, running_call in running:
             made.check(now)
             if running_call is not None and running_call.is_overdue(now):
-                _answer(running_call, BusyError(f"it took longer than {running_call.seconds:g} s and was ended"))
+                _answer(
+                    running_call,
+                    BusyError(f"the computation took longer than {running_call.seconds:g} s and was stopped"),
+                )
                 made.stop()
 
 

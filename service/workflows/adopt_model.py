@@ -62,9 +62,9 @@ def finish_and_adopt(
             changes.last_of_history(connection, clutch_id)
             > records.diagnosis(connection, clutch_id, diagnosis_id).revision
         ):
-            raise NothingToAdoptError(f"the runs of diagnosis {diagnosis_id!r} were changed meanwhile")
+            raise NothingToAdoptError(f"runs have changed since diagnosis {diagnosis_id!r}: run a new diagnosis")
         if not jobs.end(connection, diagnosis_id, jobs.FINISHED, at, claimer=claimer):
-            raise NothingToAdoptError(f"diagnosis {diagnosis_id!r} was ended meanwhile")
+            raise NothingToAdoptError(f"diagnosis {diagnosis_id!r} was cancelled: run a new diagnosis")
         diagnoses.finish(connection, diagnosis_id, at, ended["report"], ended["extension"])
 
     try:
@@ -134,7 +134,7 @@ def _in_force(connection: Connection, clutch_id: str, diagnosis_id: str | None) 
 
 def _adoptable(row: DiagnosisRow) -> Adoption:
     if row.extension is None:
-        why = "has not finished" if row.report is None else "found nothing to adopt"
+        why = "has no report yet: wait for it" if row.report is None else "has no extended model that could be adopted"
         raise NothingToAdoptError(f"diagnosis {row.diagnosis_id!r} {why}")
     return Adoption(diagnosis_id=row.diagnosis_id, life=row.life, extension=extension_of(row.extension))
 
@@ -147,4 +147,6 @@ def _of_present_life(database: Database, clutch_id: str, adoption: Adoption) -> 
 
 def _require_present(adoption: Adoption, life: str) -> None:
     if adoption.life != life:
-        raise NothingToAdoptError(f"diagnosis {adoption.diagnosis_id!r} belongs to a life that a rebuild has ended")
+        raise NothingToAdoptError(
+            f"diagnosis {adoption.diagnosis_id!r} is of the life before the last rebuild: run a new diagnosis"
+        )

@@ -148,7 +148,5 @@ def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:
     if content not in [
         content_of(ClutchIn.model_validate(record).model_dump(mode="json")) for record in stored_records
     ]:
-        raise ConflictError(
-            f"clutch {stored.clutch_id!r} is already registered with another record; use PATCH to change it"
-        )
+        raise ConflictError(f"clutch {stored.clutch_id!r} has another record: change it with PATCH or clutchlife edit")
     return False

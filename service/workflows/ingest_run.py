@@ -177,7 +177,7 @@ def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
 def _computed(database: Database, before: ClutchState, arrival: Arrival, read_with: tuple[Geometry, float]) -> _Outcome:
     """The results of the run in the clutch's history `before` it; it was read with a geometry and a filter."""
     if (before.geometry, before.record.torque_filter) != read_with:
-        raise BusyError("the clutch's geometry or filter was edited while the run was read: send it again")
+        raise BusyError("the clutch's geometry or filter was edited while the run was read: send the run again")
     event = _event_of(arrival)
     event = replace(event, cofs=cofs_among(before, event, arrival.analysis.fits))
     state = replace(before, events=order([*before.events, event]))

@@ -33,7 +33,7 @@ from storage.engine.database import Database
 
 #: Why a refresh leaves a clutch.
 LEFT = "not updated, because runs arrived during the computation: the next refresh updates it"
-GAVE_WAY = "not refreshed here, because another fleet is first: a separate job refreshes it"
+GAVE_WAY = "not refreshed now, because another fleet is being refreshed: a separate job follows"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -56,12 +56,14 @@ def relocate(database: Database, address: str, to: str) -> int:
     for name in _named(database, store):
         count += 1
         if not target.exists(name):
-            raise ValueError(f"{target.address} lacks the blob {name}: copy all of {store.address} there first")
+            raise ValueError(
+                f"{target.address} lacks the raw record {name}: copy all files from {store.address} to it first"
+            )
     if target.mark() != store.mark:
-        raise ValueError(f"{target.address} is no copy of {store.address}: it has the mark of another database")
+        raise ValueError(f"{target.address} is not a copy of {store.address}, but belongs to another database")
     with database.writing() as connection:
         if raw_stores.numbers(connection).get(store.address, (0, 0))[1] != count:
-            raise ValueError(f"a run arrived meanwhile: copy all of {store.address} there again")
+            raise ValueError(f"a run arrived during the check: copy all files from {store.address} again")
         raw_stores.set_address(connection, store.store_key, target.address)
     return count
 
@@ -162,7 +164,7 @@ def _claim(database: Database, address: str) -> None:
 
 def _require_mark(store: BlobStore, mark: str) -> None:
     if store.mark() != mark:
-        raise ValueError(f"{store.address} is not marked as this database's, so nothing in it was changed")
+        raise ValueError(f"{store.address} is not marked as this database's: nothing in it was changed")
 
 
 def _store_at(database: Database, address: str) -> RawStore:

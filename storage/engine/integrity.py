@@ -19,7 +19,7 @@ def refuse_newer(revision: str | None) -> None:
     """Raise DatabaseTooNew on a revision that this code does not know."""
     if revision is not None and revision not in revisions():
         raise DatabaseTooNew(
-            f"the database is at revision {revision}, this release knows up to {head()}: use a newer one"
+            f"the database is at revision {revision}, this release knows only up to {head()}: use a newer release"
         )
 
 

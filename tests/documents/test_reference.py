@@ -46,6 +46,11 @@ def test_every_code_is_documented() -> None:
     assert [slug for slug in sorted(slugs) if f":problem:{slug}`" not in text] == []
 
 
+def test_no_message_holds_a_place_that_nothing_fills() -> None:
+    """A string without its f: `missed_forecasts` showed `{back_cast.widening:.2g}` to its readers."""
+    assert "{" not in written("codes")
+
+
 def test_every_metric_is_documented() -> None:
     found = {name for text in SOURCES for name in re.findall(r'"(clutchlife_[a-z_]+)"', text)}
     assert len(found) > 8

@@ -163,7 +163,7 @@ def test_deviations_given_too_small_are_not_believed() -> None:
     truth, torque, noisy = _simulated(0.01)
     fits = fit_curves([curve(VELOCITY, y, 0.002 * t) for y, t in zip(noisy, torque, strict=True)])
     assert np.abs(_coverage(fits, truth) - COVERAGE).max() <= WITHIN
-    assert all("exceed the given torque_sd" in fit.message for fit in fits)
+    assert all("are larger than torque_sd_nm" in fit.message for fit in fits)
 
 
 @pytest.mark.parametrize("life", [0.0, 0.8])

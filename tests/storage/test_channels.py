@@ -136,10 +136,12 @@ def test_a_column_that_is_damaged_or_missing_in_its_store_is_named(database: Dat
     store = open_store(raw_address)
     whole = store.get(one.blob)
     store.put(one.blob, whole[:-1])
-    with pytest.raises(DamagedData, match=f"channel torque_nm of run {run_key}: the blob {one.blob} in .* is damaged"):
+    with pytest.raises(
+        DamagedData, match=f"channel torque_nm of run {run_key}: the raw record {one.blob} in .* is damaged"
+    ):
         one.values()
     store.delete(one.blob)
-    with pytest.raises(DamagedData, match=f"channel torque_nm of run {run_key}: there is no blob {one.blob}"):
+    with pytest.raises(DamagedData, match=f"channel torque_nm of run {run_key}: the raw record {one.blob} is missing"):
         one.values()
     store.put(one.blob, whole)
     assert one.values().size == 50_000

@@ -120,7 +120,7 @@ def thinned(campaign: Campaign, notes: list[str]) -> Campaign:
         return campaign
     kept = _evenly(states, max(2, int(states.size * criteria.MOST_ROWS / size)))
     notes.append(
-        f"{states.size - len(kept)} of {states.size} states were left out, evenly: the campaign is very large."
+        f"{states.size - len(kept)} of {states.size} states were left out evenly, because the campaign is very large."
     )
     return replace(
         campaign,
@@ -134,7 +134,9 @@ def _with_fewer_loops(campaign: Campaign, notes: list[str]) -> Campaign:
     if states.size <= criteria.MOST_LOOP_STATES:
         return campaign
     kept = _evenly(states, criteria.MOST_LOOP_STATES)
-    notes.append(f"Dynamic tests of {len(kept)} of {states.size} states were taken, evenly: there are very many.")
+    notes.append(
+        f"Dynamic tests of {len(kept)} of {states.size} states were used, spread evenly, because there are very many."
+    )
     return replace(campaign, dynamic=tuple(run for run in campaign.dynamic if run.cycles in kept))
 
 
@@ -316,7 +318,7 @@ def _plateaus(
     if usable.size < table.torque.size:
         notes.append(f"{run.run_id}: {table.torque.size - usable.size} plateaus at rest left out.")
     if usable.size > criteria.MOST_PLATEAUS:
-        notes.append(f"{run.run_id}: {criteria.MOST_PLATEAUS} of {usable.size} plateaus taken, evenly.")
+        notes.append(f"{run.run_id}: {criteria.MOST_PLATEAUS} of {usable.size} plateaus used, spread evenly.")
         usable = usable[np.linspace(0, usable.size - 1, criteria.MOST_PLATEAUS).round().astype(int)]
     velocity = campaign.geometry.sliding_velocity(table.speed[usable])
     sign = np.copysign(1.0, velocity)

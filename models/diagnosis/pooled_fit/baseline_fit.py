@@ -186,7 +186,7 @@ def missing_for_baseline(design: Design) -> str:
         return f"{few}, and at least {criteria.FEWEST_ROWS} are needed."
     usual, largest = design.usual_torque, float(np.abs(design.torque).max())
     if not (usual > 1e-6 and largest < 1e7):  # no clutch's
-        return f"torques of {usual:.3g} Nm in the median and {largest:.3g} Nm at most are no clutch's."
+        return f"the torques (median {usual:.3g} Nm, largest {largest:.3g} Nm) are not possible: check the unit."
     return ""
 
 
@@ -224,13 +224,13 @@ def _require_weights(problem: FitProblem, fitted: Fit) -> None:
         steepest = float(np.abs(fitted.prediction.jacobian(design)[:, problem.priors.free]).max())
         finite = bool(steepest * np.finfo(np.float64).eps < design.usual_torque)
     if not finite:
-        raise IndeterminateError("no finite torque can be fitted to these numbers.")
+        raise IndeterminateError("the model cannot be fitted to these torques, pressures and speeds: check the units.")
     parts = [deviation[: design.plateaus], deviation[design.plateaus :]]
     noise = min(float(np.median(part)) for part in parts if part.size)
     if not noise >= criteria.LEAST_NOISE_SHARE * design.usual_torque:
         raise IndeterminateError(
-            f"the readings have no noise ({noise:.1g} Nm about {design.usual_torque:.3g} Nm), like a dead channel or "
-            "computed values. Without noise, the diagnosis cannot judge the model."
+            f"the readings have no noise ({noise:.1g} Nm about {design.usual_torque:.3g} Nm). Are they computed values? "
+            "The diagnosis needs measured values."
         )
 
 
@@ -247,13 +247,13 @@ def _with_estimated_noise(problem: FitProblem, fitted: Fit) -> tuple[FitProblem,
 def _notes(design: Design, assumed: bool) -> tuple[str, ...]:
     notes = list(design.notes)
     if assumed:
-        notes.append("Too few rows to estimate the noise: 1 % of the torque is assumed.")
+        notes.append("Too few plateaus to estimate the noise: 1 % of the torque is assumed.")
     speeds = _speeds(design).size
     if speeds < criteria.CURVE_SPEEDS:
         notes.append(
-            f"{speeds} speed{'s' * (speeds > 1)} cannot show the form of a Stribeck curve: what depends on speed alone is "
-            "not seen here; what depends on use, pressure, time within a test or temperature is."
+            f"{speeds} speed{'s' * (speeds > 1)} cannot show a Stribeck curve, so causes that depend on speed alone are not "
+            "seen here: test more speeds."
         )
     if not design.facts.temperature_measured:
-        notes.append("No oil temperature was measured: any slow course of it competes with the other causes.")
+        notes.append("No oil temperature was measured, so a slow change of it may look like another cause: measure it.")
     return tuple(notes)

@@ -197,7 +197,7 @@ def _unseen(report: Report) -> list[Sentence]:
         sentences = [Sentence(f"{say}: {conjunction(shown)}.")]
     if report.unseen:
         names = conjunction([effect_name(slug) for slug in report.unseen])
-        sentences.append(Sentence(f"These data cannot show, at any size:  {names}.", SHOULD))
+        sentences.append(Sentence(f"These data cannot show, at any size: {names}.", SHOULD))
     return sentences
 
 

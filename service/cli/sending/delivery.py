@@ -122,7 +122,7 @@ def _present(service: Service, spool: Spool) -> bool:
 
 def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Report) -> None:
     """One entry; raises NoLongerWantedError where it waits no more, and what `deliver` raises."""
-    answer = "sent, and no answer was received"
+    answer = "sent, but no answer was received"
     spool.note(entry, tries=entry.tries + 1, last_try=entries.stamp(), last_answer=answer, perhaps_stored=True)
     address = f"/v1/clutches/{spool.clutch_id}/{entry.resource}" + ("" if entry.parameters is None else "/file")
     try:

@@ -94,7 +94,7 @@ def passing(response: httpx2.Response, answer: object | None) -> str | None:
         if answer is not None:
             return None
         media = response.headers.get("Content-Type", "nothing")[:_MAX_QUOTED]
-        return f"status {status} with {media}, not an answer of the service: a login page or a proxy?"
+        return f"status {status} with {media}, which is not from the service: is it a login page or a proxy?"
     if status < 400:
         target = response.headers.get("Location", "nowhere")[:_MAX_QUOTED]
         return f"status {status}, a redirect to {target}: is the address right?"

@@ -21,6 +21,13 @@ FIRST_WAIT, LAST_WAIT = 0.25, 15.0
 _NOT_SENT = (httpx2.ConnectError, httpx2.ConnectTimeout, httpx2.PoolTimeout)
 
 
+def _failure(error: httpx2.RequestError) -> str:
+    """A failed request in words, without the library's names."""
+    if isinstance(error, _NOT_SENT):
+        return "no connection"
+    return "no answer in time" if isinstance(error, httpx2.TimeoutException) else "the connection broke off"
+
+
 class NoLongerWantedError(Exception):
     """What was to be sent is not to be sent any more."""
 
@@ -118,7 +125,7 @@ class Service:
                 detail = f"the address {str(self.http.base_url).rstrip('/')} is not valid: {error}"
                 raise RefusedError(0, {"detail": detail}) from error
             except httpx2.RequestError as error:
-                reason = f"no answer ({type(error).__name__}); is the service running there?"
+                reason = f"{_failure(error)}; is the service running at this address?"
                 unsure = unsure or not isinstance(error, _NOT_SENT)
             else:
                 answer = read(response)

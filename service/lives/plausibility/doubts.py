@@ -35,7 +35,7 @@ def doubt(verdict: Verdict, sent: Reading, shown: Shown) -> Notice:
         return _of_unit(verdict, shown)
     if slip.name == DEAD_PRESSURE:
         message = (
-            f"by its pressure the clutch is open, but a torque of {shown.open_torque or 0.0:.3g} Nm needs a closed clutch: "
+            f"by its pressure the clutch is open, but a torque of {shown.open_torque or 0.0:.3g} Nm needs a closed one: "
             "is the pressure sensor connected? Withdraw the run, or confirm it."
         )
         return Notice(code=DEAD, message=message)
@@ -46,7 +46,7 @@ def negative(cof: float) -> Notice:
     """The doubt of a torque that pushes."""
     message = (
         f"torque drives the clutch instead of braking it (COF {cof:.3g}): is the sign of torque or speed wrong? "
-        "Send it with a positive torque, or confirm it."
+        "Send the run with the right sign, or confirm it."
     )
     return Notice(code=BEYOND_PHYSICS, message=message)
 
@@ -54,7 +54,7 @@ def negative(cof: float) -> Notice:
 def _of_cycles(verdict: Verdict, sent: Reading) -> Notice:
     sentences = [_gap(verdict, sent.cycles)]
     if verdict.against_time:
-        sentences.append("Its started_at does not fit the order of the cycles.")
+        sentences.append("Its date (started_at) does not fit the order of the cycles.")
     if verdict.expected is not None and sent.log_cof is not None:
         (low, high), cof = verdict.expected, math.exp(sent.log_cof)
         if not low <= cof <= high:

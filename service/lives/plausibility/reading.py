@@ -391,7 +391,7 @@ def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notic
     cof = float(np.abs(rows.cof_by_speed(geometry)[0]).mean())
     if cof < NO_FRICTION and float(rows.torque.std()) > 0.5 * float(np.abs(rows.torque.mean())):
         message = (
-            f"torque is noise about zero ({rows.torque.mean():.3g} ± {rows.torque.std():.3g} Nm) under pressure: is the "
+            f"torque is only noise ({rows.torque.mean():.3g} ± {rows.torque.std():.3g} Nm) under pressure: is the torque "
             "sensor connected?"
         )
         return [*doubts, Notice(code=DEAD, message=message)]
@@ -418,7 +418,7 @@ def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
     if scatter > SINGLE_LEVEL_SPREAD:
         message = (
             f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque at one speed scatters by {100 * scatter:.0f} "
-            "%, as if pressure had varied: is its sensor connected?"
+            "%, as if pressure had varied: is the pressure sensor connected?"
         )
         return [Notice(code=DEAD, message=message)]
     return []
@@ -441,7 +441,7 @@ def _speed_stands(speed: FloatArray) -> list[Notice]:
     if fastest > 1.0 and _spread(speed) > SPEED_STILL * fastest:
         return []
     rpm = float(np.median(speed)) / RADIANS_PER_SECOND_PER_RPM
-    message = f"speed stays at {rpm:.4g} rpm in a dynamic test: is its sensor connected?"
+    message = f"speed stays at {rpm:.4g} rpm in a dynamic test: is the speed sensor connected?"
     return [Notice(code=DEAD, message=message)]
 
 
@@ -452,7 +452,9 @@ def _oil(temperature: FloatArray | None) -> list[Notice]:
     still_at_zero = temperature.size >= FEWEST_ROWS and bool((np.abs(temperature - ZERO_CELSIUS) < 1e-6).all())
     if COLDEST <= median <= HOTTEST and not still_at_zero:
         return []
-    message = f"oil temperature is {median - ZERO_CELSIUS:.4g} °C, which no oil has in a test: is the sensor connected?"
+    message = (
+        f"oil temperature is {median - ZERO_CELSIUS:.4g} °C, which is not possible in a test: is the sensor connected?"
+    )
     return [Notice(code=DEAD, message=message)]
 
 

@@ -25,7 +25,7 @@ from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, Stora
 #: A lock that was not free in time, a serialization failure, a deadlock, and too many connections.
 LOCK_NOT_FREE = "55P03"
 _BUSY = {
-    LOCK_NOT_FREE: "another writer held the database for too long",
+    LOCK_NOT_FREE: "another request held the database for too long",
     "40001": "another transaction was in the way",
     "40P01": "another transaction was in the way",
     "53300": "the server has no free connection",

@@ -62,7 +62,7 @@ def copy(source: Path, target: Path, *, lock_timeout: float) -> None:
     try:
         make_new(target)
     except FileExistsError as error:
-        raise FileExistsError(f"the backup's path {target} exists already") from error
+        raise FileExistsError(f"{target} exists already: name a new file for the backup") from error
     partial = target.with_name(f"{target.name}.partial")
     try:
         make_if_missing(partial)

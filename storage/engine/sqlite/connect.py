@@ -203,7 +203,7 @@ class WriteLock:
         """
         deadline = time.monotonic() + self._timeout
         if not self._thread_lock.acquire(timeout=self._timeout):
-            raise DatabaseBusy(f"another writer of this process held the database for more than {self._timeout:g} s")
+            raise DatabaseBusy(f"another request held the database for more than {self._timeout:g} s")
         try:
             file = self._opened()
             self._take(file, deadline)

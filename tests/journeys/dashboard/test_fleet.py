@@ -245,7 +245,7 @@ def test_with_keys_the_page_asks_for_one(browser: Browser, tmp_path: Path) -> No
         assert "secret" not in page.content()
         page.get_by_role("textbox", name="Key").fill("wrong")
         page.get_by_role("button", name="Use this key").click()
-        page.get_by_text("the key is not known").wait_for()
+        page.get_by_text("the key is unknown").wait_for()
         page.get_by_role("textbox", name="Key").fill(text)
         page.keyboard.press("Enter")
         page.get_by_role("link", name="secret").click()

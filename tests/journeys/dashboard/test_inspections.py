@@ -206,7 +206,7 @@ def test_with_keys_photographs_are_shown_and_sent_with_the_readers_key(browser: 
         dialog = page.get_by_role("dialog", name="Withdraw this inspection")
         dialog.get_by_label("Reason").fill("a slip")
         dialog.get_by_role("button", name="Withdraw").click()
-        dialog.get_by_text("this needs the scope admin").wait_for()
+        dialog.get_by_text("this request needs admin").wait_for()
         assert all(text not in url for url in watched.asked)
         watched.said = [line for line in watched.said if "401" not in line and "403" not in line]
         watched.close()

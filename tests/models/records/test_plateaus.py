@@ -252,7 +252,7 @@ def test_a_constant_record_is_one_plateau(n):
     ("record", "message"),
     [
         (plain(3), "at least 16 samples, got 3"),
-        (plain(20), "no steady dwell"),
+        (plain(20), "must hold plateaus"),
         (plain(time=np.zeros(5000)), "time must advance"),
         (plain(time=-0.001 * np.arange(5000)), "time must advance"),
         (plain(time=np.tile(0.001 * np.arange(2500), 2)), "time must run forwards"),
@@ -260,7 +260,7 @@ def test_a_constant_record_is_one_plateau(n):
         (plain(torque=np.full(5000, 1e300)), "torque must lie within"),
         (plain(pressure=np.where(np.arange(5000) < 60, 5e5, 0.0)), "without pressure"),
         (plain(pressure=np.zeros(5000), speed=np.zeros(5000)), "at standstill"),
-        (plain(speed=np.linspace(0, 200, 5000)), "no steady dwell"),
+        (plain(speed=np.linspace(0, 200, 5000)), "must hold plateaus"),
     ],
 )
 def test_a_record_that_cannot_be_cut_is_refused(record, message):
@@ -283,7 +283,7 @@ def test_whatever_comes_is_cut_or_refused(seed, n, scales, counts):
     try:
         cut = cut_plateaus(record)
     except ValueError:
-        with pytest.raises(ValueError, match=r"must|no steady dwell"):
+        with pytest.raises(ValueError, match="must"):
             cut_plateaus(record)
     else:
         assert np.isfinite(cut.plateaus.torque_sd).all()

@@ -54,6 +54,10 @@ def test_commands_that_read_leave_an_older_file_as_it_is(tmp_path: Path) -> None
     assert (revision(path), kept) == ("s9000_later", ["old.db-before-s9000_later"])
 
 
+def test_a_database_without_keys_says_so(path: Path) -> None:
+    assert clutchlife("key", "list", "--database", f"sqlite:///{path}").strip() == "no key exists"
+
+
 def test_verify_is_clean_on_what_a_service_stored(path: Path) -> None:
     url = ("--database", f"sqlite:///{path}")
     assert "3 runs of 3 clutches were checked, 3 of the clutches computed again: 0 findings" in clutchlife(

@@ -104,9 +104,9 @@ def test_a_plan_is_run_on_the_clutch_that_was_simulated_and_never_twice_the_same
 @pytest.mark.parametrize(
     ("written", "words"),
     [
-        ("nothing", "has 0 alternatives, no alternative 1"),
+        ("nothing", "is not a plan of a diagnosis (it has no tests)"),
         (PLAN.replace("4 5", "4 x"), "pressures_bar.1: must be a number"),
-        ("{}", "is not a plan of the service"),
+        ("{}", "is not a plan of a diagnosis"),
     ],
 )
 def test_what_is_no_plan_is_refused_in_a_line(tmp_path: Path, written: str, words: str) -> None:

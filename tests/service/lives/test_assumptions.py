@@ -205,7 +205,7 @@ def test_an_exponent_that_the_tests_contradict_is_doubted() -> None:
     assert found is not None
     (doubt,) = found.doubts(Severity(basis=SeverityBasis.CYCLES))
     assert doubt.code == "severity_exponent"
-    assert "exponent 1 of dissipated_energy" in doubt.message
+    assert "wear grows with dissipated energy to the power of 1" in doubt.message
     assert found.doubts(Severity(basis=SeverityBasis.DISSIPATED_ENERGY, exponent=1.0)) == []
 
 

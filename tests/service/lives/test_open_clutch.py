@@ -94,7 +94,7 @@ def test_an_open_sweep_is_taken_in_and_said_to_be_one(client: TestClient, databa
     receipt = answer.json()
     assert (receipt["fits"], receipt["loops"]) == ([], [])
     assert [each["code"] for each in receipt["warnings"]] == ["open_clutch"]
-    assert "all pressures lie below 0.05 bar: no curve is fitted" in receipt["warnings"][0]["message"]
+    assert "(all pressures below 0.05 bar): no curve is fitted" in receipt["warnings"][0]["message"]
     assert client.post(RUNS, json=sweep(0, "open")).json() == receipt | {"duplicate": True}
     assert client.get(f"{RUNS}/open").json()["channels"] == sweep(0, "open")["channels"]
     (run,) = campaign(database_url).campaign.stationary

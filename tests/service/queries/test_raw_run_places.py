@@ -146,7 +146,9 @@ def test_verify_names_a_blob_that_is_missing_or_damaged(database_url: str, raw_a
     store.put(name, whole[:-1])
     assert f"the blob {name} in {raw_address} is damaged" in clutchlife("verify", "--database", database_url, code=1)
     store.delete(name)
-    assert f"there is no blob {name} in {raw_address}" in clutchlife("verify", "--database", database_url, code=1)
+    assert f"the raw record {name} is missing in {raw_address}" in clutchlife(
+        "verify", "--database", database_url, code=1
+    )
     store.put(name, whole)
     assert "0 findings" in clutchlife("verify", "--database", database_url)
 
@@ -160,12 +162,12 @@ def test_backup_names_what_it_leaves_out_and_the_commands_say_where_it_is(
     assert f"does not contain 2 raw records: copy them now from {in_folder}" in said
     given = ("--database", database_url)
     assert clutchlife("raw", "list", *given) == f"{in_folder}: 2 columns in 2 files, in use\n"
-    assert clutchlife("raw", "move", "--to", in_bucket, *given).strip() == "2 columns are moved"
+    assert clutchlife("raw", "move", "--to", in_bucket, *given).strip() == "2 channels were moved"
     listed = clutchlife("raw", "list", *given)
     assert f"{in_folder}: 0 columns in 0 files\n{in_bucket}: 2 columns in 2 files, in use\n" == listed
     assert "2 too new to be removed" in clutchlife("raw", "collect", *given)
     clutchlife("raw", "collect", "--grace-hours", "0.5", *given, code=64)
-    assert clutchlife("raw", "move", "--to", DATABASE, *given).strip() == "2 columns are moved"
+    assert clutchlife("raw", "move", "--to", DATABASE, *given).strip() == "2 channels were moved"
     assert "new raw records go into the database" in clutchlife("raw", "list", *given)
     assert "raw records are kept in" in clutchlife("raw", "move", "--to", "ftp://id:secret@x", *given, code=64)
     assert "raw records" not in clutchlife("backup", str(tmp_path / "b.db"), *given)

@@ -98,7 +98,7 @@ def test_a_run_that_is_not_what_was_sent_is_named(life: str, tampered: str, says
     ("tampered", "says"),
     [
         ("UPDATE fit SET static_torque = 1.001 * static_torque WHERE run_key = 2", "the fit of run s1000"),
-        ("DELETE FROM prediction WHERE cycles = 1000 AND method = 'ukf'", "follows from the runs and is not stored"),
+        ("DELETE FROM prediction WHERE cycles = 1000 AND method = 'ukf'", "is missing, although the runs give it"),
         (
             "UPDATE prediction SET payload = json_set(payload, '$.remaining_cycles.\"0.5\"', 7) WHERE cycles = 2000",
             "/remaining_cycles/0.5 is 7",

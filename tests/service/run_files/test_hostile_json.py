@@ -84,7 +84,7 @@ def test_each_unknown_field_is_an_error(count: int) -> None:
     found = refused(unknown_fields(count))
     require_total(found, count + (count < 5000))  # where the body is parsed, its channels are missing too
     error = next(error for error in found.errors if error.code == "extra_forbidden")
-    assert (error.pointer, error.message.split(":")[0]) == ("/a0", "a0")
+    assert (error.pointer, error.message) == ("/a0", "a0: no such field")
 
 
 def test_unknown_channels_and_parts_of_duty_are_errors() -> None:
@@ -142,7 +142,7 @@ def test_what_is_no_json_is_named() -> None:
     for body in (b"", b"{", b'{"a":}', b'{"kind":"maintenance",}'):
         found = refused(body)
         assert found.errors[0].code == "json_invalid"
-        assert found.errors[0].message.startswith("the body: Invalid JSON: ")
+        assert found.errors[0].message.startswith("the body must be valid JSON: ")
 
 
 @pytest.mark.parametrize("kept", [r"\\u0000", r"a\\\\u0000", r"\u0001"])

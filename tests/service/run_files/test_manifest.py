@@ -47,10 +47,10 @@ class TestManifest:
         ("content", "rule"),
         [
             ({"file": "a.csv"}, "must hold a list"),
-            (["a.csv"], "must hold file, kind, cycles"),
-            ([{"file": "a.csv", "kind": "x"}], "must hold file, kind, cycles"),
-            ([{"file": "a.csv", "kind": "x", "cycles": 0, "speed": 1}], "at most run_id"),
-            ([{"file": "a.csv", "kind": "x", "cycles": -1}], "cycles must be a number that is not negative, got -1"),
+            (["a.csv"], "must have the fields file, kind, cycles"),
+            ([{"file": "a.csv", "kind": "x"}], "must have the fields file, kind, cycles"),
+            ([{"file": "a.csv", "kind": "x", "cycles": 0, "speed": 1}], "may have run_id"),
+            ([{"file": "a.csv", "kind": "x", "cycles": -1}], "cycles must be a number of 0 or more, got -1"),
             ([{"file": "a.csv", "kind": "x", "cycles": True}], "cycles must be a number"),
             ([{"file": "a.csv", "kind": "x", "cycles": float("nan")}], "cycles must be a number"),
             ([{"file": "a.csv", "kind": 7, "cycles": 0}], "kind must be a text, got 7"),
@@ -63,7 +63,7 @@ class TestManifest:
 
     def test_refuses_a_file_that_is_not_there(self, tmp_path: Path) -> None:
         self.write(tmp_path, [self.entry(file="other.csv")])
-        with pytest.raises(FileNotFoundError, match=r"runs\.json\[0\]: .*other\.csv is not there"):
+        with pytest.raises(FileNotFoundError, match=r"runs\.json\[0\]: .*other\.csv does not exist"):
             manifest.find([tmp_path])
 
     @pytest.mark.parametrize("name", ["../secret.csv", "{outside}/secret.csv", "link.csv", "linked/secret.csv"])

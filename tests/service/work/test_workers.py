@@ -203,7 +203,7 @@ def test_a_call_that_waits_too_long_is_refused_and_never_begun(workers: Workers,
         workers.submit(Lane.ANSWERS, calls.logged, log, "b", gate, turn=turn, patience=0.5) for turn in ("c1", "c2")
     ]
     for call in late:
-        with pytest.raises(BusyError, match="waited for"):
+        with pytest.raises(BusyError, match="the request waited"):
             call.result(IN_TIME)
     oldest = workers.oldest()
     assert oldest is not None
