@@ -33,7 +33,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         head = opened.read(16)
     version = head[8:].decode("latin-1").strip("\0 ")
     if not version.startswith("4"):
-        raise InvalidError(f"an MDF file must be of version 4, got {version!r}: asammdf converts it (MDF.convert)")
+        raise InvalidError(f"an MDF file must be of version 4, got {version!r}: convert it with asammdf (MDF.convert)")
     shutil.copy = shutil.copyfile  # asammdf's copy for finalising also sets the mode, which this process may not
     file = MDF(path)
     masters = "time_s" in choices_of(reading)  # a map may name a master channel for the time

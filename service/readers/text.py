@@ -120,7 +120,9 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[tuple[str, bool]]:
             end = len(text)
         whole, rest = text[:end], text[end:]
         if (nul := whole.find("\0")) >= 0:
-            raise wrong_line(line + whole.count("\n", 0, nul), "must be text, got a NUL byte", "not_text")
+            raise wrong_line(
+                line + whole.count("\n", 0, nul), "has a NUL byte, which is no text: save the file as UTF-8", "not_text"
+            )
         if whole:
             yield whole, last
         line += whole.count("\n")

@@ -193,7 +193,7 @@ def _unseen(report: Report) -> list[Sentence]:
     shown = [_shown(visible) for visible in listed]
     sentences = []
     if shown:
-        say = "The smallest sizes that these data would show in nine of ten cases, in the most (least) visible form"
+        say = "Smallest sizes that these data show in nine of ten cases, and in brackets for the least visible form"
         sentences = [Sentence(f"{say}: {conjunction(shown)}.")]
     if report.unseen:
         names = conjunction([effect_name(slug) for slug in report.unseen])
@@ -206,7 +206,7 @@ def _shown(visible: Visible) -> str:
     name = effect_name(visible.effect)
     if visible.unit == "-":
         name = f"{BY_SLUG[visible.effect].amplitude} of {name}"
-    hardest = "none" if math.isinf(visible.amplitude) else _amount(visible.amplitude, visible.unit)
+    hardest = "at no size" if math.isinf(visible.amplitude) else _amount(visible.amplitude, visible.unit)
     return f"{name} {_amount(visible.least, visible.unit)} ({hardest})"
 
 

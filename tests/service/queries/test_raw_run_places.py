@@ -144,7 +144,9 @@ def test_verify_names_a_blob_that_is_missing_or_damaged(database_url: str, raw_a
     store, name = open_store(raw_address), min(blobs(raw_address))
     whole = store.get(name)
     store.put(name, whole[:-1])
-    assert f"the blob {name} in {raw_address} is damaged" in clutchlife("verify", "--database", database_url, code=1)
+    assert f"the raw record {name} in {raw_address} is damaged" in clutchlife(
+        "verify", "--database", database_url, code=1
+    )
     store.delete(name)
     assert f"the raw record {name} is missing in {raw_address}" in clutchlife(
         "verify", "--database", database_url, code=1
@@ -161,10 +163,10 @@ def test_backup_names_what_it_leaves_out_and_the_commands_say_where_it_is(
     said = clutchlife("backup", str(tmp_path / "a.db"), "--database", database_url)
     assert f"does not contain 2 raw records: copy them now from {in_folder}" in said
     given = ("--database", database_url)
-    assert clutchlife("raw", "list", *given) == f"{in_folder}: 2 columns in 2 files, in use\n"
+    assert clutchlife("raw", "list", *given) == f"{in_folder}: 2 channels in 2 files, in use\n"
     assert clutchlife("raw", "move", "--to", in_bucket, *given).strip() == "2 channels were moved"
     listed = clutchlife("raw", "list", *given)
-    assert f"{in_folder}: 0 columns in 0 files\n{in_bucket}: 2 columns in 2 files, in use\n" == listed
+    assert f"{in_folder}: 0 channels in 0 files\n{in_bucket}: 2 channels in 2 files, in use\n" == listed
     assert "2 too new to be removed" in clutchlife("raw", "collect", *given)
     clutchlife("raw", "collect", "--grace-hours", "0.5", *given, code=64)
     assert clutchlife("raw", "move", "--to", DATABASE, *given).strip() == "2 channels were moved"

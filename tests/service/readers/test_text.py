@@ -118,7 +118,7 @@ WRONG = [
     (f"{HEADER}\n{ROWS}0.2,-9,100,20\n", r"pressure_bar\[2\] \(line 4\) must lie between .* got -9"),
     (f"{HEADER}\n{ROWS}0.2,5,0x10,20\n", "'0x10'"),
     (f"{HEADER}\n{ROWS}0.2,5,1_0,20\n", "'1_0'"),
-    (f"{HEADER}\n{ROWS}0.2,5,1\x000,20\n", "line 4 must be text, got a NUL byte"),
+    (f"{HEADER}\n{ROWS}0.2,5,1\x000,20\n", "line 4 has a NUL byte, which is no text"),
     (
         "time_s;torque_nm\n0,5;1,5\n1.5;2\n",
         r"time_s\[1\] \(line 3\) must have the decimal sign ',', as earlier numbers have, got '1.5'",

@@ -102,7 +102,7 @@ def test_a_profile_is_saved_once_and_replaced_by_put_alone(client: TestClient) -
         ({"columns": [{"title": "a", "channel": "torque_nm", "unit": "bar"}]}, "bar"),
         ({"file_name": "*" * 9}, "file_name may hold at most"),
         ({"file_name": "{cycles}{cycles}"}, "once"),
-        ({"file_name": "{kind}_{cycles}"}, "needs `kinds`"),
+        ({"file_name": "{kind}_{cycles}"}, "so `kinds` must list"),
         ({"colour": "red"}, "colour"),
         ({"name": "a b"}, "name"),
     ],

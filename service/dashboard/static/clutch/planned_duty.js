@@ -230,7 +230,10 @@ function shown(life) {
     ["Cycles under recent duty", ...numbers(recent, 0)],
   ];
   if (dates !== null && life.counted_from !== null)
-    rows.push([`End of life, counted from the last run on ${life.counted_from.slice(0, 10)}`, ...SHOWN.map((quantile) => dates[quantile]?.slice(0, 10) ?? "–")]);
+    rows.push([
+      `End of life, counted from the last run on ${life.counted_from.slice(0, 10)}`,
+      ...SHOWN.map((quantile) => dates[quantile]?.slice(0, 10) ?? "–"),
+    ]);
   const columns = ["Probability", ...SHOWN.map((quantile) => `${significant(100 * Number(quantile))} %`)];
   const notes = life.warnings.map(({ message }) => h("p", { class: "quiet" }, message));
   return [

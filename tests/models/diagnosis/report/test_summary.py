@@ -176,14 +176,14 @@ def test_what_these_data_would_show_is_said_with_units_zero_and_pressure_first()
     shown = tuple(visible(slug, size) for slug, size in (*sizes.items(), ("torque_zero_shift", 12.0)))
     said = summarise(replace(found, visible=shown))
     assert (
-        "The smallest sizes that these data would show in nine of ten cases, in the most (least) visible form: "
+        "Smallest sizes that these data show in nine of ten cases, and in brackets for the least visible form: "
         "torque zero shift 3 Nm (6 Nm), pressure offset 0.075 bar (0.15 bar) and running in "
     ) in said
-    assert "These data cannot show, at any size:  channel delay and stick slip." in said
+    assert "These data cannot show, at any size: channel delay and stick slip." in said
     said = summarise(replace(found, visible=(visible("oil_temperature", 4.0),)))
     assert "viscosity exponent β of oil temperature 1.4 (2.8)" in said
     some = replace(visible("pressure_offset", 3.0), amplitude=math.inf, least=0.1)  # seen in one of its shapes alone
-    assert "pressure offset 0.1 bar (none)." in summarise(replace(found, visible=(some,)))
+    assert "pressure offset 0.1 bar (at no size)." in summarise(replace(found, visible=(some,)))
 
 
 def sized(interval: tuple[float, float], sign: float) -> str:
