@@ -163,12 +163,12 @@ def present_life(connection: Connection, clutch_id: str) -> str:
 def events(connection: Connection, clutch_id: str) -> tuple[Event, ...]:
     """All accepted runs of a clutch as its history sees them, ordered; mean COF as the model in force corrects it."""
     cofs, corrected = results.cofs_of(connection, clutch_id), assumptions.corrected_cofs_of(connection, clutch_id)
-    return order(
-        [
-            _event(row, cofs.get(row.run_key, {})).corrected(corrected.get(row.run_key))
-            for row in runs.in_order(connection, clutch_id)
-        ]
-    )
+    levels = clutch(connection, clutch_id).summary.get("new_levels", ())
+    accepted = [
+        _event(row, cofs.get(row.run_key, {})).corrected(corrected.get(row.run_key))
+        for row in runs.in_order(connection, clutch_id)
+    ]
+    return order([replace(event, new_level=event.run_id in levels) for event in accepted])
 
 
 def held(connection: Connection, clutch_id: str) -> tuple[Event, ...]:

@@ -66,14 +66,30 @@ class Verdict:
     latest: float | None
 
 
-def judge(runs: Sequence[Run], about: Collection[int] = ()) -> dict[int, Verdict]:
-    """The runs that are to be held, by index.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """Verdicts on the runs that are to be held, by index; of the tests that were looked at, all and those from which on COF
+    has a new level."""
+
+    held: Mapping[int, Verdict]
+    tests: frozenset[int]
+    levels: frozenset[int]
+
+
+def judge(runs: Sequence[Run], about: Collection[int] = ()) -> Judgement:
+    """The runs that are to be held, and new levels among the others.
 
     `runs` in the order of the history. Of more than can be looked at, those nearest to the runs `about` which somebody asks
     and to the latest one are looked at; of fewer the answer depends on the runs alone.
     """
     clutch = _Clutch(runs=tuple(runs), about=frozenset(about))
     best, weighed = _searched(clutch)
+    held = _held(clutch, best, weighed)
+    return Judgement(held=held, tests=frozenset(clutch.tests), levels=best.belief.levels - held.keys())
+
+
+def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> dict[int, Verdict]:
+    """Verdicts on the runs that probably slipped, by the beliefs that were met."""
     weighed |= {other: _Weighed(clutch=clutch, belief=other).log_probability for other in best.instead()}
     if not (best.belief.slipped or best.doubts or len(weighed) > 1):
         return {}
@@ -87,7 +103,7 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> dict[int, Verdict
         with_it = [value for belief, value in weighed.items() if index in belief.slipped]
         log_share = min(float(np.logaddexp.reduce(with_it) - total), -1e-12)
         log_odds = log_share - math.log(-math.expm1(log_share))
-        if log_odds >= math.log(criteria.HELD) and not runs[index].fixed:
+        if log_odds >= math.log(criteria.HELD) and not clutch.runs[index].fixed:
             verdicts[index] = best.verdict(index, log_odds)
     return verdicts
 

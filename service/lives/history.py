@@ -89,6 +89,7 @@ class Event:
     dated: bool = False
     shown: Shown | None = None
     confirmed: bool = False
+    new_level: bool = False
     under: Mapping[float, tuple[float, ...]] = field(default_factory=dict)
 
     def corrected(self, cofs: Corrected | None) -> "Event":
@@ -115,7 +116,8 @@ class Series:
 
     `scale` leads from cycles since new to ζ and back; an adopted model's course is off the measurements. A slope is one at
     `speed_rpm`, the lag of a loop one at `frequency_hz`. `draws` are the measurements under each draw of the model in force,
-    by weight, where it has any: the clutch is tracked under each, and `measurements` are their mean.
+    by weight, where it has any: the clutch is tracked under each, and `measurements` are their mean. `new_levels` are the
+    cycles since new of its tests that begin one without an event.
     """
 
     quantity: str
@@ -126,6 +128,7 @@ class Series:
     speed_rpm: float | None = None
     frequency_hz: float | None = None
     draws: tuple[tuple[float, tuple[Measurement, ...]], ...] = ()
+    new_levels: tuple[float, ...] = ()
 
     @property
     def weighted(self) -> tuple[tuple[float, tuple[Measurement, ...]], ...]:
@@ -260,7 +263,7 @@ class Life:
         scale = self.scale(assumptions)
         cycles = np.array([self.events[index].cycles for index, _ in measured])
         course = assumptions.offset(quantity, pressure, cycles)
-        epochs = list(itertools.accumulate(int(event.shift) for event in self.events))
+        epochs = list(itertools.accumulate(int(event.shift or event.new_level) for event in self.events))
         return Series(
             quantity=quantity,
             pressure=pressure,
@@ -272,6 +275,7 @@ class Life:
             ),
             events=tuple(index for index, _ in measured),
             scale=scale,
+            new_levels=tuple(self.events[index].cycles for index, _ in measured if self.events[index].new_level),
         )
 
 

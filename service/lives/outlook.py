@@ -46,6 +46,7 @@ def summarised(state: ClutchState, tracking: Tracking, evidence: Evidence | None
     pace, pooled = pace_of(life.events), life.pooled(state.assumptions())
     summary = {name: payload[name] for name in STORED} | {
         "runs": len(state.events),
+        "new_levels": [event.run_id for event in state.events if event.new_level],
         "recent": recent(state.events, pooled),
         "life": life.name,
         "from_cycles": life.origin,

@@ -35,6 +35,8 @@ NEW_EXTRAPOLATED = "new_extrapolated"
 MISSED_FORECASTS = "missed_forecasts"
 #: The warning of an answer that another filter's median lies outside of.
 FILTERS_DISAGREE = "filters_disagree"
+#: The warning of a level of COF that begins with a test and no event explains.
+NEW_LEVEL = "new_level"
 #: Warnings of a run in its clutch's history, written again where the history changes: it arrived after a run of more cycles,
 #: its pressures or its oil temperature are not those of the first test, its mean COF is not what those before it predict.
 LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE = "late_arrival", "other_pressures", "other_oil_temperature"
@@ -118,6 +120,17 @@ def off_track(posterior: Posterior, measurements: Sequence[Measurement], prior: 
         "the earlier tests. Repeat the test: if the value stays, the clutch has changed"
     )
     return [Notice(code=OFF_TRACK, message=message)]
+
+
+def new_level(cycles: Sequence[float]) -> list[Notice]:
+    """The warning of tests at these cycles since new from which on COF has a new level, and no event explains it."""
+    if not cycles:
+        return []
+    message = (
+        f"mean COF has a new level since the test at {' and at '.join(f'{at:,.0f}' for at in cycles)} cycles, and no "
+        "event explains it. Look at the lining and the sensors; if something was changed, send it as maintenance"
+    )
+    return [Notice(code=NEW_LEVEL, message=message)]
 
 
 def late_arrival(cycles: float, latest: float) -> list[Notice]:

@@ -31,7 +31,7 @@ from service.errors import NotFoundError, Notice
 from service.lives.assumptions import ALL_PRESSURES, WEAK, Assumptions
 from service.lives.criteria import FEWEST_PARTICLES, PREDICTION_DRAWS
 from service.lives.history import Event, Life, Series, lives_of, nearest_pressure
-from service.lives.payloads import ended, insufficient, left_out, new_extrapolated, off_track, predicted
+from service.lives.payloads import ended, insufficient, left_out, new_extrapolated, new_level, off_track, predicted
 
 FilterState = ParticleState | UkfState | GridState
 
@@ -276,7 +276,11 @@ def predict(
             "effective_draws": sample.effective_draws,
             "status": sample.status.value,
         },
-        warnings=[*left_out(tests, tracked.runs), *_off_track(sample, series, assumptions, tracked.runs)],
+        warnings=[
+            *left_out(tests, tracked.runs),
+            *new_level([at for at in series.new_levels if at <= cycles]),
+            *_off_track(sample, series, assumptions, tracked.runs),
+        ],
     )
 
 

@@ -8,7 +8,7 @@ Dead channels are found in a run by itself, and nothing that other runs show tak
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from models.clutch import Geometry
 from models.plausibility import criteria
@@ -131,22 +131,25 @@ _NAMED = 3
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
     """What the joint judgement says: the doubts about each run that is to be held, by run_id; the runs that were held and
-    are now accepted, those that were accepted and are now held, and why, by run_id."""
+    are now accepted, those that were accepted and are now held, and why, by run_id; whether a test begins a new level that
+    did not, or does not that did, by run_id."""
 
     doubts: Mapping[str, tuple[Notice, ...]] = field(default_factory=dict)
     accepted: tuple[Event, ...] = ()
     held: tuple[Event, ...] = ()
     reasons: Mapping[str, str] = field(default_factory=dict)
+    levels: Mapping[str, bool] = field(default_factory=dict)
 
     @property
     def changes(self) -> bool:
-        """Whether the state of a run changes that was there already."""
-        return bool(self.accepted or self.held)
+        """Whether anything changes of what was there already."""
+        return bool(self.accepted or self.held or self.levels)
 
     def settled(self, events: Sequence[Event], further: Sequence[Event] = ()) -> tuple[Event, ...]:
         """The accepted runs as they are from now on: `events` were accepted before, `further` come in accepted."""
         gone = {event.run_id for event in self.held}
-        return order([*(event for event in events if event.run_id not in gone), *self.accepted, *further])
+        settled = order([*(event for event in events if event.run_id not in gone), *self.accepted, *further])
+        return tuple(replace(event, new_level=self.levels.get(event.run_id, event.new_level)) for event in settled)
 
     def aside(self, held: Sequence[Event], further: Sequence[Event] = ()) -> tuple[Event, ...]:
         """The held runs as they are from now on: `held` were before, `further` come in held."""
@@ -180,22 +183,27 @@ def doubts_together(
     doubted = [
         event for event in held if event.shown is not None and beyond_end(order([*accepted, *new, event])) is None
     ]
-    if incoming is None and not doubted:
-        return Judged()
     events = order([*accepted, *doubted, *new])
     runs = runs_of(events, geometry, corrected=corrected)
     place = {run.name: index for index, run in enumerate(runs)}
-    verdicts = judge(runs, [place[event.run_id] for event in [*doubted, *new]])
+    judgement = judge(runs, [place[event.run_id] for event in [*doubted, *new]])
+    levels = {
+        events[index].run_id: index in judgement.levels
+        for index in judgement.tests
+        if events[index].new_level is not (index in judgement.levels)
+    }
+    if incoming is None and not doubted:  # what somebody has changed is no reason to hold other runs
+        return Judged(levels=levels)
     doubts = {
         runs[index].name: (doubt(verdict, runs[index].sent, events[index].shown or Shown()),)
-        for index, verdict in verdicts.items()
+        for index, verdict in judgement.held.items()
     }
     back = tuple(event for event in doubted if event.run_id not in doubts)
     gone = tuple(event for event in accepted if event.run_id in doubts)
     counted = [event for event in events if event.run_id not in doubts]
     reasons = {event.run_id: f"agrees with {_beside(event, counted)}" for event in back}
     reasons |= {event.run_id: f"does not agree with {_beside(event, counted)}" for event in gone}
-    return Judged(doubts=doubts, accepted=back, held=gone, reasons=reasons)
+    return Judged(doubts=doubts, accepted=back, held=gone, reasons=reasons, levels=levels)
 
 
 def _beside(event: Event, counted: Sequence[Event]) -> str:

@@ -20,6 +20,10 @@ const CODES = {
     title: "The clutch does not age as expected",
     help: "The forecast follows the tests. If you did not expect this, check the cycles and the sensors, or run a diagnosis.",
   },
+  new_level: {
+    title: "Friction has stepped",
+    help: "The forecast goes on from the new level, as after an oil change.",
+  },
   missed_forecasts: {
     title: "Earlier forecasts missed",
     help: "The clutch does not age along one curve, so the interval of the remaining life is wider for now.",

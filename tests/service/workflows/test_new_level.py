@@ -1,0 +1,77 @@
+"""Friction that falls at once: the second test that shows it makes it the present, whatever is known of why."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from models.plausibility import criteria
+from tests.support import stationary
+
+CLUTCH = "/v1/clutches/c1"
+#: The tests before friction falls by a fifth, and after.
+BEFORE, AFTER = range(0, 9000, 1000), (9000, 10_000, 11_000)
+
+
+def sent(client: TestClient, cycles: Iterable[int], share: float = 1.0) -> list[str]:
+    """Posts tests whose torque is a share of what it was; how each was taken."""
+    states = []
+    for at in cycles:
+        run = stationary(at, run_id=f"s{at}", noise=0.002)
+        run["channels"]["torque_nm"] = [share * torque for torque in run["channels"]["torque_nm"]]
+        answer = client.post(f"{CLUTCH}/runs", json=run)
+        assert answer.status_code == 201
+        states.append(answer.json()["state"])
+    return states
+
+
+def life(client: TestClient, method: str = "particle") -> dict[str, Any]:
+    answer: dict[str, Any] = client.get(f"{CLUTCH}/remaining-useful-life", params={"method": method}).json()
+    return answer
+
+
+def warned(answer: dict[str, Any]) -> list[str]:
+    return [warning["message"] for warning in answer["warnings"] if warning["code"] == "new_level"]
+
+
+def test_the_second_test_after_a_fall_is_the_present(client: TestClient) -> None:
+    """One may be another clutch's and is held; with two the forecast goes on from there, and says so."""
+    assert set(sent(client, BEFORE)) == {"accepted"}
+    assert warned(life(client)) == []
+    before = life(client)["current"]["fraction_of_initial"]
+    assert sent(client, AFTER[:2], 0.8) == ["held", "accepted"]
+    for method in ("particle", "ukf", "grid"):
+        after = life(client, method)
+        assert after["held_runs"] is None
+        assert 0.7 * before < after["current"]["fraction_of_initial"] < 0.8 * before  # it goes on to wear
+        assert "since the test at 9,000 cycles" in warned(after)[0]
+    assert sent(client, AFTER[2:], 0.8) == ["accepted"]
+    assert "since the test at 9,000 cycles" in warned(life(client))[0]
+
+
+def test_the_order_of_arrival_does_not_matter_to_a_new_level(client: TestClient) -> None:
+    sent(client, reversed(AFTER), 0.8)
+    sent(client, BEFORE)
+    assert "since the test at 9,000 cycles" in warned(life(client))[0]
+
+
+def test_a_level_begins_with_the_next_test_where_its_first_is_withdrawn(client: TestClient) -> None:
+    sent(client, BEFORE)
+    sent(client, AFTER, 0.8)
+    for at, begins in (("s9000", 10_000), ("s10000", None)):
+        withdrawn = client.post(f"{CLUTCH}/runs/{at}/withdraw", json={"reason": "another clutch's"})
+        assert withdrawn.status_code == 200
+        withdrawn = client.patch(f"{CLUTCH}/runs/{at}", json={"state": "withdrawn", "reason": "another clutch's"})
+        found = warned(life(client))
+        assert (f"since the test at {begins:,} cycles" in found[0]) if begins else found == []
+
+
+def test_nothing_is_stepped_where_new_levels_are_never_believed(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the test above shows is the judgement's doing."""
+    monkeypatch.setattr(criteria, "LEVEL_UNDECLARED", 1e-300)
+    sent(client, BEFORE)
+    sent(client, AFTER, 0.8)
+    assert warned(life(client)) == []
