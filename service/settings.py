@@ -63,16 +63,12 @@ class Settings(BaseSettings):
         default=2, ge=0, description="number of processes that take in runs; 0: no worker processes at all"
     )
     max_body_mb: int = Field(
-        default=64,
-        ge=1,
-        description="largest run that is accepted as JSON [MiB]; send longer records as files",
+        default=64, ge=1, description="largest run that is accepted as JSON [MiB]; send longer records as files"
     )
     max_file_mb: int = Field(default=1024, ge=1, description="largest file that is accepted [MiB]")
     # a rig's run arrives within one second, over a bad line within ten
     body_seconds: int = Field(
-        default=30,
-        ge=1,
-        description="time in which a body must arrive [s], plus one second for each 64 KiB; else 408",
+        default=30, ge=1, description="time in which a body must arrive [s], plus one second for each 64 KiB; else 408"
     )
     # eight rigs and twenty pages behind one address ask 100 times a second (`make load`), 30 at once
     requests_per_second: int = Field(
@@ -85,9 +81,7 @@ class Settings(BaseSettings):
     )
     # twice the requests of one caller at once; four such addresses fit in the 1,024 files that a system gives a process
     connections_at_once: int = Field(
-        default=256,
-        ge=1,
-        description="open connections of one address; further ones get 429 and are closed",
+        default=256, ge=1, description="open connections of one address; further ones get 429 and are closed"
     )
     # docs/appendix/benchmarks.md: the longest diagnosis takes 11 s
     diagnosis_seconds: int = Field(
@@ -100,9 +94,7 @@ class Settings(BaseSettings):
     )
     # an operator's restart of the database takes some seconds, and a lease is prolonged ten times before it runs out
     job_lease_seconds: int = Field(
-        default=30,
-        ge=1,
-        description="time after which the job of a killed service is started again [s]",
+        default=30, ge=1, description="time after which the job of a killed service is started again [s]"
     )
     most_diagnoses: int = Field(default=16, ge=1, description="diagnoses that may wait or run; further ones get 503")
     # docs/appendix/scale.md: 10,000 clutches of 16 tests take four hours of a core, of 200 tests over twelve times that

@@ -294,11 +294,7 @@ _LOOPS = ("run", "law", "cycles", "bar", "Hz", "area, Nm·m/s", "attractor, Nm/s
 
 @asking
 def loops(
-    service: Service,
-    clutch: ClutchId,
-    query: Arguments = None,
-    as_json: Json = False,
-    as_csv: Csv = False,
+    service: Service, clutch: ClutchId, query: Arguments = None, as_json: Json = False, as_csv: Csv = False
 ) -> None:
     """Show the friction loops of the dynamic tests: area, attractor and film time."""
 

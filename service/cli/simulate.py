@@ -47,8 +47,7 @@ def simulate(
         typer.Option(metavar="EFFECT[:SIZE]", help="Hide an effect, to rehearse a diagnosis; may be repeated"),
     ] = None,
     film: Annotated[
-        bool,
-        typer.Option("--film", help="Add the lag of friction from the reference's oil film; answer.json says so"),
+        bool, typer.Option("--film", help="Add the lag of friction from the reference's oil film; answer.json says so")
     ] = False,
     plate_rise: Annotated[
         float | None,
@@ -65,8 +64,7 @@ def simulate(
         ),
     ] = None,
     pressures: Annotated[
-        list[float] | None,
-        typer.Option(min=4, max=8, help="Pressure of the tests in bar; repeat it for several"),
+        list[float] | None, typer.Option(min=4, max=8, help="Pressure of the tests in bar; repeat it for several")
     ] = None,
     plan: Annotated[
         Path | None,

@@ -92,13 +92,7 @@ States = Mapping[str, Tracked]
 
 
 def follow(
-    life: Life,
-    whole: Series,
-    assumptions: Assumptions,
-    fraction: float,
-    states: States,
-    *,
-    first_event: int = 0,
+    life: Life, whole: Series, assumptions: Assumptions, fraction: float, states: States, *, first_event: int = 0
 ) -> Iterator[tuple[States, list[Prediction]]]:
     """Walk a life's events from `first_event` on; after each, the states by method and the predictions of the series.
 
@@ -272,10 +266,7 @@ def predict(
         back_cast=tracked.back_cast,
         ended_lives=end.lives,
         of_new=new_extrapolated(series, assumptions, end.late, fraction),
-        sample={
-            "effective_draws": sample.effective_draws,
-            "status": sample.status.value,
-        },
+        sample={"effective_draws": sample.effective_draws, "status": sample.status.value},
         warnings=[
             *left_out(tests, tracked.runs),
             *new_level([at for at in series.new_levels if at <= cycles]),

@@ -158,10 +158,7 @@ NotNegativeNumber = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_na
 StartedAt = Annotated[AwareDatetime, Field(ge=EARLIEST_START, le=LATEST_START)]
 
 #: A column is checked by `service.columns`, which names row and value among millions.
-Column = Annotated[
-    list[Any],
-    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 1}),
-]
+Column = Annotated[list[Any], WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 1})]
 
 Origin = Annotated[Literal["measured", "simulated"], Field(description="Whether a rig measured it or it is simulated")]
 

@@ -246,8 +246,7 @@ class DiagnosisListed(base.Answer):
     earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
     adoptable: bool = Field(description="Whether it has an extended model to adopt")
     not_adoptable: str | None = Field(
-        default=None,
-        description="Why a fitted cause cannot be adopted; null if it can, or if none was fitted",
+        default=None, description="Why a fitted cause cannot be adopted; null if it can, or if none was fitted"
     )
     adopted: bool = Field(description="Whether its model is the current one")
     problem: str | None = Field(description="Why it failed")

@@ -307,8 +307,7 @@ class RemainingLife(Answer):
         default=None, description="How well earlier forecasts of this clutch predicted the later tests"
     )
     ended_lives: int = Field(
-        default=0,
-        description="Number of ended lives of the same kind that calibrated the predicted end",
+        default=0, description="Number of ended lives of the same kind that calibrated the predicted end"
     )
     sample: SampleQuality | None = Field(
         default=None, description="The draws behind the prediction; null without a prediction"

@@ -72,8 +72,7 @@ State = Annotated[
 ]
 Archived = Annotated[bool, Field(description="Archived clutches instead of those in use")]
 ClutchStateName = Annotated[
-    base.StateName | None,
-    Field(description="Only clutches in this state by NAMUR NE 107; default: all"),
+    base.StateName | None, Field(description="Only clutches in this state by NAMUR NE 107; default: all")
 ]
 Held = Annotated[bool, Field(description="Only clutches with held runs")]
 Find = Annotated[
@@ -129,8 +128,7 @@ FileMap = Annotated[
     Field(max_length=base.LONGEST_MAP, description="The columns of the channels, such as torque_nm:Mz,speed_rpm:n"),
 ]
 FileTable = Annotated[
-    str,
-    Field(max_length=base.LONGEST_FILENAME, description="The sheet, group or archived file, if there are several"),
+    str, Field(max_length=base.LONGEST_FILENAME, description="The sheet, group or archived file, if there are several")
 ]
 FileTime = Annotated[
     str, Field(max_length=base.LONGEST_FILENAME, description="The time column; `none`: each row is a plateau")

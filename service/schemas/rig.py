@@ -27,8 +27,7 @@ class RigColumn(Schema):
     channel: ChannelName | None = Field(default=None, description="The channel; null: ignore the column")
     unit: Text | None = Field(default=None, description="Its unit; null: the unit in the file")
     stated: Text | None = Field(
-        default=None,
-        description="What the file writes instead of `unit`; any other unit in the file is refused",
+        default=None, description="What the file writes instead of `unit`; any other unit in the file is refused"
     )
     scale: Number = Field(
         default=1.0, description="Channel = `scale` · value + `offset`, all in the channel's unit; not 0"

@@ -152,8 +152,7 @@ class MaintenanceRunIn(RunBase):
         description="What was done; `end_of_life`: the life has ended, and later duty and tests are refused until a rebuild"
     )
     reason: EndReason | None = Field(
-        default=None,
-        description="Why a life has ended: `worn` (default), or `other` (taken out before its end)",
+        default=None, description="Why a life has ended: `worn` (default), or `other` (taken out before its end)"
     )
     note: Annotated[str, StringConstraints(max_length=base.LONGEST_NOTE)] = Field(default="", description="A remark")
 

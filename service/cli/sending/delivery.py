@@ -21,11 +21,7 @@ def say(line: str) -> None:
 
 
 def transmit(
-    spools: Sequence[Spool],
-    url: str,
-    key: str | None,
-    patience: float,
-    prepare: Callable[[Service, Spool], object],
+    spools: Sequence[Spool], url: str, key: str | None, patience: float, prepare: Callable[[Service, Spool], object]
 ) -> None:
     """Send what waits in the spools of one service, after `prepare`; ends the command where any stays or is refused."""
     sent = Sent()

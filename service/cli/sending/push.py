@@ -196,11 +196,7 @@ def list_runs(
 
 @app.command()
 def send(
-    clutch: Clutch = None,
-    url: Url = URL,
-    key: Key = None,
-    spool: SpoolFolder = SPOOL,
-    patience: Patience = 60.0,
+    clutch: Clutch = None, url: Url = URL, key: Key = None, spool: SpoolFolder = SPOOL, patience: Patience = 60.0
 ) -> None:
     """Send the runs that wait for the service at --url. Runs for other addresses stay, because the key belongs to this
     service."""
