@@ -202,7 +202,7 @@ def _cut(raw: socket.socket) -> None:
 def _in_words(error: Exception) -> str:
     """An error without what it may quote of the address."""
     if isinstance(error, socket.gaierror):
-        return "the name of the receiver is not known"
+        return "the host name of the receiver is not known: check its address"
     if isinstance(error, ssl.SSLCertVerificationError):
         return f"the certificate of the receiver is not valid: {error.verify_message}"
     if isinstance(error, OSError) and error.strerror:

@@ -264,7 +264,7 @@ def _tests(summary: Mapping[str, Any]) -> str:
     if _places(summary) < summary["runs_used"]:
         known = f"tests at {_places(summary)} of the {FEWEST_TESTS} different cycles that a prediction needs"
     left_out = _left_out(summary)
-    return f"{known}, {left_out} more cannot be compared with the first" if left_out else known
+    return f"{known} ({left_out} more cannot be compared with the first)" if left_out else known
 
 
 def _places(summary: Mapping[str, Any]) -> int:

@@ -217,12 +217,12 @@ def _severity_item(estimate: SeverityEstimate | None) -> dict[str, Any] | None:
 def _disagreements(payload: Mapping[str, Any] | None) -> list[Notice]:
     if payload is None:
         return []
-    words = {"now_sd": "the present value", "end_of_life_sd": "the median end of life"}
+    words = {"now_sd": "mean COF now", "end_of_life_sd": "the median end of life"}
     return [
         Notice(
             code="tracks_disagree",
-            message=f"{words[name]} by the four Stribeck parameters is {abs(value):.1f} standard deviations "
-            f"{'above' if value > 0 else 'below'} the directly tracked one. Look at the fits of the last tests",
+            message=f"{words[name]}, computed from the four Stribeck parameters, is {abs(value):.1f} standard deviations "
+            f"{'above' if value > 0 else 'below'} its direct estimate. Look at the fits of the last tests",
         )
         for name, value in payload["disagreement"].items()
         if far_apart(value)

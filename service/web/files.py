@@ -83,7 +83,7 @@ async def received(request: Request, path: Path, filename: str) -> tuple[str, Ri
     async with request.form(max_files=1, max_fields=8) as form:
         sent = next((part for part in form.values() if isinstance(part, UploadFile)), None)
         if sent is None:
-            raise InvalidError("the form must hold one file")
+            raise InvalidError("the form must have exactly one file")
         with path.open("wb") as file:
             while chunk := await sent.read(_CHUNK):
                 file.write(chunk)

@@ -396,7 +396,9 @@ class Cluster(_Elsewhere):
         try:
             others: Mapping[str, str | None] = self._client.run(_difference, release())
         except Exception as error:  # a worker without this program cannot read the question
-            raise ExecutorUnavailableError(f"{self.address}: a worker lacks clutchlife ({error})") from error
+            raise ExecutorUnavailableError(
+                f"{self.address}: a worker cannot import clutchlife ({error}): install this release there"
+            ) from error
         for worker, difference in others.items():
             if difference is not None:
                 raise ExecutorUnavailableError(f"worker {worker}: {difference}")

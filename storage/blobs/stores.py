@@ -79,7 +79,9 @@ class BlobStore(ABC):
     def require_mark(self) -> None:
         """Raise RawStoreUnavailable where the place is no store."""
         if self.read(MARK) is None:
-            raise RawStoreUnavailable(f"{self.address} is no store of raw records, or {self.missing} {MARK}")
+            raise RawStoreUnavailable(
+                f"{self.address} is no store of raw records: the file {MARK} is missing. {self.missing}"
+            )
 
 
 def name_of(data: bytes | bytearray) -> str:
@@ -104,7 +106,7 @@ _PARTIAL = "partial"
 class FolderStore(BlobStore):
     """A folder. Made by `opening`."""
 
-    missing = "its disk is not mounted: it has no file"
+    missing = "Is its disk mounted?"
 
     def __init__(self, root: Path) -> None:
         self._root = root
@@ -207,7 +209,7 @@ _Answer = TypeVar("_Answer")
 class ObjectStore(BlobStore):
     """A bucket, or what begins with a prefix in it. Made by `opening`; RawStoreUnavailable where no client is installed."""
 
-    missing = "there is no such bucket: it has no object"
+    missing = "Does this bucket exist?"
 
     def __init__(self, bucket: str, prefix: str) -> None:
         if find_spec("obstore") is None:
@@ -313,8 +315,8 @@ def normal_address(address: str) -> str:
     if bucket:
         return f"s3://{bucket[1]}/{(bucket[2] or '').strip('/')}".rstrip("/")
     raise ValueError(
-        "raw records are kept in `database`, `folder:///absolute/path` or `s3://bucket/prefix` (credentials and endpoint "
-        "are taken from AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_ENDPOINT_URL): the address is none of them"
+        "the place of raw records must be `database`, `folder:///absolute/path` or `s3://bucket/prefix`. "
+        "Set credentials and endpoint with AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_ENDPOINT_URL"
     )
 
 

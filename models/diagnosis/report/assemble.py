@@ -132,9 +132,9 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
     if not sizes.draws:
         return ""
     if gain is not None and gain.rmse_after > criteria.MOST_WORSE * gain.rmse_before:
-        return "The extension is not proposed: its error on left-out runs is larger than the baseline's."
+        return "No extended model is offered: its error on left-out runs is larger than the baseline's."
     if gain is not None and gain.log_score_gain < 0:
-        return "The extension is not proposed: left-out runs are more likely with the baseline."
+        return "No extended model is offered: the baseline predicts left-out runs better."
     return " ".join(
         _unsure(slug, size) for slug, size in sizes.by_slug.items() if size.other_sign > criteria.SIGN_UNDETERMINED
     )
@@ -146,7 +146,7 @@ def _unsure(slug: str, size: Size) -> str:
     wrong = f"its sign may be wrong with probability {size.other_sign:.2f}"
     why = f"it depends on the assumed course over life, and {wrong}" if size.courses else wrong
     return (
-        f"The extension is not proposed: these data do not determine the size of {effect_name(slug)} "
+        f"No extended model is offered: these data do not determine the size of {effect_name(slug)} "
         f"(90 % interval {low} to {high} {effect.unit}); {why}."
     )
 
@@ -214,7 +214,7 @@ def report_of(
 
 def insufficient(missing: str, design: Design) -> Report:
     """Nothing can be judged."""
-    summary = f"Too little data for a pooled baseline: {missing}"
+    summary = f"Too little data for a diagnosis: {missing}"
     return Report(verdict=Verdict.INSUFFICIENT_DATA, summary=summary, notes=design.notes)
 
 

@@ -243,7 +243,7 @@ def _named(report: Report) -> list[Sentence]:
     if companions:
         sentences.append(
             Sentence(
-                f"These data neither confirm nor exclude that something else is at work: {_either(companions)}.", SHOULD
+                f"Something else may also be at work; these data do not show it clearly: {_either(companions)}.", SHOULD
             )
         )
     return [*sentences, *_gained(report), *_next(report)]

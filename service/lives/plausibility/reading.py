@@ -408,8 +408,8 @@ def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
         exponent, error = _exponent(rows)
         if exponent + 3 * error < MIN_EXPONENT:
             message = (
-                f"torque does not follow pressure: from {span} it grows as pressure to the power of {exponent:.2f}; "
-                "about 1 is expected. Is a sensor disconnected, or does a column hold another channel?"
+                f"torque grows as pressure to the power of {exponent:.2f} (from {span}), but about 1 is expected. "
+                "Is a sensor disconnected, or does a column hold another channel?"
             )
             return [Notice(code=DEAD, message=message)]
         return []

@@ -26,8 +26,8 @@ from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, Stora
 LOCK_NOT_FREE = "55P03"
 _BUSY = {
     LOCK_NOT_FREE: "another request held the database for too long",
-    "40001": "another transaction was in the way",
-    "40P01": "another transaction was in the way",
+    "40001": "another request changed the same data at the same time",
+    "40P01": "another request changed the same data at the same time",
     "53300": "the server has no free connection",
 }
 _READ_ONLY = "25006"

@@ -213,7 +213,7 @@ class ServerDatabase(Database):
             return {"database": f"the database cannot be read: {type(error).__name__}"}
         if revision != head():
             return {"database": f"the database is at revision {revision}, this release needs {head()}"}
-        return {"database": "the server is a standby, which is only read"} if standby else {}
+        return {"database": "the server is a standby and read-only: connect to the primary server"} if standby else {}
 
     def damage(self, connection: sa.Connection) -> list[str]:  # noqa: ARG002  (pages are the server's: pg_amcheck)
         """Nothing: the server refuses rows that refer to missing ones, and checks its pages itself."""

@@ -98,7 +98,7 @@ def test_tests_at_the_same_cycles_or_at_other_pressures_are_not_asked_for_again(
         bench.send(stationary(500.0 * (place == 4), run_id=f"n{place}", wear=0.01 * place, pressures=pressures))
     shown = item(bench)
     assert shown["state"]["why"].startswith(
-        "tests at 1 of the 3 different cycles that a prediction needs, 1 more cannot"
+        "tests at 1 of the 3 different cycles that a prediction needs (1 more cannot"
     )
     assert shown["action"].startswith("Run 2 more stationary tests, at different cycles, with the pressures and oil")
     for answer in (now(bench, method) for method in METHODS):
@@ -250,7 +250,7 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
         ),
         (
             summary(0.0, status="insufficient_data", runs_used=1, tests=7, places=1), None,
-            "Function check: 1 of the 3 tests that a prediction needs, 6 more cannot be compared with the first; ",
+            "Function check: 1 of the 3 tests that a prediction needs (6 more cannot be compared with the first); ",
             "Run 2 more stationary tests, at different cycles, with the pressures and oil of this life's first test: then",
         ),
         ({}, None, "Function check: no run counts yet", "Run 3 more stationary tests, at different cycles: then "),

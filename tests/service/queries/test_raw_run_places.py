@@ -89,7 +89,7 @@ def test_a_store_that_is_away_is_a_503_with_its_reason_and_nothing_is_stored(
         for answer in (client.post(RUNS, json=long_run(1.0)), client.get(f"{RUNS}/long-0")):
             assert (answer.status_code, answer.headers["content-type"]) == (503, "application/problem+json")
             assert answer.json()["type"] == "urn:clutchlife:problem:raw-records"
-            assert "its disk is not mounted" in answer.json()["detail"]
+            assert "Is its disk mounted?" in answer.json()["detail"]
             assert answer.headers["retry-after"]
         assert client.get(f"{RUNS}/long-1").status_code == 404
         client.post("/v1/clutches", json={"clutch_id": "c2"})
@@ -171,7 +171,7 @@ def test_backup_names_what_it_leaves_out_and_the_commands_say_where_it_is(
     clutchlife("raw", "collect", "--grace-hours", "0.5", *given, code=64)
     assert clutchlife("raw", "move", "--to", DATABASE, *given).strip() == "2 channels were moved"
     assert "new raw records go into the database" in clutchlife("raw", "list", *given)
-    assert "raw records are kept in" in clutchlife("raw", "move", "--to", "ftp://id:secret@x", *given, code=64)
+    assert "the place of raw records must be" in clutchlife("raw", "move", "--to", "ftp://id:secret@x", *given, code=64)
     assert "raw records" not in clutchlife("backup", str(tmp_path / "b.db"), *given)
 
 

@@ -47,7 +47,7 @@ def test_what_is_put_is_there_until_it_is_deleted(store: BlobStore) -> None:
 def test_a_second_put_mends_what_was_damaged_and_is_new(store: BlobStore) -> None:
     name = name_of(DATA)
     store.put(name, DATA[:-1] + b"x")
-    with pytest.raises(DamagedData, match=f"the blob {name} in {store.address} is damaged"):
+    with pytest.raises(DamagedData, match=f"the raw record {name} in {store.address} is damaged"):
         fetched(store, name)
     ((_, first),) = store.names()
     time.sleep(1.1)  # S3 counts whole seconds
@@ -79,7 +79,7 @@ def test_a_store_that_is_not_there_is_not_an_empty_one(raw_address: str) -> None
 def test_a_folder_that_is_not_mounted_is_not_written_to(tmp_path: Path) -> None:
     unmounted = open_store(f"folder://{tmp_path}")
     for use in (lambda: unmounted.put(name_of(DATA), DATA), lambda: list(unmounted.names())):
-        with pytest.raises(RawStoreUnavailable, match="its disk is not mounted"):
+        with pytest.raises(RawStoreUnavailable, match="Is its disk mounted"):
             use()
     assert list(tmp_path.iterdir()) == []
 
@@ -145,6 +145,6 @@ def test_addresses_have_one_form_and_no_secrets() -> None:
     assert normal_address("s3://bucket/a/b/") == "s3://bucket/a/b"
     assert normal_address("database") == "database"
     for wrong in ("folder://relative", "s3://id:secret@bucket", "s3://bucket?secret=1", "/data", "ftp://x/y", ""):
-        with pytest.raises(ValueError, match="raw records are kept in") as caught:
+        with pytest.raises(ValueError, match="the place of raw records must be") as caught:
             normal_address(wrong)
         assert not wrong or wrong not in str(caught.value)

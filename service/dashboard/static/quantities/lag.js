@@ -54,7 +54,7 @@ const columnsOf = (name) => [
 ];
 
 /** @param {LagName} name */
-const missing = (name) => `No dynamic Stribeck test determines this yet: ${LAG[name].meaning.toLowerCase()}.`;
+const missing = (name) => `${LAG[name].title}: no dynamic Stribeck test determines it yet. ${LAG[name].meaning}.`;
 
 /**
  * The values that were measured at a pressure.

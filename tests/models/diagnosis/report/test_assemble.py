@@ -40,7 +40,7 @@ def posterior(given: Study) -> Posterior:
     [
         (GAIN, ""),
         (None, ""),
-        (WORSE, "more likely with the baseline"),
+        (WORSE, "the baseline predicts left-out runs better"),
         (LARGER, "error on left-out runs is larger"),
     ],
 )

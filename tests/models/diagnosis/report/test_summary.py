@@ -155,7 +155,7 @@ def test_an_adequate_model_names_what_is_left_of_a_credible_set() -> None:
 
 
 def test_why_nothing_may_be_adopted_stands_in_the_paragraph() -> None:
-    why = "The extension is not proposed: its error on left-out runs is larger than the baseline's."
+    why = "No extended model is offered: its error on left-out runs is larger than the baseline's."
     said = summarise(replace(findings(Verdict.CAUSE_NAMED, "oil_change"), not_adoptable=why))
     assert why in said
     assert "left-out runs, the error" not in said
@@ -203,7 +203,7 @@ def test_a_size_and_the_words_on_its_sign_agree() -> None:
 
 
 def test_no_sentence_stands_twice() -> None:
-    why = "The extension is not proposed: its error on left-out runs is larger than the baseline's."
+    why = "No extended model is offered: its error on left-out runs is larger than the baseline's."
     found = replace(findings(Verdict.CAUSE_NAMED, "oil_change"), not_adoptable=why, notes=(why,))
     assert summarise(found).count(why) == 1
 
@@ -236,7 +236,7 @@ def test_a_certain_cause_with_sized_companions_keeps_to_the_words() -> None:
     )
     steps = (sweep, replace(sweep, kind="dynamic_stribeck", frequency=0.3, temperature=333.15))
     advice = replace(found.advice[0], test=TRIALS["all_loads_and_60c"].text, steps=steps, narrows=0.44)
-    why = "The extension is not proposed: its error on left-out runs is larger than the baseline's."
+    why = "No extended model is offered: its error on left-out runs is larger than the baseline's."
     changed = replace(
         found, explanations=explanations_of(beside), candidates=stated, advice=(advice,), not_adoptable=why
     )
@@ -291,7 +291,7 @@ def test_pairs_beside_a_long_test_and_a_reason_against_it_are_shortened() -> Non
     advice = replace(
         found.advice[0], test=TRIALS["all_loads_and_60c"].text, steps=(sweep, replace(sweep, kind="dynamic_stribeck"))
     )
-    why = "The extension is not proposed: its error on held-out runs is larger than the baseline's."
+    why = "No extended model is offered: its error on held-out runs is larger than the baseline's."
     said = summarise(replace(found, explanations=explanations_of(pairs), advice=(advice,), not_adoptable=why))
     assert len(said.split()) <= MAX_WORDS
     assert all(slug.replace("_", " ") in said for slug in slugs)
