@@ -65,8 +65,8 @@ def _finding(database: Database, row: RunRow) -> str | None:
         sha256 = row.content_sha256 if sha256 == file.get("content_sha256") else sha256
     if not sha256 == row.content_sha256 == row.receipt["content_sha256"]:
         return (
-            f"run {row.run_id} differs from what was sent: the sha256 of its content is {sha256}, the stored one is "
-            f"{row.content_sha256}, the one in its receipt {row.receipt['content_sha256']}"
+            f"run {row.run_id} differs from what was sent. sha256 of its content: now {sha256}, "
+            f"when stored {row.content_sha256}, in the receipt {row.receipt['content_sha256']}"
         )
     return None
 
@@ -213,8 +213,8 @@ def _inspection_finding(row: InspectionRow) -> str | None:
     if sha256 == row.content_sha256 and row.cycles == row.content["cycles"]:
         return None
     return (
-        f"inspection {row.inspection_id} differs from what was sent: it is stored at {row.cycles:g} cycles, the sha256 of "
-        f"its content is {sha256}, the stored one is {row.content_sha256}"
+        f"inspection {row.inspection_id} (stored at {row.cycles:g} cycles) differs from what was sent. "
+        f"sha256 of its content: now {sha256}, when stored {row.content_sha256}"
     )
 
 
@@ -226,5 +226,5 @@ def _photograph_finding(database: Database, row: InspectionRow, photograph: Phot
         return None
     return (
         f"photograph {photograph.sha256} of inspection {row.inspection_id} differs from what was sent: "
-        f"its sha256 is {sha256}"
+        f"the sha256 is now {sha256}"
     )

@@ -194,7 +194,9 @@ def diagnosed(
     )
     while report["status"] == "running":
         if time.monotonic() > deadline:
-            raise TimeoutError(f"diagnosis {report['diagnosis_id']} of {clutch_id} has not ended after {wait:g} s")
+            raise TimeoutError(
+                f"diagnosis {report['diagnosis_id']} of {clutch_id} still runs after {wait:g} s: ask again"
+            )
         look(_LOOK)
         report = service.get(f"{address}/{report['diagnosis_id']}")
     return report

@@ -173,7 +173,7 @@ def test_a_backup_holds_inspections_and_photographs_and_verify_checks_them(copy:
     [
         ("UPDATE photograph SET data = x'00' WHERE rowid = 2", f"photograph {sha256(png(2))}"),
         ("UPDATE inspection SET content = replace(content, '9.52', '9.25')", "differs from what was sent"),
-        ("UPDATE inspection SET cycles = 10 WHERE cycles = 0", "it is stored at 10 cycles"),
+        ("UPDATE inspection SET cycles = 10 WHERE cycles = 0", "(stored at 10 cycles)"),
     ],
 )
 def test_verify_names_what_is_not_as_it_was_sent(copy: str, tampered: str, says: str) -> None:

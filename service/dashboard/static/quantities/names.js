@@ -11,12 +11,12 @@ export const INDICATORS = {
   initial_cof_ratio: ["Initial over midpoint COF", ""],
   endpoint_cof_ratio: ["Endpoint over midpoint COF", ""],
   breakaway_cof_ratio: ["Breakaway over midpoint COF", ""],
-  torque_rise: ["Torque's rise at the end", ""],
+  torque_rise: ["Rise of torque at the end", ""],
   engagement_energy_kj: ["Energy", "kJ"],
   peak_power_kw: ["Peak power", "kW"],
-  normalised_duration: ["Duration over that of the first", ""],
-  euclidean_distance: ["Distance of speed from the first", ""],
-  spectral_angle_rad: ["Spectral angle from the first", "rad"],
+  normalised_duration: ["Duration relative to the first engagement", ""],
+  euclidean_distance: ["Distance of speed from the first engagement", ""],
+  spectral_angle_rad: ["Spectral angle to the first engagement", "rad"],
 };
 
 /** @type {Record<string, { title: string, unit: string }>} */
