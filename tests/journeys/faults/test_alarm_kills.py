@@ -18,8 +18,8 @@ def prepared(server: Server, receiver: Receiver) -> None:
         client.register("e")
         for cycles in CYCLES:
             client.post_run("e", stationary(cycles))
-        client.service.post("/v1/webhooks", f'{{"url": "{receiver.url}", "secret": "{SECRET}"}}'.encode())
-        client.service.post("/v1/alarms", b'{"clutch_id": "e", "quantity": "held_runs"}')
+        client.service.post("/v1/webhooks", {"url": receiver.url, "secret": SECRET})
+        client.service.post("/v1/alarms", {"clutch_id": "e", "quantity": "held_runs"})
 
 
 def raise_alarm(server: Server) -> None:
