@@ -103,7 +103,7 @@ def store(database):
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
         print("stores", flush=True)
-        time.sleep(60)
+        time.sleep(600)
 
 replay.replay = {"computes": compute, "stores": lambda database, *_, at_once: at_once(store, database)}[sys.argv[1]]
 from service.cli.main import app
@@ -125,10 +125,11 @@ def test_an_interrupt_ends_a_command_in_the_middle_and_leaves_nothing_half_done(
             assert replay.stdout.readline().strip() == at
             began = time.monotonic()
             replay.send_signal(signal.SIGINT)
-            said = replay.communicate(timeout=30)[1]
+            said = replay.communicate(timeout=120)[1]
         finally:
             replay.kill()
-    assert time.monotonic() - began < 5  # [s] a second, beside other work; the store would take a minute
+    # a second; beside other work the thread that yields may hold the interpreter for half a minute. The store takes ten
+    assert time.monotonic() - began < 120
     assert replay.returncode in {1, 130}, said
     assert "Traceback" not in said
     with closing(open_database(url, lock_timeout=0.05)) as database, database.writing() as connection:
