@@ -36,6 +36,8 @@ _LEAST = math.log(1e-250)
 _WORTH = 1e-6
 #: So many runs that surprise are asked about at a time.
 SUSPECTS = 4
+#: Where not all tests are looked at, so many right before a test must be for a new level to be seen there. Chosen.
+FOLLOWS = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,8 +70,8 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
-    """Verdicts on the runs that are to be held, by index; of the tests that were looked at, all and those from which on COF
-    has a new level."""
+    """Verdicts on the runs that are to be held, by index; the tests of which can be said whether COF has a new level from
+    them on that no event declares, and those from which on it has."""
 
     held: Mapping[int, Verdict]
     tests: frozenset[int]
@@ -85,7 +87,8 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> Judgement:
     clutch = _Clutch(runs=tuple(runs), about=frozenset(about))
     best, weighed = _searched(clutch)
     held = _held(clutch, best, weighed)
-    return Judgement(held=held, tests=frozenset(clutch.tests), levels=best.belief.levels - held.keys())
+    levels = {i for i in best.belief.levels & clutch.followed if not best.declared(i)}
+    return Judgement(held=held, tests=clutch.followed, levels=frozenset(levels - held.keys()))
 
 
 def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> dict[int, Verdict]:
@@ -170,6 +173,12 @@ class _Clutch:
     def tests(self) -> list[int]:
         """The tests that are looked at."""
         return self._nearest([i for i, run in enumerate(self.runs) if run.tests], 40)
+
+    @cached_property
+    def followed(self) -> frozenset[int]:
+        """The tests that are looked at with those right before them, by which a new level is seen."""
+        tests, seen = [i for i, run in enumerate(self.runs) if run.tests], set(self.tests)
+        return frozenset(i for k, i in enumerate(tests) if seen.issuperset(tests[max(k - FOLLOWS, 0) : k + 1]))
 
     @cached_property
     def compared(self) -> frozenset[int]:
@@ -334,21 +343,27 @@ class _Weighed:
 
     def _log_level(self, test: int) -> float:
         """log prior that a new level begins with a test."""
-        return math.log(self._level_share(self.life_of[test], test, self.clutch.runs[test].sent.cycles))
+        return math.log(self._level_share(self.life_of[test], self.clutch.runs[test].sent.cycles))
 
-    def _level_share(self, life: int, index: int, cycles: float) -> float:
+    def _level_share(self, life: int, cycles: float) -> float:
         """Prior probability that a new level begins with a test of a life at these cycles: after an event, or without."""
-        runs, own = self.clutch.runs, self.fits[life][1]
-        before = max((runs[i].sent.cycles for i in own if i != index and runs[i].sent.cycles <= cycles), default=0.0)
-        shifts = self._shifts(life)
-        declared = bool(((shifts >= before) & (shifts <= cycles)).any())
-        return criteria.LEVEL_AFTER_EVENT if declared else criteria.LEVEL_UNDECLARED
+        return criteria.LEVEL_AFTER_EVENT if self._declared(life, cycles) else criteria.LEVEL_UNDECLARED
+
+    def declared(self, test: int) -> bool:
+        """Whether an event lies between a test and the one before it."""
+        return self._declared(self.life_of[test], self.clutch.runs[test].sent.cycles)
+
+    def _declared(self, life: int, cycles: float) -> bool:
+        runs, shifts = self.clutch.runs, self._shifts(life)
+        earlier = (runs[i].sent.cycles for i in self.fits[life][1])
+        before = max((at for at in earlier if at < cycles), default=0.0)  # tests at the same cycles step together
+        return bool(((shifts >= before) & (shifts <= cycles)).any())
 
     def _new_level(self, index: int, life: int, cycles: float) -> float:
         """The same where no other test comes later: else they would have the new level too. 0 before the first test."""
         runs = self.clutch.runs
         others = [runs[i].sent.cycles for i in self.fits[life][1] if i != index]
-        return self._level_share(life, index, cycles) if others and max(others) < cycles else 0.0
+        return self._level_share(life, cycles) if others and max(others) < cycles else 0.0
 
     def log_cof(self, index: int, readings: Sequence[Reading]) -> list[float]:
         """log density of the COF of readings of a run by the course of the others; 0 for one that shows none."""

@@ -334,8 +334,8 @@ def beyond_end(events: Sequence[Event]) -> tuple[Event, Event] | None:
 
 
 def life_with(events: Sequence[Event], event: Event) -> Life:
-    """The life of an ordered history to which one of its events belongs."""
-    return next(life for life in lives_of(events) if event in life.events)
+    """The life of an ordered history to which one of its events belongs, whatever became of it since."""
+    return next(life for life in lives_of(events) if any(own.run_id == event.run_id for own in life.events))
 
 
 def stationary_tests_of(events: Sequence[Event]) -> dict[str, str | None]:

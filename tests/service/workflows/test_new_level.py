@@ -56,13 +56,35 @@ def test_the_order_of_arrival_does_not_matter_to_a_new_level(client: TestClient)
     assert "since the test at 9,000 cycles" in warned(life(client))[0]
 
 
+def test_a_test_that_comes_in_may_begin_a_level_itself(client: TestClient) -> None:
+    """It lies before those that showed the level first."""
+    sent(client, BEFORE)
+    sent(client, AFTER[1:], 0.8)
+    assert "since the test at 10,000 cycles" in warned(life(client))[0]
+    assert sent(client, AFTER[:1], 0.8) == ["accepted"]
+    assert "since the test at 9,000 cycles" in warned(life(client))[0]
+
+
+@pytest.mark.parametrize("declared_first", [True, False])
+def test_no_level_is_unexplained_once_an_event_is_declared(client: TestClient, *, declared_first: bool) -> None:
+    """The advice of the warning is to send maintenance: then it must end."""
+    event = {"run_id": "m", "kind": "maintenance", "cycles": 8500, "event": "oil_change"}
+    sent(client, BEFORE)
+    if declared_first:
+        assert client.post(f"{CLUTCH}/runs", json=event).status_code == 201
+    sent(client, AFTER, 0.8)
+    assert bool(warned(life(client))) is not declared_first
+    if not declared_first:
+        assert client.post(f"{CLUTCH}/runs", json=event).status_code == 201
+    assert warned(life(client)) == []
+
+
 def test_a_level_begins_with_the_next_test_where_its_first_is_withdrawn(client: TestClient) -> None:
     sent(client, BEFORE)
     sent(client, AFTER, 0.8)
     for at, begins in (("s9000", 10_000), ("s10000", None)):
         withdrawn = client.post(f"{CLUTCH}/runs/{at}/withdraw", json={"reason": "another clutch's"})
         assert withdrawn.status_code == 200
-        withdrawn = client.patch(f"{CLUTCH}/runs/{at}", json={"state": "withdrawn", "reason": "another clutch's"})
         found = warned(life(client))
         assert (f"since the test at {begins:,} cycles" in found[0]) if begins else found == []
 

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from service.lives.history import Event, Shown
+from service.lives.plausibility.doubts import Judged, doubts_together
 from tests.plausibility import simulated, slips, trials
 from tests.plausibility.bench import REFUSED, Bench
 from tests.support import stationary
@@ -26,6 +28,38 @@ def next_test(**changed: Any) -> Body:
     body = stationary(7000, run_id="next")
     body["channels"]["oil_temperature_c"] = [85.0] * len(body["channels"]["torque_nm"])
     return body | changed
+
+
+def made(at: float, level: float, *, new_level: bool = False) -> Event:
+    """A test of a clutch whose COF hardly changes, at a level of it."""
+    cof = level * (1.0 + 0.002 * np.random.default_rng(int(at)).standard_normal())
+    return Event(
+        run_id=f"t{at:g}",
+        kind="stationary_stribeck",
+        cycles=at,
+        moment=at,
+        speed_range=(1.0, 50.0),
+        cofs={5e5: (cof, 1e-4)},
+        shown=Shown(cof=cof, pressure=5e5, speed=50.0),
+        new_level=new_level,
+    )
+
+
+@pytest.mark.parametrize(
+    ("tests", "begins", "incoming"),
+    [
+        (12, 10, None), (46, 10, None), (50, 10, None), (55, 10, None),  # the first of the forty last at 50
+        (70, 10, 10_500.0), (70, 25, 500.0), (70, 60, 500.0),  # at 25 between those that are nearest to either
+    ],
+)  # fmt: skip
+def test_a_level_stays_where_the_tests_before_it_are_no_longer_looked_at(
+    tests: int, begins: int, incoming: float | None
+) -> None:
+    """And none begins a second time with the first test that is looked at after it."""
+    begun = 1000.0 * begins
+    known = [made(1000.0 * k, 0.1 if k < begins else 0.08, new_level=k == begins) for k in range(tests)]
+    new = None if incoming is None else made(incoming, 0.1 if incoming < begun else 0.08)
+    assert doubts_together(known, [], new, Bench({}).geometry, corrected=False) == Judged()
 
 
 def test_a_test_that_follows_is_not_doubted() -> None:
