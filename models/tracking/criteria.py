@@ -75,4 +75,4 @@ DOMAIN = 6.0
 #: An innovation counts at most as one of this many deviations in an unscented filter. Chosen; no table.
 OUTLIER = 5.0
 #: The unscented filters start again where courses that end before what is measured have more than this share of the weight.
-MOST_OVER = 0.1
+MAX_OVER = 0.1

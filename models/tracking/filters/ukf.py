@@ -45,7 +45,7 @@ from models.tracking.courses import (
     log_scale_at,
     place_of,
 )
-from models.tracking.criteria import DOMAIN, FORGET, MOST_OVER, OUTLIER
+from models.tracking.criteria import DOMAIN, FORGET, MAX_OVER, OUTLIER
 from models.tracking.discrepancy import PAST, at_end, drawn
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState, log_likelihood_of, table_of
@@ -362,7 +362,7 @@ class Ukf:
             covariance=step.covariance,
             scatter=step.scatter,
         )
-        if squared_innovation > 4.0 or _over(updated) > MOST_OVER:
+        if squared_innovation > 4.0 or _over(updated) > MAX_OVER:
             return _started(prior, history)
         return updated
 

@@ -14,7 +14,7 @@ from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
 
 FILTERS = [(Grid(), GridState), (Particle(particles=300), ParticleState), (Ukf(), UkfState)]
-COLUMNS = [name for name in Posterior.__slots__ if name not in ("discrepancy", "forced", "branch")]
+COLUMNS = [name for name in Posterior.__slots__ if name not in ("discrepancy", "branch")]
 NAMES = [tracker.name for tracker, _ in FILTERS]
 TYPICAL = Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7)
 
