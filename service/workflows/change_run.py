@@ -326,9 +326,9 @@ def _others(loaded: _Loaded) -> ClutchState:
     )
 
 
-def _together(others: ClutchState, changed: Event | None) -> Judged:
+def _together(others: ClutchState, incoming: Event | None, changed: Sequence[Event] = ()) -> Judged:
     corrected = others.extension is not None
-    return doubts_together(others.events, others.held, changed, others.geometry, corrected=corrected)
+    return doubts_together(others.events, others.held, incoming, others.geometry, corrected=corrected, changed=changed)
 
 
 def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
@@ -337,7 +337,7 @@ def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
     for event in accepted:
         cofs = cofs_among(others, event, loaded.levels.get(event.run_id, ()))
         others = replace(others, events=order([*others.events, replace(event, cofs=cofs, confirmed=True)]))
-    return _together(others, None)
+    return _together(others, None, [*loaded.events, *accepted])
 
 
 def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _Changed:

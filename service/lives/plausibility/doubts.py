@@ -6,6 +6,7 @@ Dead channels are found in a run by itself, and nothing that other runs show tak
 `models.plausibility.judgement`, asked again whenever a run comes in or is changed.
 """
 
+import bisect
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -171,13 +172,20 @@ def doubts_alone(run: IncomingRun, analysis: Analysis, geometry: Geometry) -> tu
 
 
 def doubts_together(
-    accepted: Sequence[Event], held: Sequence[Event], incoming: Event | None, geometry: Geometry, *, corrected: bool
+    accepted: Sequence[Event],
+    held: Sequence[Event],
+    incoming: Event | None,
+    geometry: Geometry,
+    *,
+    corrected: bool,
+    changed: Sequence[Event] = (),
 ) -> Judged:
     """Which runs are to be held, all of them weighed together.
 
     `accepted` and `held` are the runs as they stand, `incoming` one that comes in or was changed (None: none is new). Held
     runs with a dead channel are no part of the question, nor are those after the declared end of their life. `corrected`:
-    a model in force corrects the mean COFs of tests.
+    a model in force corrects the mean COFs of tests. `changed` are runs that were changed or taken out: what lies about
+    them is looked at.
     """
     new = [] if incoming is None else [incoming]
     doubted = [
@@ -186,7 +194,9 @@ def doubts_together(
     events = order([*accepted, *doubted, *new])
     runs = runs_of(events, geometry, corrected=corrected)
     place = {run.name: index for index, run in enumerate(runs)}
-    judgement = judge(runs, [place[event.run_id] for event in [*doubted, *new]])
+    cycles = [event.cycles for event in events]
+    about = [min(bisect.bisect_left(cycles, event.cycles), len(events) - 1) for event in changed if events]
+    judgement = judge(runs, [*(place[event.run_id] for event in [*doubted, *new]), *about])
     levels = {
         events[index].run_id: index in judgement.levels
         for index in judgement.tests

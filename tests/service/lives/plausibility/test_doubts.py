@@ -62,6 +62,14 @@ def test_a_level_stays_where_the_tests_before_it_are_no_longer_looked_at(
     assert doubts_together(known, [], new, Bench({}).geometry, corrected=False) == Judged()
 
 
+def test_a_level_passes_to_the_next_test_however_long_ago_its_first_was_made() -> None:
+    """Where that is withdrawn."""
+    first = made(10_000.0, 0.08, new_level=True)
+    left = [made(1000.0 * k, 0.1 if k < 10 else 0.08) for k in range(70) if k != 10]
+    judged = doubts_together(left, [], None, Bench({}).geometry, corrected=False, changed=[first])
+    assert judged == Judged(levels={"t11000": True})
+
+
 def test_a_test_that_follows_is_not_doubted() -> None:
     assert bench_after().answer(next_test()).codes == ()
 
