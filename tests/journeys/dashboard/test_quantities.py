@@ -75,7 +75,7 @@ def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_
     expect(lag.locator(".note")).to_contain_text("at 0.1 Hz")
     lag.get_by_label("Quantity").select_option("Attractor C")
     expect(page.locator("#chart-lag-pressure .note")).to_contain_text("Attractor C")
-    expect(page.locator("#chart-loop-curves .note")).to_contain_text("stationary curve of the same state")
+    expect(page.locator("#chart-loop-curves .note")).to_contain_text("stationary curve at the same number of cycles")
     assert violations(page) == []
 
     before = asked(watched, "degradation?quantity=slope")

@@ -111,7 +111,7 @@ export function loopCurves({ loops, tests, clutch, channels, over, pressure, run
     ? `At ${pressureText(pressure)}, from the first dynamic test to the last.`
     : `After ${fixed(drawn[0].loop.cycles)} cycles, at every pressure.`;
   return {
-    note: `${place} Dashed: the stationary curve of the same state. ${lagNote(
+    note: `${place} Dashed: the stationary curve at the same number of cycles. ${lagNote(
       drawn.map(({ loop }) => loop),
       label,
     )}`,

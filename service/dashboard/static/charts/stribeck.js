@@ -175,7 +175,8 @@ export function surface(answers) {
   const states = distinct(drawn.map(({ cycles }) => cycles));
   const after = `After ${states.map((cycles) => fixed(cycles)).join(", ")} cycles`;
   const place = byPressure ? after : `At ${pressureText(pressure)} over the life`;
-  const drawing = over === "states" ? "the fitted surface, one colour per state" : "points measured, surface fitted";
+  const drawing =
+    over === "states" ? "the fitted surface, one colour per number of cycles" : "points measured, surface fitted";
   return {
     note: `${place}: ${drawing}. Drag to turn.`,
     columns: columnsOf(),

@@ -17,14 +17,14 @@ import { within } from "../shared/dom.js";
 const MAX_ON_SURFACE = 9;
 /** @type {["state" | "pressure", string][]} */
 export const BY = [
-  ["state", "state"],
+  ["state", "cycles"],
   ["pressure", "pressure"],
 ];
 /** @type {[Depth, string][]} */
 const DEPTHS = [
   ["pressure", "pressure"],
-  ["states", "pressure, several states"],
-  ["cycles", "cycles"],
+  ["states", "pressure, at several cycles"],
+  ["cycles", "cycles, at one pressure"],
 ];
 /** @type {[ParameterName, string][]} */
 const NAMES = PARAMETER_NAMES.map((key) => [key, PARAMETERS[key].title]);
@@ -87,7 +87,7 @@ export class Curves {
     const { channels } = this.reader;
     const shared = { tests, clutch: this.reader.present(), channels, pressure: this.pressure(), run };
     const state = () =>
-      choice("State", stateOptions(tests), run, async (value) => {
+      choice("Cycles", stateOptions(tests), run, async (value) => {
         this.chosen.run = value;
         await this.readRecords();
         this.drawCurves();
@@ -122,7 +122,7 @@ export class Curves {
     setControls(this.landscape, [which("parameter")]);
     this.landscape.show(landscape({ items, name: this.chosen.parameter }));
     const test = tests.find(({ run_id: id }) => id === this.chosen.lawRun) ?? tests[0];
-    const state = choice("State", stateOptions(tests), test?.run_id, (value) => {
+    const state = choice("Cycles", stateOptions(tests), test?.run_id, (value) => {
       this.chosen.lawRun = value;
       this.drawParameters();
     });

@@ -67,7 +67,7 @@ export class Loops {
       this.chosen.pressure = Number(value);
       this.draw();
     });
-    const state = choice("State", stateOptions(runs), run, async (value) => {
+    const state = choice("Cycles", stateOptions(runs), run, async (value) => {
       this.chosen.run = value;
       await this.readRecords();
       this.draw();

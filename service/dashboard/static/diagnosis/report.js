@@ -185,7 +185,7 @@ function errorGain(gained) {
   const [before, after] = [gained.rmse_before_nm, gained.rmse_after_nm].map((rmse) => significant(rmse, 3));
   const scores = [
     scoreText("on the runs that were left out of the fit", gained.log_score_gain),
-    scoreText("in predicting the last states from the first", gained.prediction_log_score_gain),
+    scoreText("in predicting the last tests from the earlier ones", gained.prediction_log_score_gain),
   ];
   return h(
     "p",

@@ -92,7 +92,7 @@ export class Engagements {
     });
     /** @type {[string, string][]} */
     const states = measured.map((engagement) => [engagement.run_id, `${fixed(engagement.cycles)} cycles`]);
-    const state = choice("State", states, compared?.run_id, async (value) => {
+    const state = choice("Cycles", states, compared?.run_id, async (value) => {
       this.run = value;
       this.answer = await this.read();
       this.drawTrace();

@@ -44,7 +44,7 @@ export function surfaceOverLife({ inspections, events, quantity }) {
   const linings = [...new Set(measured.map(({ lining }) => lining))].sort();
   const states = distinct(measured.map(({ cycles }) => cycles)).length;
   return {
-    note: `${meaning} At ${states === 1 ? "one state" : `${fixed(states)} states`}.`,
+    note: `${meaning} Inspected at ${states === 1 ? "one number" : `${fixed(states)} different numbers`} of cycles.`,
     columns: [{ name: "lining" }, CYCLES, digitsColumn(name, 3)],
     rows: measured.map((item) => [item.lining, item.cycles, item[quantity]]),
     figure: (c) => ({
