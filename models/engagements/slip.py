@@ -176,7 +176,8 @@ def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
     rest = first + int(np.argmax(slow[first:]))
     if not slow[rest]:
         least = 100 * float(smooth[first:].min()) / highest
-        return _never_ends(f"the lowest speed is {least:.3g} %")
+        limit = f"and must fall to {100 * criteria.SLOW:g} % or less"
+        return _never_ends(f"the lowest speed is {least:.3g} % of the highest, {limit}")
     slowing = int(np.flatnonzero(fast[:rest])[-1])
     turning = np.flatnonzero(smooth[rest:] > 2 * criteria.SLOW * highest)
     leaves = rest + int(turning[0]) if turning.size else time.size
@@ -184,7 +185,8 @@ def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
     latest = min(2 * rest - slowing + 2, leaves - 1)
     end, zero = _rest(time[window], speed[window], float(time[slowing]), float(time[latest]))
     if abs(zero) > criteria.LARGEST_ZERO * highest:
-        return _never_ends(f"speed stays at {100 * zero / highest:.3g} %")
+        limit = f"and must come within {100 * criteria.LARGEST_ZERO:g} % of zero"
+        return _never_ends(f"the speed stays at {100 * zero / highest:.3g} % of the highest, {limit}")
     again = None
     if turning.size:
         still = np.flatnonzero(speed[rest:leaves] - zero <= criteria.LARGEST_ZERO * highest)
@@ -198,8 +200,7 @@ def _rpm(speed: float) -> str:
 
 
 def _never_ends(reason: str) -> Refusal:
-    stands = 100 * criteria.LARGEST_ZERO
-    rule = f"slip must end within the record, at {stands:g} % of the highest speed or less: {reason}"
+    rule = f"slip must end within the record: {reason}. Record longer"
     return Refusal(status=SlipStatus.SLIP_NEVER_ENDS, message=rule)
 
 

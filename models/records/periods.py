@@ -25,6 +25,8 @@ from models.records.outliers import beside, leading, near
 _STEPS = 25
 #: The frequency is refined to so much of 1/duration: with the first harmonic alone, and at last.
 _EXACT = 1e-10
+#: A speed that a curve misses by so much of its amplitude does not swing; nor one with a larger share of samples off it.
+_MISS, _OFF = 0.15, 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,10 +107,16 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
         fitted = _without_ends(t, y, fitted.frequency, criteria.SPEED_HARMONICS)
     if isinstance(fitted, str):
         return fitted
-    if not (fitted.noise < 0.15 * fitted.amplitude and fitted.outliers <= 0.2 * t.size):
+    if not fitted.noise < _MISS * fitted.amplitude:
         miss = fitted.noise / max(fitted.amplitude, 1e-3 * fitted.noise, 1e-300)
         return (
-            f"The speed does not swing periodically: a periodic fit leaves an error of {miss:.0%} of the swing (RMS)."
+            f"The speed does not swing periodically: a periodic curve misses it by {100 * miss:.3g} % of its amplitude "
+            f"(RMS; {100 * _MISS:g} % is the limit)."
+        )
+    if fitted.outliers > _OFF * t.size:
+        return (
+            f"The speed does not swing periodically: {100 * fitted.outliers / t.size:.3g} % of the samples lie off the "
+            f"periodic curve ({100 * _OFF:g} % is the limit)."
         )
     return _with_corners(t, y, fitted)
 

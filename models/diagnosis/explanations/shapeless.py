@@ -127,7 +127,7 @@ def _runs(design: Design, noise: Noise, residual: FloatArray) -> list[_Run]:
 
 
 #: What to do about it.
-ADVICE = "Check that run first."
+ADVICE = "Check this run's cycles, clutch and sensors first."
 #: Orders of the cosines over speed and pressure, and deviations τ of their coefficients, shares of the usual torque.
 _SIZES = (0.1, 1.0)
 
@@ -142,8 +142,8 @@ def outlying_run(problem: FitProblem, fitted: Fit) -> str:
     error, usual = (float(np.sqrt((left[rows] ** 2).mean())) for rows in (here, ~here))
     run = design.runs[worst]
     return (
-        f"The run {run.run_id} at {run.cycles:,.0f} cycles is an outlier: the baseline's error there is {error:.2g} Nm RMS, "
-        f"elsewhere {usual:.2g} Nm. {ADVICE}"
+        f"Run {run.run_id} at {run.cycles:,.0f} cycles does not fit the other runs: the model without effects misses its "
+        f"torque by {error:.2g} Nm RMS, the torque of the others by {usual:.2g} Nm. {ADVICE}"
     )
 
 

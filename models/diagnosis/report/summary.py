@@ -52,6 +52,10 @@ def count_of(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
+def _numbers_of_cycles(count: int) -> str:
+    return f"{count_of(count, 'different number' if count > 1 else 'number')} of cycles"
+
+
 def probability(value: float) -> str:
     """Two digits; no certainty."""
     return "above 0.99" if value > 0.99 else "below 0.01" if value < 0.01 else f"{value:.2f}"
@@ -122,7 +126,7 @@ def summarise(report: Report) -> str:
         Verdict.UNEXPLAINED_STRUCTURE: _unexplained,
         Verdict.INSUFFICIENT_DATA: _insufficient,
     }[report.verdict]
-    data = f"{count_of(report.tests, 'test')} at {count_of(report.states, 'state')} of use were examined."
+    data = f"{count_of(report.tests, 'test')} at {_numbers_of_cycles(report.states)} were examined."
     if report.tests == 1:
         data = data.replace("were", "was")
     said = {sentence.text: sentence for sentence in (Sentence(data, MAY), *say(report), *_noted(report.notes))}
@@ -175,7 +179,7 @@ def _adequate(report: Report) -> list[Sentence]:
     sentences += _unseen(report)
     if report.states < 3:
         say = "says" if report.states == 1 else "say"
-        few = f"{count_of(report.states, 'state')} of use {say} little about a course over life."
+        few = f"{_numbers_of_cycles(report.states)} {say} little about a course over life."
         sentences.append(Sentence(few, SHOULD))
     return sentences
 
@@ -380,11 +384,11 @@ def _gained(report: Report) -> list[Sentence]:
     ]
     if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         return sentences
-    better, uses = "better", "extrapolates"
+    better, continues = "better", "continues"
     if not gain.forecast_log_score_gain > 0:
-        better, uses = "no better", "does not extrapolate"
-    ahead = f"{model[0].upper()}{model[1:]} predicts the last states from the first ones {better}"
-    ahead += f", so remaining life {uses} it."
+        better, continues = "no better", "does not continue"
+    ahead = f"{model[0].upper()}{model[1:]} predicts the last tests from the earlier ones {better}"
+    ahead += f", so the prediction of remaining life {continues} its changes over life."
     return [*sentences, Sentence(ahead, SHOULD if report.verdict is Verdict.CAUSE_AMBIGUOUS else MUST)]
 
 

@@ -131,6 +131,10 @@ def test_a_record_that_is_cut_off_has_no_end_of_slip() -> None:
     found = measured_engagement(cut, GEOMETRY)
     assert isinstance(found, Refusal)
     assert found.status is SlipStatus.SLIP_NEVER_ENDS
+    assert found.message.endswith("% of the highest, and must fall to 5 % or less. Record longer")
+    stays = measured_engagement(WRONG[SlipStatus.SLIP_NEVER_ENDS], GEOMETRY)
+    assert isinstance(stays, Refusal)
+    assert "must come within 2 % of zero" in stays.message
 
 
 def test_noise_for_torque_and_a_shaft_that_turns_on_are_refused() -> None:

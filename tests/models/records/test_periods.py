@@ -1,6 +1,7 @@
 """Swings with corners: harmonics enough for ramps and few for a sine, cut where the swing begins and ends."""
 
 import math
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -83,6 +84,15 @@ def test_holds_of_a_fiftieth_of_a_period_are_seen_once_the_corners_are(first: fl
     cycle = fitted(np.arange(value.size) / RATE, value)
     assert cycle.begin == pytest.approx(0.2, abs=0.05)
     assert cycle.stop == pytest.approx(15.2, abs=0.05)
+
+
+def test_a_speed_that_does_not_swing_is_refused_for_the_limit_that_it_passes() -> None:
+    time, rng = np.arange(2500) / RATE, np.random.default_rng(1)
+    sine = 1 + AMPLITUDE * np.sin(2 * np.pi * 0.1 * time)
+    noisy = fit_cycle(time, sine + 0.3 * AMPLITUDE * rng.standard_normal(time.size))
+    assert re.search(r"misses it by (29|30|31)\S* % of its amplitude \(RMS; 15 % is the limit\)", str(noisy))
+    spoiled = sine + np.where(rng.random(time.size) < 0.3, 0.1, 0.0) * rng.choice([-1, 1], time.size)
+    assert re.search(r": 2\d\S* % of the samples lie off the periodic curve \(20 % ", str(fit_cycle(time, spoiled)))
 
 
 def test_a_fit_that_ran_out_of_steps_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

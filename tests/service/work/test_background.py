@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from contextlib import closing
 from pathlib import Path
 from typing import NoReturn
@@ -123,13 +122,12 @@ def test_an_interrupt_ends_a_command_in_the_middle_and_leaves_nothing_half_done(
         try:
             assert replay.stdout is not None
             assert replay.stdout.readline().strip() == at
-            began = time.monotonic()
             replay.send_signal(signal.SIGINT)
+            # a second; beside other work the thread that yields may hold the interpreter for half a minute. The store
+            # takes ten
             said = replay.communicate(timeout=120)[1]
         finally:
             replay.kill()
-    # a second; beside other work the thread that yields may hold the interpreter for half a minute. The store takes ten
-    assert time.monotonic() - began < 120
     assert replay.returncode in {1, 130}, said
     assert "Traceback" not in said
     with closing(open_database(url, lock_timeout=0.05)) as database, database.writing() as connection:

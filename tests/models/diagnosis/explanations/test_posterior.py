@@ -189,14 +189,14 @@ def test_a_run_that_is_not_like_the_others_is_named_in_the_summary() -> None:
     given = campaign(2, loops=False, cycles=SEVEN)
     report = diagnose(other(given, 4, too_low(given.stationary[4])), rng=np.random.default_rng(1))
     assert report.verdict in {Verdict.UNEXPLAINED_STRUCTURE, Verdict.CAUSE_AMBIGUOUS}
-    assert f"The run {given.stationary[4].run_id} at" in report.summary
+    assert f"Run {given.stationary[4].run_id} at" in report.summary
 
 
 @pytest.mark.parametrize(("changed", "place"), [(reversed_torque, 2), (too_low, 4)])
 def test_a_run_that_is_not_like_the_others_is_named(changed, place: int) -> None:
     given = campaign(2, loops=False, cycles=SEVEN)
     known = baseline(other(given, place, changed(given.stationary[place])))
-    assert f"The run {given.stationary[place].run_id} at" in outlying_run(known.problem, known.fit)
+    assert f"Run {given.stationary[place].run_id} at" in outlying_run(known.problem, known.fit)
 
 
 @pytest.mark.parametrize("planted", [None, warm])

@@ -126,7 +126,10 @@ def test_what_is_named_is_explained_with_its_size_its_gain_and_the_next_test() -
     assert BY_SLUG["oil_temperature"].physics in said
     assert "0.363 ± 0.055, positive with probability above 0.99" in said
     assert re.search(r"the error of the extended model is 7\.[45] ± 0\.9 % smaller", said)
-    assert "predicts the last states from the first ones better, so remaining life extrapolates it." in said
+    assert (
+        "predicts the last tests from the earlier ones better, so the prediction of remaining life continues its"
+        in said
+    )
     assert "It distinguishes oil change from running in (probability 0.80)." in said
 
 
