@@ -27,6 +27,7 @@ from service.settings import CODE_VERSION
 from storage import channels, results, runs
 from storage.blobs import raw_stores
 from storage.engine.database import Database
+from storage.engine.errors import DamagedData
 from storage.runs import RunRow
 
 
@@ -87,7 +88,7 @@ def run_reader(database: Database, clutch_id: str) -> RunReader:
         with database.reading() as connection:
             row = run(connection, clutch_id, run_id)
             columns = channels.all_stored(connection, row.run_key)
-        return incoming(row, channels.values_of(columns))
+        return decoded(row, columns)
 
     with database.reading() as connection:
         record = records.record(records.clutch(connection, clutch_id))
@@ -133,10 +134,18 @@ class _LoadedRuns:
 
     def read(self, run_id: str) -> IncomingRun:
         """A run with its channels. Raises DamagedData."""
-        return incoming(self.rows[run_id], {column.name: column.values() for column in self.channels[run_id]})
+        return decoded(self.rows[run_id], self.channels[run_id])
 
     def describe(self, run_id: str) -> IncomingRun:
         return incoming(self.rows[run_id], {})
+
+
+def decoded(row: RunRow, columns: Sequence[channels.Stored]) -> IncomingRun:
+    """A run with its channels. Raises DamagedData, naming the run."""
+    try:
+        return incoming(row, channels.values_of(columns))
+    except DamagedData as error:
+        raise DamagedData(f"run {row.run_id} is damaged: {error}") from error
 
 
 def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> IncomingRun:

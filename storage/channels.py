@@ -7,7 +7,7 @@ no transaction is open any more.
 
 import hashlib
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -203,9 +203,9 @@ class Stored:
                 if target is not None:
                     target.write(block)
         except zlib.error as error:
-            raise DamagedData(f"the file of run {self.run_key}: {error}") from error
+            raise DamagedData(f"the file: {error}") from error
         if length != self.length:
-            raise DamagedData(f"the file of run {self.run_key} has {length} bytes, {self.length} were sent")
+            raise DamagedData(f"the file has {length} bytes, {self.length} were sent")
         return digest.hexdigest()
 
     def values(self) -> NDArray[np.float64]:
@@ -216,7 +216,7 @@ class Stored:
                 return decode_decimals(data, self.length)
             return decode(data, self.codec, self.length)
         except DamagedData as error:
-            raise DamagedData(f"channel {self.name} of run {self.run_key}: {error}") from error
+            raise DamagedData(f"channel {self.name}: {error}") from error
 
 
 def all_stored(connection: Connection, run_key: int) -> list[Stored]:
@@ -269,7 +269,7 @@ def _refuse_removed(connection: Connection, store: RawStore, blobs: Iterable[str
         )
 
 
-def values_of(columns: list[Stored]) -> dict[str, NDArray[np.float64]]:
+def values_of(columns: Sequence[Stored]) -> dict[str, NDArray[np.float64]]:
     """The channels by name, fetched and decoded one after the other. Raises as `Stored.values` does."""
     return {column.name: column.values() for column in columns}
 

@@ -83,7 +83,7 @@ def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
     title = f"Clutchlife: {event['name'] or event['quantity'].replace('_', ' ')}" + (" is over" if over else "")
     task = {"url": url, "title": title, "body": event["message"], "private": private}
     reply = _exchange(task)
-    return Attempt() if reply.get("sent") else Attempt(problem=reply.get("problem", "the message could not be sent"))
+    return Attempt() if reply.get("sent") else Attempt(problem=reply["problem"])
 
 
 def _exchange(task: dict[str, Any]) -> dict[str, Any]:
@@ -97,7 +97,10 @@ def _exchange(task: dict[str, Any]) -> dict[str, Any]:
     except subprocess.TimeoutExpired:
         return {"problem": f"the message was not sent within {_SECONDS:g} s"}
     except ValueError:
-        return {}
+        return {
+            "problem": "not sent: the program that sends through Apprise ended without an answer. Send a test again; if "
+            "this repeats, tell the operator of the service"
+        }
     return reply
 
 
@@ -141,7 +144,10 @@ def main() -> None:
     task = json.load(sys.stdin)
     with redirect_stdout(sys.stderr):
         receiver = apprise.Apprise.instantiate(task["url"], suppress_exceptions=True)
-        answer: dict[str, Any] = {"understood": receiver is not None}
+        answer: dict[str, Any] = {
+            "understood": receiver is not None,
+            "problem": "not sent: Apprise does not understand the address",
+        }
         if receiver is not None and "body" in task:
             confine(private=task["private"])
             try:

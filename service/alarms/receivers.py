@@ -98,7 +98,7 @@ def allowed(host: str, port: int, *, private: bool) -> tuple[Any, ...]:
         if reason is None:
             return address
         reasons.append(reason)
-    raise NotAllowedError(reasons[0] if reasons else "the name of the receiver has no address")
+    raise NotAllowedError(reasons[0] if reasons else "the host name in url has no network address: check its spelling")
 
 
 def why_not(address: Address, *, private: bool) -> str | None:

@@ -92,7 +92,10 @@ def life(
         ),
     ] = None,
     pace: Annotated[
-        float | None, typer.Option(help="Planned duty cycles per hour, idle hours counted; then dates are given too")
+        float | None,
+        typer.Option(
+            help="Planned duty cycles per hour, averaged over all hours, idle ones too. With it, the answer also gives dates"
+        ),
     ] = None,
     as_json: Json = False,
     as_csv: Csv = False,

@@ -70,7 +70,10 @@ def refresh(
     for clutch_id, reason in done.left.items():
         print_line(f"{clutch_id}: {reason}")
     if not priors and not quiet:
-        print_line("no kind has three clutches with six tests each: all priors stay weak")
+        print_line(
+            "nothing was learned: this needs three clutches of the same friction material, reaction plate and fluid, with "
+            "six tests each"
+        )
 
 
 def _line(item: dict[str, Any]) -> str:
@@ -84,7 +87,10 @@ def _line(item: dict[str, Any]) -> str:
 
 
 def score(
-    method: Annotated[str, typer.Option(help="particle, ukf or grid")] = "particle", database: Database = DATABASE
+    method: Annotated[
+        str, typer.Option(help="The filter whose predictions are scored: particle, ukf or grid")
+    ] = "particle",
+    database: Database = DATABASE,
 ) -> None:
     """Score the prediction at every test of every life that has ended."""
     from service.lives.tracks import METHODS  # start-up time

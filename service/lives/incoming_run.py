@@ -163,27 +163,32 @@ def _require_readings(channels: Mapping[str, FloatArray]) -> None:
     if (pressure * CHANNELS["pressure_bar"].factor >= UNLOADED).any():
         _require_curve(torque, speed, pressure)
     elif not speed.any():
-        _refuse("speed_rpm", speed, "open_at_rest", "if no plateau is under load, at least one must turn")
+        open_ = f"the clutch is open (all pressures below {UNLOADED / 1e5:g} bar)"
+        _refuse_all("speed_rpm", speed, "open_at_rest", f"{open_}, so at least one speed must differ from zero")
     if not torque.any():
-        _refuse("torque_nm", torque, "torque_all_zero", "at least one torque must differ from zero")
+        _refuse_all("torque_nm", torque, "torque_all_zero", "at least one torque must differ from zero")
 
 
 def _require_curve(torque: FloatArray, speed: FloatArray, pressure: FloatArray) -> None:
     if torque.size == 1:
-        _refuse("torque_nm", torque, "too_few_points", "a Stribeck curve needs more than one point")
-    if np.unique(levels_of(pressure * CHANNELS["pressure_bar"].factor)).size > MAX_LEVELS:
-        _refuse("pressure_bar", pressure, "too_many_levels", f"a test may have at most {MAX_LEVELS} pressure levels")
+        _refuse("torque_nm", torque, "too_few_points", "a Stribeck curve needs more than one point, got 1")
+    levels = np.unique(levels_of(pressure * CHANNELS["pressure_bar"].factor)).size
+    if levels > MAX_LEVELS:
+        rule = f"a test may have at most {MAX_LEVELS} pressure levels, got {levels}. Send it as several tests"
+        _refuse("pressure_bar", pressure, "too_many_levels", rule)
     if (speed == speed[0]).all():
-        _refuse("speed_rpm", speed, "speeds_all_equal", "a Stribeck curve needs more than one speed")
+        _refuse_all("speed_rpm", speed, "speeds_all_equal", "a Stribeck curve needs more than one speed")
+
+
+def _refuse_all(name: str, column: FloatArray, code: str, rule: str) -> None:
+    """Refuse a column for the value that all its rows have."""
+    rows = "" if column.size == 1 else f" in all {column.size} rows"
+    _refuse(name, column, code, f"{rule}, got {column[0]:g}{rows}")
 
 
 def _refuse(name: str, column: FloatArray, code: str, rule: str) -> None:
-    value = float(column[0])
-    more = "" if column.size == 1 else f" in all {column.size} rows"
-    if more and not (column == value).all():
-        more = f" in row 1 of {column.size}"
-    message = f"{name}: {rule}, got {value:g}{more}"
+    message = f"{name}: {rule}"
     raise InvalidError(
         message,
-        errors=[FieldError(pointer=f"/channels/{name}/0", row=1, value=f"{value:g}", code=code, message=message)],
+        errors=[FieldError(pointer=f"/channels/{name}/0", row=1, value=f"{column[0]:g}", code=code, message=message)],
     )

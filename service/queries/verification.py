@@ -22,7 +22,7 @@ from service.lives.incoming_run import content_hash
 from service.lives.tracks import CARRIED
 from service.records import inspection_hash
 from service.settings import CODE_VERSION
-from service.stored_runs import incoming
+from service.stored_runs import decoded
 from storage import channels, inspections, results, runs
 from storage.channels import Stored
 from storage.encoding import to_text
@@ -53,9 +53,9 @@ def _finding(database: Database, row: RunRow) -> str | None:
         with database.reading() as connection:
             columns = channels.all_stored(connection, row.run_key)
             stored_file = channels.file_of(connection, row.run_key)
-        sent = incoming(row, channels.values_of(columns))
+        sent = decoded(row, columns)
     except DamagedData as error:
-        return f"run {row.run_id} is damaged: {error}"
+        return str(error)
     sha256 = content_hash(replace(sent, cycles=row.cycles if row.sent_cycles is None else row.sent_cycles))
     file = row.details.get("file")
     if file is not None:

@@ -122,8 +122,10 @@ def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Lim
             raise overdue(kind, limits) from None
         result.seek(0)
         if result.read(len(_STARTED)) != _STARTED and ended.returncode != -signal.SIGTERM:
-            why = f"the reader of {kind} files ended with {_ending(ended.returncode)} before it opened the file"
-            raise BusyError(f"{why}. The file is not the cause: see the service's log")
+            raise BusyError(
+                f"the program that reads {kind} files could not start ({_ending(ended.returncode)}). The file is not the "
+                "cause: send it again later. If this repeats, tell the operator of the service"
+            )
         if ended.returncode == -signal.SIGXCPU:
             raise too_slow(kind, limits)
         if ended.returncode == -signal.SIGTERM:
@@ -135,13 +137,19 @@ def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Lim
             why = f"it is damaged or of another type (the library for it ended with {crash})"
             raise _unreadable(kind, why, "reader_crashed")
         if ended.returncode:
-            raise _unreadable(kind, f"its reader ended with {_ending(ended.returncode)}")
+            raise _broken_off(kind, _ending(ended.returncode))
         return _answer(result, kind, answer, limits)
 
 
 def _unreadable(kind: Format, why: str, code: str = "unreadable") -> InvalidError:
     message = f"the {kind} file cannot be read: {why}"
     return InvalidError.of(message, code=code)
+
+
+def _broken_off(kind: Format, how: str) -> InvalidError:
+    return _unreadable(
+        kind, f"the program that reads it broke off ({how}). Export the file again, or save it in another format"
+    )
 
 
 def _ending(code: int) -> str:
@@ -168,13 +176,13 @@ def _answer(result: BinaryIO, kind: Format, wanted: str, limits: Limits) -> Any:
         counts = bool(answer["counts"])
         labels = {str(name): str(text) for name, text in answer["labels"].items()}
     except (ValueError, KeyError, TypeError, AttributeError):
-        raise _unreadable(kind, "its reader gave no answer") from None
+        raise _broken_off(kind, "no answer") from None
     if not lengths.keys() <= CHANNELS.keys() or not 0 <= sum(lengths.values()) <= limits.most_values:
-        raise _unreadable(kind, "its reader gave no answer")
+        raise _broken_off(kind, "no answer")
     columns = {name: np.empty(max(0, length)) for name, length in lengths.items()}
     for column in columns.values():
         if result.readinto(column.data) != column.nbytes:  # type: ignore[attr-defined]
-            raise _unreadable(kind, "its reader gave no answer")
+            raise _broken_off(kind, "no answer")
     return Channels(columns=columns, notices=notices, counts=counts, labels=labels)
 
 

@@ -88,7 +88,12 @@ class Child:
         if code == AWAY:
             raise AwayError
         if code != 0:
-            raise FailedError(f"the computation ended with {_ending(code)}: see the service's log")
+            if output:
+                raise FailedError(f"the computation ended with {_ending(code)}: see the service's log")
+            raise FailedError(
+                f"the computation was stopped ({_ending(code)}), perhaps for want of memory: start it again. If it fails "
+                "again, tell the operator of the service"
+            )
         try:
             written = json.loads(self._lines()[-1])
         except (ValueError, IndexError):

@@ -84,7 +84,10 @@ def workflow_work(function: str) -> Callable[[JobRow, Settings], Work]:
 #: How often a job is begun at most. Chosen: whatever ends the service once, as an operator may, is not the job's fault; what
 #: ends it three times is.
 MAX_ATTEMPTS = 3
-GIVEN_UP = f"the service or its database stopped {MAX_ATTEMPTS} times during this job"
+GIVEN_UP = (
+    f"the service or its database stopped {MAX_ATTEMPTS} times during this job: start it again, and tell the operator if it "
+    "stops again"
+)
 UNSTORED = "the result could not be stored: see the service's log"
 UNDONE = "an error stopped the job: see the service's log"
 #: A lease is prolonged so many times before it would run out. Chosen: a database that is away for some seconds loses none.

@@ -355,7 +355,10 @@ class Workers:
             if running_call is not None and running_call.is_overdue(now):
                 _answer(
                     running_call,
-                    BusyError(f"the computation took longer than {running_call.seconds:g} s and was stopped"),
+                    BusyError(
+                        f"the computation took longer than {running_call.seconds:g} s and was stopped: ask again when the "
+                        "service is less busy"
+                    ),
                 )
                 made.stop()
 

@@ -48,7 +48,7 @@ class BlobStore(ABC):
         data = self.read(name)
         if data is None:
             self.require_mark()
-            raise MissingBlob(f"the raw record {name} is missing in {self.address}")
+            raise MissingBlob(f"the raw record {name} is missing in {self.address}. Restore this file from a backup")
         return data
 
     @abstractmethod
@@ -94,7 +94,10 @@ def fetched(store: BlobStore, name: str) -> bytes:
     data = store.get(name)
     sha256 = name_of(data)
     if sha256 != name:
-        raise DamagedData(f"the raw record {name} in {store.address} is damaged: its sha256 is {sha256}")
+        raise DamagedData(
+            f"the raw record {name} in {store.address} is damaged: the sha256 of its content is {sha256}, and must be its "
+            "name. Restore this file from a backup"
+        )
     return data
 
 

@@ -70,7 +70,7 @@ def test_a_damaged_channel_is_named(database: Database) -> None:
         key = runs.insert(connection, new_run())
         channels.write(connection, key, channels.encoded(columns(1)))
         connection.exec_driver_sql("UPDATE channel SET data = substr(data, 1, 50) WHERE name = 'speed_rpm'")
-    with database.reading() as connection, pytest.raises(DamagedData, match=f"channel speed_rpm of run {key}"):
+    with database.reading() as connection, pytest.raises(DamagedData, match="channel speed_rpm: "):
         channels.read(connection, key)
 
 
@@ -88,7 +88,7 @@ def test_one_channel_is_read_alone_and_decoded_without_a_connection(database: Da
         with pytest.raises(LookupError, match="has no channel torque_nm"):
             channels.stored(connection, bare, "torque_nm")
     assert [each.values().tobytes() for each in stored] == [column.tobytes() for column in sent.values()]
-    with pytest.raises(DamagedData, match=f"channel time_s of run {key}"):
+    with pytest.raises(DamagedData, match="channel time_s: "):
         replace(stored[0], data=stored[0].data[:50]).values()
 
 
@@ -136,12 +136,10 @@ def test_a_column_that_is_damaged_or_missing_in_its_store_is_named(database: Dat
     store = open_store(raw_address)
     whole = store.get(one.blob)
     store.put(one.blob, whole[:-1])
-    with pytest.raises(
-        DamagedData, match=f"channel torque_nm of run {run_key}: the raw record {one.blob} in .* is damaged"
-    ):
+    with pytest.raises(DamagedData, match=f"channel torque_nm: the raw record {one.blob} in .* is damaged"):
         one.values()
     store.delete(one.blob)
-    with pytest.raises(DamagedData, match=f"channel torque_nm of run {run_key}: the raw record {one.blob} is missing"):
+    with pytest.raises(DamagedData, match=f"channel torque_nm: the raw record {one.blob} is missing"):
         one.values()
     store.put(one.blob, whole)
     assert one.values().size == 50_000

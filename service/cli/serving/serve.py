@@ -131,7 +131,12 @@ def _allowed(host: str, settings: "Settings") -> str:
     if has_keys and not opens:
         start.warning("all keys are revoked or expired, so the service refuses every request. %s", make)
     elif not has_keys and not is_loopback(host):
-        start.warning("no key exists, so the service listens at %s and not at %s. %s", LOOPBACK, host, make)
+        start.warning(
+            "no key exists, so the service listens at %s and not at %s. %s. Then start the service again",
+            LOOPBACK,
+            host,
+            make,
+        )
         host = LOOPBACK
     elif not has_keys:
         through = "accepted" if settings.insecure_local else "refused"

@@ -5,6 +5,7 @@ import logging
 import socket
 import socketserver
 import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -269,6 +270,13 @@ def test_apprise_does_not_lead_inside_either() -> None:
             ended = notify.send(url, body, secret=SECRET, delivery_id="d", private=False)
             assert ended.problem is not None, url
     assert (mails, receiver.requests) == ([], [])
+
+
+def test_a_sender_that_gives_no_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(notify, "PYTHON", (sys.executable, "-c", "", "--"))
+    body = b'{"type": "alarm.raised", "event": {"name": "n", "quantity": "state", "message": "m"}}'
+    ended = notify.send("mailto://a@example.org", body, secret=SECRET, delivery_id="d", private=False)
+    assert "ended without an answer" in (ended.problem or "")
 
 
 def test_a_sender_reads_no_file_of_this_machine(tmp_path: Path) -> None:

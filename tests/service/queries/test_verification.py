@@ -82,7 +82,10 @@ def test_nothing_is_found_where_all_is_as_it_was_stored_and_the_file_is_only_rea
             "UPDATE run SET started_at = '2026-01-01T00:00:00+00:00' WHERE run_id = 's0'",
             "run s0 differs from what was sent",
         ),
-        ("UPDATE channel SET data = zeroblob(9) WHERE run_key = 1 AND position = 0", "run s0 is damaged"),
+        (
+            "UPDATE channel SET data = zeroblob(9) WHERE run_key = 1 AND position = 0",
+            "c1: run s0 is damaged: channel pressure_bar: ",
+        ),
         ("DELETE FROM channel WHERE run_key = 1 AND position = 0", "run s0 differs from what was sent"),
     ],
 )
@@ -116,7 +119,7 @@ def test_a_run_that_cannot_be_evaluated_is_a_finding(life: str) -> None:
     execute(life, "UPDATE channel SET data = zeroblob(9) WHERE run_key = 1 AND position = 0")
     with closing(find_database(life)) as database:
         (finding,) = check_results(database, "c1").findings
-    assert "results cannot be computed again: channel" in finding
+    assert "results cannot be computed again: run s0 is damaged: channel" in finding
 
 
 def test_results_of_an_earlier_release_are_counted_and_no_finding(life: str) -> None:

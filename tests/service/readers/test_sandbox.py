@@ -34,11 +34,11 @@ ANSWER = (
     [
         ("import os; os.abort()", "SIGABRT"),
         ("while True: pass", "more than 1 s"),
-        ("import os; os._exit(3)", "status 3"),
+        ("import os; os._exit(3)", r"broke off \(status 3\)"),
         ("raise RecursionError('deep')", "RecursionError: deep"),
-        (ANSWER.format(channels="{'secret': 3}"), "gave no answer"),
-        (ANSWER.format(channels="{'torque_nm': 9000000}"), "gave no answer"),
-        ("import os, sys; os.write(int(sys.argv[1]), bytes(9000000)); os._exit(0)", "gave no answer"),
+        (ANSWER.format(channels="{'secret': 3}"), r"broke off \(no answer\)"),
+        (ANSWER.format(channels="{'torque_nm': 9000000}"), r"broke off \(no answer\)"),
+        ("import os, sys; os.write(int(sys.argv[1]), bytes(9000000)); os._exit(0)", r"broke off \(no answer\)"),
     ],
 )
 def test_a_reader_that_misbehaves_ends_alone(
@@ -54,6 +54,12 @@ def test_a_machine_with_too_much_to_do_is_not_the_files_fault(tmp_path: Path, mo
     (tmp_path / "a.csv").write_text("t [s],M [Nm]\n0,1\n", encoding="utf-8")
     with pytest.raises(BusyError, match="the CSV file was not read within 0 s"):
         read_file(tmp_path / "a.csv", filename="a.csv", limits=replace(LIMITS, wall_seconds=0))
+
+
+def test_a_reader_that_cannot_start_is_not_the_files_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    dies = "pass\nimport os\nos._exit(4)"
+    with pytest.raises(BusyError, match=r"reads TDMS files could not start \(status 4\).* tell the operator"):
+        read_with(tmp_path, monkeypatch, dies, LIMITS)
 
 
 def read_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, limits: Limits) -> None:

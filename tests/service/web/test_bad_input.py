@@ -88,6 +88,25 @@ CASES = [
 ]
 
 
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        (
+            stationary(0, pressures=(5.0,), speeds=(500,)),
+            "torque_nm: a Stribeck curve needs more than one point, got 1",
+        ),
+        (stationary(0, pressures=tuple(4 + 0.5 * i for i in range(101))), "at most 100 pressure levels, got 101. Send"),
+        (stationary(0, pressures=(0.0, 0.02), speeds=(0,)), "must differ from zero, got 0 in all 2 rows"),
+    ],
+    ids=["one point", "101 levels", "open at rest"],
+)
+def test_a_run_of_too_little_or_too_much_is_told_what_was_counted(
+    client: TestClient, known: dict[str, Any], body: dict[str, Any], says: str
+) -> None:
+    assert known
+    assert says in client.post(RUNS, json=body).json()["detail"]
+
+
 @pytest.mark.parametrize(("body", "pointer", "row", "value", "code"), CASES, ids=lambda each: str(each)[:40])
 def test_a_wrong_run_is_refused_and_leaves_no_trace(
     client: TestClient, known: dict[str, Any], database_file: Path, body: dict[str, Any], pointer: str, row: int | None,

@@ -133,5 +133,7 @@ def test_a_job_that_fails_in_any_way_is_marked_failed_and_the_next_one_runs(
         row = jobs.get(connection, "bad")
     assert row is not None
     assert row.problem
+    if how == "dies":
+        assert "stopped (SIGKILL)" in row.problem, "it wrote nothing: the log has nothing of it"
     if how not in ("dies",):
         assert any(record.levelname == "ERROR" for record in caplog.records), "it is logged"

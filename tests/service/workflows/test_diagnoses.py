@@ -386,7 +386,7 @@ def test_what_ends_the_service_again_and_again_is_given_up(tmp_path: Path) -> No
     left_running(tmp_path, attempts=MAX_ATTEMPTS)
     with service(tmp_path) as client:
         found = ended(client, report["diagnosis_id"])
-        assert (found["status"], "ended 3 times" in found["problem"]) == ("failed", True)
+        assert (found["status"], "stopped 3 times" in found["problem"]) == ("failed", True)
         assert client.get(f"/v1/jobs/{report['diagnosis_id']}").json()["state"] == "failed"
 
 

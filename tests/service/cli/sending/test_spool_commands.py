@@ -271,7 +271,7 @@ def test_without_a_rig_a_record_needs_its_kind_and_cycles(terminal: Terminal) ->
 
 
 def test_a_file_whose_reader_cannot_start_waits_in_the_spool(terminal: Terminal) -> None:
-    busy = "the reader of TDMS files ended with status 1 before it opened the file"
+    busy = "the program that reads TDMS files could not start (status 1)"
     terminal.service.instead = lambda request: problem(503, "busy", busy) if "/runs" in request.url.path else None
     record = written(terminal.folder / "a.tdms", b"TDSm")
     told = ("--clutch", "c1", "--url", URL, "--patience", "0")
