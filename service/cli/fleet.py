@@ -71,8 +71,8 @@ def refresh(
         print_line(f"{clutch_id}: {reason}")
     if not priors and not quiet:
         print_line(
-            "nothing was learned: this needs three clutches of the same friction material, reaction plate and fluid, with "
-            "six tests each"
+            "nothing was learned: this needs three clutches of the same friction material, reaction plate, fluid and origin,"
+            " with six tests each"
         )
 
 
