@@ -103,7 +103,7 @@ def test_replay_goes_on_after_a_clutch_that_it_refuses_and_names_it_at_the_end(p
     execute(path, "UPDATE channel SET data = zeroblob(9) WHERE run_key = 1 AND position = 0")
     execute(path, "UPDATE fit SET rmse = 2 * rmse WHERE run_key = 3")
     output = clutchlife("replay", *url, code=1)
-    assert "a: not replayed: channel" in output
+    assert "a: not replayed: run s0 is damaged: channel" in output
     assert "b: 1 runs" in output
     assert "c: 1 runs" in output
     assert output.strip().endswith("1 clutches keep their previous results: a")
