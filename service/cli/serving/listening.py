@@ -17,8 +17,9 @@ def bound(host: str, port: int) -> list[socket.socket]:
     """
     with ExitStack() as held:
         taken: list[socket.socket] = []
-        for family, kind, _, _, address in _addresses(host, port):
-            at = held.enter_context(socket.socket(family, kind))
+        for family, kind, protocol, _, address in _addresses(host, port):
+            # where asyncio knows the protocol it sends at once: else a body waits 40 ms for the receipt of its head
+            at = held.enter_context(socket.socket(family, kind, protocol))
             at.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             if family == socket.AF_INET6:
                 at.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)

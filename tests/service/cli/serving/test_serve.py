@@ -13,6 +13,7 @@ from typing import Any
 import httpx2
 import pytest
 
+from service.cli.serving import listening
 from tests.support import ONCE, free_port, stationary, wait_until_ready
 
 
@@ -50,6 +51,15 @@ def test_every_line_of_a_service_is_json_from_its_start_to_its_stop(tmp_path: Pa
     assert not any(line.get("route") == "/readyz" for line in lines), "probes are not logged"
     assert "forged" not in said
     assert any("no key exists" in line["message"] for line in lines)
+
+
+def test_an_answers_body_does_not_wait_until_its_head_was_received() -> None:
+    """asyncio sends at once (TCP_NODELAY) on connections whose protocol it knows."""
+    (at,) = listening.bound("127.0.0.1", 0)
+    with at:
+        at.listen()
+        with socket.create_connection(at.getsockname()), at.accept()[0] as accepted:
+            assert accepted.proto == socket.IPPROTO_TCP
 
 
 @pytest.mark.slow
