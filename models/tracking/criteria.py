@@ -75,4 +75,5 @@ DOMAIN = 6.0
 #: An innovation counts at most as one of this many deviations in an unscented filter. Chosen; no table.
 OUTLIER = 5.0
 #: The unscented filters start again where courses that end before what is measured have more than this share of the weight.
+#: Chosen: lives that fall at once (ad hoc) are forecast the same where they start again at every test; without it they end.
 MAX_OVER = 0.1

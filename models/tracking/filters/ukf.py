@@ -440,6 +440,7 @@ def _started(prior: Prior, history: History) -> UkfState:
         ),
     )
     shares = np.bincount(form, weights=draws.weight, minlength=FORM_SIZE.size)
+    # a covariance of d numbers needs more than d draws; the exact posterior's rare courses are those that end soon
     enough = np.bincount(form, minlength=FORM_SIZE.size) > 2 * points.shape[1]
     kept = np.flatnonzero(enough | (shares == shares.max()))
     moments = [_moments(points[form == kind], draws.weight[form == kind]) for kind in kept]
