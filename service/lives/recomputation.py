@@ -34,6 +34,7 @@ from service.lives.history import (
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
 from service.lives.payloads import OF_HISTORY, OFF_TRACK, fit_items, loop_items, warned_again
+from service.lives.plausibility.doubts import levelled
 from service.lives.run_analysis import Analysis, LevelFit, loops_of, mean_cofs
 from service.lives.tracks import CARRIED, Prediction, States, follow
 from service.schemas.clutch import ClutchIn
@@ -183,13 +184,14 @@ def computed_again(
 def with_cofs(
     state: ClutchState, levels: Levels, reader: RunReader
 ) -> tuple[ClutchState, dict[str, ByPressure], dict[str, Corrected]]:
-    """The state with the mean COFs of its events, those that the fits give by run_id, and those that the model in force
-    corrects; arguments as of `computed_again`."""
+    """The state with the mean COFs of its events and the new levels that these show, the COFs that the fits give by run_id,
+    and those that the model in force corrects; arguments as of `computed_again`."""
     cofs = _all_cofs(state.lives, levels, state.geometry)
     events = tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in state.events)
     plain = replace(state, events=events)
     corrected = _corrected(plain, reader)
-    events = tuple(event.corrected(corrected.get(event.run_id)) for event in plain.events)
+    freed = [event.corrected(corrected.get(event.run_id)) for event in plain.events]
+    events = levelled(freed, state.held, state.geometry, corrected=state.extension is not None)
     return replace(plain, events=events), cofs, corrected
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from models.clutch import Geometry
 from models.plausibility import criteria
-from models.plausibility.judgement import Verdict, judge
+from models.plausibility.judgement import Judgement, Verdict, judge
 from models.plausibility.slips import OF_CYCLES, OTHER_CYCLES, Reading
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 from service.errors import Notice
@@ -188,20 +188,14 @@ def doubts_together(
     them is looked at.
     """
     new = [] if incoming is None else [incoming]
-    doubted = [
-        event for event in held if event.shown is not None and beyond_end(order([*accepted, *new, event])) is None
-    ]
+    doubted = _doubted(accepted, held, new)
     events = order([*accepted, *doubted, *new])
     runs = runs_of(events, geometry, corrected=corrected)
     place = {run.name: index for index, run in enumerate(runs)}
     cycles = [event.cycles for event in events]
     about = [min(bisect.bisect_left(cycles, event.cycles), len(events) - 1) for event in changed if events]
     judgement = judge(runs, [*(place[event.run_id] for event in [*doubted, *new]), *about])
-    levels = {
-        events[index].run_id: index in judgement.levels
-        for index in judgement.tests
-        if events[index].new_level is not (index in judgement.levels)
-    }
+    levels = _levels(events, judgement)
     if incoming is None and not doubted:  # what somebody has changed is no reason to hold other runs
         return Judged(levels=levels)
     doubts = {
@@ -214,6 +208,33 @@ def doubts_together(
     reasons = {event.run_id: f"agrees with {_beside(event, counted)}" for event in back}
     reasons |= {event.run_id: f"does not agree with {_beside(event, counted)}" for event in gone}
     return Judged(doubts=doubts, accepted=back, held=gone, reasons=reasons, levels=levels)
+
+
+def levelled(
+    accepted: Sequence[Event], held: Sequence[Event], geometry: Geometry, *, corrected: bool
+) -> tuple[Event, ...]:
+    """The accepted runs with the new levels that they show; arguments as of `doubts_together`, which says the same."""
+    doubted = _doubted(accepted, held)
+    events = order([*accepted, *doubted])
+    names = {event.run_id for event in doubted}
+    about = [index for index, event in enumerate(events) if event.run_id in names]
+    return Judged(levels=_levels(events, judge(runs_of(events, geometry, corrected=corrected), about))).settled(
+        accepted
+    )
+
+
+def _doubted(accepted: Sequence[Event], held: Sequence[Event], new: Sequence[Event] = ()) -> list[Event]:
+    """The held runs that are part of the question."""
+    return [event for event in held if event.shown is not None and beyond_end(order([*accepted, *new, event])) is None]
+
+
+def _levels(events: Sequence[Event], judgement: Judgement) -> dict[str, bool]:
+    """Whether a test begins a new level that did not, or does not that did, by run_id."""
+    return {
+        events[index].run_id: index in judgement.levels
+        for index in judgement.tests
+        if events[index].new_level is not (index in judgement.levels)
+    }
 
 
 def _beside(event: Event, counted: Sequence[Event]) -> str:

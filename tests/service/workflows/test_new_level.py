@@ -97,3 +97,14 @@ def test_nothing_is_stepped_where_new_levels_are_never_believed(
     sent(client, BEFORE)
     sent(client, AFTER, 0.8)
     assert warned(life(client)) == []
+
+
+def test_what_is_computed_again_is_judged_again(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clutch stored by a release that knew no levels has them as soon as its history is computed again."""
+    with monkeypatch.context() as unknown:
+        unknown.setattr(criteria, "LEVEL_UNDECLARED", 1e-300)
+        sent(client, BEFORE)
+        sent(client, AFTER, 0.8)
+    assert warned(life(client)) == []
+    assert client.patch(CLUTCH, json={"torque_filter_ms": 1.0, "reason": "its amplifier"}).status_code == 200
+    assert "since the test at 9,000 cycles" in warned(life(client))[0]
