@@ -26,7 +26,8 @@ def integrated(progress: np.ndarray) -> np.ndarray:
 
 def normal(prior: Prior, measurements: list[Measurement], points: Points) -> tuple[np.ndarray, np.ndarray]:
     """Mean [n, t] and covariance [n, t, t] of the measurements at n points, all linear terms integrated out."""
-    progress, variance, epoch = (np.array([getattr(m, name) for m in measurements], dtype=float) for name in NAMES)
+    columns = (np.array([getattr(m, name) for m in measurements], dtype=float) for name in NAMES)
+    progress, variance, epoch, new_levels = columns
     signs = np.array([(1, 1), (-1, -1), (1, -1), (-1, 1), (1, 1), (1, 1)], dtype=float)[points.course]
     growth = np.maximum(1.0 + progress * signs[:, :1] * np.exp(-points.log_scale)[:, None], 1e-12)
     grown = np.minimum(-signs[:, 1:] * np.exp(points.log_exponent)[:, None] * np.log(growth), math.log(1e3))
@@ -46,11 +47,12 @@ def normal(prior: Prior, measurements: list[Measurement], points: Points) -> tup
     covariance += (points.size * size)[:, None, None] ** 2 * integrated(progress)
     for begun in np.unique(epoch)[1:]:
         after = (epoch >= begun).astype(float)
-        covariance += (prior.step_size * size) ** 2 * np.outer(after, after)
+        new = new_levels[epoch == begun].max() > new_levels[epoch < begun].max()
+        covariance += ((0.3 if new else prior.step_size) * size) ** 2 * np.outer(after, after)
     return prior.initial_mean + prior.change_mean * b, covariance
 
 
-NAMES = ("progress", "variance", "epoch")
+NAMES = ("progress", "variance", "epoch", "new_levels")
 
 
 def log_likelihood(prior: Prior, measurements: list[Measurement], points: Points) -> np.ndarray:

@@ -44,7 +44,8 @@ OUTLYING_SHARE, OUTLYING_SD = 0.02, 0.06
 #: Deviation of the level's step at an event of maintenance. As in `models.tracking.criteria`.
 STEP_SD = 0.05
 #: A new level from some test on: how often after an event that was declared (or a pause or gap of PAUSE times the usual),
-#: how often without one, and the deviation of log COF that it steps by. Chosen: an oil change may move COF by a fifth.
+#: how often without one, and the deviation of log COF that it steps by, as in `models.tracking.criteria`. Chosen: an oil
+#: change may move COF by a fifth.
 LEVEL_AFTER_EVENT, LEVEL_UNDECLARED, LEVEL_SD = 0.3, 3e-3, 0.3
 
 # Cycles (`pace`): weights of how a run comes to its cycles. Chosen; only their orders of magnitude matter.

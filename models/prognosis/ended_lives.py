@@ -49,7 +49,7 @@ from models.prognosis.first_passage import Offset, ends_of_life
 from models.tracking.courses import FORM_COURSE, LEAST_DISCREPANCY, Course, log_form_weight
 from models.tracking.criteria import STEP_SIZE
 from models.tracking.filters.grid import Grid
-from models.tracking.history import later_epochs
+from models.tracking.history import later_epochs, step_sizes
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
@@ -330,7 +330,8 @@ class _Decline:
 
     @classmethod
     def of(cls, tests: Sequence[Measurement], offset: FloatArray | None, fraction: float) -> "_Decline | None":
-        progress, value, variance, epoch = np.array([(t.progress, t.value, t.variance, t.epoch) for t in tests]).T
+        rows = [(t.progress, t.value, t.variance, t.epoch, t.new_levels) for t in tests]
+        progress, value, variance, epoch, new_levels = np.array(rows).T
         value = value if offset is None else value + offset
         first = value[progress.argmin()]
         if first <= 0.0:
@@ -338,8 +339,8 @@ class _Decline:
         damage, span = (1.0 - value / first) / (1.0 - fraction), float(progress.max())
         # half of the scatter is taken to be that of the fits: a test that is known badly counts for less
         noise = np.sqrt(0.5 + 0.5 * variance / variance.mean()) if variance.any() else np.ones(value.size)
-        later = later_epochs(epoch)
-        steps = (epoch[:, None] >= np.array(later)) * STEP_SIZE / (1.0 - fraction)
+        sizes = step_sizes(epoch, new_levels, STEP_SIZE) / (1.0 - fraction)
+        steps = (epoch[:, None] >= np.array(later_epochs(epoch))) * sizes
         features = np.column_stack([np.full(value.size, _LEVEL_SD), steps])
         walk, turn = np.linalg.eigh(_walked(progress / span, (progress / span)[:, None]) / np.outer(noise, noise))
         turn = turn / noise[:, None]
@@ -348,7 +349,7 @@ class _Decline:
             span=span,
             damage=damage @ turn,
             features=turn.T @ features,
-            sizes=np.array([_LEVEL_SD * (1.0 - fraction), *np.full(len(later), STEP_SIZE / (1.0 - fraction))]),
+            sizes=np.array([_LEVEL_SD * (1.0 - fraction), *sizes]),
             turn=turn,
             walk=np.maximum(walk, 0.0),
         )

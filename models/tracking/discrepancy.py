@@ -75,11 +75,12 @@ def _columns(progress: bytes, epoch: bytes) -> FloatArray:
     return terms
 
 
-def column_sds(prior: Prior, size: FloatArray, steps: int) -> FloatArray:
-    """Prior deviations of the further terms [n, PAST + steps] for discrepancies of relative size q [n]."""
-    sds = np.empty((size.size, PAST + steps))
+def column_sds(prior: Prior, size: FloatArray, history: History) -> FloatArray:
+    """Prior deviations of the further terms [n, PAST + e] of a history for discrepancies of relative size q [n]."""
+    steps = history.step_sizes(prior)
+    sds = np.empty((size.size, PAST + steps.size))
     sds[:, :PAST] = (size * prior.size)[:, None]
-    sds[:, PAST:] = prior.step_size * prior.size
+    sds[:, PAST:] = steps * prior.size
     return sds
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from models.arrays import FloatArray
+from models.tracking.criteria import LEVEL_SIZE
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 
@@ -19,28 +20,24 @@ LEAST_SPAN = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class History:
-    """The measurements so far, in the order they came: progress, value, variance, epoch, each [t]."""
+    """The measurements so far, in the order they came: progress, value, variance, epoch, new levels, each [t]."""
 
     progress: FloatArray
     value: FloatArray
     variance: FloatArray
     epoch: FloatArray
+    new_levels: FloatArray
 
     @classmethod
     def of(cls, measurements: Sequence[Measurement], prior: Prior) -> "History":
         """The columns of a sequence of measurements, possibly empty, with the variance of their resolution added."""
-        rows = np.array([_row(m, prior) for m in measurements], dtype=np.float64).reshape(-1, 4)
+        rows = np.array([_row(m, prior) for m in measurements], dtype=np.float64).reshape(-1, 5)
         return cls(**{field.name: rows[:, column].copy() for column, field in enumerate(fields(cls))})
 
     def append(self, measurement: Measurement, prior: Prior) -> "History":
         """A history with one more measurement."""
-        progress, value, variance, epoch = _row(measurement, prior)
-        return History(
-            progress=np.append(self.progress, progress),
-            value=np.append(self.value, value),
-            variance=np.append(self.variance, variance),
-            epoch=np.append(self.epoch, epoch),
-        )
+        row = zip(fields(self), _row(measurement, prior), strict=True)
+        return History(**{field.name: np.append(getattr(self, field.name), number) for field, number in row})
 
     @property
     def span(self) -> float:
@@ -52,6 +49,10 @@ class History:
         """The progress at which each epoch after the first begins, as far as it was measured [e]."""
         begun = [self.progress[self.epoch >= epoch].min() for epoch in later_epochs(self.epoch)]
         return np.array(begun, dtype=np.float64)
+
+    def step_sizes(self, prior: Prior) -> FloatArray:
+        """The deviations of these steps, as shares of the size of the quantity [e]."""
+        return step_sizes(self.epoch, self.new_levels, prior.step_size)
 
     def relative(self, prior: Prior) -> FloatArray:
         """The square of every value over the quantity's size [t]: what scatter that is a share of the value grows with.
@@ -81,6 +82,14 @@ def later_epochs(epoch: FloatArray) -> list[float]:
     return sorted(set(epoch.tolist()))[1:]
 
 
-def _row(measurement: Measurement, prior: Prior) -> tuple[float, float, float, int]:
+def step_sizes(epoch: FloatArray, new_levels: FloatArray, step_size: float) -> FloatArray:
+    """How far the level may step where an epoch [t] after the first begins, as a share of the quantity's size [e]: as by an
+    event, or to a new level."""
+    known = np.array([new_levels[epoch == each].max() for each in sorted(set(epoch.tolist()))])
+    return np.where(np.diff(known) > 0, LEVEL_SIZE, step_size)
+
+
+def _row(measurement: Measurement, prior: Prior) -> tuple[float, ...]:
     resolution = _RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
-    return measurement.progress, measurement.value, measurement.variance + resolution**2, measurement.epoch
+    variance = measurement.variance + resolution**2
+    return measurement.progress, measurement.value, variance, measurement.epoch, measurement.new_levels

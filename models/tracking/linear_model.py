@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.tracking.courses import FORM_COURSE, FORM_PROPORTIONAL, FORM_SIZE, basis, scatter_growth
-from models.tracking.discrepancy import PAST, column_sds, columns
+from models.tracking.discrepancy import column_sds, columns
 from models.tracking.history import History
 from models.tracking.prior import Prior
 
@@ -164,7 +164,7 @@ def pointwise(history: History, prior: Prior, points: Points, table: FloatArray 
     rb_sum, rby = plain[:2] @ rb
     sums = Sums(r=r_sum, rb=rb_sum, rbb=np.einsum("tn,tn->n", rb, b), ry=ry, rby=rby, ryy=ryy, log_r=log_r)
     z = columns(history)
-    where, sd = _disturbed(prior, points.size, z.shape[1] - PAST)
+    where, sd = _disturbed(prior, points.size, history)
     if where.size == 0:
         return sums, Terms(where=where, sd=sd, rows=np.zeros((0, 3, 0)))
     rows = _eliminated(z, y, r.take(where, axis=1), rb.take(where, axis=1), sd)
@@ -228,7 +228,7 @@ def tabulated(
         "log_r": np.log(r).sum(axis=2) - y.size * math.log(2.0 * math.pi),
     }
     z = columns(history)
-    terms, (where, sd) = z.shape[1], _disturbed(prior, FORM_SIZE[form], z.shape[1] - PAST)
+    terms, (where, sd) = z.shape[1], _disturbed(prior, FORM_SIZE[form], history)
     if where.size:
         sd = sd.T[:, None, :]
         weighted = (r[where, :, None, :] * z.T) * sd[..., None]
@@ -265,10 +265,10 @@ def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, norma
     return drawn
 
 
-def _disturbed(prior: Prior, size: FloatArray, steps: int) -> tuple[NDArray[np.intp], FloatArray]:
+def _disturbed(prior: Prior, size: FloatArray, history: History) -> tuple[NDArray[np.intp], FloatArray]:
     """Which of the sizes q [n] have further terms, and the prior deviations σ of these [p, j]."""
-    where = np.flatnonzero(size > 0.0) if steps == 0 else np.arange(size.size)
-    return where, column_sds(prior, size[where], steps).T
+    where = np.flatnonzero(size > 0.0) if history.steps.size == 0 else np.arange(size.size)
+    return where, column_sds(prior, size[where], history).T
 
 
 def _eliminated(z: FloatArray, y: FloatArray, r: FloatArray, rb: FloatArray, sd: FloatArray) -> FloatArray:

@@ -9,16 +9,18 @@ class Measurement:
     """One fitted value of the quantity at progress ζ >= 0 (cycles), with the variance >= 0 of its fit.
 
     `epoch` >= 0 counts the events so far that may have shifted the level (an oil change, a zeroed sensor): measurements
-    of one epoch share a level. Raises ValueError where a number is not finite or negative where it must not be.
+    of one epoch share a level. `new_levels` >= 0 of these epochs begin with a level that the tests show and no event
+    declares. Raises ValueError where a number is not finite or negative where it must not be.
     """
 
     progress: float
     value: float
     variance: float
     epoch: int = 0
+    new_levels: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("progress", "value", "variance", "epoch"):
+        for name in ("progress", "value", "variance", "epoch", "new_levels"):
             number = getattr(self, name)
             if not math.isfinite(number):
                 raise ValueError(f"{name} must be finite, got {number}")

@@ -50,7 +50,7 @@ def verdicts(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes)
     """
     further = (prior.outlying_size * prior.size) ** 2
     d = history.variance + further * outlying + nodes.noise
-    sd = column_sds(prior, nodes.size, history.steps.size)
+    sd = column_sds(prior, nodes.size, history)
     needed = np.flatnonzero(sd.any(axis=0))
     sd, terms = sd[:, needed], columns(history)[:, needed]
     z = np.broadcast_to(terms, (nodes.b.shape[0], *terms.shape))

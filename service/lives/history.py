@@ -264,11 +264,14 @@ class Life:
         cycles = np.array([self.events[index].cycles for index, _ in measured])
         course = assumptions.offset(quantity, pressure, cycles)
         epochs = list(itertools.accumulate(int(event.shift or event.new_level) for event in self.events))
+        levels = list(itertools.accumulate(int(event.new_level) for event in self.events))
         return Series(
             quantity=quantity,
             pressure=pressure,
             measurements=tuple(
-                Measurement(progress=zeta, value=value - off, variance=sd**2, epoch=epochs[index])
+                Measurement(
+                    progress=zeta, value=value - off, variance=sd**2, epoch=epochs[index], new_levels=levels[index]
+                )
                 for (index, (value, sd)), zeta, off in zip(
                     measured, scale.progress(cycles).tolist(), course.tolist(), strict=True
                 )

@@ -75,12 +75,12 @@ class Normals:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Way:
     """From one run to the next: the `reference` progress of the coordinates, the largest progress `before` and `after`,
-    `steps` after events so far, and the new run's progress, value, variance and `relative` size squared."""
+    how far the level's `steps` may go [e], and the new run's progress, value, variance and `relative` size squared."""
 
     reference: float
     before: float
     after: float
-    steps: int
+    steps: FloatArray
     progress: float
     value: float
     variance: float
@@ -176,20 +176,20 @@ def coefficients(
 
 def process(prior: Prior, size: FloatArray, way: Way) -> FloatArray:
     """Process noise [k, d, d] of δ and its slope over the way to the last measurement, for discrepancies of sizes q [k]."""
-    noise = np.tile(_PROCESS * np.eye(BEFORE_STEPS + way.steps), (size.size, 1, 1))
+    noise = np.tile(_PROCESS * np.eye(BEFORE_STEPS + way.steps.size), (size.size, 1, 1))
     gap = (way.after - way.before) / way.reference
     density = 3.0 * (size * prior.size / prior.initial_sd) ** 2 * (way.reference / way.after) ** 3
     noise[:, 4:6, 4:6] += density[:, None, None] * np.array([[gap**3 / 3.0, gap**2 / 2.0], [gap**2 / 2.0, gap]])
     return noise
 
 
-def _widened(prior: Prior, normals: Normals, steps: int) -> tuple[FloatArray, FloatArray]:
-    """Means and covariances with the steps of all events: those that have none yet are as the prior has them."""
-    (count, before), dimension = normals.mean.shape, BEFORE_STEPS + steps
+def _widened(prior: Prior, normals: Normals, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Means and covariances with all steps [e] of the level: those that have none yet are as the prior has them."""
+    (count, before), dimension = normals.mean.shape, BEFORE_STEPS + steps.size
     mean, covariance = np.zeros((count, dimension)), np.zeros((count, dimension, dimension))
     mean[:, :before], covariance[:, :before, :before] = normals.mean, normals.covariance
     new = np.arange(before, dimension)
-    covariance[:, new, new] = (prior.step_size * prior.size / prior.initial_sd) ** 2
+    covariance[:, new, new] = (steps[new - BEFORE_STEPS] * prior.size / prior.initial_sd) ** 2
     return mean, covariance
 
 
@@ -343,7 +343,7 @@ class Ukf:
             reference=state.reference,
             before=before.span,
             after=history.span,
-            steps=history.steps.size,
+            steps=history.step_sizes(prior),
             progress=measurement.progress,
             value=measurement.value,
             variance=float(history.variance[-1]),

@@ -27,7 +27,7 @@ from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.scoring import crps_of_sample
 from models.prognosis.stated_end import stated_end
 from models.tracking.courses import FORM_SIZE, Course
-from models.tracking.criteria import STEP_SIZE
+from models.tracking.criteria import LEVEL_SIZE, STEP_SIZE
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
@@ -253,9 +253,10 @@ def test_it_is_alive_now() -> None:
     assert low > 1_200.0
 
 
-def test_the_evidence_is_that_of_the_normal_written_out() -> None:
+@pytest.mark.parametrize(("new_level", "size"), [(0, STEP_SIZE), (1, LEVEL_SIZE)])
+def test_the_evidence_is_that_of_the_normal_written_out(new_level: int, size: float) -> None:
     """Of every course, end and pair of deviations, with x, a, the step and δ integrated out: by dense covariances."""
-    tests = measured(1_100.0, 0.5, step=0.02)
+    tests = [replace(t, new_levels=new_level * t.epoch) for t in measured(1_100.0, 0.5, step=0.02)]
     seen = ended_lives._Decline.of(tests, None, 0.5)
     assert seen is not None
     log_end = np.log([900.0, 1_300.0])
@@ -273,7 +274,7 @@ def test_the_evidence_is_that_of_the_normal_written_out() -> None:
             for j in range(2):
                 b = courses[j, e]
                 covariance = q**2 * walk + s**2 * np.eye(b.size) + 0.25 * np.ones((b.size, b.size))
-                covariance += COURSE_SIZE_SD**2 * np.outer(b, b) + (STEP_SIZE / 0.5) ** 2 * np.outer(later, later)
+                covariance += COURSE_SIZE_SD**2 * np.outer(b, b) + (size / 0.5) ** 2 * np.outer(later, later)
                 expected[e, k, j] = multivariate_normal(b, covariance).logpdf(damage)
     assert found - found[0, 0, 0] == pytest.approx(expected - expected[0, 0, 0], abs=1e-5)
 

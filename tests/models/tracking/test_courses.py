@@ -266,8 +266,11 @@ POINTS = linear_model.Points(
 COUNT = POINTS.form.size
 
 
-#: The last four runs come after an event.
-EPOCHS = [replace(each, epoch=int(index > 8)) for index, each in enumerate(CAMPAIGN_here)]
+#: An event comes before the fifth run from the end, and the last three have a new level.
+EPOCHS = [
+    replace(each, epoch=int(index > 7) + int(index > 9), new_levels=int(index > 9))
+    for index, each in enumerate(CAMPAIGN_here)
+]
 
 
 def normal(point: int, measurements: list[Measurement]) -> tuple[np.ndarray, np.ndarray]:
@@ -276,7 +279,7 @@ def normal(point: int, measurements: list[Measurement]) -> tuple[np.ndarray, np.
     return means[point], covariances[point]
 
 
-@pytest.mark.parametrize("measurements", [CAMPAIGN_here, EPOCHS], ids=["one epoch", "two epochs"])
+@pytest.mark.parametrize("measurements", [CAMPAIGN_here, EPOCHS], ids=["one epoch", "three epochs"])
 def test_evidence_is_that_of_the_whole_normal(measurements: list[Measurement]) -> None:
     """All linear terms integrated out, the data are normal; δ's covariance comes from quadrature here."""
     history = History.of(measurements, PRIOR_here)
@@ -323,9 +326,9 @@ def test_the_table_and_the_points_are_one_sum() -> None:
         np.testing.assert_allclose(tabled[kind, level], pointed, rtol=1e-9)
 
 
-@pytest.mark.parametrize("measurements", [CAMPAIGN_here, EPOCHS], ids=["one epoch", "two epochs"])
+@pytest.mark.parametrize("measurements", [CAMPAIGN_here, EPOCHS], ids=["one epoch", "three epochs"])
 def test_the_last_run_turned_outlying_is_that_of_all_sums_anew(measurements: list[Measurement]) -> None:
-    """With one epoch the first point has no further terms, with two all have."""
+    """With one epoch the first point has no further terms, with three all have."""
     history = History.of(measurements, PRIOR_here)
     sound = replace(POINTS, outlying=POINTS.outlying * (np.arange(13) < 12)[:, None])
     outlying = replace(sound, outlying=sound.outlying + (np.arange(13) == 12)[:, None])

@@ -98,7 +98,7 @@ def test_particle_and_grid_agree_on_the_coefficients() -> None:
         assert abs(particle - grid) < 0.2 * sd, name
 
 
-SERIES = {"prior", "progress", "value", "variance", "epoch"}
+SERIES = {"prior", "progress", "value", "variance", "epoch", "new_levels"}
 
 
 STORED_NAMES = {

@@ -116,7 +116,7 @@ def test_a_step_of_all_filters_at_once_is_filterpys_step_of_each() -> None:
         reference=reference,
         before=last,
         after=1.2 * last,
-        steps=0,
+        steps=np.zeros(0),
         progress=1.2 * last,
         value=0.1,
         variance=0.0,
