@@ -71,7 +71,7 @@ class Verdict:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
     """Verdicts on the runs that are to be held, by index; the tests of which can be said whether COF has a new level from
-    them on that no event declares, and those from which on it has."""
+    them on, and those from which on it has."""
 
     held: Mapping[int, Verdict]
     tests: frozenset[int]
@@ -87,8 +87,8 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> Judgement:
     clutch = _Clutch(runs=tuple(runs), about=frozenset(about))
     best, weighed = _searched(clutch)
     held = _held(clutch, best, weighed)
-    levels = {i for i in best.belief.levels & clutch.followed if not best.declared(i)}
-    return Judgement(held=held, tests=clutch.followed, levels=frozenset(levels - held.keys()))
+    levels = best.belief.levels & clutch.followed
+    return Judgement(held=held, tests=clutch.followed, levels=levels - held.keys())
 
 
 def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> dict[int, Verdict]:
@@ -349,11 +349,8 @@ class _Weighed:
         """Prior probability that a new level begins with a test of a life at these cycles: after an event, or without."""
         return criteria.LEVEL_AFTER_EVENT if self._declared(life, cycles) else criteria.LEVEL_UNDECLARED
 
-    def declared(self, test: int) -> bool:
-        """Whether an event lies between a test and the one before it."""
-        return self._declared(self.life_of[test], self.clutch.runs[test].sent.cycles)
-
     def _declared(self, life: int, cycles: float) -> bool:
+        """Whether an event lies between a test of a life at these cycles and the one before it."""
         runs, shifts = self.clutch.runs, self._shifts(life)
         earlier = (runs[i].sent.cycles for i in self.fits[life][1])
         before = max((at for at in earlier if at < cycles), default=0.0)  # tests at the same cycles step together

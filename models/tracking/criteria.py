@@ -13,8 +13,8 @@ LAW_SHARE = 0.95
 #: The deviation of the level's step at an event, as a share of the size of the quantity. Chosen: `make score PARTS=events`
 #: shows what it achieves, and no table compares it with others.
 STEP_SIZE = 0.05
-#: The same of a new level that no event declares: of friction that was lost or regained at once. Chosen: as the judgement of
-#: runs, which finds the level, has its deviation; by STEP_SIZE two tests after a step of 0.4 are outlying together.
+#: The same of a new level that tests show, declared or not: of friction that was lost or regained at once. Chosen: as the
+#: judgement of runs, which finds the level, has its deviation; by STEP_SIZE two tests after a step of 0.4 are outlying.
 LEVEL_SIZE = 0.3
 
 #: The probability that the scatter is a share of the value, as that of a gain is, and not the same at every value. Chosen:

@@ -9,8 +9,8 @@ class Measurement:
     """One fitted value of the quantity at progress ζ >= 0 (cycles), with the variance >= 0 of its fit.
 
     `epoch` >= 0 counts the events so far that may have shifted the level (an oil change, a zeroed sensor): measurements
-    of one epoch share a level. `new_levels` >= 0 of these epochs begin with a level that the tests show and no event
-    declares. Raises ValueError where a number is not finite or negative where it must not be.
+    of one epoch share a level. `new_levels` >= 0 of these epochs begin with a level that the tests show to be new,
+    whether or not an event declares it. Raises ValueError where a number is not finite or negative where it must not be.
     """
 
     progress: float

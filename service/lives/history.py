@@ -9,7 +9,7 @@ epoch: it may have shifted the level of what is measured.
 import bisect
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, fields, replace
 from datetime import UTC, datetime
 from typing import Any
@@ -191,6 +191,14 @@ class Life:
             return False
         return abs(event.oil_temperature - reference) > OTHER_OIL
 
+    def _unexplained(self, tests: Sequence[Event]) -> Iterator[float]:
+        """The cycles of those tests that begin a new level while no event lies between them and the test before."""
+        shifts = [event.cycles for event in self.events if event.shift]
+        for at in (test.cycles for test in tests if test.new_level):
+            before = max((test.cycles for test in tests if test.cycles < at), default=0.0)
+            if not any(before <= shift <= at for shift in shifts):
+                yield at
+
     def until(self, event: int) -> "Life":
         """The life as it was when `event` had happened."""
         return Life(origin=self.origin, events=self.events[: event + 1])
@@ -278,7 +286,7 @@ class Life:
             ),
             events=tuple(index for index, _ in measured),
             scale=scale,
-            new_levels=tuple(self.events[index].cycles for index, _ in measured if self.events[index].new_level),
+            new_levels=tuple(self._unexplained([self.events[index] for index, _ in measured])),
         )
 
 

@@ -68,6 +68,19 @@ def test_a_test_that_comes_in_may_begin_a_level_itself(client: TestClient) -> No
     assert "since the test at 9,000 cycles" in warned(life(client))[0]
 
 
+def test_the_first_test_after_a_declared_event_is_the_present(client: TestClient) -> None:
+    """However far it is from those before: it is accepted, so it counts. The threshold that it has passed is passed."""
+    sent(client, BEFORE)
+    event = {"run_id": "m", "kind": "maintenance", "cycles": 8500, "event": "oil_change"}
+    assert client.post(f"{CLUTCH}/runs", json=event).status_code == 201
+    before = life(client)["current"]["fraction_of_initial"]
+    assert sent(client, AFTER[:1], 0.6) == ["accepted"]
+    for method in ("particle", "ukf", "grid"):
+        after = life(client, method)
+        assert 0.5 * before < after["current"]["fraction_of_initial"] < 0.6 * before, method
+        assert warned(after) == []
+
+
 @pytest.mark.parametrize("declared_first", [True, False])
 def test_no_level_is_unexplained_once_an_event_is_declared(client: TestClient, *, declared_first: bool) -> None:
     """The advice of the warning is to send maintenance: then it must end."""
