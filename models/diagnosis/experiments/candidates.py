@@ -20,8 +20,7 @@ from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
 
-#: The dynamic test of the reference (section 2.3.4): a swing of 1000 rpm about 1000 rpm, sampled at 200 a period.
-SWING = 1000 * 2 * np.pi / 60
+#: Samples a period of a dynamic test.
 _SAMPLES = 200
 _HOUR = 3600.0
 #: Light pressures of loops, as multiples: far enough apart to be distinguished.
@@ -57,7 +56,7 @@ class Trial:
     parts: tuple[str, ...] = ()
 
 
-_LOOPS = "dynamic test at 0.3 Hz, ten periods a pressure, 60 samples a second, 1000 ± 1000 rpm"
+_LOOPS = "dynamic test at 0.3 Hz, ten periods a pressure, 60 samples a second, at the usual speeds"
 _LIGHT_SWEEP = "stationary test at a quarter of the usual pressures"
 _OPEN_SWEEP = "stationary test with the clutch open (no pressure), at the usual speeds, five times over"
 _OPEN_LOOPS = "dynamic test at 0.3 Hz with the clutch open, ten periods"
@@ -225,7 +224,7 @@ def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, res
 
 
 def _loops(pattern: DynamicRun, trial: Trial, cycles: float) -> DynamicRun:
-    """The pressures of a dynamic test, or a share of them, at another frequency."""
+    """The pressures of a dynamic test, or a share of them, and its speeds, at another frequency."""
     record = pattern.record
     levels = np.unique(levels_of(record.pressure[:: max(1, record.pressure.size // 5000)]))
     levels = levels[levels >= UNLOADED]
@@ -234,7 +233,8 @@ def _loops(pattern: DynamicRun, trial: Trial, cycles: float) -> DynamicRun:
     count = _SAMPLES * 10 + 1
     step = 1.0 / (trial.frequency * _SAMPLES)
     phase = 2 * np.pi * np.arange(count) / _SAMPLES
-    speed = np.tile(SWING * (1 - np.cos(phase)), levels.size)
+    slowest, fastest = np.quantile(record.speed, (0.01, 0.99))  # spikes are no speeds
+    speed = np.tile(slowest + (fastest - slowest) * (1 - np.cos(phase)) / 2, levels.size)
     pressure = np.repeat(levels, count)
     temperature = None
     if record.oil_temperature is not None:

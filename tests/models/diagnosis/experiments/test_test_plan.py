@@ -13,14 +13,13 @@ from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.fitted_effect import effect_rows
 from models.diagnosis.effects.readings import STRAIGHT
 from models.diagnosis.effects.thermal import AT_ONCE
-from models.diagnosis.experiments import candidates
 from models.diagnosis.experiments.candidates import OIL_SETTLING, PASSES, TRIALS, steps_of, with_trial
 from models.diagnosis.experiments.information import CandidateDistances
 from models.diagnosis.experiments.test_plan import Advice, advise, decided
 from models.diagnosis.explanations.verdict import Fitted
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.records.runs import Plateaus
-from tests.models.diagnosis.campaigns import Where, campaign
+from tests.models.diagnosis.campaigns import RPM, Where, campaign
 from tests.models.diagnosis.fitted import Study, of_size, study, warmth
 
 
@@ -144,7 +143,7 @@ def test_every_trial_adds_runs_that_can_be_analysed(key, swung):
     if trial.loops:
         assert added.loops == {0.0: 1, 1.0: 5}.get(trial.pressure, 3)
         assert added.rows.angular_frequency.max() == pytest.approx(2 * np.pi * trial.frequency, rel=1e-3)
-        assert added.rows.velocity.max() == pytest.approx(2 * candidates.SWING * 0.058, rel=1e-2)
+        assert added.rows.velocity.max() == pytest.approx(2000 * RPM * 0.058, rel=1e-2)
     if trial.temperature is not None:
         np.testing.assert_allclose(added.rows.temperature, trial.temperature)
     assert added.closed.all() == (trial.pressure != 0)
@@ -197,12 +196,17 @@ def without_temperature(table: Plateaus) -> Plateaus:
     return Plateaus(pressure=table.pressure, speed=table.speed, torque=table.torque)
 
 
-def test_a_trial_swings_as_the_reference_does():
-    then = with_trial(campaign(24, cycles=(0.0, 3000.0)), "loops_0.3hz")
+def test_a_trial_swings_over_the_speeds_of_the_rig():
+    """40 to 124 rad/s, and a spike of the encoder."""
+    given = campaign(24, cycles=(0.0, 3000.0))
+    run = given.dynamic[-1]
+    speed = 40.0 + 0.4 * run.record.speed
+    speed[100] = 1e4
+    slower = replace(run, record=replace(run.record, speed=speed))
+    then = with_trial(replace(given, dynamic=(given.dynamic[0], slower)), "loops_0.3hz")
     assert then is not None
-    record = then.dynamic[-1].record
-    assert record.speed.max() == pytest.approx(2 * candidates.SWING)
-    assert record.speed.min() == 0
+    swing = then.dynamic[-1].record.speed
+    assert [swing.min(), swing.max()] == pytest.approx([40.0, 40.0 + 0.4 * 2000 * RPM], rel=0.01)
 
 
 NONE = np.zeros((2, 3))
