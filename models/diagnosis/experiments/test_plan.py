@@ -108,7 +108,7 @@ def advise(
             worth = chance if len(race) > 1 else -narrows
             # probability that a run must add for the work that it is
             ranked.append(((worth - 0.005 * runs_of(key), nats), advice))
-    first = _thermometer(campaign, problem, fits)
+    first = _thermometer(campaign, problem, fits[: len(race)])
     ranked.sort(key=lambda trial: trial[0], reverse=True)
     worthy = [advice for i, (_, advice) in enumerate(ranked) if i == 0 or advice.nats >= criteria.WORTHWHILE]
     if len(race) > 1:

@@ -118,6 +118,9 @@ def test_without_oil_temperature_it_is_asked_for(warm):
     assert (first.key, first.other) == ("sweep_60c", "oil_temperature")
     assert "oil temperature recorded" in first.test
     assert first.nats > WORTHWHILE
+    # a zero that is out of the race is no reason to ask
+    wear = beside(blind, "accelerated_wear", 0.03, (6000.0, 1.0))
+    assert all(each.other != "oil_temperature" for each in advised(blind, wear, nearby=(zero,)))
     # the control: where it was measured nobody asks for it
     measured = warm.extended(("torque_zero_shift", 0.3, (1.0, 0.0, *STRAIGHT)))
     assert all(each.other != "oil_temperature" for each in advised(warm, measured))
