@@ -89,8 +89,9 @@ class FleetPrior:
 
     def together(self, under_weak: Posterior, under_fleet: Posterior, first: Measurement) -> Posterior:
         """Samples of the posterior under `weak` and under `prior_for`, as one of the posterior under the mixture."""
-        drawn = pooled(under_weak, under_fleet)
         ours, theirs = weak(first, falling=True), self.prior_for(first)
+        under_weak, under_fleet = _possible(under_weak, ours), _possible(under_fleet, theirs)
+        drawn = pooled(under_weak, under_fleet)
         log_weak = _log_prior(drawn, ours)
         # a vanishing density: no draws beyond REACH deviations of the prior
         lean = np.where(_within(drawn, theirs), _log_prior(drawn, theirs) - log_weak, (-700.0))
@@ -224,6 +225,14 @@ def _within(drawn: Posterior, prior: Prior) -> NDArray[np.bool_]:
     ]
     off[1] = np.where(WITHOUT_EXPONENT[drawn.course], 0.0, off[1])
     return np.asarray((np.abs(off) <= REACH).all(axis=0))
+
+
+def _possible(drawn: Posterior, prior: Prior) -> Posterior:
+    """A sample under a prior without the draws whose Δ lies beyond the prior's range, if there are others: the normals of an
+    unscented filter reach there, and one draw divided by a density that vanishes would have all of the weight."""
+    off = (drawn.change * unit_of_change(drawn.course) - prior.change_mean) / prior.change_sd
+    weight = np.where(np.abs(off) <= REACH, drawn.weight, 0.0)
+    return replace(drawn, weight=weight / weight.sum()) if weight.any() else drawn
 
 
 def _log_evidence_ratio(

@@ -14,11 +14,13 @@ from models.prognosis.fleet import FleetPrior, learn, pooled, population, taught
 from models.prognosis.scoring import crps_of_sample
 from models.tracking.courses import Course, basis
 from models.tracking.filters.grid import Grid
+from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
+from tests.models.tracking.tracked_series import followed
 
-GRID = Grid()
+GRID, UKF = Grid(), Ukf()
 
 
 def life(rng: np.random.Generator, scale: float) -> Degradation:
@@ -143,6 +145,20 @@ def test_the_mixture_is_that_of_importance_sampling() -> None:
     assert misfits[0] < 0.1
     # the negative control: neither sample alone is that distribution
     assert min(misfits[1:]) > 0.15
+
+
+def test_no_draw_of_an_unscented_filter_has_all_the_weight() -> None:
+    """A life three times as long as those of its fleet, of another law: its normals reach where no prior has anything."""
+    prior, rng = fleet(8, 5), np.random.default_rng(3)
+    zeta = np.linspace(0.0, 30_000.0, 9)
+    values = 0.13 * (1.0 - 0.5 * (zeta / 60_000.0) ** 1.5) * (1.0 + 0.003 * rng.standard_normal(9))
+    seen = [
+        Measurement(progress=z, value=v, variance=1.6e-7) for z, v in zip(zeta.tolist(), values.tolist(), strict=True)
+    ]
+    for count in range(6, 10):
+        beliefs = weak(seen[0], falling=True), prior.prior_for(seen[0])
+        under = [UKF.posterior(followed(UKF, believed, seen[:count]), 500, rng) for believed in beliefs]
+        assert prior.together(under[0], under[1], seen[0]).effective_draws > 60.0, count
 
 
 def _misfit(found: Posterior, reference: Posterior) -> float:
