@@ -1,8 +1,9 @@
 """Smooth contrasts: shapes of structure that any unknown cause might have, each on the axes on which it lives.
 
-They are relative to the predicted torque (structure in friction scales with it) and are products of cosines over the
-ranges of pressure, speed, clock and torque and over the rank of life, bumps and kinks in speed, waves over a loop's
-phase, and single states; waves over speed go through the loops' lag, as friction does. Axes: `design.design`.
+They are relative to the predicted torque (structure in friction scales with it). What other laws of speed, pressure and
+life than the baseline's would add is friction: products of cosines, which loops show with their lag. There speed counts
+as v^γ (eq. 2), because most of a curve's shape lies within its lowest tenth. The others are cosines over the clock and
+the torque, bumps and kinks in speed, waves over a loop's phase, and single states. Axes: `design.design`.
 """
 
 from collections.abc import Callable
@@ -16,12 +17,15 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.diagnosis.baseline.prediction import Prediction
 from models.diagnosis.design.design import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE, Design
+from models.friction.stribeck import GAMMA
 
 #: Takes the axis and a column [N] relative to the torque.
 Add: TypeAlias = Callable[[str, FloatArray], None]
 
 #: Waves of a nonlinear sensor over its range; ripples over speed (an encoder's, a mount's).
 TORQUE_WAVES, SPEED_WAVES = 20, range(4, 17)
+#: The product of the orders of waves over speed, pressure and life is this at most. Chosen: 8 waves over speed, as ever.
+MOST_ORDER = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,36 +45,19 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
     life = _rank(rows.cycles)
     states, levels = design.facts.states.size, design.levels.size
     lives, presses = min(states - 1, 3), min(levels - 1, 2)
-    columns: list[FloatArray] = []
-    axes: list[str] = []
+    columns, axes = _over_the_laws(design, prediction)
 
     def add(axis: str, column: FloatArray) -> None:
         if float((column * column).sum()) > 0:
             columns.append(column * torque)
             axes.append(axis)
 
-    for s in range(1, 9):
-        add(SPEED, _cosine(s, speed) * steady)
-        for p in range(1, presses + 1):
-            add(SPEED if s > p + 1 else PRESSURE, _cosine(s, speed) * _cosine(p, pressure) * steady)
-        for z in range(1, lives + 1):
-            add(SPEED if s > z + 1 else CYCLES, _cosine(s, speed) * _cosine(z, life) * steady)
-    for wave in _speed_waves(design, prediction).T:
-        if np.abs(wave).max() > 1e-6 * torque.max():  # at even speeds a sine may be 0 at each
-            columns.append(wave)
-            axes.append(SPEED)
-    for p, z, s in product(range(1, presses + 1), range(1, min(lives, 2) + 1), range(1, 4)):
-        add(SPEED if s > max(p, z) else PRESSURE, _cosine(s, np.sqrt(speed)) * _cosine(p, pressure) * _cosine(z, life))
     for centre in np.linspace(0.06, 0.94, 13):
         for width in (0.05, 0.11):
             add(SPEED, _bump(speed, centre, width))
         add(SPEED, (speed - centre) * _bump(speed, centre, 0.08))
         if lives:
             add(SPEED, _bump(speed, centre, 0.1) * _cosine(1, life))
-    for p in range(1, min(levels - 1, 6) + 1):
-        add(PRESSURE, _cosine(p, pressure))
-        for z in range(1, lives + 1):
-            add(PRESSURE if p > 1 else CYCLES, _cosine(p, pressure) * _cosine(z, life))
     for z in range(1, min(states - 1, 12) + 1):
         add(CYCLES, _cosine(z, life))
         add(CYCLES, _cosine(z, life) * steady)
@@ -96,13 +83,34 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
     return Contrasts(columns=np.stack(columns, axis=1), axes=tuple(axes)) if columns else no_contrasts(design)
 
 
-def _speed_waves(design: Design, prediction: Prediction) -> FloatArray:
-    """[N, m] Nm: ripples of friction over speed, which loops show with their lag."""
-    scene = prediction.scene
-    speed = _unit(scene.points.velocity, scene.points.engaged > 0)
-    orders = np.pi * np.array(SPEED_WAVES)
-    waves = np.concatenate([np.cos(orders * speed[:, None]), np.sin(orders * speed[:, None])], axis=1)
-    return prediction.change_at_rows(design, np.abs(scene.curve)[:, None] * waves, before_lag=True)
+def _over_the_laws(design: Design, prediction: Prediction) -> tuple[list[FloatArray], list[str]]:
+    """Columns [N] Nm over speed, pressure and life, and their axes: friction by other laws, which loops show with their lag.
+
+    A law is smooth: of a product of waves the coefficient may be 1/(s p z) as large, its orders in speed, pressure and life.
+    """
+    points, friction = design.points, np.abs(prediction.scene.curve)
+    closed = points.engaged > 0
+    even, speed = (_unit(points.velocity**power, closed) for power in (1.0, GAMMA))
+    pressure, life = _unit(points.pressure, closed), _rank(points.cycles)
+    presses, lives = min(design.levels.size - 1, 6), min(design.facts.states.size - 1, 3)
+    shapes = [
+        (_axis(s, p, z), _cosine(s, speed) * _cosine(p, pressure) * _cosine(z, life) / order)
+        for s, p, z in product(range(MOST_ORDER + 1), range(presses + 1), range(lives + 1))
+        if (s or p) and (order := max(s, 1) * max(p, 1) * max(z, 1)) <= MOST_ORDER
+    ]
+    shapes += [(SPEED, wave(np.pi * s * even)) for s in SPEED_WAVES for wave in (np.cos, np.sin)]
+    seen = [
+        (axis, shape) for axis, shape in shapes if np.abs(shape).max() > 1e-6
+    ]  # at even speeds a sine may be 0 at each
+    changes = friction[:, None] * np.stack([shape for _, shape in seen], axis=1)
+    return list(prediction.change_at_rows(design, changes, before_lag=True).T), [axis for axis, _ in seen]
+
+
+def _axis(s: int, p: int, z: int) -> str:
+    """The axis on which a product of waves of these orders in speed, pressure and life lives."""
+    if s > max(p, z) + 1 or not (p or z):
+        return SPEED
+    return PRESSURE if p > (1 if z and not s else 0) else CYCLES
 
 
 def no_contrasts(design: Design) -> Contrasts:

@@ -75,7 +75,7 @@ def evidence_of(problem: FitProblem, fitted: Fit, columns: Sequence[Column] = ()
         base = projected.evidence + _beside_bounds(projected, held, outward) + prior
         wholes.append(base + _averaged(projected, wrong, own, criteria.TEMPLATE_ERRORS))
         for axis, mine in places.items():
-            structures[axis].append(base + _structure(projected.info[np.ix_(mine, mine)], projected.score[mine]))
+            structures[axis].append(base + structure_gain(projected.info[np.ix_(mine, mine)], projected.score[mine]))
         info, score = projected.info[catalogue, catalogue], projected.score[catalogue]
         screened.append(replace(projected, info=info, score=score, whole=projected.whole[catalogue], evidence=base))
     whole = log_sum(wholes)
@@ -134,7 +134,7 @@ def _averaged(projected: Projected, wrong: slice, own: FloatArray, sizes: Sequen
     return log_mean([log_gain(info, score, np.where(own > 0, *size)) for size in sizes])
 
 
-def _structure(info: FloatArray, score: FloatArray) -> float:
+def structure_gain(info: FloatArray, score: FloatArray) -> float:
     """What smooth structure adds [nats], averaged over its size, all contrasts together or one of them alone."""
     values, vectors = independent(info)
     sizes = np.array(criteria.CONTRAST_SIZES)[:, None]

@@ -9,10 +9,10 @@ import pytest
 
 from models.arrays import FloatArray
 from models.diagnosis.design.autocorrelation import Correlation
-from models.diagnosis.design.design import TORQUE, Design, Points, build_design
+from models.diagnosis.design.design import SPEED, TORQUE, Design, Points, build_design
 from models.diagnosis.explanations import contrasts
 from models.diagnosis.explanations.contrasts import contrasts_of
-from models.diagnosis.explanations.evidence import evidence_of
+from models.diagnosis.explanations.evidence import evidence_of, structure_gain
 from models.diagnosis.explanations.shapeless import HighestLine, lines
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.noise.estimate import first_noise
@@ -197,3 +197,23 @@ def test_ripples_over_speed_are_seen_through_the_lag_of_loops(plain: Study, wave
     scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
     shares = (info / scale[:, None] / scale)[:4, 4:] ** 2
     assert shares.max(axis=1).min() > 0.45
+
+
+@pytest.mark.parametrize(
+    "form",
+    [lambda v: np.exp(-(v**0.6)), lambda v: np.exp(-(v**1.5)), lambda v: 1 - np.tanh(v), lambda v: 1 / (1 + v * v)],
+    ids=["stretched", "compressed", "tanh", "rational"],
+)
+def test_a_curve_of_another_form_is_structure_over_speed(
+    plain: Study, form: Callable[[FloatArray], FloatArray]
+) -> None:
+    """That falls within a tenth of the range, with the loops' lag; λ = 50 of it is left beside the baseline."""
+    known, points = plain.baseline, plain.design.points
+    prediction = known.fit.prediction
+    contrasts = contrasts_of(plain.design, prediction)
+    friction = prediction.scene.curve * form(points.velocity / (0.1 * points.velocity.max()))
+    structure = prediction.change_at_rows(plain.design, friction[:, None], before_lag=True)
+    columns = np.column_stack([structure, contrasts.columns[:, np.array(contrasts.axes) == SPEED]])
+    info = project(gram_of(plain.problem, known.fit, columns), plain.problem.noise.run_gain, 0.0).info
+    score = np.sqrt(2 * 50.0 / info[0, 0]) * info[1:, 0]
+    assert structure_gain(info[1:, 1:], score) > 20.0
