@@ -314,7 +314,7 @@ def _open(
     if len(alternatives) == 1:
         sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
     elif alternatives:
-        sentences.append(Sentence(f"Other causes that may be at work (with probabilities): {_either(alternatives)}."))
+        sentences.append(Sentence(f"What else may be at work (with probabilities): {_either(alternatives)}."))
     return sentences
 
 

@@ -178,7 +178,9 @@ def slow(campaign: Campaign, *, rng: np.random.Generator) -> Report:
 def endless(campaign: Campaign, *, rng: np.random.Generator) -> Report:  # noqa: ARG001
     """Never, and it writes down its process' id."""
     if "STAND_IN_PID" in os.environ:
-        Path(os.environ["STAND_IN_PID"]).write_text(str(os.getpid()))
+        path = Path(os.environ["STAND_IN_PID"])
+        path.with_suffix(".part").write_text(str(os.getpid()))
+        path.with_suffix(".part").rename(path)  # whoever sees it can read it whole
     while True:
         time.sleep(0.1)
 

@@ -217,7 +217,7 @@ def test_a_cause_of_all_explanations_is_certain_and_open_is_what_is_beside_it() 
     both = explanations_of({("channel_delay",): 0.55, ("channel_delay", UNCATALOGUED): 0.45})
     said = summarise(replace(found, explanations=both))
     assert "Channel delay is at work (probability above 0.99)." in said
-    assert "Other causes that may be at work (with probabilities): nothing (0.55), or something that" in said
+    assert "What else may be at work (with probabilities): nothing (0.55), or something that" in said
     assert "cannot distinguish" not in said
     one = explanations_of({("channel_delay", UNCATALOGUED): 1.0})
     said = summarise(replace(found, explanations=one))
