@@ -99,9 +99,8 @@ def _over_the_laws(design: Design, prediction: Prediction) -> tuple[list[FloatAr
         if (s or p) and (order := max(s, 1) * max(p, 1) * max(z, 1)) <= MOST_ORDER
     ]
     shapes += [(SPEED, wave(np.pi * s * even)) for s in SPEED_WAVES for wave in (np.cos, np.sin)]
-    seen = [
-        (axis, shape) for axis, shape in shapes if np.abs(shape).max() > 1e-6
-    ]  # at even speeds a sine may be 0 at each
+    # at even speeds a sine may be 0 at each
+    seen = [(axis, shape) for axis, shape in shapes if np.abs(shape).max() > 1e-6]
     changes = friction[:, None] * np.stack([shape for _, shape in seen], axis=1)
     return list(prediction.change_at_rows(design, changes, before_lag=True).T), [axis for axis, _ in seen]
 
