@@ -16,14 +16,12 @@ from typing import Any
 
 from models.diagnosis.diagnose import diagnose
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
-from tests.blind.rows import drawn_pairs
+from tests.blind.rows import LOOPS, RECORDS, drawn_pairs
 from tests.blind.trials import Diagnose, Trial, judge
 from tests.measuring import ROOT, Asked, kept
 from tests.measuring import table as markdown
 
 STORE = ROOT / ".blind"
-#: Effects that only loops show, and those that only raw records do.
-LOOPS, RECORDS = {"channel_delay", "inertia_torque", "squeeze_film"}, {"shaft_ripple", "stick_slip"}
 
 
 @dataclass(frozen=True)

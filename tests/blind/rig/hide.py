@@ -55,7 +55,7 @@ def hide(seed: Sequence[int], slugs: Sequence[str] = (), lam: float = 0.0, **wan
         rng = np.random.default_rng([*seed, attempt])
         plan = draw_plan(rng, wish)
         clutch = draw_clutch(rng, plan.pressures, plan.life.span)
-        sensor = draw_sensor(rng)
+        sensor = draw_sensor(rng, wish.noise)
         made = [ALL[slug][0](rng, plan) for slug in slugs]
         try:
             ear: Ear | None = listen(plan, clutch, sensor) if slugs else None

@@ -97,6 +97,7 @@ class Wish:
     frequencies: tuple[float, ...] = (0.1,)
     full: bool = False  # the reference's 7 x 40
     speeds: int | None = None  # so few of them, from a third of the highest up
+    noise: float = 1.0  # of the sensor, in percent of the torque
 
 
 def draw_plan(rng: np.random.Generator, wish: Wish) -> Plan:

@@ -46,14 +46,14 @@ class Sensor:
         return self.memory if site.kind == "stationary" else self.sample_memory
 
 
-def draw_sensor(rng: np.random.Generator, *, misjudged: float | None = None) -> Sensor:
-    """A sensor of about 1 %."""
+def draw_sensor(rng: np.random.Generator, percent: float = 1.0, *, misjudged: float | None = None) -> Sensor:
+    """A sensor of about so much noise; on quieter ones the scatter of gains and the count stay as they are."""
     factor = float(rng.uniform(0.9, 1.1)) if rng.random() < 0.5 else None
     return Sensor(
-        noise=0.01 * rng.uniform(0.7, 1.3),
-        floor=rng.uniform(0.01, 0.08),
+        noise=0.01 * percent * rng.uniform(0.7, 1.3),
+        floor=percent * rng.uniform(0.01, 0.08),
         memory=float(rng.choice([0.0, 0.0, 0.3, 0.5])),
-        sample_noise=0.01 * rng.uniform(0.8, 2.0),
+        sample_noise=0.01 * percent * rng.uniform(0.8, 2.0),
         sample_memory=0.9 if rng.spawn(1)[0].random() < 0.2 else float(rng.choice([0.0, 0.4, 0.7])),
         gain=rng.uniform(0.0, 0.005),
         count=float(rng.choice([0.001, 0.01])),
