@@ -1,5 +1,6 @@
 """Alarms: rules say when, events say what, an outbox sees to it that receivers learn of it.
 
 In: a clutch's stored results, and the clock. Out: events as rows, and requests to receivers. Open `rules.py` first (what a
-rule watches), then `events.py` (raised, cleared), `outbox.py` (delivered) and `receivers.py` (to whom, and to whom not).
+rule watches), then `raising.py` (raised, cleared), `outbox.py` (delivered), `receivers.py` (to whom, and to whom not) and
+`notify.py` (sends, by whatever way).
 """
