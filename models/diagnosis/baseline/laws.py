@@ -31,6 +31,8 @@ from models.friction.stribeck import GAMMA
 
 #: The laws of eq. 6 over pressure, in the order of `models.friction.stribeck.PARAMETER_NAMES`; each has six places in θ.
 BLOCK = 6
+#: What stands where in such a block of θ.
+ENDS, SHARES, COURSE = slice(0, 2), slice(2, 4), slice(4, BLOCK)
 #: θ: four blocks of (low end, high end, share low, share high, log h, log ε); log p_0, log b;
 #: d_1, d_2, d_3; then κ at each pressure of the loops; then o_1 ... o_4 of the open clutch.
 LOG_DECAY = 4 * BLOCK

@@ -15,12 +15,15 @@ from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import (
     ATTRACTOR,
     BLOCK,
+    COURSE,
+    ENDS,
     FALL,
     KAPPA,
     LOG_CURVATURE,
     LOG_DECAY,
     POWERS,
     RATIO,
+    SHARES,
     Frame,
     Laws,
     falling_weight,
@@ -37,8 +40,6 @@ from models.records.runs import Curve
 
 _EXPONENT = 0.8
 _MOST_SHARE = 0.6
-#: Where the laws of M_s, V_S and C_v begin.
-_STATIC, _VELOCITY, _VISCOUS = 0, 2 * BLOCK, 3 * BLOCK
 
 
 def starting_laws(design: Design, frame: Frame) -> Laws:
@@ -74,14 +75,16 @@ def starting_laws(design: Design, frame: Frame) -> Laws:
 
 
 def _share_torque(theta: FloatArray, design: Design) -> None:
-    """Where no curve determines how torque is shared, V_S is the lowest speed, and half of torque is viscous, ageing as M_s:
-    from V_S = 0 or C_v < 0, where fits of single curves end, the pooled fit does not come back."""
+    """Change θ in place where too few speeds were measured to tell static from viscous torque: V_S becomes the lowest speed,
+    half of the torque is viscous, and C_v ages as M_s does. Single-curve fits end at V_S = 0 or C_v < 0 there, from where
+    the pooled fit does not return."""
+    static, _, velocity, viscous = theta[: 4 * BLOCK].reshape(4, BLOCK)
     lowest = float(design.rows.velocity.min())
     ends = [float(np.median(design.torque[design.level == level])) for level in design.levels[[0, -1]]]
-    theta[_STATIC : _STATIC + 2] /= 2.0
-    theta[_VELOCITY : _VELOCITY + 4] = lowest, lowest, 0.0, 0.0
-    theta[_VISCOUS : _VISCOUS + 2] = 0.5 * np.array(ends) / lowest**GAMMA
-    theta[_VISCOUS + 2 : _VISCOUS + BLOCK] = theta[_STATIC + 2 : _STATIC + BLOCK]
+    static[ENDS] /= 2.0
+    velocity[ENDS], velocity[SHARES] = lowest, 0.0
+    viscous[ENDS] = 0.5 * np.array(ends) / lowest**GAMMA
+    viscous[SHARES], viscous[COURSE] = static[SHARES], static[COURSE]
 
 
 def _speeds(design: Design) -> FloatArray:
@@ -91,16 +94,14 @@ def _speeds(design: Design) -> FloatArray:
 
 
 def cautious_laws(design: Design, start: Laws) -> Laws:
-    """A second start that trusts the curves' fits less: fresh values near their usual size at both ends of the
-    pressures, small shares, half of them at half the life. Where curves hardly determine a parameter, the first start
-    may lie in another valley."""
+    """A second start for the fit, for curves that hardly determine a parameter: fresh values at least a quarter of their
+    median, changes over life of at most 0.6, and half of each change at half the life. It may lead to another minimum."""
     theta = start.theta.copy()
-    for k in range(4):
-        block = k * BLOCK
-        usual = max(float(np.median(np.abs(theta[block : block + 2]))), 1e-12)
-        theta[block : block + 2] = np.clip(theta[block : block + 2], 0.25 * usual, None)
-        theta[block + 2 : block + 4] = np.clip(theta[block + 2 : block + 4], -_MOST_SHARE, _MOST_SHARE)
-        theta[block + 4 : block + BLOCK] = np.log(0.5 * design.facts.life), np.log(_EXPONENT)
+    for block in theta[: 4 * BLOCK].reshape(4, BLOCK):
+        usual = max(float(np.median(np.abs(block[ENDS]))), 1e-12)
+        block[ENDS] = np.clip(block[ENDS], 0.25 * usual, None)
+        block[SHARES] = np.clip(block[SHARES], -_MOST_SHARE, _MOST_SHARE)
+        block[COURSE] = np.log(0.5 * design.facts.life), np.log(_EXPONENT)
     return Laws(theta=theta, frame=start.frame)
 
 
