@@ -261,6 +261,11 @@ _NEAREST_BIN = 10
 _SECOND_HARMONIC, _SECOND_PROBABILITY = 0.33, 0.4
 #: Windows in which a line is looked for, taken evenly, and in which a frequency must be visible.
 _MOST_WINDOWS, _FEWEST_WINDOWS = 400, 3
+#: [s] In which a swing is taken to rise once the shaft enters a window: it may take none to some of its own periods.
+_RISE_SECONDS = 0.12
+#: Multiples [-] of the lowest frequency that the spline leaves untouched: from the first on a line is looked for, from the
+#: second on a frequency may give the noise level beside one.
+_VISIBLE_ABOVE, _COMPARED_ABOVE = 0.8, 0.4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -297,18 +302,10 @@ def windows_of(
     count = 1 + int(min(highest, max(record.highest for record in records)) / _SPACING)
     frequency = _SPACING * np.arange(count, dtype=np.float64)
     sums, weight = np.zeros((len(places), count), dtype=np.complex128), np.zeros((len(places), count))
-    # shares of the lowest frequency that the spline leaves
-    lowest_line = 0.8 * np.array([[record.lowest] for record, _, _ in places])
-    for row, (record, first, stop) in enumerate(places):
-        inside = (frequency > 0.4 * record.lowest) & (frequency < record.highest)
-        size = round(1.0 / (_SPACING * record.step))
-        slot = np.minimum(np.round((record.time[first:stop] - record.time[first]) / record.step).astype(int), size - 1)
-        # a swing takes between none and some of its own periods to rise after the shaft enters the window
-        envelope = -np.expm1(-np.arange(stop - first) * (record.step / 0.12))
-        spectrum = np.fft.rfft(np.bincount(slot, record.matched[first:stop] * envelope, size))
-        bins = np.flatnonzero(inside[: spectrum.size])
-        weight[row, bins] = float(record.weight[first:stop] @ envelope**2) * record.response(frequency[bins])
-        sums[row, bins] = spectrum[bins]
+    lowest_line = _VISIBLE_ABOVE * np.array([[record.lowest] for record, _, _ in places])
+    for row, place in enumerate(places):
+        bins, matched, power = _spectrum_of(*place, frequency)
+        sums[row, bins], weight[row, bins] = matched, power
     speeds = [np.abs(record.speed[first:stop]) for record, first, stop in places]
     return Windows(
         sums=sums,
@@ -320,6 +317,20 @@ def windows_of(
         torque=np.array([abs(float(record.torque[first:stop].mean())) for record, first, stop in places]),
         length=float(np.median([(stop - first) * record.step for record, first, stop in places])),
     )
+
+
+def _spectrum_of(
+    record: WhitenedRecord, first: int, stop: int, frequency: FloatArray
+) -> tuple[IntArray, ComplexArray, FloatArray]:
+    """Which of the frequencies [f] Hz the record shows in the window of samples [first, stop), and D and N there."""
+    inside = (frequency > _COMPARED_ABOVE * record.lowest) & (frequency < record.highest)
+    size = round(1.0 / (_SPACING * record.step))
+    slot = np.minimum(np.round((record.time[first:stop] - record.time[first]) / record.step).astype(int), size - 1)
+    envelope = -np.expm1(-np.arange(stop - first) * (record.step / _RISE_SECONDS))
+    spectrum = np.fft.rfft(np.bincount(slot, record.matched[first:stop] * envelope, size))
+    bins = np.flatnonzero(inside[: spectrum.size])
+    weight = float(record.weight[first:stop] @ envelope**2) * record.response(frequency[bins])
+    return bins, spectrum[bins], weight
 
 
 def _passages(
