@@ -136,11 +136,13 @@ def _loop(
 def _lags(
     cycle: Cycle, samples: Samples, curve: StationaryCurve | None
 ) -> tuple[LoopStatus, tuple[LagFit, LagFit] | None]:
-    turn = cycle.value(np.linspace(0.0, 2 * np.pi, 361))
-    least = 0.01 * float(np.abs(samples.torque).max())  # torque lags no stationary curve that is below 1 % of it
-    if curve is None or float(stationary_torque(np.maximum(turn, 0.0), curve.parameters).min()) < least:
+    """The fits of both laws of lag to a loop, or why there are none. With fits, the status is that of the attractor's."""
+    speed_over_a_swing = cycle.value(np.linspace(0.0, 2 * np.pi, 361))
+    # where the stationary curve falls below 1 % of the loop's largest torque, lag has no meaning
+    least = 0.01 * float(np.abs(samples.torque).max())
+    if curve is None or stationary_torque(np.maximum(speed_over_a_swing, 0.0), curve.parameters).min() < least:
         return LoopStatus.NO_CURVE, None
-    if float(turn.min()) < -0.02 * cycle.amplitude:  # of the swing
+    if float(speed_over_a_swing.min()) < -0.02 * cycle.amplitude:  # of the swing
         return LoopStatus.REVERSES, None
     attractor = fit_lag(ATTRACTOR, cycle, samples.phase, samples.torque, curve)
     film = fit_lag(SQUEEZE_FILM, cycle, samples.phase, samples.torque, curve)

@@ -48,12 +48,13 @@ class Limit:
     def passages(self, paths: FloatArray, progress: FloatArray) -> FloatArray:
         """The ζ [n] at which each path [k, n] over ascending progress [k] first comes to the limit; inf where it never does.
 
-        A path that begins past its limit comes to it only once it has left it; one that never does is at it from the first.
+        A path that begins past its limit counts only after it has come back to the good side. One that never comes back is
+        at the limit from the first ζ.
         """
         sign = -1.0 if self.above is not None else 1.0
         from_above, level = sign * paths, sign * self.level(paths[0])
-        left = np.logical_or.accumulate(from_above > level, axis=0)
-        return first_below(np.where(left | ~left[-1], from_above, np.inf), progress, level)
+        was_good = np.logical_or.accumulate(from_above > level, axis=0)
+        return first_below(np.where(was_good | ~was_good[-1], from_above, np.inf), progress, level)
 
 
 def places(now: float, horizon: float) -> FloatArray:

@@ -192,6 +192,8 @@ def _invalid(error: pydantic.ValidationError) -> InvalidError:
 
 
 def _field_error(loc: tuple[int | str, ...], code: str, rule: str, value: object) -> FieldError:
+    """One of pydantic's errors as ours. pydantic puts the run's kind before the place, and it is no part of the body's path;
+    rows count from 1."""
     place = loc[1:] if loc and loc[0] in _KINDS else loc
     if code.startswith("union_tag"):
         place = (*place, "kind")

@@ -1,6 +1,7 @@
 """Whether the service can work now: its database, its disk, its memory and its workers.
 
-One thread looks, for all who ask at that moment; no lock is taken, so that nobody who holds one makes the service look dead.
+One thread looks at everything, for all who ask at that moment; a second asks the store of raw records, which may hang. No
+lock is taken, so that nobody who holds one makes the service look dead.
 """
 
 import asyncio
@@ -42,11 +43,17 @@ class Readiness:
         self._workers = workers
         self._jobs = jobs
         self._needs = needs
+        # looks at everything
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="readiness")
+        # asks the store of raw records, and may hang in it
         self._raw_thread = ThreadPoolExecutor(1, thread_name_prefix="raw records")
+        # the last look at the store, which may still be on its way
         self._raw: Future[str | None] | None = None
+        # when the store is looked at again, by the monotonic clock [s]
         self._look_again = 0.0
+        # whether that look has come to the store itself: before, it waits for the database
         self._asking_store = False
+        # the look at everything that all who ask now wait for
         self._looking: asyncio.Future[dict[str, str]] | None = None
 
     async def faults(self) -> dict[str, str]:

@@ -142,7 +142,8 @@ class JobQueue:
             self._change.notify_all()
 
     def _work(self, group: Mapping[str, Kind]) -> None:
-        wakes = 0
+        """Do the jobs of a group one after the other; where none is free, wait until the queue is woken, or for a pause."""
+        seen_wakes = 0
         while not self._closing:
             try:
                 job = self._claimed(group)
@@ -151,12 +152,12 @@ class JobQueue:
                     continue
             except Exception:  # noqa: BLE001  (the next job is to be done whatever became of this one)
                 _log.exception("a job could not be started")
-            wakes = self._waited(wakes)
+            seen_wakes = self._waited(seen_wakes)
 
-    def _waited(self, wakes: int) -> int:
-        """How often the queue was woken by now, once that is not `wakes` any more, or after a pause."""
+    def _waited(self, seen_wakes: int) -> int:
+        """How often the queue was woken by now, once that is more than was seen, or after a pause."""
         with self._change:
-            self._change.wait_for(lambda: self._wakes != wakes or self._closing, timeout=self._pause)
+            self._change.wait_for(lambda: self._wakes != seen_wakes or self._closing, timeout=self._pause)
             return self._wakes
 
     def _claimed(self, group: Mapping[str, Kind]) -> JobRow | None:

@@ -258,19 +258,19 @@ class Workers:
 
     def _work(self, lane: Lane) -> None:
         """A worker's own thread."""
-        made = self._make(lane)
+        worker = self._make(lane)
         with self._lock:
-            self._workers[made] = (lane, None)
+            self._workers[worker] = (lane, None)
         while not self._closing:
-            if not made.look():
+            if not worker.look():
                 self._closed.wait(_LOOK)
-            elif (call := self._next(lane, made)) is not None:
-                self._do(call, made)
-        made.end()
+            elif (call := self._next(lane, worker)) is not None:
+                self._do(call, worker)
+        worker.end()
         with self._lock:
-            del self._workers[made]
+            del self._workers[worker]
 
-    def _next(self, lane: Lane, made: _Worker) -> _Call | None:
+    def _next(self, lane: Lane, worker: _Worker) -> _Call | None:
         """The lane's next call, begun; None where there was none for a while."""
         with self._lock:
             self._idle[lane] += 1
@@ -281,14 +281,14 @@ class Workers:
                 return None
             call = self._queues[lane].popleft()
             call.begun = time.monotonic()
-            self._workers[made] = (lane, call)
+            self._workers[worker] = (lane, call)
             return call
 
-    def _do(self, call: _Call, made: _Worker) -> None:
+    def _do(self, call: _Call, worker: _Worker) -> None:
         error: BaseException | None = None
         result, again = None, False
         try:
-            result = made.call(call)
+            result = worker.call(call)
         except _LostError:
             waited = time.monotonic() - call.queued_at
             again = not (call.retried or call.answer.done() or waited > call.patience)
@@ -296,7 +296,7 @@ class Workers:
         except BaseException as raised:  # noqa: BLE001  (raised again for who asked)
             error = raised
         with self._lock:
-            self._workers[made] = (call.lane, None)
+            self._workers[worker] = (call.lane, None)
             if again and not self._closing:
                 call.retried, call.begun = True, None
                 self._queues[call.lane].appendleft(call)
@@ -327,12 +327,13 @@ class Workers:
         while not self._closed.wait(_LOOK):
             now = time.monotonic()
             if now - looked < _SILENCE / 2:  # else this process itself stood still, and has heard nobody meanwhile
-                self._check(now)
+                self._refuse_late(now)
+                self._stop_overdue(now)
             looked = now
 
-    def _check(self, now: float) -> None:
+    def _refuse_late(self, now: float) -> None:
+        """Refuse as busy what has waited for too long to be begun."""
         with self._lock:
-            running = [(made, call) for made, (_, call) in self._workers.items()]
             refused = [
                 call for queue in self._queues.values() for call in queue if now - call.queued_at > call.patience
             ]
@@ -343,24 +344,29 @@ class Workers:
                 late = [call for call in waiting if now - call.queued_at > call.patience]
                 for call in late:
                     waiting.remove(call)
-                    self._count(call.lane, -1)
+                    self._count(call.lane, -1)  # it held no turn, so nobody else's begins
                 refused += late
         for call in refused:
             _answer(
                 call,
                 BusyError(f"the service is busy: the request waited {now - call.queued_at:.0f} s. Send it again later"),
             )
-        for made, running_call in running:
-            made.check(now)
-            if running_call is not None and running_call.is_overdue(now):
+
+    def _stop_overdue(self, now: float) -> None:
+        """End the processes that do not answer, and those whose call takes longer than it may."""
+        with self._lock:
+            running = [(each, call) for each, (_, call) in self._workers.items()]
+        for each, call in running:
+            each.check(now)
+            if call is not None and call.is_overdue(now):
                 _answer(
-                    running_call,
+                    call,
                     BusyError(
-                        f"the computation took longer than {running_call.seconds:g} s and was stopped: ask again when the "
-                        "service is less busy"
+                        f"the computation took longer than {call.seconds:g} s and was stopped: ask again when the service "
+                        "is less busy"
                     ),
                 )
-                made.stop()
+                each.stop()
 
 
 def _answer(call: _Call, error: BaseException | None, result: Any = None) -> None:

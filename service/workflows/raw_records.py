@@ -46,9 +46,10 @@ def use(database: Database, address: str | None) -> None:
 
 
 def relocate(database: Database, address: str, to: str) -> int:
-    """Look for the blobs of one store at another address, where they have been copied; how many are there.
+    """Say in the database that a store's blobs, which were copied, are now at another address; returns how many.
 
-    Raises ValueError where the one is unknown or the other lacks a blob that is named.
+    Nothing changes, and ValueError is raised, where the store is unknown, a blob is missing at the new address, the copy is
+    another database's, or a run came meanwhile.
     """
     store = _store_at(database, normal_address(address))
     target = open_store(normal_address(to))
@@ -62,7 +63,8 @@ def relocate(database: Database, address: str, to: str) -> int:
     if target.mark() != store.mark:
         raise ValueError(f"{target.address} is not a copy of {store.address}, but belongs to another database")
     with database.writing() as connection:
-        if raw_stores.numbers(connection).get(store.address, (0, 0))[1] != count:
+        _, named = raw_stores.numbers(connection).get(store.address, (0, 0))
+        if named != count:
             raise ValueError(f"a run arrived during the check: copy all files from {store.address} again")
         raw_stores.set_address(connection, store.store_key, target.address)
     return count
