@@ -126,7 +126,8 @@ def _brought(
     computed), the rival of the best that is hardest to distinguish from it, and the nats between them that the trial
     brings."""
     count = evidences.size
-    gained, freedom = np.maximum(after[0] - before[0], 0.0), (after[1] - before[1])[:count]
+    gained, change = np.maximum(after[0] - before[0], 0.0), after[1] - before[1]
+    freedom = change[:count] - change[-1]
     if not (np.isfinite(gained).all() and np.isfinite(freedom).all()):
         return np.nan, 0, 0.0
     chance = decided(gained, evidences, freedom)
@@ -137,13 +138,17 @@ def _brought(
 
 
 def decided(gained: FloatArray, evidences: FloatArray, freedom: FloatArray) -> float:
-    """The probability that one candidate is left, by what is gained [k, k + 1] nats for row against column (the last one no
-    effect at all), by their evidences [k] nats, and by what these change by for nothing but the candidates' `freedom` [k]
-    nats: a candidate with more freedom pays more for it when more is measured."""
+    """The probability that one candidate is left; of a single one, against no effect.
+
+    `gained` [k, k + 1] nats: what the trial brings for row against column (the last one no effect at all). `evidences` [k]
+    nats over no effect. `freedom` [k] nats: how much each of them changes by the trial only because the candidate has more
+    free parameters than no effect has (more of them, more to pay).
+    """
     count = evidences.size
     after = evidences + freedom
-    lead = after[:, None] - after
-    rivals = gained[:count, :count] if count > 1 else gained[:1, -1:]
+    lead, rivals = after[:, None] - after, gained[:count, :count]
+    if count == 1:
+        lead, rivals = after[:, None], gained[:1, -1:]
     chance = distinguished(rivals, lead)
     if count > 1:
         np.fill_diagonal(chance, 1.0)

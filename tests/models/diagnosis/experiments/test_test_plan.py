@@ -222,6 +222,10 @@ def test_what_a_trial_leaves_alone():
     sure = np.array([[0.0, 60.0, 0.0], [60.0, 0.0, 0.0]])
     assert decided(sure, even, even) == pytest.approx(0.986, abs=0.003)
     assert decided(NONE, even, even) == pytest.approx(0.014, abs=0.001)
+    # alone it is compared with no effect, with the evidence in hand: Φ((30 - 2.2)/1), and Φ((1 - 2.2)/1) by hand
+    alone = np.zeros((1, 2))
+    assert decided(alone, np.array([30.0]), np.zeros(1)) > 0.99
+    assert decided(alone, np.array([3.0]), np.array([-2.0])) == pytest.approx(0.116, abs=0.002)
     # what parts only one way helps only where that one is true
     one_way = np.array([[0.0, 60.0, 0.0], [0.0, 0.0, 0.0]])
     assert decided(one_way, even, even) == pytest.approx(0.5, abs=0.02)
