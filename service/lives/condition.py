@@ -242,8 +242,11 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping
 
 
 def _test_in_words(test: str) -> str:
-    """An advised test; of a long protocol, which the diagnosis shows whole, its first test."""
+    """An advised test; of a long protocol, which the diagnosis shows whole, its first test. Tests after further use are said
+    with their number and pauses."""
     test = test.removeprefix("the ")
+    if not test.startswith(("stationary", "dynamic")):
+        return test
     return f"a {test}" if len(test) <= LONGEST_TEST else f"the advised tests, first a {test.partition(',')[0]}"
 
 

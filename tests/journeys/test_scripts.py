@@ -41,7 +41,7 @@ def test_the_notebook_runs(server: Server) -> None:
     environment = SCRIPTS | {"CLUTCHLIFE_URL": server.url}
     done = subprocess.run([sys.executable, script], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert "The cause is oil temperature" in done.stdout
+    assert "The cause is changed oil temperature" in done.stdout
     assert done.stdout.splitlines()[-1].startswith("with the extended model: safe for ")
 
 

@@ -122,6 +122,7 @@ class Effect:
     counts_in_severity: its amplitude is the exponent by which ζ counts engagements (no torque is added along a life).
     named: whether it may be named as a cause; where not, what it explains is uncatalogued and lies on `axis`
     (`design.design`).
+    article: what stands before its name where it is the cause (`a`, `changed`).
     opposite_physics: a sentence for a negative amplitude, where `physics` holds for a positive one only.
     """
 
@@ -151,6 +152,7 @@ class Effect:
     counts_in_severity: bool = False
     named: bool = True
     axis: str = ""
+    article: str = ""
     opposite_physics: str = ""
 
     def changes(self, scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:

@@ -39,6 +39,7 @@ def _running_in_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArr
 RUNNING_IN = Effect(
     slug="running_in",
     title="Running-in was not finished",
+    article="unfinished",
     physics="The first cycles polish the lining; friction starts away from the course that eq. 6 follows later.",
     formula="a M_s ∂S/∂M_s e^{-ζ/ζ_r}, or a S e^{-ζ/ζ_r}",
     source="Ompusunggu et al. 2013, section 2.3.1: 200 cycles of running-in before cycle 0",
@@ -84,6 +85,7 @@ def _oil_change_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArr
 OIL_CHANGE = Effect(
     slug="oil_change",
     title="The oil was changed",
+    article="an",
     physics="Fresh oil has another viscosity and fresh friction modifiers: the viscous term steps, the boundary friction a "
     "little.",
     formula="a (C_v |v|^γ + k M̄_c ∂S/∂M̄_c) (1 - l (1 - e^{-2(ζ - ζ_k)/ζ_last})) after ζ_k",
@@ -125,7 +127,8 @@ def _accelerated_wear_change(scene: Scene, amplitude: float, shape: Shape) -> Fl
 ACCELERATED_WEAR = Effect(
     slug="accelerated_wear",
     title="Wear accelerates late in life",
-    physics="Glazing, lost porosity or torn fibres: from a cycle on the static torque falls faster than eq. 6.",
+    physics="Glazing, lost porosity or torn fibres: at some cycle the static torque begins to fall faster than the model's "
+    "course.",
     formula="-a M_s ∂S/∂M_s ((ζ - ζ_k)₊/(ζ_last - ζ_k))^q",
     source="Ompusunggu et al. 2013, figs. 4 and 5: glazing and lost porosity",
     family=Family.HISTORY,
@@ -172,6 +175,7 @@ def _load_severity_change(scene: Scene, amplitude: float, _shape: Shape) -> Floa
 LOAD_SEVERITY = Effect(
     slug="load_severity",
     title="Some duty was harder than other",
+    article="varying",
     physics="The rate of eq. 6's kinetics grows with the energy of an engagement: harder blocks age the clutch faster.",
     formula="S(ζ_e) - S(ζ), ζ_e = Σ (E/E_usual)^m over the engagements whose energy was sent",
     source="models.degradation.general_order: dD/dζ = -k Dⁿ with k by the load's severity",
@@ -229,15 +233,15 @@ def _strengths(facts: Facts) -> FloatArray:
 REST_RECOVERY = Effect(
     slug="rest_recovery",
     title="Friction recovered during a rest",
-    physics="While the clutch rests additives settle on the lining and oil drains: friction starts away from its course "
-    "and returns to it within some cycles or minutes of sliding.",
+    physics="While the clutch rests, additives settle on the lining and oil drains. Friction is then off its course and "
+    "returns within some cycles or minutes of sliding.",
     formula="a S (ln(1 + rest/1 h)/ln(1 + longest/1 h))^r e^{-(ζ - ζ_rest)/ζ_c}, S or M_s ∂S/∂M_s; with the clock also "
     "e^{-(t - t_rest)/τ}",
     source="boundary films of friction modifiers re-form at rest",
     family=Family.HISTORY,
     kind=Kind.COURSE,
     channels=("started_at",),
-    amplitude="recovery at the end of the longest rest",
+    amplitude="change of friction at the end of the longest rest",
     unit="%",
     prior_sd=0.04,
     scale=100.0,

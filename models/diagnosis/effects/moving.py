@@ -35,6 +35,7 @@ def _inertia_torque_change(scene: Scene, amplitude: float, _shape: Shape) -> Flo
 INERTIA_TORQUE = Effect(
     slug="inertia_torque",
     title="Inertia is in the measured torque",
+    article="an",
     physics="A mass between clutch and sensor turns with the shaft: the sensor also measures the torque that "
     "accelerates it.",
     formula="J dω/dt",
@@ -172,6 +173,7 @@ def usual_slope(laws: Laws, sheared: FloatArray) -> FloatArray:
 SQUEEZE_FILM = Effect(
     slug="squeeze_film",
     title="A squeezed film lags behind the speed",
+    article="a",
     physics="While speed rises the film is still thin from before and more asperities carry: torque is higher than "
     "stationary, also where the curve rises; the GMS attractor cannot reproduce that.",
     formula="a (p/5 bar)^x v̇ / (v/v_0 + f)^(y + 1/2), eq. 7's film to first order; or S(w) for S(v) with C_v v^γ (v/w)^s, "

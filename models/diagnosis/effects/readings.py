@@ -100,6 +100,7 @@ def _days_of(scene: Scene) -> FloatArray:
 TORQUE_ZERO_SHIFT = Effect(
     slug="torque_zero_shift",
     title="The torque sensor's zero has shifted",
+    article="a",
     physics="The sensor's reading without load is not zero: from a cycle on, drifting with the test's clock (it warms), or "
     "creeping along the life, by cycles or by days. It adds the same torque at every speed and pressure.",
     formula="a · step(ζ > ζ_k), a · t/30 min, a (1 - e^{-t/τ}), or a · (ζ/ζ_last)^q or the same in days, with the sensor's "
@@ -181,6 +182,7 @@ def _pressure_offset_change(scene: Scene, amplitude: float, shape: Shape) -> Flo
 PRESSURE_OFFSET = Effect(
     slug="pressure_offset",
     title="The pressure reading is off",
+    article="a",
     physics="The pressure at the clutch differs from the gauge's reading; the torque changes as it does with pressure.",
     formula="S(p + a) - S(p), a constant, growing as (ζ/ζ_last)^q or towards an end, or from a cycle on",
     source="Ompusunggu et al. 2013, fig. 1: one gauge in the line, none at the piston",
@@ -238,6 +240,7 @@ def _unsettled_dwell_change(scene: Scene, amplitude: float, shape: Shape) -> Flo
 UNSETTLED_DWELL = Effect(
     slug="unsettled_dwell",
     title="Plateaus were not settled",
+    article="an",
     physics="Friction approaches its steady value exponentially after a step; a reading taken too early still contains a "
     "share of the plateau before.",
     formula="a (x_before - S), x = S + k a (x_before - S) what a plateau ends with; a = e^{-dwell/τ} averaged over what was "
@@ -285,7 +288,9 @@ def _shifted(curves: FloatArray, steps: FloatArray) -> FloatArray:
 CHANNEL_DELAY = Effect(
     slug="channel_delay",
     title="The torque channel is delayed",
-    physics="A filter or the recorder delays torque against speed: while accelerating, torque belongs to a lower speed.",
+    article="a",
+    physics="A filter or the recorder delays torque against speed: while the clutch accelerates, the recorded torque "
+    "belongs to an earlier, lower speed.",
     formula="S(v(t - δ)) - S(v(t)), to first order -δ dS/dt",
     source="anti-aliasing filters and multiplexed recorders; no friction is in it",
     family=Family.DYNAMIC,

@@ -85,8 +85,9 @@ def _oil_temperature_change(scene: Scene, amplitude: float, shape: Shape) -> Flo
 OIL_TEMPERATURE = Effect(
     slug="oil_temperature",
     title="Oil temperature changes the viscosity",
-    physics="Friction was measured at other oil temperatures than the usual one; thinner oil shears more easily and, the "
-    "film being thinner, changes over to asperity contact at a higher speed.",
+    article="changed",
+    physics="Oil temperature differed between tests or within them. Thinner oil shears more easily, and its thinner film "
+    "lets asperities touch up to a higher speed.",
     formula="C_v |v|^γ ((ν(T)/ν_ref)^β - 1), and V_S (ν(T)/ν_ref)^{κβ} for V_S, ν by ASTM D341 at a film's "
     "temperature, which follows the oil's within τ; κ = -1/γ with β = γ is Hersey's similarity",
     source="ASTM D341-20; M. D. Hersey, J. Wash. Acad. Sci. 4 (1914) 542; Ompusunggu et al. 2013, section 2.3 (80 to 90 °C)",
@@ -195,8 +196,9 @@ def _viscous_exponent_change(scene: Scene, amplitude: float, _shape: Shape) -> F
 VISCOUS_EXPONENT = Effect(
     slug="viscous_exponent",
     title="The viscous term has another exponent than 0.3",
-    physics="How shear grows with speed depends on the film (0.3 is elastohydrodynamic); grooves, porosity or another oil "
-    "give another power.",
+    article="a different",
+    physics="Viscous torque does not grow with the model's power of speed, 0.3: grooves, porosity or another oil give "
+    "another one.",
     formula="C_v |v|^γ ((|v|/v_0)^δ - 1), v_0 the middle of the speeds",
     source="Ompusunggu et al. 2013, section 3.1.2: γ = 0.3 fixed beforehand",
     family=Family.VISCOUS,
@@ -234,7 +236,7 @@ def _hydrodynamic_drag_change(scene: Scene, amplitude: float, shape: Shape) -> F
 HYDRODYNAMIC_DRAG = Effect(
     slug="hydrodynamic_drag",
     title="Hydrodynamic drag beside the friction",
-    physics="Oil is sheared in grooves and gaps: a torque that grows with speed and viscosity, whatever the pressure.",
+    physics="Oil sheared in grooves and gaps adds a torque that grows with speed and viscosity, whatever the pressure.",
     formula="a (v/v_0)^m (1 + r)/(1 + r (v/v_0)²) (ν(T)/ν_ref)^t, v_0 the middle of the speeds",
     source="Kato et al., drag torque of disengaged wet clutches; Newtonian shear in an annular gap",
     family=Family.VISCOUS,

@@ -104,20 +104,20 @@ TRIALS: dict[str, Trial] = {
     "light_sweep": Trial(text=_LIGHT_SWEEP, pressure=0.25),
     "light_sweeps": Trial(text=f"{_LIGHT_SWEEP}, five times", pressure=0.25, times=5),
     "repeats": Trial(text="the stationary test again at once, five times", times=5),
-    "more_states": Trial(text="three more states of use, at the usual distance, with a stationary test each", later=3),
+    "more_states": Trial(text="three more stationary tests after further use, spaced as before", later=3),
     "rests": Trial(
-        text="three more states of use, at the usual distance, with a stationary test each; the clutch rests for two days "
-        "before the first and the third of these tests, not before the second",
+        text="three more stationary tests after further use, spaced as before, with two days' rest before the first and the "
+        "third",
         later=3,
         rest=48 * _HOUR,
     ),
     "half_energy": Trial(
-        text="two more states of use with engagements of half the usual energy, with a stationary test each",
+        text="two more stationary tests after further use, with engagements of half the usual energy",
         later=2,
         energy=0.5,
     ),
     "twice_energy": Trial(
-        text="two more states of use with engagements of twice the usual energy, with a stationary test each",
+        text="two more stationary tests after further use, with engagements of twice the usual energy",
         later=2,
         energy=2.0,
     ),

@@ -194,6 +194,7 @@ def report_of(
         candidates=candidates,
         baseline=misfit_of(problem, fitted, judgement.where),
         extended=None if extended is None else misfit_of(problem, extended, judgement.left),
+        extended_effects=() if extended is None else tuple(effect.effect.slug for effect in extended.effects),
         gain=validation.gain,
         advice=advice,
         visible=visible,

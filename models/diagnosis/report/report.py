@@ -137,6 +137,8 @@ class Report:
     candidates: tuple[Candidate, ...] = ()
     baseline: Misfit | None = None
     extended: Misfit | None = None
+    #: The effects of the extended model.
+    extended_effects: tuple[str, ...] = ()
     gain: Gain | None = None
     advice: tuple[Advice, ...] = ()
     visible: tuple[Visible, ...] = ()

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from models.diagnosis import criteria
 from models.diagnosis.design.design import CLOCK, CYCLES, FREQUENCY, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE
 from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.effect import Kind
 from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.experiments.test_plan import BASELINE, Advice
 from models.diagnosis.explanations.decide import smallest
@@ -42,6 +43,15 @@ def effect_name(slug: str) -> str:
     return slug.replace("_", " ")
 
 
+def _with_article(slug: str) -> str:
+    """An effect of the catalogue as a sentence names it."""
+    return f"{BY_SLUG[slug].article} {effect_name(slug)}".lstrip()
+
+
+def _capitalised(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}"
+
+
 def conjunction(parts: Sequence[str]) -> str:
     """`a`, `a and b`, `a, b and c`."""
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
@@ -52,8 +62,8 @@ def count_of(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def _numbers_of_cycles(count: int) -> str:
-    return f"{count_of(count, 'different number' if count > 1 else 'number')} of cycles"
+def _points_of_life(count: int) -> str:
+    return f"{count_of(count, 'point')} of the clutch's life"
 
 
 def probability(value: float) -> str:
@@ -69,12 +79,12 @@ def with_unit(text: str, unit: str) -> str:
 def estimated(estimate: Estimate) -> str:
     """Value and deviation to the deviation's second digit."""
     if not estimate.sd > 0:
-        return with_unit(f"{estimate.name} {number(estimate.value)}", estimate.unit)
+        return with_unit(f"{estimate.name}: {number(estimate.value)}", estimate.unit)
     digits = max(0, 1 - math.floor(math.log10(estimate.sd)))
     if digits > 5:
-        return with_unit(f"{estimate.name} {number(estimate.value)} ± {number(estimate.sd)}", estimate.unit)
+        return with_unit(f"{estimate.name}: {number(estimate.value)} ± {number(estimate.sd)}", estimate.unit)
     value = _signed(f"{estimate.value:.{digits}f}")
-    return with_unit(f"{estimate.name} {value} ± {estimate.sd:.{digits}f}", estimate.unit)
+    return with_unit(f"{estimate.name}: {value} ± {estimate.sd:.{digits}f}", estimate.unit)
 
 
 def signed(estimate: Estimate) -> str:
@@ -84,7 +94,7 @@ def signed(estimate: Estimate) -> str:
     low, high = estimate.interval
     size = estimated(estimate)
     if estimate.stated_interval is not None:
-        size = with_unit(f"{estimate.name} {number(estimate.value)}", estimate.unit)
+        size = with_unit(f"{estimate.name}: {number(estimate.value)}", estimate.unit)
         size += f", 90 % interval {number(low)} to {_amount(high, estimate.unit)}"
     if sign is None:
         return size
@@ -126,7 +136,7 @@ def summarise(report: Report) -> str:
         Verdict.UNEXPLAINED_STRUCTURE: _unexplained,
         Verdict.INSUFFICIENT_DATA: _insufficient,
     }[report.verdict]
-    data = f"{count_of(report.tests, 'test')} at {_numbers_of_cycles(report.states)} were examined."
+    data = f"{count_of(report.tests, 'test')} at {_points_of_life(report.states)} were examined."
     if report.tests == 1:
         data = data.replace("were", "was")
     said = {sentence.text: sentence for sentence in (Sentence(data, MAY), *say(report), *_noted(report.notes))}
@@ -165,10 +175,11 @@ def _adequate(report: Report) -> list[Sentence]:
     for item in (item for item in report.explanations if item.effects):
         if mass >= criteria.SURE:
             break
-        others.append(f"{' together with '.join(map(_cause_name, item.effects))} ({probability(item.probability)})")
+        names = " together with ".join(map(_cause_name, item.effects))
+        others.append(f"{names} (probability {probability(item.probability)})")
         mass += item.probability
     if others:
-        sentences.append(Sentence(f"These data do not exclude: {_either(others)}."))
+        sentences.append(Sentence(f"Not excluded: {conjunction(others)}."))
     if report.scatter is not None and report.scatter.lower > criteria.USUAL_GAIN:
         sentences.append(
             Sentence(
@@ -176,14 +187,16 @@ def _adequate(report: Report) -> list[Sentence]:
                 "at once."
             )
         )
+    else:
+        sentences.append(Sentence("Nothing needs to be done; diagnose again after the next tests."))
     sentences += _unseen(report)
     if report.states < 3:
         say = "says" if report.states == 1 else "say"
-        few = f"{_numbers_of_cycles(report.states)} {say} little about a course over life."
-        sentences.append(Sentence(few, SHOULD))
+        sentences.append(Sentence(f"{_points_of_life(report.states)} {say} little about its course.", SHOULD))
     return sentences
 
 
+_HARDEST_FORM = " in its least visible form"
 #: What an engineer asks for first: what the paragraph always gives, where the data show it in some form.
 _ASKED_FIRST = ("torque_zero_shift", "pressure_offset")
 
@@ -197,8 +210,9 @@ def _unseen(report: Report) -> list[Sentence]:
     shown = [_shown(visible) for visible in listed]
     sentences = []
     if shown:
-        say = "Smallest sizes that these data show in nine of ten cases, and in brackets for the least visible form"
-        sentences = [Sentence(f"{say}: {conjunction(shown)}.")]
+        before, form, after = conjunction(shown).partition(_HARDEST_FORM)
+        sizes = f"{before}{form}{after.replace(_HARDEST_FORM, '')}"  # explained once
+        sentences = [Sentence(f"These data would show, in nine of ten cases, {sizes}.")]
     if report.unseen:
         names = conjunction([effect_name(slug) for slug in report.unseen])
         sentences.append(Sentence(f"These data cannot show, at any size: {names}.", SHOULD))
@@ -206,12 +220,14 @@ def _unseen(report: Report) -> list[Sentence]:
 
 
 def _shown(visible: Visible) -> str:
-    """The smallest sizes that show, `torque zero shift 0.64 Nm (11.3 Nm)`."""
-    name = effect_name(visible.effect)
+    """The smallest sizes that show, `a torque zero shift from 0.64 Nm (11.3 Nm in its least visible form)`."""
+    name = _with_article(visible.effect)
     if visible.unit == "-":
-        name = f"{BY_SLUG[visible.effect].amplitude} of {name}"
-    hardest = "at no size" if math.isinf(visible.amplitude) else _amount(visible.amplitude, visible.unit)
-    return f"{name} {_amount(visible.least, visible.unit)} ({hardest})"
+        name = f"{BY_SLUG[visible.effect].amplitude} of {effect_name(visible.effect)}"
+    hardest = "its least visible form never"
+    if math.isfinite(visible.amplitude):
+        hardest = f"{_amount(visible.amplitude, visible.unit)}{_HARDEST_FORM}"
+    return f"{name} from {_amount(visible.least, visible.unit)} ({hardest})"
 
 
 def _amount(value: float, unit: str) -> str:
@@ -231,13 +247,13 @@ def _scatter(scatter: RunScatter | None) -> str:
 def _named(report: Report) -> list[Sentence]:
     causes = set(report.causes)
     chosen = [candidate for candidate in report.candidates if candidate.effect in causes]
-    names = " together with ".join(effect_name(slug) for slug in report.causes)
+    names = " together with ".join(_with_article(slug) for slug in report.causes)
     share = sum(item.probability for item in report.explanations if causes <= set(item.effects))
     sentences = [
         Sentence(f"The cause{'s are' if len(causes) > 1 else ' is'} {names} (probability {probability(share)}).")
     ]
     for candidate in chosen:
-        sentences += [Sentence(_physics(candidate), SHOULD), Sentence(f"Size: {signed(candidate.estimate)}.")]
+        sentences += [Sentence(_physics(candidate), SHOULD), Sentence(f"{_capitalised(signed(candidate.estimate))}.")]
     sentences.append(Sentence(_error(report), MAY))
     companions = [
         f"{effect_name(item.effect)} (probability {probability(item.probability)})"
@@ -280,7 +296,7 @@ def _ambiguous(report: Report) -> list[Sentence]:
             if slug not in sure and (estimate := sized.pop(slug, None)) is not None
         ]
         listed.append((" together with ".join(names) or "nothing", probability(item.probability), sizes))
-    certain = [Sentence(f"Size: {signed(sized[slug])}.") for slug in sure if slug in sized]
+    certain = [Sentence(f"{_capitalised(signed(sized[slug]))}.") for slug in sure if slug in sized]
     rest = [Sentence(_error(report), MAY), *_gained(report), *_next(report)]
     whole = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in listed]
     ways = [whole]  # then without sizes, which are in the report's fields, and with fewer probabilities
@@ -306,11 +322,15 @@ def _open(
         first = "One explanation remains (with its probability)"
         if len(alternatives) > 1:
             first = "These data cannot distinguish between the following explanations (with probabilities)"
-        return [Sentence(f"The data disagree with the model. {first}: {_either(alternatives)}.")]
+        wrong = 1.0 - sum(item.probability for item in report.explanations if not item.effects)
+        disagree = f"probably disagree with the model (probability {probability(wrong)})"
+        if wrong > 0.99:
+            disagree = "disagree with the model"
+        return [Sentence(f"The data {disagree}. {first}: {conjunction(alternatives)}.")]
     share = sum(item.probability for item in report.explanations if set(sure) <= set(item.effects))
     verb = "is at work" if len(sure) == 1 else "are at work"
-    said = f"{conjunction([effect_name(slug) for slug in sure])} {verb} (probability {probability(share)})"
-    sentences = [Sentence(f"{said[0].upper()}{said[1:]}."), *certain]
+    said = f"{conjunction([_with_article(slug) for slug in sure])} {verb} (probability {probability(share)})"
+    sentences = [Sentence(f"{_capitalised(said)}."), *certain]
     if len(alternatives) == 1:
         sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
     elif alternatives:
@@ -323,8 +343,8 @@ def _cause_name(slug: str) -> str:
 
 
 def _either(parts: Sequence[str]) -> str:
-    """`a`, `a, or b`, `a, b, or c`."""
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])}, or {parts[-1]}"
+    """`a`, `a or b`, `a, b or c`."""
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} or {parts[-1]}"
 
 
 def _unexplained(report: Report) -> list[Sentence]:
@@ -349,15 +369,12 @@ def _error(report: Report) -> str:
     misfit = report.baseline
     if misfit is None:
         return ""
-    error = f"The baseline model's error is {number(misfit.rmse)} Nm RMS"
+    error = f"The baseline is off by {number(misfit.rmse)} Nm RMS"
     where = _axes(misfit)
     if misfit.rmse <= misfit.noise:
-        return (
-            f"{error}, as large as noise alone, but it follows a pattern{f' that depends on {where}' if where else ''}."
-        )
-    percent = 100 * misfit.unexplained_share
-    share = f"{'less than 0.1' if percent < 0.1 else number(percent)} % of the squared error is not noise"
-    return f"{error} (noise alone: {number(misfit.noise)} Nm); {share}{f', and depends on {where}' if where else ''}."
+        return f"{error}, as much as noise alone gives, but in a pattern{f' that depends on {where}' if where else ''}."
+    rest = f"; the rest depends on {where}" if where else ""
+    return f"{error}, where noise alone gives {number(misfit.noise)} Nm{rest}."
 
 
 def _axes(misfit: Misfit | None) -> str:
@@ -372,23 +389,23 @@ def _gained(report: Report) -> list[Sentence]:
         return [Sentence(report.not_adoptable)]
     if gain is None:
         return []
-    way = "smaller" if gain.reduction_percent >= 0 else "larger"
     model = {
-        Verdict.CAUSE_AMBIGUOUS: "the model with the most probable of them",
+        Verdict.CAUSE_AMBIGUOUS: f"the model with {' and '.join(map(effect_name, report.extended_effects))}",
         Verdict.UNEXPLAINED_STRUCTURE: "the model with a smooth correction",
     }.get(report.verdict, "the extended model")
-    change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} % {way}"
-    sentences = [
-        Sentence(f"On left-out runs, the error of {model} is {change}.", SHOULD),
-        Sentence(_hardest(gain, report.extended)),
-    ]
+    way = "smaller" if gain.reduction_percent >= 0 else "larger"
+    change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} % {way} than the baseline's"
+    hardest = _hardest(gain, report.extended)
+    sentences = [Sentence(f"On left-out runs, the error of {model} is {change}.{hardest}", SHOULD)]
     if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         return sentences
-    better, continues = "better", "continues"
+    better, then = "better", "lets the effect go on developing"
     if not gain.forecast_log_score_gain > 0:
-        better, continues = "no better", "does not continue"
-    ahead = f"{model[0].upper()}{model[1:]} predicts the last tests from the earlier ones {better}"
-    ahead += f", so the prediction of remaining life {continues} its changes over life."
+        better, then = "no better", "leaves the effect's development out"
+    ahead = f"From the earlier tests, {model} predicts the last ones {better} than the baseline."
+    adoptable = () if report.extension is None else report.extension.effects
+    if any(BY_SLUG[slug].kind is Kind.COURSE for slug in adoptable):
+        ahead += f" If you adopt it, the predicted remaining life {then}."
     return [*sentences, Sentence(ahead, SHOULD if report.verdict is Verdict.CAUSE_AMBIGUOUS else MUST)]
 
 
@@ -397,31 +414,28 @@ def _hardest(gain: Gain, extended: Misfit | None) -> str:
     hardest = gain.hardest
     if hardest is None or extended is None or gain.rmse_after < 5.0 * extended.rmse:  # less is what gains make
         return ""
-    pressed = hardest.axis == PRESSURE
-    size, unit = (1e-5, "bar") if pressed else (1.0, "cycles")
-    kept = "within the others' range"
-    if hardest.beyond > 0.0:
-        kept = f"{number(size * hardest.beyond)} {unit} outside the others' range"
-    error = f"{number(hardest.rmse)} Nm RMS (fit: {number(extended.rmse)} Nm)."
-    place = f"{number(size * hardest.value)} {unit}, {kept}"
-    return f"Left-out runs are predicted worst at {place}: {error}"
+    what, size, unit = ("curves", 1e-5, "bar") if hardest.axis == PRESSURE else ("tests", 1.0, "cycles")
+    kept = f"{number(size * hardest.beyond)} {unit} outside" if hardest.beyond > 0.0 else "within"
+    place = f"{number(size * hardest.value)} {unit}, {kept} the others' range"
+    errors = f"{number(hardest.rmse)} Nm RMS, against {number(extended.rmse)} Nm for all tests when none is left out"
+    return f" Worst are the {what} at {place}: {errors}."
 
 
 def _next(report: Report) -> list[Sentence]:
     """The first test of the plan, and what it is good for."""
     if not report.advice:
-        return []
+        nothing = "No test in the plan would tell much more; the extended model can be adopted."
+        return [] if report.extension is None else [Sentence(nothing)]
     best = report.advice[0]
-    chance = f"probability {probability(best.probability)}"
     if best.narrows:
-        left = f"{100 * best.narrows:.0f} % of the uncertainty"
-        size = f"to size {effect_name(best.effect)} more precisely"
-        return [Sentence(f"Next, {size}: {brief_test(best)} (leaves {left}).")]
-    if best.other == BASELINE:
-        return [Sentence(f"Next, to confirm it ({chance}): {brief_test(best)}.")]
+        left = f"its uncertainty falls to {100 * best.narrows:.0f} %"
+        return [Sentence(f"Next, to measure the {effect_name(best.effect)} better: {brief_test(best)}; {left}.")]
     first = "No single test would decide. The best" if best.nats < criteria.WORTHWHILE else "Next"
-    pair = f"{_cause_name(best.effect)} from {_cause_name(best.other)}"
-    return [Sentence(f"{first}: {brief_test(best)}. It distinguishes {pair} ({chance}).")]
+    hardest = f"hardest to tell apart: {_cause_name(best.effect)} and {_cause_name(best.other)}"
+    if best.other == BASELINE:
+        hardest = f"hardest to tell: whether {_cause_name(best.effect)} is at work"
+    left = f"It leaves one explanation with probability {probability(best.probability)}"
+    return [Sentence(f"{first}: {brief_test(best)}. {left} ({hardest}).")]
 
 
 #: Words from which a test is put shortly. The longest test of one kind has 16, two kinds take 29 and more.
@@ -429,20 +443,23 @@ _LONG_TEST = 20
 
 
 def brief_test(advice: Advice) -> str:
-    """A test in words; a long one by its kinds, pressures, speeds and frequency alone: its steps are the protocol."""
-    if len(advice.test.split()) <= _LONG_TEST or not advice.steps:
+    """A test in words; a long one by its kinds, pressures, speeds and frequency alone, as a rig is set. Pauses and further
+    use are never left out."""
+    later = any(step.pause for step in advice.steps) or len({step.cycles for step in advice.steps}) > 1
+    if later or len(advice.test.split()) <= _LONG_TEST or not advice.steps:
         return advice.test
     kinds = []
     for kind, name in (("stationary_stribeck", "stationary"), ("dynamic_stribeck", "dynamic")):
         if steps := [step for step in advice.steps if step.kind == kind]:
             frequencies = sorted({step.frequency for step in steps if step.frequency is not None})
-            at = f" at {number(frequencies[0])} Hz" if frequencies else ""
-            pressures = _range([1e-5 * value for step in steps for value in step.pressures])
-            speeds = _range([value * 30.0 / math.pi for step in steps for value in step.speeds])
+            at = f"{number(frequencies[0])} Hz, " if frequencies else ""
+            pressures = _range([float(f"{1e-5 * value:.2g}") for step in steps for value in step.pressures])
+            speeds = _range([round(value * 30.0 / math.pi) for step in steps for value in step.speeds])
+            speeds = f"up to{speeds[4:]}" if speeds.startswith("0 to") else speeds
             oils = {step.temperature - 273.15 for step in steps if step.temperature is not None}
             oil = f", also at {number(max(oils))} °C" if oils else ""
-            kinds.append(f"{name} tests{at}, {pressures} bar, {speeds} rpm{oil}")
-    return f"{' and '.join(kinds)}; see its protocol"
+            kinds.append(f"{name} tests at {at}{pressures} bar, {speeds} rpm{oil}")
+    return f"{', and '.join(kinds)} (steps in the report)"
 
 
 def _range(values: Sequence[float]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from models.diagnosis.experiments.candidates import TRIALS
 from models.prognosis.criteria import QUANTILES
 from service.lives.condition import (
     beside_held,
@@ -272,6 +273,12 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
             summary(9000.0),
             found(["film"]) | {"advice": {"test": f"stationary test at 5 bar, and {80 * 'x'}", "separates": ["film"]}},
             "Out of specification: ", "Run the advised tests, first a stationary test at 5 bar: it shows whether film",
+        ),
+        (
+            summary(9000.0),
+            found(["rest_recovery"]) | {"advice": {"test": TRIALS["rests"].text, "separates": ["rest_recovery"]}},
+            "Out of specification: ", "Run three more stationary tests after further use, spaced as before, with two days' "
+            "rest before the first and the third: it shows whether rest recovery is at work.",
         ),
         (summary(9000.0), found([]), "Out of specification: ", "Read the diagnosis before you rely on the forecast."),
     ],

@@ -16,8 +16,7 @@ const SENTENCES = {
   model_adequate: () => "Nothing is left beyond noise and run-to-run scatter: the model is adequate.",
   cause_named: (causes) =>
     `The data disagree with the model, and ${causes} ${causes.includes(" and ") ? "account" : "accounts"} for it.`,
-  cause_ambiguous: (causes) =>
-    `The data disagree with the model. The cause may be ${causes}: these runs cannot distinguish between them.`,
+  cause_ambiguous: (causes) => `The cause may be ${causes}: these runs cannot distinguish between them.`,
   unexplained_structure: () => "The data disagree with the model, and no cause in the catalogue accounts for it.",
   insufficient_data: () => "There is too little data for a verdict.",
 };

@@ -23,6 +23,7 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
 CRITICAL_SPEED = Effect(
     slug="critical_speed",
     title="The shaft passes a critical speed",
+    article="a",
     physics="Unbalance loads the bearings most at the critical speed: a torque that peaks there, whatever the pressure.",
     formula="a / (1 + ((v - v_c)/w)²), w = 0.8 m/s",
     source="made up for docs/explanation/architecture.md",
