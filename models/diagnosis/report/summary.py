@@ -452,13 +452,16 @@ def brief_test(advice: Advice) -> str:
     for kind, name in (("stationary_stribeck", "stationary"), ("dynamic_stribeck", "dynamic")):
         if steps := [step for step in advice.steps if step.kind == kind]:
             frequencies = sorted({step.frequency for step in steps if step.frequency is not None})
-            at = f"{number(frequencies[0])} Hz, " if frequencies else ""
-            pressures = _range([float(f"{1e-5 * value:.2g}") for step in steps for value in step.pressures])
-            speeds = _range([round(value * 30.0 / math.pi) for step in steps for value in step.speeds])
+            pressures = [float(f"{1e-5 * value:.2g}") for step in steps for value in step.pressures]
+            closed = [value for value in pressures if value > 0.0]
+            opened = ", also with the clutch open" if 0.0 in pressures and closed else ""
+            speeds = _range([round(float(f"{value * 30.0 / math.pi:.3g}")) for step in steps for value in step.speeds])
             speeds = f"up to{speeds[4:]}" if speeds.startswith("0 to") else speeds
             oils = {step.temperature - 273.15 for step in steps if step.temperature is not None}
             oil = f", also at {number(max(oils))} °C" if oils else ""
-            kinds.append(f"{name} tests at {at}{pressures} bar, {speeds} rpm{oil}")
+            at = [*(f"{number(value)} Hz" for value in frequencies), *([f"{_range(closed)} bar"] if closed else [])]
+            at.append(f"{speeds} rpm")
+            kinds.append(f"{name} tests{'' if closed else ' with the clutch open'} at {', '.join(at)}{opened}{oil}")
     return f"{', and '.join(kinds)} (steps in the report)"
 
 

@@ -285,6 +285,10 @@ def test_a_test_of_many_words_is_put_into_a_short_line() -> None:
         "tests at 0.3 Hz, 0.75 to 1.8 bar, up to 2,000 rpm, also at 60 °C (steps in the report); its uncertainty falls "
         "to 30 %."
     ) in said
+    opened = (replace(sweep, pressures=(0.0, 75e3)), replace(swing, pressures=(0.0,), speeds=(0.0, 209.34)))
+    said = summarise(replace(found, advice=(replace(advice, steps=opened),)))
+    assert "stationary tests at 0.75 bar, 20 to 1,970 rpm, also with the clutch open" in said
+    assert "dynamic tests with the clutch open at 0.3 Hz, up to 2,000 rpm" in said
 
 
 def test_pauses_and_further_use_are_never_left_out_of_a_test() -> None:
