@@ -30,12 +30,14 @@ from models.diagnosis.design.facts import Facts
 from models.friction.stribeck import GAMMA
 
 #: The laws of eq. 6 over pressure, in the order of `models.friction.stribeck.PARAMETER_NAMES`; each has six places in θ.
-BLOCK = 6
+BLOCK, BLOCKS = 6, 4
 #: What stands where in such a block of θ.
 ENDS, SHARES, COURSE = slice(0, 2), slice(2, 4), slice(4, BLOCK)
+#: What `Laws.raised` raises: the four, and log C.
+RAISED = BLOCKS + 1
 #: θ: four blocks of (low end, high end, share low, share high, log h, log ε); log p_0, log b;
 #: d_1, d_2, d_3; then κ at each pressure of the loops; then o_1 ... o_4 of the open clutch.
-LOG_DECAY = 4 * BLOCK
+LOG_DECAY = BLOCKS * BLOCK
 LOG_CURVATURE = LOG_DECAY + 1
 FALL = slice(LOG_DECAY, LOG_CURVATURE + 1)
 DRIFT = LOG_CURVATURE + 1
@@ -120,6 +122,18 @@ class Laws:
         if slopes is not None:
             slopes[too_low, 2] = 0.0
         return values, by_fall
+
+    def raised(self, place: int, by: float) -> "Laws":
+        """The same but for one of M_s, M̄_c, V_S, C_v, log C, which is larger by so much everywhere."""
+        theta = self.theta.copy()
+        if place == BLOCKS:
+            theta[KAPPA] += by
+        else:
+            block = theta[place * BLOCK : (place + 1) * BLOCK]  # a view
+            lost = block[ENDS] * block[SHARES]
+            block[ENDS] += by
+            block[SHARES] = lost / block[ENDS]
+        return Laws(theta=theta, frame=self.frame)
 
     def by_pressure(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
         """d(M_s, M̄_c, V_S, C_v)/dp [n, 4] 1/Pa."""

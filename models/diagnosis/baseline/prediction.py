@@ -24,6 +24,7 @@ from models.diagnosis.baseline.laws import (
     LOG_DECAY,
     OPEN_DRAG,
     POWERS,
+    RAISED,
     RATIO,
     Frame,
     Laws,
@@ -117,10 +118,12 @@ class Prediction:
         loops[:] = self.lag.follow(loops)
         return out
 
-    def jacobian(self, design: Design) -> FloatArray:
-        """∂torque/∂θ [N, θ.size]."""
+    def jacobian(self, design: Design, of_effects: FloatArray | None = None) -> FloatArray:
+        """∂torque/∂θ [N, θ.size]. `of_effects` [N, 5]: how effects beside the baseline change with the four parameters and
+        log C, which move everywhere by the same amount."""
         laws, rows = self.scene.laws, design.rows
-        by_parameters = self.change_at_rows(design, self.scene.gradient, before_lag=True)
+        of_effects = np.zeros((rows.run.size, RAISED)) if of_effects is None else of_effects
+        by_parameters = self.change_at_rows(design, self.scene.gradient, before_lag=True) + of_effects[:, :-1]
         # a loop has one pressure and one state: the parameters depend on θ at its rows as they do at its points
         _, slopes, by_fall = laws.with_gradient(rows.pressure, rows.cycles)
         columns = np.zeros((rows.run.size, laws.theta.size))
@@ -128,7 +131,9 @@ class Prediction:
         columns[:, FALL] = by_parameters[:, RATIO, None] * by_fall
         columns[:, OPEN_DRAG] = design.to_rows(self.scene.open_powers)
         if self.lag is not None:
-            slowness = design.to_rows(np.append(np.zeros(design.plateaus), self.lag.by_log_attractor))
+            slowness = (
+                design.to_rows(np.append(np.zeros(design.plateaus), self.lag.by_log_attractor)) + of_effects[:, -1]
+            )
             looping = slice(design.plateaus, None)
             weights = laws.log_attractor(rows.pressure[looping], rows.cycles[looping])[1]
             columns[looping, DRIFT:-POWERS] = slowness[looping, None] * weights

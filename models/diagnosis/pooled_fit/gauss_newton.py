@@ -18,7 +18,13 @@ from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import BLOCK, LOG_CURVATURE, LOG_DECAY, POWERS, Laws
 from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.effects.effect import amplitude_cost
-from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns, effect_precisions, effect_rows
+from models.diagnosis.effects.fitted_effect import (
+    FittedEffect,
+    effect_columns,
+    effect_precisions,
+    effect_rows,
+    law_columns,
+)
 from models.diagnosis.noise.covariance import whitening
 from models.diagnosis.pooled_fit.problem import FitProblem, Priors
 
@@ -142,7 +148,7 @@ def _evaluated(problem: FitProblem, white: Whiten, laws: Laws, effects: tuple[Fi
 def _normal(problem: FitProblem, white: Whiten, state: Fit) -> tuple[FloatArray, FloatArray]:
     """Gram matrix and gradient over the free θ and the effects' parameters."""
     design, priors = problem.design, problem.priors
-    columns = [state.prediction.jacobian(design)[:, priors.free]]
+    columns = [law_columns(design, state.prediction, state.effects)[:, priors.free]]
     columns += [effect_columns(design, state.prediction, fitted) for fitted in state.effects]
     jacobian = np.concatenate(columns, axis=1)
     rows_white = white(np.column_stack([jacobian, state.residual]))

@@ -32,6 +32,7 @@ from models.diagnosis.effects.fitted_effect import (
     discrepancy_factors,
     effect_columns,
     effect_precisions,
+    law_columns,
 )
 from models.diagnosis.noise.covariance import Noise, by_curve, gains_of, whitened
 from models.diagnosis.pooled_fit.gauss_newton import Fit
@@ -75,7 +76,9 @@ def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None) ->
     changes = np.zeros((design.torque.size, 0)) if changes is None else changes
     own = [effect_columns(design, fit.prediction, effect) for effect in fit.effects]
     discrepancy = [discrepancy_columns(design, fit.prediction, effect) for effect in fit.effects]
-    jacobian = np.concatenate([fit.prediction.jacobian(design)[:, priors.free], *own, *discrepancy], axis=1)
+    jacobian = np.concatenate(
+        [law_columns(design, fit.prediction, fit.effects)[:, priors.free], *own, *discrepancy], axis=1
+    )
     white = whitened(np.column_stack([jacobian, changes, fit.residual]), design, noise)
     gains = gains_of(design, fit.torque, noise)
     matrix = white.T @ white

@@ -19,7 +19,7 @@ from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import KAPPA, Laws
 from models.diagnosis.design.design import CYCLES, PRESSURE, Design
-from models.diagnosis.effects.fitted_effect import effect_columns, effect_precisions
+from models.diagnosis.effects.fitted_effect import effect_columns, effect_precisions, law_columns
 from models.diagnosis.noise.covariance import Noise, whitening
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
@@ -155,7 +155,7 @@ def _forecast_score(problem: FitProblem, model: Fit, out: BoolArray) -> float:
     before = _without(noise, out)
     refit = fit(problem.with_noise(before), model.laws, model.effects, steps=_STEPS)
     own = [effect_columns(design, refit.prediction, effect) for effect in refit.effects]
-    jacobian = np.concatenate([refit.prediction.jacobian(design)[:, priors.free], *own], axis=1)
+    jacobian = np.concatenate([law_columns(design, refit.prediction, refit.effects)[:, priors.free], *own], axis=1)
     fitted = whitening(design, problem.gained, before)(jacobian)
     held = whitening(design, problem.gained, _without(noise, ~out))(np.column_stack([jacobian, refit.residual]))
     precision = fitted.T @ fitted

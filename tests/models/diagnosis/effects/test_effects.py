@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm, t
 
+from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene, scene_of
 from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.campaign import Oil
@@ -24,7 +25,13 @@ from models.diagnosis.effects.effect import (
     unit_changes,
 )
 from models.diagnosis.effects.faults import last_direction
-from models.diagnosis.effects.fitted_effect import FittedEffect, discrepancy_columns, discrepancy_factors, effect_rows
+from models.diagnosis.effects.fitted_effect import (
+    FittedEffect,
+    discrepancy_columns,
+    discrepancy_factors,
+    effect_rows,
+    law_columns,
+)
 from models.diagnosis.effects.readings import DAYS, STRAIGHT
 from models.diagnosis.effects.thermal import HERSEY, log_viscosity_ratio, viscosity
 from models.diagnosis.explanations.verdict import Verdict
@@ -33,7 +40,7 @@ from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, starting_laws
 from models.diagnosis.pooled_fit.projection import gram_of, project
 from models.friction.stribeck import GAMMA, torque
 from tests.models.diagnosis.campaigns import campaign
-from tests.models.diagnosis.fitted import of_size, study
+from tests.models.diagnosis.fitted import Study, of_size, study
 
 
 @pytest.fixture(scope="module")
@@ -237,6 +244,29 @@ def test_discrepancy_factors_stay_within_one_and_are_independent(given, effect):
     assert np.abs(columns).max(initial=0.0) <= 1.0
     rank = np.linalg.matrix_rank(columns - columns.mean(axis=0)) if columns.shape[1] else 0
     assert rank == columns.shape[1]
+
+
+@pytest.mark.parametrize(
+    "slug", ["interface_heating", "viscous_exponent", "oil_change", "channel_delay", "inertia_torque"]
+)
+def test_a_fit_knows_that_effects_change_with_the_friction_that_they_change(given: Study, slug: str) -> None:
+    design, fit = given.problem.design, given.baseline.fit
+    effect = BY_SLUG[slug]
+    loud = FittedEffect(effect=effect, amplitude=2 * effect.prior_sd, shape=effect.grid(design.facts)[0].shape)
+    laws, free = fit.laws, np.flatnonzero(given.problem.priors.free)
+
+    def model(theta: FloatArray) -> FloatArray:
+        prediction = predict(design, replace(laws, theta=theta))
+        return prediction.torque + effect_rows(design, prediction, loud)
+
+    wanted = []
+    for place in free.tolist():
+        step = np.zeros(laws.theta.size)
+        step[place] = 1e-5 * max(abs(float(laws.theta[place])), 1.0)
+        wanted.append((model(laws.theta + step) - model(laws.theta - step)) / (2 * step[place]))
+    columns = law_columns(design, fit.prediction, [loud])[:, free]
+    off = np.linalg.norm(columns - np.array(wanted).T, axis=0)
+    assert (off <= 0.03 * np.linalg.norm(wanted, axis=1)).all()  # how a loop's lag follows its own curve is left out
 
 
 def test_an_exact_law_has_no_discrepancy(given):

@@ -10,7 +10,7 @@ from models.diagnosis.baseline.laws import ATTRACTOR, Scene
 from models.diagnosis.design.autocorrelation import Correlation
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import amplitude_precision
-from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns
+from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns, law_columns
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.validation.held_out import (
@@ -121,7 +121,8 @@ def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
         masked = given.problem.with_noise(_without(noise, out))
         found = fit(masked, model.laws, model.effects, steps=_STEPS)
         own = [effect_columns(given.design, found.prediction, each) for each in found.effects]
-        jacobian = np.concatenate([found.prediction.jacobian(given.design)[:, priors.free], *own], axis=1)
+        laws = law_columns(given.design, found.prediction, found.effects)
+        jacobian = np.concatenate([laws[:, priors.free], *own], axis=1)
         unit = jacobian / noise.deviation[:, None]
         precision = unit[~out].T @ unit[~out]
         rows = priors.rows[:, priors.free]
