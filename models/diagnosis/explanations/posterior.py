@@ -167,7 +167,7 @@ class Search:
         facts = baseline.problem.design.facts
         effects = effects_for(facts, without)
         self._raw = {r.effect: r.log_evidence for r in raw if r.effect in BY_SLUG and not is_vibration(r)}
-        self.problem = baseline.problem
+        self.problem = self._null_problem = baseline.problem
         self._columns = _shown(self.problem, baseline.fit, columns_of([*effects, *FAULTS], facts))
         null = self._node(baseline.fit, (), ())
         if null is None:
@@ -183,7 +183,8 @@ class Search:
             likely = null.evidence.screened[best.gain]
             self.problem = baseline.problem.with_noise(likely.noise(baseline.problem.noise))
             again = self._node(fit(self.problem, baseline.fit.laws), (), ())
-            null = max(null, again, key=lambda node: node.log_evidence) if again is not None else null
+            if again is not None and again.log_evidence > null.log_evidence:
+                null, self._null_problem = again, self.problem
         self.nodes: dict[Alternative, list[Node]] = {NOTHING: [null]}
         self.refits = 0
         self._promises: dict[tuple[Alternative, Shape], tuple[float, Node, Start | None]] = {}
@@ -199,6 +200,7 @@ class Search:
     def run(self) -> None:
         """Up and down until neither changes what leads."""
         fallen = set[Alternative]()
+        self._single()
         while True:
             self._up()
             weights = self.weights()
@@ -249,15 +251,29 @@ class Search:
                 key = max(
                     causes, key=lambda key: hopes[key]
                 )  # structure leads causes only once one of them was refitted
-            promise, parent, start = self._promises.pop(key)
-            self.refits += 1
-            if start is None:
-                self._add_structure(key[0], parent, promise)
-            else:
-                shape_evidence = (*parent.shape_evidence, start.column.log_weight_around)
-                self._add(key[0], parent.fit, (*parent.fit.effects, start.fitted), shape_evidence, promise)
-            if key[0] not in self.nodes:
-                self._failed.add(key[0])
+            self._take(key)
+
+    def _single(self) -> None:
+        """Every single cause that promises more than nothing, its best kind: a loud one may be a hundred nats better than it
+        was screened, for the screen is linear about a baseline that has absorbed a part of it."""
+        best: dict[Alternative, tuple[Alternative, Shape]] = {}
+        for key, (promise, _, _) in sorted(self._promises.items(), key=lambda item: item[1][0]):
+            if len(key[0].causes) == 1 and not key[0].unknown and promise > self.null.log_evidence:
+                best[key[0]] = key
+        for key in best.values():
+            self._take(key)
+
+    def _take(self, key: tuple[Alternative, Shape]) -> None:
+        """Refit what was promised."""
+        promise, parent, start = self._promises.pop(key)
+        self.refits += 1
+        if start is None:
+            self._add_structure(key[0], parent, promise)
+        else:
+            shape_evidence = (*parent.shape_evidence, start.column.log_weight_around)
+            self._add(key[0], parent.fit, (*parent.fit.effects, start.fitted), shape_evidence, promise)
+        if key[0] not in self.nodes:
+            self._failed.add(key[0])
 
     def _hope(self, key: tuple[Alternative, Shape], leader: Alternative, slack: float) -> float:
         """A promise, less what refits of the same alternative fell short of theirs, and the slack where it explains what the
@@ -406,15 +422,15 @@ class Search:
                 weights[key[0]] = float(np.logaddexp(weights.get(key[0], -np.inf), promise))
         null = self.null
         swinging = {record.effect: record.log_evidence for record in raw if record.effect in LINES}
-        for unknown, value in {LINE: lines(self.problem, null.fit.residual).evidence, **swinging}.items():
+        for unknown, value in {LINE: lines(self._null_problem, null.fit.residual).evidence, **swinging}.items():
             line = Alternative((), unknown)
             weights[line] = null.log_evidence + value + self.prior(line)
         outlier = Alternative((), OUTLIER)
-        weights[outlier] = outlier_evidence(self.problem, null.fit) + self.prior(outlier)
+        weights[outlier] = outlier_evidence(self._null_problem, null.fit) + self.prior(outlier)
         facts = self.problem.design.facts
         if not facts.temperature_measured and OIL_TEMPERATURE.slug not in without:
             warm = Alternative((OIL_TEMPERATURE.slug,))
-            weights[warm] = null.log_evidence + temperature_evidence(self.problem, null.fit) + self.prior(warm)
+            weights[warm] = null.log_evidence + temperature_evidence(self._null_problem, null.fit) + self.prior(warm)
             if (
                 not facts.oil_changes
             ):  # oil of another temperature from some state on is oil of another viscosity as well

@@ -25,6 +25,8 @@ from models.diagnosis.explanations.verdict import (
 )
 from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline
 from models.diagnosis.raw_records.evidence import FIXED_LINE, RawEvidence
+from tests.blind.rig.hide import hide
+from tests.blind.rig.sent import campaign as sent
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import study, warmth
 from tests.models.diagnosis.rehearsals import rehearsal
@@ -254,3 +256,21 @@ def test_what_stands_beside_a_certain_cause_was_refitted() -> None:
     standing = [alternative for alternative, share in posterior.probabilities.items() if share > 0.05]
     assert standing == [Alternative(("hydrodynamic_drag", "squeeze_film"))]  # the simulated rig has a film
     assert standing[0] in posterior.nodes
+
+
+def test_a_loud_cause_is_refitted_however_little_its_screen_promised() -> None:
+    """Heating by a quarter: its screen about the baseline, which has absorbed half of it, promises 100 of 220 nats, fewer
+    than drag's, and drag with another exponent explains 187."""
+    hidden = hide((404, 3245693708, 3), ("interface_heating",), 300.0, loops=False)
+    found = posterior_of(fit_baseline(build_design(sent(hidden))), ())
+    heating, pair = (
+        Alternative(causes) for causes in (("interface_heating",), ("hydrodynamic_drag", "viscous_exponent"))
+    )
+    assert found.weights[heating] > found.weights.get(pair, -np.inf) + 20.0
+
+
+def test_an_unmeasured_temperature_competes_under_the_scatter_of_gains_that_nothing_has() -> None:
+    """Friction that recovers in rests passes for gains that scatter; about that baseline a temperature explains nothing."""
+    hidden = hide((404, 3894774685, 2), ("rest_recovery",), 300.0, loops=True)
+    found = posterior_of(fit_baseline(build_design(sent(hidden))), ())
+    assert found.weights[Alternative(("rest_recovery",))] > found.weights[Alternative(("oil_temperature",))] + 20.0
