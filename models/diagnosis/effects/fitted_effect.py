@@ -83,7 +83,7 @@ def law_columns(design: Design, prediction: Prediction, effects: Sequence[Fitted
     scene, moving = prediction.scene, [one for one in effects if one.effect.grows_with is None]
     changes = np.zeros((design.rows.run.size, RAISED))
     for place, size in enumerate(np.abs(scene.parameters).max(axis=0) if moving else ()):
-        by = _STEP * float(size)
+        by = _STEP * (float(size) or 1.0)
         raised = scene_of(scene.laws.raised(place, by), design.points, design.facts)
         for one in moving:
             ends = [one.effect.change(at, one.amplitude, one.shape) for at in (raised, scene)]

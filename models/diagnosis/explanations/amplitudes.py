@@ -19,7 +19,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.design.design import IntArray
-from models.diagnosis.effects.fitted_effect import FittedEffect
+from models.diagnosis.effects.fitted_effect import FittedEffect, effect_precisions
 from models.gaussian_evidence import independent, log_sum
 
 #: Nodes along an amplitude [-]: over all amplitudes that are likely, and about that of the exact template; deviations that
@@ -89,6 +89,7 @@ class Proportional:
         at_work[np.flatnonzero(np.isinf(self.sd))[~np.isnan(given)]] = False
         mine, others = np.flatnonzero(at_work & (self.of == place)), np.flatnonzero(at_work & (self.of != place))
         known = info[np.ix_(others, others)] + np.diag(self.sd[others] ** -2.0)
+        known[np.diag_indices(others.size)] *= 1.0 + 1e-12  # two that are one have no inverse
         absorbed = np.linalg.solve(known, np.column_stack([info[np.ix_(others, mine)], score[others]]))
         across = info[np.ix_(mine, others)]
         own, along = info[np.ix_(mine, mine)] - across @ absorbed[:, :-1], score[mine] - across @ absorbed[:, -1]
@@ -105,8 +106,9 @@ def _along_amplitude(
     sd > 0 of c."""
     values, vectors = independent(sd[:, None] * info[1:, 1:] * sd)
     fixed, sloped = vectors.T @ (sd * score[1:]), vectors.T @ (sd * info[1:, 0])
-    # a jointly normal (a, c), and the exact template beside it
+    # a jointly normal (a, c), and the exact template beside it; rounding aside no less than the amplitude's own prior
     left = np.array([info[0, 0] - (sloped**2 / (1 + values)).sum(), info[0, 0]])
+    left = np.maximum(left, effect_precisions(fitted)[0])
     middle = (score[0] - np.array([(sloped * fixed / (1 + values)).sum(), 0.0])) / left
     low, high = middle - _REACH * left**-0.5, middle + _REACH * left**-0.5
     steps = np.unique([*np.linspace(low.min(), high.max(), _WIDE), *np.linspace(low[1], high[1], _NEAR)])

@@ -84,9 +84,10 @@ def evidence_of(problem: FitProblem, fitted: Fit, columns: Sequence[Column] = ()
     sd = np.concatenate(
         [np.full(len(axes), criteria.CONTRAST_SIZES[-1]), np.where(own > 0, *criteria.TEMPLATE_ERRORS[-1])]
     )
-    info, score = likely.info[flexible, flexible] + np.diag(sd**-2.0), likely.score[flexible]
+    values, vectors = independent(sd[:, None] * likely.info[flexible, flexible] * sd)
+    score = vectors.T @ (sd * likely.score[flexible])
     return Evidence(
-        misfit=(likely.miss - float(score @ np.linalg.solve(info, score))) / design.torque.size,
+        misfit=(likely.miss - float((score**2 / (1.0 + values)).sum())) / design.torque.size,
         whole=whole,
         structure={axis: log_sum(logs) - whole for axis, logs in structures.items()},
         patterns={

@@ -36,7 +36,8 @@ Whiten: TypeAlias = Callable[[FloatArray], FloatArray]
 
 
 class FitStatus(StrEnum):
-    """How a fit ended: the cost stopped falling; no step lowered it at all; it used all of its steps; no finite cost."""
+    """How a fit ended: the cost stopped falling; no step lowered it at all; it used all of its steps; its cost or its
+    derivatives were not finite."""
 
     CONVERGED = "converged"
     STALLED = "stalled"
@@ -75,7 +76,11 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
     damping, growth = 1e-3, 2.0
     status, made = FitStatus.OUT_OF_STEPS, 0
     for _ in range(steps):
-        gram, gradient = _normal(problem, white, state)
+        with np.errstate(over="ignore", invalid="ignore"):
+            gram, gradient = _normal(problem, white, state)
+        if not np.isfinite(gram).all():
+            status = FitStatus.NOT_FINITE
+            break
         fallen = 0.0
         for _ in range(8):
             step = _inside(state, priors, gram + damping * np.diag(np.diag(gram)), gradient)

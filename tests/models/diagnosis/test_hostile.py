@@ -77,6 +77,11 @@ WITHOUT_THERMOMETER = Recipe(
     seed=341, scale=1.0, shape="noise", rows=(9, 26, 1, 1), loops=(), temperature=False, blocks=0, events=()
 )
 
+#: Two effects that change the same rows in the same way, beside no noise at all.
+TWO_THAT_ARE_ONE = Recipe(
+    seed=916920, scale=1.0, shape="falling", rows=(58, 46, 21), loops=(900, 4), temperature=False, blocks=2, events=()
+)
+
 
 def _torque(rng: np.random.Generator, speed: np.ndarray, scale: float, shape: str) -> np.ndarray:
     base = {
@@ -137,6 +142,7 @@ def _finite(report: Report) -> bool:
 @given(recipe=RECIPES)
 @example(recipe=BEYOND_ROUNDING)
 @example(recipe=WITHOUT_THERMOMETER)
+@example(recipe=TWO_THAT_ARE_ONE)
 def test_a_diagnosis_is_a_report(recipe: Recipe) -> None:
     report = diagnose(recipe.campaign(), rng=np.random.default_rng(0))
     assert isinstance(report, Report)
