@@ -18,6 +18,8 @@
 # make visible hides effects at twice the amplitude that a report calls visible, and counts alarms (SEED= COUNT= STORE=)
 # make adoption  hides artefacts, adopts what the diagnosis offers, holds remaining life against the truth: a table of
 #              docs/appendix/diagnosis.md; goes on where it ended                         (SEED= SIZE=small|full ONLY= ARGS=--list)
+# make mutants  puts small faults into the product, each into a copy, and counts those that the tests of its folder find
+#              (SEED= COUNT= ONLY= STORE=)
 # make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/appendix/benchmarks.md
 #              (ARGS="--seconds 60 --no-raw"; "--services 4 --database postgresql --rigs 16 --clients 40 --no-raw"); a few
 #              minutes, on a machine that does nothing else
@@ -57,7 +59,7 @@ SLIM := $(LOCK) $(foreach name,$(UNUSED),--no-emit-package $(name))
 # what the first run of the tests compiles, the next ones read: a third of what `make quick` takes
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help compiled docs gallery reference adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
+.PHONY: help compiled docs gallery reference adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind visible mutants plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -151,6 +153,9 @@ blind: $(VENV)/.tests
 
 visible: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.visible
+
+mutants: $(VENV)/.tests
+	$(BIN)/python -m tests.mutants
 
 adoption: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.adoption $(ARGS)
