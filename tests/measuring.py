@@ -23,9 +23,10 @@ APPENDIX = ROOT / "docs" / "appendix"
 
 @dataclass(frozen=True)
 class Asked:
-    """What `make` passes on: SEED= (1), SIZE= small, full or a share of the whole, ONLY= beginnings of names."""
+    """What `make` passes on: SEED= (1; several with commas where a tool counts them together), SIZE= small, full or a share
+    of the whole, ONLY= beginnings of names."""
 
-    seed: int
+    seeds: tuple[int, ...]
     size: float
     only: tuple[str, ...]
 
@@ -34,10 +35,17 @@ class Asked:
         """By the environment."""
         seed, chosen, only = (os.environ.get(name) or "" for name in ("SEED", "SIZE", "ONLY"))
         share = {"small": 0.1, "full": 1.0}.get(chosen or size)
-        return cls(int(seed or 1), float(chosen) if share is None else share, tuple(only.split(",")))
+        seeds = tuple(int(one) for one in (seed or "1").split(","))
+        return cls(seeds, float(chosen) if share is None else share, tuple(only.split(",")))
+
+    @property
+    def seed(self) -> int:
+        """The only one, or the first."""
+        return self.seeds[0]
 
     def __str__(self) -> str:
-        return f"SEED={self.seed} SIZE={self.size:g}" + (f" ONLY={','.join(self.only)}" if any(self.only) else "")
+        only = f" ONLY={','.join(self.only)}" if any(self.only) else ""
+        return f"SEED={','.join(map(str, self.seeds))} SIZE={self.size:g}{only}"
 
 
 def where(processes: int) -> str:

@@ -1,7 +1,7 @@
 """`make blind`: hide effects, let the diagnosis find them, print what it found as Markdown.
 
-SEED=  another seed, other campaigns          SIZE=   small, full, or a share of the full table
-ONLY=  rows whose names begin with these      PROCESSES= how many at once (2)
+SEED=  other campaigns, several with commas       SIZE=   small, full, or a share of the full table
+ONLY=  rows whose names begin with these          PROCESSES= how many at once (2)
 ARGS="--scheduler WHERE": local, processes[:N], or tcp://host:port of a Dask scheduler whose workers can import these tests
 ARGS=--write puts the table into docs/appendix/diagnosis.md, ARGS=--failures lists what went wrong with its command
 
@@ -25,8 +25,8 @@ def document(outcomes: Sequence[Outcome], command: str) -> list[str]:
         [f"`{command}`"],
         table.unmade(outcomes),
         table.summary(made),
-        ["One effect, λ = 20, 6 states:"],
         table.by_effect(made),
+        table.by_loudness(made),
         table.outside(made),
         table.reliability(made),
         table.of_gains(),
@@ -39,7 +39,8 @@ def document(outcomes: Sequence[Outcome], command: str) -> list[str]:
 def main() -> None:
     """Print the table."""
     asked = Asked.here()
-    chosen = [trial for trial in trials(asked.seed, asked.size) if trial.row.startswith(asked.only)]
+    every = (trial for seed in asked.seeds for trial in trials(seed, asked.size))
+    chosen = [trial for trial in every if trial.row.startswith(asked.only)]
     outcomes = list(each(stored, chosen, where(2)))
     lines = document(outcomes, f"make blind {asked}")
     print("\n".join(lines))

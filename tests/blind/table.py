@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from tests.blind.rig.hide import DRAWS
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
-from tests.blind.rows import HALVED, calibration, counts, wilson
+from tests.blind.rows import HALVED, LOUDNESSES, calibration, counts, wilson
 from tests.blind.trials import Outcome
 
 
@@ -27,9 +27,9 @@ def summary(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def by_effect(outcomes: Sequence[Outcome], row: str = "one") -> list[str]:
-    """Each of the seventeen by itself."""
+    """Each of the seventeen by itself, at λ = 20 and 6 states."""
     lines = [
-        "| effect | campaigns | detected | truth in set | top candidate | named | named and wrong | unexplained |",
+        "| effect, λ = 20 | campaigns | detected | truth in set | top candidate | named | named and wrong | unexplained |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for slug in CATALOGUED:
@@ -45,6 +45,20 @@ def by_effect(outcomes: Sequence[Outcome], row: str = "one") -> list[str]:
                 f"{sum(one.verdict == 'unexplained_structure' for one in mine)}/{len(mine)}",
             )
             lines.append(f"| `{slug}` | {len(mine)} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def by_loudness(outcomes: Sequence[Outcome]) -> list[str]:
+    """The same at every loudness: named rightly, and named wrongly, of how many."""
+    titles = [f"λ = {lam:.0f}: named rightly, wrongly" for lam in LOUDNESSES]
+    lines = ["| effect | " + " | ".join(titles) + " |", "|---|" + len(titles) * "---|"]
+    for slug in CATALOGUED:
+        cells = []
+        for lam in LOUDNESSES:
+            mine = [one for one in outcomes if one.trial.row == f"loud/{lam:.0f}/{slug}"]
+            right = sum(one.named and one.causes == one.truth for one in mine)
+            cells += [f"{right}, {sum(one.wrong for one in mine)} of {len(mine)}"] if mine else []
+        lines += [f"| `{slug}` | " + " | ".join(cells) + " |"] if cells else []
     return lines
 
 

@@ -46,6 +46,9 @@ def test_every_effect_has_its_row_and_every_line_its_trials() -> None:
     assert sum(trial.row.startswith("none/") for trial in made) == 390
     rows = "\n".join(table.by_effect(outcomes))
     assert all(f"| `{slug}` | 40 | 40/40 |" in rows for slug in CATALOGUED)
+    assert all(
+        f"| `{slug}` | 20, 0 of 20 | 20, 0 of 20 |" in "\n".join(table.by_loudness(outcomes)) for slug in CATALOGUED
+    )
     assert all(slug.replace("_", " ") in "\n".join(table.outside(outcomes)) for slug in OUTSIDE)
     assert all(line.of(outcomes)[1] > 0 for line in counts() if "ambiguous" not in line.title)
     assert len({trial.seed for trial in made}) == len(made)
