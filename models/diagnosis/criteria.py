@@ -93,9 +93,6 @@ LIKELY, SURE = 0.5, 0.9
 #: refits at most from one leader to the next (time only; of all together, they went to rivals, and beside the leader stood
 #: what was never refitted). Of 101 promises the refit was 1.3 nats below in the median, 4.7 at 95 %.
 NEGLIGIBLE, SLACK, MOST_REFITS = 0.01, 0.2, 14
-#: Cosine between changes of torque from which an effect is refitted beside a leader that it resembles. Two of two pressure
-#: offsets at λ = 300 were named a shifted zero; refitted, one is 16 nats better, and had been promised to be 49 worse.
-RELATIVE = 0.8
 #: An extension whose held-out error is more than this times the baseline's is withheld; it changes no verdict.
 MOST_WORSE = 1.02
 #: Factors on what is usual, by which an unmeasured viscosity changes from test to test and within a test.

@@ -36,7 +36,6 @@ EACH: dict[str, tuple[object, ...]] = {
     "NEGLIGIBLE": (0.1,),
     "SLACK": (0.0,),
     "MOST_REFITS": (5, 1000),
-    "RELATIVE": (1.1,),
     "LIKELY": (0.35, 0.65),
     "SURE": (0.8, 0.95),
     "SHARP": (1e9,),

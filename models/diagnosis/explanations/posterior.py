@@ -6,11 +6,11 @@ e, f are effects of the catalogue, u faults of the same catalogue that may not b
 an oil temperature that nobody measured, a line is torque that swings with the tests' clock or at one frequency in raw
 records. Their probabilities sum to one, and a verdict is read off them alone.
 
-The search goes up, best first: what the linear screen about a refitted alternative promises of one thing more is refitted,
-while it could hold more than NEGLIGIBLE of the posterior; the promise errs by a share SLACK of the leader's lead. Then
-down: what changes torque much as the leader does, and the leader without each of its parts, from where it has the rest.
-Structure is refitted as an effect is, its likeliest form taken off: judged linearly it looked 7.5 nats strong where it was
-a false lead. It draws no random numbers.
+The search begins with every single cause that promises anything and goes up, best first: what the linear screen about a
+refitted alternative promises of one thing more is refitted, while it could hold more than NEGLIGIBLE of the posterior; the
+promise errs by a share SLACK of the leader's lead. Then down: the leader without each of its parts, from where it has the
+rest. Structure is refitted as an effect is, its likeliest form taken off: judged linearly it looked 7.5 nats strong where
+it was a false lead. It draws no random numbers.
 
 The linear screen refits nothing,
 
@@ -31,7 +31,7 @@ from models.diagnosis import criteria
 from models.diagnosis.effects.catalogue import BY_SLUG, Column, columns_at_rows, columns_of, effects_for
 from models.diagnosis.effects.effect import SCALES, Kind, Shape
 from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
-from models.diagnosis.effects.fitted_effect import FittedEffect, effect_rows, free_shapes
+from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.history import OIL_CHANGE
 from models.diagnosis.effects.thermal import OIL_TEMPERATURE
 from models.diagnosis.explanations.evidence import Evidence, evidence_of
@@ -188,7 +188,7 @@ class Search:
         self.nodes: dict[Alternative, list[Node]] = {NOTHING: [null]}
         self.refits = 0
         self._promises: dict[tuple[Alternative, Shape], tuple[float, Node, Start | None]] = {}
-        self._failed, self._tried = set[Alternative](), set[Alternative]()
+        self._failed = set[Alternative]()
         self._nearest: dict[tuple[Alternative, Shape], tuple[float, float]] = {}
         self._promise(NOTHING, null)
 
@@ -208,8 +208,6 @@ class Search:
             if leader in fallen:
                 return
             fallen.add(leader)
-            self._elsewhere(leader)
-            self._relatives(leader)
             self._down(leader)
 
     def weights(self) -> dict[Alternative, float]:
@@ -283,52 +281,6 @@ class Search:
         beside = set(leader.causes) <= set(alternative.causes) and leader.unknown in {"", alternative.unknown}
         return self._promises[key][0] + min(short, default=0.0) + (0.0 if beside else slack)
 
-    def _elsewhere(self, leader: Alternative) -> None:
-        """Single effects that could lead but were driven to a bound of a shape, from the other starts of their kind, until
-        one leads elsewhere: the screen of a loud effect is far from linear (heating of 15 % settled at 400 s, 103
-        nats behind what it does at once)."""
-        weights = self.weights()
-        slack = criteria.SLACK * max(weights[leader] - weights[NOTHING], 0.0)
-        near = [a for a in self.nodes if len(a.causes) == 1 and not a.unknown and weights[a] + slack >= weights[leader]]
-        for alternative in [a for a in near if a not in self._tried]:
-            self._tried.add(alternative)
-            node = self.nodes[alternative][0]
-            stuck = node.fit.effects[0]
-            if free_shapes(stuck).all():
-                continue
-            for column in self._columns:
-                if column.effect.slug == stuck.effect.slug and column.effect.stiff(column.shape) == node.kind[0][1]:
-                    start = replace(stuck, shape=column.shape)
-                    self._add(alternative, self.null.fit, (start,), node.shape_evidence, -np.inf)
-                    if self.nodes[alternative][0] is not node:
-                        break
-
-    def _relatives(self, leader: Alternative) -> None:
-        """Effects that change torque much as a single leader does, from its laws, whatever they were promised to be: the
-        baseline about which they were screened has absorbed another part of each. What may stand beside one of them is
-        screened where it leads: a promise that nobody refits would count."""
-        node, design = self.nodes[leader][0], self.problem.design
-        if len(node.fit.effects) != 1 or leader.unknown:
-            return
-        white = 1.0 / self.problem.noise.deviation
-        change = effect_rows(design, node.fit.prediction, node.fit.effects[0]) * white
-        units = columns_at_rows(design, node.fit.prediction, self._columns) * white[:, None]
-        along = change @ units / np.maximum(np.linalg.norm(units, axis=0), 1e-300)
-        alike: dict[str, int] = {}
-        for place in np.argsort(-np.abs(along)).tolist():
-            if np.abs(along[place]) > criteria.RELATIVE * np.linalg.norm(change):
-                alike.setdefault(self._columns[place].effect.slug, place)
-        for slug, place in alike.items():
-            column, relative = self._columns[place], Alternative((slug,))
-            if column.effect.named and relative not in self.nodes and relative not in self._failed:
-                amplitude = float(along[place] / np.linalg.norm(units[:, place]))
-                start = FittedEffect(effect=column.effect, amplitude=amplitude, shape=column.shape)
-                self._add(relative, node.fit, (start,), (column.log_weight_around,), -np.inf, screened=False)
-        weights = self.weights()
-        best = max(self.nodes, key=lambda alternative: weights[alternative])
-        if best != leader:
-            self._promise(best, self.nodes[best][0])
-
     def _down(self, leader: Alternative) -> None:
         """The leader with one thing less, from where it has the rest."""
         node = self.nodes[leader][0]
@@ -347,11 +299,9 @@ class Search:
         effects: tuple[FittedEffect, ...],
         shape_evidence: tuple[float, ...],
         promise: float,
-        *,
-        screened: bool = True,
     ) -> None:
-        """One refit more of an alternative; the better one of each kind of shapes is kept. `screened`: a first single effect
-        promises what may stand beside it."""
+        """One refit more of an alternative; the better one of each kind of shapes is kept. A first single effect promises
+        what may stand beside it."""
         fitted = refit(self.problem, start.laws, effects)
         node = None if fitted is None else self._node(fitted, alternative.causes, shape_evidence)
         if node is None:
@@ -363,7 +313,7 @@ class Search:
         if same is None or node.log_evidence > same.log_evidence:
             kept = [node, *(other for other in before if other is not same)]
             self.nodes[alternative] = sorted(kept, key=lambda node: -node.log_evidence)
-        if screened and first and len(effects) == 1 and alternative.causes:
+        if first and len(effects) == 1 and alternative.causes:
             self._promise(alternative, node)
 
     def _add_structure(self, alternative: Alternative, parent: Node, promise: float) -> None:
