@@ -51,10 +51,10 @@ class Count:
     @property
     def target(self) -> str:
         if self.least is not None and self.most is not None:
-            return f"{100 * self.least:.0f} to {100 * self.most:.0f} %"
+            return f"{100 * self.least:g} to {100 * self.most:g} %"
         if self.least is not None:
-            return f"≥ {100 * self.least:.0f} %"
-        return f"≤ {100 * self.most:.0f} %" if self.most is not None else ""
+            return f"≥ {100 * self.least:g} %"
+        return f"≤ {100 * self.most:g} %" if self.most is not None else ""
 
 
 def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
@@ -191,10 +191,10 @@ def counts() -> list[Count]:
     for lam in LOUDNESSES:
         row = f"loud/{lam:.0f}/"
         lines += [
-            Count(f"one effect, λ = {lam:.0f}, half without loops: detected", row, lambda one: one.detected),
-            Count("… true cause in the set, of all", row, lambda one: one.in_set, 0.97 if lam >= 50 else None),
-            Count("… named rightly", row, _right, 0.90 if lam >= 80 else None),
-            Count("… named and wrong", row, lambda one: one.wrong, most=0.015),
+            Count(f"λ = {lam:.0f}: detected", row, lambda one: one.detected),
+            Count(f"λ = {lam:.0f}: true cause in the set", row, lambda one: one.in_set, 0.97 if lam >= 50 else None),
+            Count(f"λ = {lam:.0f}: named rightly", row, _right, 0.90 if lam >= 80 else None),
+            Count(f"λ = {lam:.0f}: named and wrong", row, lambda one: one.wrong, most=0.015),
         ]
     lines += [
         Count("outside the catalogue, λ = 50: `unexplained_structure`", "outside/", _unexplained, 0.80),

@@ -70,7 +70,7 @@ def test_what_cannot_be_made_is_an_outcome_that_counts_nowhere(monkeypatch: pyte
     assert unmade.verdict == "unreachable"
     assert not unmade.detected
     made = [all_knowing(replace(trial, seed=(1, 3))), all_knowing(Trial("none", (1, 4)))]
-    line = next(line for line in counts() if line.title == "one effect, λ = 300, half without loops: detected")
+    line = next(line for line in counts() if line.title == "λ = 300: detected")
     assert (line.of([unmade]), line.of([*made, unmade])) == ((0, 0), (1, 1))
     lines = blind.document([*made, unmade], "make blind")
     assert any("1 of 3 trials could not be made" in row and "`running_in` at λ = 300 (1)" in row for row in lines)
