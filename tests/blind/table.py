@@ -57,8 +57,8 @@ def by_loudness(outcomes: Sequence[Outcome]) -> list[str]:
         for lam in LOUDNESSES:
             mine = [one for one in outcomes if one.trial.row == f"loud/{lam:.0f}/{slug}"]
             right = sum(one.named and one.causes == one.truth for one in mine)
-            cells += [f"{right}, {sum(one.wrong for one in mine)} of {len(mine)}"] if mine else []
-        lines += [f"| `{slug}` | " + " | ".join(cells) + " |"] if cells else []
+            cells.append(f"{right}, {sum(one.wrong for one in mine)} of {len(mine)}" if mine else "–")
+        lines += [f"| `{slug}` | " + " | ".join(cells) + " |"] if set(cells) != {"–"} else []
     return lines
 
 

@@ -14,8 +14,9 @@ from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
 
-#: Log of a settling time [s] after which what a rest did lasts through a test.
-LASTING = math.log(1e5)
+#: Whether what a rest did settles with use alone, or by the test's clock as well; and the log of its settling time [s],
+#: which with use alone stays where it is.
+BY_USE, BY_CLOCK, SETTLING = 0.0, 1.0, (math.log(20.0), math.log(1e4))
 #: What is changed: the static torque's part of the curve, or all of it.
 STATIC, WHOLE = 0.0, 1.0
 
@@ -202,9 +203,9 @@ def _rest_recovery_grid(facts: Facts) -> tuple[Tried, ...]:
     if not facts.rests or facts.states.size < 2:
         return ()
     gap = float(np.median(np.diff(facts.states)))
-    courses = [(length, LASTING) for length in (0.1 * gap, 0.5 * gap, 1.5 * gap)]
+    courses = [(length, BY_USE, sum(SETTLING) / 2) for length in (0.1 * gap, 0.5 * gap, 1.5 * gap)]
     if np.isfinite(facts.rest_moments).any():
-        courses += [(0.1 * gap, math.log(seconds)) for seconds in (150.0, 600.0)]
+        courses += [(0.1 * gap, BY_CLOCK, math.log(seconds)) for seconds in (150.0, 600.0)]
     powers = (0.0, 1.0) if np.isfinite(facts.rest_lengths).sum() > 1 else (0.0,)
     return tuple(
         Tried(shape=(*course, power, part)) for course in courses for power in powers for part in (WHOLE, STATIC)
@@ -212,14 +213,14 @@ def _rest_recovery_grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _rest_recovery_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    length, settling, power, part = shape
+    length, clocked, settling, power, part = shape
     points, seconds = scene.points, math.exp(settling)
     share = np.zeros_like(points.cycles)
     strengths = _strengths(scene.facts) ** power
     for rest, moment, strength in zip(scene.facts.rests, scene.facts.rest_moments, strengths.tolist(), strict=True):
         since = points.cycles - rest
         left = np.where(since >= 0, strength * np.exp(-np.maximum(since, 0.0) / length), 0.0)
-        if settling < LASTING and np.isfinite(moment):
+        if clocked == BY_CLOCK and np.isfinite(moment):
             waited = np.where(np.isfinite(points.moment), points.moment - moment, points.clock)
             left = np.where(waited < -60.0, 0.0, left)  # tested at the same cycles, but before the pause
             left = left * np.exp(-np.clip(waited / seconds, 0.0, 50.0))
@@ -251,7 +252,10 @@ REST_RECOVERY = Effect(
     scale=100.0,
     shapes=(
         ShapeParameter(name="length ζ_c", unit="cycles"),
-        ShapeParameter(name="log of the settling time τ", unit="ln s", lowest=3.0, highest=LASTING, smooth=True),
+        ShapeParameter(name="whether it settles by the clock", unit="-"),
+        ShapeParameter(
+            name="log of the settling time τ", unit="ln s", lowest=SETTLING[0], highest=SETTLING[1], smooth=True
+        ),
         ShapeParameter(name="power of the rest's length r", unit="-", lowest=0.0, highest=2.0, smooth=True),
         ShapeParameter(name="what is changed", unit="-"),
     ),

@@ -6,11 +6,11 @@ e, f are effects of the catalogue, u faults of the same catalogue that may not b
 an oil temperature that nobody measured, a line is torque that swings with the tests' clock or at one frequency in raw
 records. Their probabilities sum to one, and a verdict is read off them alone.
 
-The search begins with every single cause that promises anything and goes up, best first: what the linear screen about a
-refitted alternative promises of one thing more is refitted, while it could hold more than NEGLIGIBLE of the posterior; the
-promise errs by a share SLACK of the leader's lead. Then down: the leader without each of its parts, from where it has the
-rest. Structure is refitted as an effect is, its likeliest form taken off: judged linearly it looked 7.5 nats strong where
-it was a false lead. It draws no random numbers.
+The search begins with each single cause that is promised to be more probable than nothing, and goes up, best first: what
+the linear screen about a refitted alternative promises of one thing more is refitted, while it could hold more than
+NEGLIGIBLE of the posterior; the promise errs by a share SLACK of the leader's lead. Then down: the leader without each of
+its parts, from where it has the rest. Structure is refitted as an effect is, its likeliest form taken off: judged linearly
+it looked 7.5 nats strong where it was a false lead. It draws no random numbers.
 
 The linear screen refits nothing,
 
@@ -252,8 +252,8 @@ class Search:
             self._take(key)
 
     def _single(self) -> None:
-        """Every single cause that promises more than nothing, its best kind: a loud one may be a hundred nats better than it
-        was screened, for the screen is linear about a baseline that has absorbed a part of it."""
+        """Each single cause whose best kind is promised to be more probable than nothing: a loud one may be a hundred nats
+        better than it was screened, for the screen is linear about a baseline that has absorbed a part of it."""
         best: dict[Alternative, tuple[Alternative, Shape]] = {}
         for key, (promise, _, _) in sorted(self._promises.items(), key=lambda item: item[1][0]):
             if len(key[0].causes) == 1 and not key[0].unknown and promise > self.null.log_evidence:

@@ -246,13 +246,15 @@ def test_discrepancy_factors_stay_within_one_and_are_independent(given, effect):
     assert rank == columns.shape[1]
 
 
-@pytest.mark.parametrize(
-    "slug", ["interface_heating", "viscous_exponent", "oil_change", "channel_delay", "inertia_torque"]
-)
+#: What reads the laws at another pressure or at other cycles, and what only records in time show.
+ELSEWHERE = {"pressure_offset", "load_severity", "shaft_ripple", "stick_slip"}
+
+
+@pytest.mark.parametrize("slug", sorted({effect.slug for effect in CATALOGUE} - ELSEWHERE))
 def test_a_fit_knows_that_effects_change_with_the_friction_that_they_change(given: Study, slug: str) -> None:
     design, fit = given.problem.design, given.baseline.fit
     effect = BY_SLUG[slug]
-    loud = FittedEffect(effect=effect, amplitude=2 * effect.prior_sd, shape=effect.grid(design.facts)[0].shape)
+    loud = FittedEffect(effect=effect, amplitude=2 * effect.prior_sd, shape=effect.grid(design.facts)[-1].shape)
     laws, free = fit.laws, np.flatnonzero(given.problem.priors.free)
 
     def model(theta: FloatArray) -> FloatArray:
@@ -266,7 +268,8 @@ def test_a_fit_knows_that_effects_change_with_the_friction_that_they_change(give
         wanted.append((model(laws.theta + step) - model(laws.theta - step)) / (2 * step[place]))
     columns = law_columns(design, fit.prediction, [loud])[:, free]
     off = np.linalg.norm(columns - np.array(wanted).T, axis=0)
-    assert (off <= 0.03 * np.linalg.norm(wanted, axis=1)).all()  # how a loop's lag follows its own curve is left out
+    exact = slug != "unsettled_dwell"  # which reads the laws at the pressure before
+    assert (off <= (1e-3 if exact else 0.03) * np.linalg.norm(wanted, axis=1)).all()
 
 
 def test_an_exact_law_has_no_discrepancy(given):

@@ -34,7 +34,8 @@ def other_encoder(at: Where) -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.parametrize(("planted", "slug"), [(settling_gain, "gain_with_clock"), (other_encoder, "speed_scale_step")])
 def test_what_no_catalogue_holds_is_unexplained_and_described_in_the_summary(planted: Planted, slug: str) -> None:
-    report = diagnose(campaign(3, planted, noise=0.004, gain=0.001), rng=np.random.default_rng(1))
+    # without loops: what is planted does not lag there as friction does, and a delay of 46 ms truly explains that
+    report = diagnose(campaign(3, planted, noise=0.004, gain=0.001, loops=False), rng=np.random.default_rng(1))
     assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
     assert report.baseline is not None
     assert report.baseline.where[0].axis == FAULT_BY_SLUG[slug].axis

@@ -15,7 +15,7 @@ from models.diagnosis.campaign import Campaign, DutyRun, EventKind, MaintenanceE
 from models.diagnosis.design.design import build_design
 from models.diagnosis.design.facts import facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.history import LASTING, STATIC, WHOLE
+from models.diagnosis.effects.history import BY_CLOCK, BY_USE, STATIC, WHOLE
 from models.diagnosis.effects.moving import FILM, FIRST_ORDER, LEAST_TIME, MOST_POWER, THICKNESS, usual_slope
 from models.diagnosis.pooled_fit.baseline_fit import starting_laws
 from tests.models.diagnosis.campaigns import campaign
@@ -74,7 +74,7 @@ def test_friction_recovers_with_the_logarithm_of_the_rest_where_the_power_is_one
     effect, first = BY_SLUG["rest_recovery"], scene.points.clock == scene.points.clock[0]
     shares = {}
     for power in (0.0, 1.0):
-        change = effect.change(scene, 0.01, (10.0, LASTING, power, WHOLE)) / scene.curve
+        change = effect.change(scene, 0.01, (10.0, BY_USE, 6.0, power, WHOLE)) / scene.curve
         shares[power] = [float(change[first & (scene.points.cycles == at)].max()) for at in (1000.0, 3000.0)]
     kept = shares[0.0][0]  # of the cycles and the clock, the same for both
     assert shares[0.0] == pytest.approx([kept, kept])
@@ -84,7 +84,7 @@ def test_friction_recovers_with_the_logarithm_of_the_rest_where_the_power_is_one
 def test_what_recovers_is_friction_as_a_whole_or_its_static_torque() -> None:
     scene = scene_of_all(rested(2.0, 10.0))
     effect = BY_SLUG["rest_recovery"]
-    whole, static = (effect.change(scene, 0.01, (10.0, LASTING, 0.0, part)) for part in (WHOLE, STATIC))
+    whole, static = (effect.change(scene, 0.01, (10.0, BY_USE, 6.0, 0.0, part)) for part in (WHOLE, STATIC))
     some = whole > 0
     sheared = np.where(np.arange(4) == 3, 0.0, scene.parameters)  # without C_v the curve is that of the asperities
     share = curve(scene.points.velocity, sheared) / scene.curve
@@ -98,7 +98,7 @@ def test_a_test_before_the_pause_at_the_same_cycles_has_not_rested() -> None:
     given = campaign(1)
     pause = MaintenanceEvent(run_id="rest", cycles=3000.0, event=EventKind.REST, moment=1e9 + 2 * DAY + 1000.0)
     scene = scene_of_all(replace(given, maintenance=(pause,)))
-    change = BY_SLUG["rest_recovery"].change(scene, 0.01, (100.0, math.log(600.0), 0.0, WHOLE))
+    change = BY_SLUG["rest_recovery"].change(scene, 0.01, (100.0, BY_CLOCK, math.log(600.0), 0.0, WHOLE))
     here = scene.points.cycles == 3000.0
     assert np.abs(change[here & scene.points.steady]).max() < 1e-6
     assert np.abs(change[here & ~scene.points.steady]).max() > 1e-3

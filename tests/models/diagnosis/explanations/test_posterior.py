@@ -266,6 +266,7 @@ def test_a_loud_cause_is_refitted_however_little_its_screen_promised() -> None:
     heating, pair = (
         Alternative(causes) for causes in (("interface_heating",), ("hydrodynamic_drag", "viscous_exponent"))
     )
+    assert heating in found.nodes
     assert found.weights[heating] > found.weights.get(pair, -np.inf) + 20.0
 
 
