@@ -15,6 +15,7 @@ relaxation's own time between phases), and so are its sensitivities: a change δ
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.lapack import dtbtrs
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import (
@@ -66,7 +67,7 @@ def lag_of(curve: FloatArray, attractor: FloatArray, angular_frequency: FloatArr
     torque = _relaxed(keep, mean_keep, curve[:, :, None])[:, :, 0]
     by_mean = keep - mean_keep  # x dm/dx of M_i = e^-x M_{i-1} + (1 - m) S_i + (m - e^-x) S_{i-1}
     gain = -x * keep * np.roll(torque, 1, axis=1) - by_mean * curve + (by_mean + x * keep) * np.roll(curve, 1, axis=1)
-    behind = _periodic(keep, gain.T[:, :, None].copy())[:, :, 0]
+    behind = _periodic(keep, gain[:, :, None])[:, :, 0]
     return Lag(
         keep=keep,
         mean_keep=mean_keep,
@@ -78,23 +79,19 @@ def lag_of(curve: FloatArray, attractor: FloatArray, angular_frequency: FloatArr
 
 def _relaxed(keep: FloatArray, mean_keep: FloatArray, target: FloatArray) -> FloatArray:
     """R[target] for targets [l, k, m]."""
-    by_phase = np.ascontiguousarray(target.transpose(1, 0, 2))
-    here, before = 1 - mean_keep.T[:, :, None], (mean_keep - keep).T[:, :, None]
-    gain = here * by_phase
-    gain[1:] += before[1:] * by_phase[:-1]
-    gain[0] += before[0] * by_phase[-1]
-    return _periodic(keep, gain)
+    here, before = (1 - mean_keep)[:, :, None], (mean_keep - keep)[:, :, None]
+    return _periodic(keep, here * target + before * np.roll(target, 1, axis=1))
 
 
 def _periodic(keep: FloatArray, gain: FloatArray) -> FloatArray:
-    """The periodic y [l, k, m] of y_i = keep_i y_{i-1} + gain_i, keep [l, k], gain [k, l, m] (overwritten): once around from
-    y = 0, then the share of its end that was missing at its start is added."""
-    steps = keep.T[:, :, None]
-    for i in range(1, gain.shape[0]):
-        gain[i] += steps[i] * gain[i - 1]
-    left = np.cumprod(steps, axis=0)
-    gain += left * (gain[-1] / (1 - left[-1]))
-    return gain.transpose(1, 0, 2)
+    """The periodic y [l, k, m] of y_i = keep_i y_{i-1} + gain_i, keep [l, k], gain [l, k, m]: once around from y = 0, then
+    the share of its end that was missing at its start is added. All loops are one system of two diagonals."""
+    bands = np.ones((2, keep.size))
+    bands[1] = np.append(-keep[:, 1:], np.zeros((keep.shape[0], 1)), axis=1).ravel()
+    from_zero, _ = dtbtrs(bands, gain.reshape(keep.size, -1), uplo="L", diag="U")
+    from_zero = from_zero.reshape(gain.shape)
+    left = np.cumprod(keep, axis=1)[:, :, None]
+    return np.asarray(from_zero + left * (from_zero[:, -1:] / (1 - left[:, -1:])), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

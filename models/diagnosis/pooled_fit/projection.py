@@ -56,10 +56,10 @@ class Gram:
         member = np.zeros((int(self.run_of_curve.max()) + 1, self.run_of_curve.size))
         member[self.run_of_curve, np.arange(self.run_of_curve.size)] = freed
         along, squares = member @ self.along, member @ self.squares
-        weight = run_gain**2 / (1 + run_gain**2 * squares)
-        matrix = self.matrix - along.T @ (weight[:, None] * along)
+        taken = (run_gain / np.sqrt(1 + run_gain**2 * squares))[:, None] * along
         if curve_gain > 0.0:
-            matrix -= self.along.T @ ((curve_gain**2 * freed)[:, None] * self.along)
+            taken = np.concatenate([taken, (curve_gain * np.sqrt(freed))[:, None] * self.along])
+        matrix = self.matrix - taken.T @ taken
         return matrix, float(np.log1p(run_gain**2 * squares).sum() - np.log(freed).sum())
 
     def covariance(self, run_gain: float, curve_gain: float) -> FloatArray:
