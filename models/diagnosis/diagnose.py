@@ -44,7 +44,7 @@ def diagnose(
     except IndeterminateError as lacking:
         return insufficient(str(lacking), design)
     of_gain, of_sizes = rng.spawn(2)
-    raw = tuple(record for record in raw_evidence(campaign) if record.effect not in without)
+    raw = raw_evidence(campaign, without)
     posterior = posterior_of(baseline, raw, without)
     problem = posterior.problem
     judgement = judge(posterior)

@@ -18,7 +18,6 @@ from scipy.special import erfcx
 from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
-from models.diagnosis.effects.catalogue import Column, columns_at_rows
 from models.diagnosis.effects.effect import log_amplitude_peak
 from models.diagnosis.effects.fitted_effect import (
     discrepancy_factors,
@@ -39,7 +38,7 @@ from models.gaussian_evidence import independent, log_gain, log_gain_alone, log_
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """About one fit [nats, up to one constant]: `whole` with the templates' errors; `structure` by axis what smooth
-    structure adds to it, and `patterns` its likeliest form [N] Nm; `screened` are the given columns projected off the fit,
+    structure adds to it, and `patterns` its likeliest form [N] Nm; `screened` are the given changes projected off the fit,
     one for each scatter of the gains; `misfit` is χ²/N, what is left of the residual when the templates' errors and
     structure on all axes, at its largest size, have taken their part, near 1 where that is noise."""
 
@@ -50,14 +49,14 @@ class Evidence:
     misfit: float
 
 
-def evidence_of(problem: FitProblem, fitted: Fit, columns: Sequence[Column] = (), *, smooth: bool = True) -> Evidence:
-    """The evidence about a fit, with `columns` of the catalogue projected beside it for the screen of one thing more, and
-    smooth structure beside it unless not wanted."""
+def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = None, *, smooth: bool = True) -> Evidence:
+    """The evidence about a fit, with changes [N, m] Nm `beside` it projected for the screen of one thing more, and smooth
+    structure beside it unless not wanted."""
     design = problem.design
     contrasts = contrasts_of(design, fitted.prediction) if smooth else no_contrasts(design)
     factors, own = template_errors(design, fitted)
     changes = (
-        columns_at_rows(design, fitted.prediction, columns),
+        np.zeros((design.torque.size, 0)) if beside is None else beside,
         contrasts.columns,
         off_by(design, fitted, factors),
     )

@@ -12,7 +12,7 @@ NEGLIGIBLE of the posterior; the promise errs by a share SLACK of the leader's l
 its parts, from where it has the rest. Structure is refitted as an effect is, its likeliest form taken off: judged linearly
 it looked 7.5 nats strong where it was a false lead. It draws no random numbers.
 
-The linear screen refits nothing,
+The linear screen refits nothing, and takes the changes about nothing at work for all,
 
     promise = ln Σ_g Σ_s p(g) p(shape) ∫ p(data | a; g) p(a) da - the same without the effect        [nats]
 
@@ -22,11 +22,13 @@ summed over; those that it does not (a change point, which torque is meant) are 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import expit
 
+from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.effects.catalogue import BY_SLUG, Column, columns_at_rows, columns_of, effects_for
 from models.diagnosis.effects.effect import SCALES, Kind, Shape
@@ -40,7 +42,7 @@ from models.diagnosis.explanations.verdict import LINE, LINES, NOTHING, OUTLIER,
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, refit, refit_beside
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import Projected
+from models.diagnosis.pooled_fit.projection import Projected, without_likely_gains
 from models.diagnosis.raw_records.evidence import RawEvidence
 from models.gaussian_evidence import log_gain_alone, log_positive, log_sum
 
@@ -168,8 +170,8 @@ class Search:
         effects = effects_for(facts, without)
         self._raw = {r.effect: r.log_evidence for r in raw if r.effect in BY_SLUG and not is_vibration(r)}
         self.problem = self._null_problem = baseline.problem
-        self._columns = _shown(self.problem, baseline.fit, columns_of([*effects, *FAULTS], facts))
-        null = self._node(baseline.fit, (), ())
+        self._columns, self._changes = _shown(self.problem, baseline.fit, columns_of([*effects, *FAULTS], facts))
+        null = self._node(baseline.fit, (), (), self._changes, smooth=True)
         if null is None:
             raise ArithmeticError("the baseline's evidence is not finite")
         shown = {column.effect.slug for column in self._columns}
@@ -182,13 +184,14 @@ class Search:
         if best is not None and best.promise > 0.0:  # the gains that suit the best, for the metric of all refits
             likely = null.evidence.screened[best.gain]
             self.problem = baseline.problem.with_noise(likely.noise(baseline.problem.noise))
-            again = self._node(fit(self.problem, baseline.fit.laws), (), ())
+            again = self._node(fit(self.problem, baseline.fit.laws), (), (), self._changes, smooth=True)
             if again is not None and again.log_evidence > null.log_evidence:
                 null, self._null_problem = again, self.problem
         self.nodes: dict[Alternative, list[Node]] = {NOTHING: [null]}
         self.refits = 0
         self._promises: dict[tuple[Alternative, Shape], tuple[float, Node, Start | None]] = {}
         self._failed = set[Alternative]()
+        self._unscreened = set[Alternative]()
         self._nearest: dict[tuple[Alternative, Shape], tuple[float, float]] = {}
         self._promise(NOTHING, null)
 
@@ -220,7 +223,8 @@ class Search:
             for axis in nodes[0].evidence.structure:
                 beside = Alternative(alternative.causes, axis)
                 if beside not in self.nodes:
-                    logs = [node.log_evidence + node.evidence.structure[axis] for node in nodes]
+                    screened = [node for node in nodes if node.evidence.structure]
+                    logs = [node.log_evidence + node.evidence.structure[axis] for node in screened]
                     out[beside] = log_sum(logs) + self.prior(beside)
         return out
 
@@ -240,6 +244,11 @@ class Search:
             weights = self.weights()
             leader = max(self.nodes, key=lambda alternative: weights[alternative])
             slack = criteria.SLACK * max(weights[leader] - weights[NOTHING], 0.0)
+            least = weights[leader] - slack + np.log(criteria.NEGLIGIBLE)
+            near = {one for one in self._unscreened if leader.unknown or weights[one] > least}
+            if near:
+                self._screen(near)
+                continue
             hopes = {key: self._hope(key, leader, slack) for key in self._promises}
             key = max(hopes, key=lambda key: hopes[key])
             if hopes[key] < log_sum(list(weights.values())) + np.log(criteria.NEGLIGIBLE):
@@ -260,6 +269,16 @@ class Search:
                 best[key[0]] = key
         for key in best.values():
             self._take(key)
+
+    def _screen(self, alternatives: set[Alternative]) -> None:
+        """What smooth structure and the catalogue promise beside single causes, or nothing, that were refitted."""
+        for alternative in sorted(alternatives):
+            first, *others = self.nodes[alternative]
+            evidence = evidence_of(self.problem, first.fit, self._changes)
+            self.nodes[alternative] = [replace(first, evidence=evidence), *others]
+            if alternative != NOTHING:
+                self._promise(alternative, self.nodes[alternative][0])
+        self._unscreened -= alternatives
 
     def _take(self, key: tuple[Alternative, Shape]) -> None:
         """Refit what was promised."""
@@ -291,6 +310,7 @@ class Search:
             effects = tuple(e for k, e in enumerate(node.fit.effects) if k != place)
             shape_evidence = tuple(x for k, x in enumerate(node.shape_evidence) if k != place)
             self._add(leader.without(effect.effect.slug), node.fit, effects, shape_evidence, -np.inf)
+        self._screen({leader.without(effect.effect.slug) for effect in node.fit.effects} & self._unscreened)
 
     def _add(
         self,
@@ -300,8 +320,7 @@ class Search:
         shape_evidence: tuple[float, ...],
         promise: float,
     ) -> None:
-        """One refit more of an alternative; the better one of each kind of shapes is kept. A first single effect promises
-        what may stand beside it."""
+        """One refit more of an alternative; the better one of each kind of shapes is kept."""
         fitted = refit(self.problem, start.laws, effects)
         node = None if fitted is None else self._node(fitted, alternative.causes, shape_evidence)
         if node is None:
@@ -313,22 +332,29 @@ class Search:
         if same is None or node.log_evidence > same.log_evidence:
             kept = [node, *(other for other in before if other is not same)]
             self.nodes[alternative] = sorted(kept, key=lambda node: -node.log_evidence)
-        if first and len(effects) == 1 and alternative.causes:
-            self._promise(alternative, node)
+        if first and len(effects) < 2 and not alternative.unknown:
+            self._unscreened.add(alternative)
 
     def _add_structure(self, alternative: Alternative, parent: Node, promise: float) -> None:
         """Structure on an axis beside a parent, about the baseline that leaves its likeliest form."""
         axis = alternative.unknown
         fitted = refit_beside(self.problem, parent.fit, parent.evidence.patterns[axis])
-        node = None if fitted is None else self._node(fitted, alternative.causes, parent.shape_evidence)
+        node = None if fitted is None else self._node(fitted, alternative.causes, parent.shape_evidence, smooth=True)
         if node is not None and axis in node.evidence.structure:
             value = node.log_evidence + node.evidence.structure[axis]
             self.nodes[alternative] = [replace(node, log_evidence=value, promise=promise)]
 
-    def _node(self, fitted: Fit, causes: tuple[str, ...], shape_evidence: tuple[float, ...]) -> Node | None:
-        """A fit with its evidence; single effects with the catalogue projected beside them."""
-        single = len(fitted.effects) < 2
-        evidence = evidence_of(self.problem, fitted, self._columns if single else (), smooth=single)
+    def _node(
+        self,
+        fitted: Fit,
+        causes: tuple[str, ...],
+        shape_evidence: tuple[float, ...],
+        beside: FloatArray | None = None,
+        *,
+        smooth: bool = False,
+    ) -> Node | None:
+        """A fit with its evidence."""
+        evidence = evidence_of(self.problem, fitted, beside, smooth=smooth)
         value = evidence.whole + sum(shape_evidence)
         if not np.isfinite(value):
             return None
@@ -371,10 +397,11 @@ class Search:
                 promise = min(self._nearest[key][1], most)
                 weights[key[0]] = float(np.logaddexp(weights.get(key[0], -np.inf), promise))
         null = self.null
-        swinging = {record.effect: record.log_evidence for record in raw if record.effect in LINES}
-        for unknown, value in {LINE: lines(self._null_problem, null.fit.residual).evidence, **swinging}.items():
+        left = without_likely_gains(self._null_problem, null.fit)
+        swinging = [(record.effect, record.log_evidence) for record in raw if record.effect in LINES]
+        for unknown, value in [(LINE, lines(self._null_problem, left).evidence), *swinging]:
             line = Alternative((), unknown)
-            weights[line] = null.log_evidence + value + self.prior(line)
+            weights[line] = max(null.log_evidence + value + self.prior(line), weights.get(line, -np.inf))
         outlier = Alternative((), OUTLIER)
         weights[outlier] = outlier_evidence(self._null_problem, null.fit) + self.prior(outlier)
         facts = self.problem.design.facts
@@ -407,11 +434,13 @@ class Search:
         )
 
 
-def _shown(problem: FitProblem, fitted: Fit, columns: Sequence[Column]) -> list[Column]:
-    """The columns of effects that change a reading: without loops no delay does, without a clock no drift along it."""
+def _shown(problem: FitProblem, fitted: Fit, columns: Sequence[Column]) -> tuple[list[Column], FloatArray]:
+    """The columns of effects that change a reading, with their changes [N, m]: without loops no delay does, without a clock
+    no drift along it."""
     changes = columns_at_rows(problem.design, fitted.prediction, columns)
     shown = {column.effect.slug for column, change in zip(columns, changes.T, strict=True) if change.any()}
-    return [column for column in columns if column.effect.slug in shown]
+    kept = [column.effect.slug in shown for column in columns]
+    return list(compress(columns, kept)), changes[:, kept]
 
 
 def is_vibration(record: RawEvidence) -> bool:
@@ -423,4 +452,4 @@ def posterior_of(baseline: Baseline, raw: Sequence[RawEvidence], without: frozen
     """Search the explanations of a baseline's campaign; effects `without` are not in the catalogue."""
     search = Search(baseline, raw, without)
     search.run()
-    return search.posterior([record for record in raw if record.effect not in without], without)
+    return search.posterior(raw, without)

@@ -13,7 +13,7 @@ and its law, order or frequency, how long the phase is kept, below which speed):
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -50,14 +50,17 @@ class RawEvidence:
     note: str
 
 
-def raw_evidence(campaign: Campaign) -> tuple[RawEvidence, ...]:
-    """What the raw records of a campaign show; nothing where there are none or they are too slow or too short."""
+def raw_evidence(campaign: Campaign, without: frozenset[str] = frozenset()) -> tuple[RawEvidence, ...]:
+    """What the raw records of a campaign show; nothing where there are none or they are too slow or too short. A swing of a
+    kind that the catalogue is `without` has no name."""
     stationary = [(run, run.record) for run in campaign.stationary if run.record is not None]
     cuts = [(record, _cut(record)) for _, record in _evenly(stationary)]
     dwells = [(record, cut) for record, cut in cuts if cut is not None]
     records = [whitened_record(record, np.stack([cut.start, cut.stop], axis=1)) for record, cut in dwells]
     records += [whitened_record(record) for _, record in _evenly([(run, run.record) for run in campaign.dynamic])]
-    return (*_lines([record for record in records if record is not None]), *_unsettled(dwells))
+    swings = _lines([record for record in records if record is not None])
+    nameless = [replace(swing, effect=FIXED_LINE) if swing.effect in without else swing for swing in swings]
+    return (*nameless, *(_unsettled(dwells) if UNSETTLED_DWELL.slug not in without else ()))
 
 
 def _evenly(runs: Sequence[tuple[Run, Record]]) -> Sequence[tuple[Run, Record]]:

@@ -8,17 +8,22 @@ import numpy as np
 import pytest
 
 from models.arrays import FloatArray
+from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.design.autocorrelation import Correlation
 from models.diagnosis.design.design import SPEED, TORQUE, Design, Points, build_design
 from models.diagnosis.explanations import contrasts
 from models.diagnosis.explanations.contrasts import contrasts_of
 from models.diagnosis.explanations.evidence import evidence_of, structure_gain
+from models.diagnosis.explanations.posterior import posterior_of
 from models.diagnosis.explanations.shapeless import HighestLine, lines
+from models.diagnosis.explanations.verdict import LINE, Alternative
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.noise.estimate import first_noise
+from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.diagnosis.pooled_fit.problem import FitProblem, Priors
 from models.diagnosis.pooled_fit.projection import gram_of, project
 from models.friction.stribeck import torque
+from tests.models.diagnosis import campaigns
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import Study, study
 
@@ -115,6 +120,26 @@ def test_pauses_and_odd_runs_do_not_hide_a_swing(design: Design, noise: Noise) -
         assert raised(line_of(replace(design, rows=replace(rows, clock=clock)), noise, residual))
     standing = replace(design, rows=replace(rows, clock=np.zeros_like(rows.clock)))
     assert not raised(line_of(standing, noise, residual))
+
+
+def test_gains_of_curves_one_after_the_other_are_no_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every pressure of every run has a gain of its own, at even times; a swing beside them stays one."""
+    monkeypatch.setattr(campaigns, "PRESSURES", np.linspace(4e5, 7e5, 8))
+
+    def with_gains(run: StationaryRun, dice: np.random.Generator, swing: float) -> StationaryRun:
+        at = run.plateaus
+        clock = 5.0 * np.arange(at.torque.size)
+        gains = np.repeat(1 + 0.0015 * dice.standard_normal(np.unique(at.pressure).size), np.unique(at.speed).size)
+        swings = 1 + swing * np.sin(2 * np.pi * clock / 90.0 + run.cycles)
+        return replace(run, plateaus=replace(at, torque=at.torque * gains * swings))
+
+    quiet = campaign(1, loops=False, noise=0.001)
+    weights = []
+    for swing in (0.0, 0.002):
+        dice = np.random.default_rng(3)  # one draw of eight that looked like a line, by 91 nats
+        given = replace(quiet, stationary=tuple(with_gains(run, dice, swing) for run in quiet.stationary))
+        weights.append(posterior_of(fit_baseline(build_design(given)), ()).weights[Alternative((), LINE)])
+    assert weights[0] < 0.0 < 10.0 < weights[1]
 
 
 def test_too_few_plateaus_show_no_line() -> None:
