@@ -137,7 +137,9 @@ def test_a_plate_as_cold_as_the_oil_was_not_heated_whatever_else_is_hidden() -> 
     for planted, cause in ((PLANTED["hydrodynamic_drag"], "hydrodynamic_drag"), (heated, None)):
         report = look(with_plate(campaign(7, planted), 0.0))
         assert HEATING not in report.causes
-        assert all(each.effect != HEATING for each in report.candidates)
+        assert all(
+            each.effect != HEATING or each.probability < 0.02 for each in report.candidates
+        )  # that of any second
         assert cause is None or report.causes == (cause,)
 
 
