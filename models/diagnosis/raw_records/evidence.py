@@ -114,7 +114,7 @@ def _fixed_line(records: list[WhitenedRecord], order: Line | None) -> tuple[Line
 def _line_evidence(effect: str, line: Line, name: str, note: str) -> RawEvidence:
     # λ goes with A², so log L near its maximum has a curvature of about 4 log L / A²
     deviation = line.amplitude / max(2.0 * math.sqrt(max(line.peak, 0.0)), 1.0)
-    estimate = Estimate(name=name, value=line.amplitude, sd=deviation, unit="Nm")
+    estimate = Estimate(name=name, value=line.amplitude, sd=deviation, unit="Nm", one_sided=True)
     return RawEvidence(effect=effect, log_evidence=line.evidence, estimate=estimate, note=note)
 
 
@@ -126,5 +126,6 @@ def _unsettled(dwells: list[tuple[Record, PlateauCut]]) -> list[RawEvidence]:
         return []
     seconds = f"{settling.time_constant:.2g} s"
     note = f"after each step torque settles from the side of the last level, with a time constant of {seconds}"
-    estimate = Estimate(name="settling time constant", value=settling.time_constant, sd=settling.deviation, unit="s")
+    constant, deviation = settling.time_constant, settling.deviation
+    estimate = Estimate(name="settling time constant", value=constant, sd=deviation, unit="s", one_sided=True)
     return [RawEvidence(effect=UNSETTLED_DWELL.slug, log_evidence=settling.evidence, estimate=estimate, note=note)]

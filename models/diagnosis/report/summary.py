@@ -18,6 +18,7 @@ from models.diagnosis.explanations.decide import smallest
 from models.diagnosis.explanations.shapeless import ADVICE
 from models.diagnosis.explanations.verdict import UNCATALOGUED, Verdict, probabilities_by_slug
 from models.diagnosis.pooled_fit.projection import RunScatter
+from models.diagnosis.raw_records.evidence import FIXED_LINE
 from models.diagnosis.report.report import Candidate, Misfit, Report, Visible
 from models.diagnosis.validation.held_out import Gain
 
@@ -108,7 +109,7 @@ def number(value: float) -> str:
     """Three digits, without an exponent where that is readable."""
     if 100 <= abs(value) < 1e6:
         return _signed(f"{value:,.0f}")
-    return _signed(f"{value:.3g}") if value == 0 or 1e-3 <= abs(value) < 100 else f"{value:.2e}"
+    return _signed(f"{value:.3g}") if value == 0 or 1e-4 <= abs(value) < 100 else f"{value:.2e}"
 
 
 def _signed(text: str) -> str:
@@ -350,18 +351,17 @@ def _either(parts: Sequence[str]) -> str:
 def _unexplained(report: Report) -> list[Sentence]:
     unknown = sum(item.probability for item in report.explanations if UNCATALOGUED in item.effects)
     resembles = f" It most resembles {report.resembles}." if report.resembles else ""
-    return [
-        Sentence(
-            f"The model is wrong in a way that no effect of the catalogue explains (probability {probability(unknown)}), so "
-            f"no cause is named.{resembles}"
-        ),
-        Sentence(_error(report)),
-        *_gained(report),
-        Sentence(
-            "Next: repeat one of these tests at once. If the error is gone, it came from one run; if it stays, look for "
-            f"what depends on {_axes(report.baseline) or 'the rig'}."
-        ),
-    ]
+    first = Sentence(
+        f"The model is wrong in a way that no effect of the catalogue explains (probability {probability(unknown)}), so "
+        f"no cause is named.{resembles}"
+    )
+    again = "Next: repeat one of these tests at once. If the error is gone, it came from one run; if it stays, look for"
+    swings = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{FIXED_LINE}: ")]
+    if swings and _axes(report.baseline).startswith(axis_name(FREQUENCY)):
+        found = [Sentence(f"In the raw records {swing}") for swing in swings]
+        return [first, *found, Sentence(f"{again} what turns, or is driven, at this frequency.")]
+    where = _axes(report.baseline) or "the rig"
+    return [first, Sentence(_error(report)), *_gained(report), Sentence(f"{again} what depends on {where}.")]
 
 
 def _error(report: Report) -> str:
@@ -372,7 +372,8 @@ def _error(report: Report) -> str:
     error = f"The baseline is off by {number(misfit.rmse)} Nm RMS"
     where = _axes(misfit)
     if misfit.rmse <= misfit.noise:
-        return f"{error}, as much as noise alone gives, but in a pattern{f' that depends on {where}' if where else ''}."
+        pattern = f", but in a pattern that depends on {where}" if where else ""
+        return f"{error}, as much as noise alone gives{pattern}."
     rest = f"; the rest depends on {where}" if where else ""
     return f"{error}, where noise alone gives {number(misfit.noise)} Nm{rest}."
 
@@ -424,8 +425,10 @@ def _hardest(gain: Gain, extended: Misfit | None) -> str:
 def _next(report: Report) -> list[Sentence]:
     """The first test of the plan, and what it is good for."""
     if not report.advice:
-        nothing = "No test in the plan would tell much more; the extended model can be adopted."
-        return [] if report.extension is None else [Sentence(nothing)]
+        if report.extension is not None:
+            return [Sentence("No test in the plan would tell much more; the extended model can be adopted.")]
+        look = "Next: look for it at the rig."
+        return [Sentence(look)] if report.verdict is Verdict.CAUSE_NAMED and report.gain is None else []
     best = report.advice[0]
     if best.narrows:
         left = f"its uncertainty falls to {100 * best.narrows:.0f} %"

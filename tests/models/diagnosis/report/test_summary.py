@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from models.diagnosis.criteria import MAX_WORDS
+from models.diagnosis.design.design import FREQUENCY
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.experiments.candidates import TRIALS, Step
@@ -309,6 +310,21 @@ def test_an_error_as_large_as_noise_is_not_called_correlated_along_cycles() -> N
     assert "as much as noise alone gives, but in a pattern that depends on oil temperature and cycles." in summarise(
         found
     )
+
+
+def test_a_swing_without_a_name_is_said_as_what_it_is() -> None:
+    """The paragraph sent an engineer to look for what depends on frequency, and gave the gain of a smooth correction."""
+    misfit = replace(MISFIT, where=(Where(axis=FREQUENCY, strength=40.0), *MISFIT.where))
+    notes = ("fixed_line: torque swings at 12.5 Hz at all speeds alike.",)
+    said = summarise(replace(findings(Verdict.UNEXPLAINED_STRUCTURE), baseline=misfit, notes=notes))
+    assert "In the raw records torque swings at 12.5 Hz at all speeds alike." in said
+    assert said.endswith("look for what turns, or is driven, at this frequency.")
+    assert "On left-out runs" not in said
+
+
+def test_a_cause_that_no_test_measures_better_is_to_be_looked_for() -> None:
+    found = replace(findings(Verdict.CAUSE_NAMED, "shaft_ripple"), advice=(), gain=None)
+    assert summarise(found).endswith("Next: look for it at the rig.")
 
 
 def test_notes_on_single_runs_stay_in_the_report() -> None:
