@@ -109,12 +109,13 @@ class _Channels:
         self.friction = _friction(slip, per_pascal, rows)
 
     def initial_speed(self) -> Estimate:
-        """The speed at contact: the mean over a quarter of the slip's duration before it, else what the slip begins with."""
+        """The speed at contact: the mean over the quarter of the slip's duration before contact; where fewer than 3 samples
+        lie there, the speed when the slip begins; where that cannot be fitted, the highest speed."""
         slip = self.slip
         before = slip.speed[slip.between(slip.contact - 0.25 * (slip.end.value - slip.contact), slip.contact)]
         if before.size >= 3:
             return Estimate(value=float(before.mean()), sd=float(before.std(ddof=1)) / math.sqrt(before.size))
-        first = self.speed.at(self.speed.low, self.width)
+        first = self.speed.at(self.speed.first_time, self.width)
         return Estimate(value=float(self.speed.values.max()), sd=self.noise(self.speed)) if first is None else first
 
     def moment(self, speed: float) -> float:
@@ -168,8 +169,8 @@ def _energy(slip: Slip, channels: _Channels) -> Estimate:
 def _peak_power(slip: Slip) -> Estimate | None:
     rows = slip.between(slip.contact, slip.end.value)
     power = channel_of(slip.time[rows], (slip.torque * slip.speed)[rows])
-    width = 0.12 * (power.high - power.low)
-    values = [power.at(moment, width) for moment in np.linspace(power.low, power.high, 61).tolist()]
+    width = 0.12 * (power.last_time - power.first_time)
+    values = [power.at(moment, width) for moment in np.linspace(power.first_time, power.last_time, 61).tolist()]
     return max((value for value in values if value is not None), key=lambda value: value.value, default=None)
 
 

@@ -83,32 +83,32 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
-    """A channel over [low, high] s: time [n] s ascending, values [n]; `inflation` f >= 1 of its noise."""
+    """A channel over [first_time, last_time] s: time [n] s ascending, values [n]; `inflation` f >= 1 of its noise."""
 
     time: FloatArray
     values: FloatArray
     inflation: float
 
     @property
-    def low(self) -> float:
-        """The first time [s]."""
+    def first_time(self) -> float:
+        """[s]."""
         return float(self.time[0])
 
     @property
-    def high(self) -> float:
-        """The last time [s]."""
+    def last_time(self) -> float:
+        """[s]."""
         return float(self.time[-1])
 
     def at(self, moment: float, half_width: float) -> Estimate | None:
         """The value at a moment [s] within the channel, by the samples within `half_width` [s] or, at an end, within twice
         that. None where too few lie near."""
-        centre = min(max(moment, self.low + half_width), self.high - half_width)
+        centre = min(max(moment, self.first_time + half_width), self.last_time - half_width)
         distance = np.abs(self.time - centre)
         width = half_width
         if distance.size < FEWEST_LOCAL:
             return None
         width = max(width, float(np.partition(distance, FEWEST_LOCAL - 1)[FEWEST_LOCAL - 1]))
-        if width > max(half_width, 0.25 * (self.high - self.low)):
+        if width > max(half_width, 0.25 * (self.last_time - self.first_time)):
             return None
         rows = distance <= width * (1 + 1e-9)
         return _fitted((self.time[rows] - moment) / width, self.values[rows], self.inflation)

@@ -53,11 +53,11 @@ _BEGUN = np.concatenate(
 )
 
 
-def at_end() -> FloatArray:
-    """The contribution of each stretch of the past to δ(T) and to T δ'(T); [2, PAST]."""
+def value_and_slope_now() -> FloatArray:
+    """What curvature of one deviation on each stretch of the past adds to δ(T), row 0, and to T δ'(T), row 1; [2, PAST]."""
     gain = _GAIN[:PAST]
-    left = 1.0 - _EDGES[:PAST] - 0.5 * _LENGTHS[:PAST]
-    return np.asarray(np.stack([gain * _LENGTHS[:PAST] * left, gain * _LENGTHS[:PAST]]))
+    from_middle = 1.0 - _EDGES[:PAST] - 0.5 * _LENGTHS[:PAST]
+    return np.asarray(np.stack([gain * _LENGTHS[:PAST] * from_middle, gain * _LENGTHS[:PAST]]))
 
 
 def columns(history: History) -> FloatArray:

@@ -54,12 +54,10 @@ class History:
         """The deviations of these steps, as shares of the size of the quantity [e]."""
         return step_sizes(self.epoch, self.new_levels, prior.step_size)
 
-    def relative(self, prior: Prior) -> FloatArray:
-        """The square of every value over the quantity's size [t]: what scatter that is a share of the value grows with.
-
-        The measured value stands for the true one, which is off by scatter squared.
-        """
-        return np.asarray(prior.relative(self.value))
+    def relative_squared(self, prior: Prior) -> FloatArray:
+        """(value / size)² of every run [t]: the factor on the scatter's variance where scatter is a share of the value. The
+        measured value stands in for the true one, which on average makes the factor too large by the scatter squared."""
+        return np.asarray(prior.relative_squared(self.value))
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The columns by name."""

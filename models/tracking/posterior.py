@@ -121,7 +121,7 @@ class Posterior:
         """The variance of the scatter from run to run at a value, by draw [n]."""
         if self.proportional is None:
             return np.square(self.scatter)
-        return np.asarray(np.square(self.scatter) * np.where(self.proportional, prior.relative(value), 1.0))
+        return np.asarray(np.square(self.scatter) * np.where(self.proportional, prior.relative_squared(value), 1.0))
 
     def taken(self, index: NDArray[np.intp], weight: FloatArray) -> "Posterior":
         """The draws at `index`, with new weights."""

@@ -67,8 +67,8 @@ class Prior:
         """How large the quantity is, in its unit."""
         return max(abs(self.initial_mean), self.initial_sd)
 
-    def relative(self, value: FloatArray | float) -> FloatArray:
-        """The square of a value over the size, any shape: what the variance of scatter that is a share of it grows with."""
+    def relative_squared(self, value: FloatArray | float) -> FloatArray:
+        """(value / size)² of any shape, at least 0.01: the factor on the variance of scatter that is a share of it."""
         return np.maximum(np.square(np.asarray(value) / self.size), 0.01)  # values may cross zero
 
     def to_array(self) -> FloatArray:

@@ -147,18 +147,18 @@ def _artefact(extension: Extension, run: StationaryRun, before: Campaign) -> Flo
 
 
 def model_in_force(extension: Extension | None, life: Life | None, geometry: Geometry) -> ModelInForce:
-    """What an extension (None: the baseline) changes in the tracking of a life."""
+    """What an extension changes in the tracking of a life; nothing where none is adopted or no run has begun a life."""
     if extension is None or life is None:
         return ModelInForce()
     return ModelInForce(
         name={"name": "extended", "effects": list(extension.effects)},
         weights=tuple(extension.weights.tolist()),
-        course=course_of(extension, life, geometry),
+        course=added_course(extension, life, geometry),
         severity_exponent=extension.severity_exponent,
     )
 
 
-def course_of(extension: Extension, life: Life, geometry: Geometry) -> Course | None:
+def added_course(extension: Extension, life: Life, geometry: Geometry) -> Course | None:
     """Mean COF [d, m] that the effects of use add at cycles since new [m] at a pressure [Pa], 0 = the reference pressures.
 
     None where they add nothing at any of many cycles, where they make no number of one of them, or no test has set a

@@ -98,23 +98,25 @@ def _comparison(run: IncomingRun, row: dict[str, Any], capacity: Capacity, geome
     at = trace_times(slip)
     columns = {"pressure_bar": slip.pressure, "speed_rpm": slip.speed, "torque_nm": slip.torque}
     means = {name: bin_means(slip.time, column, at) for name, column in columns.items()}
-    beside = discrepancy(engagement, capacity, geometry.mean_radius)
+    found = discrepancy(engagement, capacity, geometry.mean_radius)
     return {
         "run_id": row["run_id"],
         "cycles": row["cycles"],
         "channels": public_channels({"time_s": at - slip.contact} | means),
-        "model": None if beside is None else _beside(beside, slip.contact),
+        "model": None if found is None else _model_part(found, slip.contact),
     }
 
 
-def _beside(beside: Discrepancy, contact: float) -> dict[str, Any]:
-    difference = beside.stop_time_difference
+def _model_part(found: Discrepancy, contact: float) -> dict[str, Any]:
+    """The model's engagement from the measured one's conditions, and how far the measured one is from it, in the public
+    shape."""
+    difference = found.stop_time_difference
     return {
-        "channels": _course(beside.trace, contact),
-        "inertia_kg_m2": beside.drive.inertia,
-        "motor_torque_limit_nm": beside.drive.limit,
-        "stop_time_s": beside.simulated_stop_time,
-        "torque_discrepancy": beside.torque_share,
+        "channels": _course(found.trace, contact),
+        "inertia_kg_m2": found.drive.inertia,
+        "motor_torque_limit_nm": found.drive.limit,
+        "stop_time_s": found.simulated_stop_time,
+        "torque_discrepancy": found.torque_share,
         "stop_time_difference_s": None if difference is None else difference.value,
         "stop_time_difference_sd_s": None if difference is None else difference.sd,
     }

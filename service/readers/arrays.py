@@ -18,7 +18,7 @@ from service.errors import InvalidError, Notice
 from service.readers.clocks import UNITS, stated_clock
 from service.readers.column_names import column_of, known_channel, recognised
 from service.readers.limits import Limits
-from service.readers.table import Clock, Column, Reading, Table, only
+from service.readers.table import Clock, Column, Reading, Table, index_of_wanted
 from service.readers.unit_table import is_unit
 
 _DATA = ("data", "values", "value", "y", "samples")
@@ -63,10 +63,10 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
     sources = list(_sources(_paired(tree), "", 0, {}))
     groups = tuple(dict.fromkeys(source.column.group for source in sources))
     if reading.table:
-        chosen = groups[only(groups, reading.table, "group")]
+        chosen = groups[index_of_wanted(groups, reading.table, "group")]
         sources = [source for source in sources if source.column.group == chosen]
     elif len(knowing := _complete(sources)) > 1:
-        only(knowing, "", "group")
+        index_of_wanted(knowing, "", "group")
     if not sources:
         hint = (
             f": only MATLAB can read {', '.join(unread[:10])}. Save the channels as arrays, or as a struct of arrays"

@@ -30,7 +30,7 @@ from service.readers.limits import Limits
 from service.readers.long_table import says_valid, valid_rows, widened
 from service.readers.no_values import refuse_stand_ins, without_stated, without_totals
 from service.readers.numerals import empty_cells, plain, read_cells
-from service.readers.table import NO_MISSING, NO_TIME, Clock, Column, Reading, Table, labels, marks, only
+from service.readers.table import NO_MISSING, NO_TIME, Clock, Column, Reading, Table, index_of_wanted, labels, marks
 
 #: The code of the notice that lists unused columns.
 LEFT_OUT = "columns_left_out"
@@ -127,7 +127,7 @@ def _one_table(columns: dict[str, FloatArray], table: Table, reading: Reading) -
         if all(0 < steps[row - 1] < _LONGEST_PAUSE * np.median(steps) for row in table.breaks):
             return columns, 0
     wanted = reading.table if table.breaks and reading.table != table.name else ""
-    number = only(tables, wanted, "table")
+    number = index_of_wanted(tables, wanted, "table")
     return {name: column[starts[number] : starts[number + 1]] for name, column in columns.items()}, starts[number]
 
 

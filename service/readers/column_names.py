@@ -422,17 +422,20 @@ def _may_be_time(column: Column) -> bool:
 
 
 def no_unit(columns: Sequence[tuple[str, Column]], reading: Reading) -> InvalidError:
-    """The error of columns whose units nobody states, with the one map that takes all of them for the channels' own."""
+    """The error of columns that state no unit. It ends with the `map=` to add if all of them are in their channels' own
+    units."""
     errors = []
     for channel, column in columns:
         message = f"{channel} (column {column.shown()!r}): the unit must be stated ({spellings(channel)})"
         errors.append(FieldError(pointer=f"/channels/{channel}", code="missing_unit", message=message))
     named = {channel: choice.column for channel, choice in reading.mapping.items()}
     titles = {channel: column.title or column.shown() for channel, column in columns}
-    way = ",".join(f"{channel}:{title}" for channel, title in {**named, **titles}.items())
-    own = ", ".join(CHANNELS[channel].unit for channel in titles)
+    map_argument = ",".join(f"{channel}:{title}" for channel, title in {**named, **titles}.items())
+    own_units = ", ".join(CHANNELS[channel].unit for channel in titles)
     message = "; ".join(error.message for error in errors)
-    return InvalidError(f"{message}, in brackets or in a unit row. If the unit is {own}, add map={way}", errors=errors)
+    return InvalidError(
+        f"{message}, in brackets or in a unit row. If the unit is {own_units}, add map={map_argument}", errors=errors
+    )
 
 
 def remedy(columns: Sequence[Column]) -> str:

@@ -72,7 +72,7 @@ def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, re
         return
     column = plain(values)
     with np.errstate(over="ignore"):  # 1e308 less -1e308 is far enough
-        value = _stand_in(column, steady=name == "time_s")
+        value = _stand_in(column, unbounded=name == "time_s")
     if value is None:
         return
     row = int(np.argmax(column == value))
@@ -88,8 +88,9 @@ def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, re
     raise InvalidError.of(message, code="no_value", pointer=f"/channels/{name}/{row}", row=row + 1, value=shown)
 
 
-def _stand_in(column: FloatArray, *, steady: bool) -> float | None:
-    """A value of a column [n] that stands for none; `steady`: values may go on for as long as they like, as times do."""
+def _stand_in(column: FloatArray, *, unbounded: bool) -> float | None:
+    """A value of a column [n] that stands for none; `unbounded`: values may grow for as long as a record lasts, as times
+    do."""
     finite = np.isfinite(column)
     held = column if finite.all() else column[finite]
     if held.size < 2:
@@ -97,13 +98,13 @@ def _stand_in(column: FloatArray, *, steady: bool) -> float | None:
     outermost = float(held.min()), float(held.max())
     usual = float(np.median(np.abs(held[:: max(1, held.size // _MAX_SAMPLED)])))
     if not any(map(_nines, outermost)) and max(map(abs, outermost)) < _FAR_NINES * usual:
-        return None if steady else _jumped_to(held, *outermost)  # no value is far off by any rule
+        return None if unbounded else _jumped_to(held, *outermost)  # no value is far off by any rule
     ends = sorted(_ends(held, np.min) | _ends(held, np.max), key=abs, reverse=True)
     others = held[~np.isin(held, [end for end in ends if _nines(end)])]
     for end in ends:
         nines = _nines(end)
         apart = others if nines else others[np.abs(others) < abs(end)]
-        if apart.size < 2 or (steady and not nines):
+        if apart.size < 2 or (unbounded and not nines):
             continue
         low, high = apart.min(), apart.max()
         scale = max(-low, high)
@@ -113,7 +114,7 @@ def _stand_in(column: FloatArray, *, steady: bool) -> float | None:
         far = min(far, _FAR_NINES) if below and not common else far
         if 0 < far * scale <= max(low - end, end - high):
             return end
-    return None if steady else _jumped_to(held, *outermost)
+    return None if unbounded else _jumped_to(held, *outermost)
 
 
 def _ends(held: FloatArray, end_of: Callable[[FloatArray], Any]) -> set[float]:

@@ -16,7 +16,7 @@ from service.readers.column_names import parse_map
 from service.readers.detect import Format, members, opened, sniff, unpacked
 from service.readers.limits import LIMITS, Limits
 from service.readers.preview import preview
-from service.readers.table import Reading, only
+from service.readers.table import Reading, index_of_wanted
 from service.readers.text import read_text
 
 #: Files of an archive that are tried, to find the one that holds channels. Chosen; a rig's folder of one test has few.
@@ -81,4 +81,4 @@ def _in_archive(path: Path, reading: Reading, limits: Limits, answer: sandbox.An
             refused.append(error)
     if not records and len(refused) == 1:
         raise refused[0]
-    return list(records.values())[only(list(records) or names, "", "file")]
+    return list(records.values())[index_of_wanted(list(records) or names, "", "file")]

@@ -132,10 +132,10 @@ def labels(above: Sequence[Sequence[str]]) -> dict[str, str]:
     return values_by_label
 
 
-def only(names: Sequence[str], wanted: str, kind: str) -> int:
-    """The index of the table that is read among those of a file, by name or by number from 1.
+def index_of_wanted(names: Sequence[str], wanted: str, kind: str) -> int:
+    """The index in `names` of the table to read: the one `wanted` by name or by number from 1, else the only one.
 
-    Raises InvalidError where none is named and there are several, or the named one is not there.
+    Raises InvalidError where that leaves none or several; `kind` is what the message calls one (sheet, group).
     """
     if wanted:
         if wanted in names:

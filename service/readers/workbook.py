@@ -18,7 +18,7 @@ from service.readers.column_names import named_columns, recognised
 from service.readers.detect import check_archive
 from service.readers.grid import MAX_ROWS, DataRows, Layout, find_table, no_table, table_in, turned, was_turned
 from service.readers.limits import Limits
-from service.readers.table import Reading, Table, only
+from service.readers.table import Reading, Table, index_of_wanted
 
 
 def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
@@ -32,7 +32,9 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     named = named_columns(reading)
     if reading.table or len(sheets) == 1:
         sheet, _, number = reading.table.rpartition("/")  # of tables below each other on a sheet
-        sheets = [sheets[only(sheets, sheet if sheet in sheets and number.isdecimal() else reading.table, "sheet")]]
+        sheets = [
+            sheets[index_of_wanted(sheets, sheet if sheet in sheets and number.isdecimal() else reading.table, "sheet")]
+        ]
     tables: dict[str, tuple[list[Sequence[Any]], Layout]] = {}
     refused: list[InvalidError] = []
     on_side: set[str] = set()
@@ -50,7 +52,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         raise refused[0]
     visible = {sheet.name for sheet in book.sheets_metadata if sheet.visible == SheetVisibleEnum.Visible}
     tables = {name: held for name, held in tables.items() if name in visible} or tables
-    name = list(tables)[only(list(tables) or sheets, "", "sheet")]
+    name = list(tables)[index_of_wanted(list(tables) or sheets, "", "sheet")]
     table = _table(name, *tables[name], tuple(sheets), limits)
     return replace(table, notices=[*table.notices, was_turned()]) if name in on_side else table
 

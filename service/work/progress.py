@@ -32,14 +32,14 @@ def progress(console: Console, title: str) -> Iterator[Advance]:
 
             yield advance_bar
         return
-    done, all_of, shown_at = 0, None, time.monotonic()
+    done, expected, shown_at = 0, None, time.monotonic()
 
     def advance_line(count: int = 1, *, total: int | None = None) -> None:
-        nonlocal done, all_of, shown_at
-        done, all_of = done + count, all_of if total is None else total
+        nonlocal done, expected, shown_at
+        done, expected = done + count, expected if total is None else total
         if time.monotonic() - shown_at >= LINE_SECONDS:
             shown_at = time.monotonic()
-            of_all = "" if all_of is None else f" of {all_of}"
-            console.print(f"{title}: {done}{of_all}", markup=False, soft_wrap=True)
+            out_of = "" if expected is None else f" of {expected}"
+            console.print(f"{title}: {done}{out_of}", markup=False, soft_wrap=True)
 
     yield advance_line

@@ -298,7 +298,7 @@ def _one_as_asked(database: Database, loaded: _Loaded, request: _Request) -> Run
 def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     """The run at other cycles: accepted where it is plausible there, else held."""
     row, sent_cycles = loaded.row, loaded.row.cycles if loaded.row.sent_cycles is None else loaded.row.sent_cycles
-    others = _others(loaded)
+    others = _state_without_these(loaded)
     sent = replace(loaded.reader(database).read(row.run_id), cycles=cycles)
     event = loaded.event.at(cycles)
     event = replace(event, cofs=cofs_among(others, event, loaded.levels.get(row.run_id, ())))
@@ -318,7 +318,8 @@ def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     )
 
 
-def _others(loaded: _Loaded) -> ClutchState:
+def _state_without_these(loaded: _Loaded) -> ClutchState:
+    """The clutch's state without the runs that are being changed, whether they were accepted or held."""
     return replace(
         loaded.state,
         events=_without(loaded.state.events, loaded.events),
@@ -333,7 +334,7 @@ def _together(others: ClutchState, incoming: Event | None, changed: Sequence[Eve
 
 def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
     """What becomes of the other runs; the runs themselves are as they were asked for, these of them `accepted`."""
-    others = _others(loaded)
+    others = _state_without_these(loaded)
     for event in accepted:
         cofs = cofs_among(others, event, loaded.levels.get(event.run_id, ()))
         others = replace(others, events=order([*others.events, replace(event, cofs=cofs, confirmed=True)]))
@@ -342,7 +343,7 @@ def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
 
 def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _Changed:
     """All that follows from the runs as they are to be."""
-    before, others = loaded.state, _others(loaded)
+    before, others = loaded.state, _state_without_these(loaded)
     pairs = [(row, event.at(row.cycles)) for row, event in zip(rows, loaded.events, strict=True)]
     own = [event for row, event in pairs if row.state == runs.ACCEPTED]
     out = [event for row, event in pairs if row.state != runs.ACCEPTED]

@@ -236,15 +236,15 @@ def ends_of(target: FloatArray, keep: FloatArray) -> FloatArray:
 
 
 def followed(target: FloatArray, points: Points, settling: float) -> FloatArray:
-    """The mean over each plateau [P] of what approaches its target [P] in `settling` s, from what the one before left; loops
-    stay as they are."""
+    """The mean over each plateau [P] of a quantity that relaxes to that plateau's target [P] with the time constant
+    `settling` [s], beginning at what the plateau before ended with. A run's first plateau and loops are at their target."""
     follows = np.flatnonzero(points.previous >= 0)  # each follows the point just before it
     before = points.previous[follows]
-    ratio = np.maximum(points.clock[follows] - points.clock[before], 1e-6) / settling
+    durations = np.maximum(points.clock[follows] - points.clock[before], 1e-6) / settling  # in time constants
     keep = np.zeros(points.previous.size)
-    keep[follows] = np.exp(-ratio)
+    keep[follows] = np.exp(-durations)
     out = target.copy()
-    out[follows] += (ends_of(target, keep)[before] - target[follows]) * (1.0 - keep[follows]) / ratio
+    out[follows] += (ends_of(target, keep)[before] - target[follows]) * (1.0 - keep[follows]) / durations
     return out
 
 

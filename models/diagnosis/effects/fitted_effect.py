@@ -136,13 +136,13 @@ def drawn_change(drawn: FittedEffect, scene: Scene, ranges: Ranges) -> FloatArra
 
 def ranges_of(rows: Points) -> Ranges:
     """The ranges over which a campaign's rows vary."""
-    return {along: (float(values.min()), float(np.ptp(values))) for along, values in _along(rows).items()}
+    return {along: (float(values.min()), float(np.ptp(values))) for along, values in _coordinates(rows).items()}
 
 
 def factors_at(points: Points, effect: Effect, ranges: Ranges) -> FloatArray:
     """φ [P, m] at points, each within ±1, along what the effect's form is uncertain in and a campaign varied; beyond its
     range that at its end."""
-    values, factors = _along(points), list[FloatArray]()
+    values, factors = _coordinates(points), list[FloatArray]()
     for discrepancy in effect.discrepancies:
         low, width = ranges[discrepancy]
         if width > 0:
@@ -154,7 +154,7 @@ def factors_at(points: Points, effect: Effect, ranges: Ranges) -> FloatArray:
 def small_factors_at(points: Points, ranges: Ranges) -> FloatArray:
     """φ [P, m] within ±1 at points: smooth factors over every axis that a campaign varied, by which any template may be a
     little wrong; beyond its range that at its end."""
-    values, factors = _along(points), [np.zeros((points.run.size, 0))]
+    values, factors = _coordinates(points), [np.zeros((points.run.size, 0))]
     for along, orders in _SMALL.items():
         low, width = ranges[along]
         if width > 0:
@@ -167,7 +167,8 @@ def small_factors_at(points: Points, ranges: Ranges) -> FloatArray:
     return np.concatenate(factors, axis=1)
 
 
-def _along(points: Points) -> dict[Discrepancy, FloatArray]:
+def _coordinates(points: Points) -> dict[Discrepancy, FloatArray]:
+    """Where each point lies [P] on every axis along which an effect's form may be uncertain."""
     return {
         Discrepancy.SPEED: points.velocity,
         Discrepancy.PRESSURE: points.pressure,

@@ -106,10 +106,13 @@ def _over_the_laws(design: Design, prediction: Prediction) -> tuple[list[FloatAr
 
 
 def _axis(s: int, p: int, z: int) -> str:
-    """The axis on which a product of waves of these orders in speed, pressure and life lives."""
-    if s > max(p, z) + 1 or not (p or z):
+    """The axis under which a product of waves of orders s, p, z in speed, pressure and life is reported: speed where it is
+    alone or two orders above both others; else pressure where it takes part (beside life alone from order 2 on); else
+    life."""
+    if (p, z) == (0, 0) or s >= max(p, z) + 2:
         return SPEED
-    return PRESSURE if p > (1 if z and not s else 0) else CYCLES
+    least = 2 if s == 0 and z > 0 else 1
+    return PRESSURE if p >= least else CYCLES
 
 
 def no_contrasts(design: Design) -> Contrasts:

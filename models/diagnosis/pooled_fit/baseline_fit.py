@@ -256,5 +256,7 @@ def _notes(design: Design, assumed: bool) -> tuple[str, ...]:
             "seen here: test more speeds."
         )
     if not design.facts.temperature_measured:
-        notes.append("No oil temperature was measured, so a slow change of it may look like another cause: measure it.")
+        notes.append(
+            "No oil temperature was measured, so a slow change of it may look like another cause: measure it in every test."
+        )
     return tuple(notes)

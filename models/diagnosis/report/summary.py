@@ -221,18 +221,22 @@ def _unseen(report: Report) -> list[Sentence]:
 
 
 def _shown(visible: Visible) -> str:
-    """The smallest sizes that show, `a torque zero shift from 0.64 Nm (11.3 Nm in its least visible form)`."""
+    """The smallest sizes that show, `a torque zero shift from 0.64 Nm (from 11 Nm in its least visible form)`."""
     name = _with_article(visible.effect)
     if visible.unit == "-":
         name = f"{BY_SLUG[visible.effect].amplitude} of {effect_name(visible.effect)}"
-    hardest = "its least visible form never"
+    hardest = "not at all in the least visible form"
     if math.isfinite(visible.amplitude):
-        hardest = f"{_amount(visible.amplitude, visible.unit)}{_HARDEST_FORM}"
-    return f"{name} from {_amount(visible.least, visible.unit)} ({hardest})"
+        hardest = f"from {_threshold(visible.amplitude, visible.unit)}{_HARDEST_FORM}"
+    return f"{name} from {_threshold(visible.least, visible.unit)} ({hardest})"
 
 
 def _amount(value: float, unit: str) -> str:
     return with_unit(number(value), unit)
+
+
+def _threshold(value: float, unit: str) -> str:
+    return with_unit(number(float(f"{value:.2g}")), unit)
 
 
 def _scatter(scatter: RunScatter | None) -> str:
@@ -355,7 +359,7 @@ def _unexplained(report: Report) -> list[Sentence]:
         f"The model is wrong in a way that no effect of the catalogue explains (probability {probability(unknown)}), so "
         f"no cause is named.{resembles}"
     )
-    again = "Next: repeat one of these tests at once. If the error is gone, it came from one run; if it stays, look for"
+    again = "Next: repeat the last test at once. If the error is gone, it came from one run; if it stays, look for"
     swings = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{FIXED_LINE}: ")]
     if swings and _axes(report.baseline).startswith(axis_name(FREQUENCY)):
         found = [Sentence(f"In the raw records {swing}") for swing in swings]
@@ -401,9 +405,10 @@ def _gained(report: Report) -> list[Sentence]:
     if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         return sentences
     better, then = "better", "lets the effect go on developing"
+    may = " and can be adopted" if report.extension is not None else ""
     if not gain.forecast_log_score_gain > 0:
-        better, then = "no better", "leaves the effect's development out"
-    ahead = f"From the earlier tests, {model} predicts the last ones {better} than the baseline."
+        better, then, may = "no better", "leaves the effect's development out", ""
+    ahead = f"From the earlier tests, {model} predicts the last ones {better} than the baseline{may}."
     adoptable = () if report.extension is None else report.extension.effects
     if any(BY_SLUG[slug].kind is Kind.COURSE for slug in adoptable):
         ahead += f" If you adopt it, the predicted remaining life {then}."
@@ -431,8 +436,9 @@ def _next(report: Report) -> list[Sentence]:
         return [Sentence(look)] if report.verdict is Verdict.CAUSE_NAMED and report.gain is None else []
     best = report.advice[0]
     if best.narrows:
-        left = f"its uncertainty falls to {100 * best.narrows:.0f} %"
-        return [Sentence(f"Next, to measure the {effect_name(best.effect)} better: {brief_test(best)}; {left}.")]
+        left = f"its uncertainty falls by {100 * (1 - best.narrows):.0f} %"
+        amplitude = BY_SLUG[best.effect].amplitude
+        return [Sentence(f"Next, to measure the {amplitude} better: {brief_test(best)}; {left}.")]
     first = "No single test would decide. The best" if best.nats < criteria.WORTHWHILE else "Next"
     hardest = f"hardest to tell apart: {_cause_name(best.effect)} and {_cause_name(best.other)}"
     if best.other == BASELINE:

@@ -46,7 +46,7 @@ from models.tracking.courses import (
     place_of,
 )
 from models.tracking.criteria import DOMAIN, FORGET, MAX_OVER, OUTLIER
-from models.tracking.discrepancy import PAST, at_end, drawn
+from models.tracking.discrepancy import PAST, drawn, value_and_slope_now
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState, log_likelihood_of, table_of
 from models.tracking.history import History
@@ -159,7 +159,8 @@ def measured(
 
 @cache
 def _standard_points(dimension: int) -> tuple[FloatArray, FloatArray]:
-    """filterpy's sigma points of a standard normal [2 d, d] with their weights [2 d], without the centre, which has none."""
+    """filterpy's 2 d sigma points of a standard normal of d numbers [2 d, d] and their weights [2 d]. Its first point, the
+    centre, is left out: its weight is 0."""
     from filterpy.kalman import MerweScaledSigmaPoints  # start-up time
 
     points = MerweScaledSigmaPoints(dimension, alpha=1.0, beta=0.0, kappa=0.0)
@@ -347,7 +348,7 @@ class Ukf:
             progress=measurement.progress,
             value=measurement.value,
             variance=float(history.variance[-1]),
-            relative=float(history.relative(prior)[-1]),
+            relative=float(history.relative_squared(prior)[-1]),
         )
         step = stepped(prior, state.normals, way)
         log_weight = state.log_weight + step.log_likelihood
@@ -383,7 +384,7 @@ class Ukf:
         change = (at_reference - initial) / progress_fraction(state.reference, scale, exponent)
         ends = np.stack([beside[0], beside[1] * history.span / state.reference])
         sizes = FORM_SIZE[form]
-        course = np.where(sizes[:, None] > 0.0, (np.linalg.pinv(at_end()) @ ends).T, 0.0)
+        course = np.where(sizes[:, None] > 0.0, (np.linalg.pinv(value_and_slope_now()) @ ends).T, 0.0)
         heights = np.stack(beside[2:], axis=1) if len(beside) > 2 else np.zeros((size, 0))
         weight = np.where((scale < 0.0) & (-scale <= history.span), 0.0, 1.0)
         weight = weight if weight.any() else np.ones(size)
@@ -465,7 +466,7 @@ def _beside(draws: Posterior, steps: int) -> tuple[FloatArray, FloatArray]:
     beside = draws.discrepancy
     if beside is None:
         return np.zeros((draws.weight.size, 2)), np.zeros((draws.weight.size, steps))
-    return beside.curvature[:, :PAST] @ at_end().T, beside.height
+    return beside.curvature[:, :PAST] @ value_and_slope_now().T, beside.height
 
 
 def _moments(points: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,6 +1,7 @@
 """The doubts about runs, in words: what is odd, the value, the expected value, the likely mistake, and what to do.
 
-Some doubts concern a run by itself, the others come from a joint judgement over all runs.
+Some doubts concern a run by itself, the others come from a joint judgement over all runs. A file whose columns state no
+unit, or one that is not known, is refused before: `service.readers.column_names`.
 
 Dead channels are found in a run by itself, and nothing that other runs show takes them back. All else is one question,
 `models.plausibility.judgement`, asked again whenever a run comes in or is changed.

@@ -13,6 +13,7 @@ import asyncio
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager, nullcontext
+from typing import Literal
 
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
@@ -228,12 +229,12 @@ class ServerDatabase(Database):
 
     def migrate(self) -> None:
         """Make the tables of an empty database, or run the steps that it lacks, not under a running service."""
-        in_use = self._is_in_use()
-        if in_use is None:
+        found = self._to_migrate()
+        if found is None:
             return
         try:
             with (
-                migration_lock(self._address, self._lock_timeout) if in_use else nullcontext(),
+                migration_lock(self._address, self._lock_timeout) if found == "older" else nullcontext(),
                 self.writing() as connection,
             ):
                 revision = current(connection)  # another process may have been before
@@ -245,16 +246,19 @@ class ServerDatabase(Database):
                     connection.execute(commits.insert().values(number=0))
         except ServiceRuns:
             # the service that runs may be the one that was before, and has nothing left to do
-            if self._is_in_use() is not None:
+            if self._to_migrate() is not None:
                 raise
 
-    def _is_in_use(self) -> bool | None:
-        """Whether services may use the database, which lacks a step; None where it lacks none."""
+    def _to_migrate(self) -> Literal["empty", "older"] | None:
+        """What a migration would find: an empty database; an older one, which a service may be using at this moment; None
+        where nothing is to do. Raises where the database's text is not UTF-8."""
         with self.reading() as connection:
             _require_utf8(connection, self.name)
             revision = current(connection)
             has_server_tables = set(sa.inspect(connection).get_table_names()) >= set(server_tables.tables)
-        return None if revision == head() and has_server_tables else revision is not None
+        if revision == head() and has_server_tables:
+            return None
+        return "empty" if revision is None else "older"
 
 
 def open_server(address: sa.URL, *, lock_timeout: float, serving: bool = False) -> ServerDatabase:

@@ -111,6 +111,8 @@ class FileWatch(Watch):
         return self.snapshots([question])[0]
 
     def _snapshot(self, version: int, question: Question) -> Snapshot:
+        """What the rest of a request relies on: whether keys are needed, what its key grants, its clutch's revision, all at
+        one `version` of the file."""
         any_key = self._row(_ANY_KEY)
         key = None if question.secret_sha256 is None else self._row(_KEY, question.secret_sha256)
         revision = None if question.clutch_id is None else self._row(_REVISION, question.clutch_id)

@@ -16,7 +16,7 @@ from models.diagnosis.extension import Extension, NotFiniteError
 from models.rig.campaign import planned, simulated_clutch
 from models.rig.programme import Ageing
 from models.rig.stationary import Sensor
-from service.run_files.plan_file import planned_tests
+from service.run_files.planned_tests import planned_tests
 from service.run_files.simulated import simulated_body
 from service.schemas.diagnosis import DiagnosisListed, DiagnosisOut, JobPage, ModelOut, PlanOut
 from service.work.queue import MAX_ATTEMPTS

@@ -196,14 +196,14 @@ def test_what_these_data_would_show_is_said_with_units_zero_and_pressure_first()
     shown = tuple(visible(slug, size) for slug, size in (*sizes.items(), ("torque_zero_shift", 12.0)))
     said = summarise(replace(found, visible=shown))
     assert (
-        "These data would show, in nine of ten cases, a torque zero shift from 3 Nm (6 Nm in its least visible form), "
-        "a pressure offset from 0.075 bar (0.15 bar) and unfinished running in from "
+        "These data would show, in nine of ten cases, a torque zero shift from 3 Nm (from 6 Nm in its least visible form), "
+        "a pressure offset from 0.075 bar (from 0.15 bar) and unfinished running in from "
     ) in said
     assert "These data cannot show, at any size: channel delay and stick slip." in said
     said = summarise(replace(found, visible=(visible("oil_temperature", 4.0),)))
-    assert "viscosity exponent β of oil temperature from 1.4 (2.8 in its least visible form)." in said
+    assert "viscosity exponent β of oil temperature from 1.4 (from 2.8 in its least visible form)." in said
     some = replace(visible("pressure_offset", 3.0), amplitude=math.inf, least=0.1)  # seen in one of its shapes alone
-    assert "a pressure offset from 0.1 bar (its least visible form never)." in summarise(
+    assert "a pressure offset from 0.1 bar (not at all in the least visible form)." in summarise(
         replace(found, visible=(some,))
     )
 
@@ -282,9 +282,9 @@ def test_a_test_of_many_words_is_put_into_a_short_line() -> None:
     advice = replace(found.advice[0], test=TRIALS["all_loads_and_60c"].text, steps=(sweep, swing), narrows=0.3)
     said = summarise(replace(found, advice=(advice,)))
     assert (
-        "Next, to measure the oil change better: stationary tests at 0.75 to 1.8 bar, 20 to 1,970 rpm, and dynamic "
-        "tests at 0.3 Hz, 0.75 to 1.8 bar, up to 2,000 rpm, also at 60 °C (steps in the report); its uncertainty falls "
-        "to 30 %."
+        "Next, to measure the viscous step better: stationary tests at 0.75 to 1.8 bar, 20 to 1,970 rpm, "
+        "and dynamic tests at 0.3 Hz, 0.75 to 1.8 bar, up to 2,000 rpm, also at 60 °C (steps in the report); its "
+        "uncertainty falls by 70 %."
     ) in said
     opened = (replace(sweep, pressures=(0.0, 75e3)), replace(swing, pressures=(0.0,), speeds=(0.0, 209.34)))
     said = summarise(replace(found, advice=(replace(advice, steps=opened),)))
