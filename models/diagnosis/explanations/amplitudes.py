@@ -114,7 +114,11 @@ def _along_amplitude(
     low, high = middle - _REACH * left**-0.5, middle + _REACH * left**-0.5
     steps = np.unique([*np.linspace(low.min(), high.max(), _WIDE), *np.linspace(low[1], high[1], _NEAR)])
     if fitted.effect.positive:
-        steps = np.array([-fitted.amplitude, *steps[steps > -fitted.amplitude]])
+        least = -fitted.amplitude
+        inside = steps[steps > least]
+        if inside.size == 0:  # the data ask for less than none: what falls off from there
+            inside = least + _REACH * np.linspace(0.0, 1.0, _NEAR)[1:] / (left * (least - middle)).min()
+        steps = np.array([least, *inside])
     squared = np.square(1.0 + steps / fitted.amplitude)[:, None]
     gain = squared * np.square(fixed - sloped * steps[:, None]) / (1 + squared * values) - np.log1p(values)
     logs = score[0] * steps - 0.5 * info[0, 0] * np.square(steps) + 0.5 * gain.sum(axis=1)

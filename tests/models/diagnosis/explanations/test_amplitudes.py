@@ -60,3 +60,14 @@ def test_an_effect_does_not_vanish_while_what_is_in_proportion_to_it_explains_th
     assert normal[0, 0] ** 0.5 == pytest.approx(1.0, abs=0.02)
     found = FITTED.amplitude + np.concatenate(list(at_work.amplitudes(1000, np.random.default_rng(0))))
     assert np.mean(np.abs(found) < 0.5) < 0.002  # 0.06 of a normal
+
+
+def test_what_falls_off_from_no_effect_at_all_is_integrated() -> None:
+    """Of a drag whose data ask for far less than none no step was left, and the diagnosis ended in an error."""
+    drag = replace(FITTED, effect=BY_SLUG["hydrodynamic_drag"], shape=(1.0, 0.0, 0.0, 0.0, 0.0))
+    at_work = given(1e-4, -6.0 * FORM, drag)
+    steps = -drag.amplitude + np.linspace(0.0, 0.2, 20001)
+    logs = at_work.score[0] * steps - 0.5 * at_work.info[0, 0] * np.square(steps)
+    dense = np.log(np.exp(logs - logs[0]).sum() * 1e-5) + logs[0] - 0.5 * np.log(2 * np.pi)
+    assert at_work.log_integral() == pytest.approx(dense, abs=0.15)
+    assert all(0.0 <= drag.amplitude + step[0] < 0.2 for step in at_work.amplitudes(50, np.random.default_rng(0)))
