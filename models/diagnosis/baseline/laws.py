@@ -264,9 +264,10 @@ def gradient_of(velocity: FloatArray, parameters: FloatArray) -> tuple[FloatArra
     return np.stack(columns, axis=-1), decay
 
 
-def scene_of(laws: Laws, points: Points, facts: Facts) -> Scene:
-    """The laws evaluated at the points."""
-    values = laws.parameters(points.pressure, points.cycles)
+def scene_of(laws: Laws, points: Points, facts: Facts, values: FloatArray | None = None) -> Scene:
+    """The laws evaluated at the points, where their parameters may be known as `values` [P, 4]."""
+    if values is None:
+        values = laws.parameters(points.pressure, points.cycles)
     gradient, decay = gradient_of(points.velocity, values)
     gradient *= points.engaged[:, None]
     falling = gradient[:, 2] * values[:, 2] / points.velocity

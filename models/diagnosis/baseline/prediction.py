@@ -150,9 +150,9 @@ def frame_of(design: Design) -> Frame:
     )
 
 
-def predict(design: Design, laws: Laws) -> Prediction:
-    """The torque at every row by the laws."""
-    scene = scene_of(laws, design.points, design.facts)
+def predict(design: Design, laws: Laws, parameters: FloatArray | None = None) -> Prediction:
+    """The torque at every row by the laws, whose parameters at the points [P, 4] may be known."""
+    scene = scene_of(laws, design.points, design.facts, parameters)
     at_points, lag = scene.curve, None
     if design.loops:
         start = design.plateaus

@@ -89,7 +89,8 @@ def law_columns(design: Design, prediction: Prediction, effects: Sequence[Fitted
     before = [effect_rows(design, prediction, one) for one in moving]
     for place, size in enumerate(sizes if moving else ()):
         by = _RAISE * (size or 1.0)
-        raised = predict(design, scene.laws.raised(place, by))
+        parameters = scene.parameters + by * (np.arange(BLOCKS) == place)
+        raised = predict(design, scene.laws.raised(place, by), parameters)
         for one, change in zip(moving, before, strict=True):
             changes[:, place] += (effect_rows(design, raised, one) - change) / by
     return prediction.jacobian(design, changes)
