@@ -192,7 +192,7 @@ class Search:
         self._promises: dict[tuple[Alternative, Shape], tuple[float, Node, Start | None]] = {}
         self._failed = set[Alternative]()
         self._unscreened = set[Alternative]()
-        self._nearest: dict[tuple[Alternative, Shape], tuple[float, float]] = {}
+        self._nearest: dict[Alternative, tuple[float, float]] = {}
         self._promise(NOTHING, null)
 
     @property
@@ -250,15 +250,13 @@ class Search:
                 self._screen(near)
                 continue
             hopes = {key: self._hope(key, leader, slack) for key in self._promises}
-            key = max(hopes, key=lambda key: hopes[key])
-            if hopes[key] < log_sum(list(weights.values())) + np.log(criteria.NEGLIGIBLE):
-                causes = [key for key in hopes if key[0].causes]
-                if not causes or leader.causes or not leader.unknown or any(other.causes for other in self.nodes):
+            enough = log_sum(list(weights.values())) + np.log(criteria.NEGLIGIBLE)
+            able = [key for key in hopes if hopes[key] >= enough]
+            if not able:  # structure leads causes only once one of them was refitted
+                able = [key for key in hopes if key[0].causes]
+                if not able or leader.causes or not leader.unknown or any(other.causes for other in self.nodes):
                     return
-                key = max(
-                    causes, key=lambda key: hopes[key]
-                )  # structure leads causes only once one of them was refitted
-            self._take(key)
+            self._take(max(able, key=lambda key: self._hope(key, leader, 0.0)))
 
     def _single(self) -> None:
         """Each single cause whose best kind is promised to be more probable than nothing: a loud one may be a hundred nats
@@ -380,8 +378,10 @@ class Search:
             more = Alternative(parent.causes, axis)
             if more not in self.nodes:
                 promises[more, ()] = (node.log_evidence + gained + self.prior(more), node, None)
+        for more in dict.fromkeys(more for more, _ in promises):
+            promised = log_sum([value for (other, _), (value, _, start) in promises.items() if other == more and start])
+            self._nearest[more] = max(self._nearest.get(more, (-np.inf, -np.inf)), (node.log_evidence, promised))
         for key, promise in promises.items():
-            self._nearest[key] = max(self._nearest.get(key, (-np.inf, -np.inf)), (node.log_evidence, promise[0]))
             if key not in self._promises or promise[0] > self._promises[key][0]:
                 self._promises[key] = promise
 
@@ -392,10 +392,9 @@ class Search:
         N (s² - 1 - ln s²)/2 nats."""
         weights = self.weights()
         most = max(weights.values())
-        for key, (_, _, start) in self._promises.items():
-            if key[0] not in self.nodes and key[0] not in self._failed and start is not None:
-                promise = min(self._nearest[key][1], most)
-                weights[key[0]] = float(np.logaddexp(weights.get(key[0], -np.inf), promise))
+        for alternative, (_, promised) in self._nearest.items():
+            if alternative not in self.nodes and alternative not in self._failed and not is_axis(alternative.unknown):
+                weights[alternative] = min(promised, most)
         null = self.null
         left = without_likely_gains(self._null_problem, null.fit)
         swinging = [(record.effect, record.log_evidence) for record in raw if record.effect in LINES]

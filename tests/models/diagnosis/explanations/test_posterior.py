@@ -11,7 +11,7 @@ from models.diagnosis.design.design import build_design
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.explanations.decide import decide, explanations_of
-from models.diagnosis.explanations.posterior import Posterior, Prior, posterior_of
+from models.diagnosis.explanations.posterior import Posterior, Prior, Search, posterior_of
 from models.diagnosis.explanations.shapeless import outlying_run, temperature_evidence
 from models.diagnosis.explanations.verdict import (
     LINE,
@@ -30,7 +30,7 @@ from tests.blind.rig.sent import campaign as sent
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import study, warmth
 from tests.models.diagnosis.rehearsals import rehearsal
-from tests.models.diagnosis.test_diagnose import warm
+from tests.models.diagnosis.test_diagnose import PLANTED, warm
 
 # --- The posterior: the same data, the same answer; what is planted leads, what nobody planted does not; ends of the
 # list.
@@ -275,3 +275,15 @@ def test_an_unmeasured_temperature_competes_under_the_scatter_of_gains_that_noth
     hidden = hide((404, 3894774685, 2), ("rest_recovery",), 300.0, loops=True)
     found = posterior_of(fit_baseline(build_design(sent(hidden))), ())
     assert found.weights[Alternative(("rest_recovery",))] > found.weights[Alternative(("oil_temperature",))] + 20.0
+
+
+def test_what_was_not_refitted_counts_as_its_likeliest_parent_promises() -> None:
+    """A film beside inertia was as probable as inertia alone: a film that was 18 nats behind had promised it most."""
+    search = Search(baseline(campaign(1, PLANTED["inertia_torque"])), [], frozenset())
+    search._single()
+    search._screen(search._unscreened)
+    weights = search.posterior([], frozenset()).weights
+    inertia, film = Alternative(("inertia_torque",)), Alternative(("squeeze_film",))
+    assert film in search.nodes
+    assert weights[inertia] > weights[film] + 3.0
+    assert weights[Alternative(("inertia_torque", "squeeze_film"))] < weights[inertia] - 2.0
