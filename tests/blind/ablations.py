@@ -71,7 +71,7 @@ def verdicts(trial: Trial, numbers: Mapping[str, Sequence[object]]) -> dict[str,
     """What is said as it is, and with each value of each number; what a number does not act on is computed once."""
     seen = campaign(trial.hidden())
     design = build_design(seen)
-    raw = tuple(record for record in raw_evidence(seen) if record.effect not in trial.without)
+    raw = raw_evidence(seen, trial.without)
 
     def said(search: Search, began: float) -> Judged:
         judgement = judge(search.posterior(raw, trial.without))

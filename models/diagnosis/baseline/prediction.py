@@ -86,6 +86,8 @@ def _relaxed(keep: FloatArray, mean_keep: FloatArray, target: FloatArray) -> Flo
 def _periodic(keep: FloatArray, gain: FloatArray) -> FloatArray:
     """The periodic y [l, k, m] of y_i = keep_i y_{i-1} + gain_i, keep [l, k], gain [l, k, m]: once around from y = 0, then
     the share of its end that was missing at its start is added. All loops are one system of two diagonals."""
+    if gain.shape[2] == 0:
+        return gain  # LAPACK writes where nothing is
     bands = np.ones((2, keep.size))
     bands[1] = np.append(-keep[:, 1:], np.zeros((keep.shape[0], 1)), axis=1).ravel()
     from_zero, _ = dtbtrs(bands, gain.reshape(keep.size, -1), uplo="L", diag="U")

@@ -115,10 +115,10 @@ def _along_amplitude(
     steps = np.unique([*np.linspace(low.min(), high.max(), _WIDE), *np.linspace(low[1], high[1], _NEAR)])
     if fitted.effect.positive:
         least = -fitted.amplitude
-        inside = steps[steps > least]
-        if inside.size == 0:  # the data ask for less than none: what falls off from there
-            inside = least + _REACH * np.linspace(0.0, 1.0, _NEAR)[1:] / (left * (least - middle)).min()
-        steps = np.array([least, *inside])
+        falls = left * (least - middle)  # how fast both densities fall off from none, where the data ask for less
+        ends = _REACH / np.maximum(falls, np.sqrt(left)) * np.linspace(0.0, 1.0, _NEAR)[1:, None]
+        beyond = (least + ends[:, falls > 0.0]).ravel()
+        steps = np.unique([least, *steps[steps > least], *beyond])
     squared = np.square(1.0 + steps / fitted.amplitude)[:, None]
     gain = squared * np.square(fixed - sloped * steps[:, None]) / (1 + squared * values) - np.log1p(values)
     logs = score[0] * steps - 0.5 * info[0, 0] * np.square(steps) + 0.5 * gain.sum(axis=1)

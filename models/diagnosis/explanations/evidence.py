@@ -40,7 +40,7 @@ class Evidence:
     """About one fit [nats, up to one constant]: `whole` with the templates' errors; `structure` by axis what smooth
     structure adds to it, and `patterns` its likeliest form [N] Nm; `screened` are the given changes projected off the fit,
     one for each scatter of the gains; `misfit` is χ²/N, what is left of the residual when the templates' errors and
-    structure on all axes, at its largest size, have taken their part, near 1 where that is noise."""
+    structure on all axes, at its largest size, have taken their part (where it was wanted), near 1 where that is noise."""
 
     whole: float
     structure: Mapping[str, float]

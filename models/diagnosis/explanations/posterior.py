@@ -23,7 +23,7 @@ summed over; those that it does not (a change point, which torque is meant) are 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.special import expit
@@ -89,6 +89,12 @@ def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str
     return {slug: sorted(by_kind, key=lambda start: -start.promise) for slug, by_kind in by_effect.items()}
 
 
+#: By slug, in order, the shapes of an alternative's effects that a refit does not move; an alternative that is promised, in
+#: one of them.
+Kinds: TypeAlias = tuple[tuple[str, Shape], ...]
+Key: TypeAlias = tuple[Alternative, Kinds]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Node:
     """An alternative that was refitted: its fit, its log evidence [nats] with that of its kind of shapes and of raw records,
@@ -101,7 +107,7 @@ class Node:
     promise: float
 
     @property
-    def kind(self) -> tuple[tuple[str, Shape], ...]:
+    def kind(self) -> Kinds:
         """The shapes that a refit does not move."""
         return tuple(sorted((e.effect.slug, e.effect.stiff(e.shape)) for e in self.fit.effects))
 
@@ -189,7 +195,7 @@ class Search:
                 null, self._null_problem = again, self.problem
         self.nodes: dict[Alternative, list[Node]] = {NOTHING: [null]}
         self.refits = 0
-        self._promises: dict[tuple[Alternative, Shape], tuple[float, Node, Start | None]] = {}
+        self._promises: dict[Key, tuple[float, Node, Start | None]] = {}
         self._failed = set[Alternative]()
         self._unscreened = set[Alternative]()
         self._nearest: dict[Alternative, tuple[float, float]] = {}
@@ -208,6 +214,7 @@ class Search:
             self._up()
             weights = self.weights()
             leader = max(self.nodes, key=lambda alternative: weights[alternative])
+            self._screen({leader} & self._unscreened)  # it may have come to lead by the last refit
             if leader in fallen:
                 return
             fallen.add(leader)
@@ -218,14 +225,15 @@ class Search:
         out: dict[Alternative, float] = {}
         for alternative, nodes in self.nodes.items():
             out[alternative] = self._evidence(alternative) + self.prior(alternative)
-            if len(alternative.causes) > 1 or alternative.unknown:
+            screened = [node for node in nodes if node.evidence.structure]
+            if len(alternative.causes) > 1 or alternative.unknown or not screened:
                 continue
-            for axis in nodes[0].evidence.structure:
+            others = self._evidence(alternative) - log_sum([node.log_evidence for node in screened])
+            for axis in screened[0].evidence.structure:
                 beside = Alternative(alternative.causes, axis)
                 if beside not in self.nodes:
-                    screened = [node for node in nodes if node.evidence.structure]
                     logs = [node.log_evidence + node.evidence.structure[axis] for node in screened]
-                    out[beside] = log_sum(logs) + self.prior(beside)
+                    out[beside] = log_sum(logs) + others + self.prior(beside)
         return out
 
     def _evidence(self, alternative: Alternative) -> float:
@@ -245,7 +253,7 @@ class Search:
             leader = max(self.nodes, key=lambda alternative: weights[alternative])
             slack = criteria.SLACK * max(weights[leader] - weights[NOTHING], 0.0)
             least = weights[leader] - slack + np.log(criteria.NEGLIGIBLE)
-            near = {one for one in self._unscreened if leader.unknown or weights[one] > least}
+            near = {one for one in self._unscreened if not leader.causes or weights[one] > least}
             if near:
                 self._screen(near)
                 continue
@@ -261,7 +269,7 @@ class Search:
     def _single(self) -> None:
         """Each single cause whose best kind is promised to be more probable than nothing: a loud one may be a hundred nats
         better than it was screened, for the screen is linear about a baseline that has absorbed a part of it."""
-        best: dict[Alternative, tuple[Alternative, Shape]] = {}
+        best: dict[Alternative, Key] = {}
         for key, (promise, _, _) in sorted(self._promises.items(), key=lambda item: item[1][0]):
             if len(key[0].causes) == 1 and not key[0].unknown and promise > self.null.log_evidence:
                 best[key[0]] = key
@@ -278,7 +286,7 @@ class Search:
                 self._promise(alternative, self.nodes[alternative][0])
         self._unscreened -= alternatives
 
-    def _take(self, key: tuple[Alternative, Shape]) -> None:
+    def _take(self, key: Key) -> None:
         """Refit what was promised."""
         promise, parent, start = self._promises.pop(key)
         self.refits += 1
@@ -290,7 +298,7 @@ class Search:
         if key[0] not in self.nodes:
             self._failed.add(key[0])
 
-    def _hope(self, key: tuple[Alternative, Shape], leader: Alternative, slack: float) -> float:
+    def _hope(self, key: Key, leader: Alternative, slack: float) -> float:
         """A promise, less what refits of the same alternative fell short of theirs, and the slack where it explains what the
         leader does in another way."""
         alternative = key[0]
@@ -302,7 +310,9 @@ class Search:
         """The leader with one thing less, from where it has the rest."""
         node = self.nodes[leader][0]
         if is_axis(leader.unknown):
-            self._add(Alternative(leader.causes), node.fit, node.fit.effects, node.shape_evidence, -np.inf)
+            less = Alternative(leader.causes)
+            self._add(less, node.fit, node.fit.effects, node.shape_evidence, -np.inf)
+            self._screen({less} & self._unscreened)
             return
         for place, effect in enumerate(node.fit.effects):
             effects = tuple(e for k, e in enumerate(node.fit.effects) if k != place)
@@ -366,14 +376,15 @@ class Search:
 
     def _promise(self, parent: Alternative, node: Node) -> None:
         """What the screen about a node promises of everything with one thing more; the larger promise stands."""
-        promises: dict[tuple[Alternative, Shape], tuple[float, Node, Start | None]] = {}
+        promises: dict[Key, tuple[float, Node, Start | None]] = {}
         for slug, kinds in starts(self._columns, node.evidence.screened).items():
             more = parent.and_effect(slug)
             if more is None or (parent != NOTHING and more in self.nodes):
                 continue
             for start in kinds:
                 value = node.log_evidence + start.promise + self._by_raw(more.causes, start.promise) + self.prior(more)
-                promises[more, start.column.effect.stiff(start.column.shape)] = (value, node, start)
+                own = (slug, start.column.effect.stiff(start.column.shape))
+                promises[more, tuple(sorted((*node.kind, own)))] = (value, node, start)
         for axis, gained in node.evidence.structure.items():
             more = Alternative(parent.causes, axis)
             if more not in self.nodes:
@@ -448,7 +459,7 @@ def is_vibration(record: RawEvidence) -> bool:
 
 
 def posterior_of(baseline: Baseline, raw: Sequence[RawEvidence], without: frozenset[str] = frozenset()) -> Posterior:
-    """Search the explanations of a baseline's campaign; effects `without` are not in the catalogue."""
+    """Search the explanations of a baseline's campaign; effects `without` are not in the catalogue, and `raw` has none."""
     search = Search(baseline, raw, without)
     search.run()
     return search.posterior(raw, without)

@@ -34,7 +34,7 @@ from models.records.runs import Record
 #: Log likelihood ratio [nats] from which a line or a settling transient counts as evidence. Derived: it pays for the prior
 #: odds of one effect of the catalogue, so that the effect is at work rather than not.
 LEAST_EVIDENCE = math.log((1 / criteria.ANYTHING_WRONG - 1) * len(CATALOGUE) / (1 - criteria.UNCATALOGUED_SHARE))
-#: A line of one frequency at all speeds: structure that is no effect of the catalogue.
+#: A line of one frequency at all speeds, or a swing of a kind that the catalogue lacks: structure without a name.
 FIXED_LINE = "fixed_line"
 
 Run = TypeVar("Run", StationaryRun, DynamicRun)

@@ -97,7 +97,7 @@ def _with_onset(estimate: Estimate, fitted: FittedEffect) -> Estimate:
 
 
 def _finite_estimate(estimate: Estimate) -> Estimate:
-    return Estimate(name=estimate.name, value=_finite(estimate.value), sd=_finite(estimate.sd), unit=estimate.unit)
+    return replace(estimate, value=_finite(estimate.value), sd=_finite(estimate.sd))
 
 
 def with_signs(explanations: Iterable[Explanation], candidates: Iterable[Candidate]) -> tuple[Explanation, ...]:

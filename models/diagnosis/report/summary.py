@@ -363,7 +363,7 @@ def _unexplained(report: Report) -> list[Sentence]:
     swings = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{FIXED_LINE}: ")]
     if swings and _axes(report.baseline).startswith(axis_name(FREQUENCY)):
         found = [Sentence(f"In the raw records {swing}") for swing in swings]
-        return [first, *found, Sentence(f"{again} what turns, or is driven, at this frequency.")]
+        return [first, *found, Sentence(f"{again} what turns, or is driven, like that.")]
     where = _axes(report.baseline) or "the rig"
     return [first, Sentence(_error(report)), *_gained(report), Sentence(f"{again} what depends on {where}.")]
 
@@ -405,7 +405,7 @@ def _gained(report: Report) -> list[Sentence]:
     if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         return sentences
     better, then = "better", "lets the effect go on developing"
-    may = " and can be adopted" if report.extension is not None else ""
+    may = "; it can be adopted" if report.extension is not None else ""
     if not gain.forecast_log_score_gain > 0:
         better, then, may = "no better", "leaves the effect's development out", ""
     ahead = f"From the earlier tests, {model} predicts the last ones {better} than the baseline{may}."
@@ -431,7 +431,7 @@ def _next(report: Report) -> list[Sentence]:
     """The first test of the plan, and what it is good for."""
     if not report.advice:
         if report.extension is not None:
-            return [Sentence("No test in the plan would tell much more; the extended model can be adopted.")]
+            return [Sentence("No test in the plan would tell much more.")]
         look = "Next: look for it at the rig."
         return [Sentence(look)] if report.verdict is Verdict.CAUSE_NAMED and report.gain is None else []
     best = report.advice[0]

@@ -359,10 +359,10 @@ def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
     )
     initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
     drawn = linear_model.drawn_terms(terms, initial - PRIOR_here.initial_mean, change, rng.standard_normal((count, 6)))
-    value_and_slope_now = drawn @ smooth(history.progress, history.span, 6)[-1]
+    at_the_last = drawn @ smooth(history.progress, history.span, 6)[-1]
     mean, covariance = normal(1, CAMPAIGN_here)
     cross = (0.03 * 0.134) ** 2 * dense.integrated(PROGRESS)[-1]
     gain = np.linalg.solve(covariance, cross)
     sd = math.sqrt((0.03 * 0.134) ** 2 * dense.integrated(PROGRESS)[-1, -1] - gain @ cross)
-    assert value_and_slope_now.mean() == pytest.approx(gain @ (history.value - mean), abs=4.0 * sd / math.sqrt(count))
-    assert value_and_slope_now.std() == pytest.approx(sd, rel=0.03)
+    assert at_the_last.mean() == pytest.approx(gain @ (history.value - mean), abs=4.0 * sd / math.sqrt(count))
+    assert at_the_last.std() == pytest.approx(sd, rel=0.03)

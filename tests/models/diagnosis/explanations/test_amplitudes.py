@@ -62,12 +62,15 @@ def test_an_effect_does_not_vanish_while_what_is_in_proportion_to_it_explains_th
     assert np.mean(np.abs(found) < 0.5) < 0.002  # 0.06 of a normal
 
 
-def test_what_falls_off_from_no_effect_at_all_is_integrated() -> None:
-    """Of a drag whose data ask for far less than none no step was left, and the diagnosis ended in an error."""
+@pytest.mark.parametrize("below", [0.5, 3.0, 7.9, 7.99999, 30.0])
+def test_what_falls_off_from_no_effect_at_all_is_integrated(below: float) -> None:
+    """Of a drag whose data ask for so many deviations less than none no step was left, or one in a cell of no width."""
     drag = replace(FITTED, effect=BY_SLUG["hydrodynamic_drag"], shape=(1.0, 0.0, 0.0, 0.0, 0.0))
-    at_work = given(1e-4, -6.0 * FORM, drag)
-    steps = -drag.amplitude + np.linspace(0.0, 0.2, 20001)
+    deviation = float(FORM @ FORM) ** -0.5
+    at_work = given(1e-4, -(drag.amplitude + below * deviation) * FORM, drag)
+    steps = -drag.amplitude + np.linspace(0.0, 10.0 * deviation, 200001)
     logs = at_work.score[0] * steps - 0.5 * at_work.info[0, 0] * np.square(steps)
-    dense = np.log(np.exp(logs - logs[0]).sum() * 1e-5) + logs[0] - 0.5 * np.log(2 * np.pi)
-    assert at_work.log_integral() == pytest.approx(dense, abs=0.15)
-    assert all(0.0 <= drag.amplitude + step[0] < 0.2 for step in at_work.amplitudes(50, np.random.default_rng(0)))
+    dense = np.log(np.exp(logs - logs[0]).sum() * (steps[1] - steps[0])) + logs[0] - 0.5 * np.log(2 * np.pi)
+    assert at_work.log_integral() == pytest.approx(dense, abs=0.2)
+    drawn = [drag.amplitude + step[0] for step in at_work.amplitudes(50, np.random.default_rng(0))]
+    assert all(0.0 <= amplitude < 8.0 * deviation for amplitude in drawn)

@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 from models.diagnosis.diagnose import diagnose
-from models.diagnosis.effects.fitted_effect import Draw
+from models.diagnosis.effects.fitted_effect import Draw, Estimate
 from models.diagnosis.explanations.decide import judge
 from models.diagnosis.explanations.posterior import Posterior, posterior_of
 from models.diagnosis.explanations.sizes import Size, Sizes, sizes_of
 from models.diagnosis.explanations.verdict import Judgement, Verdict
 from models.diagnosis.pooled_fit.gauss_newton import FitStatus
-from models.diagnosis.report.assemble import reason_against, report_of
+from models.diagnosis.raw_records.evidence import RawEvidence
+from models.diagnosis.report.assemble import candidates_of, reason_against, report_of
 from models.diagnosis.report.report import Isolability
+from models.diagnosis.report.summary import signed
 from models.diagnosis.validation.extended_model import Validation
 from models.diagnosis.validation.held_out import Gain
 from tests.models.diagnosis.campaigns import campaign
@@ -140,3 +142,11 @@ def test_pairs_come_hardest_first_and_only_those_get_a_test(sweeps: Isolability)
 
 def test_it_is_computed_on_request_only() -> None:
     assert diagnose(campaign(3, loops=False), rng=np.random.default_rng(0)).isolability is None
+
+
+def test_the_size_of_a_swing_has_no_sign(given: Study) -> None:
+    estimate = Estimate(name="ripple amplitude", value=0.5, sd=0.02, unit="Nm", one_sided=True)
+    raw = (RawEvidence(effect="shaft_ripple", log_evidence=50.0, estimate=estimate, note="it swings"),)
+    found = posterior_of(given.baseline, raw)
+    (ripple,) = (c for c in candidates_of(found.problem, judge(found), raw, {}) if c.effect == "shaft_ripple")
+    assert signed(ripple.estimate) == "ripple amplitude: 0.500 ± 0.020 Nm"
