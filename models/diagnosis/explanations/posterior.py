@@ -8,7 +8,8 @@ records. Their probabilities sum to one, and a verdict is read off them alone.
 
 The search begins with each single cause that is promised to be more probable than nothing, and goes up, best first: what
 the linear screen about a refitted alternative promises of one thing more is refitted, while it could hold more than
-NEGLIGIBLE of the posterior; the promise errs by a share SLACK of the leader's lead. Then down: the leader without each of
+NEGLIGIBLE of the posterior; the promise errs by a share SLACK of the leader's lead, and a single cause that is further
+behind than that is not screened, unless nothing with a name leads. Then down: the leader without each of
 its parts, from where it has the rest. Structure is refitted as an effect is, its likeliest form taken off: judged linearly
 it looked 7.5 nats strong where it was a false lead. It draws no random numbers.
 
