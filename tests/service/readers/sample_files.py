@@ -1,9 +1,10 @@
-"""Writers of small record files in every format, for tests. The packages that write are those of the extras."""
+"""Small record files in every format, written and read. The packages that write are those of the extras."""
 
 import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow  # type: ignore[import-untyped]
@@ -11,6 +12,8 @@ import pyarrow.parquet  # type: ignore[import-untyped]
 from nptdms import ChannelObject, RootObject, TdmsWriter  # type: ignore[import-untyped]
 
 from models.arrays import FloatArray
+from service.readers.channels import Channels
+from service.readers.read_file import read_file, reading_of
 
 UNITS = {"time_s": "s", "pressure_bar": "bar", "speed_rpm": "rpm", "torque_nm": "Nm", "oil_temperature_c": "°C"}
 
@@ -110,3 +113,12 @@ def write_parquet(path: Path, columns: Mapping[str, object], *, units: Mapping[s
     ]
     pyarrow.parquet.write_table(pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields)), path)
     return path
+
+
+def read_content(
+    folder: Path, content: str | bytes, mapping: str | None = None, *, name: str = "a.csv", **options: Any
+) -> Channels:
+    """What a file of that name with this content is read as; `options` of the reading beside its map."""
+    path = folder / "posted"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return read_file(path, filename=name, reading=reading_of(mapping, **options))

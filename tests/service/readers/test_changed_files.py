@@ -117,6 +117,15 @@ def cases(name: str, few: int, many: int) -> list[object]:
     ]
 
 
+def refusal_of(path: Path, name: str) -> ServiceError | None:
+    """Why a changed file is refused, if it is."""
+    try:
+        check_arrays(read_file(path, filename=name, limits=SOON).columns)
+    except (InvalidError, TooLargeError) as error:
+        return error
+    return None
+
+
 def is_of_the_reader(refusal: ServiceError) -> bool:
     """Whether a file was refused because the process that read it took too long or gave no answer.
 
@@ -153,12 +162,10 @@ def test_a_changed_file_is_read_or_refused(
     refused, faults = 0, []
     for index in range(number):
         path.write_bytes(changed(content, rng) if index % 3 else with_a_bit_flipped(content, rng))
-        try:
-            check_arrays(read_file(path, filename=name, limits=SOON).columns)
-        except (InvalidError, TooLargeError) as error:
+        if refusal := refusal_of(path, name):
             refused += 1
-            if is_of_the_reader(error):
-                faults.append(f"file {index}: {error.detail}")
+            if is_of_the_reader(refusal):
+                faults.append(f"file {index}: {refusal.detail}")
     assert faults == []
     assert refused > 0
     # a sum of what it holds is in an archive: nothing that was changed is read
@@ -180,11 +187,9 @@ def test_files_that_are_changed_for_minutes_are_read_or_refused(name: str, tmp_p
     while time.monotonic() < end and len(faults) < 10:
         rng = np.random.default_rng(first + number)
         path.write_bytes(changed(content, rng))
-        try:
-            check_arrays(read_file(path, filename=name, limits=SOON).columns)
-        except (InvalidError, TooLargeError) as error:
-            if is_of_the_reader(error):
-                faults.append(f"seed {first + number}: {error.detail}")
+        refusal = refusal_of(path, name)
+        if refusal and is_of_the_reader(refusal):
+            faults.append(f"seed {first + number}: {refusal.detail}")
         number += 1
     print(f"{number} changed files of {name}")
     assert faults == []

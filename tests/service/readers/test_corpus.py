@@ -7,7 +7,7 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -24,15 +24,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nptdms import ChannelObject, TdmsWriter  # type: ignore[import-untyped]
 
-from models.arrays import FloatArray
 from service.columns import CHANNELS
 from service.errors import InvalidError, TooLargeError
 from service.readers import hdf5 as hdf5_reader
 from service.readers.channels import Channels, to_channels
 from service.readers.limits import LIMITS
-from service.readers.read_file import preview_file, read_file, reading_of
-from service.readers.table import Choice, Reading
+from service.readers.read_file import preview_file, read_file
+from service.readers.table import Reading
 from service.readers.unit_table import UNITS
+from tests.service.readers.sample_files import read_content
 
 ROWS = 12
 TIME = np.round(np.arange(ROWS) * 0.01, 2)
@@ -77,14 +77,9 @@ def grouped(sign: str, decimal: str, quote: str = "") -> str:
 
 
 def stamps(form: str, first: datetime = datetime(2026, 11, 2, 7)) -> str:
-    lines = rows(names=PLATEAUS).splitlines()
     moments = [(first + timedelta(seconds=float(time))).strftime(form) for time in TIME]
-    return (
-        "timestamp,"
-        + ",".join(PLATEAUS)
-        + "\n"
-        + "".join(f"{at},{line}\n" for at, line in zip(moments, lines, strict=True))
-    )
+    lines = [f"{at},{line}" for at, line in zip(moments, rows(names=PLATEAUS).splitlines(), strict=True)]
+    return "\n".join(["timestamp," + ",".join(PLATEAUS), *lines]) + "\n"
 
 
 def long(titles: str, form: str) -> str:
@@ -295,17 +290,13 @@ TEXTS: dict[str, tuple[str | bytes, str | None]] = {
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_text_gives_its_numbers(tmp_path: Path, name: str) -> None:
-    content, mapping = TEXTS[name]
-    path = tmp_path / name
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    require_record(path, reading_of(mapping))
+    assert_record(read_content(tmp_path, *TEXTS[name], name=name))
 
 
-def require_record(path: Path, reading: Reading | None = None) -> None:
-    columns = read_file(path, filename=path.name, reading=reading).columns
-    assert columns.keys() == RECORD.keys()
+def assert_record(read: Channels) -> None:
+    assert read.columns.keys() == RECORD.keys()
     for channel, values in RECORD.items():
-        np.testing.assert_allclose(columns[channel], values, rtol=1e-9, atol=1e-9, err_msg=channel)
+        np.testing.assert_allclose(read.columns[channel], values, rtol=1e-9, atol=1e-9, err_msg=channel)
 
 
 @pytest.mark.parametrize(
@@ -319,11 +310,9 @@ def require_record(path: Path, reading: Reading | None = None) -> None:
 )
 def test_counts_that_can_only_be_one_computers_are_times(tmp_path: Path, first: int, a_second: int, unit: str) -> None:
     lines = [f"{first + round(a_second * t)},{m}\n" for t, m in zip(TIME, RECORD["torque_nm"], strict=True)]
-    (tmp_path / "a.csv").write_text("timestamp,M [Nm]\n" + "".join(lines), encoding="utf-8")
-    read = read_file(tmp_path / "a.csv", filename="a.csv")
-    np.testing.assert_allclose(
-        read.columns["time_s"], TIME, atol=1.3e-5
-    )  # what a float holds of 100 ns since the year 1
+    read = read_content(tmp_path, "timestamp,M [Nm]\n" + "".join(lines))
+    # what a float holds of 100 ns since the year 1
+    np.testing.assert_allclose(read.columns["time_s"], TIME, atol=1.3e-5)
     assert [notice.message for notice in read.notices] == [
         f"timestamp states no unit; its values were read as times in {unit}"
     ]
@@ -331,101 +320,76 @@ def test_counts_that_can_only_be_one_computers_are_times(tmp_path: Path, first: 
 
 def test_a_slower_channel_in_the_same_rows_is_brought_to_their_clock(tmp_path: Path) -> None:
     """As exporters write several rates into one table: cells are empty where the slower channel has no sample."""
+    title = f"{GERMAN};Öltemperatur [°C]"
     lines = [f"{line};{80 + row}" if row % 3 == 0 else f"{line};" for row, line in enumerate(rows(";").splitlines())]
-    (tmp_path / "a.csv").write_text("\n".join([f"{GERMAN};Öltemperatur [°C]", *lines]) + "\n", encoding="utf-8")
-    read = read_file(tmp_path / "a.csv", filename="a.csv")
+    read = read_content(tmp_path, "\n".join([title, *lines]) + "\n")
     np.testing.assert_allclose(read.columns["oil_temperature_c"], 80 + np.minimum(np.arange(ROWS), 9), rtol=1e-12)
     assert [notice.code for notice in read.notices] == ["brought_to_one_clock"]
     lines[5:7] = [line.replace(";", ";;", 1).rpartition(";")[0] for line in lines[5:7]]
-    (tmp_path / "a.csv").write_text("\n".join([f"{GERMAN};Öltemperatur [°C]", *lines]) + "\n", encoding="utf-8")
     with pytest.raises(InvalidError, match=r"pressure_bar\[5\] \(line 7\) must be a number, got '': fill the cell"):
-        read_file(tmp_path / "a.csv", filename="a.csv")
+        read_content(tmp_path, "\n".join([title, *lines]) + "\n")
 
 
 def test_dates_beside_each_channel_are_counted_from_one_moment(tmp_path: Path) -> None:
     dates = [f"2026-11-02 07:00:{t:06.3f};{n};{p};2026-11-02 07:00:{t + 0.02:06.3f};{m}"
              for t, p, n, m in zip(*RECORD.values(), strict=True)]  # fmt: skip
-    titles = "Zeit_n;n [rpm];p [bar];Zeit_M;M [Nm]"
-    (tmp_path / "a.csv").write_text("\n".join([titles, *dates]) + "\n", encoding="utf-8")
-    columns = read_file(tmp_path / "a.csv", filename="a.csv").columns
+    columns = read_content(tmp_path, "\n".join(["Zeit_n;n [rpm];p [bar];Zeit_M;M [Nm]", *dates]) + "\n").columns
     np.testing.assert_allclose(columns["speed_rpm"], RECORD["speed_rpm"][2:], rtol=1e-9)
 
 
 def test_the_time_of_a_table_of_one_value_a_row_is_chosen(tmp_path: Path) -> None:
     text = long("Tag,Start time [ms],Time [s],Value", "{channel},{ms},{t},{value}").replace(",0.0,0.0,", ",9.5,0.0,")
-    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     with pytest.raises(InvalidError, match="got Start time and Time; choose one with time=NAME"):
-        read_file(tmp_path / "a.csv", filename="a.csv")
-    require_record(tmp_path / "a.csv", Reading(time="Time [s]"))
+        read_content(tmp_path, text)
+    assert_record(read_content(tmp_path, text, time="Time [s]"))
 
 
 def test_a_shorter_channel_has_the_times_beside_it(tmp_path: Path) -> None:
-    half = [(f"{t}", f"{p}") for t, p in zip(TIME[::2], RECORD["pressure_bar"][::2], strict=True)] + [("", "")] * (
-        ROWS // 2
-    )
-    lines = [
-        f"{t};{m};{n};{';'.join(slow)}"
-        for (t, _, n, m), slow in zip(zip(*RECORD.values(), strict=True), half, strict=True)
-    ]
-    titles = "Zeit_M [s];M [Nm];n [rpm];Zeit_p [s];p [bar]"
-    (tmp_path / "a.csv").write_text("\n".join([titles, *lines]) + "\n", encoding="utf-8")
-    columns = read_file(tmp_path / "a.csv", filename="a.csv").columns
+    half = [f"{t};{p}" for t, p in zip(TIME[::2], RECORD["pressure_bar"][::2], strict=True)] + [";"] * (ROWS // 2)
+    whole = zip(TIME, RECORD["torque_nm"], RECORD["speed_rpm"], half, strict=True)
+    lines = ["Zeit_M [s];M [Nm];n [rpm];Zeit_p [s];p [bar]", *(";".join(map(str, row)) for row in whole)]
+    columns = read_content(tmp_path, "\n".join(lines) + "\n").columns
     np.testing.assert_allclose(columns["pressure_bar"][:-1], RECORD["pressure_bar"][:-1], rtol=1e-9)
 
 
-REFUSED = {
+REFUSED: dict[str, tuple[str, ...]] = {
     "units-in-cells-that-differ": (
         "t [s];M\n0;21 Nm\n1;22 mNm\n",
-        None,
         "torque_nm[1] (line 3) must be a number in Nm, as in the first row, got '22 mNm'",
     ),
-    "a-unit-in-one-cell": (
-        "t [s];M [Nm]\n0;21\n1;22 Nm\n",
-        None,
-        "torque_nm[1] (line 3) must be a number, got '22 Nm'",
-    ),
+    "a-unit-in-one-cell": ("t [s];M [Nm]\n0;21\n1;22 Nm\n", "torque_nm[1] (line 3) must be a number, got '22 Nm'"),
     "a-unit-in-all-cells-but-one": (
         "t [s];M\n0;21 Nm\n1;22\n",
-        None,
         "torque_nm[1] (line 3) must be a number in Nm, as in the first row, got '22'",
     ),
-    "an-unknown-unit": ("t [s];M [10 Nm]\n0;1\n1;2\n", None, "got '10 Nm'; state it with map=torque_nm:M [UNIT]"),
+    "an-unknown-unit": ("t [s];M [10 Nm]\n0;1\n1;2\n", "got '10 Nm'; state it with map=torque_nm:M [UNIT]"),
     "two-zones": (
         "time;M [Nm]\n2026-10-25 02:59:59 CEST;1\n2026-10-25 02:00:00 CET;2\n",
-        None,
         "in one zone, or each with its offset",
     ),
     "a-factor-in-a-title": (
         "t [s];Torque x10 [Nm]\n0;210\n",
-        "torque_nm:Torque x10 [Nm]",
         "[x0.1 Nm], [x10 Nm] or [x1 Nm]",
+        "torque_nm:Torque x10 [Nm]",
     ),
-    "a-factor-in-a-title-without-a-map": ("t [s];Drehzahl x100 [1/min]\n0;12\n", None, "[x0.01 1/min], [x100 1/min]"),
-    "a-row-of-factors": (
-        "t;M\ns;Nm\nFaktor;1;0,1\n0;210\n1;211\n",
-        None,
-        "are the values already multiplied?",
-    ),
-    "a-factor-behind-a-unit": ("t;M\ns;Nm*10\n0;2.1\n", None, "'Nm*10'"),
-    "two-torques": ("t [s];Torque A1 [Nm];Torque A2 [Nm]\n0;1;2\n", None, "torque_nm must be one column"),
+    "a-factor-in-a-title-without-a-map": ("t [s];Drehzahl x100 [1/min]\n0;12\n", "[x0.01 1/min], [x100 1/min]"),
+    "a-row-of-factors": ("t;M\ns;Nm\nFaktor;1;0,1\n0;210\n1;211\n", "are the values already multiplied?"),
+    "a-factor-behind-a-unit": ("t;M\ns;Nm*10\n0;2.1\n", "'Nm*10'"),
+    "two-torques": ("t [s];Torque A1 [Nm];Torque A2 [Nm]\n0;1;2\n", "torque_nm must be one column"),
     "speeds-of-both-sides": (
         "t [s];p [bar];n inner [rpm];n outer [rpm];M [Nm]\n0;5;520;500;20\n",
-        None,
         "if the columns hold the speeds of both sides, send the difference",
     ),
     "two-torques-understood-in-part": (
         "t [s];p [bar];n [rpm];Torque FZG [Nm];Torque HBM [Nm]\n0;5;100;1;2\n",
-        None,
         "torque_nm must be one column, got Torque FZG and Torque HBM; choose one with map=torque_nm:NAME",
     ),
     "a-clock-in-whole-seconds": (
         "Time,p [bar],n [rpm],M [Nm]\n" + "".join(f"08:00:0{k // 10},5,{k},20\n" for k in range(40)),
-        None,
         "time_s does not advance in 36 of 39 steps: the clock is coarser than the rows",
     ),
     "a-rate-of-more-samples-than-rows": (
         "Sampling rate,1000 Hz\nThinning,1/20\n\n" + ",".join(PLATEAUS) + "\n" + rows(names=PLATEAUS),
-        None,
         "one every 0.001 s, thinning = 1/20. Add a column of times",
     ),
     "a-counter-of-samples": (
@@ -433,70 +397,59 @@ REFUSED = {
         + ",".join(PLATEAUS)
         + "\n"
         + "".join(f"{5 * k},{line}\n" for k, line in enumerate(rows(names=PLATEAUS).splitlines())),
-        None,
         "Index rises by 5 a row",
     ),
     "a-duration-that-contradicts-the-rate": (
         "Sample rate,1000 Hz\nDuration,8 s\nSamples,12\n\n" + ",".join(PLATEAUS) + "\n" + rows(names=PLATEAUS),
-        None,
         "one every 0.001 s, 8 s for 12 samples",
     ),
     "gains-above-a-table": (
         "Channel,Gain,Offset\nPressure,0.001,0\nTorque,0.01,0\n\np [bar],M [Nm]\n3995,1731\n",
-        None,
         "the line 'Gain' holds factors",
     ),
     "two-times-that-differ": (
         "Timestamp;Time (s);M [Nm]\n" + "".join(f"2026-11-02 08:00:0{s};{2 * s};1\n" for s in range(5)),
-        None,
         "got Timestamp and Time (s); choose one with time=NAME",
     ),
-    "german-thousands": ("pressure_bar;speed_rpm;torque_nm\n5;800;21\n5;1.100;21\n", None, "may be 1.1 or 1100"),
-    "american-thousands": ('pressure_bar,speed_rpm,torque_nm\n5,800,21\n5,"1,100",21\n', None, "may be 1.1 or 1100"),
-    "foreign-unit": ("t [s],M [V]\n0,1\n", None, "'V'"),
-    "mapped-foreign-unit": ("t [s],Mz V\n0,1\n", "torque_nm:Mz, V", "but the file has only"),
-    "mapped-unit-of-another": ("t [s];Kraft, kN\n0;1\n", "torque_nm:Kraft, kN", "'kN'"),
-    "turns-or-radians": ("t [s];n [1/s]\n0;1\n", None, "'1/s'"),
-    "decimal-commas-between-commas": (HEAD + "\n0,0,5,0,100,0,20,0\n0,1,5,0,100,0,20,0\n", None, "must have 4 cells"),
-    "ambiguous-dates": ("timestamp,M [Nm]\n01/02/2026 07:00:00,1\n02/02/2026 07:00:00,2\n", None, "day/month"),
-    "hours-or-minutes": ("Zeit,M [Nm]\n07:30,1\n07:31,2\n", None, "must be a number"),
-    "no-titles": ("1,2,3\n4,5,6\n", None, "line 1 must be a header"),
+    "german-thousands": ("pressure_bar;speed_rpm;torque_nm\n5;800;21\n5;1.100;21\n", "may be 1.1 or 1100"),
+    "american-thousands": ('pressure_bar,speed_rpm,torque_nm\n5,800,21\n5,"1,100",21\n', "may be 1.1 or 1100"),
+    "foreign-unit": ("t [s],M [V]\n0,1\n", "'V'"),
+    "mapped-foreign-unit": ("t [s],Mz V\n0,1\n", "but the file has only", "torque_nm:Mz, V"),
+    "mapped-unit-of-another": ("t [s];Kraft, kN\n0;1\n", "'kN'", "torque_nm:Kraft, kN"),
+    "turns-or-radians": ("t [s];n [1/s]\n0;1\n", "'1/s'"),
+    "decimal-commas-between-commas": (HEAD + "\n0,0,5,0,100,0,20,0\n0,1,5,0,100,0,20,0\n", "must have 4 cells"),
+    "ambiguous-dates": ("timestamp,M [Nm]\n01/02/2026 07:00:00,1\n02/02/2026 07:00:00,2\n", "day/month"),
+    "hours-or-minutes": ("Zeit,M [Nm]\n07:30,1\n07:31,2\n", "must be a number"),
+    "no-titles": ("1,2,3\n4,5,6\n", "line 1 must be a header"),
     "words-in-a-column-of-times": (
         "timestamp,M [Nm]\nMon 2 Nov,1\nTue 3 Nov,2\n",
-        None,
         "a time such as 2026-11-02 07:00:00.5",
     ),
-    "absolute-pressure": ("t [s];p [bar(a)]\n0;1\n", None, "'bar(a)'"),
-    "a-sensor's-range-or-a-factor": ("t [s];p [10 bar]\n0;1\n", None, "'10 bar'"),
+    "absolute-pressure": ("t [s];p [bar(a)]\n0;1\n", "'bar(a)'"),
+    "a-sensor's-range-or-a-factor": ("t [s];p [10 bar]\n0;1\n", "'10 bar'"),
     "days-of-a-spreadsheet": (
         "Datum;M [Nm]\n46000.25000012;1\n46000.25000023;2\n",
-        "time_s:Datum",
         "State the unit with map=time_s:Datum [s], or [d]",
+        "time_s:Datum",
     ),
-    "two-tables": ("p [bar],M [Nm]\n5,1\n\nTest 2\np [bar],M [Nm]\n5,2\n", None, "holds 2 tables"),
-    "two-records": (HEAD + "\n" + rows() + "\nTest 2\n" + HEAD + "\n" + rows(), None, "holds 2 tables"),
-    "an-empty-cell": (
-        HEAD + "\n0,5,,20\n",
-        None,
-        "(line 2) must be a number, got '': fill the cell, or add missing=empty",
-    ),
+    "two-tables": ("p [bar],M [Nm]\n5,1\n\nTest 2\np [bar],M [Nm]\n5,2\n", "holds 2 tables"),
+    "two-records": (HEAD + "\n" + rows() + "\nTest 2\n" + HEAD + "\n" + rows(), "holds 2 tables"),
+    "an-empty-cell": (HEAD + "\n0,5,,20\n", "(line 2) must be a number, got '': fill the cell, or add missing=empty"),
     "a-long-table-of-two-values": (
         long("time_s,channel,a,b", "{t},{channel},{value},1"),
-        None,
         "column of values is not clear, got a, b: name one column 'value'",
     ),
-    "a-word-for-no-value": (HEAD + "\n0,5,n/a,20\n", None, "got 'n/a': add missing=n/a to leave out such rows"),
-    "not-a-number": (HEAD + "\n0,5,NaN,20\n", None, "got nan: add missing=nan to leave such rows out"),
-    "words-among-rows": (HEAD + "\n" + rows() + "Mittelwert\n" + rows(), None, "line 14 must have 4 cells"),
+    "a-word-for-no-value": (HEAD + "\n0,5,n/a,20\n", "got 'n/a': add missing=n/a to leave out such rows"),
+    "not-a-number": (HEAD + "\n0,5,NaN,20\n", "got nan: add missing=nan to leave such rows out"),
+    "words-among-rows": (HEAD + "\n" + rows() + "Mittelwert\n" + rows(), "line 14 must have 4 cells"),
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_text_is_refused_with_words_that_help(tmp_path: Path, name: str) -> None:
-    content, mapping, words = REFUSED[name]
-    (tmp_path / "a.csv").write_text(content, encoding="utf-8")
+    content, words, *mapping = REFUSED[name]
     with pytest.raises(InvalidError) as caught:
-        read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of(mapping))
+        read_content(tmp_path, content, *mapping)
     assert words in caught.value.detail
 
 
@@ -514,12 +467,12 @@ def test_a_number_that_may_stand_for_no_value_is_refused_until_an_option_settles
 ) -> None:
     lines = [line.split(",") for line in rows().splitlines()]
     lines[-1][list(RECORD).index(channel)] = mark
-    (tmp_path / "a.csv").write_text("\n".join([HEAD, *map(",".join, lines)]) + "\n", encoding="utf-8")
+    text = "\n".join([HEAD, *map(",".join, lines)]) + "\n"
     with pytest.raises(InvalidError, match=rf"{channel}\[11\] \(line 13\)") as caught:
-        read_file(tmp_path / "a.csv", filename="a.csv")
+        read_content(tmp_path, text)
     missing = re.search(r"add missing=(\S+); to use", caught.value.detail)
     assert missing is not None
-    read = read_file(tmp_path / "a.csv", filename="a.csv", reading=Reading(missing=missing[1]))
+    read = read_content(tmp_path, text, missing=missing[1])
     assert {name: column.tolist() for name, column in read.columns.items()} == {
         name: values[:-1].tolist() for name, values in RECORD.items()
     }
@@ -537,21 +490,19 @@ MEASURED = {
 
 @pytest.mark.parametrize("name", MEASURED)
 def test_measured_numbers_are_read(tmp_path: Path, name: str) -> None:
-    (tmp_path / "a.csv").write_text("\n".join(["torque_nm", *map(str, MEASURED[name])]) + "\n", encoding="utf-8")
-    assert read_file(tmp_path / "a.csv", filename="a.csv").columns["torque_nm"].tolist() == MEASURED[name]
+    text = "\n".join(["torque_nm", *map(str, MEASURED[name])]) + "\n"
+    assert read_content(tmp_path, text).columns["torque_nm"].tolist() == MEASURED[name]
 
 
 def test_a_drop_to_a_number_of_nines_within_the_range_is_refused(tmp_path: Path) -> None:
     speeds = [f"{1500 + row % 3 if row != 30 else 999}" for row in range(60)]
-    (tmp_path / "a.csv").write_text("\n".join(["speed_rpm", "0", *speeds]) + "\n", encoding="utf-8")
     with pytest.raises(InvalidError, match=r"speed_rpm\[31\] .*is 999,.*missing=999"):
-        read_file(tmp_path / "a.csv", filename="a.csv")
+        read_content(tmp_path, "\n".join(["speed_rpm", "0", *speeds]) + "\n")
 
 
 def test_one_option_leaves_out_every_row_without_a_value(tmp_path: Path) -> None:
     text = rows().replace("0.0300,5.0003", ",5.0003").replace("0.0500,5.0005", "0.0500,NaN").replace("20.0909", "---")
-    (tmp_path / "a.csv").write_text(f"{HEAD}\n{text}", encoding="utf-8")
-    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=Reading(missing="---")).columns
+    columns = read_content(tmp_path, f"{HEAD}\n{text}", missing="---").columns
     assert columns["time_s"].tolist() == np.delete(TIME, [3, 5, 5]).tolist()
 
 
@@ -568,13 +519,12 @@ def test_rows_made_of_those_above_are_left_out_with_a_warning(
     tmp_path: Path, held: dict[str, np.ndarray], names: list[str]
 ) -> None:
     lines = [",".join(map(str, row)) for row in zip(*held.values(), strict=True)]
-    made = [",".join(f"{STATISTICS[name](np.array(column)):.2f}" for column in held.values()) for name in names]
-    if held is RECORD and not {"maxima", "minima"} & set(names):
+    without_time = held is RECORD and not {"maxima", "minima"} & set(names)
+    form = "{:.2f}" if without_time else "{:.10g}"
+    made = [",".join(form.format(STATISTICS[name](np.array(column))) for column in held.values()) for name in names]
+    if without_time:
         made = ["," + line.partition(",")[2] for line in made]
-    else:
-        made = [",".join(f"{STATISTICS[name](np.array(column)):.10g}" for column in held.values()) for name in names]
-    (tmp_path / "a.csv").write_text("\n".join([",".join(held), *lines, "", *made]) + "\n", encoding="utf-8")
-    read = read_file(tmp_path / "a.csv", filename="a.csv")
+    read = read_content(tmp_path, "\n".join([",".join(held), *lines, "", *made]) + "\n")
     assert {name: column.tolist() for name, column in read.columns.items()} == {k: list(v) for k, v in held.items()}
     (notice,) = read.notices
     line = len(lines) + 3
@@ -586,8 +536,7 @@ def test_rows_made_of_those_above_are_left_out_with_a_warning(
 def test_a_table_on_its_side_is_read(tmp_path: Path) -> None:
     for titles in ([f"{name};{{}}" for name in FIVE], ["Druck;bar;{}", "Drehzahl;1/min;{}", "Drehmoment;Nm;{}"]):
         lines = [title.format(";".join(map(str, column))) for title, column in zip(titles, FIVE.values(), strict=True)]
-        (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-        read = read_file(tmp_path / "a.csv", filename="a.csv")
+        read = read_content(tmp_path, "\n".join(lines) + "\n")
         assert {name: column.tolist() for name, column in read.columns.items()} == FIVE
         assert [notice.code for notice in read.notices] == ["turned"]
 
@@ -599,8 +548,7 @@ MS = ["t.ms", "Time..ms.", "timeMs", "T_MS", "time-ms", "Uhr, ms", "ms", "Time m
 @pytest.mark.parametrize("title", MS)
 def test_a_mapped_title_that_ends_in_a_unit_is_that_unit(tmp_path: Path, title: str) -> None:
     lines = [f"{title};M [Nm]", *(f"{1000 * time};1" for time in TIME)]
-    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of(f"time_s:{title}")).columns
+    columns = read_content(tmp_path, "\n".join(lines) + "\n", f"time_s:{title}").columns
     np.testing.assert_allclose(columns["time_s"], TIME, rtol=0, atol=1e-12)
 
 
@@ -608,29 +556,25 @@ def test_a_mapped_title_that_ends_in_a_unit_is_that_unit(tmp_path: Path, title: 
 def test_a_mapped_title_with_a_unit_that_is_not_clear_is_refused_until_the_map_states_it(
     tmp_path: Path, title: str, unit: str
 ) -> None:
-    (tmp_path / "a.csv").write_text(f"t [s];{title}\n0;1\n1;2\n", encoding="utf-8")
+    text = f"t [s];{title}\n0;1\n1;2\n"
     with pytest.raises(InvalidError, match=rf"may be {unit}: state it with map=torque_nm:.* \[{unit}\]"):
-        read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of(f"torque_nm:{title}"))
-    stated = reading_of(f"torque_nm:{title} [{unit}]")
-    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=stated).columns
+        read_content(tmp_path, text, f"torque_nm:{title}")
+    columns = read_content(tmp_path, text, f"torque_nm:{title} [{unit}]").columns
     assert columns["torque_nm"].tolist() == [UNITS["Nm"][unit].factor, 2 * UNITS["Nm"][unit].factor]
 
 
 def test_a_unit_in_the_map_is_used_and_must_not_contradict_the_file(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("t [s];Mz;Mx [Nm]\n0;1;1\n1;2;2\n", encoding="utf-8")
-    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("torque_nm:Mz [kNm]")).columns
-    assert columns["torque_nm"].tolist() == [1000, 2000]
+    text = "t [s];Mz;Mx [Nm]\n0;1;1\n1;2;2\n"
+    assert read_content(tmp_path, text, "torque_nm:Mz [kNm]").columns["torque_nm"].tolist() == [1000, 2000]
     with pytest.raises(InvalidError, match="must be kNm, as the rig profile or map says, got 'Nm'"):
-        read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("torque_nm:Mx [kNm]"))
-    (tmp_path / "a.csv").write_text(REFUSED["an-unknown-unit"][0], encoding="utf-8")
-    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("torque_nm:M [x10 Nm]")).columns
+        read_content(tmp_path, text, "torque_nm:Mx [kNm]")
+    columns = read_content(tmp_path, REFUSED["an-unknown-unit"][0], "torque_nm:M [x10 Nm]").columns
     assert columns["torque_nm"].tolist() == [10, 20]
 
 
 @pytest.mark.parametrize("number", [1, 2])
 def test_one_of_tables_below_each_other_is_read_by_its_number(tmp_path: Path, number: int) -> None:
-    (tmp_path / "a.csv").write_text(REFUSED["two-tables"][0], encoding="utf-8")
-    channels = read_file(tmp_path / "a.csv", filename="a.csv", reading=Reading(table=str(number)))
+    channels = read_content(tmp_path, REFUSED["two-tables"][0], table=str(number))
     assert channels.columns["torque_nm"].tolist() == [number]
     assert channels.line_of is not None
     assert channels.line_of(0) == (2, 6)[number - 1]
@@ -638,8 +582,7 @@ def test_one_of_tables_below_each_other_is_read_by_its_number(tmp_path: Path, nu
 
 @pytest.mark.parametrize(("decimal", "speed"), [(",", 1100.0), (".", 1.1)])
 def test_an_option_settles_the_thousands(tmp_path: Path, decimal: str, speed: float) -> None:
-    (tmp_path / "a.csv").write_text(REFUSED["german-thousands"][0], encoding="utf-8")
-    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=Reading(decimal=decimal)).columns
+    columns = read_content(tmp_path, REFUSED["german-thousands"][0], decimal=decimal).columns
     assert columns["speed_rpm"].tolist() == [800.0, speed]
 
 
@@ -650,13 +593,8 @@ def german_workbook(path: Path) -> None:
     book = openpyxl.Workbook()
     sheet = book.active
     sheet.title = "Messung"
-    for row in (
-        ["Prüfstand 3"],
-        ["Lastspiele", 7000],
-        [],
-        ["Zeit", "Druck", "Drehzahl", "Drehmoment", "Bemerkung"],
-        ["s", "bar", "1/min", "Nm"],
-    ):
+    titles = ["Zeit", "Druck", "Drehzahl", "Drehmoment", "Bemerkung"]
+    for row in (["Prüfstand 3"], ["Lastspiele", 7000], [], titles, ["s", "bar", "1/min", "Nm"]):
         sheet.append(row)
     for values in zip(*RECORD.values(), strict=True):
         sheet.append([*map(float, values), "ok"])
@@ -704,11 +642,9 @@ def version_73(path: Path) -> None:
 
 
 def struct(path: Path) -> None:
-    named = {"time": "time_s", "pressure": "pressure_bar", "speed": "speed_rpm", "torque": "torque_nm"}
-    units = {"time": "s", "pressure": "bar", "speed": "1/min", "torque": "Nm"}
-    scipy.io.savemat(
-        path, {"test": {name: {"data": RECORD[channel], "unit": units[name]} for name, channel in named.items()}}
-    )
+    columns = zip(RECORD.items(), ("s", "bar", "1/min", "Nm"), strict=True)
+    fields = {channel.rpartition("_")[0]: {"data": values, "unit": unit} for (channel, values), unit in columns}
+    scipy.io.savemat(path, {"test": fields})
 
 
 def zipped(path: Path) -> None:
@@ -747,7 +683,7 @@ MADE: dict[str, Callable[[Path], object]] = {
 @pytest.mark.parametrize("name", MADE)
 def test_a_file_of_a_library_gives_its_numbers(tmp_path: Path, name: str) -> None:
     MADE[name](tmp_path / name)
-    require_record(tmp_path / name)
+    assert_record(read_file(tmp_path / name, filename=name))
 
 
 def test_a_preview_shows_the_table_and_what_is_understood(tmp_path: Path) -> None:
@@ -760,7 +696,7 @@ def test_a_preview_shows_the_table_and_what_is_understood(tmp_path: Path) -> Non
 
 def test_files_of_libreoffice_in_three_languages_give_their_numbers() -> None:
     for path in sorted((Path(__file__).parent / "libreoffice").glob("*.[cox]*s*")):
-        require_record(path)
+        assert_record(read_file(path, filename=path.name))
 
 
 # --- clocks, factors and marks that HDF5 and MATLAB files state ---
@@ -881,8 +817,7 @@ def test_an_archive_with_a_file_without_a_name_is_read(tmp_path: Path) -> None:
     zipped(tmp_path / "a.zip")
     content = bytearray((tmp_path / "a.zip").read_bytes())
     content[content.rindex(b"run/plot.png")] = 0
-    (tmp_path / "a.zip").write_bytes(content)
-    require_record(tmp_path / "a.zip")
+    assert_record(read_content(tmp_path, bytes(content), name="a.zip"))
 
 
 @pytest.mark.parametrize("inner", ["xl/worksheets/sheet1.xml", "run.csv"])
@@ -896,13 +831,8 @@ def test_bombs_are_refused_by_what_they_state(tmp_path: Path, inner: str) -> Non
 
 # --- no factor ---
 
-TITLES = {
-    "time_s": "Zeit",
-    "pressure_bar": "Druck",
-    "speed_rpm": "Drehzahl",
-    "torque_nm": "Drehmoment",
-    "oil_temperature_c": "Öltemperatur",
-}
+GERMAN_NAMES = ("Zeit", "Druck", "Drehzahl", "Drehmoment", "Öltemperatur")
+TITLES = dict(zip((*RECORD, "oil_temperature_c"), GERMAN_NAMES, strict=True))
 UNIT = {channel: sorted(UNITS[CHANNELS[channel].unit]) for channel in TITLES}
 
 
@@ -910,9 +840,7 @@ UNIT = {channel: sorted(UNITS[CHANNELS[channel].unit]) for channel in TITLES}
 @given(
     st.fixed_dictionaries({channel: st.sampled_from(units) for channel, units in UNIT.items()}),
     st.sampled_from(["{} [{}]", "{} ({})", "{}（{}）", "{} / {}", "{} in {}", "{}, {}", "{}_{}"]),
-    st.sampled_from(
-        [(";", ".", ""), (";", ",", ""), (";", ",", "."), ("\t", ".", ","), ("\t", ",", "."), ("|", ".", ",")]
-    ),
+    st.sampled_from([";. ", ";, ", ";,.", "\t.,", "\t,.", "|.,"]),
     st.sampled_from(["%.0f", "%.1f", "%.3f", "%.6f", "%r"]),
     st.booleans(),
     st.lists(st.tuples(*[st.floats(0.001, 9000)] * len(TITLES)), min_size=2, max_size=5),
@@ -921,21 +849,20 @@ def test_no_file_is_accepted_with_a_channel_off_by_a_factor(
     tmp_path_factory: pytest.TempPathFactory,
     units: dict[str, str],
     title: str,
-    signs: tuple[str, str, str],
+    signs: str,
     number: str,
     mapped: bool,
     values: list[tuple[float, ...]],
 ) -> None:
     """Whatever units, separators, decimals and thousands a file has: it gives the numbers that it states, or is refused."""
-    separator, decimal, thousands = signs
+    separator, decimal, thousands = signs[0], signs[1], signs[2].strip()
     titles = [title.format("Kanal " + name if mapped else name, units[channel]) for channel, name in TITLES.items()]
     printed = [[number % value for value in row] for row in values]
     lines = [separator.join([_grouped(cell, decimal, thousands) for cell in row]) for row in printed]
-    file = tmp_path_factory.getbasetemp() / "factor.csv"
-    file.write_text("\n".join([separator.join(titles), *lines]) + "\n", encoding="utf-8")
-    choices = {channel: Choice(column=title) for channel, title in zip(TITLES, titles, strict=True)} if mapped else {}
+    mapping = ",".join(f"{channel}:{title}" for channel, title in zip(TITLES, titles, strict=True)) if mapped else None
+    text = "\n".join([separator.join(titles), *lines]) + "\n"
     try:
-        columns = read_file(file, filename="a.csv", reading=Reading(mapping=choices)).columns
+        columns = read_content(tmp_path_factory.getbasetemp(), text, mapping).columns
     except InvalidError:
         return
     for place, channel in enumerate(TITLES):
@@ -983,12 +910,6 @@ def test_no_array_is_accepted_with_a_factor_or_a_clock_that_is_off(
         np.testing.assert_allclose(columns[channel], expected, rtol=1e-9, err_msg=channel)
 
 
-def assert_record(columns: Mapping[str, FloatArray]) -> None:
-    assert columns.keys() == RECORD.keys()
-    for channel, values in RECORD.items():
-        np.testing.assert_allclose(columns[channel], values, rtol=1e-9, atol=1e-9, err_msg=channel)
-
-
 def test_a_header_beside_its_data_is_used(tmp_path: Path) -> None:
     """As catman writes MATLAB files; the units are not the channels' own."""
     units = {"time_s": ("ms", 1e3), "pressure_bar": ("kPa", 100), "speed_rpm": ("rpm", 1), "torque_nm": ("Nm", 1)}
@@ -997,7 +918,7 @@ def test_a_header_beside_its_data_is_used(tmp_path: Path) -> None:
         held[f"Channel_{number}_Data"] = RECORD[channel] * factor
         held[f"Channel_{number}_Header"] = {"SignalName": channel.rpartition("_")[0], "Unit": unit}
     scipy.io.savemat(tmp_path / "a.mat", held)
-    assert_record(read_file(tmp_path / "a.mat", filename="a.mat").columns)
+    assert_record(read_file(tmp_path / "a.mat", filename="a.mat"))
 
 
 @pytest.mark.parametrize("way", ["text of JSON", "list", "attribute of each"])
@@ -1016,7 +937,7 @@ def test_units_beside_a_compound_or_a_group_are_used(tmp_path: Path, way: str) -
         each = {f"{name}_unit": unit for name, unit in zip(names, units, strict=True)}
         held.attrs.update({"units": units} if way == "list" else each)
 
-    assert_record(read_hdf5(tmp_path / "a.h5", fill).columns)
+    assert_record(read_hdf5(tmp_path / "a.h5", fill))
 
 
 @pytest.mark.parametrize("name", ["Scale", "CalibrationFactor", "lsb_weight", "resolution"])
@@ -1055,12 +976,11 @@ def test_a_scale_of_tdms_is_applied_or_refused(tmp_path: Path, kind: str, words:
 def test_a_mapped_title_that_may_be_scaled_is_refused_until_the_map_says_so(
     tmp_path: Path, title: str, factor: float
 ) -> None:
-    file = tmp_path / "a.csv"
-    file.write_text(f"pressure_bar,speed_rpm,{title}\n5,100,20\n5,200,19\n", encoding="utf-8")
+    text = f"pressure_bar,speed_rpm,{title}\n5,100,20\n5,200,19\n"
     with pytest.raises(InvalidError, match=rf"\[x{factor:g} Nm\]"):
-        read_file(file, filename="a.csv", reading=reading_of(f"torque_nm:{title}"))
+        read_content(tmp_path, text, f"torque_nm:{title}")
     for unit, expected in ((f"x{factor:g} Nm", 20 * factor), ("Nm", 20.0)):
-        columns = read_file(file, filename="a.csv", reading=reading_of(f"torque_nm:{title} [{unit}]")).columns
+        columns = read_content(tmp_path, text, f"torque_nm:{title} [{unit}]").columns
         np.testing.assert_allclose(columns["torque_nm"][0], expected)
 
 
@@ -1068,18 +988,17 @@ def test_a_mapped_title_that_may_be_scaled_is_refused_until_the_map_says_so(
 def test_rows_that_a_column_marks_invalid_are_left_out(tmp_path: Path, title: str, good: object, bad: object) -> None:
     marks = [bad if row == 3 else good for row in range(ROWS)]
     lines = [f"{line},{mark}\n" for line, mark in zip(rows().splitlines(), marks, strict=True)]
-    (tmp_path / "a.csv").write_text(",".join(RECORD) + f",{title}\n" + "".join(lines), encoding="utf-8")
-    read = read_file(tmp_path / "a.csv", filename="a.csv")
+    read = read_content(tmp_path, f"{HEAD},{title}\n" + "".join(lines))
     np.testing.assert_allclose(read.columns["torque_nm"], np.delete(RECORD["torque_nm"], 3))
     assert "invalid_samples" in [notice.code for notice in read.notices]
 
 
 def test_fractions_of_a_day_are_refused_until_the_map_says_what_they_are(tmp_path: Path) -> None:
     lines = [f"{0.33 + row / 86400:.12f},5,{100 + row},20\n" for row in range(ROWS)]
-    (tmp_path / "a.csv").write_text("Time,pressure_bar,speed_rpm,torque_nm\n" + "".join(lines), encoding="utf-8")
+    text = "Time,pressure_bar,speed_rpm,torque_nm\n" + "".join(lines)
     with pytest.raises(InvalidError, match="in seconds or days"):
-        read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("time_s:Time"))
-    read = read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("time_s:Time [d]"))
+        read_content(tmp_path, text, "time_s:Time")
+    read = read_content(tmp_path, text, "time_s:Time [d]")
     np.testing.assert_allclose(np.diff(read.columns["time_s"]), 1, atol=1e-4)
 
 
@@ -1093,7 +1012,7 @@ def test_a_clock_above_the_table_of_a_sheet_is_used_and_a_hidden_sheet_is_not(tm
         for row in zip(*(RECORD[name].tolist() for name in PLATEAUS), strict=True):
             one.append(row)
     book.save(tmp_path / "a.xlsx")
-    assert_record(read_file(tmp_path / "a.xlsx", filename="a.xlsx").columns)
+    assert_record(read_file(tmp_path / "a.xlsx", filename="a.xlsx"))
 
 
 def _grouped(cell: str, decimal: str, thousands: str) -> str:

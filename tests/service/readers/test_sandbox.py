@@ -13,7 +13,7 @@ from service.readers import confinement, sandbox
 from service.readers.detect import Format
 from service.readers.limits import LIMITS, Limits
 from service.readers.read_file import read_file
-from tests.service.readers.sample_files import UNITS, record, write_tdms
+from tests.service.readers.sample_files import UNITS, read_content, record, write_tdms
 
 
 def test_memory_is_limited(tmp_path: Path) -> None:
@@ -59,19 +59,27 @@ def test_a_machine_with_too_much_to_do_is_not_the_files_fault(tmp_path: Path, mo
 def test_a_reader_that_cannot_start_is_not_the_files_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dies = "pass\nimport os\nos._exit(4)"
     with pytest.raises(BusyError, match=r"reads TDMS files could not start \(status 4\).* tell the operator"):
-        read_with(tmp_path, monkeypatch, dies, LIMITS)
+        read_with(tmp_path, monkeypatch, dies)
 
 
-def read_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, limits: Limits) -> None:
+#: Numbers of calls that Python has no function for, by architecture.
+CALLS = {"x86_64": {"tgkill": 234, "tkill": 200, "shmget": 29}, "aarch64": {"tgkill": 131, "tkill": 130, "shmget": 194}}
+
+
+def read_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, limits: Limits = LIMITS) -> None:
     """Read a file with a reader that does what `body` says."""
     (tmp_path / "nptdms.py").write_text("class TdmsFile: pass\n", encoding="utf-8")
     (tmp_path / "sitecustomize.py").write_text(
-        f"import sys, types\nfake = types.ModuleType('service.readers.tdms')\n"
+        "import ctypes, sys, types, threading, tempfile, socket, subprocess\n"
+        "fake = types.ModuleType('service.readers.tdms')\n"
+        "def call(name, *arguments):\n"
+        f"    libc, numbers = ctypes.CDLL(None, use_errno=True), {CALLS.get(platform.machine(), {})}\n"
+        "    if libc.syscall(numbers[name], *arguments) < 0:\n        raise OSError(ctypes.get_errno(), name)\n"
         f"def read_table(path, reading, limits):\n    {body}\n"
         "fake.read_table = read_table\nsys.modules['service.readers.tdms'] = fake\n",
         encoding="utf-8",
     )
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{Path(__file__).parents[3]}")
     path = tmp_path / "a.tdms"
     path.write_bytes(b"TDSm")
     read_file(path, filename="a.tdms", limits=limits)
@@ -79,10 +87,8 @@ def read_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, limits
 
 def test_a_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sandbox.READERS, Format.TDMS, ("service.readers.tdms", "no_such_package", "mdf"))
-    path = tmp_path / "a.tdms"
-    path.write_bytes(b"TDSm")
     with pytest.raises(BusyError, match=r"pip install -e '\.\[mdf\]'"):
-        read_file(path, filename="a.tdms")
+        read_content(tmp_path, b"TDSm", name="a.tdms")
 
 
 def test_reading_loads_no_foreign_package_here() -> None:
@@ -111,8 +117,6 @@ REACHES = {
     "what is noted of another file": "__import__('os').setxattr({secret!r}, 'user.a', b'x')",
     "memory that outlives it": "call('shmget', 0, 4096, 0o1600)",
 }
-#: Numbers of calls that Python has no function for, by architecture.
-CALLS = {"x86_64": {"tgkill": 234, "tkill": 200, "shmget": 29}, "aarch64": {"tgkill": 131, "tkill": 130, "shmget": 194}}
 #: What a reader may do: read the file, write into its own folder, use threads; and have only so many files open.
 MAY = {
     "the file": "raise ValueError(open(path).read())",
@@ -123,42 +127,22 @@ MAY = {
 }
 
 
-def reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str) -> str:
-    """What a reader that does this is answered with."""
-    (tmp_path / "nptdms.py").write_text("class TdmsFile: pass\n", encoding="utf-8")
-    (tmp_path / "sitecustomize.py").write_text(
-        "import ctypes, sys, types, threading, tempfile, socket, subprocess\n"
-        "fake = types.ModuleType('service.readers.tdms')\n"
-        "def call(name, *arguments):\n"
-        f"    libc, numbers = ctypes.CDLL(None, use_errno=True), {CALLS.get(platform.machine(), {})}\n"
-        "    if libc.syscall(numbers[name], *arguments) < 0:\n        raise OSError(ctypes.get_errno(), name)\n"
-        f"def read_table(path, reading, limits):\n    {body}\n"
-        "fake.read_table = read_table\nsys.modules['service.readers.tdms'] = fake\n",
-        encoding="utf-8",
-    )
-    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{Path(__file__).parents[3]}")
-    path = tmp_path / "a.tdms"
-    path.write_bytes(b"TDSm")
-    with pytest.raises(InvalidError) as caught:
-        read_file(path, filename="a.tdms")
-    return caught.value.detail
-
-
 @pytest.mark.skipif(confinement.missing() != [], reason=f"this system leaves open {confinement.missing()}")
 @pytest.mark.parametrize("reach", REACHES)
 def test_a_reader_reaches_nothing_but_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reach: str) -> None:
     secret = tmp_path / "clutchlife.db"
     secret.write_text("what keys protect", encoding="utf-8")
     attempt = REACHES[reach].format(secret=str(secret), folder=str(tmp_path), service=os.getpid())
-    assert "PermissionError" in reading(tmp_path, monkeypatch, f"{attempt}; raise ValueError('reached')")
+    with pytest.raises(InvalidError, match="PermissionError"):
+        read_with(tmp_path, monkeypatch, f"{attempt}; raise ValueError('reached')")
 
 
 @pytest.mark.parametrize("use", MAY)
 def test_a_reader_may_do_what_reading_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, use: str) -> None:
-    assert "TDSm" in reading(tmp_path, monkeypatch, MAY[use])
+    with pytest.raises(InvalidError, match="TDSm"):
+        read_with(tmp_path, monkeypatch, MAY[use])
 
 
 def test_a_reader_opens_only_so_many_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "Too many open files" in reading(
-        tmp_path, monkeypatch, "held = [open(path) for _ in range(1000)]; raise ValueError(len(held))"
-    )
+    with pytest.raises(InvalidError, match="Too many open files"):
+        read_with(tmp_path, monkeypatch, "held = [open(path) for _ in range(1000)]; raise ValueError(len(held))")

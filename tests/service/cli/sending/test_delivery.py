@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import httpx2
 import pytest
@@ -72,9 +73,15 @@ def test_a_run_that_the_service_refuses_is_set_aside_with_the_reason(sender: Sen
     assert "because" in sender.lines[0]
 
 
-@pytest.mark.parametrize("status", [400, 409, 413, 422, 431, 451, 500])
-def test_a_run_that_somebody_else_objects_to_stays_and_the_next_is_sent(sender: Sender, status: int) -> None:
-    sender.service.instead = of_run(b'"bad"', lambda: httpx2.Response(status, html="<h1>no</h1>"))
+@pytest.mark.parametrize(
+    "status", [400, 405, 406, 409, 410, 411, 413, 414, 415, 421, 422, 426, 428, 431, 451, 499, 500]
+)
+@pytest.mark.parametrize("body_of", [{"html": "<h1>no</h1>"}, {"json": {"detail": "no"}}], ids=["html", "json"])
+def test_a_run_that_somebody_else_objects_to_stays_and_the_next_is_sent(
+    sender: Sender, status: int, body_of: dict[str, Any]
+) -> None:
+    """An nginx with a bound of its own answers 413 in HTML: the run is not bad, and others may pass."""
+    sender.service.instead = of_run(b'"bad"', lambda: httpx2.Response(status, **body_of))
     sender.push(body(1, "bad"), "1.json")
     sender.push(body(2, "good"), "2.json")
     assert sender.send().failed == 1
@@ -84,9 +91,16 @@ def test_a_run_that_somebody_else_objects_to_stays_and_the_next_is_sent(sender: 
     assert str(status) in str(entry.last_answer)
 
 
-@pytest.mark.parametrize("answer", [(401, "unauthorized"), (403, "forbidden"), (404, "not-found"), (409, "archived")])
-def test_what_would_refuse_every_run_ends_the_sending_and_all_wait(sender: Sender, answer: tuple[int, str]) -> None:
-    sender.service.instead = lambda _request: problem(*answer)
+@pytest.mark.parametrize(
+    "answer",
+    [
+        *(problem(*own) for own in ((401, "unauthorized"), (403, "forbidden"), (404, "not-found"), (409, "archived"))),
+        httpx2.Response(407, text="because"),
+    ],
+    ids=lambda answer: f"{answer.status_code}",
+)
+def test_what_would_refuse_every_run_ends_the_sending_and_all_wait(sender: Sender, answer: httpx2.Response) -> None:
+    sender.service.instead = lambda _request: answer
     for cycles in (1, 2):
         sender.push(body(cycles), f"{cycles}.json")
     with pytest.raises(RefusedError, match="because"):
@@ -100,12 +114,12 @@ def test_what_would_refuse_every_run_ends_the_sending_and_all_wait(sender: Sende
     [
         httpx2.Response(200, html="<p>log in</p>"),
         httpx2.Response(200, json={"success": True}),
-        httpx2.Response(308, headers={"Location": "https://login.test"}),
-        httpx2.Response(408),
-        httpx2.Response(425),
+        httpx2.Response(200, json=["no object"]),
+        httpx2.Response(204),
+        *(httpx2.Response(status, headers={"Location": "https://login.test"}) for status in (301, 302, 303, 307, 308)),
+        *(httpx2.Response(status) for status in (408, 425, 502, 503, 504, 511, 520)),
         httpx2.Response(429, headers={"Retry-After": "Fri, 01 Jan 2100 00:00:00 GMT"}),
-        httpx2.Response(503),
-        httpx2.Response(511),
+        problem(503, "busy"),
     ],
     ids=lambda answer: f"{answer.status_code}",
 )

@@ -1,5 +1,6 @@
-"""The spool on disk: what waits, what replaces what, and what is damaged."""
+"""The spool on disk: what waits, what replaces what, and what is damaged; which content is a newer version of which."""
 
+import json
 import sqlite3
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -10,6 +11,7 @@ import pytest
 
 from service.cli.sending import spool as entries
 from service.cli.sending.delivery import Sent, deliver
+from service.cli.sending.run_head import RunHead, of_body, of_file, same_run
 from service.cli.sending.spool import HeldError, Spool
 from service.client.clutchlife.transport import Service
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body
@@ -162,3 +164,62 @@ def test_many_push_at_once_and_nothing_is_lost(spool: Spool, tmp_path: Path) -> 
         list(senders.map(push, range(4)))
     assert spool.waiting() == spool.refused() == spool.replaced() == []
     assert len(service.stored) == 4 * 8 + 8
+
+
+# --- Which content is a newer version of which.
+
+
+def head(*, torque: float = 1.0, **fields: object) -> RunHead:
+    return of_body(json.dumps({"kind": "k", "channels": {"torque_nm": [torque]}} | fields).encode())
+
+
+MORNING, NOON = "2026-01-01T08:00:00Z", "2026-01-01T12:00:00Z"
+IN_GERMANY = head(started_at="2026-01-01T09:00:00+01:00", torque=2, cycles=7000)
+
+
+@pytest.mark.parametrize(
+    ("older", "newer", "same_file", "expected"),
+    [
+        (head(run_id="a", cycles=70000), head(run_id="a", cycles=7000), False, True),
+        (head(run_id="a"), head(run_id="b"), True, False),  # a recorder that writes every run into one file
+        (head(cycles=70000), head(cycles=7000, torque=2), True, True),
+        (head(cycles=70000), head(cycles=7000), False, False),
+        (head(cycles=1), head(cycles=1, run_id="a"), True, True),
+        (head(started_at=MORNING), head(started_at=NOON, torque=2), True, False),
+        (head(started_at=MORNING), head(started_at=NOON), True, True),  # the start was mistyped
+        (head(started_at=MORNING), head(started_at=MORNING, torque=2), True, True),
+        (head(started_at=MORNING), head(started_at=NOON), False, False),
+        (head(started_at=MORNING, cycles=7000.0), IN_GERMANY, True, True),
+        (head(started_at=NOON), IN_GERMANY, True, False),
+    ],
+)
+def test_versions_of_a_run(older: RunHead, newer: RunHead, same_file: bool, expected: bool) -> None:
+    assert same_run(older, newer, same_file=same_file) is expected
+
+
+def test_a_head_states_what_the_run_does() -> None:
+    stated = of_body(body(7000, "a", started_at=NOON))
+    assert (stated.run_id, stated.kind, stated.cycles, stated.started_at) == ("a", "maintenance", 7000.0, NOON)
+    assert of_file({"kind": "k", "cycles": "7000.0"}, "abc") == RunHead(kind="k", cycles=7000.0, measurements="abc")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"",
+        b"no json",
+        b"[1]",
+        b"\xff",
+        b"[" * 100000,
+        b'{"cycles": "many", "run_id": 3}',
+        b'{"cycles": NaN}',
+        b'{"cycles": 1e999}',
+    ],
+)
+def test_what_is_no_run_has_an_empty_head(text: bytes) -> None:
+    assert of_body(text) == RunHead()
+
+
+def test_measurements_are_the_same_however_their_numbers_are_written() -> None:
+    texts = [b'{"started_at": "%s", "channels": {"torque_nm": [%s]}}' % (MORNING.encode(), n) for n in (b"1", b"1.0")]
+    assert of_body(texts[0]).measurements == of_body(texts[1]).measurements

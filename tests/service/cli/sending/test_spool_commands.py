@@ -45,8 +45,10 @@ class Terminal:
 
     def push(self, content: bytes, name: str = "run.json", *, code: int = 0, clutch: str = "c1", url: str = URL) -> str:
         """Push one run without waiting."""
-        file = written(self.folder / name, content)
-        return self("push", file, "--clutch", clutch, "--url", url, "--patience", "0", code=code)
+        return self.push_files(written(self.folder / name, content), code=code, clutch=clutch, url=url)
+
+    def push_files(self, path: Path, *more: str, code: int = 0, clutch: str = "c1", url: str = URL) -> str:
+        return self("push", path, "--clutch", clutch, "--url", url, "--patience", "0", *more, code=code)
 
     def listed(self) -> list[dict[str, Any]]:
         """What `spool list --json` prints."""
@@ -239,7 +241,7 @@ def test_a_rigs_files_are_sent_with_its_name_and_what_else_is_given(terminal: Te
     folder.mkdir()
     for name in ("b_2000.csv", "a_1000.xlsx", "notes.pdf"):
         (folder / name).write_bytes(name.encode())
-    terminal("push", folder, "--clutch", "c1", "--url", URL, "--rig", "bench-3", "--patience", "0")
+    terminal.push_files(folder, "--rig", "bench-3")
     sent = [request for request in asked if request.url.path.endswith("/runs/file")]
     assert sorted((request.url.params["filename"], request.url.params["rig"]) for request in sent) == [
         ("a_1000.xlsx", "bench-3"),
@@ -247,34 +249,19 @@ def test_a_rigs_files_are_sent_with_its_name_and_what_else_is_given(terminal: Te
     ]
     assert all("kind" not in request.url.params and "cycles" not in request.url.params for request in sent)
     asked.clear()
-    terminal(
-        "push",
-        folder / "b_2000.csv",
-        "--clutch",
-        "c1",
-        "--url",
-        URL,
-        "--rig",
-        "bench-3",
-        "--cycles",
-        "7",
-        "--patience",
-        "0",
-    )
+    terminal.push_files(folder / "b_2000.csv", "--rig", "bench-3", "--cycles", "7")
     sent = [request for request in asked if request.url.path.endswith("/runs/file")]
     assert [(request.url.params["rig"], request.url.params["cycles"]) for request in sent] == [("bench-3", "7.0")]
 
 
 def test_without_a_rig_a_record_needs_its_kind_and_cycles(terminal: Terminal) -> None:
-    record = written(terminal.folder / "a.csv", b"1,2")
-    assert "Give --kind and --cycles" in terminal("push", record, "--clutch", "c1", "--url", URL, code=64)
+    assert "Give --kind and --cycles" in terminal.push(b"1,2", "a.csv", code=64)
 
 
 def test_a_file_whose_reader_cannot_start_waits_in_the_spool(terminal: Terminal) -> None:
     busy = "the program that reads TDMS files could not start (status 1)"
     terminal.service.instead = lambda request: problem(503, "busy", busy) if "/runs" in request.url.path else None
     record = written(terminal.folder / "a.tdms", b"TDSm")
-    told = ("--clutch", "c1", "--url", URL, "--patience", "0")
-    assert "1 run waits" in terminal("push", record, *told, "--rig", "bench-3", code=75)
+    assert "1 run waits" in terminal.push_files(record, "--rig", "bench-3", code=75)
     terminal.service.instead = present
     assert "1 stored" in terminal("spool", "send", "--url", URL)

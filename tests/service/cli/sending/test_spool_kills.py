@@ -2,16 +2,79 @@
 replaced version is revived."""
 
 import os
-from collections.abc import Callable
+import sqlite3
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from service.cli.sending import spool
-from tests.service.cli.sending.kills import every_kill
 from tests.service.cli.sending.stand_in_service import body
 from tests.service.cli.sending.test_delivery import Sender
 from tests.service.cli.sending.test_spool import PARAMETERS, contents, set_aside, written
+
+_OPERATIONS = ("open", "os.rename", "os.remove", "os.mkdir", "os.truncate", "sqlite3.connect")
+
+
+class KilledError(BaseException):
+    """The process is gone; nothing catches it."""
+
+
+class _Killer:
+    """Counts operations on files below a folder; from the fatal one on, none is carried out."""
+
+    def __init__(self) -> None:
+        self.folder: str | None = None
+        self.left = 0
+        self.installed = False
+
+    def __call__(self, event: str, arguments: tuple[object, ...]) -> None:
+        if event in _OPERATIONS and self.folder is not None and str(arguments[0]).startswith(self.folder):
+            self.count(event, arguments)
+
+    def count(self, event: str, arguments: tuple[object, ...]) -> None:
+        """An operation, which is not carried out where it is the fatal one or comes after it."""
+        if self.folder is None:
+            return
+        if self.left == 0:
+            raise KilledError(f"{event} {arguments}")
+        self.left -= 1
+
+
+_killer = _Killer()
+
+
+class _Connection(sqlite3.Connection):
+    """A database whose statements are operations on its file."""
+
+    def execute(self, *arguments: Any) -> sqlite3.Cursor:
+        _killer.count("statement", arguments)
+        return super().execute(*arguments)
+
+    def executemany(self, *arguments: Any) -> sqlite3.Cursor:
+        _killer.count("statement", arguments)
+        return super().executemany(*arguments)
+
+
+_connect = sqlite3.connect
+
+
+@contextmanager
+def killed_before(operation: int, folder: object) -> Iterator[None]:
+    """Kill what happens inside before its operation of that number, from 0."""
+    if not _killer.installed:
+        sys.addaudithook(_killer)
+        _killer.installed = True
+    _killer.folder, _killer.left = str(folder), operation
+    sqlite3.connect = partial(_connect, factory=_Connection)  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        _killer.folder, sqlite3.connect = None, _connect
 
 
 @pytest.fixture(autouse=True)
@@ -24,19 +87,19 @@ def quick_disk(monkeypatch: pytest.MonkeyPatch) -> None:
 def benches(tmp_path: Path, prepare: Callable[[Sender], None], act: Callable[[Sender], None]) -> list[Sender]:
     """A sender with its files, its spool and a service for each operation of `act`, killed before it."""
     made: list[Sender] = []
-
-    def act_on(_operation: int) -> None:
-        act(made[-1])
-
-    def folder_of(operation: int) -> Path:
-        folder = tmp_path / str(operation)
+    while True:
+        folder = tmp_path / str(len(made))
         folder.mkdir()
-        made.append(Sender(folder))
-        prepare(made[-1])
-        return made[-1].spool.folder
-
-    kills = list(every_kill(folder_of, act_on))
-    return made[: len(kills)]
+        bench = Sender(folder)
+        prepare(bench)
+        try:
+            with killed_before(len(made), bench.spool.folder):
+                act(bench)
+        except KilledError:
+            made.append(bench)
+        else:
+            assert len(made) > 3, "hardly anything was done"
+            return made
 
 
 OLDER, NEWER = body(70000), body(7000)
@@ -48,9 +111,8 @@ def waits(bench: Sender) -> None:
 
 def test_a_killed_push_loses_nothing_and_keeps_no_half(tmp_path: Path) -> None:
     """Each kill of the first push: the run waits whole, or not at all; pushed again it waits once."""
-    for bench in benches(
-        tmp_path, lambda bench: bench.push(body(1), "1.json"), lambda bench: bench.push(body(2), "2.json")
-    ):
+    first, second = (partial(Sender.push, content=body(n), name=f"{n}.json") for n in (1, 2))
+    for bench in benches(tmp_path, first, second):
         bench.spool.begin()
         assert {path.name for path in bench.spool.folder.iterdir()} - {"spool.sqlite"} == {
             entry.body for entry in bench.spool.waiting()
