@@ -79,7 +79,7 @@ class Ear:
         """
         last: Refitted | None = None
         for share in GROWING:
-            y = self._changed(effect, share * amplitude)
+            y = self.changed(effect, share * amplitude)
             if y is None:
                 return None
             last = self.refit.to(y, last)
@@ -89,7 +89,7 @@ class Ear:
 
     def linear(self, effect: Effect, amplitude: float) -> float:
         """λ of one that is not fast if the baseline were linear in what it adjusts."""
-        y = self._changed(effect, amplitude)
+        y = self.changed(effect, amplitude)
         return np.inf if y is None else self.refit.linear(y)
 
     def amplitude_for(self, effect: Effect, lam: float) -> float:
@@ -107,14 +107,14 @@ class Ear:
         except UnreachableError:
             begin = effect.most
         if begin > FAR * effect.most:
-            y = self._changed(effect, effect.most)
+            y = self.changed(effect, effect.most)
             if y is not None and self.refit.to(y, enough=lam).left <= lam:
                 raise UnreachableError  # at once: a search would end there
         last: Refitted | None = None
 
         def heard(amplitude: float) -> float:
             nonlocal last
-            y = self._changed(effect, amplitude)
+            y = self.changed(effect, amplitude)
             if y is None:
                 return np.inf
             last = self.refit.to(y, last)
@@ -122,7 +122,7 @@ class Ear:
 
         for _ in range(ROUNDS):
             amplitude = _found(heard, lam, begin, effect.most)
-            y = self._changed(effect, amplitude)
+            y = self.changed(effect, amplitude)
             if y is None or last is None:
                 break
             last = self.refit.lower(y, last)
@@ -131,7 +131,7 @@ class Ear:
             begin = min(amplitude * float(np.sqrt(lam / last.left)), effect.most)
         return amplitude
 
-    def _changed(self, effect: Effect, amplitude: float) -> FloatArray | None:
+    def changed(self, effect: Effect, amplitude: float) -> FloatArray | None:
         """What the effect changes in the thin plan's readings, whitened; None where that is no number."""
         sites = zip(self._delta(effect, amplitude), self.plan.sites, self.thin.sites, strict=True)
         thinned = [_averaged(part, full, few) for part, full, few in sites]
