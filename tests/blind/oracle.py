@@ -64,7 +64,9 @@ def look(outcome: Outcome) -> Seen:
     wanted = ear.changed(effect, amplitude)
     assert wanted is not None
     chosen = sorted(_linear(ear, hidden, wanted), key=lambda one: one[0])[:REFITTED]
-    return Seen(outcome, *min((_refitted(ear, rival, start, wanted), rival.slug) for _, start, rival in chosen))
+    alone = ear.refit.lower(wanted, ear.refit.to(wanted)).left
+    found = [(alone, "none"), *((_refitted(ear, rival, start, wanted), rival.slug) for _, start, rival in chosen)]
+    return Seen(outcome, *min(found))
 
 
 def _linear(ear: Ear, hidden: Hidden, wanted: FloatArray) -> Iterator[tuple[float, float, Effect]]:
