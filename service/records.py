@@ -25,7 +25,7 @@ from service.columns import content_of, instant, whole
 from service.errors import BusyError, NotFoundError, unknown_clutch
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
 from service.lives.condition import DISAGREES, rank_of, state_of, top_line
-from service.lives.history import ByPressure, Event, Shown, duty_block, moment_of, of_maintenance, order
+from service.lives.history import ByPressure, Event, Shown, duty_block, maintenance_fields, moment_of, order
 from service.lives.model_correction import extension_of
 from service.lives.payloads import notice_items
 from service.lives.plausibility.doubts import Judged
@@ -33,7 +33,7 @@ from service.lives.recomputation import Adoption, ClutchState, Levels, Results, 
 from service.lives.run_analysis import LevelFit, Value
 from service.lives.tracks import CARRIED, States, Tracked
 from service.logging import request_id
-from service.schemas.base import of_row
+from service.schemas.base import schema_fields
 from service.schemas.clutch import ClutchIn, LatestDiagnosis
 from service.schemas.inspection import InspectionOut, PhotographOut
 from service.schemas.rig import RigOut
@@ -369,7 +369,7 @@ def _event(row: RunInOrder, cofs: ByPressure) -> Event:
         speed_range=None if low is None or high is None else (low, high),
         oil_temperature=row.oil_temperature,
         cofs=cofs,
-        **of_maintenance(row.event, row.reason),
+        **maintenance_fields(row.event, row.reason),
         duty=duty_block(row.cycles, row.duty_cycles, row.duty_energy_kj, row.duty_speed_rpm, row.duty_duration_s),
         dated=row.started_at is not None,
         shown=None if row.shown is None else Shown.from_list(json.loads(row.shown)),
@@ -421,7 +421,7 @@ def latest_diagnosis(row: ClutchRow, verdict: VerdictRow | None) -> dict[str, An
     if verdict is None:
         return None
     earlier = verdict.life != row.summary.get("life", "")
-    return of_row(
+    return schema_fields(
         LatestDiagnosis,
         verdict,
         causes=list(verdict.causes),
@@ -467,7 +467,7 @@ def inspection_hash(content: Mapping[str, Any]) -> str:
 def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) -> list[dict[str, Any]]:
     photographs = inspections.photographs(connection, [row.inspection_key for row in rows])
     return [
-        of_row(
+        schema_fields(
             InspectionOut,
             row,
             **row.content,
@@ -479,4 +479,4 @@ def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) ->
 
 
 def photograph_answer(row: PhotographRow) -> dict[str, Any]:
-    return of_row(PhotographOut, row, photograph_id=row.sha256)
+    return schema_fields(PhotographOut, row, photograph_id=row.sha256)

@@ -87,7 +87,7 @@ def run_reader(database: Database, clutch_id: str) -> RunReader:
     def with_channels(run_id: str) -> IncomingRun:
         with database.reading() as connection:
             row = run(connection, clutch_id, run_id)
-            columns = channels.all_stored(connection, row.run_key)
+            columns = channels.stored_of_run(connection, row.run_key)
         return decoded(row, columns)
 
     with database.reading() as connection:
@@ -114,7 +114,7 @@ def _loaded_reader(database: Database, record: ClutchIn, rows: Sequence[RunRow])
     loaded = {}
     for row in rows:
         with database.reading() as connection:
-            columns = channels.all_stored(connection, row.run_key)
+            columns = channels.stored_of_run(connection, row.run_key)
         loaded[row.run_id] = tuple(column.loaded() for column in columns)
     runs_loaded = _LoadedRuns(rows={row.run_id: row for row in rows}, channels=loaded)
     return RunReader(
@@ -210,7 +210,7 @@ def recomputed(recorded: Recorded) -> Recomputed:
             raise InvalidError(f"run {row.run_id!r} is refused: {error}", errors=error.errors) from error
         measured[row.run_id] = {"speed_range": analysis.speed_range, "oil_temperature": analysis.oil_temperature}
         shown, _ = doubts_alone(sent, analysis, state.geometry)
-        details[row.run_id] = analysis.kept_beside(sent) | ({} if shown is None else {"shown": shown.to_list()})
+        details[row.run_id] = analysis.details_to_store(sent) | ({} if shown is None else {"shown": shown.to_list()})
         receipts[row.run_id] = receipt(row.clutch_id, incoming(row, {}), analysis, received_at=row.received_at)
         levels[row.run_id] = analysis.fits
     events = order([replace(event, **measured[event.run_id]) for event in state.events])

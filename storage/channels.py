@@ -219,7 +219,7 @@ class Stored:
             raise DamagedData(f"channel {self.name}: {error}") from error
 
 
-def all_stored(connection: Connection, run_key: int) -> list[Stored]:
+def stored_of_run(connection: Connection, run_key: int) -> list[Stored]:
     """The channels of a run in the order they were sent, not fetched and not decoded; none for a run without."""
     return [_stored(run_key, row) for row in connection.execute(_of_run, {"of_run": run_key})]
 
@@ -238,7 +238,7 @@ def stored(connection: Connection, run_key: int, name: str) -> Stored:
     return _stored(run_key, row)
 
 
-def kept_elsewhere(
+def stored_elsewhere(
     connection: Connection, store: RawStore | None, *, after: tuple[int, str], most: int
 ) -> list[tuple[int, str]]:
     """(run_key, name) of channels that a move to `store` (None: to the database) is still to take there, in order, behind
@@ -276,7 +276,7 @@ def values_of(columns: Sequence[Stored]) -> dict[str, NDArray[np.float64]]:
 
 def read(connection: Connection, run_key: int) -> dict[str, NDArray[np.float64]]:
     """The same at once, while the transaction waits. Raises as `Stored.values` does."""
-    return values_of(all_stored(connection, run_key))
+    return values_of(stored_of_run(connection, run_key))
 
 
 def lengths(connection: Connection, run_key: int) -> dict[str, int]:

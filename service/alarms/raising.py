@@ -24,7 +24,7 @@ from service.lives.history import STATIONARY
 from service.lives.payloads import OFF_TRACK
 from service.lives.plausibility.doubts import OFF_COURSE
 from service.schemas.alarm import AlarmIn, EventOut
-from service.schemas.base import of_row
+from service.schemas.base import schema_fields
 from service.schemas.clutch import ClutchIn
 from storage import alarms, clutches, diagnoses, results, runs, webhooks
 from storage.alarms import AlarmRow, EventRow, NewEvent
@@ -76,7 +76,7 @@ def rule_of(row: AlarmRow) -> AlarmIn:
 
 def event_out(row: EventRow) -> dict[str, Any]:
     said = {name: value for name, value in row.content.items() if name != _ENDED_LIFE}
-    return of_row(EventOut, row, **said)
+    return schema_fields(EventOut, row, **said)
 
 
 def to_receivers(connection: Connection, kind: str, event: EventRow, receivers: Iterable[WebhookRow]) -> list[str]:

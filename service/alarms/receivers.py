@@ -103,7 +103,7 @@ def allowed(host: str, port: int, *, private: bool) -> tuple[Any, ...]:
 
 def why_not(address: Address, *, private: bool) -> str | None:
     """Why an address may not be asked, None where it may. An IPv4 address within an IPv6 one counts as itself."""
-    inner = _within(address)
+    inner = _embedded_ipv4(address)
     if inner is not None:
         return why_not(inner, private=private)
     if address.is_multicast or address.is_unspecified or address.is_link_local:
@@ -115,7 +115,7 @@ def why_not(address: Address, *, private: bool) -> str | None:
     return f"{address} is on this machine or in a private network: to allow this, set CLUTCHLIFE_PRIVATE_RECEIVERS=true"
 
 
-def _within(address: Address) -> ipaddress.IPv4Address | None:
+def _embedded_ipv4(address: Address) -> ipaddress.IPv4Address | None:
     """The IPv4 address that an IPv6 address stands for: mapped, compatible, 6to4, Teredo, NAT64 (RFC 4291, 3056, 4380,
     6052)."""
     if isinstance(address, ipaddress.IPv4Address):

@@ -86,7 +86,7 @@ def _export(service: Service, clutch: str, out_folder: Path) -> None:
         _results(service, clutch, results)
         _inspections(service, clutch, results)
         _tables(service, clutch, results)
-        _write(results / "about.json", _about(service, clutch_out, record))
+        _write(results / "about.json", _description(service, clutch_out, record))
     print_line(f"{count} runs of {clutch} in {out_folder}, results in {results}")
     if not _parquet_can_be_written():
         print_line("tables are CSV and XLSX only: for Parquet too, install pyarrow (the extra `parquet`)")
@@ -113,7 +113,7 @@ def _write_parquet(path: Path) -> None:
     parquet.write_table(arrow_csv.read_csv(path), path.with_suffix(".parquet"))
 
 
-def _about(service: Service, clutch: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
+def _description(service: Service, clutch: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
     """What an export is of: the release, the settings of the clutch, and the data by their hashes."""
     runs = service.pages(f"/v1/clutches/{clutch['clutch_id']}/runs")
     return {

@@ -102,7 +102,9 @@ def score(
     with read_only(database) as opened:
         with opened.reading() as connection:
             clutch_ids = clutches.all_ids(connection)
-        fleet = scores.of_fleet((scores.of_clutch(opened, name, method) for name in clutch_ids), method=method)
+        fleet = scores.scores_of_fleet(
+            (scores.scores_of_clutch(opened, name, method) for name in clutch_ids), method=method
+        )
     for life in fleet["lives"]:
         print_line(f"{life['clutch_id']}: ended at {life['end_of_life_cycles']:.0f} cycles")
     if not fleet["lives"]:

@@ -56,7 +56,7 @@ def rank_of(summary: Mapping[str, Any]) -> float:
     return HORIZON if bound is None else min(bound, HORIZON)
 
 
-def beside_held(
+def with_held_runs(
     payload: Mapping[str, Any], summary: Mapping[str, Any], among: Mapping[str, Any] | None, count: int
 ) -> dict[str, Any]:
     """What an answer says beside its prediction: `held_runs` with what these, `count`, would make of it, which is `among`
@@ -65,7 +65,7 @@ def beside_held(
     held, warnings = None, list(payload["warnings"])
     if among is not None:
         held = {"count": count} | {name: among[name] for name in ("status", "remaining_cycles")}
-        warnings.append(_held_warning(payload, among, count))
+        warnings.append(_warning_about_held_runs(payload, among, count))
     at_least = lower_bound(payload["at_least"], among)
     at, since = None, None
     if at_least is not None and (pace := summary.get("pace")) is not None:
@@ -97,7 +97,7 @@ def stated(summary: Mapping[str, Any]) -> dict[str, Any] | None:
     if "status" not in summary:
         return None
     among = (summary.get("with_held") or {}).get(SHOWN)
-    beside = beside_held({**summary, "warnings": ()}, summary, among, summary.get("held", 0))
+    beside = with_held_runs({**summary, "warnings": ()}, summary, among, summary.get("held", 0))
     return {name: summary[name] for name in SUMMARY} | {name: beside[name] for name in BESIDE}
 
 
@@ -107,7 +107,7 @@ def lower_bound(at_least: float | None, among: Mapping[str, Any] | None) -> floa
     return min((bound for bound in bounds if bound is not None), default=None)
 
 
-def _held_warning(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> dict[str, str]:
+def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> dict[str, str]:
     """What held runs would make of an answer, by all that it states: where both are unknown the safe bounds may differ."""
     if all(among[name] == payload[name] for name in ("status", "remaining_cycles", "at_least")):
         effect = f"the remaining life would be the same with {_them(count)}"
@@ -122,7 +122,7 @@ def _held_warning(payload: Mapping[str, Any], among: Mapping[str, Any], count: i
     return {"code": HELD_RUNS, "message": f"{held_in_words(count)}: {effect}"}
 
 
-def held_beside(count: int) -> dict[str, Any]:
+def held_runs_left_out(count: int) -> dict[str, Any]:
     """What an answer that is without so many held runs says of them: `held_runs`, and a warning where there are some."""
     message = f"{held_in_words(count)}: this is without {_them(count)}"
     return {"held_runs": count, "warnings": [{"code": HELD_RUNS, "message": message}] if count else []}

@@ -160,7 +160,7 @@ class StoredEngagement:
         item: Mapping[str, Any] = self.receipt["engagement"]
         return item
 
-    def of_duty(self, other: "StoredEngagement") -> bool:
+    def has_duty_of(self, other: "StoredEngagement") -> bool:
         """Whether it is of the same duty as another, both evaluated."""
         return all(
             same_duty(self.item[name], other.item[name]) for name in ("initial_speed_rpm", "maximum_pressure_bar")
@@ -180,11 +180,11 @@ def engagements_over_life(stored: Sequence[StoredEngagement], lives: Sequence[Co
     for life in lives:
         own = [engagement for engagement in stored if engagement.run_id in life and engagement.course is not None]
         first = [engagement for engagement in own if engagement.receipt["kind"] == DUTY_KINDS[0]]
-        first = [engagement for engagement in first if engagement.of_duty(first[0])][:3]  # three make the reference
+        first = [engagement for engagement in first if engagement.has_duty_of(first[0])][:3]  # three make the reference
         courses = [engagement.course for engagement in first if engagement.course is not None]
         reference = reference_of(courses) if courses else None
         for engagement in own:
-            basis = None if reference is None or not engagement.of_duty(first[0]) else reference
+            basis = None if reference is None or not engagement.has_duty_of(first[0]) else reference
             rows.append(_row(engagement, basis))
     return rows
 

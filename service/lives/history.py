@@ -310,7 +310,7 @@ def lives_of(events: Sequence[Event]) -> list[Life]:
     return [Life(origin=part[0].cycles if part[0].rebuild else 0.0, events=part) for part in parts]
 
 
-def of_maintenance(event: str | None, reason: str | None) -> dict[str, Any]:
+def maintenance_fields(event: str | None, reason: str | None) -> dict[str, Any]:
     """What maintenance of that kind is in the history; of a run that is none, nothing."""
     return {
         "rebuild": event == REBUILD,

@@ -38,7 +38,7 @@ def needs_evidence(state: ClutchState) -> bool:
 def summarised(state: ClutchState, tracking: Tracking, evidence: Evidence | None) -> dict[str, Any]:
     """The summary of a clutch that was tracked; `evidence` is needed where `needs_evidence` says so."""
     if not state.events:
-        return held_part(state, {}, evidence)
+        return held_summary(state, {}, evidence)
     last, life = state.events[-1].cycles, state.lives[-1]
     payload = next(made.payload for made in tracking.predictions if (made.cycles, made.method) == (last, SHOWN))
     if evidence is not None:
@@ -54,10 +54,10 @@ def summarised(state: ClutchState, tracking: Tracking, evidence: Evidence | None
         "places": len({measurement.progress for measurement in pooled.measurements}),
         "pace": None if pace is None else {"cycles_per_second": pace, "moment": moment_at(life.events, pace, last)},
     }
-    return summary | held_part(state, tracking.filters, evidence)
+    return summary | held_summary(state, tracking.filters, evidence)
 
 
-def held_part(state: ClutchState, filters: States, evidence: Evidence | None) -> dict[str, Any]:
+def held_summary(state: ClutchState, filters: States, evidence: Evidence | None) -> dict[str, Any]:
     """What a summary says of the held runs: how many there are, and by each filter what would be predicted with them."""
     if not state.held or evidence is None:
         return {"held": len(state.held), "with_held": None}

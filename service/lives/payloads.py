@@ -143,7 +143,7 @@ def late_arrival(cycles: float, latest: float) -> list[Notice]:
     return [Notice(code=LATE, message=message)]
 
 
-def other_pressures(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
+def other_pressures_notice(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
     """A test that cannot be compared with the reference test: none of its pressures is one of that's."""
     if not cofs or any(nearest(level, cofs) is not None for level in reference):
         return []
@@ -166,7 +166,7 @@ def left_out(tests: int, runs: int) -> list[Notice]:
     return [Notice(code=TESTS_LEFT_OUT, message=message)]
 
 
-def other_oil(life: Life, event: Event) -> list[Notice]:
+def other_oil_notice(life: Life, event: Event) -> list[Notice]:
     """A test in oil that is much warmer or colder than the reference test's."""
     if not life.in_other_oil(event) or event.oil_temperature is None or life.reference_oil is None:
         return []
@@ -408,8 +408,8 @@ def history_warnings(
     return {
         event.run_id: [
             *notice_items(late_arrival(event.cycles, latest[event.run_id])),
-            *notice_items(other_pressures(life.reference, event.cofs)),
-            *notice_items(other_oil(life, event)),
+            *notice_items(other_pressures_notice(life.reference, event.cofs)),
+            *notice_items(other_oil_notice(life, event)),
             *off_track.get(event.run_id, ()),
         ]
         for life in lives

@@ -186,7 +186,7 @@ def with_cofs(
 ) -> tuple[ClutchState, dict[str, ByPressure], dict[str, Corrected]]:
     """The state with the mean COFs of its events and the new levels that these show, the COFs that the fits give by run_id,
     and those that the model in force corrects; arguments as of `computed_again`."""
-    cofs = _all_cofs(state.lives, levels, state.geometry)
+    cofs = _cofs_of_tests(state.lives, levels, state.geometry)
     events = tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in state.events)
     plain = replace(state, events=events)
     corrected = _corrected(plain, reader)
@@ -226,7 +226,7 @@ def set_aside(
     return cofs, receipt | parts | {"warnings": warnings}
 
 
-def _all_cofs(lives: Sequence[Life], levels: Levels, geometry: Geometry) -> dict[str, ByPressure]:
+def _cofs_of_tests(lives: Sequence[Life], levels: Levels, geometry: Geometry) -> dict[str, ByPressure]:
     """Mean COF of every test that has curves, over the protocol of its life's first test."""
     cofs: dict[str, ByPressure] = {}
     for life in lives:
@@ -328,7 +328,9 @@ class Arrival:
 
     @property
     def kept(self) -> dict[str, Any]:
-        return self.analysis.kept_beside(self.run) | ({} if self.shown is None else {"shown": self.shown.to_list()})
+        return self.analysis.details_to_store(self.run) | (
+            {} if self.shown is None else {"shown": self.shown.to_list()}
+        )
 
 
 def test_of(arrival: Arrival, life: Life) -> StationaryRun | None:

@@ -57,7 +57,7 @@ class Analysis:
     times: tuple[float, ...] | None = None
     engagement: Engagement | None = None
 
-    def kept_beside(self, run: IncomingRun) -> dict[str, Any]:
+    def details_to_store(self, run: IncomingRun) -> dict[str, Any]:
         """What is kept beside a run's channels: what was sent with them, its range of speeds [rad/s] and its oil [K], the
         course of an engagement."""
         kept = dict(run.details) | {"origin": run.origin}

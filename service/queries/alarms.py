@@ -8,7 +8,7 @@ from service.alarms import raising, receivers
 from service.errors import found
 from service.lists import Part, by_key, by_name
 from service.schemas.alarm import AlarmOut, DeliveryOut
-from service.schemas.base import of_row
+from service.schemas.base import schema_fields
 from storage import alarms, webhooks
 from storage.alarms import AlarmRow
 from storage.engine.database import Database
@@ -16,7 +16,7 @@ from storage.webhooks import DeliveryRow, WebhookRow
 
 
 def rule_out(row: AlarmRow) -> dict[str, Any]:
-    return of_row(AlarmOut, row, **raising.rule_of(row).model_dump(mode="json"))
+    return schema_fields(AlarmOut, row, **raising.rule_of(row).model_dump(mode="json"))
 
 
 def page(database: Database, part: Part, *, only: Collection[str] | None = None) -> dict[str, Any]:
@@ -97,4 +97,4 @@ def delivered(database: Database, delivery_ids: Collection[str]) -> list[dict[st
 def delivery_out(row: DeliveryRow) -> dict[str, Any]:
     again = row.state == webhooks.WAITING and row.due > 0.0
     next_attempt = datetime.fromtimestamp(row.due, UTC).isoformat(timespec="seconds") if again else None
-    return of_row(DeliveryOut, row, next_attempt_at=next_attempt)
+    return schema_fields(DeliveryOut, row, next_attempt_at=next_attempt)

@@ -15,7 +15,7 @@ from service import records
 from service.lists import Part, by_name, page_as_bytes
 from service.lives.condition import STATES, stated
 from service.queries.cache import AnswerCache, to_json
-from service.schemas.base import of_row
+from service.schemas.base import schema_fields
 from service.schemas.clutch import ClutchOut
 from storage import assumptions, clutches, diagnoses, jobs, runs
 from storage.clutches import Choice, ClutchRow
@@ -149,4 +149,4 @@ def _shown(
 def _item(row: ClutchRow, held: int, diagnosis: dict[str, Any] | None, state: dict[str, Any]) -> dict[str, Any]:
     said = {"runs": row.summary.get("runs", 0), "recent": row.summary.get("recent"), "summary": stated(row.summary)}
     beside = state | said | {"held": held, "diagnosis": diagnosis}
-    return of_row(ClutchOut, row, **records.record(row).model_dump(mode="json") | beside)
+    return schema_fields(ClutchOut, row, **records.record(row).model_dump(mode="json") | beside)

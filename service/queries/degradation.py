@@ -17,7 +17,7 @@ from models.prognosis.from_parameters import CofPaths, Disagreement, disagreemen
 from service import records, stored_runs
 from service.errors import Notice
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
-from service.lives.condition import held_beside
+from service.lives.condition import held_runs_left_out
 from service.lives.criteria import SEVERITY_EXPONENTS
 from service.lives.history import Series, reference_velocities
 from service.lives.outlook import measured_life
@@ -74,14 +74,14 @@ def degradation(
         chosen = chosen_life(state, life, at_cycles)
         evidence = stored_runs.evidence(connection, clutch_id)
     measured = measured_life(state, chosen, evidence)
-    held = held_beside(len(chosen.held))
+    held = held_runs_left_out(len(chosen.held))
     head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}
     if measured is None or (wanted is None and not measured.life.reference):
         nothing: dict[str, Any] = {"items": [], "rebuilt": None, "severity_estimate": None}
         return head | nothing | held | chosen.assumptions.named() | {"next": None}
     estimate = None
     if wanted is None:
-        items, again = _all(measured, method, draws, until)
+        items, again = _all_tracks(measured, method, draws, until)
         estimate = severity_estimate(measured.life, measured.assumptions)
     else:
         items, again = _items(measured, wanted, method, draws, until), None
@@ -109,7 +109,7 @@ def arguments(
     return () if whole == ("grid", None, None, None, 0, None) else whole
 
 
-def _all(
+def _all_tracks(
     measured: MeasuredLife, method: str, draws: int, until: float | None
 ) -> tuple[list[dict[str, Any]], dict[str, Any] | None]:
     """Mean COF, every parameter, and mean COF from the parameters."""

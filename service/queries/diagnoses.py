@@ -13,7 +13,7 @@ from service.lists import Part, by_key
 from service.lives.assumptions import BASELINE
 from service.lives.diagnosis.report import empty
 from service.lives.model_correction import extension_of
-from service.schemas.base import of_row
+from service.schemas.base import schema_fields
 from service.schemas.diagnosis import ModelVersion
 from storage import assumptions, changes, diagnoses
 from storage.assumptions import AdoptedRow
@@ -110,7 +110,7 @@ def model(database: Database, clutch_id: str) -> dict[str, Any]:
             "version": rows[0].version if rows else 0,
             "diagnosis_id": None if in_force is None else in_force.diagnosis_id,
             "versions": [
-                of_row(ModelVersion, row, model=_name(_extension(connection, clutch_id, row))) for row in rows
+                schema_fields(ModelVersion, row, model=_name(_extension(connection, clutch_id, row))) for row in rows
             ],
         }
 

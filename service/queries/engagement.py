@@ -18,7 +18,7 @@ from service import records, stored_runs
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, whole
 from service.errors import NotFoundError
 from service.lives.assumptions import Assumptions
-from service.lives.condition import held_beside
+from service.lives.condition import held_runs_left_out
 from service.lives.engagements import evaluated, public_channels
 from service.lives.history import Life, Series, lives_of
 from service.lives.incoming_run import IncomingRun
@@ -59,7 +59,7 @@ def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id:
         **_simulated(capacities[0], state.geometry),
         "measured": measured,
         "compared": comparison,
-        **held_beside(len(chosen_life(state, at_cycles=at_cycles).held)),
+        **held_runs_left_out(len(chosen_life(state, at_cycles=at_cycles).held)),
     }
 
 

@@ -10,7 +10,7 @@ from models.degradation.severity import SeverityBasis
 from models.prognosis.criteria import FEWEST_SEVERITIES
 from models.prognosis.ended_lives import EndedLife, severity_exponent
 from models.prognosis.fleet import FleetPrior
-from service.schemas.base import of_row
+from service.schemas.base import schema_fields
 from service.schemas.fleet import FleetPriorOut
 from storage import assumptions
 from storage.assumptions import FleetPriorRow
@@ -40,7 +40,7 @@ def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
 
 def _item(row: FleetPriorRow) -> dict[str, Any]:
     """A prior as it goes out: medians, and the factor or share by which two thirds of the clutches stay within."""
-    return of_row(
+    return schema_fields(
         FleetPriorOut,
         row,
         kind=row.fleet,

@@ -87,7 +87,7 @@ def preview(
         **evaluated,
         "missing": [
             *evaluated["missing"],
-            *_without_unit(columns),
+            *_missing_units(columns),
             *(["kind"] if kind is None else []),
             *(["cycles"] if cycles is None else []),
         ],
@@ -157,7 +157,7 @@ def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, 
     }
 
 
-def _without_unit(columns: Sequence[Mapping[str, Any]]) -> list[str]:
+def _missing_units(columns: Sequence[Mapping[str, Any]]) -> list[str]:
     """What is missing of columns that are channels: nothing is taken for the channel's own unit without a word."""
     return [f"unit of {column['title']}" for column in columns if column["channel"] and not column["unit"]]
 

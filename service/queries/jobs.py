@@ -5,7 +5,7 @@ from typing import Any
 
 from service.errors import found
 from service.lists import Part, by_key
-from service.schemas.base import of_row
+from service.schemas.base import schema_fields
 from service.schemas.diagnosis import JobOut
 from storage import jobs
 from storage.engine.database import Database
@@ -30,4 +30,4 @@ def shown(row: JobRow) -> dict[str, Any]:
     result = progress.get("result")
     if result is not None:
         progress = {name: value for name, value in progress.items() if name != "result"}
-    return of_row(JobOut, row, progress=None if row.progress is None else progress, result=result)
+    return schema_fields(JobOut, row, progress=None if row.progress is None else progress, result=result)

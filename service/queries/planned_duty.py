@@ -21,7 +21,7 @@ from models.prognosis.stated_end import StatedEnd
 from service import records, stored_runs
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 from service.errors import Notice
-from service.lives.condition import beside_held
+from service.lives.condition import with_held_runs
 from service.lives.history import Event, Series, date_of, moment_at, pace_of
 from service.lives.outlook import with_held
 from service.lives.payloads import ENDED, INSUFFICIENT, SAFE, by_quantile, ended, notice_items
@@ -63,7 +63,7 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
         "end_of_life_at": _dates(prediction["end_of_life_cycles"], events, pace),
         "pace_cycles_per_hour": pace,
         "pace_from": None if pace is None else "runs" if stated is None else "request",
-        **beside_held(prediction, summary, among, len(state.held)),
+        **with_held_runs(prediction, summary, among, len(state.held)),
     }
 
 

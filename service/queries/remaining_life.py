@@ -11,7 +11,7 @@ from sqlalchemy import Connection
 from service import records, stored_runs
 from service.errors import NotFoundError, unknown_clutch
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
-from service.lives.condition import beside_held
+from service.lives.condition import with_held_runs
 from service.lives.outlook import Evidence, measured_life, with_held
 from service.lives.payloads import ended, filters_disagree, notice_items
 from service.lives.quantities.ends import GIVEN, criteria_answer, criterion_end
@@ -78,7 +78,7 @@ def remaining_life(
     else:
         payload = _predicted(state, method, pressure_bar, at_cycles)
     payload = {**payload, "warnings": [*payload["warnings"], *disagree]}
-    answer = head | payload | beside_held(payload, summary, among, count)
+    answer = head | payload | with_held_runs(payload, summary, among, count)
     return answer | {"criteria": _criteria(payload)}
 
 
@@ -183,7 +183,7 @@ def life_by_criteria(
         held = with_held(state, evidence)
         among = _by_criteria(held, chosen_life(held, life, None if now else at_cycles), evidence, request)
     head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": state.record.origin}
-    return head | answer | beside_held(answer, row.summary if now else {}, among, len(chosen.held))
+    return head | answer | with_held_runs(answer, row.summary if now else {}, among, len(chosen.held))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,14 +203,16 @@ def _by_criteria(state: ClutchState, chosen: ChosenLife, evidence: Evidence, req
     measured = measured_life(state, chosen, evidence)
     if measured is None:
         return answer
-    wanted = _wanted(state.record.end_of_life, measured, request.quantity, request.criterion, request.pressure_bar)
+    wanted = _requested_criteria(
+        state.record.end_of_life, measured, request.quantity, request.criterion, request.pressure_bar
+    )
     if all(criterion_in.quantity != MEAN_COF for criterion_in in wanted):
         answer |= _NOT_OF_MEAN_COF
     ends = [criterion_end(measured, criterion_in, request.method) for criterion_in in wanted]
     return ended(answer | criteria_answer(measured, ends, answer["current"]), measured.life.end)
 
 
-def _wanted(
+def _requested_criteria(
     record: EndOfLifeIn, measured: MeasuredLife, quantity: str | None, criterion: str | None, pressure_bar: float | None
 ) -> Sequence[CriterionIn]:
     own = record.criteria or (CriterionIn(quantity="mean_cof", fraction=record.cof_fraction),)

@@ -20,10 +20,10 @@ def page(database: Database, part: Part) -> dict[str, Any]:
 
 def look_up(database: Database, name: str) -> dict[str, Any]:
     """One profile as it is answered. Raises NotFoundError."""
-    return of_name(database, name).model_dump(mode="json")
+    return rig_profile(database, name).model_dump(mode="json")
 
 
-def of_name(database: Database, name: str) -> RigOut:
+def rig_profile(database: Database, name: str) -> RigOut:
     """One profile. Raises NotFoundError."""
     with database.reading() as connection:
         return records.rig(connection, name)

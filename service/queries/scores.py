@@ -30,7 +30,7 @@ STAGES, HALF_STAGE = (0.2, 0.4, 0.6, 0.8), 0.1
 _LOW, _HIGH = "0.05", "0.95"
 
 
-def of_clutch(database: Database, clutch_id: str, method: str) -> dict[str, Any]:
+def scores_of_clutch(database: Database, clutch_id: str, method: str) -> dict[str, Any]:
     """The scores of a clutch's lives that came to their end; NotFoundError for an unknown clutch."""
     with database.reading() as connection:
         state = records.state(connection, clutch_id)
@@ -46,8 +46,8 @@ def of_clutch(database: Database, clutch_id: str, method: str) -> dict[str, Any]
     return {"clutch_id": clutch_id, "method": method, "revision": state.revision, "items": items, "next": None}
 
 
-def of_fleet(scored: Iterable[Mapping[str, Any]], *, method: str) -> dict[str, Any]:
-    """All lives that came to their end, together and by stage of life, of what `of_clutch` gives for each clutch."""
+def scores_of_fleet(scored: Iterable[Mapping[str, Any]], *, method: str) -> dict[str, Any]:
+    """All lives that came to their end, together and by stage of life, of what `scores_of_clutch` gives for each clutch."""
     lives = [life | {"clutch_id": clutch["clutch_id"]} for clutch in scored for life in clutch["items"]]
     tests = [test for life in lives for test in life["predictions"]]
     stages = [

@@ -52,7 +52,7 @@ def series(database: Database, clutch_id: str, quantity: str | None) -> list[dic
         held = runs.held(connection, [clutch_id]).get(clutch_id, 0)
     measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))
     slopes = _slopes(records.record(clutch), rows, levels)
-    lags = (item for row in dynamic for loop in row.receipt["loops"] for item in _of_loop(row.receipt, loop))
+    lags = (item for row in dynamic for loop in row.receipt["loops"] for item in _rows_of_loop(row.receipt, loop))
     indicators = (item for row in engaged for item in _indicators(row))
     ahead = (item for row in predicted for item in _predicted(row))
     waiting = [_ahead_row(predicted[-1].cycles if predicted else 0.0, "held_runs", "1", float(held))] if held else []
@@ -68,7 +68,7 @@ def _measured(receipt: dict[str, Any], fit: dict[str, Any]) -> Iterator[dict[str
     values = [(MEAN_COF, "1", fit["mean_cof"], fit["mean_cof_sd"])]
     for public, unit in PARAMETER_UNITS.values():
         values.append((public, unit, fit["parameters"][public], fit["standard_errors"][public]))
-    of_run = _of_run(receipt) | {"pressure_bar": fit["pressure_bar"]}
+    of_run = _columns_of_run(receipt) | {"pressure_bar": fit["pressure_bar"]}
     for quantity, unit, value, sd in values:
         yield of_run | _row(quantity, unit, value, sd)
 
@@ -90,10 +90,10 @@ def _slope(receipt: dict[str, Any], curve: LevelFit, geometry: Geometry, speed_r
     slope = slope_of(curve, geometry, speed_rpm)
     if slope is not None:
         place = {"pressure_bar": bar(curve.fit.pressure), "speed_rpm": speed_rpm}
-        yield _of_run(receipt) | _row(SLOPE, QUANTITIES[SLOPE].unit, *slope) | place
+        yield _columns_of_run(receipt) | _row(SLOPE, QUANTITIES[SLOPE].unit, *slope) | place
 
 
-def _of_loop(receipt: dict[str, Any], loop: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def _rows_of_loop(receipt: dict[str, Any], loop: dict[str, Any]) -> Iterator[dict[str, Any]]:
     frequency = loop["frequency_hz"]
     place = {
         "pressure_bar": loop["pressure_bar"],
@@ -101,17 +101,17 @@ def _of_loop(receipt: dict[str, Any], loop: dict[str, Any]) -> Iterator[dict[str
     }
     for quantity, (value, sd) in LOOP_COLUMNS.items():
         if loop[value] is not None and loop[sd] is not None:
-            yield _of_run(receipt) | _row(quantity, QUANTITIES[quantity].unit, loop[value], loop[sd]) | place
+            yield _columns_of_run(receipt) | _row(quantity, QUANTITIES[quantity].unit, loop[value], loop[sd]) | place
 
 
 def _indicators(row: dict[str, Any]) -> Iterator[dict[str, Any]]:
     for quantity, indicator in ALL_INDICATORS.items():
         estimate = row["indicators"][quantity]
         if estimate is not None:
-            yield _of_run(row, row["time"]) | _row(quantity, indicator.unit, estimate["value"], estimate["sd"])
+            yield _columns_of_run(row, row["time"]) | _row(quantity, indicator.unit, estimate["value"], estimate["sd"])
 
 
-def _of_run(run: dict[str, Any], time: str | None = None) -> dict[str, Any]:
+def _columns_of_run(run: dict[str, Any], time: str | None = None) -> dict[str, Any]:
     """What a row says of a run, by its receipt, or by a row that has the time."""
     time = time or run["started_at"] or run["received_at"]
     return {"cycles": run["cycles"], "time": time, "run_id": run["run_id"], "source": "run", **_NOWHERE}

@@ -10,7 +10,7 @@ from models.friction.pressure_laws import LinearLaw, PressureLaws, fit_pressure_
 from service import records
 from service.columns import PASCALS_PER_BAR, whole
 from service.lists import Part, by_cycles
-from service.lives.condition import held_beside
+from service.lives.condition import held_runs_left_out
 from service.lives.payloads import PARAMETER_UNITS
 from service.lives.run_analysis import LevelFit
 from storage import runs
@@ -29,7 +29,7 @@ def curves(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
         levels = records.levels(connection, clutch_id)
         held = runs.held(connection, [clutch_id]).get(clutch_id, 0)
     tests = part.of(rows, by_cycles("run_id"), lambda row: _item(row, levels.get(row.run_id, [])))
-    return held_beside(held) | tests  # the next page last, where it is found
+    return held_runs_left_out(held) | tests  # the next page last, where it is found
 
 
 def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:

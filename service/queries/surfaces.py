@@ -20,7 +20,7 @@ from service import records
 from service.columns import RADIANS_PER_SECOND_PER_RPM, bar, whole
 from service.errors import NotFoundError
 from service.lives.assumptions import Assumptions
-from service.lives.condition import held_beside
+from service.lives.condition import held_runs_left_out
 from service.lives.history import Event, lives_of
 from service.lives.payloads import PARAMETER_UNITS
 from service.lives.quantities.measured import Track, parameter_tracks, tests_of
@@ -38,7 +38,7 @@ def surface(database: Database, clutch_id: str) -> dict[str, Any]:
     assumptions = state.assumptions()
     grids = surfaces(state.events, assumptions, levels, state.geometry)
     head = {"clutch_id": clutch_id, "revision": state.revision}
-    return head | held_beside(len(state.held)) | grids | assumptions.named()
+    return head | held_runs_left_out(len(state.held)) | grids | assumptions.named()
 
 
 def surfaces(

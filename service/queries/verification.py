@@ -51,7 +51,7 @@ def check_runs(database: Database, clutch_id: str) -> CheckedRuns:
 def _finding(database: Database, row: RunRow) -> str | None:
     try:
         with database.reading() as connection:
-            columns = channels.all_stored(connection, row.run_key)
+            columns = channels.stored_of_run(connection, row.run_key)
             stored_file = channels.file_of(connection, row.run_key)
         sent = decoded(row, columns)
     except DamagedData as error:

@@ -153,8 +153,8 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
         parts = [(f"{name}[{number}]", place) for number, place in enumerate(places, 1)]
     size = len(parts)
     lists = [texts for texts in map(_texts, {**beside, **leaf.attributes}.values()) if len(texts) == size > 1]
-    units = max(lists, key=_known_units, default=[])
-    units = units if 2 * _known_units(units) > size else [""] * size
+    units = max(lists, key=_count_units, default=[])
+    units = units if 2 * _count_units(units) > size else [""] * size
     matrix = size > 1 and not dtype.names
     names = max(
         (texts for texts in lists if matrix and texts is not units), key=lambda own: recognised(own, ()), default=[]
@@ -175,16 +175,16 @@ def _unit(names: Sequence[str], attributes: Tree, beside: Tree, *, whole: bool) 
     """The unit that stands at an array or beside it under one of its names; `whole`: or without any, as it is one column."""
     at_data = beside if whole and any(key.lower() in _DATA for key in beside) else {}
     named = (stated_unit(name, held) for held in (attributes, beside) for name in names)
-    return next(filter(None, [own_unit(attributes if whole else {}), *named, own_unit(at_data)]), "")
+    return next(filter(None, [unit_of_array(attributes if whole else {}), *named, unit_of_array(at_data)]), "")
 
 
-def own_unit(held: Tree) -> str:
+def unit_of_array(held: Tree) -> str:
     """The unit among what is stated of one array."""
     lowered = {key.lower(): value for key, value in held.items()}
     return next(filter(None, (_text(lowered.get(key)) for key in UNITS)), "")
 
 
-def _known_units(texts: list[str]) -> int:
+def _count_units(texts: list[str]) -> int:
     return sum(map(is_unit, texts))
 
 

@@ -28,7 +28,7 @@ from service.readers.column_names import (
 )
 from service.readers.limits import Limits
 from service.readers.long_table import says_valid, valid_rows, widened
-from service.readers.no_values import refuse_stand_ins, without_stated, without_totals
+from service.readers.no_values import drop_totals, mask_stated_marks, refuse_stand_ins
 from service.readers.numerals import empty_cells, plain, read_cells
 from service.readers.table import NO_MISSING, NO_TIME, Clock, Column, Reading, Table, index_of_wanted, labels, marks
 
@@ -87,7 +87,7 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     series, table, taken, counts = _read(table, taken, reading, limits)
     notices = [*table.notices, *_left_out(table.columns, taken, reading)]
     columns = _on_one_clock(series, notices)
-    columns, first = _one_table(columns, table, reading)
+    columns, first = _chosen_table(columns, table, reading)
     line_in_file = table.line_of
     line_of = None if line_in_file is None else lambda row: line_in_file(first + row)
     try:
@@ -114,7 +114,7 @@ def _refuse_standing(columns: Mapping[str, FloatArray]) -> None:
     raise InvalidError.of(message, code="time_stands", pointer="/channels/time_s")
 
 
-def _one_table(columns: dict[str, FloatArray], table: Table, reading: Reading) -> tuple[dict[str, FloatArray], int]:
+def _chosen_table(columns: dict[str, FloatArray], table: Table, reading: Reading) -> tuple[dict[str, FloatArray], int]:
     """The one table, or of several below each other the one that is named by its number (`2`, `Sheet/2`), and its first row.
 
     Titles that only interrupt a table, whose time goes on after them, begin no other.
@@ -208,9 +208,9 @@ def _read(
     }
     parts = {} if reading.time == NO_TIME or "time_s" not in channels.values() else parts
     read = read_cells(table, dict.fromkeys(says, "") | dict.fromkeys(parts, "time_s") | channels, reading)
-    read, table = without_totals(read, [column.index for column in taken if column.channel != "time_s"], table)
+    read, table = drop_totals(read, [column.index for column in taken if column.channel != "time_s"], table)
     for column in taken:
-        read[column.index] = without_stated(read[column.index], reading)
+        read[column.index] = mask_stated_marks(read[column.index], reading)
         refuse_stand_ins(column.channel, read[column.index], table.line_of, reading)
     values: dict[int, FloatArray] = {}
     valid: dict[int, NDArray[np.bool_] | None] = {}
@@ -236,7 +236,7 @@ def _read(
             clock = clocks.get(column.index)
             key = None if clock is None else clock.key
             whole = _Series(values[column.index], valid[column.index], key, times.get(key))
-            own = series[column.channel] = _without_gaps(column.channel, whole, table, bool(marks(reading.missing)))
+            own = series[column.channel] = _drop_empty_rows(column.channel, whole, table, bool(marks(reading.missing)))
             for good in marked:
                 if good is not None and good.size == own.values.size:
                     own.valid = good if own.valid is None else own.valid & good
@@ -245,7 +245,7 @@ def _read(
     return series, table, taken, len(used) == 1 and all(clock.counts for clock in used.values())
 
 
-def _without_gaps(name: str, own: _Series, table: Table, leave_out: bool) -> _Series:
+def _drop_empty_rows(name: str, own: _Series, table: Table, leave_out: bool) -> _Series:
     """A channel without the rows that hold neither it nor its time. Where at least every second of its cells is empty, its
     rate is lower than that of the rows: it is the samples that are there.
 

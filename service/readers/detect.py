@@ -115,7 +115,7 @@ class _Unpacked:
     def __init__(self, file: BinaryIO, size: int, limits: Limits) -> None:
         self._unpacking = gzip.GzipFile(fileobj=file)
         self._packed = size
-        self._most = _most_unpacked(size, limits)
+        self._most = _max_unpacked_bytes(size, limits)
         self._done = 0
 
     def read(self, size: int, /) -> bytes:
@@ -141,7 +141,7 @@ def sniff(path: Path, filename: str, limits: Limits) -> Format:
         raise InvalidError(f"{shown} must not be empty")
     for magic, kind in _MAGIC.items():
         if head.startswith(magic):
-            return _of_archive(path) if magic == _ARCHIVE else kind
+            return _format_of_archive(path) if magic == _ARCHIVE else kind
     if _HDF5 in (head[512:520], head[1024:1032], head[2048:2056]):
         return Format.HDF5
     if suffix == ".mat" and head[:2] in (b"\0\0", b"\n\0", b"\x14\0", b"\x1e\0"):
@@ -156,7 +156,7 @@ def sniff(path: Path, filename: str, limits: Limits) -> Format:
     return Format.TEXT
 
 
-def _of_archive(path: Path) -> Format:
+def _format_of_archive(path: Path) -> Format:
     """A workbook or any other ZIP archive, by the names in it; what is packed with gzip besides is no archive here."""
     try:
         with zipfile.ZipFile(path) as archive:
@@ -177,13 +177,13 @@ def check_archive(path: Path, limits: Limits) -> list[zipfile.ZipInfo]:
     if len(listed) > _MAX_MEMBERS:
         raise TooLargeError(f"a ZIP archive must not hold more than {_MAX_MEMBERS} files, got {len(listed)}")
     packed = path.stat().st_size
-    most = _most_unpacked(packed, limits)
+    most = _max_unpacked_bytes(packed, limits)
     if sum(info.file_size for info in listed) > most:
         raise TooLargeError(f"a ZIP archive of {packed} bytes must not unpack to more than {most} bytes, got more")
     return listed
 
 
-def _most_unpacked(packed: int, limits: Limits) -> int:
+def _max_unpacked_bytes(packed: int, limits: Limits) -> int:
     """Bytes that a packed file of so many may unpack to."""
     return min(limits.most_bytes, max(limits.free_bytes, limits.most_ratio * packed))
 
@@ -204,7 +204,7 @@ def members(path: Path, limits: Limits) -> list[str]:
 @contextmanager
 def unpacked(path: Path, name: str, limits: Limits) -> Iterator[Path]:
     """One file of an archive, beside it. Raises InvalidError where it is encrypted or damaged, else TooLargeError."""
-    most = _most_unpacked(path.stat().st_size, limits)
+    most = _max_unpacked_bytes(path.stat().st_size, limits)
     with tempfile.NamedTemporaryFile(dir=path.parent) as plain:
         try:
             with zipfile.ZipFile(path) as archive, archive.open(name) as member:

@@ -97,13 +97,13 @@ class DataRows:
         held: list[tuple[int, Row]] = []
         for number, row in rows:
             if row == self.titles and before + len(held):
-                self._without_footer(held)
+                self._split_footer(held)
                 self.breaks.append(before + len(held))
             elif not is_blank(row) and tuple(row) not in self._above:
                 summary = not self._summarised and _is_summary(row) and any(map(is_value, row))
                 self._summaries += [row] if summary else []
                 held += [] if summary else [(number, row)]
-        if last and (footer := self._without_footer(held)):
+        if last and (footer := self._split_footer(held)):
             self._leave_out(footer, "below")
         return [number for number, _ in held], [row for _, row in held]
 
@@ -112,7 +112,7 @@ class DataRows:
         if self._summaries:
             self._leave_out(self._summaries, "of means, extremes or sums in")
 
-    def _without_footer(self, held: list[tuple[int, Row]]) -> list[Row]:
+    def _split_footer(self, held: list[tuple[int, Row]]) -> list[Row]:
         """The rows at the end that are words, or that a word begins (`Mean;5;100;20`), which are taken out."""
         end = len(held)
         while end and is_footer(held[end - 1][1], self.first):
@@ -224,7 +224,7 @@ def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, 
         yield start, length
 
 
-def _without_labelled(rows: Sequence[Row], comments: frozenset[int], start: int, length: int) -> tuple[int, int]:
+def _skip_labelled_rows(rows: Sequence[Row], comments: frozenset[int], start: int, length: int) -> tuple[int, int]:
     """Where a run begins without its first rows that hold numbers of another kind beside a label (`Length;12;12`), and
     how many those are."""
     run = [index for index in range(start, len(rows)) if index not in comments and not is_blank(rows[index])][:length]
@@ -289,7 +289,7 @@ def _layout(
     rows: Sequence[Row], comments: frozenset[int], start: int, length: int, named: Sequence[str]
 ) -> Layout | None:
     """The layout of the data from row `start` on: the row above them that knows most channels has the titles."""
-    start, labelled = _without_labelled(rows[:-1], comments, start, length)
+    start, labelled = _skip_labelled_rows(rows[:-1], comments, start, length)
     above = _text_rows_above(rows, comments, start)
     width = max((index + 1 for index, cell in enumerate(rows[start]) if cell not in (None, "")), default=0)
     data = [row for row in rows[start : start + length] if not is_blank(row)][:_LONG_RUN]
@@ -402,11 +402,15 @@ def _units(
     best: Sequence[str] = []
     for index in (*below, *over, *labelled):
         if index != at and texts[index] != texts[at]:
-            best = max(best, *_beside(texts[index], titles, width), key=lambda units: sum(map(_fits, titles, units)))
+            best = max(
+                best,
+                *_placements_of_units(texts[index], titles, width),
+                key=lambda units: sum(map(_fits, titles, units)),
+            )
     return ["" if _UNIT_LABELS.fullmatch(unit) else unit for unit in best]
 
 
-def _beside(units: Sequence[str], titles: Sequence[str], width: int) -> Iterator[Sequence[str]]:
+def _placements_of_units(units: Sequence[str], titles: Sequence[str], width: int) -> Iterator[Sequence[str]]:
     """A row of units as it stands to the titles, each under its own; or, where every one fits then, those of all columns
     that are known, or known and no time, one after the other, as writers leave out what needs none."""
     yield units

@@ -56,7 +56,7 @@ _STATISTICS: dict[str, Callable[[FloatArray], float]] = {
 }
 
 
-def without_stated(values: NDArray[Any], reading: Reading) -> NDArray[Any]:
+def mask_stated_marks(values: NDArray[Any], reading: Reading) -> NDArray[Any]:
     """Numbers [n], masked where they are one of the caller's marks, or NaN where there is any mark."""
     stated = marks(reading.missing)
     if not stated or values.dtype.kind not in "iuf":
@@ -150,7 +150,7 @@ def _jumped_to(held: FloatArray, low: float, high: float) -> float | None:
     return None
 
 
-def without_totals(
+def drop_totals(
     columns: Mapping[int, NDArray[Any]], measured: list[int], table: Table
 ) -> tuple[dict[int, NDArray[Any]], Table]:
     """Columns [n] by index and their table without the rows at its end that are the means, sums, maxima of those above."""

@@ -15,7 +15,7 @@ import pyarrow.types as kinds  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from service.errors import MAX_QUOTED
-from service.readers.arrays import own_unit, parsed, refuse_counts, stated_unit
+from service.readers.arrays import parsed, refuse_counts, stated_unit, unit_of_array
 from service.readers.column_names import column_of, known_channel
 from service.readers.limits import Limits
 from service.readers.numerals import is_stamp
@@ -56,7 +56,7 @@ def _column(field: Any, file: Any, beside: Mapping[str, Any]) -> Column:
     moment = kinds.is_temporal(field.type)
     if known_channel(field.name) == "time_s" and kinds.is_large_string(field.type) | kinds.is_string(field.type):
         moment = any(is_stamp(str(batch[0][0])) for batch in islice(file.iter_batches(1, columns=[field.name]), 1))
-    unit = own_unit(_stated(field.metadata)) or stated_unit(field.name, beside)
+    unit = unit_of_array(_stated(field.metadata)) or stated_unit(field.name, beside)
     return replace(column_of(field.name, unit, moments=moment), rows=file.metadata.num_rows)
 
 

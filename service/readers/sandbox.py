@@ -227,7 +227,7 @@ def main() -> None:
         except MemoryError:
             _write_error(result, _too_much(kind))
         except BaseException as error:  # noqa: BLE001 (whatever a foreign library raises on a foreign file, Rust's panics too)
-            _write_error(result, _unreadable(kind, f"{type(error).__name__}: {_without_paths(str(error))}"))
+            _write_error(result, _unreadable(kind, f"{type(error).__name__}: {_strip_paths(str(error))}"))
 
 
 def _described(channels: Channels) -> dict[str, Any]:
@@ -239,7 +239,7 @@ def _described(channels: Channels) -> dict[str, Any]:
     }
 
 
-def _without_paths(message: str) -> str:
+def _strip_paths(message: str) -> str:
     """A foreign message without the places of this machine."""
     return re.sub(r"(/[\w.~+-]+)+/", "", message)[:_MAX_QUOTED]
 

@@ -15,7 +15,7 @@ from nptdms import TdmsFile  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from service.errors import MAX_QUOTED, InvalidError
-from service.readers.arrays import own_unit, refuse_counts
+from service.readers.arrays import refuse_counts, unit_of_array
 from service.readers.clocks import evenly, in_seconds, stated_clock
 from service.readers.column_names import column_of
 from service.readers.limits import Limits
@@ -98,7 +98,7 @@ def _column(channel: Any, grouped: bool, clock: Clock | None) -> Column:
     kind = "" if channel.dtype is None else channel.dtype.kind
     moments = kind == "M" or (kind in "OSU" and is_stamp(str(channel[0])))
     group = channel.group_name if grouped else ""
-    column = column_of(channel.name, own_unit(channel.properties) or None, group, moments=moments)
+    column = column_of(channel.name, unit_of_array(channel.properties) or None, group, moments=moments)
     return replace(column, rows=len(channel), clock=clock)
 
 

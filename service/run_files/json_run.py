@@ -140,10 +140,10 @@ def _in_utf8(body: bytes) -> bytes:
     """
     for mark, name in _MARKS:
         if body.startswith(mark):
-            raise _other_encoding(f"the body begins with the byte order mark of {name}")
+            raise _encoding_error(f"the body begins with the byte order mark of {name}")
     body = body.removeprefix(codecs.BOM_UTF8)
     if (zero := body[:4].find(0)) >= 0:
-        raise _other_encoding(f"byte {zero + 1} is zero, as in UTF-{32 if body[:4].count(0) == 3 else 16}")
+        raise _encoding_error(f"byte {zero + 1} is zero, as in UTF-{32 if body[:4].count(0) == 3 else 16}")
     return body
 
 
@@ -153,12 +153,12 @@ def _require_utf8(body: bytes) -> None:
         body.decode()
     except UnicodeDecodeError as error:
         wrong = body[error.start]
-        raise _other_encoding(
+        raise _encoding_error(
             f"byte {error.start + 1} is 0x{wrong:02x}, which is {bytes([wrong]).decode('latin-1')!r} in Latin-1"
         ) from None
 
 
-def _other_encoding(why: str) -> InvalidError:
+def _encoding_error(why: str) -> InvalidError:
     message = f"the body must be JSON in UTF-8: {why}"
     return InvalidError.of(message, code="encoding")
 

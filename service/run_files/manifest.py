@@ -43,7 +43,7 @@ class RunFile:
     parameters: Mapping[str, str] | None = None
 
     @property
-    def of_inspection(self) -> bool:
+    def is_inspection(self) -> bool:
         """Whether it is an inspection's: JSON in a folder of them."""
         return self.path.suffix == ".json" and self.path.absolute().parent.name == INSPECTIONS
 

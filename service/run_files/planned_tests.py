@@ -20,7 +20,7 @@ _LISTS = ("pressures_bar", "speeds_rpm")
 def planned_tests(path: Path, alternative: int) -> list[PlannedTest]:
     """The steps of one of a plan's alternatives, from 1. Raises ValueError that names what is wrong, OSError."""
     text = path.read_text(encoding="utf-8-sig")
-    tests = _of_json(path, text) if text.lstrip().startswith("{") else _of_csv(text)
+    tests = _steps_from_json(path, text) if text.lstrip().startswith("{") else _steps_from_csv(text)
     if not tests:
         raise _no_plan(path, "it has no tests")
     if alternative not in tests:
@@ -28,7 +28,7 @@ def planned_tests(path: Path, alternative: int) -> list[PlannedTest]:
     return [_planned(f"{path}, step {number}", step) for number, step in enumerate(tests[alternative], start=1)]
 
 
-def _of_json(path: Path, text: str) -> dict[int, list[Any]]:
+def _steps_from_json(path: Path, text: str) -> dict[int, list[Any]]:
     try:
         return {number: test["steps"] for number, test in enumerate(json.loads(text)["tests"], start=1)}
     except (ValueError, KeyError, TypeError) as error:
@@ -39,7 +39,7 @@ def _no_plan(path: Path, why: str) -> ValueError:
     return ValueError(f"{path} is not a plan of a diagnosis ({why}): save one with clutchlife diagnose ID --plan FILE")
 
 
-def _of_csv(text: str) -> dict[int, list[Any]]:
+def _steps_from_csv(text: str) -> dict[int, list[Any]]:
     tests: dict[int, list[Any]] = {}
     for row in csv.DictReader(text.splitlines()):
         cells = {name: cell or None for name, cell in row.items() if name in PlanStep.model_fields}

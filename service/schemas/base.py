@@ -178,7 +178,7 @@ Revision = Annotated[int, Field(description="Increases with every change of the 
 Next = Annotated[str | None, Field(description="The `cursor` of the next page; null on the last one")]
 
 
-def of_row(schema: type[BaseModel], row: object, **own: Any) -> dict[str, Any]:
+def schema_fields(schema: type[BaseModel], row: object, **own: Any) -> dict[str, Any]:
     """A stored row as the schema has it, field by field; `own` are those that the row calls otherwise or has not."""
     return {name: own[name] if name in own else getattr(row, name) for name in schema.model_fields}
 

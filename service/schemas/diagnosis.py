@@ -317,7 +317,7 @@ class JobIn(base.Schema):
     )
 
     @model_validator(mode="after")
-    def _of_all(self) -> Self:
+    def _fleet_refresh_names_no_clutch(self) -> Self:
         if self.kind == "fleet_refresh" and self.clutch_id is not None:
             raise ValueError("a fleet_refresh concerns all clutches: omit clutch_id")
         return self

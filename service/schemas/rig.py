@@ -78,7 +78,7 @@ class RigProfile(Schema):
     )
 
     @model_validator(mode="after")
-    def _each_once(self) -> Self:
+    def _titles_and_channels_are_unique(self) -> Self:
         for name in ("title", "channel"):
             given = [value for column in self.columns if (value := getattr(column, name)) is not None]
             twice = next((value for value, count in Counter(given).items() if count > 1), None)

@@ -210,7 +210,7 @@ class Correction(base.Schema):
     reason: GivenReason = Field(description="Why")
 
     @model_validator(mode="after")
-    def _one_thing(self) -> Self:
+    def _either_cycles_or_rig(self) -> Self:
         if (self.cycles is None) == (self.rig is None):
             raise ValueError("give either cycles or rig")
         return self

@@ -98,7 +98,7 @@ async def answer(request: Request, make: Callable[[], object]) -> Response:
     return tagged(request, Answer.of(await run_in_threadpool(lambda: to_json(make()))), JSON_TYPE)
 
 
-async def kept(context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> Answer:
+async def cached_answer(context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> Answer:
     """What the cache has for `key` at `version`; where it has nothing yet, `make` is called in a thread."""
     answer = context.cache.held(key, version)
     if answer is not None:
@@ -166,7 +166,7 @@ WholeOf = Annotated[OfClutch, Depends(_whole_of_clutch)]
 
 async def clutch_bytes(of: OfClutch, name: str, make: Callable[[], bytes]) -> bytes:
     """What follows from a clutch's revision and is needed to answer, not the answer itself. Raises NotFoundError."""
-    return (await kept(of.context, (of.clutch_id, name), _revision(of.request, of.clutch_id), make)).body
+    return (await cached_answer(of.context, (of.clutch_id, name), _revision(of.request, of.clutch_id), make)).body
 
 
 async def clutch_answer(of: OfClutch, name: str, make: Callable[[], bytes], *arguments: Hashable) -> Response:
@@ -177,15 +177,15 @@ async def clutch_answer(of: OfClutch, name: str, make: Callable[[], bytes], *arg
     context, revision = of.context, _revision(of.request, of.clutch_id)
     # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
     key = (of.clutch_id, name, *arguments)
-    held = await kept(context, key, revision, make)
-    remember(of.request, held_again(context, key))
+    held = await cached_answer(context, key, revision, make)
+    remember(of.request, repeated_answer(context, key))
     return tagged(of.request, held, JSON_TYPE, revision)
 
 
 async def clutch_table(of: OfClutch, name: str, make: Callable[[], Page], *arguments: Hashable) -> Response:
     """The CSV export of an answer that follows from a clutch's revision, a page of it. Raises NotFoundError."""
     revision = _revision(of.request, of.clutch_id)
-    exported = await kept(of.context, (of.clutch_id, f"{name}.csv", *arguments, of.part), revision, make)
+    exported = await cached_answer(of.context, (of.clutch_id, f"{name}.csv", *arguments, of.part), revision, make)
     return tagged(of.request, exported, CSV_TYPE, revision)
 
 
@@ -202,15 +202,15 @@ async def computed_answer(
     revision = _revision(request, clutch_id)
     revision, whole = await _computed(request, context, clutch_id, revision, query, arguments, prefer, lane)
     if of.part == WHOLE:
-        remember(request, held_again(context, (clutch_id, name_of(query), *arguments)))
+        remember(request, repeated_answer(context, (clutch_id, name_of(query), *arguments)))
         return tagged(request, whole, JSON_TYPE, revision)
 
-    def one_page() -> bytes:
+    def page_of_cached() -> bytes:
         payload = json.loads(whole.body)
         return to_json(payload | of.part.sliced(payload["items"]))
 
     key = (clutch_id, f"{name_of(query)}.page", *arguments, of.part)
-    return tagged(request, await kept(context, key, revision, one_page), JSON_TYPE, revision)
+    return tagged(request, await cached_answer(context, key, revision, page_of_cached), JSON_TYPE, revision)
 
 
 async def computed_table(
@@ -220,12 +220,12 @@ async def computed_table(
     revision = _revision(of.request, of.clutch_id)
     revision, whole = await _computed(of.request, of.context, of.clutch_id, revision, query, arguments, prefer)
 
-    def one_page() -> Page:
+    def page_of_cached() -> Page:
         page = table.sliced(json.loads(whole.body), of.part)
         return Page(page.body, page.next or whole.next)
 
     key = (of.clutch_id, f"{name_of(query)}.csv", *arguments, of.part)
-    return tagged(of.request, await kept(of.context, key, revision, one_page), CSV_TYPE, revision)
+    return tagged(of.request, await cached_answer(of.context, key, revision, page_of_cached), CSV_TYPE, revision)
 
 
 async def computed_of_each(
@@ -282,7 +282,7 @@ async def begin_computed(context: Context, clutch_id: str, query: Callable[..., 
     context.revalidation.begin((clutch_id, name_of(query)), revision, body)
 
 
-def held_again(context: Context, key: Hashable, *, of_clutch: bool = True) -> Again:
+def repeated_answer(context: Context, key: Hashable, *, of_clutch: bool = True) -> Again:
     """What answers the same address again, by what the cache holds for the clutch's present revision, or else for the last
     commit of all."""
 

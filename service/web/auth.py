@@ -86,7 +86,7 @@ def authorise(snapshot: Snapshot, caller: Caller, scope: Scope, clutch_id: str |
     """
     grant = identify(snapshot, caller)
     require_scope(grant, scope)
-    _require_own(grant, clutch_id)
+    _require_clutch_of_key(grant, clutch_id)
     return grant
 
 
@@ -139,7 +139,7 @@ def require_scope(grant: Grant, scope: Scope) -> None:
         raise ForbiddenError(f"the key has the scope {grant.scope}, and this request needs {scope}")
 
 
-def _require_own(grant: Grant, clutch_id: str | None) -> None:
+def _require_clutch_of_key(grant: Grant, clutch_id: str | None) -> None:
     if grant.clutches is not None and clutch_id not in grant.clutches:
         subject = "all clutches" if clutch_id is None else f"clutch {clutch_id[:80]!r}"
         raise ForbiddenError(f"the key is for certain clutches only, and this request is about {subject}")
@@ -249,7 +249,7 @@ def name_of_caller(request: Request) -> str:
     return _grant_of(request).name
 
 
-def own_clutches(request: Request) -> frozenset[str] | None:
+def clutches_of_key(request: Request) -> frozenset[str] | None:
     """The clutches that an allowed request is bound to, None where to none."""
     return _grant_of(request).clutches
 
@@ -261,7 +261,7 @@ def require(request: Request, scope: Scope) -> None:
 
 def require_clutch(request: Request, clutch_id: str | None) -> None:
     """Raise ForbiddenError where an allowed request's key is bound to other clutches; None: it is of all of them."""
-    _require_own(_grant_of(request), clutch_id)
+    _require_clutch_of_key(_grant_of(request), clutch_id)
 
 
 def _grant_of(request: Request) -> Grant:

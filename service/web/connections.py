@@ -41,7 +41,7 @@ def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Proto
 
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
             super().connection_made(transport)
-            if self.client is not None and _held_by(self.client[0], self.connections) > most:
+            if self.client is not None and _connections_of(self.client[0], self.connections) > most:
                 self._refuse(http.HTTPStatus.TOO_MANY_REQUESTS, f"one address may have {most} connections at once")
                 return
             self._expect_head()
@@ -151,7 +151,7 @@ def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Proto
     return Bounded
 
 
-def _held_by(address: str, connections: set[Any]) -> int:
+def _connections_of(address: str, connections: set[Any]) -> int:
     return sum(other.client is not None and other.client[0] == address for other in connections)
 
 

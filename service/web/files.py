@@ -47,7 +47,7 @@ def emptied_folder(database: Path | None) -> Path:
 
 
 @asynccontextmanager
-async def kept_body(request: Request, folder: Path) -> AsyncIterator[bytes | Path]:
+async def body_or_file(request: Request, folder: Path) -> AsyncIterator[bytes | Path]:
     """A request's body: in memory where it is short, else as a file in the folder, which is removed in the end."""
     pieces, taken = request.stream(), bytearray()
     async for piece in pieces:

@@ -503,7 +503,7 @@ class RootPath:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 if "location" in headers:
-                    headers["location"] = self._below(_without_origin(headers["location"], host))
+                    headers["location"] = self._below(_relative_address(headers["location"], host))
                 if headers.get("link", "").startswith("<"):
                     headers["link"] = "<" + self._below(headers["link"].removeprefix("<"))
             await send(message)
@@ -519,7 +519,7 @@ class RootPath:
         return self.root + address if address.startswith("/") else address
 
 
-def _without_origin(address: str, host: str) -> str:
+def _relative_address(address: str, host: str) -> str:
     """An address of this service without scheme and host, which a proxy may have changed; others as they are."""
     parts = urlsplit(address)
     return parts._replace(scheme="", netloc="").geturl() if parts.netloc == host else address

@@ -231,7 +231,7 @@ class JobQueue:
             return {"problem": GIVEN_UP}
         try:
             with running(kind.work(job, self._settings), self._database.url) as process:
-                return process.written(f"{job.kind} {job.job_id}") if self._seen_through(job, process) else None
+                return process.written(f"{job.kind} {job.job_id}") if self._watch_to_end(job, process) else None
         except AwayError:
             _log.warning("%s %s is repeated once its lease has expired", job.kind, job.job_id)
             return None
@@ -241,7 +241,7 @@ class JobQueue:
             _log.exception("%s %s of %s", job.kind, job.job_id, job.clutch_id)
             return {"problem": UNDONE}
 
-    def _seen_through(self, job: JobRow, process: Child) -> bool:
+    def _watch_to_end(self, job: JobRow, process: Child) -> bool:
         """Wait for the process' end, the lease prolonged; False where it is to be ended before. Raises FailedError."""
         due = time.monotonic() + self._pause
         while not process.ends_within(min(self._pause, _LOOK)):

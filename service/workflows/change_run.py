@@ -30,7 +30,7 @@ from service.lives.history import (
 )
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader
-from service.lives.outlook import held_part, summarised
+from service.lives.outlook import held_summary, summarised
 from service.lives.payloads import notice_items, receipt
 from service.lives.plausibility.doubts import Judged, doubts_alone, doubts_together
 from service.lives.recomputation import (
@@ -322,8 +322,8 @@ def _state_without_these(loaded: _Loaded) -> ClutchState:
     """The clutch's state without the runs that are being changed, whether they were accepted or held."""
     return replace(
         loaded.state,
-        events=_without(loaded.state.events, loaded.events),
-        held=_without(loaded.state.held, loaded.events),
+        events=_remaining_events(loaded.state.events, loaded.events),
+        held=_remaining_events(loaded.state.held, loaded.events),
     )
 
 
@@ -371,7 +371,7 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _C
     if evidence is not None:
         evidence = replace(evidence, levels=loaded.levels, receipts={**receipts, **changed})
     if computed.tracking is None:
-        summary = {**before.summary, **held_part(after, {}, evidence)}
+        summary = {**before.summary, **held_summary(after, {}, evidence)}
     else:
         summary = summarised(after, computed.tracking, evidence)
     teaches = any(
@@ -389,7 +389,7 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _C
     )
 
 
-def _without(events: Iterable[Event], others: Iterable[Event]) -> tuple[Event, ...]:
+def _remaining_events(events: Iterable[Event], others: Iterable[Event]) -> tuple[Event, ...]:
     names = {event.run_id for event in others}
     return tuple(event for event in events if event.run_id not in names)
 

@@ -24,14 +24,14 @@ from service.lives.history import (
     Event,
     duty_block,
     life_with,
+    maintenance_fields,
     moment_of,
-    of_maintenance,
     order,
     require_within_ends,
     stationary_tests_of,
 )
 from service.lives.incoming_run import IncomingRun
-from service.lives.outlook import Evidence, held_part, needs_evidence, summarised
+from service.lives.outlook import Evidence, held_summary, needs_evidence, summarised
 from service.lives.payloads import history_warnings, notice_items, receipt, warned_again
 from service.lives.plausibility.doubts import Judged, doubts_alone, doubts_together
 from service.lives.recomputation import (
@@ -189,7 +189,7 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
         arrival.analysis,
         received_at=arrival.received_at,
         cofs=event.cofs,
-        loops=_own_loops(state, event, levels, arrival.run),
+        loops=_loops_of_run(state, event, levels, arrival.run),
     )
     judged = Judged()
     if not arrival.odd:
@@ -200,7 +200,7 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
         return _with_others(database, before, event, answer, arrival, judged)
     if doubtful:
         held = replace(before, held=(*before.held, event))
-        part = held_part(held, before.filters or {}, _evidence(database, held, arrival, answer))
+        part = held_summary(held, before.filters or {}, _evidence(database, held, arrival, answer))
         results_of_others = Results(summary={**before.summary, **part})
         return _Outcome(
             revision=before.revision, receipt=answer, cofs=event.cofs, results=results_of_others, doubts=doubtful
@@ -311,7 +311,7 @@ def _evidence(database: Database, state: ClutchState, arrival: Arrival, answer: 
     with database.reading() as connection:
         stored = stored_runs.evidence(connection, state.clutch_id)
     reader = reader_with(stored_runs.run_reader(database, state.clutch_id), arrival)
-    engagement = stored_engagement(answer, arrival.analysis.kept_beside(arrival.run))
+    engagement = stored_engagement(answer, arrival.analysis.details_to_store(arrival.run))
     return Evidence(
         levels={**stored.levels, name: arrival.analysis.fits},
         receipts={**stored.receipts, name: answer},
@@ -384,14 +384,14 @@ def _event_of(arrival: Arrival) -> Event:
         moment=moment_of(run.started_at, arrival.received_at),
         speed_range=arrival.analysis.speed_range,
         oil_temperature=arrival.analysis.oil_temperature,
-        **of_maintenance(run.details.get("event"), run.details.get("reason")),
+        **maintenance_fields(run.details.get("event"), run.details.get("reason")),
         duty=duty_block(run.cycles, *(duty.get(name) for name in names)),
         dated=run.started_at is not None,
         shown=arrival.shown,
     )
 
 
-def _own_loops(
+def _loops_of_run(
     state: ClutchState, event: Event, levels: Mapping[str, Sequence[LevelFit]], run: IncomingRun
 ) -> Sequence[Any]:
     if run.kind != DYNAMIC:

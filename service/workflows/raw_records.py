@@ -82,7 +82,7 @@ def move(database: Database, to: str, *, tell: Callable[[int], None]) -> int:
     while True:
         with database.reading() as connection:
             store = raw_stores.in_use(connection) if address != DATABASE else None
-            left = channels.kept_elsewhere(connection, store, after=after, most=_BATCH)
+            left = channels.stored_elsewhere(connection, store, after=after, most=_BATCH)
         for run_key, name in left:
             with database.reading() as connection:
                 column = channels.stored(connection, run_key, name)
@@ -182,7 +182,7 @@ def _named(database: Database, store: RawStore) -> Iterator[str]:
     after = ""
     while True:
         with database.reading() as connection:
-            names = raw_stores.all_named(connection, store.store_key, after=after, most=_BATCH)
+            names = raw_stores.names_in_store(connection, store.store_key, after=after, most=_BATCH)
         yield from names
         if not names:
             return

@@ -114,7 +114,7 @@ def named(connection: Connection, store_key: int, names: Iterable[str]) -> set[s
     return set(connection.execute(_named, {"of_store": store_key, "of_names": to_text(list(names))}).scalars())
 
 
-def all_named(connection: Connection, store_key: int, *, after: str, most: int) -> list[str]:
+def names_in_store(connection: Connection, store_key: int, *, after: str, most: int) -> list[str]:
     """The names that rows have in the store, in order, at most so many behind `after`."""
     values = {"of_store": store_key, "after": after, "most": most}
     return list(connection.execute(_all_named, values).scalars())

@@ -56,7 +56,7 @@ def measured(folder: Path, places: dict[str, str]) -> list[tuple[int, dict[str, 
 
                     def read(key: int) -> None:
                         with database.reading() as connection:  # noqa: B023
-                            held = channels.all_stored(connection, key)
+                            held = channels.stored_of_run(connection, key)
                         channels.values_of(held)
 
                     taken[name].append(timed(write, read))

@@ -113,7 +113,7 @@ def test_columns_keep_their_bits_wherever_they_are(database: Database, place: st
     sent = columns(7, 50_000) | {"oil_temperature_c": np.zeros(50_000), "time_s": np.arange(50_000) / 1000}
     run_key = store_long_run(database, place, sent)
     with database.reading() as connection:
-        held = channels.all_stored(connection, run_key)
+        held = channels.stored_of_run(connection, run_key)
         rows = connection.exec_driver_sql("SELECT name, length(data) FROM channel")
         sizes = {name: size for name, size in rows}  # noqa: C416  (rows are no pairs to mypy)
         assert channels.lengths(connection, run_key) == dict.fromkeys(sent, 50_000)

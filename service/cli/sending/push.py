@@ -88,8 +88,8 @@ def push(
         if record is None:
             _require_known(url, key, clutch)
         waiting = Spool.of(spool, url, clutch)
-        runs = [_request(file, kind, cycles, reading, rig) for file in files if not file.of_inspection]
-        inspections = [(file.path, None) for file in files if file.of_inspection]
+        runs = [_request(file, kind, cycles, reading, rig) for file in files if not file.is_inspection]
+        inspections = [(file.path, None) for file in files if file.is_inspection]
         digests: set[str] = set()
         for resource, requests in ((RUNS, runs), (INSPECTIONS, inspections)):
             added, replaced = waiting.add(requests, resource)
@@ -185,7 +185,7 @@ def list_runs(
 ) -> None:
     """List the runs that wait, with the last answer; the refused runs, with the reason; and the replaced versions."""
     with errors_in_a_line():
-        kept = _kept(spool, clutch)
+        kept = _spooled_entries(spool, clutch)
         if as_json:
             typer.echo(json.dumps({"items": [_item(spool, entry) for entry in kept]}, indent=1, ensure_ascii=False))
             return
@@ -224,7 +224,7 @@ def empty(
 ) -> None:
     """Show what is in the spool, ask whether to delete it, and then delete it for good."""
     with errors_in_a_line():
-        kept = [entry for entry in _kept(spool, clutch) if entry.state != WAITING or not refused]
+        kept = [entry for entry in _spooled_entries(spool, clutch) if entry.state != WAITING or not refused]
         if not kept:
             print_line("nothing to delete")
             return
@@ -242,7 +242,7 @@ def empty(
         print_line(f"{len(kept)} deleted; the service never stored {waiting} of them")
 
 
-def _kept(folder: Path, clutch: str | None) -> list[Entry]:
+def _spooled_entries(folder: Path, clutch: str | None) -> list[Entry]:
     """Everything in the spools, of one clutch where it is given."""
     if folder.exists() and not folder.is_dir():
         fail(f"{folder} is not a folder", EX_DATAERR)

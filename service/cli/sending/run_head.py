@@ -23,7 +23,7 @@ class RunHead:
     measurements: str = ""
 
 
-def of_body(body: bytes) -> RunHead:
+def head_of_body(body: bytes) -> RunHead:
     """The head of a JSON body; an empty one where it is not a run: the service will say so."""
     try:
         run = json.loads(body, parse_int=float)  # 7000 is 7000.0
@@ -39,7 +39,7 @@ def of_body(body: bytes) -> RunHead:
     return _stated(run, measurements=digest)
 
 
-def of_file(parameters: Mapping[str, str], measurements: str) -> RunHead:
+def head_of_file(parameters: Mapping[str, str], measurements: str) -> RunHead:
     """The head of a record file: its request's parameters, and the hash of its bytes."""
     return _stated(parameters, measurements=measurements)
 

@@ -255,9 +255,9 @@ class Spool:
             os.fsync(copy.fileno())
         measurements = sha256.hexdigest()
         if parameters is None:
-            head = run_head.of_body(partial.read_bytes())
+            head = run_head.head_of_body(partial.read_bytes())
         else:
-            head = run_head.of_file(parameters, measurements)
+            head = run_head.head_of_file(parameters, measurements)
             sha256.update(_text(parameters))
         entry = Entry(
             number=number,

@@ -50,14 +50,14 @@ def campaign_of(record: ClutchIn, runs: Sequence[CampaignRun]) -> Campaign:
             viscosity_100=record.oil.kinematic_viscosity_100c_cst * 1e-6,
         ),
         cof_fraction=record.end_of_life.cof_fraction,
-        stationary=_of(StationaryRun, runs),
-        dynamic=_of(DynamicRun, runs),
-        duty=_of(DutyRun, runs),
-        maintenance=_of(MaintenanceEvent, runs),
+        stationary=_runs_of_kind(StationaryRun, runs),
+        dynamic=_runs_of_kind(DynamicRun, runs),
+        duty=_runs_of_kind(DutyRun, runs),
+        maintenance=_runs_of_kind(MaintenanceEvent, runs),
     )
 
 
-def _of(kind: type[Kind], runs: Sequence[CampaignRun]) -> tuple[Kind, ...]:
+def _runs_of_kind(kind: type[Kind], runs: Sequence[CampaignRun]) -> tuple[Kind, ...]:
     return tuple(run for run in runs if isinstance(run, kind))
 
 

@@ -32,16 +32,16 @@ def doubt(verdict: Verdict, sent: Reading, shown: Shown) -> Notice:
     """The doubt of which the verdict's slip is the most probable explanation."""
     slip = verdict.slip
     if slip.name in OF_CYCLES:
-        return _of_cycles(verdict, sent)
+        return _cycles_notice(verdict, sent)
     if slip.unit and (slip.name in ("oil", "speed") or _expected_then(verdict)):
-        return _of_unit(verdict, shown)
+        return _unit_notice(verdict, shown)
     if slip.name == DEAD_PRESSURE:
         message = (
             f"by its pressure the clutch is open, but a torque of {shown.open_torque or 0.0:.3g} Nm needs a closed one: "
             "is the pressure sensor connected? Withdraw the run, or confirm it."
         )
         return Notice(code=DEAD, message=message)
-    return _of_cof(verdict, sent)
+    return _cof_notice(verdict, sent)
 
 
 def negative(cof: float) -> Notice:
@@ -53,7 +53,7 @@ def negative(cof: float) -> Notice:
     return Notice(code=BEYOND_PHYSICS, message=message)
 
 
-def _of_cycles(verdict: Verdict, sent: Reading) -> Notice:
+def _cycles_notice(verdict: Verdict, sent: Reading) -> Notice:
     sentences = [_gap(verdict, sent.cycles)]
     if verdict.against_time:
         sentences.append("Its date (started_at) does not fit the order of the cycles.")
@@ -80,7 +80,7 @@ def _gap(verdict: Verdict, cycles: float) -> str:
     return f"{gap}." if usual is None else f"{gap}; earlier runs were about {_number(usual)} cycles apart."
 
 
-def _of_unit(verdict: Verdict, shown: Shown) -> Notice:
+def _unit_notice(verdict: Verdict, shown: Shown) -> Notice:
     slip = verdict.slip
     if slip.name == "oil":
         oil = (shown.oil or 0.0) - ZERO_CELSIUS
@@ -113,7 +113,7 @@ def _expected(verdict: Verdict) -> str:
     )
 
 
-def _of_cof(verdict: Verdict, sent: Reading) -> Notice:
+def _cof_notice(verdict: Verdict, sent: Reading) -> Notice:
     cof = math.exp(sent.log_cof or -20.0)
     beyond = abs(math.log(cof / criteria.COF)) / criteria.LOG_COF_SD > 2.5
     cause = "Is a sensor or a unit wrong?" if beyond else "Is it another clutch's test?"
@@ -206,8 +206,8 @@ def doubts_together(
     back = tuple(event for event in doubted if event.run_id not in doubts)
     gone = tuple(event for event in accepted if event.run_id in doubts)
     counted = [event for event in events if event.run_id not in doubts]
-    reasons = {event.run_id: f"agrees with {_beside(event, counted)}" for event in back}
-    reasons |= {event.run_id: f"does not agree with {_beside(event, counted)}" for event in gone}
+    reasons = {event.run_id: f"agrees with {_names_of_nearest_runs(event, counted)}" for event in back}
+    reasons |= {event.run_id: f"does not agree with {_names_of_nearest_runs(event, counted)}" for event in gone}
     return Judged(doubts=doubts, accepted=back, held=gone, reasons=reasons, levels=levels)
 
 
@@ -238,7 +238,7 @@ def _levels(events: Sequence[Event], judgement: Judgement) -> dict[str, bool]:
     }
 
 
-def _beside(event: Event, counted: Sequence[Event]) -> str:
+def _names_of_nearest_runs(event: Event, counted: Sequence[Event]) -> str:
     """The runs nearest to one in the history, of its kind where there are any, by their names."""
     others = [other for other in counted if other.run_id != event.run_id]
     alike = [other for other in others if other.kind == event.kind] or others

@@ -203,10 +203,10 @@ def _item(end: CriterionEnd, now: float, first: float) -> dict[str, Any]:
     value, sd = end.current or (None, None)
     reaching = None if end.ends is None else end.probability_by(np.nextafter(np.inf, 0.0))
     own = {"current": {"value": value, "sd": sd}, "probability_of_reaching": reaching, "probability_first": first}
-    return _given(end) | _quantiles(end.ends, now) | own | {"tests": end.tests}
+    return _criterion_item(end) | _quantiles(end.ends, now) | own | {"tests": end.tests}
 
 
-def _given(end: CriterionEnd) -> dict[str, Any]:
+def _criterion_item(end: CriterionEnd) -> dict[str, Any]:
     given = {name: getattr(end.criterion, name) for name in GIVEN}
     return given | {"initial": end.initial, "limit": _limit(end)}
 
@@ -221,7 +221,7 @@ def _limit(end: CriterionEnd) -> float | None:
 def _criterion(end: CriterionEnd) -> dict[str, Any]:
     """The leading criterion as the answer's own; mean COF's numbers only where it is mean COF."""
     of_cof = end.criterion.quantity == MEAN_COF
-    given = _given(end)
+    given = _criterion_item(end)
     return given | {
         "initial_mean_cof": end.initial if of_cof else None,
         "threshold_mean_cof": given["limit"] if of_cof else None,

@@ -130,7 +130,7 @@ def chosen_life(state: ClutchState, number: int | None = None, at_cycles: float 
         raise NotFoundError(f"the clutch has {len(lives)} lives, there is no life {number}")
     until = lives if at_cycles is None else lives_of([event for event in state.events if event.cycles <= at_cycles])
     index = len(until) if number is None else number
-    held = _held_by(state, index, at_cycles)
+    held = _held_runs_of_life(state, index, at_cycles)
     if not 1 <= index <= len(until):
         return ChosenLife(life=None, assumptions=state.assumptions(), number=max(index, 1), of=len(lives), held=held)
     life = until[index - 1]
@@ -141,7 +141,7 @@ def chosen_life(state: ClutchState, number: int | None = None, at_cycles: float 
     )
 
 
-def _held_by(state: ClutchState, number: int, at_cycles: float | None) -> tuple[Event, ...]:
+def _held_runs_of_life(state: ClutchState, number: int, at_cycles: float | None) -> tuple[Event, ...]:
     """The held runs that an answer about life `number` at `at_cycles` (None: whenever) is without."""
     lives = state.lives
     now = at_cycles is None or not state.events or at_cycles >= state.events[-1].cycles
@@ -266,16 +266,16 @@ class MeasuredLife:
             case Family.SLOPE:
                 tracks = [self._slopes(level, speed) for speed in speeds for level in self.life.reference]
             case Family.LAG:
-                tracks = list(self._of_loops(quantity))
+                tracks = list(self._loop_series(quantity))
             case Family.ENGAGEMENT:
-                tracks = [self._of_engagements(quantity)]
+                tracks = [self._engagement_series(quantity)]
         return [series for series in tracks if series.measurements]
 
     def mean_cofs(self) -> dict[float, Series]:
         """Mean COF at each reference pressure [Pa]."""
         return {level: self.life.at(self.assumptions, level) for level in self.life.reference}
 
-    def _of_engagements(self, quantity: Quantity) -> Series:
+    def _engagement_series(self, quantity: Quantity) -> Series:
         estimates = {row["run_id"]: row["indicators"][quantity.internal] for row in self.engagements}
         values = [estimates.get(event.run_id) for event in self.life.events]
         at_events = [None if value is None else (value["value"], value["sd"]) for value in values]
@@ -291,7 +291,7 @@ class MeasuredLife:
         near = nearest_pressure(level, list(curves))
         return None if near is None else slope_of(curves[near], self.geometry, speed_rpm)
 
-    def _of_loops(self, quantity: Quantity) -> Iterator[Series]:
+    def _loop_series(self, quantity: Quantity) -> Iterator[Series]:
         """Each pressure by itself, and never two frequencies in one series."""
         by_event = [
             self.receipts[event.run_id]["loops"] if event.kind == DYNAMIC and event.run_id in self.receipts else []

@@ -43,7 +43,7 @@ OfClutch = Annotated[
 @router.get("", response_model=schemas.AlarmPage, responses=READING)
 async def list_alarms(request: Request, context: auth.OwnReader, part: Paged) -> Response:
     """Rules by name. A key that is bound to clutches gets the rules of these clutches."""
-    return await answer(request, partial(alarms.page, context.database, part, only=auth.own_clutches(request)))
+    return await answer(request, partial(alarms.page, context.database, part, only=auth.clutches_of_key(request)))
 
 
 @router.post(
@@ -66,7 +66,7 @@ async def list_events(
     clutch_id: OfClutch = None,
 ) -> Response:
     """Alarms, newest first. A key that is bound to clutches gets those of these clutches."""
-    own = auth.own_clutches(request)
+    own = auth.clutches_of_key(request)
     if clutch_id is not None:
         auth.require_clutch(request, clutch_id)
         own = frozenset({clutch_id})
@@ -78,7 +78,7 @@ async def list_events(
 @router.get("/events/{event_id}", response_model=schemas.EventOut, responses=READING)
 async def read_event(request: Request, context: auth.OwnReader, event_id: EventId) -> Response:
     """One alarm."""
-    own = auth.own_clutches(request)
+    own = auth.clutches_of_key(request)
     return await answer(request, lambda: alarms.event(context.database, event_id, only=own))
 
 
@@ -90,7 +90,7 @@ async def acknowledge_event(request: Request, context: auth.OwnIngester, event_i
     """Acknowledge an alarm: somebody has seen it. The body is optional."""
     body = await json_body(request) if await request.body() else b"{}"
     remark = checked(schemas.AcknowledgeIn, body)
-    await run_in_threadpool(alarms.event, context.database, event_id, only=auth.own_clutches(request))
+    await run_in_threadpool(alarms.event, context.database, event_id, only=auth.clutches_of_key(request))
     acknowledge = partial(change_alarms.acknowledge, note=remark.note, by=auth.name_of_caller(request), at=now())
     return json_answer(await run_in_threadpool(acknowledge, context.database, event_id))
 
@@ -98,21 +98,21 @@ async def acknowledge_event(request: Request, context: auth.OwnIngester, event_i
 @router.get("/{alarm_id}", response_model=schemas.AlarmOut, responses=READING)
 async def read_alarm(request: Request, context: auth.OwnReader, alarm_id: AlarmId) -> Response:
     """A rule in force."""
-    own = auth.own_clutches(request)
+    own = auth.clutches_of_key(request)
     return await answer(request, lambda: alarms.look_up(context.database, alarm_id, only=own))
 
 
 @router.put("/{alarm_id}", **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE))
 async def put_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Replace a rule. Alarms that the new rule would not raise are cleared."""
-    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.own_clutches(request))
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.clutches_of_key(request))
     return await _saved(request, context, alarm_id)
 
 
 @router.delete("/{alarm_id}", status_code=204, response_class=Response, responses=READING)
 async def delete_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Delete a rule. Its alarms are cleared and stay listed."""
-    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.own_clutches(request))
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.clutches_of_key(request))
     await run_in_threadpool(change_alarms.remove, context.database, alarm_id)
     return Response(status_code=204)
 
@@ -120,7 +120,7 @@ async def delete_alarm(request: Request, context: auth.OwnAdmin, alarm_id: Alarm
 @router.post("/{alarm_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
 async def test_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Send a test to each of the rule's receivers, and report the results."""
-    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.own_clutches(request))
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.clutches_of_key(request))
     names = await run_in_threadpool(change_alarms.test, context.database, alarm_id)
     return await _tested(context, names)
 

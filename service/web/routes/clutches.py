@@ -76,26 +76,28 @@ async def list_clutches(
     """The clutches of the key, with health and remaining life: the lowest safe bound first, or by name. To read all
     of them, sort by name: then none is missed or repeated.
     """
-    choice = Choice(archived=archived, only=auth.own_clutches(request), state=state, held=held, find=find)
+    choice = Choice(archived=archived, only=auth.clutches_of_key(request), state=state, held=held, find=find)
     make = partial(clutch_list.page_as_json, context.database, context.cache, choice, part, offset=offset, sort=sort)
-    return await _of_all(request, context, ("clutches", choice, part, offset, sort), make)
+    return await _answer_about_all_clutches(request, context, ("clutches", choice, part, offset, sort), make)
 
 
 @fleet_router.get("/totals", response_model=FleetTotals, responses=READING)
 async def totals(request: Request, context: auth.OwnReader, archived: Archived = False, find: Find = "") -> Response:
     """The number of the key's clutches, by state."""
-    choice = Choice(archived=archived, only=auth.own_clutches(request), find=find)
-    return await _of_all(
+    choice = Choice(archived=archived, only=auth.clutches_of_key(request), find=find)
+    return await _answer_about_all_clutches(
         request, context, ("totals", choice), lambda: to_json(clutch_list.totals(context.database, choice))
     )
 
 
-async def _of_all(request: Request, context: Context, key: Hashable, make: Callable[[], bytes]) -> Response:
+async def _answer_about_all_clutches(
+    request: Request, context: Context, key: Hashable, make: Callable[[], bytes]
+) -> Response:
     """A GET's answer that any commit may change, made once for what is committed."""
     # the version before the rows are read: what is committed meanwhile makes another
-    held = await answers.kept(context, key, auth.snapshot_of(request).version, make)
-    if auth.own_clutches(request) is None:
-        remember(request, answers.held_again(context, key, of_clutch=False))
+    held = await answers.cached_answer(context, key, auth.snapshot_of(request).version, make)
+    if auth.clutches_of_key(request) is None:
+        remember(request, answers.repeated_answer(context, key, of_clutch=False))
     return answers.tagged(request, held, answers.JSON_TYPE)
 
 

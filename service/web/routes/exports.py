@@ -127,7 +127,7 @@ async def surfaces_csv(of: answers.WholeOf, prefer: Prefer = None) -> Response:
 @router.get("/scores.csv", response_class=Response)
 async def clutch_scores_csv(of: answers.WholeOf, method: Method = "particle", prefer: Prefer = None) -> Response:
     """The scored predictions, one row each."""
-    return await answers.computed_table(of, scores.of_clutch, _SCORES, method, prefer=prefer)
+    return await answers.computed_table(of, scores.scores_of_clutch, _SCORES, method, prefer=prefer)
 
 
 @router.get("/loops.csv", response_class=Response)
@@ -156,8 +156,8 @@ async def fleet_scores_csv(
     request: Request, context: Reader, part: answers.WholePaged, method: Method = "particle"
 ) -> Response:
     """Scores of all predictions, one row per stage of life; the last row has all."""
-    scored = await answers.computed_of_each(request, context, scores.of_clutch, method)
-    return await answers.table(request, lambda: _STAGES.sliced(scores.of_fleet(scored, method=method), part))
+    scored = await answers.computed_of_each(request, context, scores.scores_of_clutch, method)
+    return await answers.table(request, lambda: _STAGES.sliced(scores.scores_of_fleet(scored, method=method), part))
 
 
 @fleet_router.get("/priors.csv", response_class=Response)

@@ -59,7 +59,7 @@ async def post_run_file(
     """Post a run as CSV, XLSX, ODS, TDMS, MDF4, MATLAB, HDF5 or Parquet, plain, gzipped or in a ZIP archive. The file
     is kept as sent. A form may also hold a `profile` to read this file with.
     """
-    profile = None if rig is None else await run_in_threadpool(rigs.of_name, context.database, rig)
+    profile = None if rig is None else await run_in_threadpool(rigs.rig_profile, context.database, rig)
     with tempfile.TemporaryDirectory(dir=context.folder) as folder:
         path = Path(folder) / "run"
         filename, own = await received(request, path, filename)

@@ -22,5 +22,5 @@ async def priors(request: Request, context: Reader, part: WholePaged) -> Respons
 @router.get("/scores", response_model=FleetScores, responses=READING)
 async def fleet_scores(request: Request, context: Reader, method: Method = "particle") -> Response:
     """Scores of the predictions of all ended lives."""
-    scored = await computed_of_each(request, context, scores.of_clutch, method)
-    return await answer(request, lambda: scores.of_fleet(scored, method=method))
+    scored = await computed_of_each(request, context, scores.scores_of_clutch, method)
+    return await answer(request, lambda: scores.scores_of_fleet(scored, method=method))

@@ -13,7 +13,7 @@ from service.run_files.json_run import checked
 from service.schemas.diagnosis import JobIn, JobOut, JobPage
 from service.schemas.parameters import JobId, OfState
 from service.web.answers import Paged, answer, json_answer, json_body, now, preferred_wait, taking, until_ended
-from service.web.auth import OwnAdmin, OwnReader, name_of_caller, own_clutches, require_clutch
+from service.web.auth import OwnAdmin, OwnReader, clutches_of_key, name_of_caller, require_clutch
 from service.web.problems import READING, SENDING
 from service.workflows import ask_job
 from storage.jobs import OPEN
@@ -63,19 +63,19 @@ async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -
 @router.get("", response_model=JobPage, responses=READING)
 async def list_jobs(request: Request, context: OwnReader, part: Paged, state: OfState = None) -> Response:
     """Jobs of the key's clutches, newest first."""
-    return await answer(request, partial(jobs.page, context.database, part, state=state, only=own_clutches(request)))
+    return await answer(request, partial(jobs.page, context.database, part, state=state, only=clutches_of_key(request)))
 
 
 @router.get("/{job_id}", response_model=JobOut, responses=READING)
 async def read_job(request: Request, context: OwnReader, job_id: JobId) -> Response:
     """One job, with its progress and result."""
-    own = own_clutches(request)
+    own = clutches_of_key(request)
     return await answer(request, lambda: jobs.shown(jobs.find(context.database, job_id, only=own)))
 
 
 @router.delete("/{job_id}", response_model=JobOut, responses=READING)
 async def delete_job(request: Request, context: OwnAdmin, job_id: JobId) -> Response:
     """Cancel a job. A waiting job does not start, a running job ends within seconds, an ended job stays unchanged."""
-    row = await run_in_threadpool(jobs.find, context.database, job_id, only=own_clutches(request))
+    row = await run_in_threadpool(jobs.find, context.database, job_id, only=clutches_of_key(request))
     cancel = partial(ask_job.cancel, context.database, row, by=name_of_caller(request), at=now())
     return json_answer(jobs.shown(await run_in_threadpool(cancel)))

@@ -5,7 +5,7 @@ import asyncio
 from fastapi import APIRouter
 from fastapi.responses import Response
 
-from service.lives.condition import held_beside
+from service.lives.condition import held_runs_left_out
 from service.lives.tracks import CARRIED
 from service.queries import runs, scores
 from service.queries import series as series_query
@@ -121,7 +121,7 @@ async def surfaces(of: answers.Of, prefer: Prefer = None) -> Response:
 @router.get("/scores", response_model=Scores, responses=READING)
 async def clutch_scores(of: answers.WholeOf, method: Method = "particle", prefer: Prefer = None) -> Response:
     """Scores of the predictions of its ended lives."""
-    return await answers.computed_answer(of, scores.of_clutch, method, prefer=prefer)
+    return await answers.computed_answer(of, scores.scores_of_clutch, method, prefer=prefer)
 
 
 @router.get("/loops", response_model=LoopPage, responses=READING)
@@ -130,7 +130,7 @@ async def loops(of: answers.WholeOf) -> Response:
 
     def make() -> bytes:
         found, held = runs.loops(of.database, of.clutch_id)
-        return to_json(held_beside(held) | of.part.sliced(found))
+        return to_json(held_runs_left_out(held) | of.part.sliced(found))
 
     return await answers.clutch_answer(of, "loops", make, of.part)
 

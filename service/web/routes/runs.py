@@ -19,7 +19,7 @@ from service.schemas.parameters import ClutchId, Points, RunId, RunKind, State
 from service.schemas.run import RUN_IN, Confirmation, Confirmations, Correction, Receipt, RunOut, RunPage, Withdrawal
 from service.web import answers
 from service.web.auth import Ingester, Reader, name_of_caller
-from service.web.files import PARQUET_TYPE, kept_body, preferred, streamed
+from service.web.files import PARQUET_TYPE, body_or_file, preferred, streamed
 from service.web.limits import LARGE_BODY_BYTES
 from service.web.problems import READING, SENDING, described
 from service.work.workers import CHANGE_SECONDS, Lane
@@ -60,7 +60,7 @@ async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> 
     """Post a run, in any order of cycles. The receipt has the results. When you get it, the run is stored for good."""
     answers.require_json(request)
     by = name_of_caller(request)
-    async with kept_body(request, context.folder) as body:
+    async with body_or_file(request, context.folder) as body:
         is_short = isinstance(body, bytes) and len(body) <= LARGE_BODY_BYTES
         taken_in = context.workers.submit(
             Lane.RUNS if is_short else Lane.RECORDS,

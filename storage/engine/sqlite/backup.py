@@ -147,14 +147,14 @@ def restore(url: str, backup: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> Pa
                     copy_whole(backup, partial, lock_timeout)
                 except sqlite3.DatabaseError as error:
                     raise StorageUnavailable(f"{backup} cannot be restored: {error}") from error
-            kept = _kept(path) if path.exists() else None
+            kept = _keep_replaced_file(path) if path.exists() else None
             renamed(partial, path)
         finally:
             partial.unlink(missing_ok=True)
     return kept
 
 
-def _kept(path: Path) -> Path:
+def _keep_replaced_file(path: Path) -> Path:
     """The file under a second name, with its log; nothing beside it that would be taken for the restored one's log."""
     _settle(path)
     kept = next(name for name in names_beside(path, "replaced") if not name.exists())

@@ -14,7 +14,6 @@ from fastapi.testclient import TestClient
 from models.diagnosis.experiments.candidates import TRIALS
 from models.prognosis.criteria import QUANTILES
 from service.lives.condition import (
-    beside_held,
     bound_in_words,
     lower_bound,
     rank_of,
@@ -22,6 +21,7 @@ from service.lives.condition import (
     state_of,
     statement_of,
     top_line,
+    with_held_runs,
 )
 from service.lives.criteria import MAX_LINE_POINTS
 from service.lives.history import Event
@@ -151,7 +151,7 @@ def test_page_and_answer_say_the_same_of_held_runs_before_a_prediction() -> None
     nothing = {"status": "insufficient_data", "remaining_cycles": summary(None)["remaining_cycles"]}
     among = nothing | {"at_least": 0.0}
     known = summary(1800.0, held=1, with_held={"particle": among}, ended=None, **nothing | {"runs_used": 2})
-    (warning,) = beside_held(known | {"warnings": ()}, known, among, 1)["warnings"]
+    (warning,) = with_held_runs(known | {"warnings": ()}, known, among, 1)["warnings"]
     assert warning["message"].endswith("with it the remaining life is not known: no further cycle is safe")
     assert "no further cycle is safe if the held run counts" in top_line(known, disputed=False)["headline"]
 

@@ -35,10 +35,10 @@ class TestManifest:
         (tmp_path / "inspections").mkdir()
         for name, cycles in (("a.json", 0), ("b.json", 200), ("inspections/c.json", 100)):
             (tmp_path / name).write_text(f'{{"cycles": {cycles}}}', encoding="utf-8")
-        found = [(file.path.name, file.of_inspection) for file in manifest.find([tmp_path])]
+        found = [(file.path.name, file.is_inspection) for file in manifest.find([tmp_path])]
         assert found == [("a.json", False), ("c.json", True), ("b.json", False)]
         for alone in (tmp_path / "inspections", tmp_path / "inspections" / "c.json"):
-            assert [(file.path.name, file.of_inspection) for file in manifest.find([alone])] == [("c.json", True)]
+            assert [(file.path.name, file.is_inspection) for file in manifest.find([alone])] == [("c.json", True)]
         (tmp_path / "inspections" / "link.json").symlink_to(Path(__file__))
         with pytest.raises(ValueError, match="lies outside the folder"):
             manifest.find([tmp_path])

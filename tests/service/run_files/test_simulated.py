@@ -60,7 +60,7 @@ def simulated(*options: str | Path) -> str:
 
 def runs_in(folder: Path) -> list[manifest.RunFile]:
     """The files of runs, not of inspections."""
-    return [file for file in manifest.find([folder]) if not file.of_inspection]
+    return [file for file in manifest.find([folder]) if not file.is_inspection]
 
 
 def incoming(file: manifest.RunFile) -> Any:

@@ -125,7 +125,7 @@ def test_scores_of_the_fleet_are_computed_by_workers(client: TestClient, monkeyp
     monkeypatch.setattr(context_of(client).workers, "submit", noted)
     for address in ("/v1/fleet/scores?method=grid", "/v1/fleet/scores?method=grid", "/v1/fleet/scores.csv?method=grid"):
         assert client.get(address).status_code == 200
-    assert submitted == [(scores.of_clutch, "c1"), (scores.of_clutch, "c2")], "and once"
+    assert submitted == [(scores.scores_of_clutch, "c1"), (scores.scores_of_clutch, "c2")], "and once"
     own = client.get("/v1/clutches/c1/scores?method=grid").json()
     fleet = client.get("/v1/fleet/scores?method=grid").json()
     assert len(submitted) == 2

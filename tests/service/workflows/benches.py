@@ -171,7 +171,7 @@ class Bench:
         named["stribeck"] = stribeck.curves(database, CLUTCH, WHOLE)
         named["series"] = series.series(database, CLUTCH, None)
         named["loops"] = runs.loops(database, CLUTCH)[0]
-        named["scores"] = scores.of_clutch(database, CLUTCH, method="particle")
+        named["scores"] = scores.scores_of_clutch(database, CLUTCH, method="particle")
         named["clutch"] = clutch_list.look_up(database, CLUTCH) | {"held": None}
         named["runs"] = [
             {name: value for name, value in receipt.items() if name not in OF_THE_AUDIT}

@@ -47,7 +47,7 @@ def store(database: Database, *numbers: int) -> dict[int, int]:
 def all_there(database: Database, keys: dict[int, int]) -> bool:
     """Whether runs are as they were sent, bit for bit."""
     with database.reading() as connection:
-        held = {number: channels.all_stored(connection, key) for number, key in keys.items()}
+        held = {number: channels.stored_of_run(connection, key) for number, key in keys.items()}
     return all(
         np.array_equal(channels.values_of(held[number])[name_], values)
         for number in keys

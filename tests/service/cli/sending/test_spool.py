@@ -11,7 +11,7 @@ import pytest
 
 from service.cli.sending import spool as entries
 from service.cli.sending.delivery import Sent, deliver
-from service.cli.sending.run_head import RunHead, of_body, of_file, same_run
+from service.cli.sending.run_head import RunHead, head_of_body, head_of_file, same_run
 from service.cli.sending.spool import HeldError, Spool
 from service.client.clutchlife.transport import Service
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body
@@ -170,7 +170,7 @@ def test_many_push_at_once_and_nothing_is_lost(spool: Spool, tmp_path: Path) -> 
 
 
 def head(*, torque: float = 1.0, **fields: object) -> RunHead:
-    return of_body(json.dumps({"kind": "k", "channels": {"torque_nm": [torque]}} | fields).encode())
+    return head_of_body(json.dumps({"kind": "k", "channels": {"torque_nm": [torque]}} | fields).encode())
 
 
 MORNING, NOON = "2026-01-01T08:00:00Z", "2026-01-01T12:00:00Z"
@@ -198,9 +198,11 @@ def test_versions_of_a_run(older: RunHead, newer: RunHead, same_file: bool, expe
 
 
 def test_a_head_states_what_the_run_does() -> None:
-    stated = of_body(body(7000, "a", started_at=NOON))
+    stated = head_of_body(body(7000, "a", started_at=NOON))
     assert (stated.run_id, stated.kind, stated.cycles, stated.started_at) == ("a", "maintenance", 7000.0, NOON)
-    assert of_file({"kind": "k", "cycles": "7000.0"}, "abc") == RunHead(kind="k", cycles=7000.0, measurements="abc")
+    assert head_of_file({"kind": "k", "cycles": "7000.0"}, "abc") == RunHead(
+        kind="k", cycles=7000.0, measurements="abc"
+    )
 
 
 @pytest.mark.parametrize(
@@ -217,9 +219,9 @@ def test_a_head_states_what_the_run_does() -> None:
     ],
 )
 def test_what_is_no_run_has_an_empty_head(text: bytes) -> None:
-    assert of_body(text) == RunHead()
+    assert head_of_body(text) == RunHead()
 
 
 def test_measurements_are_the_same_however_their_numbers_are_written() -> None:
     texts = [b'{"started_at": "%s", "channels": {"torque_nm": [%s]}}' % (MORNING.encode(), n) for n in (b"1", b"1.0")]
-    assert of_body(texts[0]).measurements == of_body(texts[1]).measurements
+    assert head_of_body(texts[0]).measurements == head_of_body(texts[1]).measurements
