@@ -150,10 +150,7 @@ export class Alarms {
 
   /**
    * Change something and show what is so now; null where it was refused, which is said.
-   * @param {string} method
-   * @param {string} path
-   * @param {object} [body]
-   * @returns {Promise<any>}
+   * @type {(method: string, path: string, body?: object) => Promise<any>}
    */
   async send(method, path, body) {
     this.wrong.replaceChildren();

@@ -24,10 +24,7 @@ export const WATCHED = {
   silent_hours: { title: "Hours since the last run", side: "above", unit: "h", limit: "24" },
 };
 
-/**
- * When a rule raises an alarm.
- * @param {AlarmOut} rule
- */
+/** @type {(rule: AlarmOut) => string} when a rule raises an alarm */
 export function ruleText({ quantity, below, above, probability, any_of: names }) {
   const { title, side, unit } = WATCHED[quantity];
   if (side === null) return names ? `${title} (${names.map((name) => words(name).toLowerCase()).join(", ")})` : title;
@@ -37,10 +34,7 @@ export function ruleText({ quantity, below, above, probability, any_of: names })
   return `${title} ${side} ${value}${unit && ` ${unit}`}${sure}`;
 }
 
-/**
- * @param {string} id
- * @param {string} value
- */
+/** @type {(id: string, value: string) => HTMLInputElement} */
 const input = (id, value) => h("input", { id, value, autocomplete: "off" });
 
 /**

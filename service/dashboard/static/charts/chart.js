@@ -91,11 +91,7 @@ export class Chart {
     document.addEventListener("themechange", () => this.redraw());
   }
 
-  /**
-   * @param {string} text
-   * @param {string} action
-   * @param {() => unknown} onclick
-   */
+  /** @type {(text: string, action: string, onclick: () => unknown) => HTMLButtonElement} */
   button(text, action, onclick) {
     return h("button", { type: "button", class: "small", onclick, "aria-label": `${this.title}: ${action}` }, text);
   }
@@ -236,10 +232,7 @@ export class Chart {
   }
 }
 
-/**
- * @param {Cell} value
- * @param {Column} column
- */
+/** @type {(value: Cell, column: Column) => string} */
 function cellText(value, { text }) {
   if (value === null || value === undefined) return "–";
   return text && typeof value === "number" ? text(value) : String(value);
@@ -264,8 +257,7 @@ export function choice(label, options, value, changed) {
 
 /**
  * Replace a chart's controls, keeping the focus on the one that was used.
- * @param {Chart} chart
- * @param {HTMLElement[]} controls
+ * @type {(chart: Chart, controls: HTMLElement[]) => void}
  */
 export function setControls(chart, controls) {
   const focused = [...chart.controls.querySelectorAll("select")].findIndex(

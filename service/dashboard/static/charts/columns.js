@@ -13,20 +13,10 @@ export const HALF_OF_90 = 1.645;
 /** @type {Column} */
 export const KIND = { name: "kind" };
 
-/**
- * A column with that many decimals.
- * @param {string} name
- * @param {number} [decimals]
- * @returns {Column}
- */
+/** @type {(name: string, decimals?: number) => Column} a column with that many decimals */
 export const column = (name, decimals = 0) => ({ name, text: (value) => fixed(value, decimals) });
 
-/**
- * A column with that many significant digits.
- * @param {string} name
- * @param {number} digits
- * @returns {Column}
- */
+/** @type {(name: string, digits: number) => Column} a column with that many significant digits */
 export const digitsColumn = (name, digits) => ({ name, text: (value) => significant(value, digits) });
 
 /** The torque or the coefficient that is shown, in its unit. */
@@ -51,8 +41,5 @@ export function measuredAndLaw({ measured, trajectory }, { measured: kind, law, 
   return [...points, ...line];
 }
 
-/**
- * Values in ascending order, each once.
- * @param {number[]} values
- */
+/** @type {(values: number[]) => number[]} values in ascending order, each once */
 export const distinct = (values) => [...new Set(values)].sort((a, b) => a - b);

@@ -81,10 +81,7 @@ function lastCycle(life, measured) {
   return Math.max(1.08 * past, Math.min(1.06 * ahead, 4 * past));
 }
 
-/**
- * @param {RemainingLife} life
- * @returns {Cell[][]}
- */
+/** @type {(life: RemainingLife) => Cell[][]} */
 function endRows({ criterion: { threshold_mean_cof: threshold }, end_of_life_cycles: end }) {
   if (threshold === null) return [];
   const name = (/** @type {string} */ quantile) => `end of life, ${100 * Number(quantile)} %`;
@@ -93,9 +90,7 @@ function endRows({ criterion: { threshold_mean_cof: threshold }, end_of_life_cyc
 
 /**
  * The threshold as a dashed line with its value.
- * @param {number} y
- * @param {Colours} c
- * @returns {{ shapes: Shape[], annotations: Annotation[] }}
+ * @type {(y: number, c: Colours) => { shapes: Shape[], annotations: Annotation[] }}
  */
 function thresholdMarks(y, c) {
   const line = { color: c.failure, width: 1.6, dash: "dash" };
@@ -127,11 +122,7 @@ function safeBound({ at_least: left, as_of_cycles: now, status }, last, c) {
   };
 }
 
-/**
- * @param {Measured} measured
- * @param {Colours} c
- * @returns {PlainTrace}
- */
+/** @type {(measured: Measured, c: Colours) => PlainTrace} */
 const points = (measured, c) => ({
   name: "measured",
   mode: "markers",
@@ -144,10 +135,7 @@ const points = (measured, c) => ({
 
 /**
  * Each earlier prediction as a line from mean COF when it was made to the predicted end of life.
- * @param {Prediction[]} predictions
- * @param {number | null} threshold
- * @param {Colours} c
- * @returns {PlainTrace[]}
+ * @type {(predictions: Prediction[], threshold: number | null, c: Colours) => PlainTrace[]}
  */
 function past(predictions, threshold, c) {
   const lines = predictions.slice(0, -1).flatMap(({ at, cof, remaining: { value } }) => {
@@ -201,10 +189,7 @@ function law(trajectory, life, c) {
 
 /**
  * The predicted end of life on the threshold: its 90 % and 50 % intervals and its median.
- * @param {RemainingLife} life
- * @param {number | null} threshold
- * @param {Colours} c
- * @returns {PlainTrace[]}
+ * @type {(life: RemainingLife, threshold: number | null, c: Colours) => PlainTrace[]}
  */
 function endOfLife(life, threshold, c) {
   const q = life.end_of_life_cycles;

@@ -12,8 +12,7 @@ const ruler = /** @type {CanvasRenderingContext2D} */ (document.createElement("c
 
 /**
  * The width of a text, px; its index and exponent marks are not part of it.
- * @param {string} text
- * @param {TextFont} font
+ * @type {(text: string, font: TextFont) => number}
  */
 export function widthOf(text, { size, family }) {
   ruler.font = `${size}px ${family}`;
@@ -40,10 +39,7 @@ export function ticksOf([from, to], length, least) {
   });
 }
 
-/**
- * @param {Trace} trace
- * @returns {trace is PlainTrace}
- */
+/** @type {(trace: Trace) => trace is PlainTrace} */
 const isPlain = (trace) => (trace.type ?? "scatter") === "scatter" && !trace.xaxis && !trace.yaxis;
 
 /**
@@ -68,10 +64,7 @@ function rangeOf({ range, rangemode }, columns, room) {
   return [zero ? 0 : low - more, high + more];
 }
 
-/**
- * A trace's ordinates and both ends of its error bars.
- * @param {PlainTrace} trace
- */
+/** @type {(trace: PlainTrace) => (number | null)[][]} a trace's ordinates and both ends of its error bars */
 function barsOf({ y, error_y: bars }) {
   if (!bars) return [y];
   /** @param {number} sign */

@@ -19,10 +19,7 @@ const DIGITS = [
 
 /**
  * A chart's own layout on top of what all charts share.
- * @param {Colours} c
- * @param {Layout} layout
- * @param {{ height: number, compact: boolean }} options
- * @returns {WholeLayout}
+ * @type {(c: Colours, layout: Layout, options: { height: number, compact: boolean }) => WholeLayout}
  */
 export function base(c, layout, { height, compact }) {
   const common = commonOf(c, height, compact);
@@ -52,11 +49,7 @@ export function base(c, layout, { height, compact }) {
   };
 }
 
-/**
- * @param {Colours} c
- * @param {boolean} compact
- * @returns {Axis}
- */
+/** @type {(c: Colours, compact: boolean) => Axis} */
 function axisOf(c, compact) {
   return {
     gridcolor: c.line,
@@ -132,11 +125,7 @@ function scene(c, own, compact) {
   };
 }
 
-/**
- * @param {Axis} ours
- * @param {Axis} [own]
- * @returns {Axis}
- */
+/** @type {(ours: Axis, own?: Axis) => Axis} */
 const merged = (ours, own = {}) => ({ ...ours, ...own, title: { ...ours.title, ...own.title } });
 
 /**
@@ -157,17 +146,14 @@ export const config = (spatial) => ({
 
 /**
  * What was done; the plotting library reads texts as markup, so nothing in a note may look like it.
- * @param {string} event
- * @param {string | null} note
+ * @type {(event: string, note: string | null) => string}
  */
 const nameOf = (event, note) =>
   event === "other" && note ? note.replaceAll("<", "‹").replaceAll(">", "›").slice(0, 40) : event.replaceAll("_", " ");
 
 /**
  * Maintenance events as vertical lines with their name at the top.
- * @param {Receipt[]} events
- * @param {Colours} c
- * @returns {{ shapes: Shape[], annotations: Annotation[] }}
+ * @type {(events: Receipt[], c: Colours) => { shapes: Shape[], annotations: Annotation[] }}
  */
 export function eventMarks(events, c) {
   return {

@@ -12,8 +12,7 @@ import { band, linesByPressure, titled } from "./traces.js";
 
 /**
  * Remaining cycles as they were predicted at each test, against what is predicted now.
- * @param {{ life: RemainingLife, predictions: Prediction[], events: Receipt[] }} answers
- * @returns {Spec}
+ * @type {(answers: { life: RemainingLife, predictions: Prediction[], events: Receipt[] }) => Spec}
  */
 export function remainingCycles({ life, predictions, events }) {
   const made = predictions.flatMap(({ at, remaining: { value, lower, upper } }) => {
@@ -79,11 +78,7 @@ function predictionTraces(made, end, top, c) {
   ];
 }
 
-/**
- * Mean COF of every pressure over cycles.
- * @param {{ tests: StribeckItem[], events: Receipt[] }} answers
- * @returns {Spec}
- */
+/** @type {(answers: { tests: StribeckItem[], events: Receipt[] }) => Spec} mean COF of every pressure over cycles */
 export function meanCof({ tests, events }) {
   const values = tests.flatMap(({ cycles, fits }) => {
     return fits.flatMap(({ pressure_bar: pressure, mean_cof: value, mean_cof_sd: sd }) =>

@@ -26,9 +26,7 @@ export const loopPressures = (loops) => distinct(loops.map((loop) => loop.pressu
 
 /**
  * The record near a pressure, in its order, thinned evenly: speed and torque.
- * @param {Channels} channels
- * @param {number} pressure
- * @param {ClutchOut} clutch
+ * @type {(channels: Channels, pressure: number, clutch: ClutchOut) => [number, number][]}
  */
 function traceOf({ pressure_bar: p, speed_rpm: n, torque_nm: m }, pressure, clutch) {
   const { of } = units().torque;
@@ -73,8 +71,7 @@ function lagText({ direction, better_law: law }) {
 
 /**
  * The lag of several loops, those of one kind named together.
- * @param {LoopItem[]} loops
- * @param {(loop: LoopItem) => string} label
+ * @type {(loops: LoopItem[], label: (loop: LoopItem) => string) => string}
  */
 function lagNote(loops, label) {
   const kinds = [...new Set(loops.map(lagText))];
@@ -142,9 +139,7 @@ export function loopCurves({ loops, tests, clutch, channels, over, pressure, run
 
 /**
  * The stationary curves, named once.
- * @param {{ stationary: CurvePoint[] }[]} drawn
- * @param {string[]} colors
- * @returns {PlainTrace[]}
+ * @type {(drawn: { stationary: CurvePoint[] }[], colors: string[]) => PlainTrace[]}
  */
 function stationaryTraces(drawn, colors) {
   const curves = drawn.map(({ stationary }, index) => ({ stationary, color: colors[index] }));

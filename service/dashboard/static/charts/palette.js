@@ -23,11 +23,7 @@ const NAMES = [
   "high",
 ];
 
-/**
- * The colours as they are now, or as they are in `scheme`.
- * @param {Scheme} [scheme]
- * @returns {Colours}
- */
+/** @type {(scheme?: Scheme) => Colours} the colours as they are now, or as they are in `scheme` */
 export function colours(scheme = null) {
   const probe = document.createElement("span");
   probe.hidden = true;
@@ -48,17 +44,10 @@ export function colours(scheme = null) {
   };
 }
 
-/**
- * Red, green and blue of a computed colour.
- * @param {string} rgb
- */
+/** @type {(rgb: string) => number[]} red, green and blue of a computed colour */
 const channels = (rgb) => (rgb.match(/[\d.]+/g) ?? []).slice(0, 3).map(Number);
 
-/**
- * A colour between several, share from 0 to 1.
- * @param {string[]} stops
- * @param {number} share
- */
+/** @type {(stops: string[], share: number) => string} a colour between several, share from 0 to 1 */
 function between(stops, share) {
   const place = Math.min(1, Math.max(0, share)) * (stops.length - 1);
   const index = Math.min(stops.length - 2, Math.floor(place));
@@ -68,32 +57,20 @@ function between(stops, share) {
 
 /**
  * The colour of the n-th of several things, from fresh to worn.
- * @param {Colours} c
- * @param {number} index
- * @param {number} count
+ * @type {(c: Colours, index: number, count: number) => string}
  */
 export const rampOf = (c, index, count) => c.ramp(count > 1 ? index / (count - 1) : 0);
 
 /**
  * The colour of the n-th of several pressures, from the lowest to the highest.
- * @param {Colours} c
- * @param {number} index
- * @param {number} count
+ * @type {(c: Colours, index: number, count: number) => string}
  */
 export const pressureRampOf = (c, index, count) => c.pressureRamp(count > 1 ? index / (count - 1) : 0);
 
-/**
- * The colour, partly transparent.
- * @param {string} rgb
- * @param {number} opacity
- */
+/** @type {(rgb: string, opacity: number) => string} the colour, partly transparent */
 export const faint = (rgb, opacity) => `rgba(${channels(rgb).join(", ")}, ${opacity})`;
 
-/**
- * A colour scale from fresh to worn, for surfaces.
- * @param {Colours} c
- * @returns {[number, string][]}
- */
+/** @type {(c: Colours) => [number, string][]} a colour scale from fresh to worn, for surfaces */
 export const scaleOf = (c) => [
   [0, c.fresh],
   [0.5, c.midlife],

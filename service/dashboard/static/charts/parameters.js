@@ -22,10 +22,7 @@ export const PARAMETERS = {
 
 export const PARAMETER_NAMES = /** @type {ParameterName[]} */ (Object.keys(PARAMETERS));
 
-/**
- * A parameter's axis, in the plotting library's own small markup.
- * @param {ParameterName} name
- */
+/** @type {(name: ParameterName) => string} a parameter's axis, in the plotting library's own small markup */
 export function axisOf(name) {
   const { symbol, unit } = PARAMETERS[name];
   return `${symbol[0]}<sub>${symbol[1]}</sub>${unit && `, ${unit.replace(/\^([\d.]+)/, "<sup>$1</sup>")}`}`;
@@ -45,8 +42,7 @@ const rowsOf = (item) => measuredAndLaw(item, { measured: "identified", law: "la
 
 /**
  * A range that the measurements set, not an error bar that leaves the paper.
- * @param {DegradationItem} item
- * @returns {Range}
+ * @type {(item: DegradationItem) => Range}
  */
 function rangeOf({ measured, trajectory }) {
   const all = [...measured.value, ...trajectory.median].sort((a, b) => a - b);
@@ -103,12 +99,7 @@ export function parameter({ items, name, pressure, events }) {
   };
 }
 
-/**
- * A coefficient with its unit, where it is known.
- * @param {number} value
- * @param {number} sd
- * @param {string} unit
- */
+/** @type {(value: number, sd: number, unit: string) => string} a coefficient with its unit, where it is known */
 function inWords(value, sd, unit) {
   const text = estimate(value, sd);
   return text === "unknown" ? text : `${text}${unit}`;
@@ -116,8 +107,7 @@ function inWords(value, sd, unit) {
 
 /**
  * One parameter over cycles and pressure: the law as a surface, what was identified as points.
- * @param {{ items: DegradationItem[], name: ParameterName }} answers
- * @returns {Spec}
+ * @type {(answers: { items: DegradationItem[], name: ParameterName }) => Spec}
  */
 export function landscape({ items, name }) {
   const own = items

@@ -26,10 +26,7 @@ export function plotly() {
   return loading;
 }
 
-/**
- * When the browser has shown what there is so far.
- * @returns {Promise<void>}
- */
+/** @type {() => Promise<void>} when the browser has shown what there is so far */
 export const painted = () =>
   new Promise((resolve) => {
     requestAnimationFrame(() => setTimeout(resolve));

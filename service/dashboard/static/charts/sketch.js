@@ -17,11 +17,7 @@ const along =
 /** @param {number} value */
 const px = (value) => value.toFixed(1);
 
-/**
- * A settled figure as SVG.
- * @param {SettledFigure} figure
- * @param {Size} size
- */
+/** @type {(figure: SettledFigure, size: Size) => SVGSVGElement} a settled figure as SVG */
 export function sketch({ data, layout, ticks, legend }, { width, height }) {
   const { font, margin, paper_bgcolor: ground } = layout;
   const { l, r, t, b } = margin;
@@ -68,8 +64,7 @@ export function sketch({ data, layout, ticks, legend }, { width, height }) {
 
 /**
  * Grid lines with their values.
- * @param {Pick<SettledFigure, "layout" | "ticks">} figure
- * @param {Frame} frame
+ * @type {(figure: Pick<SettledFigure, "layout" | "ticks">, frame: Frame) => SVGElement[]}
  */
 function grid({ layout, ticks }, { x, y, l, t, inside }) {
   const { size } = layout.font;
@@ -91,8 +86,7 @@ function grid({ layout, ticks }, { x, y, l, t, inside }) {
 
 /**
  * A text with the library's small markup, index and exponent, as spans.
- * @param {string} text
- * @param {Record<string, string | number | undefined>} attributes
+ * @type {(text: string, attributes: Record<string, string | number | undefined>) => SVGTextElement}
  */
 function label(text, attributes) {
   const parts = text.split(/(<su[bp]>.*?<\/su[bp]>)/).filter(Boolean);
@@ -118,11 +112,7 @@ const dashes = ({ dash, width = 2 }) =>
         .join(" ")
     : null;
 
-/**
- * The pen lifted where a value is missing.
- * @param {(number | null)[]} xs
- * @param {(number | null)[]} ys
- */
+/** @type {(xs: (number | null)[], ys: (number | null)[]) => string} the pen lifted where a value is missing */
 function pathOf(xs, ys) {
   let lifted = true;
   const steps = xs.map((x, index) => {
@@ -138,18 +128,12 @@ function pathOf(xs, ys) {
   return steps.join("");
 }
 
-/**
- * @param {(number | null)[]} values
- * @param {Scale} scale
- */
+/** @type {(values: (number | null)[], scale: Scale) => (number | null)[]} */
 const placed = (values, scale) => values.map((value) => (value === null ? null : scale(value)));
 
 /**
  * A trace: its band down to the one before, its error bars, its line, its points.
- * @param {PlainTrace} trace
- * @param {PlainTrace | undefined} before
- * @param {Scale} x
- * @param {Scale} y
+ * @type {(trace: PlainTrace, before: PlainTrace | undefined, x: Scale, y: Scale) => SVGPathElement[]}
  */
 function drawn(trace, before, x, y) {
   const [xs, ys] = [placed(trace.x, x), placed(trace.y, y)];
@@ -188,12 +172,7 @@ const strokeOf = (line) => ({
 /** The plotting library's own size of points, px, where a trace names none. */
 const POINT = 6;
 
-/**
- * @param {number | null} x
- * @param {number | null} y
- * @param {Marker | undefined} marker
- * @param {Line} line
- */
+/** @type {(x: number | null, y: number | null, marker: Marker | undefined, line: Line) => SVGCircleElement | null} */
 function dot(x, y, marker, line) {
   if (x === null || y === null) return null;
   return svg("circle", {
@@ -208,8 +187,7 @@ function dot(x, y, marker, line) {
 
 /**
  * A shape, which is a line; `paper` counts from 0 to 1 over the whole chart.
- * @param {Shape} shape
- * @param {Frame} frame
+ * @type {(shape: Shape, frame: Frame) => SVGSVGElement}
  */
 function ruled({ x0, x1, y0, y1, xref, yref, line }, { x, y, l, t, inside }) {
   /** @type {Scale} */
@@ -220,11 +198,7 @@ function ruled({ x0, x1, y0, y1, xref, yref, line }, { x, y, l, t, inside }) {
   return svg("svg", { x: l, y: t, ...inside, overflow: "hidden" }, svg("line", { ...ends, ...strokeOf(line) }));
 }
 
-/**
- * A text beside its point.
- * @param {Annotation} annotation
- * @param {Frame} frame
- */
+/** @type {(annotation: Annotation, frame: Frame) => SVGTextElement} a text beside its point */
 function noted({ x: at, y: level, xref, yref, text, textangle = 0, xanchor, yanchor, font }, { x, y, l, t, inside }) {
   const size = font?.size ?? 12;
   const before = xanchor === "right";
@@ -236,13 +210,7 @@ function noted({ x: at, y: level, xref, yref, text, textangle = 0, xanchor, yanc
   return label(text, { ...place, fill: font?.color ?? "currentColor", "font-size": size });
 }
 
-/**
- * An entry of the legend.
- * @param {LegendEntry} entry
- * @param {number} l
- * @param {number} top
- * @param {number} size
- */
+/** @type {(entry: LegendEntry, l: number, top: number, size: number) => SVGGElement} an entry of the legend */
 function key({ trace, x, y }, l, top, size) {
   const { line = {}, marker } = trace;
   const [from, middle] = [l + x + 5, top + y];

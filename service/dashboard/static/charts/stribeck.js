@@ -58,10 +58,7 @@ function shown(points, pressure, clutch) {
 
 /**
  * Some tests at some pressures: measured points where the channels have been read, the fit in any case.
- * @param {Answers} answers
- * @param {StribeckItem[]} tests
- * @param {(pressure: number) => boolean} wanted
- * @returns {Drawn[]}
+ * @type {(answers: Answers, tests: StribeckItem[], wanted: (pressure: number) => boolean) => Drawn[]}
  */
 function drawnOf({ channels, clutch }, tests, wanted) {
   const end = fastest(channels);
@@ -81,10 +78,7 @@ function drawnOf({ channels, clutch }, tests, wanted) {
   );
 }
 
-/**
- * @param {Drawn[]} drawn
- * @returns {Cell[][]}
- */
+/** @type {(drawn: Drawn[]) => Cell[][]} */
 const rowsOf = (drawn) =>
   drawn.flatMap(({ cycles, pressure, measured, fitted }) => [
     ...measured.map((point) => ["measured", cycles, pressure, point.speed, point.torque]),
@@ -127,21 +121,14 @@ export function flat(answers) {
 
 /**
  * That some tests are not drawn, where there are more of them.
- * @param {StribeckItem[]} tests
- * @param {number} drawn
+ * @type {(tests: StribeckItem[], drawn: number) => string}
  */
 const leftOut = (tests, drawn) =>
   drawn < tests.length
     ? ` ${drawn} of ${tests.length} tests are drawn; choose “Colour by pressure” to see any of them.`
     : "";
 
-/**
- * @param {Drawn} curve
- * @param {string} name
- * @param {string} color
- * @param {Colours} c
- * @returns {PlainTrace[]}
- */
+/** @type {(curve: Drawn, name: string, color: string, c: Colours) => PlainTrace[]} */
 function flatTraces({ measured, fitted }, name, color, c) {
   const hovertemplate = `${name}<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}<extra></extra>`;
   const shared = { legendgroup: name, name, hovertemplate };
@@ -206,10 +193,7 @@ const fewOf = (tests) => spread(spread(tests), 4);
 
 /**
  * The surface of one of several states, in one colour; points of all of them would hide one another.
- * @param {Drawn[]} drawn
- * @param {number} cycles
- * @param {string} color
- * @returns {Trace}
+ * @type {(drawn: Drawn[], cycles: number, color: string) => Trace}
  */
 function stateSurface(drawn, cycles, color) {
   const own = drawn.filter((curve) => curve.cycles === cycles);
@@ -228,12 +212,7 @@ function stateSurface(drawn, cycles, color) {
   };
 }
 
-/**
- * @param {Drawn[]} drawn
- * @param {boolean} byPressure
- * @param {Colours} c
- * @returns {Trace[]}
- */
+/** @type {(drawn: Drawn[], byPressure: boolean, c: Colours) => Trace[]} */
 function surfaceTraces(drawn, byPressure, c) {
   /** @param {Drawn} curve */
   const depth = (curve) => (byPressure ? curve.pressure : curve.cycles);

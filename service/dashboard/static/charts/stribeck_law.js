@@ -18,8 +18,7 @@ function meanRadius({ geometry }) {
 
 /**
  * Eq. 3: M_s (1 + (M̄_c − 1) exp(−V_S/v)) + C_v v^0.3, Nm at v ≥ 0 m/s.
- * @param {number} v
- * @param {Parameters} parameters
+ * @type {(v: number, parameters: Parameters) => number}
  */
 function torqueAt(v, parameters) {
   const { static_torque_nm: mS, coulomb_ratio: mC, stribeck_velocity_m_s: vS, viscous_coefficient: cV } = parameters;
@@ -32,20 +31,13 @@ const metresPerSecond = (clutch) => (meanRadius(clutch) * 2 * Math.PI) / 60;
 
 /**
  * The fitted torque, Nm, at a speed, rpm.
- * @param {number} speed
- * @param {Fit} fit
- * @param {Pick<ClutchOut, "geometry">} clutch
+ * @type {(speed: number, fit: Fit, clutch: Pick<ClutchOut, "geometry">) => number}
  */
 export const torqueAtSpeed = (speed, fit, clutch) => torqueAt(speed * metresPerSecond(clutch), fit.parameters);
 
 /**
  * The fitted curve of one pressure between two speeds, rpm; closer points near rest, where it is curved most.
- * @param {Fit} fit
- * @param {Pick<ClutchOut, "geometry">} clutch
- * @param {number} from
- * @param {number} to
- * @param {number} [count]
- * @returns {CurvePoint[]}
+ * @type {(fit: Fit, clutch: Pick<ClutchOut, "geometry">, from: number, to: number, count?: number) => CurvePoint[]}
  */
 export function curveOf(fit, clutch, from, to, count = 80) {
   return Array.from({ length: count }, (_, index) => {

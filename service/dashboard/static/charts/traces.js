@@ -9,10 +9,7 @@ import { faint, pressureRampOf } from "./palette.js";
 
 /** @typedef {(number | null)[]} Values */
 
-/**
- * The title of an axis.
- * @param {string} text
- */
+/** @type {(text: string) => { title: { text: string }; }} the title of an axis */
 export const titled = (text) => ({ title: { text } });
 
 /**

@@ -49,11 +49,7 @@ export function stateMark(run) {
   return isCorrected(run) ? h("span", { class: "mark-corrected" }, `Sent as ${fixed(run.sent_cycles)}`) : "";
 }
 
-/**
- * What can be done to a run now.
- * @param {Receipt} run
- * @returns {RunAction[]}
- */
+/** @type {(run: Receipt) => RunAction[]} what can be done to a run now */
 export function actionsOf({ state, file }) {
   if (state === "withdrawn") return ["restore"];
   /** @type {RunAction[]} */
@@ -67,22 +63,14 @@ const named = (run) => `${kindName(run.kind)} at ${fixed(run.cycles)} cycles`;
 /** @param {Receipt} run */
 const pathOf = (run) => `${clutchPath(run.clutch_id)}/runs/${encodeURIComponent(run.run_id)}`;
 
-/**
- * @param {Receipt} run
- * @param {"confirm" | "withdraw" | "restore"} action
- * @param {string} reason
- */
+/** @type {(run: Receipt, action: "confirm" | "withdraw" | "restore", reason: string) => Promise<Receipt>} */
 async function post(run, action, reason) {
   /** @type {{ body: Receipt }} */
   const { body } = await sendJson("POST", `${pathOf(run)}/${action}`, { reason });
   return body;
 }
 
-/**
- * @param {Receipt} run
- * @param {number} cycles
- * @param {string} reason
- */
+/** @type {(run: Receipt, cycles: number, reason: string) => Promise<Receipt>} */
 async function patch(run, cycles, reason) {
   /** @type {{ body: Receipt }} */
   const { body } = await sendJson("PATCH", pathOf(run), { cycles, reason });
@@ -92,53 +80,32 @@ async function patch(run, cycles, reason) {
 /** @param {Receipt} run */
 const held = (run) => (run.state === "held" ? " It is held: see its doubts." : "");
 
-/**
- * @param {Receipt} run
- * @param {number} cycles
- * @param {string} reason
- * @returns {Promise<Done>}
- */
+/** @type {(run: Receipt, cycles: number, reason: string) => Promise<Done>} */
 async function correct(run, cycles, reason) {
   const after = await patch(run, cycles, reason);
   const text = `Corrected from ${fixed(run.cycles)} to ${fixed(after.cycles)} cycles.${held(after)}`;
   return { text, undo: () => correct(after, run.cycles, "the correction is undone") };
 }
 
-/**
- * @param {Receipt} run
- * @param {string} reason
- * @returns {Promise<Done>}
- */
+/** @type {(run: Receipt, reason: string) => Promise<Done>} */
 async function withdraw(run, reason) {
   const after = await post(run, "withdraw", reason);
   return { text: `${named(run)} is withdrawn.`, undo: () => restore(after, "the withdrawal is undone") };
 }
 
-/**
- * @param {Receipt} run
- * @param {string} reason
- * @returns {Promise<Done>}
- */
+/** @type {(run: Receipt, reason: string) => Promise<Done>} */
 async function restore(run, reason) {
   const after = await post(run, "restore", reason);
   const text = `${named(run)} is restored.${held(after)}`;
   return { text, undo: () => withdraw(after, "the restoration is undone") };
 }
 
-/**
- * The cycles that a doubt about a run asks about.
- * @param {Receipt} run
- * @returns {number | undefined}
- */
+/** @type {(run: Receipt) => number | undefined} the cycles that a doubt about a run asks about */
 export const likelyCycles = ({ doubts }) => doubts.find((doubt) => doubt.likely_cycles)?.likely_cycles ?? undefined;
 
 /** @typedef {"right" | "likely" | "other"} Answer the run is right, its cycles are those asked about, or it is another clutch's */
 
-/**
- * What can be said of a held run with one click: the button's words.
- * @param {Receipt} run
- * @returns {[Answer, string][]}
- */
+/** @type {(run: Receipt) => [Answer, string][]} what can be said of a held run with one click: the button's words */
 export function answersOf(run) {
   const likely = likelyCycles(run);
   /** @type {[Answer, string][]} */
@@ -172,11 +139,7 @@ export async function answerDoubts(answer, runs) {
   return first && runs.length === 1 ? first : { text: `${runs.length} runs were changed.`, undo: null };
 }
 
-/**
- * @param {Answer} answer
- * @param {Receipt} run
- * @returns {Promise<Done>}
- */
+/** @type {(answer: Answer, run: Receipt) => Promise<Done>} */
 async function answerDoubt(answer, run) {
   if (answer === "other") return withdraw(run, "another clutch's run");
   const likely = likelyCycles(run);
@@ -185,10 +148,7 @@ async function answerDoubt(answer, run) {
   return { text: `${named(run)} is confirmed.`, undo: null };
 }
 
-/**
- * @param {Receipt} run
- * @returns {Promise<Question>}
- */
+/** @type {(run: Receipt) => Promise<Question>} */
 async function rereading(run) {
   /** @type {{ name: string }[]} */
   const rigs = (await readAll("/v1/rigs")).items;
@@ -258,11 +218,7 @@ export async function askRun(action, run) {
   return ask({ ...question, lines: [name, ...question.lines] });
 }
 
-/**
- * Back to the cycles as they were sent.
- * @param {Receipt} run
- * @returns {Promise<Done | null>}
- */
+/** @type {(run: Receipt) => Promise<Done | null>} back to the cycles as they were sent */
 export const askUndo = (run) =>
   ask({
     title: "Undo the correction",
@@ -273,8 +229,7 @@ export const askUndo = (run) =>
 
 /**
  * Withdraw an inspection, or restore it where it was withdrawn.
- * @param {InspectionOut} inspection
- * @returns {Promise<Done | null>}
+ * @type {(inspection: InspectionOut) => Promise<Done | null>}
  */
 export function askInspection(inspection) {
   const [action, title] =
@@ -331,12 +286,7 @@ export const askArchive = (id, archived) =>
     send: (reason) => archive(id, archived, reason),
   });
 
-/**
- * @param {string} id
- * @param {boolean} archived
- * @param {string} reason
- * @returns {Promise<Done>}
- */
+/** @type {(id: string, archived: boolean, reason: string) => Promise<Done>} */
 async function archive(id, archived, reason) {
   await sendJson("PATCH", clutchPath(id), { archived, reason });
   const text = archived ? `${id} is archived.` : `${id} is back in the list of clutches.`;
@@ -375,12 +325,7 @@ export const askEnd = (id, cycles) =>
     },
   });
 
-/**
- * Take a declared end back.
- * @param {string} id
- * @param {DeclaredEnd} end
- * @returns {Promise<Done | null>}
- */
+/** @type {(id: string, end: DeclaredEnd) => Promise<Done | null>} take a declared end back */
 export const askTakeBack = (id, end) =>
   ask({
     title: "Take the end back",
@@ -394,11 +339,7 @@ export const askTakeBack = (id, end) =>
     },
   });
 
-/**
- * The question in a dialog.
- * @param {Question} question
- * @returns {Promise<Done | null>}
- */
+/** @type {(question: Question) => Promise<Done | null>} the question in a dialog */
 function ask({ title, lines, action, optional = false, cycles, choice, note, send }) {
   const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
   const number = h("input", { id: "changed-cycles", value: cycles, ...numeric });

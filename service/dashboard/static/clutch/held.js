@@ -15,10 +15,7 @@ import { runLink } from "./warnings.js";
 /** Held runs that are shown at the top; the others are in the list of runs. */
 const MOST_SHOWN = 5;
 
-/**
- * @param {Receipt[]} runs
- * @param {Page} page
- */
+/** @type {(runs: Receipt[], page: Page) => HTMLElement} */
 export function heldView(runs, { store }) {
   const { act, say } = store;
   const count = runs.length === 1 ? "1 run is held" : `${runs.length} runs are held`;
@@ -45,8 +42,7 @@ export function heldView(runs, { store }) {
 
 /**
  * Several runs that are held for the same cause, answered together.
- * @param {Receipt[]} runs
- * @param {Say} say
+ * @type {(runs: Receipt[], say: Say) => HTMLElement[]}
  */
 function together(runs, say) {
   const causes = [...new Set(runs.map((run) => run.doubts[0]?.code))];
@@ -64,10 +60,7 @@ function together(runs, say) {
     );
 }
 
-/**
- * @param {Receipt} run
- * @param {{ act: (action: RunAction, run: Receipt) => unknown, say: Say }} page
- */
+/** @type {(run: Receipt, page: { act: (action: RunAction, run: Receipt) => unknown, say: Say }) => HTMLElement} */
 function item(run, { act, say }) {
   return h(
     "li",
@@ -87,8 +80,7 @@ function item(run, { act, say }) {
 
 /**
  * What can be done to a run, as buttons.
- * @param {Receipt} run
- * @param {(action: RunAction, run: Receipt) => unknown} act
+ * @type {(run: Receipt, act: (action: RunAction, run: Receipt) => unknown) => HTMLElement}
  */
 export const buttons = (run, act) =>
   h(

@@ -130,10 +130,7 @@ export class Overview {
   }
 }
 
-/**
- * @param {ClutchOut} clutch
- * @param {RemainingLife} life
- */
+/** @type {(clutch: ClutchOut, life: RemainingLife) => HTMLElement[]} */
 function tiles(clutch, life) {
   const { current, model, course } = life;
   const { health } = current;
@@ -159,9 +156,7 @@ function tiles(clutch, life) {
 /** @type {Record<CourseShare["name"], string>} */
 const COURSES = { eq6: "As expected", slowing: "Slower and slower", accelerating: "Faster and faster" };
 
-/**
- * @param {RemainingLife} life
- */
+/** @type {(life: RemainingLife) => string} */
 function remainingNotes(life) {
   const { status, ended, held_runs: held, back_cast: cast, ended_lives: lives, probability_of_reaching: chance } = life;
   const never = chance !== null && chance < 0.995 && status !== "insufficient_data";
@@ -183,11 +178,7 @@ function remainingNotes(life) {
 /** @param {string} text */
 const small = (text) => h("small", {}, text);
 
-/**
- * @param {string} name
- * @param {string} value
- * @param {Content} more
- */
+/** @type {(name: string, value: string, more: Content) => HTMLElement} */
 const tile = (name, value, more) =>
   h("div", { class: "tile" }, h("dt", {}, name), h("dd", {}, h("span", { class: "big" }, value), more));
 

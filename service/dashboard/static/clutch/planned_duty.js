@@ -181,10 +181,7 @@ export class PlannedDuty {
   }
 }
 
-/**
- * @param {HTMLElement} place
- * @param {string} selector
- */
+/** @type {(place: HTMLElement, selector: string) => void} */
 function focus(place, selector) {
   const element = place.querySelector(selector);
   if (element instanceof HTMLElement) element.focus();

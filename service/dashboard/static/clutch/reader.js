@@ -23,10 +23,7 @@ export class Reader {
   /** The start of saved files' names. */
   name = () => this.id.replaceAll(/[^\w.-]+/g, "_");
 
-  /**
-   * The clutch has changed: everything is read again when it is next needed.
-   * @param {ClutchOut} clutch
-   */
+  /** @type {(clutch: ClutchOut) => void} the clutch has changed: everything is read again when it is next needed */
   renew(clutch) {
     this.clutch = clutch;
     this.answers.clear();
@@ -87,10 +84,7 @@ export class Reader {
   /** @returns {Promise<Receipt[]>} */
   held = () => this.all("/runs?state=held&limit=1000");
 
-  /**
-   * The earlier predictions of this life's end.
-   * @returns {Promise<Prediction[]>}
-   */
+  /** @type {() => Promise<Prediction[]>} the earlier predictions of this life's end */
   async predictions() {
     /** @type {[SeriesItem[], SeriesItem[]]} */
     const [remaining, cof] = await Promise.all([
@@ -114,10 +108,7 @@ export class Reader {
     return { life: byMeanCof(life), pooled, predictions, events };
   }
 
-  /**
-   * The records of runs, thinned to what is drawn.
-   * @param {(string | undefined)[]} ids
-   */
+  /** @type {(ids: (string | undefined)[]) => Promise<void>} the records of runs, thinned to what is drawn */
   async records(ids) {
     const wanted = [...new Set(ids)].flatMap((id) => (id === undefined || this.channels[id] ? [] : [id]));
     await Promise.all(

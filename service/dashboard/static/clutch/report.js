@@ -25,10 +25,7 @@ const COLUMNS = ["Cycles", "Test", "Mean COF, mean of pressures", "Fits acceptab
  * @property {Chart[]} [charts]
  */
 
-/**
- * @param {HTMLElement} place
- * @param {Answers} answers
- */
+/** @type {(place: HTMLElement, answers: Answers) => void} */
 export function makeReport(place, { clutch, life, tests = [], events = [], charts = [] }) {
   const drawings = charts.map((chart) => chart.light({ width: 760, height: 255, scheme: "light" }));
   const { state, headline, action } = clutch;
@@ -56,9 +53,7 @@ export function makeReport(place, { clutch, life, tests = [], events = [], chart
 
 /**
  * The release, the settings and the data that a report is of.
- * @param {ClutchOut} clutch
- * @param {RemainingLife | undefined} life
- * @param {StribeckItem[]} tests
+ * @type {(clutch: ClutchOut, life: RemainingLife | undefined, tests: StribeckItem[]) => string}
  */
 function basis(clutch, life, tests) {
   const { severity, geometry, revision } = clutch;
@@ -87,10 +82,7 @@ function diagnosisText(latest) {
   return `${sentence(latest)} ${latest.adopted ? "Its model is adopted." : earlier}`;
 }
 
-/**
- * @param {ClutchOut} clutch
- * @param {RemainingLife} life
- */
+/** @type {(clutch: ClutchOut, life: RemainingLife) => string[][]} */
 function facts(clutch, life) {
   const { current, model } = life;
   const { criterion } = byMeanCof(life);

@@ -17,8 +17,7 @@ import { named, pressureText, units } from "../shared/units.js";
 
 /**
  * The charts of a run; empty for one without channels.
- * @param {Receipt} run
- * @param {Reader} reader
+ * @type {(run: Receipt, reader: Reader) => Promise<HTMLElement | null>}
  */
 export async function runCharts(run, reader) {
   await reader.records([run.run_id]);
@@ -59,12 +58,7 @@ export async function runCharts(run, reader) {
   return h("div", { class: "charts" }, curves.element, residuals.element, record.element);
 }
 
-/**
- * @param {Receipt} run
- * @param {Channels} channels
- * @param {ClutchOut} clutch
- * @returns {Spec}
- */
+/** @type {(run: Receipt, channels: Channels, clutch: ClutchOut) => Spec} */
 function residualsOf({ fits }, channels, clutch) {
   const torque = units().torque;
   const levels = fits.map((fit) => ({
@@ -97,11 +91,7 @@ function residualsOf({ fits }, channels, clutch) {
   };
 }
 
-/**
- * @param {Channels} channels
- * @param {string} channel
- * @returns {Spec}
- */
+/** @type {(channels: Channels, channel: string) => Spec} */
 function recordOf(channels, channel) {
   const { [channel]: values, time_s: time } = channels;
   const x = time ?? values.map((_, index) => index + 1);

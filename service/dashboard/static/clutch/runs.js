@@ -55,10 +55,7 @@ export class Runs {
     return details?.querySelector("summary") ?? null;
   }
 
-  /**
-   * Show a run, opened.
-   * @param {string} runId
-   */
+  /** @type {(runId: string) => void} show a run, opened */
   reveal(runId) {
     const index = this.runs.findIndex((run) => run.run_id === runId);
     if (index < 0) return;
@@ -149,10 +146,7 @@ export class Runs {
     return details;
   }
 
-  /**
-   * @param {HTMLElement} inside
-   * @param {Receipt} run
-   */
+  /** @type {(inside: HTMLElement, run: Receipt) => Promise<void>} */
   async fill(inside, run) {
     const charts = h("div", { class: "run-charts" });
     inside.append(...this.inside(run), charts, ...receipt(run));

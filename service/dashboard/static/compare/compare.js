@@ -63,11 +63,7 @@ function go(change) {
   live.now();
 }
 
-/**
- * @param {string} entry
- * @param {string} quantity
- * @returns {Promise<Life>}
- */
+/** @type {(entry: string, quantity: string) => Promise<Life>} */
 async function lifeOf(entry, quantity) {
   const [, id, life] = /^(.*?)(?::(\d+))?$/.exec(entry) ?? ["", entry, undefined];
   const path = clutchPath(id);
@@ -100,12 +96,7 @@ const pooled = (items) =>
 /** @param {Colours} c */
 const palette = (c) => [c.accent, c.worn, c.high, c.midlife, c.low, c.ink];
 
-/**
- * @param {Life[]} lives
- * @param {string} quantity
- * @param {boolean} share
- * @returns {Spec}
- */
+/** @type {(lives: Life[], quantity: string, share: boolean) => Spec} */
 function overLifeOf(lives, quantity, share) {
   const drawn = lives.flatMap(({ label, answer }) => {
     const item = pooled(answer.items);
@@ -148,11 +139,7 @@ function overLifeOf(lives, quantity, share) {
   };
 }
 
-/**
- * @param {Life[]} lives
- * @param {boolean} share
- * @returns {Spec}
- */
+/** @type {(lives: Life[], share: boolean) => Spec} */
 function curvesOf(lives, share) {
   const { torque } = units();
   const drawn = lives.flatMap(({ label, clutch, tests, answer }, index) => {

@@ -65,11 +65,7 @@ export function charts(name) {
   ];
 }
 
-/**
- * @param {MapsOut | null | undefined} maps
- * @param {ResidualsMap} map
- * @returns {Spec | null}
- */
+/** @type {(maps: MapsOut | null | undefined, map: ResidualsMap) => Spec | null} */
 function mapSpec(maps, map) {
   const { key, columnwise, x, y, xName, yName } = map;
   if (!maps?.before?.[key] || !maps.axes?.[x] || !maps.axes?.[y]) return null;
@@ -160,12 +156,7 @@ function mapLayout(sides, { xName, yName }) {
   };
 }
 
-/**
- * Rows and columns exchanged.
- * @param {Table} z
- * @param {number[]} ys
- * @returns {Table}
- */
+/** @type {(z: Table, ys: number[]) => Table} rows and columns exchanged */
 const turned = (z, ys) => ys.map((_, j) => z.map((row) => row[j] ?? null));
 
 /** @typedef {"measured" | "baseline" | "extended"} Kind */
@@ -178,10 +169,7 @@ const KINDS = [
   ["extended", "extended_nm"],
 ];
 
-/**
- * @param {LoopTraceOut[]} loops
- * @returns {Spec | null}
- */
+/** @type {(loops: LoopTraceOut[]) => Spec | null} */
 function loopSpec(loops) {
   if (loops.length === 0) return null;
   const kinds = KINDS.filter(([, key]) => loops.every((loop) => loop[key]));
@@ -208,10 +196,7 @@ function loopSpec(loops) {
   };
 }
 
-/**
- * What the plotting library adds to an axis' name: nothing to the first one's.
- * @param {number} place
- */
+/** @type {(place: number) => string} what the plotting library adds to an axis' name: nothing to the first one's */
 const suffix = (place) => (place ? String(place + 1) : "");
 
 /** @param {LoopTraceOut} loop */
@@ -220,12 +205,7 @@ function loopName({ cycles, pressure_bar: pressure, frequency_hz: frequency }) {
   return `${fixed(cycles)} cycles, ${fixed(pressure, 1)} bar${rate}`;
 }
 
-/**
- * @param {LoopTraceOut} loop
- * @param {{ place: number, kind: Kind, key: TorqueKey }} options
- * @param {Colours} c
- * @returns {PlainTrace}
- */
+/** @type {(loop: LoopTraceOut, options: { place: number, kind: Kind, key: TorqueKey }, c: Colours) => PlainTrace} */
 function loopTrace(loop, { place, kind, key }, c) {
   const baseline = kind === "baseline";
   return {

@@ -60,10 +60,7 @@ export class Diagnosis {
     this.due = false;
   }
 
-  /**
-   * @param {string} id
-   * @returns {Promise<DiagnosisOut>}
-   */
+  /** @type {(id: string) => Promise<DiagnosisOut>} */
   async read(id) {
     return (await read(`${this.path}/${encodeURIComponent(id)}`)).body;
   }
@@ -125,10 +122,7 @@ export class Diagnosis {
     });
   }
 
-  /**
-   * @param {string} path
-   * @returns {Promise<DiagnosisOut>}
-   */
+  /** @type {(path: string) => Promise<DiagnosisOut>} */
   async finished(path) {
     for (;;) {
       await new Promise((resolve) => {
@@ -186,8 +180,7 @@ export class Diagnosis {
 
   /**
    * Work that the reader waits for; resolves to whether it went well.
-   * @param {string} status
-   * @param {() => Promise<void>} work
+   * @type {(status: string, work: () => Promise<void>) => Promise<boolean>}
    */
   async doing(status, work) {
     const buttons = [...this.content.querySelectorAll("button"), this.run];

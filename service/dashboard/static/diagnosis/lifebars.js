@@ -11,8 +11,7 @@ import { intervalBar } from "../shared/sparkline.js";
 
 /**
  * A bar for each; null where either answer holds no quantiles.
- * @param {{ before: Answer, after: Answer }} answers
- * @param {[string, string]} [names]
+ * @type {(answers: { before: Answer, after: Answer }, names?: string[]) => HTMLElement | null}
  */
 export function lifeBars({ before, after }, names = ["Before", "After"]) {
   const both = [before, after].map(quantilesOf).filter((quantiles) => quantiles !== null);
@@ -34,8 +33,7 @@ export function lifeBars({ before, after }, names = ["Before", "After"]) {
 
 /**
  * The quantiles of an answer, the quartiles taken from the 90 % interval where they are missing.
- * @param {Answer} answer
- * @returns {Quantiles | null}
+ * @type {(answer: Answer) => Quantiles | null}
  */
 function quantilesOf(answer) {
   const quantiles = /** @type {Quantiles | null | undefined} */ (answer?.remaining_cycles ?? answer);

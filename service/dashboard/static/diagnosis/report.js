@@ -29,10 +29,7 @@ const MOST_ROWS = 8;
 /** Probability from which a cause is certain though others are open (that of what a diagnosis names). */
 const CERTAIN = 0.9;
 
-/**
- * The report's elements.
- * @param {DiagnosisOut} diagnosis
- */
+/** @type {(diagnosis: DiagnosisOut) => HTMLElement[]} the report's elements */
 export function report(diagnosis) {
   if (diagnosis.status === "failed") {
     const reason = diagnosis.problem ?? "";
@@ -99,10 +96,7 @@ export function sentence(diagnosis) {
   return SENTENCES[verdict ?? ""]?.(joined) ?? "";
 }
 
-/**
- * @param {string} title
- * @param {Content[]} content
- */
+/** @type {(title: string, ...content: Content[]) => HTMLElement} */
 const part = (title, ...content) => h("div", { class: "part" }, h("h3", {}, title), ...content);
 
 /** @param {DiagnosisOut} diagnosis */
@@ -194,10 +188,7 @@ function errorGain(gained) {
   );
 }
 
-/**
- * @param {string} place
- * @param {number | null | undefined} gained
- */
+/** @type {(place: string, gained: number | null | undefined) => string} */
 const scoreText = (place, gained) =>
   gained === null || gained === undefined ? "" : `log score ${gained >= 0 ? "+" : ""}${fixed(gained, 1)} ${place}`;
 

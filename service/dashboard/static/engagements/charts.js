@@ -41,8 +41,7 @@ const valuesOf = (measured, name) =>
 
 /**
  * An indicator over cycles.
- * @param {{ measured: MeasuredEngagement[], events: Receipt[], name: Indicator }} answers
- * @returns {Spec}
+ * @type {(answers: { measured: MeasuredEngagement[], events: Receipt[], name: Indicator }) => Spec}
  */
 export function indicatorOverLife({ measured, events, name }) {
   if (measured.length === 0) return { empty: NO_ENGAGEMENT };
@@ -77,8 +76,7 @@ export function indicatorOverLife({ measured, events, name }) {
 
 /**
  * A measured engagement beside the model's.
- * @param {{ compared: ComparedEngagement | null, name: Channel }} answers
- * @returns {Spec}
+ * @type {(answers: { compared: ComparedEngagement | null, name: Channel }) => Spec}
  */
 export function engagementTrace({ compared, name }) {
   if (compared === null) return { empty: NO_COMPARISON };
@@ -96,13 +94,7 @@ export function engagementTrace({ compared, name }) {
   };
 }
 
-/**
- * @param {string} kind
- * @param {EngagementTrace} trace
- * @param {Channel} name
- * @param {Colours} c
- * @returns {PlainTrace}
- */
+/** @type {(kind: string, trace: EngagementTrace, name: Channel, c: Colours) => PlainTrace} */
 function lineOf(kind, trace, name, c) {
   const measured = kind === "measured";
   return {
@@ -115,10 +107,7 @@ function lineOf(kind, trace, name, c) {
   };
 }
 
-/**
- * Where measurement and model part, in a sentence.
- * @param {ComparedEngagement} compared
- */
+/** @type {(compared: ComparedEngagement) => string} where measurement and model part, in a sentence */
 function discrepancyOf({ model }) {
   if (model === null)
     return "The record does not show what drove the shaft, so no simulated engagement is drawn beside it.";

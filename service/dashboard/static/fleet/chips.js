@@ -9,11 +9,7 @@ import { stateIcon, STATES } from "../shared/state.js";
 
 /** @typedef {StateName | "held" | null} Choice a state, clutches with runs that are held, or all */
 
-/**
- * How many clutches a choice shows.
- * @param {FleetTotals} totals
- * @param {Choice} only
- */
+/** @type {(totals: FleetTotals, only: Choice) => number} how many clutches a choice shows */
 export function countOf({ all, held, states }, only) {
   return only === null ? all : only === "held" ? held : states[only];
 }

@@ -57,10 +57,7 @@ export function row(clutch, { scale, group, chosen, choose }) {
 export const kindOf = ({ friction_material: material, reaction_plate: plate, fluid }) =>
   `${words(material)} on ${plate}, ${fluid}`;
 
-/**
- * @param {string} name
- * @param {Content[]} content
- */
+/** @type {(name: string, ...content: Content[]) => HTMLElement} */
 const cell = (name, ...content) => h("td", { role: "cell", "data-label": name }, ...content);
 
 /** @param {string} text */
@@ -68,10 +65,7 @@ const number = (text) => h("span", { class: "number" }, text);
 /** @param {string} text */
 const small = (text) => h("small", {}, text);
 
-/**
- * @param {ClutchSummary | null} summary
- * @param {StateName} state
- */
+/** @type {(summary: ClutchSummary | null, state: StateName) => string[] | (HTMLElement | SVGSVGElement)[]} */
 function health(summary, state) {
   const value = summary?.current.health ?? null;
   return value === null ? ["–"] : [number(percent(value)), healthBar(value, state)];
@@ -132,18 +126,12 @@ function lastRun({ recent }) {
   ];
 }
 
-/**
- * @param {ClutchOut} clutch
- * @param {string} address
- */
+/** @type {(clutch: ClutchOut, address: string) => false | HTMLElement} */
 function held({ held: count }, address) {
   return count > 0 && h("a", { href: address, class: "mark-held" }, heldText(count));
 }
 
-/**
- * @param {ClutchOut} clutch
- * @param {string} address
- */
+/** @type {(clutch: ClutchOut, address: string) => HTMLElement[]} */
 function diagnosis({ diagnosis: latest }, address) {
   if (latest === null) return [h("span", { class: "quiet" }, "not run")];
   const verdict = latest.verdict ?? "";

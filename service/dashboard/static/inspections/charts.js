@@ -26,16 +26,12 @@ const QUANTITIES = {
 
 /** @typedef {keyof typeof QUANTITIES} SurfaceQuantity */
 
-/**
- * A lining's name as the charts write it; without one, what it is.
- * @param {string} lining
- */
+/** @type {(lining: string) => string} a lining's name as the charts write it; without one, what it is */
 const nameOf = (lining) => lining.replaceAll("<", "‹") || "lining"; // no markup comes from outside
 
 /**
  * A quantity of the surface over cycles.
- * @param {{ inspections: InspectionOut[], events: Receipt[], quantity: SurfaceQuantity }} answers
- * @returns {Spec}
+ * @type {(answers: { inspections: InspectionOut[], events: Receipt[], quantity: SurfaceQuantity }) => Spec}
  */
 export function surfaceOverLife({ inspections, events, quantity }) {
   const { title, name, meaning } = QUANTITIES[quantity];

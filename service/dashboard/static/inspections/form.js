@@ -15,19 +15,13 @@ const PHOTOGRAPHS_ONLY = "photographs";
 const LONGEST_NAME = 200;
 const LONGEST_NOTE = 4000;
 
-/**
- * @param {string} name
- * @param {Record<string, string | number | boolean>} attributes
- */
+/** @type {(name: string, attributes: Record<string, string | number | boolean>) => HTMLInputElement} */
 const input = (name, attributes) => h("input", { id: `inspection-${name}`, name, autocomplete: "off", ...attributes });
 
 /** @param {HTMLInputElement} element */
 const numberIn = ({ value }) => (value === "" ? null : Number(value));
 
-/**
- * What became of an inspection that was sent.
- * @param {InspectionOut} inspection
- */
+/** @type {(inspection: InspectionOut) => HTMLElement} what became of an inspection that was sent */
 function outcomeOf({ cycles, state }) {
   const named = `The inspection at ${fixed(cycles)} cycles`;
   return state === "accepted"

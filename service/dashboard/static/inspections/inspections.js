@@ -59,10 +59,7 @@ export class Inspections {
     }
   }
 
-  /**
-   * @param {InspectionOut[]} accepted
-   * @param {Receipt[]} events
-   */
+  /** @type {(accepted: InspectionOut[], events: Receipt[]) => void} */
   draw(accepted, events) {
     this.accepted = accepted;
     this.events = events;

@@ -22,21 +22,12 @@ export function usual(levels, chosen) {
   return levels.length === 0 ? undefined : levels.reduce((a, b) => (distance(b) < distance(a) ? b : a));
 }
 
-/**
- * The pressures that quantities are tracked at, bar.
- * @param {DegradationItem[]} items
- */
+/** @type {(items: DegradationItem[]) => number[]} the pressures that quantities are tracked at, bar */
 export const levelsOf = (items) =>
   distinct(items.flatMap(({ pressure_bar: level }) => (level === null ? [] : [level])));
 
-/**
- * @param {number[]} levels
- * @returns {[number, string][]}
- */
+/** @type {(levels: number[]) => [number, string][]} */
 export const levelOptions = (levels) => levels.map((level) => [level, pressureText(level)]);
 
-/**
- * @param {{ run_id: string, cycles: number }[]} tests
- * @returns {[string, string][]}
- */
+/** @type {(tests: { run_id: string, cycles: number }[]) => [string, string][]} */
 export const stateOptions = (tests) => tests.map((test) => [test.run_id, `${fixed(test.cycles)} cycles`]);

@@ -21,10 +21,7 @@ export const OWN_COLUMNS = [
 ];
 const COLUMNS = [...OWN_COLUMNS, "Probability of being the first"];
 
-/**
- * A quantity and where it is measured.
- * @param {CriterionIn} criterion
- */
+/** @type {(criterion: CriterionIn) => string} a quantity and where it is measured */
 export function placeText({ quantity, pressure_bar: pressure, speed_rpm: speed, frequency_hz: frequency }) {
   const at = [
     speed === null ? [] : `${fixed(speed)} rpm`,
@@ -34,10 +31,7 @@ export function placeText({ quantity, pressure_bar: pressure, speed_rpm: speed, 
   return [QUANTITIES[quantity].title, ...at].join(", ");
 }
 
-/**
- * The limit of a criterion in words.
- * @param {CriterionIn} criterion
- */
+/** @type {(criterion: CriterionIn) => string} the limit of a criterion in words */
 export function limitText({ quantity, fraction, below, above }) {
   const { unit } = QUANTITIES[quantity];
   if (fraction !== null) return `${percent(fraction)} of new`;
@@ -45,10 +39,7 @@ export function limitText({ quantity, fraction, below, above }) {
   return `${word} ${significant(value, 3)}${unit && ` ${unit}`}`;
 }
 
-/**
- * When a limit is reached, as part of a sentence.
- * @param {CriterionOutcome} criterion
- */
+/** @type {(criterion: CriterionOutcome) => string} when a limit is reached, as part of a sentence */
 export function reachedText({
   limit,
   end_of_life_cycles: end,
@@ -66,10 +57,7 @@ export function reachedText({
     : `${level} is ${at}, ${cycles(left["0.5"], left["0.05"], left["0.95"])} cycles from now`;
 }
 
-/**
- * What is known of a criterion by itself.
- * @param {CriterionOutcome} criterion
- */
+/** @type {(criterion: CriterionOutcome) => string[]} what is known of a criterion by itself */
 export function criterionRow(criterion) {
   const { current, end_of_life_cycles: end } = criterion;
   const { unit } = QUANTITIES[criterion.quantity];
@@ -101,8 +89,7 @@ export function criteriaTable({ criteria }) {
 
 /**
  * The remaining life by mean COF over all pressures alone, whatever else ends it: what the charts of mean COF show.
- * @param {RemainingLife} life
- * @returns {RemainingLife}
+ * @type {(life: RemainingLife) => RemainingLife}
  */
 export function byMeanCof(life) {
   const { criteria, criterion } = life;

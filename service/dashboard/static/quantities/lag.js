@@ -39,10 +39,7 @@ export const LAG = {
 
 export const LAG_NAMES = /** @type {LagName[]} */ (Object.keys(LAG));
 
-/**
- * @param {LagName} name
- * @returns {Column[]}
- */
+/** @type {(name: LagName) => Column[]} */
 const columnsOf = (name) => [
   KIND,
   PRESSURE,
@@ -102,12 +99,7 @@ export function lagOverCycles({ items, name, pressure, events }) {
   };
 }
 
-/**
- * @param {DegradationItem} item
- * @param {string} unit
- * @param {Colours} c
- * @returns {PlainTrace[]}
- */
+/** @type {(item: DegradationItem, unit: string, c: Colours) => PlainTrace[]} */
 function track({ pressure_bar: level, trajectory }, unit, c) {
   const name = `tracked, ${pressureText(level)}`;
   const x = trajectory.cycles;
@@ -126,8 +118,7 @@ function track({ pressure_bar: level, trajectory }, unit, c) {
 
 /**
  * A quantity of one frequency over pressure, a line a state.
- * @param {{ items: DegradationItem[], name: LagName }} answers
- * @returns {Spec}
+ * @type {(answers: { items: DegradationItem[], name: LagName }) => Spec}
  */
 export function lagOverPressure({ items, name }) {
   const values = levelsOf(items).flatMap((level) => measuredAt(items, level));

@@ -34,27 +34,18 @@ export function lawAt(law, pressure) {
   return { pressure, value, sd: Math.sqrt(Math.max(0, variance)) };
 }
 
-/**
- * @param {LinearLaw} law
- * @param {number} pressure
- */
+/** @type {(law: LinearLaw, pressure: number) => { value: number, gradient: number[] }} */
 const linear = ({ intercept, slope_per_bar: slope }, pressure) => {
   return { value: intercept + slope * pressure, gradient: [1, pressure] };
 };
 
-/**
- * @param {AsymptoticLaw} law
- * @param {number} pressure
- */
+/** @type {(law: AsymptoticLaw, pressure: number) => { value: number, gradient: number[] }} */
 function falling({ asymptote, excess, decay_bar: decay }, pressure) {
   const share = Math.exp(-pressure / decay);
   return { value: asymptote + excess * share, gradient: [1, share, (excess * share * pressure) / decay ** 2] };
 }
 
-/**
- * @param {{ test: StribeckItem | undefined, name: ParameterName }} answers
- * @returns {Spec}
- */
+/** @type {(answers: { test: StribeckItem | undefined, name: ParameterName }) => Spec} */
 export function pressureLaw({ test, name }) {
   const points = (test?.fits ?? [])
     .filter((fit) => !fit.undetermined.includes(name))

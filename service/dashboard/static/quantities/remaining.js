@@ -22,8 +22,7 @@ const ALL = "all";
 
 /**
  * The levels that a quantity is tracked at, bar; none for those that have no pressure of their own.
- * @param {string} name
- * @param {{ tests: StribeckItem[], loops: LoopItem[] }} answers
+ * @type {(name: string, answers: { tests: StribeckItem[], loops: LoopItem[] }) => number[]}
  */
 export function levelsAt(name, { tests, loops }) {
   const first = tests.find(({ fits }) => fits.length > 0);

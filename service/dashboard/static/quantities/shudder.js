@@ -53,12 +53,7 @@ export function shudderMargin({ items, limits, events }) {
 /** @param {CriterionOutcome} limit */
 const limitText = (limit) => `At ${fixed(limit.speed_rpm)} rpm ${reachedText(limit)}.`;
 
-/**
- * @param {DegradationItem} item
- * @param {string} color
- * @param {Colours} c
- * @returns {PlainTrace[]}
- */
+/** @type {(item: DegradationItem, color: string, c: Colours) => PlainTrace[]} */
 function slopeTraces({ speed_rpm: speed, measured, trajectory }, color, c) {
   const name = `${fixed(speed)} rpm`;
   const x = trajectory.cycles;
@@ -87,11 +82,7 @@ function slopeTraces({ speed_rpm: speed, measured, trajectory }, color, c) {
   ];
 }
 
-/**
- * @param {DegradationItem[]} items
- * @param {Colours} c
- * @returns {PlainTrace}
- */
+/** @type {(items: DegradationItem[], c: Colours) => PlainTrace} */
 function zeroLine(items, c) {
   const last = Math.max(1, ...items.flatMap(({ measured, trajectory }) => [...measured.cycles, ...trajectory.cycles]));
   const line = { color: c.ink, width: 1.6, dash: "dash" };

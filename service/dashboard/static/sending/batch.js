@@ -12,10 +12,7 @@ const RECORD = "clutch.json";
 
 /** @typedef {{ runs: RunFile[], record: ClutchRecord | null, wrong: string[] }} Batch `wrong`: files that are no run, and why */
 
-/**
- * @param {File[]} files
- * @returns {Promise<Batch>}
- */
+/** @type {(files: File[]) => Promise<Batch>} */
 export async function batchOf(files) {
   const listed = await listedRuns(files.find((file) => file.name === LIST));
   const record = await content(files.find((file) => file.name === RECORD));
@@ -35,11 +32,7 @@ export async function batchOf(files) {
   return batch;
 }
 
-/**
- * A JSON run without its channels, or why it is none.
- * @param {File} file
- * @returns {Promise<JsonRun | string>}
- */
+/** @type {(file: File) => Promise<JsonRun | string>} a JSON run without its channels, or why it is none */
 async function jsonRun(file) {
   if (file.size > MOST_JSON_BYTES) return "too large for JSON; send it as CSV, TDMS, MDF4 or Parquet";
   const run = await content(file);
@@ -49,11 +42,7 @@ async function jsonRun(file) {
   return rest;
 }
 
-/**
- * A JSON object, or null where the file is none.
- * @param {File | undefined} file
- * @returns {Promise<any>}
- */
+/** @type {(file: File | undefined) => Promise<any>} a JSON object, or null where the file is none */
 async function content(file) {
   if (file === undefined || file.size > MOST_JSON_BYTES) return null;
   try {
@@ -66,8 +55,7 @@ async function content(file) {
 
 /**
  * What a list of runs says of each file, by its name; null where there is no such list.
- * @param {File | undefined} file
- * @returns {Promise<Map<string, Listed> | null>}
+ * @type {(file: File | undefined) => Promise<Map<string, Listed> | null>}
  */
 async function listedRuns(file) {
   if (file === undefined || file.size > MOST_JSON_BYTES) return null;

@@ -5,8 +5,7 @@ import { h } from "../shared/dom.js";
 
 /**
  * Make a button and the whole page take files, several at once.
- * @param {HTMLElement} button
- * @param {(files: File[]) => unknown} take
+ * @type {(button: HTMLElement, take: (files: File[]) => unknown) => void}
  */
 export function takeFiles(button, take) {
   const chooser = h("input", { type: "file", multiple: true, hidden: true, "aria-label": "Run files" });

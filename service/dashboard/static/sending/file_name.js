@@ -13,10 +13,7 @@ const UNIT = /^(bar|rpm|hz|c|degc|nm|kpa|mpa|s|min|h|mm|cst|kj)$/i;
 /** A number of cycles that stands without the word: zero, or from here on; smaller ones count files. Chosen. */
 const LEAST_UNNAMED = 100;
 
-/**
- * @param {string} name
- * @returns {Guess}
- */
+/** @type {(name: string) => Guess} */
 export function guess(name) {
   const stem = name.replace(/(\.(csv|txt|tdms|mf4|mdf|parquet|json|gz))+$/i, "").replaceAll(DATE, " ");
   return { kind: kindIn(stem), cycles: cyclesIn(stem) };
@@ -49,8 +46,7 @@ const isCount = (value) => value === 0 || value >= LEAST_UNNAMED;
 
 /**
  * A number of the name, and what word says what it counts.
- * @param {Token[]} tokens
- * @param {number} index
+ * @type {(tokens: Token[], index: number) => { value: number, by: string }}
  */
 function numberAt(tokens, index) {
   const token = tokens[index];

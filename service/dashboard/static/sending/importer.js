@@ -164,11 +164,7 @@ export class Importer {
     return scrolling("First rows", grid);
   }
 
-  /**
-   * @param {PreviewColumn} column
-   * @param {number} index
-   * @param {string[]} channels
-   */
+  /** @type {(column: PreviewColumn, index: number, channels: string[]) => HTMLElement} */
   channel({ title, channel, in_part: inPart }, index, channels) {
     const options = channels.map((name) => h("option", { value: name, selected: name === channel }, quantity(name)));
     const label = { id: this.id(index, "channel"), "aria-label": `Channel of ${title}` };
@@ -183,11 +179,7 @@ export class Importer {
     return h("div", {}, select, inPart ? h("p", {}, "Check: its title was recognised only in part.") : null);
   }
 
-  /**
-   * @param {PreviewColumn} column
-   * @param {number} index
-   * @param {string[]} units
-   */
+  /** @type {(column: PreviewColumn, index: number, units: string[]) => HTMLSelectElement | Text} */
   unit({ title, channel, unit, stated_unit: stated }, index, units) {
     if (channel === null) return document.createTextNode(stated ?? "");
     const names = unit !== null && !units.includes(unit) ? [unit, ...units] : units;
@@ -203,11 +195,7 @@ export class Importer {
     );
   }
 
-  /**
-   * @param {PreviewColumn} column
-   * @param {number} index
-   * @param {"scale" | "offset"} name
-   */
+  /** @type {(column: PreviewColumn, index: number, name: "scale" | "offset") => HTMLInputElement | Text} */
   number_(column, index, name) {
     if (column.channel === null) return document.createTextNode("");
     const label = { id: this.id(index, name), "aria-label": `${words(name)} of ${column.title}` };
@@ -216,10 +204,7 @@ export class Importer {
     return h("input", { ...label, type: "number", step: "any", required: true, value: column[name], onchange: choose });
   }
 
-  /**
-   * @param {number} index
-   * @param {string} name
-   */
+  /** @type {(index: number, name: string) => string} */
   id(index, name) {
     return `import-${this.number}-${name}-${index}`;
   }
@@ -351,11 +336,7 @@ function drawing({ channels, pieces, fits, kind }) {
   );
 }
 
-/**
- * From values to px.
- * @param {number[]} values
- * @param {number} size
- */
+/** @type {(values: number[], size: number) => (value: number) => string} from values to px */
 function scale(values, size) {
   const low = values.reduce((a, b) => Math.min(a, b));
   const high = values.reduce((a, b) => Math.max(a, b));

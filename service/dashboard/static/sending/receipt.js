@@ -15,10 +15,7 @@ const UNCOUNTED = {
   withdrawn: ["It was withdrawn later and stays withdrawn. ", "#/runs", "Restore it in the list of runs"],
 };
 
-/**
- * What became of a run, in a line.
- * @param {Receipt} receipt
- */
+/** @type {(receipt: Receipt) => HTMLElement} what became of a run, in a line */
 export function outcomeOf(receipt) {
   const { clutch_id: clutchId, cycles: at, duplicate, kind, run_id: runId, state } = receipt;
   const held = state === "held";
@@ -34,19 +31,13 @@ export function outcomeOf(receipt) {
   return h("div", { class: "notice odd" }, name, held && doubtList(receipt), h("p", {}, words, link));
 }
 
-/**
- * Why a run is held, or was.
- * @param {Receipt} receipt
- */
+/** @type {(receipt: Receipt) => HTMLElement} why a run is held, or was */
 export function doubtList({ doubts }) {
   const items = doubts.map(({ message }) => h("li", {}, sentence(message)));
   return h("ul", { class: "doubts" }, items);
 }
 
-/**
- * A receipt with the curve that was fitted.
- * @param {Receipt} receipt
- */
+/** @type {(receipt: Receipt) => Promise<HTMLElement>} a receipt with the curve that was fitted */
 export async function receiptView(receipt) {
   const fitted = receipt.fits.length > 0;
   return h(

@@ -170,11 +170,7 @@ function form(id, record, registered, cancel) {
 
 /** @typedef {{ field: Field, element: HTMLInputElement }} Input */
 
-/**
- * @param {Field} field
- * @param {ClutchRecord | null} record
- * @returns {Input}
- */
+/** @type {(field: Field, record: ClutchRecord | null) => Input} */
 function inputOf(field, record) {
   const { group, name, integer, text, optional } = field;
   const value = valueIn(record, field) ?? valueIn(DEFAULTS, field);
@@ -183,11 +179,7 @@ function inputOf(field, record) {
   return { field, element: h("input", { id: `new-${group ?? "clutch"}-${name}`, ...kind, ...attributes }) };
 }
 
-/**
- * @param {ClutchRecord | null} record
- * @param {Field} field
- * @returns {string | number | null | undefined}
- */
+/** @type {(record: ClutchRecord | null, field: Field) => string | number | null | undefined} */
 function valueIn(record, { group, name }) {
   const values = /** @type {Record<string, any>} */ (record ?? {});
   return group === null ? values[name] : values[group]?.[name];

@@ -129,10 +129,7 @@ export class RunFile {
     }
   }
 
-  /**
-   * @param {Receipt} receipt
-   * @param {boolean} open
-   */
+  /** @type {(receipt: Receipt, open: boolean) => Promise<HTMLElement>} */
   async receipt(receipt, open) {
     if (open) return receiptView(receipt);
     const details = h("details", {}, h("summary", {}, "Receipt"));
@@ -141,10 +138,7 @@ export class RunFile {
     return details;
   }
 
-  /**
-   * Stored, after as many tries as a busy service asks for.
-   * @param {string} id
-   */
+  /** @type {(id: string) => Promise<Receipt>} stored, after as many tries as a busy service asks for */
   async tried(id) {
     for (let left = MOST_TRIES - 1; ; left -= 1) {
       try {
@@ -157,10 +151,7 @@ export class RunFile {
     }
   }
 
-  /**
-   * @param {string} id
-   * @returns {Promise<Receipt>}
-   */
+  /** @type {(id: string) => Promise<Receipt>} */
   async store(id) {
     if (this.json) {
       const { clutch_id: _, ...run } = JSON.parse(await this.file.text());

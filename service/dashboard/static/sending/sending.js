@@ -19,11 +19,7 @@ import { registeredLike, similarRegistered } from "./similar_names.js";
  * @property {() => unknown} sent hears of stored runs
  */
 
-/**
- * Make a button and the whole page take files.
- * @param {HTMLElement} button
- * @param {Page} page
- */
+/** @type {(button: HTMLElement, page: Page) => void} make a button and the whole page take files */
 export function sender(button, page) {
   takeFiles(button, async (files) => new Sending(await batchOf(files), page).open());
 }
@@ -110,10 +106,7 @@ class Sending {
       this.dialog.querySelector("form")?.requestSubmit();
   }
 
-  /**
-   * Offer registered names that contain what is typed.
-   * @param {HTMLElement} place
-   */
+  /** @type {(place: HTMLElement) => Promise<void>} offer registered names that contain what is typed */
   async suggest(place) {
     const typed = this.clutch.value.trim();
     const names = await registeredLike(typed).catch(() => []); // sending itself says what is wrong
@@ -173,8 +166,7 @@ class Sending {
 
   /**
    * The registered clutch to send to: the one that was named, or the one that the reader registers or chooses now.
-   * @param {string} id
-   * @returns {Promise<string | null>}
+   * @type {(id: string) => Promise<string | null>}
    */
   async registered(id) {
     try {
@@ -194,10 +186,7 @@ class Sending {
   }
 }
 
-/**
- * The clutch that the files name themselves, if they agree.
- * @param {Batch} batch
- */
+/** @type {(batch: Batch) => string | undefined} the clutch that the files name themselves, if they agree */
 function namedIn({ runs, record }) {
   const names = new Set([record?.clutch_id, ...runs.map((run) => run.json?.clutch_id)].filter(Boolean));
   return names.size === 1 ? [...names][0] : "";

@@ -32,20 +32,13 @@ export async function similarRegistered(id) {
   return similarTo(id, [...new Set(names.flat())]);
 }
 
-/**
- * @param {string} text
- * @param {number} count
- */
+/** @type {(text: string, count: number) => string[]} */
 function split(text, count) {
   const length = Math.ceil(text.length / count);
   return [...Array(count).keys()].map((part) => text.slice(part * length, (part + 1) * length)).filter(Boolean);
 }
 
-/**
- * The names that are spelt almost as this one.
- * @param {string} id
- * @param {string[]} registered
- */
+/** @type {(id: string, registered: string[]) => string[]} the names that are spelt almost as this one */
 export function similarTo(id, registered) {
   const plain = bare(id);
   return registered
@@ -59,11 +52,7 @@ export function similarTo(id, registered) {
 /** @param {string} id */
 const bare = (id) => id.toLowerCase().replaceAll(/[^a-z0-9]/g, "");
 
-/**
- * Levenshtein's distance.
- * @param {string} a
- * @param {string} b
- */
+/** @type {(a: string, b: string) => number} Levenshtein's distance */
 function distance(a, b) {
   let row = [...Array(b.length + 1).keys()];
   for (let i = 1; i <= a.length; i += 1) {

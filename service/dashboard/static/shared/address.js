@@ -10,10 +10,7 @@ const ROOT = new URL("../../../", import.meta.url).pathname;
  */
 export const at = (address) => (address.startsWith("/") ? ROOT + address.slice(1) : address);
 
-/**
- * The service's own address of one that an answer names.
- * @param {string} address
- */
+/** @type {(address: string) => string} the service's own address of one that an answer names */
 export const own = (address) => (address.startsWith(ROOT) ? `/${address.slice(ROOT.length)}` : address);
 
 /** The service's address for a command, without a slash at its end. */

@@ -49,10 +49,7 @@ export class Problem extends Error {
   }
 }
 
-/**
- * @param {string} path
- * @param {RequestInit} [options]
- */
+/** @type {(path: string, options?: RequestInit) => Promise<Response>} */
 async function request(path, options = {}) {
   const headers = new Headers(options.headers);
   const secret = key.get();
@@ -155,16 +152,10 @@ export async function send(method, path, body, headers = {}) {
 export const sendJson = (method, path, value, headers = {}) =>
   send(method, path, JSON.stringify(value), { "Content-Type": "application/json", ...headers });
 
-/**
- * An answer as text, for a file that the reader saves.
- * @param {string} path
- */
+/** @type {(path: string) => Promise<string>} an answer as text, for a file that the reader saves */
 export const readText = async (path) => (await request(path)).text();
 
-/**
- * A file that never changes under its address: the browser keeps it.
- * @param {string} path
- */
+/** @type {(path: string) => Promise<Blob>} a file that never changes under its address: the browser keeps it */
 export const readFile = async (path) => (await request(path, { cache: "default" })).blob();
 
 /** @param {string} id */
@@ -175,9 +166,7 @@ const POINTS = 2000;
 
 /**
  * A run with its channels, thinned to what is drawn.
- * @param {string} clutchId
- * @param {string} runId
- * @returns {Promise<{ body: RunOut, changed: boolean }>}
+ * @type {(clutchId: string, runId: string) => Promise<{ body: RunOut, changed: boolean }>}
  */
 export const readDrawn = (clutchId, runId) =>
   read(`${clutchPath(clutchId)}/runs/${encodeURIComponent(runId)}?points=${POINTS}`);

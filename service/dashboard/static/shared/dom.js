@@ -56,21 +56,14 @@ function filled(element, attributes, children) {
   return element;
 }
 
-/**
- * An element that the page always has.
- * @param {string} id
- */
+/** @type {(id: string) => HTMLElement} an element that the page always has */
 export function byId(id) {
   const element = document.getElementById(id);
   if (element === null) throw new Error(`the page has no element #${id}`);
   return element;
 }
 
-/**
- * The place of a section's content.
- * @param {string} id
- * @param {string} selector
- */
+/** @type {(id: string, selector: string) => HTMLElement} the place of a section's content */
 export function within(id, selector) {
   const element = byId(id).querySelector(selector);
   if (!(element instanceof HTMLElement)) throw new Error(`the page has no element #${id} ${selector}`);
@@ -85,11 +78,7 @@ export function within(id, selector) {
  */
 export const field = (input, label, more = null) => h("div", {}, h("label", { for: input.id }, label), input, more);
 
-/**
- * A letter with its index.
- * @param {string} letter
- * @param {string} index
- */
+/** @type {(letter: string, index: string) => HTMLElement} a letter with its index */
 export const symbol = (letter, index) => h("span", {}, letter, h("sub", {}, index));
 
 /**
@@ -122,16 +111,14 @@ export function table(caption, columns, rows, { shown = false } = {}) {
 
 /**
  * A table that scrolls in its own place, by keyboard too.
- * @param {string} label
- * @param {Content[]} content
+ * @type {(label: string, ...content: Content[]) => HTMLElement}
  */
 export const scrolling = (label, ...content) =>
   h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": label }, ...content);
 
 /**
  * Rare actions behind a button: opened and closed by it, left by Escape.
- * @param {string} label
- * @param {{ label: string, onclick: () => unknown, checked?: boolean }[]} entries
+ * @type {(label: string, entries: { label: string, onclick: () => unknown, checked?: boolean }[]) => HTMLElement}
  */
 export function menu(label, entries) {
   const details = h("details", { class: "menu" }, h("summary", {}, label));
@@ -176,11 +163,7 @@ export function answered(dialog, result) {
   });
 }
 
-/**
- * Give an address's content to the user as a file.
- * @param {string} name
- * @param {string} address
- */
+/** @type {(name: string, address: string) => void} give an address's content to the user as a file */
 export function save(name, address) {
   const link = h("a", { href: address, download: name, hidden: true });
   document.body.append(link);
@@ -188,21 +171,14 @@ export function save(name, address) {
   link.remove();
 }
 
-/**
- * Give content to the user as a file.
- * @param {string} name
- * @param {Blob} content
- */
+/** @type {(name: string, content: Blob) => void} give content to the user as a file */
 export function saveBlob(name, content) {
   const address = URL.createObjectURL(content);
   save(name, address);
   setTimeout(() => URL.revokeObjectURL(address), 10_000);
 }
 
-/**
- * A command beside a button that copies it and says so.
- * @param {string} text
- */
+/** @type {(text: string) => HTMLElement} a command beside a button that copies it and says so */
 export function copyable(text) {
   const status = h("span", { class: "copied", role: "status" });
   const code = h("code", {}, text);

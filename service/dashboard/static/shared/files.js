@@ -46,8 +46,7 @@ export const rowFiles = (name, rows) =>
 
 /**
  * Save rows, the first of them the header, in the format that the name's ending says.
- * @param {string} name
- * @param {Cell[][]} rows
+ * @type {(name: string, rows: Cell[][]) => void}
  */
 export function saveTable(name, rows) {
   if (name.endsWith(".xlsx")) return saveBlob(name, xlsxOf(rows));
@@ -65,11 +64,7 @@ function quoted(value) {
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
-/**
- * The cells of a CSV; what reads as a number is one.
- * @param {string} csv
- * @returns {Cell[][]}
- */
+/** @type {(csv: string) => Cell[][]} the cells of a CSV; what reads as a number is one */
 export function parsed(csv) {
   /** @type {Cell[][]} */
   const rows = [[]];
@@ -128,11 +123,7 @@ export function xlsxOf(rows) {
   return new Blob(zipped([...PARTS, ["xl/sheet.xml", sheet]]), { type: `${TYPE}.sheet` });
 }
 
-/**
- * Texts as a zip file, not compressed.
- * @param {[string, string][]} parts
- * @returns {Uint8Array<ArrayBuffer>[]}
- */
+/** @type {(parts: [string, string][]) => Uint8Array<ArrayBuffer>[]} texts as a zip file, not compressed */
 function zipped(parts) {
   const encoder = new TextEncoder();
   /** @type {Uint8Array<ArrayBuffer>[]} */
@@ -175,10 +166,7 @@ function zipped(parts) {
   return [...local, ...central, end];
 }
 
-/**
- * Numbers in as many bytes as each says, the least first.
- * @param {number[][]} fields
- */
+/** @type {(fields: number[][]) => Uint8Array<ArrayBuffer>} numbers in as many bytes as each says, the least first */
 function bytes(fields) {
   return new Uint8Array(
     fields.flatMap(([value, size]) => Array.from({ length: size }, (_, n) => (value >>> (8 * n)) & 255)),

@@ -13,26 +13,16 @@ const UNKNOWN = "unknown";
 /** @type {Record<string, string>} */
 const UNITS = { c: "°C", bar: "bar", rpm: "rpm", nm: "Nm", s: "s", hz: "Hz" };
 
-/**
- * A name that ends in its unit, as `oil_temperature_c`: Oil temperature, °C.
- * @param {string} name
- */
+/** @type {(name: string) => string} a name that ends in its unit, as `oil_temperature_c`: Oil temperature, °C */
 export function quantity(name) {
   const [, stem, unit] = /^(.*)_([a-z]+)$/.exec(name) ?? ["", name, ""];
   return UNITS[unit] ? `${words(stem)}, ${UNITS[unit]}` : words(name);
 }
 
-/**
- * @param {Maybe} value
- * @returns {value is number}
- */
+/** @type {(value: Maybe) => value is number} */
 const isNumber = (value) => value !== null && value !== undefined && Number.isFinite(value);
 
-/**
- * A number with that many decimals, thousands grouped.
- * @param {Maybe} value
- * @param {number} [decimals]
- */
+/** @type {(value: Maybe, decimals?: number) => string} a number with that many decimals, thousands grouped */
 export function fixed(value, decimals = 0) {
   if (!isNumber(value)) return NONE;
   const digits = { minimumFractionDigits: decimals, maximumFractionDigits: decimals };
@@ -40,11 +30,7 @@ export function fixed(value, decimals = 0) {
   return (value < 0 && /[1-9]/.test(text) ? MINUS : "") + text;
 }
 
-/**
- * A number with that many significant digits.
- * @param {Maybe} value
- * @param {number} [digits]
- */
+/** @type {(value: Maybe, digits?: number) => string} a number with that many significant digits */
 export function significant(value, digits = 3) {
   if (!isNumber(value)) return NONE;
   if (value === 0) return "0";
@@ -56,8 +42,7 @@ export function significant(value, digits = 3) {
 
 /**
  * A value and its deviation: the deviation to one digit (two where it starts with 1), the value to the same place.
- * @param {Maybe} value
- * @param {Maybe} sd
+ * @type {(value: Maybe, sd: Maybe) => string}
  */
 export function withSd(value, sd) {
   if (!isNumber(value)) return NONE;
@@ -69,17 +54,14 @@ export function withSd(value, sd) {
 
 /**
  * An estimate and its deviation; one that is less than its deviation is not known.
- * @param {Maybe} value
- * @param {Maybe} sd
+ * @type {(value: Maybe, sd: Maybe) => string}
  */
 export const estimate = (value, sd) =>
   isNumber(value) && isNumber(sd) && sd > Math.abs(value) ? UNKNOWN : withSd(value, sd);
 
 /**
  * Cycles, rounded to a twentieth of the interval that they lie in, but to no fewer than two digits.
- * @param {Maybe} value
- * @param {number | null} [low]
- * @param {number | null} [high]
+ * @type {(value: Maybe, low?: number | null, high?: number | null) => string}
  */
 export function cycles(value, low = null, high = null) {
   if (!isNumber(value)) return NONE;
@@ -89,10 +71,7 @@ export function cycles(value, low = null, high = null) {
   return fixed(Math.round(value / unit) * unit);
 }
 
-/**
- * The 90 % interval of quantiles by name.
- * @param {Quantiles} quantiles
- */
+/** @type {(quantiles: Quantiles) => string} the 90 % interval of quantiles by name */
 export function interval(quantiles) {
   const [low, high] = [quantiles["0.05"], quantiles["0.95"]];
   if (low === null && high === null) return NONE;
@@ -100,49 +79,30 @@ export function interval(quantiles) {
   return `${cycles(low, low, high)} to ${cycles(high, low, high)}`;
 }
 
-/**
- * The median of remaining cycles, or that it lies beyond the horizon.
- * @param {Quantiles} quantiles
- */
+/** @type {(quantiles: Quantiles) => string} the median of remaining cycles, or that it lies beyond the horizon */
 export const aboutCycles = (quantiles) =>
   quantiles["0.5"] === null ? "over 1,000,000" : cycles(quantiles["0.5"], quantiles["0.05"], quantiles["0.95"]);
 
-/**
- * What is likely of remaining cycles: the median and the 90 % interval.
- * @param {Quantiles} quantiles
- */
+/** @type {(quantiles: Quantiles) => string} what is likely of remaining cycles: the median and the 90 % interval */
 export const likely = (quantiles) =>
   `50 % chance of ${aboutCycles(quantiles)} or more; 90 % interval: ${interval(quantiles)}`;
 
-/**
- * The safe bound of remaining cycles, rounded down to two digits.
- * @param {number | null} bound
- */
+/** @type {(bound: number | null) => string} the safe bound of remaining cycles, rounded down to two digits */
 export function atLeast(bound) {
   if (bound === null || bound < 1) return "no further cycle is safe";
   return `safe for ${roundedDown(bound)} (95\u00a0%)`;
 }
 
-/**
- * Cycles, rounded down to two digits.
- * @param {number} value
- */
+/** @type {(value: number) => string} cycles, rounded down to two digits */
 export function roundedDown(value) {
   const unit = 10 ** Math.max(0, Math.floor(Math.log10(Math.max(1, value))) - 1);
   return fixed(Math.floor(value / unit) * unit);
 }
 
-/**
- * A share of one as a percentage.
- * @param {Maybe} share
- * @param {number} [decimals]
- */
+/** @type {(share: Maybe, decimals?: number) => string} a share of one as a percentage */
 export const percent = (share, decimals = 0) => (isNumber(share) ? `${fixed(100 * share, decimals)} %` : NONE);
 
-/**
- * A probability: never rounded to certainty.
- * @param {Maybe} value
- */
+/** @type {(value: Maybe) => string} a probability: never rounded to certainty */
 export function probability(value) {
   if (!isNumber(value)) return NONE;
   if (value < 0.005) return "< 1 %";
@@ -204,16 +164,10 @@ const KINDS = {
   maintenance: "Maintenance",
 };
 
-/**
- * What kind of run it is, in words.
- * @param {string} kind
- */
+/** @type {(kind: string) => string} what kind of run it is, in words */
 export const kindName = (kind) => KINDS[kind] ?? words(kind);
 
-/**
- * snake_case as words.
- * @param {unknown} name
- */
+/** @type {(name: unknown) => string} snake_case as words */
 export function words(name) {
   const text = String(name).replaceAll("_", " ");
   return text.charAt(0).toUpperCase() + text.slice(1);
@@ -229,10 +183,7 @@ export function sentence(text, starts = true) {
   return `${first}${text.slice(1)}${/[.?!]$/.test(text) ? "" : "."}`;
 }
 
-/**
- * `60000 ms` as `1 min`.
- * @param {number} milliseconds
- */
+/** @type {(milliseconds: number) => string} `60000 ms` as `1 min` */
 export const seconds = (milliseconds) =>
   milliseconds < 60_000
     ? `${Math.max(1, Math.round(milliseconds / 1000))} s`

@@ -4,11 +4,7 @@
 import { key, Problem } from "./api.js";
 import { answered, h } from "./dom.js";
 
-/**
- * Resolves when a key has been given.
- * @param {Problem} problem
- * @returns {Promise<void>}
- */
+/** @type {(problem: Problem) => Promise<void>} resolves when a key has been given */
 function askForKey(problem) {
   const input = h("input", { id: "key", type: "password", autocomplete: "off", required: true, spellcheck: "false" });
   const dialog = h(

@@ -40,10 +40,7 @@ export class Live {
     this.changed(this);
   }
 
-  /**
-   * Poll at once; a second call while one is under way polls once more after it.
-   * @returns {Promise<void>}
-   */
+  /** @type {() => Promise<void>} poll at once; a second call while one is under way polls once more after it */
   async now() {
     if (this.running) {
       this.again = true;

@@ -10,8 +10,7 @@ const HEIGHT = 28;
 
 /**
  * A line through the values from left to right, its last point marked; the threshold dashed where there is one.
- * @param {(number | null)[]} values
- * @param {number | null} [threshold]
+ * @type {(values: (number | null)[], threshold?: number | null) => SVGSVGElement | null}
  */
 export function sparkline(values, threshold = null) {
   const numbers = values.filter((value) => value !== null);
@@ -63,11 +62,7 @@ export function intervalBar(quantiles, scale) {
   );
 }
 
-/**
- * Health from 0 to 1 as a bar.
- * @param {number} health
- * @param {string} state
- */
+/** @type {(health: number, state: string) => SVGSVGElement} health from 0 to 1 as a bar */
 export function healthBar(health, state) {
   const width = Math.max(health > 0 ? 3 : 0, 60 * health).toFixed(1);
   const box = { preserveAspectRatio: "none", viewBox: "0 0 60 8", width: 60, height: 8 };

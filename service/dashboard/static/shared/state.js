@@ -25,10 +25,7 @@ export const VERDICTS = {
   insufficient_data: "Too little data",
 };
 
-/**
- * How many runs of a clutch wait for someone to look at them.
- * @param {number} count
- */
+/** @type {(count: number) => string} how many runs of a clutch wait for someone to look at them */
 export const heldText = (count) => `${count} ${count === 1 ? "run" : "runs"} held`;
 
 /** @type {Record<StateName, ["circle" | "path" | "rect", Record<string, string | number>][]>} */

@@ -24,9 +24,7 @@ function chosen() {
 
 /**
  * Torque over the torque at a coefficient of friction of 1: faces x pressure x lining area x mean radius.
- * @param {number} nm
- * @param {number} [bar]
- * @param {Pick<ClutchOut, "geometry">} [clutch]
+ * @type {(nm: number, bar?: number, clutch?: Pick<ClutchOut, "geometry">) => number}
  */
 function cofOf(nm, bar, clutch) {
   if (bar === undefined || clutch === undefined) return NaN;
@@ -56,16 +54,10 @@ export function units() {
   };
 }
 
-/**
- * The name of an axis or a column with its unit.
- * @param {Unit} unit
- */
+/** @type {(unit: Unit) => string} the name of an axis or a column with its unit */
 export const named = ({ name, unit }) => (unit ? `${name}, ${unit}` : name);
 
-/**
- * A pressure as it is shown.
- * @param {number | null | undefined} bar
- */
+/** @type {(bar: number | null | undefined) => string} a pressure as it is shown */
 export function pressureText(bar) {
   const { unit, decimals, of } = units().pressure;
   return `${fixed(bar === null || bar === undefined ? bar : of(bar), decimals)} ${unit}`;

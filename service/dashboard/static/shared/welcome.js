@@ -26,10 +26,7 @@ export function welcome() {
   );
 }
 
-/**
- * A clutch without a run.
- * @param {string} id
- */
+/** @type {(id: string) => HTMLElement} a clutch without a run */
 export function firstRun(id) {
   return h(
     "section",
