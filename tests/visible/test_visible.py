@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.diagnosis.diagnose import diagnose
-from tests.models.diagnosis.rehearsals import rehearsal
+from tests.models.diagnosis.campaigns import rehearsal
 from tests.visible.trial import Shown, shown
 
 

@@ -53,14 +53,6 @@ def test_inverse_round_trip(change: float, scale: float, exponent: float, share:
         assert value(zeta, d) == pytest.approx(level, abs=1e-13)
 
 
-@given(st.floats(1e-3, 1e5), changes, scales, st.floats(0.1, 5.0))
-def test_passage_of_a_value_is_its_progress(zeta: float, change: float, scale: float, exponent: float) -> None:
-    """Where the law has not saturated, so that the level still says where on the curve it lies."""
-    d = Degradation(initial=0.0, change=change, scale=scale, exponent=exponent)
-    if progress_fraction(zeta, scale, exponent) < 0.999:
-        assert first_passage(value(zeta, d), d) == pytest.approx(zeta, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("level", "change"), [(0.05, -0.06), (0.07, -0.06), (0.14, -0.06), (0.1, 0.06), (0.1, 0.0), (0.2, 0.06)]
 )
@@ -90,11 +82,6 @@ def test_sensitivities_against_central_differences(zeta: float, change: float, s
     numeric = [(at(point + step) - at(point - step)) / 2e-5 for step in steps]
     d = Degradation(initial=0.13, change=change, scale=scale, exponent=exponent)
     np.testing.assert_allclose(sensitivities(zeta, d), numeric, atol=2e-8)
-
-
-def test_sensitivities_have_a_column_a_coefficient() -> None:
-    d = Degradation(initial=0.13, change=np.array([-0.1, -0.05, 0.02]), scale=4_000.0, exponent=0.8)
-    assert sensitivities(np.array([[0.0], [100.0]]), d).shape == (2, 3, 4)
 
 
 def test_small_progress_keeps_its_digits() -> None:

@@ -14,9 +14,7 @@ from models.degradation.programme import Programme, uncertain_work
 from models.degradation.severity import IDENTITY, Block, Severity, SeverityBasis, severity_map
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
 from models.prognosis.scoring import crps_of_sample
-from models.tracking.filters.grid import Grid
-from models.tracking.measurement import Measurement
-from models.tracking.prior import weak
+from tests.models.tracking.tracked_series import on_grid, sent
 
 ENERGY = Severity(basis=SeverityBasis.DISSIPATED_ENERGY)
 
@@ -105,12 +103,7 @@ def test_a_life_of_light_and_heavy_blocks_is_predicted_better_by_energy() -> Non
         y = value(true_map.progress(at), truth) * (1 + 0.003 * rng.standard_normal(at.size))
         known = severity_map(ENERGY, blocks(energies[:last]))
         for name, mapped in (("cycles", IDENTITY), ("energy", known)):
-            seen = [
-                Measurement(progress=float(z), value=float(v), variance=0.0)
-                for z, v in zip(mapped.progress(at), y, strict=True)
-            ]
-            grid = Grid()
-            drawn = grid.posterior(grid.from_history(weak(seen[0], falling=True), seen), 1000, rng)
+            drawn = on_grid(sent(mapped.progress(at), y), 1000, rng)
             ends = mapped.cycles_at(np.minimum(ends_of_life(drawn, 0.5), 1e6))
             scores[name].append(crps_of_sample(ends, drawn.weight, end) / end)
             assert weighted_quantiles(ends, drawn.weight, (0.5,))[0] > at[-1] * 0.5

@@ -4,16 +4,33 @@ The clutch is the simulated rig's; loops follow the attractor law in time, from 
 nor the phase bins of the diagnosis are used to make what it is tested on.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
+from models.diagnosis.baseline.laws import Laws, Scene
+from models.diagnosis.baseline.prediction import frame_of, predict
+from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, StationaryRun
+from models.diagnosis.design.design import Design, build_design
+from models.diagnosis.diagnose import diagnose
+from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.effect import FROM_THE_START, Shape
+from models.diagnosis.effects.fitted_effect import FittedEffect
+from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline, starting_laws
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.report.report import Report
 from models.friction.stribeck import StribeckParameters, torque
 from models.loops.attractor import attractor_torque
 from models.records.runs import Plateaus, Record
+from models.rig import campaign as rig
+from models.rig.hidden import clutch_for, hidden_in
+from models.rig.programme import Programme
+from models.rig.sampled import DynamicTest
+from models.rig.stationary import SHARP
 from models.rig.truth import SimulatedClutch, draw
 
 RPM = 2 * np.pi / 60
@@ -53,78 +70,175 @@ def campaign(
     """A campaign with `planted` added to its torque; noise and gain 0: the bare truth."""
     rng = np.random.default_rng(seed)
     clutch = draw(rng)
+
+    def torque_of(bare: FloatArray, where: Where) -> FloatArray:
+        return bare if planted is None else bare + planted(where)
+
     stationary, dynamic = [], []
     for number, state in enumerate(cycles):
-        stationary.append(_stationary(number, state, clutch, rng, planted, temperature, noise, gain))
+        head = {"cycles": state, "moment": 1e9 + 86400.0 * number}
+        plateaus = _plateaus(state, clutch, rng, torque_of, noise, gain)
+        stationary.append(StationaryRun(run_id=f"stationary-{number}", **head, plateaus=plateaus))
         if loops:
-            dynamic.append(_dynamic(number, state, clutch, rng, planted, temperature, noise, gain))
-    return Campaign(stationary=tuple(stationary), dynamic=tuple(dynamic))
+            record = _record(state, clutch, rng, torque_of, noise, gain)
+            head["moment"] += 2000.0
+            dynamic.append(DynamicRun(run_id=f"dynamic-{number}", **head, record=record))
+    given = Campaign(stationary=tuple(stationary), dynamic=tuple(dynamic))
+    return given if temperature else without_temperature(given)
 
 
-def _stationary(
-    number: int,
+Columns = Callable[[Any], dict[str, FloatArray | None]]
+
+
+def altered(given: Campaign, steady: Columns = lambda _: {}, moving: Columns = lambda _: {}) -> Campaign:
+    """The campaign with columns of its plateaus and of its records changed: to what the functions make of each run."""
+    stationary = [replace(run, plateaus=replace(run.plateaus, **steady(run))) for run in given.stationary]
+    dynamic = [replace(run, record=replace(run.record, **moving(run))) for run in given.dynamic]
+    return replace(given, stationary=tuple(stationary), dynamic=tuple(dynamic))
+
+
+def without_temperature(given: Campaign) -> Campaign:
+    """As rigs without a thermometer send it."""
+    return altered(given, lambda _: {"oil_temperature": None}, lambda _: {"oil_temperature": None})
+
+
+def _plateaus(
     state: float,
     clutch: SimulatedClutch,
     rng: np.random.Generator,
-    planted: Planted | None,
-    temperature: bool,
+    torque_of: Callable[[FloatArray, Where], FloatArray],
     noise: float,
     gain: float,
-) -> StationaryRun:
+) -> Plateaus:
     pressure, speed = np.repeat(PRESSURES, SPEEDS.size), np.tile(SPEEDS, PRESSURES.size)
     clock = 5.0 * np.arange(speed.size) + 2.5
     swing = rng.uniform(2.0, 4.0) * np.sin(2 * np.pi * clock / rng.uniform(400.0, 900.0) + rng.uniform(0.0, 6.0))
     oil = 358.15 + swing
     parameters = clutch.parameters(pressure, state)
     velocity = clutch.geometry.sliding_velocity(speed)
-    true = torque(velocity, parameters)
-    if planted is not None:
-        at = Where(velocity, pressure, state, oil, clock, np.zeros_like(velocity), parameters, dynamic=False)
-        true = true + planted(at)
+    at = Where(velocity, pressure, state, oil, clock, np.zeros_like(velocity), parameters, dynamic=False)
+    true = torque_of(torque(velocity, parameters), at)
     measured = true * (1 + gain * rng.standard_normal()) * (1 + noise * rng.standard_normal(true.size))
-    return StationaryRun(
-        run_id=f"stationary-{number}",
-        cycles=state,
-        moment=1e9 + 86400.0 * number,
-        plateaus=Plateaus(
-            pressure=pressure, speed=speed, torque=measured, oil_temperature=oil if temperature else None
-        ),
-    )
+    return Plateaus(pressure=pressure, speed=speed, torque=measured, oil_temperature=oil)
 
 
-def _dynamic(
-    number: int,
+def _record(
     state: float,
     clutch: SimulatedClutch,
     rng: np.random.Generator,
-    planted: Planted | None,
-    temperature: bool,
+    torque_of: Callable[[FloatArray, Where], FloatArray],
     noise: float,
     gain: float,
-) -> DynamicRun:
+) -> Record:
     time = np.arange(0.0, 15.0, 0.02)
     speed = 1000 * RPM * (1 - np.cos(2 * np.pi * 0.1 * time))
     velocity = clutch.geometry.sliding_velocity(speed)
     acceleration = clutch.geometry.sliding_velocity(1000 * RPM * 2 * np.pi * 0.1 * np.sin(2 * np.pi * 0.1 * time))
     factor = 1 + gain * rng.standard_normal()
+    oil = np.full_like(time, 358.15)
     parts = []
     for level, pressure in enumerate(PRESSURES):
-        full = np.full_like(time, pressure)
+        full, clock = np.full_like(time, pressure), time + 15 * level
         one = StribeckParameters.from_array(clutch.parameters(float(pressure), state).as_array())
-        true = attractor_torque(time, np.maximum(velocity, 1e-4), one, 250.0)
-        oil = np.full_like(time, 358.15)
-        if planted is not None:
-            at = Where(velocity, full, state, oil, time + 15 * level, acceleration, one, dynamic=True)
-            true = true + planted(at)
-        parts.append(
-            (time + 15 * level, full, speed, true * factor * (1 + noise * rng.standard_normal(time.size)), oil)
-        )
-    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    record = Record(
-        time=columns[0],
-        pressure=columns[1],
-        speed=columns[2],
-        torque=columns[3],
-        oil_temperature=columns[4] if temperature else None,
-    )
-    return DynamicRun(run_id=f"dynamic-{number}", cycles=state, moment=1e9 + 86400.0 * number + 2000.0, record=record)
+        at = Where(velocity, full, state, oil, clock, acceleration, one, dynamic=True)
+        true = torque_of(attractor_torque(time, np.maximum(velocity, 1e-4), one, 250.0), at)
+        measured = true * factor * (1 + noise * rng.standard_normal(time.size))
+        parts.append({"time": clock, "pressure": full, "speed": speed, "torque": measured, "oil_temperature": oil})
+    return Record(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+
+
+# --- As `clutchlife simulate` writes them, with or without --hide.
+
+
+def rehearsal(
+    seed: int,
+    hidden: Mapping[str, float] | None = None,
+    *,
+    dynamic: bool = True,
+    tests: int = 40,
+    noise: float | None = None,
+) -> Campaign:
+    """A simulated campaign; without `hidden` (sizes by slug) the one of `clutchlife simulate --seed SEED`."""
+    sizes = hidden or {}
+    clutch = clutch_for(rig.simulated_clutch(seed), sizes)
+    sensor = SHARP if noise is None else replace(SHARP, noise=noise)
+    programme = Programme(dynamic=DynamicTest() if dynamic else None, engagements=True)
+    runs = rig.simulate(seed, clutch=clutch, sensor=sensor, programme=programme, most_tests=tests)
+    stationary, moving, duty = [], [], []
+    for run in (hidden_in(run, clutch, sizes) for run in runs):
+        head = {"run_id": run.run_id, "cycles": float(run.cycles)}
+        if run.plateaus is not None:
+            stationary.append(StationaryRun(**head, plateaus=run.plateaus))
+        elif run.duty is not None:
+            block = run.duty
+            engaged = {"energy": block.energy_per_cycle, "initial_speed": block.initial_speed}
+            duty.append(DutyRun(**head, engagements=block.cycles, maximum_pressure=block.maximum_pressure, **engaged))
+        elif run.record is not None:
+            moving.append(DynamicRun(**head, record=run.record))
+    return Campaign(stationary=tuple(stationary), dynamic=tuple(moving), duty=tuple(duty))
+
+
+# --- Fitted once for the tests of what follows from a fit: a baseline, and one or several extended models.
+
+
+@dataclass(frozen=True)
+class Study:
+    """A campaign, its design and its baseline."""
+
+    campaign: Campaign
+    design: Design
+    baseline: Baseline
+
+    @property
+    def problem(self) -> FitProblem:
+        return self.baseline.problem
+
+    def extended(self, *effects: tuple[str, float, Shape]) -> Fit:
+        """The baseline with effects (slug, first amplitude, shape) fitted along."""
+        start = [of_size(slug, first, shape) for slug, first, shape in effects]
+        return fit(self.problem, self.baseline.fit.laws, start)
+
+
+def of_size(slug: str, amplitude: float, shape: Shape) -> FittedEffect:
+    """An effect as large and formed so, at work from the start where the shape does not say from when on."""
+    effect = BY_SLUG[slug]
+    missing = effect.begins and len(shape) < len(effect.shapes)
+    return FittedEffect(effect=effect, amplitude=amplitude, shape=(*shape, FROM_THE_START) if missing else shape)
+
+
+def study(campaign: Campaign) -> Study:
+    design = build_design(campaign)
+    return Study(campaign, design, fit_baseline(design))
+
+
+def start_of(design: Design) -> Laws:
+    """The laws that a fit of the baseline starts from."""
+    return starting_laws(design, frame_of(design))
+
+
+def with_theta(laws: Laws, place: Any, values: Any) -> Laws:
+    theta = laws.theta.copy()
+    theta[place] = values
+    return replace(laws, theta=theta)
+
+
+def scene_of(given: Campaign) -> Scene:
+    """What effects see of a campaign, before any fit."""
+    design = build_design(given)
+    return predict(design, start_of(design)).scene
+
+
+def look(given: Campaign, seed: int = 5, **options: bool) -> Report:
+    return diagnose(given, rng=np.random.default_rng(seed), **options)
+
+
+def warmth(at: Where) -> FloatArray:
+    """Torque falls by 0.3 % of its viscous part a kelvin: no formula of viscosity."""
+    viscous = at.parameters.viscous_coefficient * at.velocity**0.3
+    return np.asarray(-0.03 * viscous * (at.temperature - 358.15), dtype=np.float64)
+
+
+def bump(at: Where) -> FloatArray:
+    """Three percent more torque about 3 m/s: outside of the catalogue."""
+    level = at.pressure / 4e5 * 20
+    return np.asarray(0.02 * level * np.exp(-0.5 * ((at.velocity - 3.0) / 0.8) ** 2), dtype=np.float64)

@@ -1,5 +1,7 @@
 """Campaigns of raw records with lines hidden in them, made without the product's own simulated rig."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -99,7 +101,7 @@ def ragged(record: Record, rng: np.random.Generator, jitter: float, lost: float)
     step = float(np.median(np.diff(record.time)))
     kept = rng.random(record.time.size) >= lost
     time = record.time + jitter * step * rng.standard_normal(record.time.size)
-    return Record(time=time[kept], pressure=record.pressure[kept], speed=record.speed[kept], torque=record.torque[kept])
+    return replace(record, time=time).take(kept)
 
 
 def with_ripple(record: Record, amplitude: float, order: float, rate: float = RATE) -> Record:
@@ -113,16 +115,12 @@ def with_line(record: Record, amplitude: float, hertz: float, below: float = np.
 
 
 def _added(record: Record, torque: FloatArray) -> Record:
-    return Record(time=record.time, pressure=record.pressure, speed=record.speed, torque=record.torque + torque)
+    return replace(record, torque=record.torque + torque)
 
 
 def campaign(stationary: list[Record], dynamic: list[Record]) -> Campaign:
     """States a thousand cycles apart; plateaus are not looked at here."""
     one = Plateaus(pressure=np.full(1, 5e5), speed=np.ones(1), torque=np.ones(1))
-    return Campaign(
-        stationary=tuple(
-            StationaryRun(run_id=f"s{i}", cycles=1000.0 * i, plateaus=one, record=record)
-            for i, record in enumerate(stationary)
-        ),
-        dynamic=tuple(DynamicRun(run_id=f"d{i}", cycles=1000.0 * i, record=record) for i, record in enumerate(dynamic)),
-    )
+    steady = [StationaryRun(run_id=f"s{i}", cycles=1e3 * i, plateaus=one, record=r) for i, r in enumerate(stationary)]
+    moving = [DynamicRun(run_id=f"d{i}", cycles=1e3 * i, record=r) for i, r in enumerate(dynamic)]
+    return Campaign(stationary=tuple(steady), dynamic=tuple(moving))

@@ -14,8 +14,7 @@ from models.diagnosis.effects.readings import DAYS, STRAIGHT
 from models.diagnosis.effects.thermal import log_viscosity_ratio
 from models.diagnosis.extension import Extension, NotFiniteError, build_extension, facts_from, facts_to
 from models.records.runs import Plateaus
-from tests.models.diagnosis.campaigns import campaign
-from tests.models.diagnosis.fitted import Study, study, warmth
+from tests.models.diagnosis.campaigns import Study, campaign, study, warmth
 
 CYCLES = np.array([0.0, 3000.0, 8000.0, 20000.0])
 PRESSURE = np.array([3e5, 6e5])
@@ -101,7 +100,6 @@ def test_without_temperature_nothing_is_taken_off(warm):
 
 
 def test_where_an_effect_makes_no_number_nothing_passes_for_no_correction(warm, monkeypatch):
-    """A NaN was taken for 0 Nm: a test of which nothing was taken off looked like one that needed nothing."""
     effect = BY_SLUG["torque_zero_shift"]
     zero = extension_of(warm, (effect.slug, 0.3, (0.0, ONSET, *STRAIGHT)))
     run = warm.campaign.stationary[4]
@@ -134,9 +132,8 @@ def test_a_huge_run_and_runs_unlike_any_before(warm):
     assert found.shape == (1, count)
     assert np.isfinite(found).all()
     # the same plateaus by themselves
-    some = slice(MOST_PLATEAUS - 5, MOST_PLATEAUS + 5)
-    part = Plateaus(**{name: getattr(table, name)[some] for name in ("pressure", "speed", "torque", "oil_temperature")})
-    alone = built.artefact(replace(run, plateaus=part), warm.campaign)
+    some = np.arange(MOST_PLATEAUS - 5, MOST_PLATEAUS + 5)
+    alone = built.artefact(replace(run, plateaus=table.take(some)), warm.campaign)
     assert np.allclose(alone, found[:, some], rtol=1e-9, atol=1e-12)
     still = Plateaus(pressure=np.zeros(3), speed=np.zeros(3), torque=np.zeros(3))
     assert np.array_equal(built.artefact(replace(run, plateaus=still), warm.campaign), np.zeros((1, 3)))

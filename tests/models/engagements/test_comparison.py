@@ -50,7 +50,6 @@ def test_a_longer_engagement_is_as_far_away_as_integrals_say(longer: float) -> N
 def test_wear_shows_in_noisy_records_beyond_its_standard_error() -> None:
     def course(cof: float, seed: int) -> SpeedCourse:
         found = measured_engagement(record(constant(cof), 100.0, seed), Geometry())
-        assert isinstance(found, MeasuredEngagement)
         return found.course
 
     reference = reference_of([course(0.12, seed) for seed in range(3)])
@@ -82,9 +81,7 @@ def coulomb(cof: float) -> Capacity:
 def against(found_record: Record, capacity: Capacity) -> Discrepancy:
     engagement = measured_engagement(found_record, GEOMETRY)
     assert isinstance(engagement, MeasuredEngagement), engagement
-    found = discrepancy(engagement, capacity, GEOMETRY.mean_radius)
-    assert found is not None
-    return found
+    return discrepancy(engagement, capacity, GEOMETRY.mean_radius)
 
 
 @pytest.mark.parametrize("name", ["constant", "ramp", "exponential"])
@@ -93,14 +90,12 @@ def test_the_right_model_has_no_discrepancy_but_noise(name: str) -> None:
     assert found.drive.inertia == pytest.approx(INERTIA, rel=0.015)
     assert found.drive.limit == pytest.approx(0.0, abs=0.2)
     assert found.torque_share < 0.015
-    assert found.stop_time_difference is not None
     assert abs(found.stop_time_difference.value) < 0.02
 
 
 def test_a_model_that_is_ten_percent_too_strong_stops_a_tenth_too_early() -> None:
     found = against(record(FORMS["constant"], 100.0), coulomb(0.132))
     stop = FORMS["constant"].stop
-    assert found.stop_time_difference is not None
     assert found.stop_time_difference.value == pytest.approx(
         stop - stop / 1.1, rel=0.15
     )  # 1 % of the inertia is 11 % of it

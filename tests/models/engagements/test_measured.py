@@ -59,7 +59,6 @@ def test_a_wrong_indicator_would_be_noticed() -> None:
     form = FORMS["constant"]
     stronger = record(form, 100.0)
     found = measured(measured_engagement(replace(stronger, torque=1.03 * stronger.torque), GEOMETRY))
-    assert found.midpoint_cof is not None
     assert abs(found.midpoint_cof.value / form.expected()["midpoint_cof"] - 1) > 0.01
 
 
@@ -81,8 +80,6 @@ def test_a_shaft_broken_loose_after_standstill_shows_breakaway() -> None:
         torque=np.concatenate([first.torque, torque]),
     )
     found = measured(measured_engagement(joined, GEOMETRY))
-    assert found.breakaway_cof is not None
-    assert found.breakaway_ratio is not None
     assert found.breakaway_cof.value == pytest.approx(1.5 * sliding, rel=0.015)
     assert found.breakaway_ratio.value == pytest.approx(1.5, rel=0.02)
     opened = replace(joined, pressure=np.where(joined.time > again[0], 0.0, joined.pressure))
@@ -100,7 +97,6 @@ def test_sensors_mounted_the_other_way_give_the_same_indicators() -> None:
 
 
 PLAIN = record(FORMS["constant"], 100.0)
-HALF = PLAIN.time < CONTACT + 0.9
 WRONG = {
     SlipStatus.NO_SLIP: replace(PLAIN, speed=0.002 * PLAIN.speed),
     SlipStatus.SLIP_NEVER_ENDS: replace(PLAIN, speed=PLAIN.speed + 0.05 * SPEED),
@@ -108,40 +104,30 @@ WRONG = {
     SlipStatus.NO_TORQUE: replace(PLAIN, torque=np.zeros_like(PLAIN.torque)),
     SlipStatus.SAMPLED_TOO_SLOWLY: record(FORMS["constant"], 9.0),
     SlipStatus.NO_PRESSURE: replace(PLAIN, pressure=np.zeros_like(PLAIN.pressure)),
-    SlipStatus.STARTS_IN_CONTACT: Record(
-        **{name: getattr(PLAIN, name)[PLAIN.time > CONTACT] for name in ("time", "pressure", "speed", "torque")}
-    ),
+    SlipStatus.STARTS_IN_CONTACT: PLAIN.take(PLAIN.time > CONTACT),
     SlipStatus.GAP: record(FORMS["constant"], 100.0, sensors=Sensors(hole=(0.3, 0.8))),
-    SlipStatus.TOO_FEW_SAMPLES: Record(
-        **{name: getattr(PLAIN, name)[::30] for name in ("pressure", "speed", "torque")}, time=PLAIN.time[::30] / 30
-    ),
+    SlipStatus.TOO_FEW_SAMPLES: replace(PLAIN, time=PLAIN.time / 30).take(np.arange(0, PLAIN.time.size, 30)),
 }
 
 
 @pytest.mark.parametrize("status", WRONG)
 def test_a_record_without_an_engagement_is_refused_with_the_reason(status: SlipStatus) -> None:
     found = measured_engagement(WRONG[status], GEOMETRY)
-    assert isinstance(found, Refusal), found
     assert found.status is status
     assert any(character.isdigit() for character in found.message)  # the rule, and the value that breaks it
 
 
 def test_a_record_that_is_cut_off_has_no_end_of_slip() -> None:
-    cut = Record(**{name: getattr(PLAIN, name)[HALF] for name in ("time", "pressure", "speed", "torque")})
-    found = measured_engagement(cut, GEOMETRY)
-    assert isinstance(found, Refusal)
+    found = measured_engagement(PLAIN.take(PLAIN.time < CONTACT + 0.9), GEOMETRY)
     assert found.status is SlipStatus.SLIP_NEVER_ENDS
     assert found.message.endswith("% of the highest, and must fall to 5 % or less. Record longer")
     stays = measured_engagement(WRONG[SlipStatus.SLIP_NEVER_ENDS], GEOMETRY)
-    assert isinstance(stays, Refusal)
     assert "must come within 2 % of zero" in stays.message
 
 
 def test_noise_for_torque_and_a_shaft_that_turns_on_are_refused() -> None:
     rng = np.random.default_rng(3)
     found = measured_engagement(replace(PLAIN, torque=rng.standard_normal(PLAIN.time.size)), GEOMETRY)
-    assert isinstance(found, Refusal)
     assert found.status is SlipStatus.NO_TORQUE
     found = measured_engagement(replace(PLAIN, speed=np.full_like(PLAIN.speed, SPEED)), GEOMETRY)
-    assert isinstance(found, Refusal)
     assert found.status is SlipStatus.SLIP_NEVER_ENDS

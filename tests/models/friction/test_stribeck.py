@@ -115,7 +115,6 @@ def test_a_noiseless_test_shows_the_true_slope_and_its_sign(cycles: float, falls
     per_cof, velocity = clutch.geometry.torque_per_cof(pressure), 0.6
     found = cof_slope(fit, velocity, per_cof)
     truth = float(slope(np.array(velocity), clutch.parameters(pressure, cycles))) / per_cof
-    assert found is not None
     assert found.value == pytest.approx(truth, rel=1e-3)
     assert (found.value < 0.0) is falls
 
@@ -127,8 +126,6 @@ def test_it_is_that_of_a_cof_at_a_speed() -> None:
         )
     )[0]
     one, half = cof_slope(fit, 0.6, 100.0), cof_slope(fit, 0.6, 200.0)
-    assert one is not None
-    assert half is not None
     assert half.value == pytest.approx(one.value / 2)
     assert half.sd == pytest.approx(one.sd / 2)
     for wrong in ((0.0, 100.0), (0.6, 0.0)):

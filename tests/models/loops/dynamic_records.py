@@ -100,33 +100,22 @@ def record(
 ) -> Record:
     """Pressures [Pa] one after another, each `duration` s of the sine; noise is a share of torque, speed and pressure
     (a tenth of it), jitter a share of the sampling interval, `ramp` s between pressures with the motor at its mean."""
-    columns: list[list[np.ndarray]] = [[], [], [], []]
+    blocks: list[tuple[np.ndarray, ...]] = []
     clock = 0.0
     for i, (torque, pressure) in enumerate(zip(torques, pressures, strict=True)):
         local = np.arange(round(duration * rate)) / rate
         if rng is not None and jitter:
             local = np.sort(local + jitter / rate * rng.uniform(-0.5, 0.5, local.size))
-        parts = [clock + local, np.full(local.size, pressure), velocity(local, frequency), torque(local)]
+        sent = torque(local)
+        blocks.append((clock + local, np.full(local.size, pressure), velocity(local, frequency), sent))
         clock += duration
         if ramp and i + 1 < len(pressures):
             way = np.arange(round(ramp * rate)) / rate
-            parts = [
-                np.append(a, b)
-                for a, b in zip(
-                    parts,
-                    (
-                        clock + way,
-                        pressure + (pressures[i + 1] - pressure) * way / ramp,
-                        np.full(way.size, GEOMETRY.mean_radius * SWING),
-                        np.full(way.size, float(np.mean(parts[3]))),
-                    ),
-                    strict=True,
-                )
-            ]
+            changing = pressure + (pressures[i + 1] - pressure) * way / ramp
+            still = np.full(way.size, GEOMETRY.mean_radius * SWING), np.full(way.size, sent.mean())
+            blocks.append((clock + way, changing, *still))
             clock += ramp
-        for column, part in zip(columns, parts, strict=True):
-            column.append(part)
-    time, p, v, m = (np.concatenate(column) for column in columns)
+    time, p, v, m = (np.concatenate(column) for column in zip(*blocks, strict=True))
     speed = v / GEOMETRY.mean_radius
     if rng is not None:
         p = p * (1 + 0.1 * noise * rng.standard_normal(p.size))

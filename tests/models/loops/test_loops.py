@@ -65,17 +65,20 @@ def test_fifteen_seconds_are_one_period():
     assert three.area == pytest.approx(closed_form(), rel=1e-6)  # a mean a period, not a sum
 
 
-def test_area_keeps_with_lost_samples_and_jitter():
-    dirty = record([lagging], [5e5], rng=np.random.default_rng(3), lost=0.2, jitter=0.9)
-    loop = only(evaluate_loops(dirty, GEOMETRY, None))
-    assert loop.area == pytest.approx(closed_form(), rel=1e-6)
+FULL = record([lagging], [5e5])
 
 
-def test_a_gap_is_bridged():
-    full = record([lagging], [5e5])
-    keep = (full.time < 8.0) | (full.time > 8.6)
-    loop = only(evaluate_loops(_rows(full, keep), GEOMETRY, None))
-    assert loop.area == pytest.approx(closed_form(), rel=1e-6)
+@pytest.mark.parametrize(
+    "made",
+    [
+        record([lagging], [5e5], rng=np.random.default_rng(3), lost=0.2, jitter=0.9),
+        FULL.take((FULL.time < 8.0) | (FULL.time > 8.6)),
+        record([lambda t: lagging(t) + 0.05 * t], [5e5], duration=35.0),
+    ],
+    ids=["lost samples and jitter", "a gap", "a drift over periods"],
+)
+def test_area_keeps_with(made):
+    assert only(evaluate_loops(made, GEOMETRY, None)).area == pytest.approx(closed_form(), rel=1e-6)
 
 
 def test_direction_turns_with_the_lag():
@@ -134,12 +137,6 @@ def test_deviation_follows_the_periods_where_they_differ():
     assert steady.area_sd < 1e-6 * closed_form()
 
 
-def test_a_drift_over_periods_is_no_area():
-    drifting = record([lambda t: lagging(t) * 1.0 + 0.05 * t], [5e5], duration=35.0)
-    loop = only(evaluate_loops(drifting, GEOMETRY, None))
-    assert loop.area == pytest.approx(closed_form(), rel=1e-6)
-
-
 @pytest.mark.parametrize(("change", "words"), [({"duration": 9.5}, "No whole period"), ({"frequency": 0.001}, "")])
 def test_nothing_closed_is_said(change, words):
     loop = only(evaluate_loops(record([lambda t: 20 + 0 * t], [5e5], **change), GEOMETRY, None))
@@ -154,20 +151,6 @@ def test_constant_speed_has_no_loop():
     assert only(evaluate_loops(still, GEOMETRY, None)).status is LoopStatus.NO_PERIOD
     noise = replace(still, speed=100 + np.random.default_rng(0).standard_normal(1500))
     assert only(evaluate_loops(noise, GEOMETRY, None)).status is LoopStatus.NO_PERIOD
-
-
-def test_standing_before_and_after_is_left_out():
-    swing = record([lagging], [5e5])
-    before = np.arange(400) / 100
-    held = Record(
-        time=np.concatenate([before, 4 + swing.time, 19 + before]),
-        pressure=np.full(2300, 5e5),
-        speed=np.concatenate([np.full(400, SWING), swing.speed, np.full(400, swing.speed[-1])]),
-        torque=np.concatenate([np.full(400, 20.0), swing.torque, np.full(400, 20.0)]),
-    )
-    loop = only(evaluate_loops(held, GEOMETRY, None))
-    assert loop.periods == 1
-    assert loop.area == pytest.approx(closed_form(), rel=0.01)  # the ends' first and last hundredth are blurred
 
 
 def test_held_between_two_pressures_and_brought_back_is_left_out():
@@ -287,7 +270,3 @@ def test_any_record_has_an_answer(rows, kind, seed):
     ):
         assert loop.message
         assert (loop.area is None) == (loop.status is LoopStatus.NO_PERIOD)
-
-
-def _rows(full: Record, keep: np.ndarray) -> Record:
-    return Record(time=full.time[keep], pressure=full.pressure[keep], speed=full.speed[keep], torque=full.torque[keep])

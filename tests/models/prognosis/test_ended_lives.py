@@ -28,12 +28,10 @@ from models.prognosis.scoring import crps_of_sample
 from models.prognosis.stated_end import stated_end
 from models.tracking.courses import FORM_SIZE, Course
 from models.tracking.criteria import LEVEL_SIZE, STEP_SIZE
-from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
-from models.tracking.prior import weak
+from tests.models.tracking.tracked_series import on_grid, sent
 from tests.statistical.lives import taught
 
-GRID = Grid()
 ENDS = 1_000.0 * np.exp(0.2 * np.array([-1.5, -1.0, -0.6, -0.3, 0.0, 0.1, 0.4, 0.7, 1.1, 1.6]))
 
 #: The share of the way to the threshold over the share of life.
@@ -57,18 +55,13 @@ def measured(
     shares = np.arange(0.0, until + 1e-9, 1.0 / 30.0)
     values = 0.1 * (1.0 - 0.5 * shape(shares)) * (1.0 + scatter * rng.standard_normal(shares.size))
     later = (shares > 1.0 / 3.0) & (step != 0.0)
-    return [
-        Measurement(progress=end * x, value=y + 0.1 * step * after, variance=1e-8, epoch=int(after))
-        for x, y, after in zip(shares.tolist(), values.tolist(), later.tolist(), strict=True)
-    ]
+    return sent(end * shares, values + 0.1 * step * later, 1e-8, later)
 
 
 def ended(end: float, shape: Shape = knee, seed: int = 0) -> EndedLife:
     tests = measured(end, 1.0, shape, seed)
     progress, values = (np.array(column) for column in zip(*((t.progress, t.value) for t in tests), strict=True))
-    life = ended_life(progress, values, end, initial=0.1, fraction=0.5)
-    assert life is not None
-    return life
+    return ended_life(progress, values, end, initial=0.1, fraction=0.5)
 
 
 def lives(shape: Shape = knee) -> list[EndedLife]:
@@ -77,7 +70,6 @@ def lives(shape: Shape = knee) -> list[EndedLife]:
 
 def said(tests: list[Measurement], of: list[EndedLife]) -> Kin:
     kin = as_its_kind(tests, tests[-1].progress, of)
-    assert kin is not None
     assert kin.weight.sum() == pytest.approx(1.0)
     return kin
 
@@ -138,10 +130,7 @@ def lawful(end: float, until: float, seed: int) -> list[Measurement]:
     law = Degradation(initial=0.1, change=change, scale=scale, exponent=0.7)
     stretch = end / float(first_passage(0.05, law))
     shares = np.arange(0.0, until + 1e-9, 1.0 / 30.0) * end
-    values = general_order.value(shares / stretch, law) * (1.0 + 0.003 * rng.standard_normal(shares.size))
-    return [
-        Measurement(progress=x, value=y, variance=0.0) for x, y in zip(shares.tolist(), values.tolist(), strict=True)
-    ]
+    return sent(shares, general_order.value(shares / stretch, law) * (1.0 + 0.003 * rng.standard_normal(shares.size)))
 
 
 @pytest.fixture(scope="module")
@@ -159,9 +148,7 @@ def mean_crps(stage: float, ended_by: list[EndedLife], course: Callable[..., lis
     found = []
     for seed, end in enumerate((800.0, 1_000.0, 1_300.0), start=20):
         tests = course(end, stage, seed=seed)
-        state = GRID.from_history(weak(tests[0], falling=True), tests)
-        posterior = GRID.posterior(state, 500, np.random.default_rng(seed))
-        as_of = tests[-1].progress
+        posterior, as_of = on_grid(tests, 500, np.random.default_rng(seed)), tests[-1].progress
         stated = stated_end(posterior, fraction=0.5, as_of=as_of, horizon=1e6, ended=ended_by, tests=tests)
         assert stated.weight.sum() == pytest.approx(1.0)
         found.append(crps_of_sample(np.minimum(stated.ends, 1e6), stated.weight, end) / end)
@@ -169,9 +156,7 @@ def mean_crps(stage: float, ended_by: list[EndedLife], course: Callable[..., lis
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 10])
-def test_ended_lives_of_its_kind_help_and_late_in_a_life_do_not_spoil_what_its_own_tests_say(
-    eq_6_kind: list[EndedLife], count: int
-) -> None:
+def test_ended_lives_of_its_kind_help_and_late_in_a_life_do_not_spoil_what_its_own_tests_say(eq_6_kind, count):
     some = [eq_6_kind[index] for index in np.linspace(0, 9, count).round().astype(int).tolist()]
     assert mean_crps(0.4, some) < 0.8 * mean_crps(0.4, [])
     assert mean_crps(0.8, some) < 1.2 * mean_crps(0.8, [])
@@ -190,12 +175,9 @@ def test_two_ended_lives_teach_the_filter_their_law_whichever_it_is(shape: Shape
 
 
 @pytest.mark.parametrize(("longer", "stage"), [(0.2, 0.8), (4.0, 0.8), (4.0, 0.7)])
-def test_ended_lives_of_another_kind_do_not_move_the_end_once_its_own_tests_speak(
-    eq_6_kind: list[EndedLife], longer: float, stage: float
-) -> None:
+def test_ended_lives_of_another_kind_do_not_move_the_end_once_its_own_tests_speak(eq_6_kind, longer, stage):
     tests = lawful(1_000.0, stage, 21)
-    state = GRID.from_history(weak(tests[0], falling=True), tests)
-    posterior, as_of = GRID.posterior(state, 500, np.random.default_rng(21)), tests[-1].progress
+    posterior, as_of = on_grid(tests, 500, np.random.default_rng(21)), tests[-1].progress
     stated_by = []
     for others in ([life.in_unit(1.0 / longer) for life in eq_6_kind], []):
         stated = stated_end(posterior, fraction=0.5, as_of=as_of, horizon=1e6, ended=others, tests=tests)
@@ -258,7 +240,6 @@ def test_the_evidence_is_that_of_the_normal_written_out(new_level: int, size: fl
     """Of every course, end and pair of deviations, with x, a, the step and δ integrated out: by dense covariances."""
     tests = [replace(t, new_levels=new_level * t.epoch) for t in measured(1_100.0, 0.5, step=0.02)]
     seen = ended_lives._Decline.of(tests, None, 0.5)
-    assert seen is not None
     log_end = np.log([900.0, 1_300.0])
     progress, damage = seen.progress, (1.0 - np.array([t.value for t in tests]) / tests[0].value) / 0.5
     own = lives()[3:5]
@@ -295,15 +276,12 @@ def test_a_life_counts_in_other_units_alike() -> None:
     halves = [replace(test, progress=0.5 * test.progress) for test in tests]
     found = quantiles(said(halves, [life.in_unit(2.0) for life in lives()]))
     assert [2.0 * x for x in found] == pytest.approx(quantiles(said(tests, lives())))
-    own = lives()[0]
-    assert EndedLife.from_dict(own.to_dict()) == own
 
 
 def test_an_ended_life_has_the_course_of_its_tests_until_its_end() -> None:
     progress = np.array([300.0, 0.0, 300.0, 600.0, 1_200.0])
     values = np.array([0.09, 0.1, 0.08, 0.07, 0.04])
     life = ended_life(progress, values, 1_000.0, initial=0.1, fraction=0.5)
-    assert life is not None
     assert life.progress == (0.0, 300.0, 600.0)
     assert life.damage == pytest.approx((0.0, 0.3, 0.6))
     assert life.course(np.array([0.3, 0.8, 1.0, 1.5])).tolist() == pytest.approx([0.3, 0.8, 1.0, 1.5])
@@ -346,7 +324,7 @@ def test_a_life_that_was_taken_out_says_that_its_end_was_later() -> None:
 def accelerating(until: float) -> list[Measurement]:
     """Mean COF that passes half of its 0.1 at ζ = 1000, ever faster, at 25 even tests of that life up to `until`."""
     at = np.arange(0.0, until + 1e-9, 40.0)
-    return [Measurement(progress=x, value=0.1 - 0.05 * (x / 1_000.0) ** 2, variance=1e-8) for x in at.tolist()]
+    return sent(at, 0.1 - 0.05 * (at / 1_000.0) ** 2, 1e-8)
 
 
 @pytest.mark.parametrize("stopped", [960.0, 880.0])
@@ -359,12 +337,12 @@ def test_a_life_that_is_declared_worn_before_its_threshold_ends_near_it(stopped:
 
 def test_a_life_without_wear_that_is_declared_worn_ended_then() -> None:
     """Nothing in its tests says so, so its end is uncertain, and not ten times as late."""
-    level = [Measurement(progress=x, value=0.1, variance=1e-8) for x in np.arange(0.0, 1_000.0, 50.0).tolist()]
+    level = sent(np.arange(0.0, 1_000.0, 50.0), 0.1, 1e-8)
     end, deviation = declared_end(level, 1_000.0, fraction=0.5, horizon=1e6)
     assert 1_000.0 <= end < 1_500.0
     assert 0.0 < deviation < 0.5
 
 
-def test_uncertain_and_censored_ends_are_stored_exactly() -> None:
-    for life in (replace(lives()[0], deviation=0.1), replace(lives()[1], censored=True)):
-        assert EndedLife.from_dict(life.to_dict()).to_dict() == life.to_dict()
+def test_ended_lives_are_stored_exactly() -> None:
+    for life in (lives()[0], replace(lives()[0], deviation=0.1), replace(lives()[1], censored=True)):
+        assert EndedLife.from_dict(life.to_dict()) == life

@@ -7,20 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.degradation.general_order import Degradation, value
+from models.degradation.general_order import Degradation, first_passage, value
 from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
 from models.prognosis.first_passage import ends_of_life
 from models.prognosis.fleet import FleetPrior, learn, pooled, population, taught
 from models.prognosis.scoring import crps_of_sample
 from models.tracking.courses import Course, basis
-from models.tracking.filters.grid import Grid
 from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
-from tests.models.tracking.tracked_series import followed
+from tests.models.tracking.tracked_series import followed, on_grid, sent
 
-GRID, UKF = Grid(), Ukf()
+UKF = Ukf()
 
 
 def life(rng: np.random.Generator, scale: float) -> Degradation:
@@ -37,7 +36,7 @@ def life(rng: np.random.Generator, scale: float) -> Degradation:
 def measured(truth: Degradation, last: float, tests: int, rng: np.random.Generator) -> list[Measurement]:
     zeta = np.linspace(0.0, last, tests)
     y = value(zeta, truth) + 0.003 * float(truth.initial) * rng.standard_normal(tests)
-    return [Measurement(progress=float(z), value=float(v), variance=0.0) for z, v in zip(zeta, y, strict=True)]
+    return sent(zeta, y)
 
 
 def fleet(count: int, seed: int, scale: float = 5000.0) -> FleetPrior:
@@ -95,7 +94,7 @@ def crps(posterior: Posterior, truth: float) -> float:
 def predicted(prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator) -> tuple[Posterior, Posterior]:
     """Under the weak prior alone, and under the mixture."""
     beliefs = weak(seen[0], falling=True), prior.prior_for(seen[0])
-    under = [GRID.posterior(GRID.from_history(each, seen), 1000, rng) for each in beliefs]
+    under = [on_grid(seen, 1000, rng, each) for each in beliefs]
     return under[0], prior.together(under[0], under[1], seen[0])
 
 
@@ -105,21 +104,12 @@ def scored(prior: FleetPrior, seed: int, count: int) -> float:
     scores = []
     for _ in range(count):
         truth = life(rng, 5000.0)
-        end = float(ends_of_life(_certain(truth), 0.5)[0])
+        end = float(first_passage(0.5 * truth.initial, truth))
         if end < 1e6:
             by_weak, by_both = predicted(prior, measured(truth, 0.3 * end, 8, rng), rng)
             scores.append((crps(by_weak, end) / end, crps(by_both, end) / end))
     both = np.array(scores).sum(axis=0)
     return float(both[1] / both[0])
-
-
-def _certain(truth: Degradation) -> Posterior:
-    initial, change, scale, exponent = (
-        np.array([float(each)]) for each in (truth.initial, truth.change, truth.scale, truth.exponent)
-    )
-    return Posterior(
-        weight=np.ones(1), initial=initial, change=change, scale=scale, exponent=exponent, scatter=np.full(1, 1e-4)
-    )
 
 
 def test_a_fleet_of_the_same_kind_helps_and_another_kind_does_little_harm() -> None:
@@ -137,7 +127,7 @@ def test_the_mixture_is_that_of_importance_sampling() -> None:
     seen = [replace(m, variance=(0.003 * m.value) ** 2) for m in measured(truth, 3000.0, 3, rng)]
     believed = replace(weak(seen[0], falling=True), outlying_share=0.0, law_share=1.0, eq_6_share=1.0)
     learned = replace(prior.prior_for(seen[0]), outlying_share=0.0, law_share=1.0, eq_6_share=1.0)
-    under = [GRID.posterior(GRID.from_history(each, seen), 4000, rng) for each in (believed, learned)]
+    under = [on_grid(seen, 4000, rng, each) for each in (believed, learned)]
     mixed = prior.together(under[0], under[1], seen[0])
     reference = _brute(prior, seen, rng)
     misfits = [_misfit(each, reference) for each in (mixed, *under)]
@@ -152,9 +142,7 @@ def test_no_draw_of_an_unscented_filter_has_all_the_weight() -> None:
     prior, rng = fleet(8, 5), np.random.default_rng(3)
     zeta = np.linspace(0.0, 30_000.0, 9)
     values = 0.13 * (1.0 - 0.5 * (zeta / 60_000.0) ** 1.5) * (1.0 + 0.003 * rng.standard_normal(9))
-    seen = [
-        Measurement(progress=z, value=v, variance=1.6e-7) for z, v in zip(zeta.tolist(), values.tolist(), strict=True)
-    ]
+    seen = sent(zeta, values, 1.6e-7)
     for count in range(6, 10):
         beliefs = weak(seen[0], falling=True), prior.prior_for(seen[0])
         under = [UKF.posterior(followed(UKF, believed, seen[:count]), 500, rng) for believed in beliefs]
@@ -206,9 +194,7 @@ def _brute(prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator)
 def test_pooled_draws_have_half_of_the_weight_each() -> None:
     rng = np.random.default_rng(9)
     seen = measured(life(rng, 5000.0), 9000.0, 8, rng)
-    one, other = (
-        GRID.posterior(GRID.from_history(weak(seen[0], falling=True), seen), size, rng) for size in (300, 500)
-    )
+    one, other = (on_grid(seen, size, rng) for size in (300, 500))
     both = pooled(one, other)
     assert both.weight[:300].sum() == pytest.approx(0.5)
     at = np.array([0.0, 5000.0, 20_000.0])
@@ -222,14 +208,12 @@ def test_a_fleet_has_no_say_in_courses_that_it_has_not_learned(log_exponent: flo
     rng = np.random.default_rng(3)
     progress = np.linspace(0.0, 7e3, 18)
     values = 0.1 * (1.0 - 0.6 * -np.expm1(-1.792 * progress / 1e4)) * (1.0 + 0.003 * rng.standard_normal(18))
-    seen = [
-        Measurement(progress=x, value=y, variance=1e-8) for x, y in zip(progress.tolist(), values.tolist(), strict=True)
-    ]
+    seen = sent(progress, values, 1e-8)
     scale = np.diag([0.15, 0.5, 0.17, 0.4]) ** 2
     mean = np.array([-0.6, math.log(4_000.0), log_exponent, math.log(0.003)])
     fleet = FleetPrior(clutches=20, mean=mean, scale=scale, freedom=20.0)
     alone, taught = (
-        Grid().posterior(Grid().from_history(prior, seen), 2_000, np.random.default_rng(1))
+        on_grid(seen, 2_000, np.random.default_rng(1), prior)
         for prior in (weak(seen[0], falling=True), fleet.prior_for(seen[0]))
     )
     together = fleet.together(alone, taught, seen[0])

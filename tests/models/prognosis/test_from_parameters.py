@@ -9,8 +9,18 @@ import pytest
 from models.degradation.general_order import Degradation, value
 from models.friction.stribeck import StribeckParameters, torque
 from models.prognosis.criteria import FAR_APART, HORIZON
-from models.prognosis.from_parameters import PressureLevel, disagreement, far_apart, mean_cof_paths
+from models.prognosis.from_parameters import (
+    PressureLevel,
+    disagreement,
+    draw_jointly,
+    far_apart,
+    mean_cof_paths,
+    paired,
+    shrunk_correlation,
+)
 from models.tracking.posterior import Posterior
+from models.tracking.prior import weak
+from tests.models.tracking.tracked_series import on_grid, sent
 
 AT = np.linspace(0.0, 12_000.0, 13)
 VELOCITIES = np.linspace(0.2, 12.0, 40)
@@ -85,7 +95,6 @@ def paths(levels, references=None, now=float(AT[-1])):
 
 def test_sure_tracks_give_eq_3_of_eq_6() -> None:
     found = paths([level()])
-    assert found is not None
     assert found.progress[found.now] == AT[-1]
     assert (np.diff(found.progress) > 0).all()
     early = found.progress <= AT[-1]
@@ -97,7 +106,6 @@ def test_sure_tracks_give_eq_3_of_eq_6() -> None:
 
 def test_ends_of_life_are_where_the_mean_cof_passes_the_threshold() -> None:
     found = paths([level()])
-    assert found is not None
     fine = np.linspace(0.0, 20_000.0, 4_001)
     course = mean_cofs(fine)
     end = float(np.interp(-0.7 * course[0], -course, fine))
@@ -109,15 +117,12 @@ def test_ends_of_life_are_where_the_mean_cof_passes_the_threshold() -> None:
 def test_pressures_are_averaged_and_scaled_to_all_of_the_reference() -> None:
     weak, strong = level(), level(1.5)
     both = paths([weak, strong])
-    assert both is not None
     expected = 0.5 * (mean_cofs(AT[-1:]) + mean_cofs(AT[-1:], 1.5))[0]
     assert both.present.mean() == pytest.approx(expected, rel=1e-3)
     alone = paths([weak], references=[weak.reference_cof, strong.reference_cof])
-    assert alone is not None
     assert alone.present.mean() == pytest.approx(expected, rel=1e-3)
     # the negative control: unscaled, the weaker pressure alone is 20 % too low
     bare = paths([weak])
-    assert bare is not None
     assert bare.present.mean() < 0.85 * expected
 
 
@@ -128,7 +133,6 @@ def test_a_test_that_happens_to_scatter_little_does_not_count_for_all() -> None:
     parameters[-1, 0] *= 1.05
     covariance[-1] *= 1e-4
     found = paths([replace(usual, parameters=parameters, covariance=covariance)])
-    assert found is not None
     assert found.present.mean() == pytest.approx(mean_cofs(AT[-1:])[0], rel=0.01)
 
 
@@ -138,8 +142,6 @@ def test_too_few_tests_give_nothing_and_take_no_part() -> None:
     assert paths([few]) is None
     assert paths([]) is None
     first, second = paths([level()], references=[1.0, 1.0]), paths([few, level()], references=[1.0, 1.0])
-    assert first is not None
-    assert second is not None
     assert (first.paths == second.paths).all()
 
 
@@ -167,3 +169,73 @@ def test_no_disagreement_is_stated_beyond_the_horizon_or_without_uncertainty() -
 )
 def test_far_apart(deviations: float | None, far: bool) -> None:
     assert far_apart(deviations) is far
+
+
+# --- Quantities whose measurements err together: what only their sum knows is not lost.
+
+PAIR = (
+    Degradation(initial=20.0, change=-9.0, scale=5000.0, exponent=0.8),
+    Degradation(initial=5.0, change=3.0, scale=9000.0, exponent=0.5),
+)
+#: One errs by +1 where the other errs by -1: their sum is known a hundred times better.
+COVARIANCE = np.array([[0.25, -0.24998], [-0.24998, 0.25]])
+
+
+def measured(rng: np.random.Generator) -> np.ndarray:
+    errors = rng.multivariate_normal(np.zeros(2), COVARIANCE, AT.size)
+    return np.stack([value(AT, truth) for truth in PAIR], axis=1) + errors
+
+
+def own(values: np.ndarray, rng: np.random.Generator) -> list[Posterior]:
+    """Each quantity's track by itself."""
+    tests = [sent(AT, column, 0.25) for column in values.T]
+    return [on_grid(seen, 1000, rng, weak(seen[0], falling=False)) for seen in tests]
+
+
+def test_the_sum_is_known_as_well_as_it_was_measured() -> None:
+    rng = np.random.default_rng(1)
+    values = measured(rng)
+    tracks = own(values, rng)
+    together = draw_jointly(AT, values, np.repeat(COVARIANCE[None], AT.size, axis=0), tracks, 300, rng)
+    end = AT[-1:]
+    sums = sum(each.values(end)[0] for each in together)
+    true = float(sum(value(AT[-1], truth) for truth in PAIR))
+    assert abs(sums.mean() - true) < 0.05
+    assert sums.std() < 0.05
+    # the negative control: side by side, the two tracks know their sum no better than each knows itself
+    alone = tracks[0].values(end)[0] + tracks[1].values(end)[0]
+    assert alone.std() > 5.0 * sums.std()
+
+
+def test_without_correlation_each_track_is_as_it_was() -> None:
+    rng = np.random.default_rng(2)
+    values = np.stack([value(AT, truth) for truth in PAIR], axis=1) + 0.5 * rng.standard_normal((AT.size, 2))
+    tracks = own(values, rng)
+    scatter = [float(each.weight @ each.scatter**2) for each in tracks]
+    together = draw_jointly(
+        AT, values, np.repeat(np.diag(0.25 + np.array(scatter))[None], AT.size, axis=0), tracks, 1000, rng
+    )
+    for track, each in zip(tracks, together, strict=True):
+        mean, sd = track.moments(track.values(AT[-1:])[0])
+        found = each.values(AT[-1:])[0]
+        assert found.mean() == pytest.approx(mean, abs=0.35 * sd)
+        assert found.std() == pytest.approx(sd, rel=0.35)
+
+
+def test_pairs_have_the_wanted_correlation_and_the_same_values() -> None:
+    rng = np.random.default_rng(3)
+    values = np.stack([rng.standard_normal(2000), np.exp(rng.standard_normal(2000))], axis=1)
+    index = paired(values, np.array([[1.0, 0.9], [0.9, 1.0]]), rng)
+    found = np.take_along_axis(values, index, axis=0)
+    assert np.sort(found, axis=0) == pytest.approx(np.sort(values, axis=0))
+    assert np.corrcoef(found[:, 0], np.log(found[:, 1]))[0, 1] == pytest.approx(0.9, abs=0.03)
+
+
+def test_correlation_shrinks_where_few_tests_tell_it() -> None:
+    rng = np.random.default_rng(4)
+    common = rng.standard_normal(60)
+    residuals = np.stack([common, common + 0.1 * rng.standard_normal(60)], axis=1)
+    many, few = shrunk_correlation(residuals), shrunk_correlation(residuals[:4])
+    assert 0.85 < many[0, 1] < 1.0
+    assert abs(few[0, 1]) < 0.5
+    assert (shrunk_correlation(residuals[:1]) == np.eye(2)).all()

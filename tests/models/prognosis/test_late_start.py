@@ -13,21 +13,18 @@ from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.late_start import late_start
 from models.prognosis.stated_end import StatedEnd, stated_end
 from models.tracking.courses import FORM_COURSE, FORM_SIZE, SCALE_SIGN, log_form_weight
-from models.tracking.filters.grid import Grid
 from models.tracking.linear_model import Points
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests import dense
+from tests.models.tracking.tracked_series import on_grid, sent
 
 LAW = Degradation(initial=0.13, change=-0.1, scale=5_000.0, exponent=0.7)
 END = float(first_passage(0.065, LAW))
 
 
 def measured(progress: FloatArray, cof: FloatArray) -> list[Measurement]:
-    noisy = cof * (1.0 + 0.003 * np.random.default_rng(1).standard_normal(cof.size))
-    return [
-        Measurement(progress=z, value=y, variance=0.0) for z, y in zip(progress.tolist(), noisy.tolist(), strict=True)
-    ]
+    return sent(progress, cof * (1.0 + 0.003 * np.random.default_rng(1).standard_normal(cof.size)))
 
 
 def elsewhere(early: float, until: float = 0.6) -> list[Measurement]:
@@ -43,12 +40,9 @@ def own(first: float, until: float) -> list[Measurement]:
 
 
 def stated(tests: list[Measurement], *, weighing: bool = True) -> StatedEnd:
-    posterior = GRID.posterior(GRID.from_history(weak(tests[0], falling=True), tests), 500, np.random.default_rng(1))
+    posterior = on_grid(tests, 500, np.random.default_rng(1))
     known, as_of = tests if weighing else [], tests[-1].progress
     return stated_end(posterior, fraction=0.5, as_of=as_of, horizon=1e6, tests=known)
-
-
-GRID = Grid()
 
 
 def interval(end: StatedEnd) -> list[float]:
@@ -58,7 +52,6 @@ def interval(end: StatedEnd) -> list[float]:
 def test_an_end_on_a_counter_that_began_with_another_clutch_is_held() -> None:
     tests = elsewhere(5.0)
     told = stated(tests)
-    assert told.late is not None
     assert told.late.probability > 0.9
     low, high = interval(told)
     assert low < 60_000.0 < high
@@ -74,7 +67,6 @@ def test_an_end_on_a_counter_that_began_with_another_clutch_is_held() -> None:
 def test_a_clutch_on_a_counter_of_its_own_is_stated_as_before(first: float) -> None:
     tests = own(first, 0.8)
     told, before = stated(tests), stated(tests, weighing=False)
-    assert told.late is not None
     assert told.late.probability < 0.1
     assert interval(told)[0] == pytest.approx(interval(before)[0], rel=0.05)
     assert interval(told)[0] < END < interval(told)[1]
@@ -82,7 +74,6 @@ def test_a_clutch_on_a_counter_of_its_own_is_stated_as_before(first: float) -> N
 
 def test_a_clutch_is_alive_at_its_first_test() -> None:
     late = late_start(elsewhere(1.0), 0.5, offset=None, horizon=1e6)
-    assert late is not None
     late, ends = replace(late, log_odds=0.0), np.array([9_000.0, 11_000.0, np.inf])
     probability, weight = late.weighed(ends, np.array([0.5, 0.3, 0.2]))
     assert probability == pytest.approx(2.0 / 3.0)
@@ -99,8 +90,6 @@ def test_a_first_test_early_in_what_was_measured_and_few_tests_are_not_weighed()
 def test_tests_that_came_in_another_order_say_the_same() -> None:
     tests = elsewhere(1.0)
     one, other = (late_start(each, 0.5, offset=None, horizon=1e6) for each in (tests, tests[::-1]))
-    assert one is not None
-    assert other is not None
     assert other.log_odds == pytest.approx(one.log_odds, abs=0.01)
 
 
@@ -109,18 +98,13 @@ def test_a_course_beside_counts_from_the_first_test() -> None:
     tests = elsewhere(1.0)
     plain = late_start(tests, 0.5, offset=None, horizon=1e6)
     doubled = late_start(tests, 0.5, offset=lambda zeta: np.where(zeta <= 10_000.0, 0.1, 0.0)[None], horizon=1e6)
-    assert plain is not None
-    assert doubled is not None
     assert doubled.initial == pytest.approx(plain.initial + 0.1)
     assert np.median(doubled.ends) == pytest.approx(10_000.0, rel=0.05)
 
 
 def test_the_probability_is_that_of_the_density_written_out_in_full() -> None:
-    tests = [
-        Measurement(progress=z, value=y, variance=1e-6) for z, y in ((2_000.0, 0.1), (4_000.0, 0.088), (6_000.0, 0.077))
-    ]
+    tests = sent([2_000.0, 4_000.0, 6_000.0], [0.1, 0.088, 0.077], 1e-6)
     told = late_start(tests, 0.5, offset=None, horizon=1e6)
-    assert told is not None
     since = [replace(test, progress=test.progress - 2_000.0) for test in tests]
     log_odds = log_evidence(since) - log_evidence(tests) + math.log(COUNTED_ELSEWHERE / (1.0 - COUNTED_ELSEWHERE))
     assert told.log_odds == pytest.approx(log_odds, abs=0.25)  # 0.08 of it is the sample's

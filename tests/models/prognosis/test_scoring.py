@@ -48,11 +48,6 @@ def test_crps_takes_weights_as_repeated_draws() -> None:
     assert crps_of_sample(weighted, 10.0 * weight, 3.0) == pytest.approx(expected)
 
 
-def test_crps_of_quantiles_is_the_absolute_error_of_a_certain_prediction() -> None:
-    for truth in (2.0, 5.0, 9.0):
-        assert crps_of_quantiles(LEVELS, [5.0] * 7, truth) == pytest.approx(abs(truth - 5.0))
-
-
 def test_crps_of_quantiles_nears_that_of_the_distribution() -> None:
     """199 levels of a normal: the integral over the levels by the nearest one is right to 1 %; seven to 15 %."""
     levels = np.arange(1, 200) / 200
@@ -91,26 +86,20 @@ def test_the_pit_of_calibrated_predictions_is_uniform_and_of_sure_ones_is_not() 
     right = pit_histogram([pit_of_sample(even, np.ones(500), t) for t in truths])
     sure = pit_histogram([pit_of_sample(0.5 * even, np.ones(500), t) for t in truths])
     assert right.sum() == pytest.approx(1.0)
+    assert pit_of_sample(np.array([1.0, 2.0, 3.0, 4.0]), np.ones(4), 2.0) == pytest.approx(0.375)
     assert np.abs(right - 0.1).max() < 0.04
     assert min(sure[0], sure[-1]) > 0.2
 
 
-def test_the_pit_by_quantiles() -> None:
-    assert pit_of_quantiles((0.1, 0.5, 0.9), (1.0, 2.0, 4.0), 3.0) == pytest.approx(0.7)
-    assert pit_of_quantiles((0.1, 0.5, 0.9), (1.0, 2.0, 4.0), 0.5) == pytest.approx(0.05)
-    assert pit_of_quantiles((0.1, 0.5, 0.9), (1.0, 2.0, 4.0), 9.0) == pytest.approx(0.95)
-    assert pit_of_sample(np.array([1.0, 2.0, 3.0, 4.0]), np.ones(4), 2.0) == pytest.approx(0.375)
+@pytest.mark.parametrize(("truth", "share"), [(3.0, 0.7), (0.5, 0.05), (9.0, 0.95)])
+def test_the_pit_by_quantiles(truth: float, share: float) -> None:
+    assert pit_of_quantiles((0.1, 0.5, 0.9), (1.0, 2.0, 4.0), truth) == pytest.approx(share)
 
 
 def test_alpha_lambda_accuracy() -> None:
     """At 600 of 1,000 cycles 400 remain: ±20 % is 320 to 480."""
-    assert [alpha_lambda(p, 600.0, 1_000.0) for p in (319.0, 321.0, 479.0, 481.0, None)] == [
-        False,
-        True,
-        True,
-        False,
-        False,
-    ]
+    right = {319.0: False, 321.0: True, 479.0: True, 481.0: False, None: False}
+    assert {predicted: alpha_lambda(predicted, 600.0, 1_000.0) for predicted in right} == right
     with pytest.raises(ValueError, match="no life left"):
         alpha_lambda(1.0, 1_000.0, 1_000.0)
 
@@ -131,10 +120,8 @@ WEIGHT = np.exp(-0.5 * np.square(np.linspace(-3.0, 3.0, 4_001)))
 FLAT = Posterior(
     weight=WEIGHT / WEIGHT.sum(),
     initial=SPREAD_LEVELS,
-    change=np.zeros(SPREAD_LEVELS.size),
-    scale=np.ones(SPREAD_LEVELS.size),
-    exponent=np.ones(SPREAD_LEVELS.size),
-    scatter=np.zeros(SPREAD_LEVELS.size),
+    **dict.fromkeys(("change", "scatter"), np.zeros(SPREAD_LEVELS.size)),
+    **dict.fromkeys(("scale", "exponent"), np.ones(SPREAD_LEVELS.size)),
 )
 
 
@@ -150,20 +137,15 @@ def forecast(posterior: Posterior = FLAT) -> BackCast:
 def test_a_miss_is_counted_in_half_widths_of_the_interval() -> None:
     judged = forecast().judged(measured(1_500.0, 1.0 + 0.1 * 1.645)).judged(measured(1_600.0, 1.0 - 0.2 * 1.645))
     np.testing.assert_allclose(judged.misses, [1.0, 2.0], rtol=0.02)
+    assert forecast().judged(measured(1_500.0, 60.0)).misses.tolist() == [3.0]  # however far off
     assert replace(judged, misses=np.array([0.9, 1.0, 1.1])).held == 2
 
 
-def test_a_test_that_is_far_off_counts_as_three_half_widths() -> None:
-    assert forecast().judged(measured(1_500.0, 60.0)).misses.tolist() == [3.0]
-
-
 def test_scatter_and_the_fits_variance_belong_to_the_interval() -> None:
-    scattered = forecast(replace(FLAT, scatter=np.full(SPREAD_LEVELS.size, 0.1)))
-    assert scattered.judged(measured(1_500.0, 1.2)).misses[0] == pytest.approx(
-        0.2 / 1.645 / math.hypot(0.1, 0.1), rel=0.02
-    )
+    scattered = forecast(replace(FLAT, scatter=np.full(SPREAD_LEVELS.size, 0.1))).judged(measured(1_500.0, 1.2))
     uncertain = forecast().judged(measured(1_500.0, 1.2, variance=0.01))
-    assert uncertain.misses[0] == pytest.approx(0.2 / 1.645 / math.hypot(0.1, 0.1), rel=0.02)
+    for judged in (scattered, uncertain):
+        assert judged.misses[0] == pytest.approx(0.2 / 1.645 / math.hypot(0.1, 0.1), rel=0.02)
 
 
 @pytest.mark.parametrize(

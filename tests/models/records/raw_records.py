@@ -69,17 +69,9 @@ def make(
     sensors = sensors or Sensors()
     p, w = np.asarray(pressure, dtype=float), np.asarray(speed, dtype=float)
     ends = idle + dwell * np.arange(p.size + 1)
-    knots, ps, ws = [0.0], [0.0 if idle else p[0]], [0.0 if idle else w[0]]
-    for k in range(p.size):
-        knots += [ends[k], ends[k] + ramp] if k or idle else [ramp]
-        ps += [ps[-1], p[k]] if k or idle else [p[k]]
-        ws += [ws[-1], w[k]] if k or idle else [w[k]]
-    if idle:
-        knots += [ends[-1], ends[-1] + ramp, ends[-1] + idle]
-        ps += [p[-1], 0.0, 0.0]
-        ws += [w[-1], 0.0, 0.0]
-    else:
-        knots, ps, ws = [*knots, ends[-1]], [*ps, p[-1]], [*ws, w[-1]]
+    steps = ends if idle else ends[1:-1]
+    knots = np.concatenate([[0.0], np.stack([steps, steps + ramp], axis=1).ravel(), [ends[-1] + idle]])
+    ps, ws = (np.repeat([0.0, *levels, 0.0] if idle else levels, 2) for levels in (p, w))
     fine = max(rate, 1000.0)
     factor = round(fine / rate)
     time = np.arange(0.0, knots[-1], 1 / fine)
@@ -100,8 +92,8 @@ def make(
     )
     return Made(
         record=record,
-        start=np.asarray(ends[:-1], dtype=np.float64),
-        stop=np.asarray(ends[1:], dtype=np.float64),
+        start=ends[:-1],
+        stop=ends[1:],
         pressure=p,
         speed=w,
         torque=true_torque(p, w),
@@ -110,12 +102,6 @@ def make(
 
 def _counted(values: FloatArray, count: float) -> FloatArray:
     return values if count == 0 else np.round(values / count) * count
-
-
-def rows(record: Record, keep: FloatArray) -> Record:
-    """Only these samples."""
-    columns = ("time", "pressure", "speed", "torque", "oil_temperature")
-    return Record(**{name: getattr(record, name)[keep] for name in columns})
 
 
 def lose(record: Record, share: float, rng: np.random.Generator, *, gap: bool = False) -> Record:
@@ -127,7 +113,7 @@ def lose(record: Record, share: float, rng: np.random.Generator, *, gap: bool = 
         keep[first : first + int(share * n)] = False
     else:
         keep = rng.random(n) >= share
-    return rows(record, keep)
+    return record.take(keep)
 
 
 def jitter(record: Record, rng: np.random.Generator, share: float = 0.15) -> Record:

@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from models.clutch import Geometry
 from models.loops.loops import evaluate_loops
 from models.records.criteria import LEVEL_GAP
 from models.records.pressure_levels import level_width, levels_of, pressure_stretches
-from models.records.runs import Record
+from models.records.runs import Plateaus, Record, curves_by_pressure
 from models.rig.sampled import EXACT, DynamicTest, Recorder
 from models.rig.stationary import Sensor
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
@@ -31,8 +32,7 @@ def recorded(step: float, *, paused: bool, recorder: Recorder = EXACT) -> Record
         speed = test.offset + test.amplitude * np.sin(2 * math.pi * test.frequency * swung)
     torque = CLUTCH.moving_torque(time, CLUTCH.geometry.sliding_velocity(speed), pressure, 0.0)
     rng = np.random.default_rng(4)
-    record = replace(recorder, memory=0.0).record(time, pressure, speed, torque, rng, NO_SCATTER)
-    return Record(time=record.time, pressure=record.pressure, speed=record.speed, torque=record.torque)
+    return replace(recorder, memory=0.0).record(time, pressure, speed, torque, rng, NO_SCATTER)
 
 
 def areas(record: Record) -> np.ndarray:
@@ -62,17 +62,10 @@ def test_a_recorder_with_noise(stepped):
     worst = 0.0
     for stretch, area in zip(pressure_stretches(t, p), stepped, strict=True):
         wide = np.flatnonzero(np.abs(p - stretch.pressure) < LEVEL_GAP)
-        all_of_it = replace_pressure(record, slice(wide[0], wide[-1] + 1), stretch.pressure)
+        all_of_it = record.take(np.arange(wide[0], wide[-1] + 1))
+        all_of_it = replace(all_of_it, pressure=np.full(all_of_it.time.size, stretch.pressure))
         worst = max(worst, abs(evaluate_loops(all_of_it, CLUTCH.geometry, None)[0].area / area - 1))
     assert worst > 0.2
-
-
-def replace_pressure(record: Record, rows: slice, pressure: float) -> Record:
-    """Those rows, as if they had been at one pressure."""
-    count = record.time[rows].size
-    return Record(
-        time=record.time[rows], pressure=np.full(count, pressure), speed=record.speed[rows], torque=record.torque[rows]
-    )
 
 
 def test_a_pressure_that_wanders_keeps_its_ends():
@@ -128,28 +121,18 @@ def test_a_level_is_as_wide_as_the_gap_or_its_share_of_the_pressure(pressure, wi
     assert level_width(pressure) == pytest.approx(width)
 
 
-def test_nominal_pressures_are_their_own_levels():
-    np.testing.assert_array_equal(levels_of(NOMINAL), NOMINAL)
-
-
-def test_scattered_pressures_find_their_level():
-    """0.02 bar of scatter about steps of 0.5 bar."""
-    measured = NOMINAL + np.random.default_rng(1).normal(0.0, 0.02e5, NOMINAL.size)
-    np.testing.assert_allclose(levels_of(measured), NOMINAL)
-
-
-def test_levels_that_are_close_but_repeated_stay_apart():
-    """Nominal values of 5.00 and 5.05 bar in three rows each are two levels."""
-    pressure = np.repeat([5.00e5, 5.05e5], 3)
-    assert np.unique(levels_of(pressure)).tolist() == [5.00e5, 5.05e5]
-
-
-def test_a_level_far_from_a_step_keeps_its_own_name():
-    assert levels_of(np.array([4.975e5, 4.976e5, 4.977e5])).tolist() == [497600.0] * 3
-
-
-def test_one_row_is_one_level():
-    assert levels_of(np.array([5.01e5])).tolist() == [5e5]
+@pytest.mark.parametrize(
+    ("pressure", "levels"),
+    [
+        (NOMINAL + np.random.default_rng(1).normal(0.0, 0.02e5, NOMINAL.size), NOMINAL),
+        ([5.00e5] * 3 + [5.05e5] * 3, [5.00e5] * 3 + [5.05e5] * 3),
+        ([4.975e5, 4.976e5, 4.977e5], [4.976e5] * 3),
+        ([5.01e5], [5e5]),
+    ],
+    ids=["scattered about steps of 0.5 bar", "close but repeated", "far from a step", "one row"],
+)
+def test_pressures_find_their_level(pressure, levels):
+    np.testing.assert_allclose(levels_of(np.asarray(pressure)), levels, rtol=1e-12)
 
 
 @given(st.permutations(range(28)))
@@ -157,3 +140,40 @@ def test_the_order_of_rows_does_not_matter(order):
     measured = np.repeat(np.arange(4.0, 7.01, 0.5) * 1e5, 4)
     measured = measured + np.random.default_rng(2).normal(0.0, 0.02e5, measured.size)
     np.testing.assert_array_equal(levels_of(measured[order]), levels_of(measured)[order])
+
+
+# --- Plateaus check themselves, and a curve holds the rows of its pressure level.
+
+
+def plateaus(pressure, /, **changes):
+    n = len(pressure)
+    columns = {"speed": np.linspace(2, 206, n), "torque": np.full(n, 20.0)}
+    return Plateaus(**({"pressure": np.asarray(pressure)} | columns | changes))
+
+
+def test_curves_hold_their_rows_in_order():
+    sd = np.linspace(0.1, 0.2, 280)
+    curves = curves_by_pressure(plateaus(NOMINAL[::-1] + 100.0, torque_sd=sd), Geometry())
+    assert [round(c.pressure) for c in curves] == [400000, 450000, 500000, 550000, 600000, 650000, 700000]
+    assert curves[0].mean_pressure == pytest.approx(400100.0)
+    np.testing.assert_array_equal(curves[0].torque_sd, sd[-40:])
+    np.testing.assert_allclose(curves[0].velocity, np.linspace(2, 206, 280)[-40:] * 0.058)
+    assert sum(c.velocity.size for c in curves) == 280
+
+
+@pytest.mark.parametrize("name", ["pressure", "speed", "torque", "torque_sd", "oil_temperature"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_value_that_is_not_finite_is_refused(name, bad):
+    column = np.full(6, 3.0)
+    column[4] = bad
+    with pytest.raises(ValueError, match=f"{name} must be finite"):
+        plateaus(np.full(6, 5e5), **{name: column})
+
+
+def test_unequal_lengths_and_no_rows_are_refused():
+    with pytest.raises(ValueError, match=r"speed must have the shape of torque \(6,\), got \(5,\)"):
+        plateaus(np.full(6, 5e5), speed=np.ones(5))
+    with pytest.raises(ValueError, match="at least one row"):
+        plateaus(np.array([]))
+    with pytest.raises(ValueError, match="at least one row"):
+        plateaus(np.full(6, 5e5), torque=np.ones((2, 3)))

@@ -1,15 +1,13 @@
 """A filter that the rig declares: against the closed form of a low-pass, and loops and plateaus behind one."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from models.friction.stribeck import StribeckParameters
 from models.loops.lag_fit import StationaryCurve
-from models.loops.loops import Loop, evaluate_loops
+from models.loops.loops import evaluate_loops
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Record
 from models.records.torque_filter import filtered, filtered_as_torque
@@ -62,9 +60,7 @@ def test_without_a_declaration_the_record_is_the_same_object() -> None:
     ],
     ids=["film", "film at 0.5 Hz", "attractor", "attractor of a rising curve"],
 )
-def test_a_loop_behind_a_declared_filter_is_that_of_the_bare_torque(
-    made: Torque, curve: StribeckParameters, frequency: float, read: Callable[[Loop], float]
-) -> None:
+def test_a_loop_behind_a_declared_filter_is_that_of_the_bare_torque(made, curve, frequency, read):
     bare, late = (record([torque], [5e5], frequency=frequency) for torque in (made, behind(made)))
     (plain,), (wrong,), (mended,) = (
         evaluate_loops(one, GEOMETRY, {5e5: StationaryCurve(parameters=curve)})

@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from models.arrays import FloatArray
-from models.clutch import Geometry
 from models.friction.identification import fit_curves
 from models.friction.pressure_laws import LinearLaw
 from models.friction.speed_protocol import REFERENCE_SPEEDS, RPM
@@ -22,57 +21,52 @@ from models.rig.hysteresis import ATTRACTOR, NO_LAG, FrictionLag
 from models.rig.sampled import EXACT, DynamicTest, RawTest, Recorder, sampled_test
 from models.rig.stationary import NOISELESS, SHARP, Sensor, stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
-from tests.models.tracking.simulated_lives import GEOMETRY
 
 # --- The simulated stationary test: rows, noise and counts.
 
 BAR = 1e5
+CLUTCH = SimulatedClutch()
+GEOMETRY = CLUTCH.geometry
 
 
-@pytest.fixture(scope="module")
-def nominal():
-    return SimulatedClutch()
+def test_rows_stand_in_the_references_order():
+    plateaus = stationary_test(CLUTCH, 0, np.random.default_rng(0))
+    assert plateaus.pressure.reshape(7, 40)[:, 0] / BAR == pytest.approx([4, 4.5, 5, 5.5, 6, 6.5, 7])
+    assert np.ptp(plateaus.pressure.reshape(7, 40), axis=1).max() == 0
+    assert plateaus.speed.reshape(7, 40)[3] / RPM == pytest.approx(np.arange(20, 1971, 50))
+    assert len(curves_by_pressure(plateaus, GEOMETRY)) == 7
 
 
-class TestStationaryTest:
-    def test_rows_stand_in_the_references_order(self, nominal):
-        plateaus = stationary_test(nominal, 0, np.random.default_rng(0))
-        assert plateaus.pressure.reshape(7, 40)[:, 0] / BAR == pytest.approx([4, 4.5, 5, 5.5, 6, 6.5, 7])
-        assert np.ptp(plateaus.pressure.reshape(7, 40), axis=1).max() == 0
-        assert plateaus.speed.reshape(7, 40)[3] / RPM == pytest.approx(np.arange(20, 1971, 50))
-        assert len(curves_by_pressure(plateaus, Geometry())) == 7
+def test_noise_is_what_was_asked_for():
+    exact = stationary_test(CLUTCH, 0, np.random.default_rng(0), NOISELESS).torque
+    sensor = Sensor(noise=0.01, floor=0.0, gain_scatter=0.05, torque_counts=0.0)
+    ratios = np.array([stationary_test(CLUTCH, 0, np.random.default_rng(s), sensor).torque / exact for s in range(300)])
+    # 300 runs know a deviation to 4 % (one sigma), 84,000 plateaus to 0.25 %; four sigma each.
+    assert ratios.mean(axis=1).std() == pytest.approx(0.05, rel=0.16)
+    assert (ratios / ratios.mean(axis=1, keepdims=True)).std() == pytest.approx(0.01, rel=0.01)
 
-    def test_noise_is_what_was_asked_for(self, nominal):
-        exact = stationary_test(nominal, 0, np.random.default_rng(0), NOISELESS).torque
-        sensor = Sensor(noise=0.01, floor=0.0, gain_scatter=0.05, torque_counts=0.0)
-        ratios = np.array(
-            [stationary_test(nominal, 0, np.random.default_rng(s), sensor).torque / exact for s in range(300)]
-        )
-        # 300 runs know a deviation to 4 % (one sigma), 84,000 plateaus to 0.25 %; four sigma each.
-        assert ratios.mean(axis=1).std() == pytest.approx(0.05, rel=0.16)
-        assert (ratios / ratios.mean(axis=1, keepdims=True)).std() == pytest.approx(0.01, rel=0.01)
 
-    def test_the_floor_is_all_that_is_left_without_noise(self, nominal):
-        exact = stationary_test(nominal, 0, np.random.default_rng(0), NOISELESS).torque
-        sensor = Sensor(noise=0.0, floor=0.02, gain_scatter=0.0)
-        left = np.concatenate(
-            [stationary_test(nominal, 0, np.random.default_rng(s), sensor).torque - exact for s in range(20)]
-        )
-        assert left.std() == pytest.approx(0.02, rel=0.04)  # 5600 values, four sigma
+def test_the_floor_is_all_that_is_left_without_noise():
+    exact = stationary_test(CLUTCH, 0, np.random.default_rng(0), NOISELESS).torque
+    sensor = Sensor(noise=0.0, floor=0.02, gain_scatter=0.0)
+    left = np.concatenate(
+        [stationary_test(CLUTCH, 0, np.random.default_rng(s), sensor).torque - exact for s in range(20)]
+    )
+    assert left.std() == pytest.approx(0.02, rel=0.04)  # 5600 values, four sigma
 
-    def test_torque_is_recorded_in_counts(self, nominal):
-        recorded = stationary_test(nominal, 0, np.random.default_rng(0), Sensor(torque_counts=100.0)).torque
-        assert np.array_equal(recorded, np.round(recorded, 2))
 
-    def test_oil_temperature_is_recorded_and_does_not_act(self, nominal):
-        for seed in range(20):
-            plateaus = stationary_test(nominal, 0, np.random.default_rng(seed), NOISELESS)
-            assert plateaus.oil_temperature.min() >= 273.15 + 80
-            assert plateaus.oil_temperature.max() <= 273.15 + 90
-            assert np.ptp(plateaus.oil_temperature) > 1
-            assert np.array_equal(
-                plateaus.torque, stationary_test(nominal, 0, np.random.default_rng(99), NOISELESS).torque
-            )
+def test_torque_is_recorded_in_counts():
+    recorded = stationary_test(CLUTCH, 0, np.random.default_rng(0), Sensor(torque_counts=100.0)).torque
+    assert np.array_equal(recorded, np.round(recorded, 2))
+
+
+def test_oil_temperature_is_recorded_and_does_not_act():
+    for seed in range(20):
+        plateaus = stationary_test(CLUTCH, 0, np.random.default_rng(seed), NOISELESS)
+        assert plateaus.oil_temperature.min() >= 273.15 + 80
+        assert plateaus.oil_temperature.max() <= 273.15 + 90
+        assert np.ptp(plateaus.oil_temperature) > 1
+        assert np.array_equal(plateaus.torque, stationary_test(CLUTCH, 0, np.random.default_rng(99), NOISELESS).torque)
 
 
 # --- The simulated recorder: noise, counts, losses and spikes.
@@ -82,114 +76,95 @@ def rng(seed: int = 2) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-class TestRecorder:
-    def test_noise_is_what_was_asked_for_and_autocorrelated(self) -> None:
-        count = 200_000
-        still = np.full(count, 20.0)
-        recorder = Recorder(torque_noise=0.3, memory=0.02, torque_counts=0.0, speed_noise=0.2, speed_counts=0.0)
-        record = recorder.record(np.arange(count) / 1000, still * 1e4, still, still, rng(), Sensor(gain_scatter=0.0))
-        noise = record.torque - 20
-        # autocorrelation time 20 samples: 200,000 of them know a deviation to 1 % (one sigma)
-        assert noise.std() == pytest.approx(0.3, rel=0.05)
-        assert np.corrcoef(noise[:-20], noise[20:])[0, 1] == pytest.approx(np.exp(-1), abs=0.05)
-        assert record.speed.std() == pytest.approx(0.2, rel=0.01)
+def test_noise_is_what_was_asked_for_and_autocorrelated() -> None:
+    count = 200_000
+    still = np.full(count, 20.0)
+    recorder = Recorder(torque_noise=0.3, memory=0.02, torque_counts=0.0, speed_noise=0.2, speed_counts=0.0)
+    record = recorder.record(np.arange(count) / 1000, still * 1e4, still, still, rng(), Sensor(gain_scatter=0.0))
+    noise = record.torque - 20
+    # autocorrelation time 20 samples: 200,000 of them know a deviation to 1 % (one sigma)
+    assert noise.std() == pytest.approx(0.3, rel=0.05)
+    assert np.corrcoef(noise[:-20], noise[20:])[0, 1] == pytest.approx(np.exp(-1), abs=0.05)
+    assert record.speed.std() == pytest.approx(0.2, rel=0.01)
 
-    def test_counts_losses_and_spikes(self) -> None:
-        count = 60_000
-        still = np.full(count, 20.0)
-        recorder = Recorder(torque_counts=200.0, lost=0.1, spikes_per_minute=30.0, torque_noise=0.01)
-        record = recorder.record(np.arange(count) / 100, still * 1e4, still, still, rng(), Sensor())
-        assert np.array_equal(record.torque, np.round(record.torque * 200) / 200)
-        assert record.time.size == pytest.approx(0.9 * count, rel=0.01)
-        assert (np.diff(record.time) > 0).all()
-        assert 200 < (np.abs(record.torque - 20) > 4).sum() < 330  # 300 in ten minutes, a tenth of them lost
+
+def test_counts_losses_and_spikes() -> None:
+    count = 60_000
+    still = np.full(count, 20.0)
+    recorder = Recorder(torque_counts=200.0, lost=0.1, spikes_per_minute=30.0, torque_noise=0.01)
+    record = recorder.record(np.arange(count) / 100, still * 1e4, still, still, rng(), Sensor())
+    assert np.array_equal(record.torque, np.round(record.torque * 200) / 200)
+    assert record.time.size == pytest.approx(0.9 * count, rel=0.01)
+    assert (np.diff(record.time) > 0).all()
+    assert 200 < (np.abs(record.torque - 20) > 4).sum() < 330  # 300 in ten minutes, a tenth of them lost
 
 
 # --- The simulated sampled records and their lag, against closed forms and an integrator.
 
-CLUTCH = SimulatedClutch()
-
-
 SILENT = DynamicTest(recorder=EXACT)
-
-
 COARSE_RAW = RawTest(rate=50.0)
 
 
-class TestDynamicTest:
-    def test_has_the_references_course(self) -> None:
-        record = sampled_test(CLUTCH, 0, SILENT, rng(), NOISELESS)
-        for turn, pressure in enumerate(PROTOCOL_PRESSURES):
-            rows = (record.time >= 15.1 * turn) & (record.time < 15.1 * turn + 15)
-            assert rows.sum() == 1500
-            assert record.pressure[rows] == pytest.approx(pressure)
-        assert record.speed.min() == pytest.approx(0, abs=1e-6)
-        assert record.speed.max() == pytest.approx(2000 * RPM)
-        risings = np.flatnonzero((record.speed[:-1] < 1000 * RPM) & (record.speed[1:] >= 1000 * RPM))
-        assert np.diff(record.time[risings]) == pytest.approx(10.0, abs=0.011)
-
-    def test_torque_follows_the_film_as_an_integrator_finds_it(self) -> None:
-        """Witness: dw/dt = (v - w) w^1.4/τ itself, by another algorithm, at the first pressure."""
-        record = sampled_test(CLUTCH, 7000, SILENT, rng(), NOISELESS)
-        rows = record.time < 15
-        film_time = 0.1 * np.exp(-(0.7 * 4 - 2.75) * (1 - 1 / 1.7**2))  # what is left of it at 4 bar
-        swing = CLUTCH.geometry.mean_radius * 1000 * RPM
-
-        def lagging(time: float, film: np.ndarray) -> np.ndarray:
-            return (swing * (1 + np.sin(2 * np.pi * 0.1 * time)) - film) * film**1.4 / film_time
-
-        found = solve_ivp(lagging, (0, 15), [swing], method="LSODA", rtol=1e-9, atol=1e-10, t_eval=record.time[rows])
-        w, v = found.y[0], CLUTCH.geometry.sliding_velocity(record.speed[rows])
-        at = CLUTCH.parameters(4e5, 7000)
-        dry = at.static_torque * (1 + (at.coulomb_ratio - 1) * np.exp(-at.stribeck_velocity / w))
-        by_hand = dry + at.viscous_coefficient * v / w**0.7
-        assert np.abs(record.torque[rows] - by_hand).max() < 0.01
-        assert np.abs(torque(v, at) - by_hand).max() > 0.5  # without the lag it would be far off
-
-    def test_the_film_time_is_lost_with_use_the_more_the_higher_the_pressure(self) -> None:
-        lag = FrictionLag(film_time=0.2, loss=LinearLaw(intercept=-2.0, slope=0.5e-5), scale=1000.0, exponent=1.0)
-        found = lag.film_time_at(np.array([3e5, 5e5, 7e5]), 1000.0)
-        assert found == pytest.approx(0.2 * np.exp([-0.0, -0.25, -0.75]))
-
-    def test_an_attractor_alone_is_the_attractor_law(self) -> None:
-        clutch = replace(CLUTCH, lag=replace(NO_LAG, attractor=150.0))
-        record = sampled_test(clutch, 1000, SILENT, rng(), NOISELESS)
-        rows = record.time < 15
-        velocity = clutch.geometry.sliding_velocity(record.speed[rows])
-        law = attractor_torque(record.time[rows], velocity, clutch.parameters(4e5, 1000), 150.0)
-        assert record.torque[rows] == pytest.approx(law, abs=1e-9)
-
-    def test_without_lag_it_is_the_stationary_curve(self) -> None:
-        record = sampled_test(replace(CLUTCH, lag=NO_LAG), 0, SILENT, rng(), NOISELESS)
-        at = CLUTCH.parameters(record.pressure, 0)
-        assert record.torque == pytest.approx(torque(CLUTCH.geometry.sliding_velocity(record.speed), at), rel=1e-12)
+def test_has_the_references_course() -> None:
+    record = sampled_test(CLUTCH, 0, SILENT, rng(), NOISELESS)
+    for turn, pressure in enumerate(PROTOCOL_PRESSURES):
+        rows = (record.time >= 15.1 * turn) & (record.time < 15.1 * turn + 15)
+        assert rows.sum() == 1500
+        assert record.pressure[rows] == pytest.approx(pressure)
+    assert record.speed.min() == pytest.approx(0, abs=1e-6)
+    assert record.speed.max() == pytest.approx(2000 * RPM)
+    risings = np.flatnonzero((record.speed[:-1] < 1000 * RPM) & (record.speed[1:] >= 1000 * RPM))
+    assert np.diff(record.time[risings]) == pytest.approx(10.0, abs=0.011)
 
 
-class TestRawTest:
-    def test_gives_the_fits_of_its_plateaus_within_their_deviations(self) -> None:
-        clutch = replace(CLUTCH, lag=replace(CLUTCH.lag, film_time=0.01))  # so that all plateaus settle
-        record = sampled_test(clutch, 3000, COARSE_RAW, rng(), Sensor(gain_scatter=0.0))
-        cut = cut_plateaus(record)
-        assert cut.plateaus.torque.size == 280
-        exact = stationary_test(clutch, 3000, rng(), NOISELESS)
-        raw, plain = (fit_curves(curves_by_pressure(p, clutch.geometry)) for p in (cut.plateaus, exact))
-        for fit, true in zip(raw, plain, strict=True):
-            off = (fit.parameters.as_array() - true.parameters.as_array()) / fit.standard_errors
-            assert np.abs(off).max() < 4.5
-        gain = replace(exact, torque=1.05 * exact.torque)
-        wrong = fit_curves(curves_by_pressure(gain, clutch.geometry))
-        assert (
-            np.abs((raw[3].parameters.as_array() - wrong[3].parameters.as_array()) / raw[3].standard_errors).max() > 5
-        )
+def test_torque_follows_the_film_as_an_integrator_finds_it() -> None:
+    """Witness: dw/dt = (v - w) w^1.4/τ itself, by another algorithm, at the first pressure."""
+    record = sampled_test(CLUTCH, 7000, SILENT, rng(), NOISELESS)
+    rows = record.time < 15
+    film_time = 0.1 * np.exp(-(0.7 * 4 - 2.75) * (1 - 1 / 1.7**2))  # what is left of it at 4 bar
+    swing = CLUTCH.geometry.mean_radius * 1000 * RPM
 
-    def test_settles_after_each_step(self) -> None:
-        test = replace(COARSE_RAW, recorder=EXACT)
-        record = sampled_test(CLUTCH, 0, test, rng(), NOISELESS)
-        dwells = record.torque.reshape(280, 250)
-        true = stationary_test(CLUTCH, 0, rng(), NOISELESS).torque
-        assert np.abs(dwells[1:, 0] - true[1:]).max() > 1.0
-        assert np.abs(dwells[:, -1] - true).max() < 0.05
-        assert record.speed.reshape(280, 250)[:, -1] == pytest.approx(np.tile(REFERENCE_SPEEDS, 7))
+    def lagging(time: float, film: np.ndarray) -> np.ndarray:
+        return (swing * (1 + np.sin(2 * np.pi * 0.1 * time)) - film) * film**1.4 / film_time
+
+    found = solve_ivp(lagging, (0, 15), [swing], method="LSODA", rtol=1e-9, atol=1e-10, t_eval=record.time[rows])
+    w, v = found.y[0], CLUTCH.geometry.sliding_velocity(record.speed[rows])
+    at = CLUTCH.parameters(4e5, 7000)
+    dry = at.static_torque * (1 + (at.coulomb_ratio - 1) * np.exp(-at.stribeck_velocity / w))
+    by_hand = dry + at.viscous_coefficient * v / w**0.7
+    assert np.abs(record.torque[rows] - by_hand).max() < 0.01
+    assert np.abs(torque(v, at) - by_hand).max() > 0.5  # without the lag it would be far off
+
+
+def test_the_film_time_is_lost_with_use_the_more_the_higher_the_pressure() -> None:
+    lag = FrictionLag(film_time=0.2, loss=LinearLaw(intercept=-2.0, slope=0.5e-5), scale=1000.0, exponent=1.0)
+    found = lag.film_time_at(np.array([3e5, 5e5, 7e5]), 1000.0)
+    assert found == pytest.approx(0.2 * np.exp([-0.0, -0.25, -0.75]))
+
+
+def test_an_attractor_alone_is_the_attractor_law() -> None:
+    clutch = replace(CLUTCH, lag=replace(NO_LAG, attractor=150.0))
+    record = sampled_test(clutch, 1000, SILENT, rng(), NOISELESS)
+    rows = record.time < 15
+    velocity = clutch.geometry.sliding_velocity(record.speed[rows])
+    law = attractor_torque(record.time[rows], velocity, clutch.parameters(4e5, 1000), 150.0)
+    assert record.torque[rows] == pytest.approx(law, abs=1e-9)
+
+
+def test_without_lag_it_is_the_stationary_curve() -> None:
+    record = sampled_test(replace(CLUTCH, lag=NO_LAG), 0, SILENT, rng(), NOISELESS)
+    at = CLUTCH.parameters(record.pressure, 0)
+    assert record.torque == pytest.approx(torque(CLUTCH.geometry.sliding_velocity(record.speed), at), rel=1e-12)
+
+
+def test_settles_after_each_step() -> None:
+    test = replace(COARSE_RAW, recorder=EXACT)
+    record = sampled_test(CLUTCH, 0, test, rng(), NOISELESS)
+    dwells = record.torque.reshape(280, 250)
+    true = stationary_test(CLUTCH, 0, rng(), NOISELESS).torque
+    assert np.abs(dwells[1:, 0] - true[1:]).max() > 1.0
+    assert np.abs(dwells[:, -1] - true).max() < 0.05
+    assert record.speed.reshape(280, 250)[:, -1] == pytest.approx(np.tile(REFERENCE_SPEEDS, 7))
 
 
 # --- The sensor of the reference's fit errors: plateaus and raw records of one clutch agree, and both laws of lag are

@@ -11,20 +11,21 @@ import pytest
 from models.clutch import Geometry
 from models.friction.speed_protocol import RPM
 from models.friction.stribeck import torque
+from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulated_clutch
+from models.rig.stationary import NOISELESS, stationary_test
 from models.rig.surface import surface
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, draw
-from tests.models.rig.noiseless import curves
 
 SPEEDS = np.arange(20, 1971, 50) * RPM
-
-
 BAR = 1e5
+CLUTCH = SimulatedClutch()
 
 
-@pytest.fixture(scope="module")
-def nominal():
-    return SimulatedClutch()
+def curves(clutch, cycles):
+    """Noiseless torque [40] at each pressure in bar, through the simulated test itself."""
+    plateaus = stationary_test(clutch, cycles, np.random.default_rng(0), NOISELESS)
+    return {c.pressure / BAR: c.torque for c in curves_by_pressure(plateaus, clutch.geometry)}
 
 
 def by_hand(clutch, pressure, cycles, velocity):
@@ -46,56 +47,52 @@ def by_hand(clutch, pressure, cycles, velocity):
 
 
 @pytest.mark.parametrize("cycles", [0, 500, 15_000, 900_000])
-def test_torque_agrees_with_the_equations_written_out_by_hand(nominal, cycles):
-    measured = curves(nominal, cycles)
+def test_torque_agrees_with_the_equations_written_out_by_hand(cycles):
+    measured = curves(CLUTCH, cycles)
     for pressure, speed in itertools.product((4.0, 5.5, 7.0), (0, 7, 39)):
         velocity = SPEEDS[speed] * 0.058
-        assert measured[pressure][speed] == pytest.approx(by_hand(nominal, pressure * BAR, cycles, velocity), rel=1e-9)
+        assert measured[pressure][speed] == pytest.approx(by_hand(CLUTCH, pressure * BAR, cycles, velocity), rel=1e-9)
 
 
-def test_mean_cof_is_the_mean_over_all_plateaus(nominal):
+def test_mean_cof_is_the_mean_over_all_plateaus():
     # Pressure levels hold equally many rows, so the mean over rows is the mean over pressures of the means over speeds.
     geometry = Geometry()
     rows = [
-        geometry.cof(by_hand(nominal, p, 7000, w * geometry.mean_radius), p)
+        geometry.cof(by_hand(CLUTCH, p, 7000, w * geometry.mean_radius), p)
         for p, w in itertools.product(PROTOCOL_PRESSURES, SPEEDS)
     ]
-    assert nominal.mean_cof(7000) == pytest.approx(math.fsum(rows) / 280, rel=1e-9)
+    assert CLUTCH.mean_cof(7000) == pytest.approx(math.fsum(rows) / 280, rel=1e-9)
 
 
-class TestFindingsOfTheReference:
-    def test_fresh_clutch_gives_about_25_newton_metres_at_5_bar(self, nominal):
-        at_1000_rpm = np.interp(1000 * RPM, SPEEDS, curves(nominal, 0)[5.0])
-        assert at_1000_rpm == pytest.approx(25, abs=1)
-
-    def test_fresh_engagement_at_8_bar_exceeds_the_motors_limit(self, nominal):
-        # Section 2.3.1: the motor gives 20 Nm at most, and the engagement brings it to a standstill.
-        torques = [by_hand(nominal, 8 * BAR, 0, w * 0.058) for w in np.linspace(20, 2000, 50) * RPM]
-        assert min(torques) > 20
-
-    def test_mean_cof_is_halved_near_15_000_cycles(self, nominal):
-        assert nominal.end_of_life() == pytest.approx(15_000, rel=0.02)
+def test_fresh_clutch_gives_about_25_newton_metres_at_5_bar():
+    at_1000_rpm = np.interp(1000 * RPM, SPEEDS, curves(CLUTCH, 0)[5.0])
+    assert at_1000_rpm == pytest.approx(25, abs=1)
 
 
-class TestEndOfLife:
-    def test_is_where_mean_cof_crosses_on_a_dense_grid(self, nominal):
-        cycles = np.arange(0.0, 40_000.0, 10.0)
-        share = nominal.mean_cofs(cycles) / nominal.mean_cof(0)
-        for fraction in (0.9, 0.5, 0.45):
-            crossing = cycles[np.argmax(share <= fraction)]
-            assert crossing - 10 <= nominal.end_of_life(fraction) <= crossing
+def test_mean_cof_is_halved_near_15_000_cycles():
+    assert CLUTCH.end_of_life() == pytest.approx(15_000, rel=0.02)
 
-    def test_is_none_where_the_loss_saturates_above_the_threshold(self, nominal):
-        assert nominal.mean_cof(1e6) > 0.2 * nominal.mean_cof(0)
-        assert nominal.end_of_life(0.2) is None
 
-    def test_spreads_over_drawn_clutches_around_the_nominal_life(self):
-        lives = [draw(np.random.default_rng(seed)).end_of_life() for seed in range(50)]
-        assert None not in lives
-        assert min(lives) > 8_000
-        assert max(lives) < 32_000
-        assert np.median(lives) == pytest.approx(15_000, rel=0.1)
-        assert 0.12 < np.std(np.log(lives)) < 0.35
+def test_is_where_mean_cof_crosses_on_a_dense_grid():
+    cycles = np.arange(0.0, 40_000.0, 10.0)
+    share = CLUTCH.mean_cofs(cycles) / CLUTCH.mean_cof(0)
+    for fraction in (0.9, 0.5, 0.45):
+        crossing = cycles[np.argmax(share <= fraction)]
+        assert crossing - 10 <= CLUTCH.end_of_life(fraction) <= crossing
+
+
+def test_is_none_where_the_loss_saturates_above_the_threshold():
+    assert CLUTCH.mean_cof(1e6) > 0.2 * CLUTCH.mean_cof(0)
+    assert CLUTCH.end_of_life(0.2) is None
+
+
+def test_spreads_over_drawn_clutches_around_the_nominal_life():
+    lives = [draw(np.random.default_rng(seed)).end_of_life() for seed in range(50)]
+    assert None not in lives
+    assert min(lives) > 8_000
+    assert max(lives) < 32_000
+    assert np.median(lives) == pytest.approx(15_000, rel=0.1)
+    assert 0.12 < np.std(np.log(lives)) < 0.35
 
 
 def test_drawn_clutches_differ_by_5_to_15_percent():
@@ -109,9 +106,6 @@ def test_drawn_clutches_differ_by_5_to_15_percent():
 def test_in_no_drawn_clutch_sliding_grips_more_than_rest():
     for seed in range(200):
         assert draw(np.random.default_rng(seed)).parameters(4 * BAR, 0).coulomb_ratio < 1
-
-
-CLUTCH = SimulatedClutch()
 
 
 def test_the_clutch_transfers_what_its_curve_says_and_less_below_its_lowest_pressure() -> None:
@@ -130,7 +124,6 @@ CLUTCHES = (SimulatedClutch(), simulated_clutch(1))
 @pytest.mark.parametrize("clutch", CLUTCHES, ids=["nominal", "drawn"])
 def test_roughness_and_skewness_are_the_references_before_and_after_the_tests(clutch: SimulatedClutch) -> None:
     end = clutch.end_of_life()
-    assert end is not None
     fresh, worn = surface(clutch, 0.0), surface(clutch, 2 * end)
     assert (fresh.roughness, fresh.skewness) == pytest.approx((9.52e-6, -0.87))
     assert (worn.roughness, worn.skewness) == pytest.approx((1.94e-6, -3.4))
@@ -141,7 +134,6 @@ def test_roughness_and_skewness_are_the_references_before_and_after_the_tests(cl
 @pytest.mark.parametrize("clutch", CLUTCHES, ids=["nominal", "drawn"])
 def test_the_lining_gets_smoother_and_flatter_all_its_life(clutch: SimulatedClutch) -> None:
     end = clutch.end_of_life()
-    assert end is not None
     surfaces = [surface(clutch, float(cycles)) for cycles in np.linspace(0.0, 0.99 * end, 20)]
     assert (np.diff([state.roughness for state in surfaces]) < 0).all()
     assert (np.diff([state.skewness for state in surfaces]) < 0).all()

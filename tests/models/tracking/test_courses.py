@@ -37,7 +37,7 @@ from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
 from tests import dense
-from tests.models.tracking.tracked_series import CAMPAIGN, NAMES, PRIOR, TYPICAL, followed, series
+from tests.models.tracking.tracked_series import NAMES, PRIOR, TYPICAL, followed, on_grid, sent, series
 
 # --- Courses of either sign of φ and ε: the kinetics that they obey, their coordinates, and their prior
 # probabilities.
@@ -109,12 +109,6 @@ def test_forms_are_courses_by_sizes_and_share_the_prior() -> None:
     assert np.isneginf(sure[FORM_COURSE != Course.EQ_6]).all()
 
 
-def test_what_may_rise_or_fall_is_tracked_by_eq_6_alone() -> None:
-    """The Stribeck parameters, whose law the paper states."""
-    assert weak(CAMPAIGN[0], falling=False).eq_6_share == 1.0
-    assert weak(CAMPAIGN[0], falling=True).eq_6_share < 1.0
-
-
 # --- The discrepancy beside eq. 6: its size, lives of another law, and steps at events.
 
 
@@ -150,16 +144,14 @@ def test_a_straight_line_is_no_eq_6_and_the_data_say_so() -> None:
     progress = np.linspace(0.0, 6_000.0, 20)
     rng = np.random.default_rng(4)
     values = 0.1 * (1.0 - 5e-5 * progress) * (1.0 + 0.002 * rng.standard_normal(20))
-    line = [Measurement(progress=z, value=y, variance=1e-9) for z, y in zip(progress, values, strict=True)]
+    line = sent(progress, values, 1e-9)
     prior = weak(line[0], falling=True)
     for tracker in (Grid(), Particle(), Ukf()):
         posterior = tracker.posterior(followed(tracker, prior, line), 1_000, np.random.default_rng(2))  # type: ignore[arg-type]
         found = predict_first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life
-        assert found[0.05] is not None
         assert found[0.05] < 10_000.0 < (found[0.95] or math.inf)
-    sure = Grid().from_history(replace(prior, law_share=1.0, eq_6_share=1.0), line)
-    told = predict_first_passage(Grid().posterior(sure, 1_000, np.random.default_rng(2)), fraction=0.5, as_of=6_000.0)
-    assert told.end_of_life[0.05] is not None
+    sure = on_grid(line, 1_000, np.random.default_rng(2), replace(prior, law_share=1.0, eq_6_share=1.0))
+    told = predict_first_passage(sure, fraction=0.5, as_of=6_000.0)
     assert told.end_of_life[0.05] > 10_000.0
 
 
@@ -174,7 +166,6 @@ def test_after_an_event_the_forecast_widens_and_then_settles(tracker: Any) -> No
     def width(measurements: list[Measurement]) -> float:
         posterior = tracker.posterior(followed(tracker, PRIOR, measurements), 2_000, np.random.default_rng(1))
         ends = predict_first_passage(posterior, fraction=0.5, as_of=measurements[-1].progress).end_of_life
-        assert ends[0.05] is not None
         return (ends[0.95] or 1e6) - ends[0.05]
 
     assert width(after[:13]) > 1.5 * width(before[:13])
@@ -211,7 +202,7 @@ def test_a_course_goes_on_along_its_knee_from_there_on() -> None:
 
 def test_knees_come_as_their_hazard_has_it_and_eq_6_alone_has_none() -> None:
     prior = weak(Measurement(progress=0.0, value=0.1, variance=0.0), falling=True)
-    history = History.of([Measurement(progress=x, value=0.1, variance=0.0) for x in (0.0, 2_000.0)], prior)
+    history = History.of(sent([0.0, 2_000.0], 0.1), prior)
     sizes = np.repeat([0.0, 0.03], 20_000)
     beside = drawn(history, prior, sizes, np.zeros((sizes.size, PAST)), np.random.default_rng(4))
     assert np.isinf(beside.knee[:20_000]).all()
@@ -228,10 +219,10 @@ def test_the_first_signs_of_a_knee_move_the_answer_within_two_tests() -> None:
     at = np.arange(0.0, 8_000.1, 400.0)
     share = np.where(at < 7_000.0, 0.4e-4 * at, 0.28 + 2.4e-4 * (at - 7_000.0))
     values = 0.1 * (1.0 - 0.5 * share) * (1.0 + 0.003 * rng.standard_normal(at.size))
-    tests = [Measurement(progress=x, value=y, variance=1e-9) for x, y in zip(at.tolist(), values.tolist(), strict=True)]
+    tests = sent(at, values, 1e-9)
     said = []
     for count in (18, 20):
-        posterior = Grid().posterior(Grid().from_history(weak(tests[0], falling=True), tests[:count]), 1_000, rng)
+        posterior = on_grid(tests[:count], 1_000, rng)
         said.append(weighted_quantiles(np.minimum(ends_of_life(posterior, 0.5), 1e6), posterior.weight, (0.05, 0.5)))
     (_, before), (low, after) = said
     assert before > 15_000.0
@@ -241,20 +232,9 @@ def test_the_first_signs_of_a_knee_move_the_answer_within_two_tests() -> None:
 
 # --- The closed form of ξ0, Δ and the further terms, against the whole normal distribution of the data.
 
-PROGRESS = np.linspace(0.0, 12_000.0, 13)
-
-
-VALUES = value(PROGRESS, Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7))
-
-
-CAMPAIGN_here = [
-    Measurement(progress=float(z), value=float(y), variance=1e-8) for z, y in zip(PROGRESS, VALUES, strict=True)
-]
-
-
-PRIOR_here = weak(CAMPAIGN_here[0], falling=True)
-
-
+#: Without noise.
+EVEN = series(TYPICAL, np.linspace(0.0, 12_000.0, 13), 0.0)
+BELIEF = weak(EVEN[0], falling=True)
 #: Three of eq. 6, with q of 0, 0.03 and 0.1, and one of every other course; of two the scatter is a share of the value.
 POINTS = linear_model.Points(
     log_scale=np.array([8.5, 7.0, 10.0, 9.6, 8.0, 9.9, 8.5, 7.5]),
@@ -264,26 +244,23 @@ POINTS = linear_model.Points(
     outlying=np.eye(13)[:, [4, 4, 12, 4, 5, 4, 3, 6]] * [0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0],
 )
 COUNT = POINTS.form.size
-
-
 #: An event comes before the fifth run from the end, and the last three have a new level.
 EPOCHS = [
-    replace(each, epoch=int(index > 7) + int(index > 9), new_levels=int(index > 9))
-    for index, each in enumerate(CAMPAIGN_here)
+    replace(each, epoch=int(index > 7) + int(index > 9), new_levels=int(index > 9)) for index, each in enumerate(EVEN)
 ]
 
 
 def normal(point: int, measurements: list[Measurement]) -> tuple[np.ndarray, np.ndarray]:
     """Mean and covariance of the measurements at one of POINTS, all linear terms integrated out."""
-    means, covariances = dense.normal(PRIOR_here, measurements, POINTS)
+    means, covariances = dense.normal(BELIEF, measurements, POINTS)
     return means[point], covariances[point]
 
 
-@pytest.mark.parametrize("measurements", [CAMPAIGN_here, EPOCHS], ids=["one epoch", "three epochs"])
+@pytest.mark.parametrize("measurements", [EVEN, EPOCHS], ids=["one epoch", "three epochs"])
 def test_evidence_is_that_of_the_whole_normal(measurements: list[Measurement]) -> None:
     """All linear terms integrated out, the data are normal; δ's covariance comes from quadrature here."""
-    history = History.of(measurements, PRIOR_here)
-    found = linear_model.evidence(linear_model.pointwise(history, PRIOR_here, POINTS)[0], PRIOR_here)
+    history = History.of(measurements, BELIEF)
+    found = linear_model.evidence(linear_model.pointwise(history, BELIEF, POINTS)[0], BELIEF)
     for point, log_probability in enumerate(found):
         mean, covariance = normal(point, measurements)
         expected = multivariate_normal(mean, covariance).logpdf(history.value)
@@ -292,15 +269,15 @@ def test_evidence_is_that_of_the_whole_normal(measurements: list[Measurement]) -
 
 def test_conditional_is_that_of_the_whole_normal() -> None:
     """(ξ0, Δ) and the data are jointly normal: condition on the data."""
-    history = History.of(EPOCHS, PRIOR_here)
-    given = linear_model.conditional(linear_model.pointwise(history, PRIOR_here, POINTS)[0], PRIOR_here)
+    history = History.of(EPOCHS, BELIEF)
+    given = linear_model.conditional(linear_model.pointwise(history, BELIEF, POINTS)[0], BELIEF)
     for point in range(COUNT):
         mean, covariance = normal(point, EPOCHS)
-        b = (mean - PRIOR_here.initial_mean) / PRIOR_here.change_mean
-        prior = np.diag([PRIOR_here.initial_sd**2, PRIOR_here.change_sd**2])
+        b = (mean - BELIEF.initial_mean) / BELIEF.change_mean
+        prior = np.diag([BELIEF.initial_sd**2, BELIEF.change_sd**2])
         cross = prior @ np.stack([np.ones_like(b), b])
         gain = np.linalg.solve(covariance, cross.T).T
-        expected = np.array([PRIOR_here.initial_mean, PRIOR_here.change_mean]) + gain @ (history.value - mean)
+        expected = np.array([BELIEF.initial_mean, BELIEF.change_mean]) + gain @ (history.value - mean)
         spread = prior - gain @ cross.T
         np.testing.assert_allclose([given.initial[point], given.change[point]], expected, rtol=1e-4)
         found = [given.initial_variance[point], given.covariance[point], given.change_variance[point]]
@@ -308,12 +285,12 @@ def test_conditional_is_that_of_the_whole_normal() -> None:
 
 
 def test_the_table_and_the_points_are_one_sum() -> None:
-    history = History.of(EPOCHS, PRIOR_here)
+    history = History.of(EPOCHS, BELIEF)
     table = basis(history.progress[:, None], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
     levels = np.array([-8.0, -7.0])
     forms, outlying = np.array([0, 2 + 24]), np.eye(13)[:, [0, 5]]
     tabled = linear_model.evidence(
-        linear_model.tabulated(history, PRIOR_here, table, np.stack([levels, levels]), forms, outlying), PRIOR_here
+        linear_model.tabulated(history, BELIEF, table, np.stack([levels, levels]), forms, outlying), BELIEF
     )
     for kind, level in np.ndindex(2, 2):
         points = replace(
@@ -322,27 +299,27 @@ def test_the_table_and_the_points_are_one_sum() -> None:
             form=np.full(COUNT, forms[kind]),
             outlying=np.repeat(outlying[:, kind : kind + 1], COUNT, axis=1),
         )
-        pointed = linear_model.evidence(linear_model.pointwise(history, PRIOR_here, points, table)[0], PRIOR_here)
+        pointed = linear_model.evidence(linear_model.pointwise(history, BELIEF, points, table)[0], BELIEF)
         np.testing.assert_allclose(tabled[kind, level], pointed, rtol=1e-9)
 
 
-@pytest.mark.parametrize("measurements", [CAMPAIGN_here, EPOCHS], ids=["one epoch", "three epochs"])
+@pytest.mark.parametrize("measurements", [EVEN, EPOCHS], ids=["one epoch", "three epochs"])
 def test_the_last_run_turned_outlying_is_that_of_all_sums_anew(measurements: list[Measurement]) -> None:
     """With one epoch the first point has no further terms, with three all have."""
-    history = History.of(measurements, PRIOR_here)
+    history = History.of(measurements, BELIEF)
     sound = replace(POINTS, outlying=POINTS.outlying * (np.arange(13) < 12)[:, None])
     outlying = replace(sound, outlying=sound.outlying + (np.arange(13) == 12)[:, None])
-    sums, terms = linear_model.pointwise(history, PRIOR_here, sound)
+    sums, terms = linear_model.pointwise(history, BELIEF, sound)
     last = basis(history.progress[-1], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
-    turned = linear_model.last_outlying(history, PRIOR_here, sound, sums, terms, last)
-    anew = linear_model.pointwise(history, PRIOR_here, outlying)[0]
+    turned = linear_model.last_outlying(history, BELIEF, sound, sums, terms, last)
+    anew = linear_model.pointwise(history, BELIEF, outlying)[0]
     for name, found in asdict(turned).items():
         np.testing.assert_allclose(found, getattr(anew, name), rtol=1e-9, err_msg=name)
 
 
 def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
     """Mean and variance of δ at the last run given the data, from 20,000 draws, against conditioning the joint normal."""
-    history = History.of(CAMPAIGN_here, PRIOR_here)
+    history = History.of(EVEN, BELIEF)
     count = 20_000
     points = linear_model.Points(
         log_scale=np.full(count, 7.0),
@@ -351,18 +328,18 @@ def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
         form=np.full(count, 2),
         outlying=np.repeat(POINTS.outlying[:, 1:2], count, axis=1),
     )
-    sums, terms = linear_model.pointwise(history, PRIOR_here, points)
-    given = linear_model.conditional(sums, PRIOR_here)
+    sums, terms = linear_model.pointwise(history, BELIEF, points)
+    given = linear_model.conditional(sums, BELIEF)
     rng = np.random.default_rng(0)
     pair = sampling.correlated_pair(
         rng.standard_normal((count, 2)), given.initial_variance, given.change_variance, given.covariance
     )
     initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
-    drawn = linear_model.drawn_terms(terms, initial - PRIOR_here.initial_mean, change, rng.standard_normal((count, 6)))
+    drawn = linear_model.drawn_terms(terms, initial - BELIEF.initial_mean, change, rng.standard_normal((count, 6)))
     at_the_last = drawn @ smooth(history.progress, history.span, 6)[-1]
-    mean, covariance = normal(1, CAMPAIGN_here)
-    cross = (0.03 * 0.134) ** 2 * dense.integrated(PROGRESS)[-1]
+    mean, covariance = normal(1, EVEN)
+    cross = (0.03 * 0.134) ** 2 * dense.integrated(history.progress)[-1]
     gain = np.linalg.solve(covariance, cross)
-    sd = math.sqrt((0.03 * 0.134) ** 2 * dense.integrated(PROGRESS)[-1, -1] - gain @ cross)
+    sd = math.sqrt((0.03 * 0.134) ** 2 * dense.integrated(history.progress)[-1, -1] - gain @ cross)
     assert at_the_last.mean() == pytest.approx(gain @ (history.value - mean), abs=4.0 * sd / math.sqrt(count))
     assert at_the_last.std() == pytest.approx(sd, rel=0.03)

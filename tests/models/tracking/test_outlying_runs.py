@@ -18,7 +18,7 @@ from models.tracking.innovation import innovation, last_innovation
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
-from tests.models.tracking.tracked_series import FILTERS, PLAIN, PRIOR, TYPICAL, followed, series
+from tests.models.tracking.tracked_series import FILTERS, PLAIN, PRIOR, TYPICAL, followed, on_grid, series
 
 # --- The standardised innovation against a filter that has not been given the last test at all.
 
@@ -33,8 +33,7 @@ def measured(off: float) -> list[Measurement]:
 
 
 def drawn(measurements: list[Measurement], prior=PLAIN) -> Posterior:
-    grid = Grid()
-    return grid.posterior(grid.from_history(prior, measurements), 8_000, np.random.default_rng(1))
+    return on_grid(measurements, 8_000, np.random.default_rng(1), prior)
 
 
 def predicted(before: Posterior, last: Measurement) -> float:
@@ -62,11 +61,9 @@ def test_draws_that_know_the_last_test_are_less_surprised_by_it() -> None:
 def test_a_test_far_off_is_off_track_and_a_good_one_is_not() -> None:
     far, good = measured(-60.0), measured(0.0)
     innovation_far = last_innovation(drawn(far, PRIOR), far, PRIOR)
-    assert innovation_far is not None
     assert innovation_far.off_track
     assert innovation_far.value < -FAR
     passed = last_innovation(drawn(good, PRIOR), good, PRIOR)
-    assert passed is not None
     assert not passed.off_track
 
 
@@ -88,11 +85,9 @@ def test_one_outlying_run_widens_and_does_not_derail() -> None:
 
     def median(tracker: Any, prior: Prior, measurements: list[Measurement]) -> float:
         posterior = tracker.posterior(followed(tracker, prior, measurements), 2_000, np.random.default_rng(1))
-        found = predict_first_passage(posterior, fraction=0.5, as_of=12_000.0).end_of_life[0.5]
-        assert found is not None
-        return found
+        return predict_first_passage(posterior, fraction=0.5, as_of=12_000.0).end_of_life[0.5]
 
-    for tracker, _ in FILTERS:
+    for tracker in FILTERS:
         clean = median(tracker, PRIOR, long)
         assert median(tracker, PRIOR, outlying) == pytest.approx(clean, rel=0.02)
     assert median(Grid(), replace(PRIOR, outlying_share=0.0), outlying) != pytest.approx(clean, rel=0.04)

@@ -17,45 +17,23 @@ from models.diagnosis.baseline.laws import (
     RATIO,
     Frame,
     Laws,
-    curve,
     falling_weight,
 )
-from models.diagnosis.baseline.prediction import frame_of, predict
+from models.diagnosis.baseline.prediction import predict
 from models.diagnosis.criteria import CURVATURE_BOUNDS, EXPONENTIAL, USUAL_CURVATURE
 from models.diagnosis.design.design import build_design
 from models.diagnosis.noise.estimate import first_noise
-from models.diagnosis.pooled_fit.baseline_fit import starting_laws
 from models.diagnosis.pooled_fit.gauss_newton import fit
 from models.diagnosis.pooled_fit.problem import FitProblem, priors_of
-from models.friction.stribeck import StribeckParameters, torque
+from models.friction.stribeck import StribeckParameters
 from models.loops.attractor import attractor_torque
-from tests.models.diagnosis.campaigns import campaign
-from tests.models.diagnosis.fitted import checked_jacobian
-
-
-def test_the_jacobian_is_that_of_central_differences() -> None:
-    design = build_design(campaign(1, cycles=(0.0, 2000.0, 9000.0)))
-    laws = starting_laws(design, frame_of(design))
-    checked_jacobian(design, laws)
-
-
-def test_the_curve_is_that_of_eq_3() -> None:
-    velocity = np.linspace(0.1, 12.0, 30)
-    parameters = StribeckParameters(
-        static_torque=22.0, coulomb_ratio=0.6, stribeck_velocity=4.0, viscous_coefficient=1.5
-    )
-    found = curve(velocity, np.tile(parameters.as_array(), (velocity.size, 1)))
-    np.testing.assert_allclose(found, torque(velocity, parameters), rtol=1e-12)
+from tests.models.diagnosis.campaigns import campaign, start_of, with_theta
 
 
 @pytest.mark.parametrize("attractor", [40.0, 250.0, 4000.0])
 def test_loops_are_the_attractor_law_in_its_periodic_state(attractor: float) -> None:
     design = build_design(campaign(2, cycles=(0.0,), noise=0.0, gain=0.0))
-    laws = starting_laws(design, frame_of(design))
-    theta = laws.theta.copy()
-    theta[KAPPA] = np.log(attractor)
-    prediction = predict(design, Laws(theta=theta, frame=laws.frame))
-    assert prediction.lag is not None
+    prediction = predict(design, with_theta(start_of(design), KAPPA, np.log(attractor)))
     points = prediction.scene.points
     first = points.loop == 0
     parameters = StribeckParameters.from_array(prediction.scene.parameters[first][0])
@@ -72,10 +50,9 @@ def test_loops_are_the_attractor_law_in_its_periodic_state(attractor: float) -> 
 
 def test_a_bare_truth_is_fitted_to_a_thousandth() -> None:
     design = build_design(campaign(3, noise=0.0, gain=0.0))
-    start = starting_laws(design, frame_of(design))
-    found = fit(
-        FitProblem(design=design, noise=first_noise(design), priors=priors_of(design, start.theta, start.frame)), start
-    )
+    start = start_of(design)
+    priors = priors_of(design, start.theta, start.frame)
+    found = fit(FitProblem(design=design, noise=first_noise(design), priors=priors), start)
     assert np.sqrt(np.mean(found.residual**2)) < 1e-3 * np.median(design.torque)
 
 
@@ -136,31 +113,29 @@ def test_far_below_two_pressures_the_ratio_stays_one(levels: tuple[float, float]
 
 def test_the_curvature_stays_within_its_bounds_wherever_a_fit_starts() -> None:
     design = build_design(campaign(3, noise=0.0, gain=0.0, loops=False, cycles=(0.0, 3000.0, 9000.0)))
-    start = starting_laws(design, frame_of(design))
-    priors = priors_of(design, start.theta, start.frame)
-    theta = start.theta.copy()
-    theta[FALL] = np.log(0.05 * start.frame.span), np.log(4.9)
-    curved = replace(design, torque=predict(design, Laws(theta=theta, frame=start.frame)).torque)
+    start = start_of(design)
+    steep = with_theta(start, FALL, (np.log(0.05 * start.frame.span), np.log(4.9)))
     noise = first_noise(design)
-    noise = replace(noise, deviation=0.02 * noise.deviation)
+    problem = FitProblem(
+        design=replace(design, torque=predict(design, steep).torque),
+        noise=replace(noise, deviation=0.02 * noise.deviation),
+        priors=priors_of(design, start.theta, start.frame),
+    )
     for begun in (0.25, 20.0):
-        theta = start.theta.copy()
-        theta[LOG_CURVATURE] = np.log(begun)
-        found = fit(FitProblem(design=curved, noise=noise, priors=priors), Laws(theta=theta, frame=start.frame))
+        found = fit(problem, with_theta(start, LOG_CURVATURE, np.log(begun)))
         assert CURVATURE_BOUNDS[0] <= np.exp(found.laws.theta[LOG_CURVATURE]) <= CURVATURE_BOUNDS[1] * (1 + 1e-9)
 
 
 def test_a_ratio_that_falls_as_a_hyperbola_is_followed_and_an_exponential_is_not_enough() -> None:
     design = build_design(campaign(3, noise=0.0, gain=0.0))
-    start = starting_laws(design, frame_of(design))
-    theta = start.theta.copy()
-    theta[RATIO * BLOCK : RATIO * BLOCK + 2] = 0.9, 0.6
-    theta[FALL] = np.log(start.frame.lowest / 2), np.log(1.5)
-    curved = replace(design, torque=predict(design, Laws(theta=theta, frame=start.frame)).torque)
-    noise, priors = first_noise(design), priors_of(design, start.theta, start.frame)
-    held = replace(priors, free=priors.free & (np.arange(theta.size) != LOG_CURVATURE))
-    stiff = start.theta.copy()
-    stiff[LOG_CURVATURE] = np.log(EXPONENTIAL)
-    free = fit(FitProblem(design=curved, noise=noise, priors=priors), start)
-    exponential = fit(FitProblem(design=curved, noise=noise, priors=held), Laws(theta=stiff, frame=start.frame))
+    start = start_of(design)
+    curved = with_theta(start, slice(RATIO * BLOCK, RATIO * BLOCK + 2), (0.9, 0.6))
+    curved = with_theta(curved, FALL, (np.log(start.frame.lowest / 2), np.log(1.5)))
+    priors = priors_of(design, start.theta, start.frame)
+    problem = FitProblem(
+        design=replace(design, torque=predict(design, curved).torque), noise=first_noise(design), priors=priors
+    )
+    held = replace(priors, free=priors.free & (np.arange(start.theta.size) != LOG_CURVATURE))
+    free = fit(problem, start)
+    exponential = fit(replace(problem, priors=held), with_theta(start, LOG_CURVATURE, np.log(EXPONENTIAL)))
     assert np.abs(free.residual).max() < 0.2 * np.abs(exponential.residual).max()

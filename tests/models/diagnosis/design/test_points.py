@@ -1,6 +1,6 @@
-"""Points are taken, put together and marked open column by column."""
+"""Loops in phase bins: what of a record belongs to the swing, and from when on friction follows it."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,71 +10,11 @@ from models.clutch import Geometry
 from models.diagnosis.baseline.prediction import lag_of
 from models.diagnosis.campaign import Campaign, DynamicRun
 from models.diagnosis.design import criteria
-from models.diagnosis.design.design import Design, Points, build_design, concatenate, mark_open
+from models.diagnosis.design.design import Design, Points, build_design
 from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
 from models.friction.stribeck import GAMMA, StribeckParameters, torque
 from models.loops.attractor import attractor_torque
-from models.records.criteria import UNLOADED
 from models.records.runs import Record
-
-_INTEGERS = {"run", "loop", "previous"}
-
-
-def numbered(first: int, count: int) -> Points:
-    """Each column other numbers; the loops of all but the first point are -1."""
-    columns = {
-        each.name: (np.arange(first, first + count) + 100 * place).astype(np.intp if each.name in _INTEGERS else float)
-        for place, each in enumerate(fields(Points))
-    }
-    columns["loop"] = np.where(np.arange(count) == 0, 0, -1).astype(np.intp)
-    return Points(**columns)
-
-
-def test_some_are_taken_and_lose_the_ones_before_them() -> None:
-    points = numbered(0, 5)
-    some = points.take(np.array([True, False, True, True, False]))
-    assert some.run.tolist() == [0, 2, 3]
-    assert some.previous.tolist() == [-1, -1, -1]
-    for each in fields(Points):
-        if each.name != "previous":
-            assert getattr(some, each.name).tolist() == getattr(points, each.name)[[0, 2, 3]].tolist()
-
-
-def test_blocks_stand_one_after_the_other() -> None:
-    one, other = numbered(0, 2), numbered(7, 3)
-    both = concatenate([one, other])
-    for each in fields(Points):
-        column = getattr(both, each.name)
-        assert column.tolist() == [*getattr(one, each.name), *getattr(other, each.name)]
-        assert column.dtype == (np.intp if each.name in _INTEGERS else np.float64)
-    assert both.steady.tolist() == [False, True, False, True, True]
-
-
-def test_no_blocks_are_no_points() -> None:
-    none = concatenate([])
-    assert {getattr(none, each.name).size for each in fields(Points)} == {0}
-
-
-@pytest.mark.parametrize(
-    ("pressure", "engaged", "expected"),
-    [
-        ([4 * UNLOADED, 0.0, 2 * UNLOADED], [1.0, 0.0, 1.0], [4 * UNLOADED, 2 * UNLOADED, 2 * UNLOADED]),
-        ([0.0, 0.5 * UNLOADED], [0.0, 0.0], [1.0, 1.0]),
-        ([UNLOADED], [1.0], [UNLOADED]),
-    ],
-)
-def test_an_open_clutch_has_the_lowest_closed_pressure(
-    pressure: list[float], engaged: list[float], expected: list[float]
-) -> None:
-    points = numbered(0, len(pressure))
-    found = mark_open(
-        Points(**{each.name: getattr(points, each.name) for each in fields(Points)} | {"pressure": np.array(pressure)})
-    )
-    assert found.engaged.tolist() == engaged
-    assert found.pressure.tolist() == expected
-
-
-# --- Loops in phase bins: what of a record belongs to the swing, and from when on friction follows it.
 
 GEOMETRY = Geometry()
 RPM = 2 * np.pi / 60
@@ -163,9 +103,7 @@ def turned(points: Points, frequency: float, time: FloatArray) -> FloatArray:
 
 @pytest.mark.parametrize(("attractor", "share"), [(30.0, 1e-4), (60.0, 1e-4), (250.0, 2e-4)])
 @pytest.mark.parametrize(("frequency", "rate", "first"), [(0.05, 100.0, 0.0), (0.1, 50.0, 0.3), (0.2, 100.0, 0.25)])
-def test_ramps_down_to_rest_are_what_the_lag_law_says(
-    attractor: float, share: float, frequency: float, rate: float, first: float
-) -> None:
+def test_ramps_down_to_rest_are_what_the_lag_law_says(attractor, share, frequency, rate, first):
     """A permille was asked; corners that four harmonics round cost a percent, S as it is amid a phase's cusp 2e-4."""
     fine, before = 50, 2 / frequency  # two periods to settle in, 50 steps a sample
     time = np.arange(round((before + 1.6 / frequency) * rate) * fine) / (rate * fine) - before
@@ -184,9 +122,7 @@ def test_ramps_down_to_rest_are_what_the_lag_law_says(
 
 
 @pytest.mark.parametrize(("attractor", "share"), [(40.0, 2e-4), (60.0, 1e-4), (140.0, 1e-4), (400.0, 1e-4)])
-def test_the_reference_test_from_rest_is_what_the_lag_law_says(
-    attractor: float, share: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_reference_test_from_rest_is_what_the_lag_law_says(attractor, share, monkeypatch):
     """0 to 2,000 rpm at 0.1 Hz for 15 s from rest: off by at most a tenth of the noise of a rig of 0.1 %, against steps of
     0.1 ms."""
     time = np.arange(150_001) / 10_000

@@ -1,22 +1,24 @@
 """Every effect of the catalogue: what its change looks like, its units and its limits."""
 
+import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.stats import norm, t
+from scipy.integrate import quad, solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.stats import t
 
 from models.arrays import FloatArray
-from models.diagnosis.baseline.laws import Scene, scene_of
-from models.diagnosis.baseline.prediction import frame_of, predict
-from models.diagnosis.campaign import Oil
+from models.diagnosis.baseline.laws import GAMMA, Scene, curve
+from models.diagnosis.baseline.laws import scene_of as scene_of_laws
+from models.diagnosis.baseline.prediction import predict
+from models.diagnosis.campaign import Campaign, DutyRun, EventKind, MaintenanceEvent, Oil, StationaryRun
 from models.diagnosis.criteria import DISCREPANCY_SD
-from models.diagnosis.design.design import build_design
-from models.diagnosis.diagnose import diagnose
+from models.diagnosis.design.facts import facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.effects.effect import (
-    Discrepancy,
     Effect,
     Kind,
     amplitude_cost,
@@ -32,50 +34,42 @@ from models.diagnosis.effects.fitted_effect import (
     effect_rows,
     law_columns,
 )
+from models.diagnosis.effects.history import BY_CLOCK, BY_USE, STATIC, WHOLE
+from models.diagnosis.effects.moving import FILM, FIRST_ORDER, LEAST_TIME, MOST_POWER, THICKNESS, usual_slope
 from models.diagnosis.effects.readings import DAYS, STRAIGHT
 from models.diagnosis.effects.thermal import HERSEY, log_viscosity_ratio, viscosity
-from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
-from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, starting_laws
+from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.diagnosis.pooled_fit.projection import gram_of, project
-from models.friction.stribeck import GAMMA, torque
-from tests.models.diagnosis.campaigns import campaign
-from tests.models.diagnosis.fitted import Study, of_size, study
+from tests.models.diagnosis.campaigns import Study, campaign, of_size, scene_of, study
 
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    design = build_design(campaign(1))
-    return predict(design, starting_laws(design, frame_of(design))).scene
-
-
-@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.slug)
-def test_no_amplitude_no_change_where_pressure_scatters_about_its_levels(effect: Effect, scene: Scene) -> None:
-    """Half of the rows of the lowest level lie below it, where M̄_c's law ends."""
-    rng = np.random.default_rng(1)
-    pressure = scene.points.pressure + 2_000.0 * rng.standard_normal(scene.points.pressure.size)
-    scattered = scene_of(scene.laws, replace(scene.points, pressure=pressure), scene.facts)
-    for tried in effect.grid(scene.facts):
-        assert np.abs(effect.change(scattered, 0.0, tried.shape)).max() < 1e-9
+    return scene_of(campaign(1))
 
 
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.slug)
 def test_no_amplitude_no_change_and_all_changes_are_finite(effect: Effect, scene: Scene) -> None:
     grid = effect.grid(scene.facts)
+    # half of the rows of the lowest level lie below it, where M̄_c's law ends
+    pressure = scene.points.pressure + 2_000.0 * np.random.default_rng(1).standard_normal(scene.points.pressure.size)
+    scattered = scene_of_laws(scene.laws, replace(scene.points, pressure=pressure), scene.facts)
+    # a film that stands is slow whatever its time
+    moving = scene.points.velocity > 0.01 * scene.points.velocity.max()
     columns = unit_changes(effect, scene, [tried.shape for tried in grid]).T if grid else np.zeros((0, 0))
     for tried, column in zip(grid, columns, strict=True):
-        assert np.abs(effect.change(scene, 0.0, tried.shape)).max() < 1e-9
+        for at in (scene, scattered):
+            assert np.abs(effect.change(at, 0.0, tried.shape)).max() < 1e-9
         assert column.shape == scene.curve.shape
         assert np.isfinite(column).all()
-        one = effect.change(scene, 1e-3 * effect.prior_sd, tried.shape) / (1e-3 * effect.prior_sd)
+        one, two = (
+            effect.change(scene, k * effect.prior_sd, tried.shape) / (k * effect.prior_sd) for k in (1e-3, 2e-3)
+        )
         np.testing.assert_allclose(column, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())  # many at once, or each alone
         assert np.abs(column).max() > 0
-        doubled = effect.change(scene, 2e-3 * effect.prior_sd, tried.shape) / (2e-3 * effect.prior_sd)
-        moving = (
-            scene.points.velocity > 0.01 * scene.points.velocity.max()
-        )  # a film that stands is slow whatever its time
         # small amplitudes act in proportion
-        assert np.abs(doubled - column)[moving].max() < 0.05 * np.abs(column[moving]).max()
+        assert np.abs(two - column)[moving].max() < 0.05 * np.abs(column[moving]).max()
 
 
 def test_effects_of_loops_leave_plateaus_alone(scene: Scene) -> None:
@@ -198,16 +192,17 @@ def test_the_direction_is_that_of_the_last_change(values: list[float], breaks: l
 # through.
 
 
-@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.slug)
-def test_the_prior_is_a_density_with_students_tails(effect):
+@pytest.mark.parametrize("effect", [*CATALOGUE, replace(BY_SLUG["oil_change"], tails=float("inf"))])
+def test_the_prior_is_students_density_or_a_normal_one(effect: Effect) -> None:
     def density(a: float) -> float:
         return float(np.exp(log_amplitude_peak(effect) - amplitude_cost(effect, a)) / np.sqrt(2 * np.pi))
 
     total = quad(lambda u: density(u * effect.prior_sd) * effect.prior_sd, -np.inf, np.inf)[0]
     assert total == pytest.approx(1.0, abs=1e-6)
-    witness = t(df=effect.tails, scale=effect.prior_sd).logpdf(6 * effect.prior_sd)
-    assert np.log(density(6 * effect.prior_sd)) == pytest.approx(witness, abs=1e-9)
-    assert witness > norm(scale=effect.prior_sd).logpdf(6 * effect.prior_sd) + 10.0
+    witness = t(df=effect.tails, scale=effect.prior_sd)
+    for deviations in (0.0, 0.3, 6.0):
+        at = deviations * effect.prior_sd
+        assert np.log(density(at)) == pytest.approx(witness.logpdf(at), abs=1e-9)
 
 
 @pytest.mark.parametrize("tails", [2.0, 5.0, float("inf")])
@@ -217,14 +212,6 @@ def test_the_precision_is_the_slope_of_the_cost(tails):
         step = 1e-6
         slope = (amplitude_cost(effect, a + step) - amplitude_cost(effect, a - step)) / (2 * step)
         assert amplitude_precision(effect, a) * a == pytest.approx(slope, rel=1e-5)
-
-
-def test_infinite_tails_are_a_normal_prior():
-    effect = replace(BY_SLUG["oil_change"], tails=float("inf"))
-    witness = norm(scale=effect.prior_sd)
-    for a in (0.0, 0.3):
-        found = log_amplitude_peak(effect) - amplitude_cost(effect, a) - 0.5 * np.log(2 * np.pi)
-        assert found == pytest.approx(witness.logpdf(a), abs=1e-12)
 
 
 # --- Model discrepancy of templates, structure that has more evidence than any effect, and noise that does not
@@ -272,13 +259,6 @@ def test_a_fit_knows_that_effects_change_with_the_friction_that_they_change(give
     assert (off <= (1e-3 if exact else 0.03) * np.linalg.norm(wanted, axis=1)).all()
 
 
-def test_an_exact_law_has_no_discrepancy(given):
-    """J dω/dt has no form to be uncertain of; a zero adds the same torque at every speed, a drag does not."""
-    assert discrepancy_factors(given.design, BY_SLUG["inertia_torque"]).shape[1] == 0
-    assert Discrepancy.SPEED not in BY_SLUG["torque_zero_shift"].discrepancies
-    assert Discrepancy.SPEED in BY_SLUG["hydrodynamic_drag"].discrepancies
-
-
 def test_a_discrepancy_absorbs_what_a_template_misses_as_far_as_its_prior_allows(given):
     """Whitened squares that are left of a truth off by one deviation of the prior, with discrepancy and without; a truth
     that is off by ten deviations keeps most of its misfit."""
@@ -300,22 +280,6 @@ def test_a_discrepancy_absorbs_what_a_template_misses_as_far_as_its_prior_allows
     assert left(fitted, 10.0) - nothing > 50.0
 
 
-@pytest.mark.slow
-def test_a_bump_in_speed_is_no_drag():
-    """Friction is higher in a band of speeds, in proportion to what it is there: no drag, which pressure does not change."""
-
-    def share(at):
-        return 0.06 * np.exp(-0.5 * ((at.velocity - 6.0) / 1.5) ** 2)
-
-    report = diagnose(
-        campaign(5, lambda at: share(at) * torque(at.velocity, at.parameters)), rng=np.random.default_rng(1)
-    )
-    assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
-    assert report.baseline is not None
-    assert report.baseline.where[0].axis == "speed_rpm"
-    assert all(each.probability < 0.5 for each in report.candidates)
-
-
 def test_noise_does_not_vanish_where_a_fit_is_far_off(given):
     """A residual with an offset of hundreds of deviations on each curve holds the same noise as one without."""
     design, rng = given.design, np.random.default_rng(2)
@@ -325,3 +289,158 @@ def test_noise_does_not_vanish_where_a_fit_is_far_off(given):
     offset, _ = estimate_noise(design, noise + 40.0, design.torque, start)
     assert np.median(offset.deviation / plain.deviation) == pytest.approx(1.0, rel=0.05)
     assert fit_baseline(design).problem.noise.deviation.min() > 0
+
+
+# --- What a rest's length and a film's own equation do, against computations of another kind.
+
+HOUR, DAY = 3600.0, 86400.0
+
+
+def rested(*hours: float) -> Campaign:
+    """A campaign of a test a day whose log says how long the clutch rested before those at 1000, 3000 ... cycles."""
+    given = campaign(1)
+    tests = given.stationary[1 : 1 + len(hours)]
+    events = [
+        MaintenanceEvent(
+            run_id=f"rest-{k}", cycles=test.cycles, event=EventKind.REST, moment=(test.moment or 0.0) - HOUR * rest
+        )
+        for k, (test, rest) in enumerate(zip(tests, hours, strict=True))
+    ]
+    return replace(given, maintenance=tuple(events))
+
+
+def test_a_rest_lasts_from_its_own_moment_to_the_next_test() -> None:
+    facts = facts_of(rested(2.0, 10.0))
+    assert facts.rests == (1000.0, 3000.0)
+    np.testing.assert_allclose(facts.rest_lengths, [2 * HOUR, 10 * HOUR])
+    np.testing.assert_allclose(facts.rest_moments, [1e9 + DAY, 1e9 + 2 * DAY])
+
+
+@pytest.mark.parametrize("told", ["at the beginning", "at the end", "not at all"])
+def test_a_pause_is_what_the_engagements_between_two_tests_leave(told: str) -> None:
+    """20 s an engagement, whether a block is timed by when it began, by when it was over or not sent; the clutch rests for
+    12 h before the one from 1000 cycles and for 30 h before that from 6000."""
+    rests = {1000.0: 12 * HOUR, 6000.0: 30 * HOUR}
+    given, moment, tests, blocks = campaign(1, loops=False), 1e9, list[StationaryRun](), list[DutyRun]()
+    for number, (test, after) in enumerate(itertools.pairwise(given.stationary)):
+        tests.append(replace(test, moment=moment))
+        engagements = after.cycles - test.cycles
+        begun = moment + 0.5 * HOUR + rests.get(test.cycles, 0.0)
+        over = begun + 20.0 * engagements
+        block = DutyRun(run_id=f"block-{number}", cycles=after.cycles, engagements=engagements)
+        if told != "not at all":
+            blocks.append(replace(block, moment=begun if told == "at the beginning" else over - 60.0))
+        moment = over
+    tests.append(replace(given.stationary[-1], moment=moment))
+    facts = facts_of(replace(given, stationary=tuple(tests), duty=tuple(blocks)))
+    assert facts.rests == (3000.0, 10000.0)
+    np.testing.assert_allclose(facts.rest_lengths, [12 * HOUR, 30 * HOUR], atol=1.2 * HOUR)
+
+
+def test_friction_recovers_with_the_logarithm_of_the_rest_where_the_power_is_one() -> None:
+    scene = scene_of(rested(2.0, 10.0))
+    effect, first = BY_SLUG["rest_recovery"], scene.points.clock == scene.points.clock[0]
+    shares = {}
+    for power in (0.0, 1.0):
+        change = effect.change(scene, 0.01, (10.0, BY_USE, 6.0, power, WHOLE)) / scene.curve
+        shares[power] = [float(change[first & (scene.points.cycles == at)].max()) for at in (1000.0, 3000.0)]
+    kept = shares[0.0][0]  # of the cycles and the clock, the same for both
+    assert shares[0.0] == pytest.approx([kept, kept])
+    assert shares[1.0] == pytest.approx([kept * np.log(3.0) / np.log(11.0), kept])
+
+
+def test_what_recovers_is_friction_as_a_whole_or_its_static_torque() -> None:
+    scene = scene_of(rested(2.0, 10.0))
+    effect = BY_SLUG["rest_recovery"]
+    whole, static = (effect.change(scene, 0.01, (10.0, BY_USE, 6.0, 0.0, part)) for part in (WHOLE, STATIC))
+    some = whole > 0
+    sheared = np.where(np.arange(4) == 3, 0.0, scene.parameters)  # without C_v the curve is that of the asperities
+    share = curve(scene.points.velocity, sheared) / scene.curve
+    np.testing.assert_allclose(static[some], (whole * share)[some], rtol=1e-12)
+    assert np.ptp(share[some]) > 0.1
+    assert {one.shape[-1] for one in effect.grid(scene.facts)} == {WHOLE, STATIC}
+
+
+def test_a_test_before_the_pause_at_the_same_cycles_has_not_rested() -> None:
+    """The dynamic test follows the stationary one by 2000 s; the pause lies between them."""
+    given = campaign(1)
+    pause = MaintenanceEvent(run_id="rest", cycles=3000.0, event=EventKind.REST, moment=1e9 + 2 * DAY + 1000.0)
+    scene = scene_of(replace(given, maintenance=(pause,)))
+    change = BY_SLUG["rest_recovery"].change(scene, 0.01, (100.0, BY_CLOCK, math.log(600.0), 0.0, WHOLE))
+    here = scene.points.cycles == 3000.0
+    assert np.abs(change[here & scene.points.steady]).max() < 1e-6
+    assert np.abs(change[here & ~scene.points.steady]).max() > 1e-3
+
+
+def test_a_film_is_the_same_whatever_rows_are_asked_for() -> None:
+    """One amplitude means one film time: loops of one pressure alone show what they show among the others."""
+    scene = scene_of(campaign(1))
+    shape = (0.3, 0.8, 0.2, 0.5, FILM, 0.0)
+    change = BY_SLUG["squeeze_film"].change(scene, 0.5, shape)
+    some = scene.points.loop == scene.points.loop.max()
+    alone = replace(
+        scene,
+        points=scene.points.take(some),
+        **{name: getattr(scene, name)[some] for name in ("parameters", "curve", "gradient", "decay", "by_velocity")},
+    )
+    assert np.abs(change[some]).max() > 0.01
+    np.testing.assert_allclose(BY_SLUG["squeeze_film"].change(alone, 0.5, shape), change[some], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("thin", "least", "sheared"), [(0.8, 0.2, 0.5), (1.4, 0.3, 0.7)])
+def test_a_film_follows_its_equation(thin: float, least: float, sheared: float) -> None:
+    """Against a general solver, two periods long, on the torque of one loop; and to first order where the film is fast."""
+    scene = scene_of(campaign(1))
+    effect, points, middle = BY_SLUG["squeeze_film"], scene.points, scene.laws.frame.reference_velocity
+    looping = points.loop >= 0
+    slope = float(usual_slope(scene.laws, np.array([sheared]))[0])
+    carried = scene.viscous / points.velocity
+    seen = float(np.median((sheared * carried - scene.by_velocity + GAMMA * carried)[looping]))
+    assert 0.7 < slope / seen < 1.4  # about that of the loops at hand
+    time = 0.08  # of the film at mid speed and 5 bar [s]
+    change = effect.change(scene, time * slope, (0.0, thin, least, sheared, FILM, 0.0))
+    one = np.flatnonzero(points.loop == points.loop[looping][0])
+    v, step = points.velocity[one], 2 * np.pi / (one.size * points.angular_frequency[one][0])
+    at = step * np.arange(-1, one.size + 1)
+    course = CubicSpline(step * np.arange(one.size + 1), np.append(v, v[0]), bc_type="periodic")
+    period = step * one.size
+
+    def film(t: float, w: np.ndarray) -> np.ndarray:
+        return np.asarray((course(t % period) - w) * (np.maximum(w, 0.0) / middle + least) ** thin / time)
+
+    told = solve_ivp(film, (0.0, 2 * period), [v[0]], t_eval=period + at[1:-1], rtol=1e-8, atol=1e-10, method="LSODA")
+    w, dry = told.y[0], scene.parameters[one] * np.array([1.0, 1.0, 1.0, 0.0])
+    expected = curve(w, dry) - curve(v, dry) + scene.viscous[one] * ((v / w) ** sheared - 1.0)
+    moving = v > 0.05 * v.max()
+    np.testing.assert_allclose(change[one][moving], expected[moving], atol=0.02 * np.abs(expected[moving]).max())
+    by_powers = effect.change(scene, time * slope, (0.0, thin, least, sheared, FIRST_ORDER, 0.0))[one]
+    assert np.abs(by_powers - expected)[moving].max() > 0.1 * np.abs(expected[moving]).max()  # the control
+
+
+@pytest.mark.parametrize(("power", "thin", "least", "time"), [(0.5, 0.5, 0.1, 0.3), (0.0, 1.5, 0.05, 0.9)])
+def test_a_film_of_its_own_strength_relaxes(power: float, thin: float, least: float, time: float) -> None:
+    """τ ḣ = H - h by a general solver; its slope at mid speed is the amplitude where it is fast; nothing on plateaus."""
+    scene = scene_of(campaign(1))
+    points, middle = scene.points, scene.laws.frame.reference_velocity
+    change = BY_SLUG["squeeze_film"].change(scene, 0.5, (power, thin, least, time, THICKNESS, 0.0))
+    assert np.abs(change[points.steady]).max() == 0.0
+    one = np.flatnonzero(points.loop == points.loop.max())
+    step, tau, q = (
+        2 * np.pi / (one.size * points.angular_frequency[one][0]),
+        LEAST_TIME * 10**time,
+        MOST_POWER / (1 + thin),
+    )
+    height = (points.velocity[one] / middle + least) ** q
+    course = CubicSpline(step * np.arange(one.size + 1), np.append(height, height[0]), bc_type="periodic")
+    period = step * one.size
+    told = solve_ivp(
+        lambda t, h: (course(t % period) - h) / tau,
+        (0.0, 4 * period),
+        [height.mean()],
+        t_eval=3 * period + step * np.arange(one.size),
+        max_step=step,
+        rtol=1e-8,
+    )
+    strength = 0.5 * (points.pressure[one] / 5e5) ** (1.0 + 0.5 * power) * middle / (tau * q * (1 + least) ** (q - 1))
+    expected = strength * (height - told.y[0])
+    np.testing.assert_allclose(change[one], expected, atol=0.02 * np.abs(expected).max())

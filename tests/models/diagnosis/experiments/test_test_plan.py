@@ -18,9 +18,17 @@ from models.diagnosis.experiments.information import CandidateDistances
 from models.diagnosis.experiments.test_plan import Advice, advise, decided
 from models.diagnosis.explanations.verdict import Fitted
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
-from models.records.runs import Plateaus
-from tests.models.diagnosis.campaigns import RPM, Where, campaign
-from tests.models.diagnosis.fitted import Study, of_size, study, warmth
+from tests.models.diagnosis.campaigns import (
+    RPM,
+    Study,
+    Where,
+    altered,
+    campaign,
+    of_size,
+    study,
+    warmth,
+    without_temperature,
+)
 
 
 def inertia(at: Where) -> np.ndarray:
@@ -30,6 +38,17 @@ def inertia(at: Where) -> np.ndarray:
 @pytest.fixture(scope="module")
 def swung() -> Study:
     return study(campaign(21, inertia, cycles=(0.0, 4000.0, 12000.0)))
+
+
+@pytest.fixture(scope="module")
+def rivals(swung: Study) -> tuple[Fit, Fit]:
+    """Inertia, which is planted, and a film."""
+    film = BY_SLUG["squeeze_film"]
+    tried = film.grid(swung.design.facts)[0]
+    return tuple(
+        swung.extended((slug, amplitude, shape))
+        for slug, amplitude, shape in (("inertia_torque", 0.012, ()), (film.slug, 0.1 * film.prior_sd, tried.shape))
+    )
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +62,8 @@ def advised(given: Study, *fits: Fit, nearby: tuple[Fit, ...] = ()) -> tuple[Adv
     return advise(given.campaign, given.problem, credible, behind)
 
 
-def test_inertia_and_a_film_are_parted_by_loops(swung):
-    found = advised(swung, swung.extended(("inertia_torque", 0.01, ())), swung.extended(squeeze(swung)))
+def test_inertia_and_a_film_are_parted_by_loops(swung, rivals):
+    found = advised(swung, *rivals)
     assert {found[0].effect, found[0].other} == {"inertia_torque", "squeeze_film"}
     assert found[0].nats > WORTHWHILE
     assert found[0].test == TRIALS[found[0].key].text
@@ -55,11 +74,6 @@ def test_inertia_and_a_film_are_parted_by_loops(swung):
 def moving(key: str) -> bool:
     """Whether loops are driven in a trial."""
     return any(TRIALS[part].loops for part in TRIALS[key].parts or (key,))
-
-
-def squeeze(given: Study):
-    tried = BY_SLUG["squeeze_film"].grid(given.design.facts)
-    return ("squeeze_film", BY_SLUG["squeeze_film"].prior_sd * 0.1, tried[0].shape)
 
 
 def test_a_zero_is_parted_from_wear_by_an_open_clutch(warm):
@@ -80,27 +94,27 @@ def beside(given: Study, slug: str, amplitude: float, shape: tuple[float, ...]) 
 
 def test_what_was_predicted_is_what_the_test_brings(warm):
     """The advised test is made in simulation; the drop between refits without and with the effect rises as predicted."""
-    extended = warm.extended(("oil_temperature", 0.3, (0.5, AT_ONCE)))
+    temperature = ("oil_temperature", 0.3, (0.5, AT_ONCE))
+    extended = warm.extended(temperature)
     found = advised(warm, extended)
     assert found[0].key in {"sweep_60c", "sweeps_60c"}
     best = next(each for each in found if each.key == "sweep_60c")
     assert best.other == "baseline"
-    drops = [warm.baseline.fit.cost - extended.cost]
-    made = study(with_measured(warm.campaign, best.key, extended))
-    drops.append(made.baseline.fit.cost - made.extended(("oil_temperature", 0.3, (0.5, AT_ONCE))).cost)
-    print(best, drops)
+
+    def brought(key: str) -> float:
+        then = study(with_measured(warm.campaign, key, extended))
+        dropped = then.baseline.fit.cost - then.extended(temperature).cost
+        return dropped - (warm.baseline.fit.cost - extended.cost)
+
     # linear in the effect and by a noise that is re-estimated: right within a factor of two
-    assert 0.5 < (drops[1] - drops[0]) / best.nats < 2.0
+    assert 0.5 < brought("sweep_60c") / best.nats < 2.0
     # the control: repeating the test as it was brings far less
-    again = study(with_measured(warm.campaign, "repeats", extended))
-    repeated = again.baseline.fit.cost - again.extended(("oil_temperature", 0.3, (0.5, AT_ONCE))).cost
-    assert repeated - drops[0] < 0.2 * best.nats
+    assert brought("repeats") < 0.2 * best.nats
 
 
 def with_measured(given: Campaign, key: str, truth: Fit) -> Campaign:
     """The trial's runs with the torque that the fitted model gives there, and noise of one percent."""
     then = with_trial(given, key)
-    assert then is not None
     at = build_design(then)
     at = replace(at, facts=replace(at.facts, reference_temperature=358.15))
     prediction = predict(at, truth.laws)
@@ -135,7 +149,6 @@ def test_no_candidate_no_advice(warm):
 def test_every_trial_adds_runs_that_can_be_analysed(key, swung):
     energetic = replace(swung.campaign, duty=(DutyRun(run_id="duty", cycles=4000.0, engagements=4000.0, energy=8e3),))
     then = with_trial(energetic, key)
-    assert then is not None
     added = build_design(replace(then, stationary=then.stationary[3:], dynamic=then.dynamic[3:]))
     assert added.torque.size > 50
     assert added.rows.cycles.min() >= 12000.0
@@ -162,7 +175,6 @@ def test_every_trial_adds_runs_that_can_be_analysed(key, swung):
 def test_rests_lie_before_the_first_and_the_third_test(swung):
     timed = tuple(replace(run, moment=1e9 + 1e5 * k) for k, run in enumerate(swung.campaign.stationary))
     then = with_trial(replace(swung.campaign, stationary=timed), "rests")
-    assert then is not None
     tests, rests = then.stationary[3:], then.maintenance[len(swung.campaign.maintenance) :]
     assert [rest.cycles for rest in rests] == [tests[0].cycles, tests[2].cycles]
     assert [tests[k].moment - rest.moment for k, rest in zip((0, 2), rests, strict=True)] == [48 * 3600.0] * 2
@@ -173,14 +185,13 @@ def test_rests_lie_before_the_first_and_the_third_test(swung):
 @pytest.mark.parametrize("key", TRIALS)
 def test_trials_on_campaigns_that_have_no_pattern_for_them(key):
     whole = campaign(24, cycles=(0.0, 3000.0))
-    bare = [replace(run, plateaus=without_temperature(run.plateaus)) for run in whole.stationary]
     flat = replace(whole.dynamic[0].record, pressure=np.full(whole.dynamic[0].record.time.size, 5e5))
     for given in (
         Campaign(),
         replace(whole, stationary=()),
         replace(whole, dynamic=()),
         replace(whole, stationary=whole.stationary[:1], dynamic=()),
-        replace(whole, stationary=tuple(bare), dynamic=()),
+        replace(without_temperature(whole), dynamic=()),
         replace(whole, dynamic=(DynamicRun(run_id="flat", cycles=0.0, record=flat),)),
     ):
         then = with_trial(given, key)
@@ -195,10 +206,6 @@ def test_trials_on_campaigns_that_have_no_pattern_for_them(key):
             build_design(then)
 
 
-def without_temperature(table: Plateaus) -> Plateaus:
-    return Plateaus(pressure=table.pressure, speed=table.speed, torque=table.torque)
-
-
 def test_a_trial_swings_over_the_speeds_of_the_rig():
     """40 to 124 rad/s, and a spike of the encoder."""
     given = campaign(24, cycles=(0.0, 3000.0))
@@ -207,7 +214,6 @@ def test_a_trial_swings_over_the_speeds_of_the_rig():
     speed[100] = 1e4
     slower = replace(run, record=replace(run.record, speed=speed))
     then = with_trial(replace(given, dynamic=(given.dynamic[0], slower)), "loops_0.3hz")
-    assert then is not None
     swing = then.dynamic[-1].record.speed
     assert [swing.min(), swing.max()] == pytest.approx([40.0, 40.0 + 0.4 * 2000 * RPM], rel=0.01)
 
@@ -241,18 +247,17 @@ def test_what_a_trial_leaves_alone():
     assert decided(some, lead, np.array([-3.0, 0.0])) < paid - 0.3
 
 
-def test_a_hypothesis_that_is_not_far_behind_counts(swung):
+def test_a_hypothesis_that_is_not_far_behind_counts(swung, rivals):
     """Where the film is out of the race by five nats only, what brings it back is not what is advised first."""
-    inertia_fit, film = swung.extended(("inertia_torque", 0.01, ())), swung.extended(squeeze(swung))
-    found = advised(swung, inertia_fit, nearby=(film,))
+    found = advised(swung, rivals[0], nearby=rivals[1:])
     assert found
     assert {each.effect for each in found} == {"inertia_torque"}
     assert {each.other for each in found} == {"baseline"}
 
 
-def test_a_distance_is_what_a_refit_leaves(swung):
+def test_a_distance_is_what_a_refit_leaves(swung, rivals):
     """λ against its own witness: torque of the one is made, the other is fitted to it, and half its squares are left."""
-    first, second = swung.extended(("inertia_torque", 0.012, ())), swung.extended(squeeze(swung))
+    first, second = rivals
     distances = CandidateDistances(swung.problem, (first, second, replace(first, effects=()))).distances(())
     np.testing.assert_allclose(np.diag(distances)[:2], 0.0, atol=1e-6)
     assert 0 < distances[0, 1] < distances[0, 2]
@@ -264,12 +269,7 @@ def test_a_distance_is_what_a_refit_leaves(swung):
 
 def test_loops_are_not_predicted_where_none_could_be_evaluated():
     """All dynamic tests stood still: what a loop would show depends on an attractor that was not measured."""
-    moving_oil = campaign(22, warmth)
-    still = [
-        replace(run, record=replace(run.record, speed=np.full_like(run.record.speed, 100.0)))
-        for run in moving_oil.dynamic
-    ]
-    given = study(replace(moving_oil, dynamic=tuple(still)))
+    given = study(altered(campaign(22, warmth), moving=lambda run: {"speed": np.full_like(run.record.speed, 100.0)}))
     assert given.design.loops == 0
     found = advised(
         given, given.extended(("oil_temperature", 0.1, (0.0, AT_ONCE))), given.extended(("viscous_exponent", 0.1, ()))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -24,8 +25,7 @@ from models.diagnosis.pooled_fit.problem import FitProblem, Priors
 from models.diagnosis.pooled_fit.projection import gram_of, project
 from models.friction.stribeck import torque
 from tests.models.diagnosis import campaigns
-from tests.models.diagnosis.campaigns import Where, campaign
-from tests.models.diagnosis.fitted import Study, study
+from tests.models.diagnosis.campaigns import Study, Where, altered, campaign, study
 
 #: A sensor's wave [Nm].
 WAVE = 2.5
@@ -86,22 +86,20 @@ def test_a_swing_is_found_whatever_its_phase_in_each_run(design: Design, noise: 
     assert line_of(design, noise, drawn(design, noise, 0) + 0.02 * swing).p_value > 0.01
 
 
-def slow(kind: str, unit: FloatArray) -> FloatArray:
-    """A course [n] over a test, 0 ... 1, that has no period, of about unit size."""
-    courses = {
-        "ramp": 2.0 * unit - 1.0,
-        "parabola": 6.0 * (unit - 0.5) ** 2 - 0.5,
-        "settling": 3.0 * np.exp(-unit / 0.1) - 0.3,
-        "step": np.where(unit > 0.4, 0.8, -1.2),
-    }
-    return np.asarray(courses[kind], dtype=np.float64)
+#: Courses [n] over a test, 0 ... 1, that have no period, of about unit size.
+COURSES: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "ramp": lambda unit: 2.0 * unit - 1.0,
+    "parabola": lambda unit: 6.0 * (unit - 0.5) ** 2 - 0.5,
+    "settling": lambda unit: 3.0 * np.exp(-unit / 0.1) - 0.3,
+    "step": lambda unit: np.where(unit > 0.4, 0.8, -1.2),
+}
 
 
-@pytest.mark.parametrize("kind", ["ramp", "parabola", "settling", "step"])
+@pytest.mark.parametrize("kind", COURSES)
 def test_structure_that_has_no_period_has_no_line(design: Design, noise: Noise, kind: str) -> None:
-    """Of twenty draws, with a course of its own in every run, as large as a line that is seen and three times as large."""
+    """Of ten draws, with a course of its own in every run, as large as a line that is seen and three times as large."""
     rows = design.rows
-    course = slow(kind, rows.clock / rows.clock[rows.steady].max()) * design.torque * rows.steady
+    course = COURSES[kind](rows.clock / rows.clock[rows.steady].max()) * design.torque * rows.steady
     for seed in range(10):
         size = np.random.default_rng([SEED, seed]).standard_normal(len(design.runs))[rows.run]
         for strength in (0.015, 0.05):
@@ -126,18 +124,18 @@ def test_gains_of_curves_one_after_the_other_are_no_line(monkeypatch: pytest.Mon
     """Every pressure of every run has a gain of its own, at even times; a swing beside them stays one."""
     monkeypatch.setattr(campaigns, "PRESSURES", np.linspace(4e5, 7e5, 8))
 
-    def with_gains(run: StationaryRun, dice: np.random.Generator, swing: float) -> StationaryRun:
+    def with_gains(run: StationaryRun, dice: np.random.Generator, swing: float) -> dict[str, FloatArray]:
         at = run.plateaus
         clock = 5.0 * np.arange(at.torque.size)
         gains = np.repeat(1 + 0.0015 * dice.standard_normal(np.unique(at.pressure).size), np.unique(at.speed).size)
         swings = 1 + swing * np.sin(2 * np.pi * clock / 90.0 + run.cycles)
-        return replace(run, plateaus=replace(at, torque=at.torque * gains * swings))
+        return {"torque": at.torque * gains * swings}
 
     quiet = campaign(1, loops=False, noise=0.001)
     weights = []
     for swing in (0.0, 0.002):
         dice = np.random.default_rng(3)  # one draw of eight that looked like a line, by 91 nats
-        given = replace(quiet, stationary=tuple(with_gains(run, dice, swing) for run in quiet.stationary))
+        given = altered(quiet, partial(with_gains, dice=dice, swing=swing))
         weights.append(posterior_of(fit_baseline(build_design(given)), ()).weights[Alternative((), LINE)])
     assert weights[0] < 0.0 < 10.0 < weights[1]
 
@@ -192,36 +190,36 @@ def slowing(rows: Points, at: float) -> FloatArray:
     return np.asarray((rows.acceleration < 0) * np.exp(-(off(rows, at) ** 4)), dtype=np.float64)
 
 
+def information(given: Study, *columns: FloatArray) -> FloatArray:
+    """What is left of columns beside the baseline, in products of each with each."""
+    gram = gram_of(given.problem, given.baseline.fit, np.column_stack(columns))
+    return project(gram, given.problem.noise.run_gain, 0.0).info
+
+
+def best_shares(given: Study, structures: FloatArray) -> FloatArray:
+    """Of λ that is left of each structure, what the best single contrast sees."""
+    info = information(given, structures, contrasts_of(given.design, given.baseline.fit.prediction).columns)
+    scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
+    count = structures.shape[1]
+    return ((info / scale[:, None] / scale)[:count, count:] ** 2).max(axis=1)
+
+
 @pytest.mark.parametrize(("shape", "least"), [(bump, 0.6), (resonance, 0.55), (slowing, 0.45)])
-def test_a_contrast_sees_its_share_of_what_is_visible(
+def test_a_contrast_sees_its_share_of_what_is_visible_wherever_it_lies(
     plain: Study, shape: Callable[[Points, float], FloatArray], least: float
 ) -> None:
-    """Of λ that is left of the structure beside the baseline, the best single contrast sees so much wherever it lies."""
-    known, rows = plain.baseline, plain.design.rows
-    contrasts = contrasts_of(plain.design, known.fit.prediction)
-    structures = np.stack([shape(rows, at) for at in PLACES], axis=1) * known.fit.torque[:, None]
-    columns = np.column_stack([structures, contrasts.columns])
-    info = project(gram_of(plain.problem, known.fit, columns), plain.problem.noise.run_gain, 0.0).info
-    scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
-    shares = (info / scale[:, None] / scale)[: PLACES.size, PLACES.size :] ** 2
-    assert shares.max(axis=1).min() > least
+    structures = np.stack([shape(plain.design.rows, at) for at in PLACES], axis=1)
+    assert best_shares(plain, structures * plain.baseline.fit.torque[:, None]).min() > least
 
 
 @pytest.mark.parametrize("waves", [5.3, 8.4, 13.7])
 def test_ripples_over_speed_are_seen_through_the_lag_of_loops(plain: Study, waves: float) -> None:
     """Half waves over the range of speeds, in between those that are looked for, and of any phase."""
-    known, points = plain.baseline, plain.design.points
-    contrasts = contrasts_of(plain.design, known.fit.prediction)
+    points, prediction = plain.design.points, plain.baseline.fit.prediction
     unit = points.velocity / points.velocity.max()
     ripples = np.stack([np.cos(np.pi * waves * unit + phase) for phase in (0.0, 0.8, 1.6, 2.4)], axis=1)
-    prediction = known.fit.prediction
     friction = prediction.scene.curve[:, None] * ripples
-    structures = prediction.change_at_rows(plain.design, friction, before_lag=True)
-    columns = np.column_stack([structures, contrasts.columns])
-    info = project(gram_of(plain.problem, known.fit, columns), plain.problem.noise.run_gain, 0.0).info
-    scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
-    shares = (info / scale[:, None] / scale)[:4, 4:] ** 2
-    assert shares.max(axis=1).min() > 0.45
+    assert best_shares(plain, prediction.change_at_rows(plain.design, friction, before_lag=True)).min() > 0.45
 
 
 @pytest.mark.parametrize(
@@ -229,16 +227,12 @@ def test_ripples_over_speed_are_seen_through_the_lag_of_loops(plain: Study, wave
     [lambda v: np.exp(-(v**0.6)), lambda v: np.exp(-(v**1.5)), lambda v: 1 - np.tanh(v), lambda v: 1 / (1 + v * v)],
     ids=["stretched", "compressed", "tanh", "rational"],
 )
-def test_a_curve_of_another_form_is_structure_over_speed(
-    plain: Study, form: Callable[[FloatArray], FloatArray]
-) -> None:
+def test_a_curve_of_another_form_is_structure_over_speed(plain, form):
     """That falls within a tenth of the range, with the loops' lag; λ = 50 of it is left beside the baseline."""
-    known, points = plain.baseline, plain.design.points
-    prediction = known.fit.prediction
+    points, prediction = plain.design.points, plain.baseline.fit.prediction
     contrasts = contrasts_of(plain.design, prediction)
     friction = prediction.scene.curve * form(points.velocity / (0.1 * points.velocity.max()))
     structure = prediction.change_at_rows(plain.design, friction[:, None], before_lag=True)
-    columns = np.column_stack([structure, contrasts.columns[:, np.array(contrasts.axes) == SPEED]])
-    info = project(gram_of(plain.problem, known.fit, columns), plain.problem.noise.run_gain, 0.0).info
+    info = information(plain, structure, contrasts.columns[:, np.array(contrasts.axes) == SPEED])
     score = np.sqrt(2 * 50.0 / info[0, 0]) * info[1:, 0]
     assert structure_gain(info[1:, 1:], score) > 20.0

@@ -15,9 +15,7 @@ from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, starting_laws
 from models.diagnosis.pooled_fit.gauss_newton import FitStatus, fit
 from models.diagnosis.pooled_fit.projection import RunScatter, gram_of, projections_of, run_scatter
-from tests.models.diagnosis.campaigns import campaign
-from tests.models.diagnosis.fitted import Study, study
-from tests.models.diagnosis.rehearsals import rehearsal
+from tests.models.diagnosis.campaigns import Study, campaign, rehearsal, study
 
 # --- A fit says how it ended: converged, without a step that lowers the cost, out of steps, without a finite cost.
 
@@ -67,7 +65,7 @@ def estimated(given: Study) -> RunScatter:
 
 @pytest.mark.slow
 def test_how_much_runs_scatter_is_estimated_with_its_uncertainty() -> None:
-    """Gains that scatter by 0.05, 0.6 and 1.2 %: three estimates, each about its truth. All three were reported as 0.2 %."""
+    """Gains that scatter by 0.05, 0.6 and 1.2 %: three estimates, each about its truth."""
     truths = (0.0005, 0.006, 0.012)
     found = [estimated(study(campaign(2, gain=gain))) for gain in truths]
     for scatter, truth in zip(found, truths, strict=True):
@@ -89,7 +87,6 @@ def test_one_run_shows_no_scatter_and_it_is_said_to_be_assumed() -> None:
 
 @pytest.mark.slow
 def test_an_extended_model_is_not_off_all_runs_by_one_share() -> None:
-    """It was 14 % below all of them, at a scatter of the gains of 2 %: held-out runs were off by 2.4 Nm."""
     baseline = fit_baseline(build_design(rehearsal(3, {"oil_temperature": 1.0}, tests=8, noise=0.01)))
     problem = baseline.problem.with_noise(replace(baseline.problem.noise, run_gain=0.02))
     start = starting_laws(problem.design, frame_of(problem.design))

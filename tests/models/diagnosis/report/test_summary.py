@@ -75,14 +75,8 @@ def explanations_of(given: dict[tuple[str, ...], float]) -> tuple[Explanation, .
 
 
 def findings(verdict: Verdict, *causes: str) -> Report:
-    advice = Advice(
-        key="repeat",
-        test="stationary test with the oil at 60 °C",
-        effect="oil_change",
-        other="running_in",
-        nats=1234.5,
-        probability=0.8,
-    )
+    test = "stationary test with the oil at 60 °C"
+    advice = Advice(key="repeat", test=test, effect="oil_change", other="running_in", nats=1234.5, probability=0.8)
     return Report(
         verdict=verdict,
         causes=causes,
@@ -100,6 +94,13 @@ def findings(verdict: Verdict, *causes: str) -> Report:
     )
 
 
+WHY = "No extended model is offered: its error on left-out runs is larger than the baseline's."
+#: Steps of an advised test, and the words of a long one.
+SWEEP = Step(
+    kind="stationary_stribeck", pressures=(1e5, 4e5), speeds=(2.0944, 206.3), temperature=None, cycles=1, minutes=3
+)
+SWING = replace(SWEEP, kind="dynamic_stribeck", frequency=0.3, temperature=333.15)
+LONG_TEST = TRIALS["all_loads_and_60c"].text
 ALL = [
     findings(Verdict.MODEL_ADEQUATE),
     *(findings(Verdict.CAUSE_NAMED, each.slug) for each in CATALOGUE),
@@ -135,11 +136,9 @@ def test_what_is_named_is_explained_with_its_size_its_gain_and_the_next_test() -
 
 
 def test_what_adoption_does_to_remaining_life_is_said_of_effects_of_use_alone() -> None:
-    """An oil temperature was said to be continued: it is taken off measurements, and nothing of it lies ahead."""
     for slug, course in (("oil_change", True), ("oil_temperature", False)):
-        found = replace(
-            findings(Verdict.CAUSE_NAMED, slug), extension=Extension(effects=(slug,), content={}), advice=()
-        )
+        extension = Extension(effects=(slug,), content={})
+        found = replace(findings(Verdict.CAUSE_NAMED, slug), extension=extension, advice=())
         said = summarise(found)
         assert ("If you adopt it, the predicted remaining life lets the effect go on developing." in said) == course
         assert "No test in the plan would tell much more." in said
@@ -151,7 +150,6 @@ def test_what_adoption_does_to_remaining_life_is_said_of_effects_of_use_alone() 
 
 
 def test_where_runs_scatter_more_than_usual_the_paragraph_says_what_may_hide_in_it() -> None:
-    """A zero that crept by 3 Nm over the days was called adequate, with gains that scatter by 0.8 %."""
     found = findings(Verdict.MODEL_ADEQUATE)
     usual, large = (
         RunScatter(median=median, lower=lower, upper=upper, information=3.0)
@@ -165,7 +163,6 @@ def test_where_runs_scatter_more_than_usual_the_paragraph_says_what_may_hide_in_
 
 
 def test_an_adequate_model_names_what_is_left_of_a_credible_set() -> None:
-    """Adequate with probability 0.57 was said to have nothing beyond noise, and no word of the 0.36 beside it."""
     found = findings(Verdict.MODEL_ADEQUATE)
     shares = {(): 0.57, (UNCATALOGUED,): 0.36, ("running_in",): 0.07}
     said = summarise(replace(found, explanations=explanations_of(shares)))
@@ -176,9 +173,8 @@ def test_an_adequate_model_names_what_is_left_of_a_credible_set() -> None:
 
 
 def test_why_nothing_may_be_adopted_stands_in_the_paragraph() -> None:
-    why = "No extended model is offered: its error on left-out runs is larger than the baseline's."
-    said = summarise(replace(findings(Verdict.CAUSE_NAMED, "oil_change"), not_adoptable=why))
-    assert why in said
+    said = summarise(replace(findings(Verdict.CAUSE_NAMED, "oil_change"), not_adoptable=WHY))
+    assert WHY in said
     assert "left-out runs, the error" not in said
 
 
@@ -191,7 +187,6 @@ def test_an_effect_without_an_estimate_is_said_to_have_none() -> None:
 
 
 def test_what_these_data_would_show_is_said_with_units_zero_and_pressure_first() -> None:
-    """Oil temperature below 2.83 was said to be missed, without a unit, and of a zero nothing."""
     found = replace(findings(Verdict.MODEL_ADEQUATE), unseen=("channel_delay", "stick_slip"))
     sizes = {"oil_temperature": 4.0, "running_in": 30.0, "unsettled_dwell": 20.0, "pressure_offset": 1.0}
     shown = tuple(visible(slug, size) for slug, size in (*sizes.items(), ("torque_zero_shift", 12.0)))
@@ -204,9 +199,8 @@ def test_what_these_data_would_show_is_said_with_units_zero_and_pressure_first()
     said = summarise(replace(found, visible=(visible("oil_temperature", 4.0),)))
     assert "viscosity exponent β of oil temperature from 1.4 (from 2.8 in its least visible form)." in said
     some = replace(visible("pressure_offset", 3.0), amplitude=math.inf, least=0.1)  # seen in one of its shapes alone
-    assert "a pressure offset from 0.1 bar (not at all in the least visible form)." in summarise(
-        replace(found, visible=(some,))
-    )
+    said = summarise(replace(found, visible=(some,)))
+    assert "a pressure offset from 0.1 bar (not at all in the least visible form)." in said
 
 
 def sized(interval: tuple[float, float], sign: float) -> str:
@@ -217,7 +211,6 @@ def sized(interval: tuple[float, float], sign: float) -> str:
 
 
 def test_a_size_and_the_words_on_its_sign_agree() -> None:
-    """3.1 ± 3.2 Nm was said to be positive with probability above 0.99."""
     said = sized((0.972, 9.23), 0.995)
     assert "3.06 Nm, 90 % interval 0.972 to 9.23 Nm." in said
     assert "0.1 to 9.23 Nm, positive with probability 0.97" in sized((0.1, 9.23), 0.97)
@@ -226,13 +219,11 @@ def test_a_size_and_the_words_on_its_sign_agree() -> None:
 
 
 def test_no_sentence_stands_twice() -> None:
-    why = "No extended model is offered: its error on left-out runs is larger than the baseline's."
-    found = replace(findings(Verdict.CAUSE_NAMED, "oil_change"), not_adoptable=why, notes=(why,))
-    assert summarise(found).count(why) == 1
+    found = replace(findings(Verdict.CAUSE_NAMED, "oil_change"), not_adoptable=WHY, notes=(WHY,))
+    assert summarise(found).count(WHY) == 1
 
 
 def test_a_cause_of_all_explanations_is_certain_and_open_is_what_is_beside_it() -> None:
-    """Neither of "channel delay, or channel delay together with something" was said to be certain."""
     found = findings(Verdict.CAUSE_AMBIGUOUS, "channel_delay")
     both = explanations_of({("channel_delay",): 0.55, ("channel_delay", UNCATALOGUED): 0.45})
     said = summarise(replace(found, explanations=both))
@@ -246,7 +237,6 @@ def test_a_cause_of_all_explanations_is_certain_and_open_is_what_is_beside_it() 
 
 
 def test_a_certain_cause_with_sized_companions_keeps_to_the_words() -> None:
-    """A delay that was certain, with a zero or a pressure beside it, took 150 words."""
     found = findings(Verdict.CAUSE_AMBIGUOUS, "channel_delay", "pressure_offset", "torque_zero_shift")
     beside = {("channel_delay", UNCATALOGUED): 0.4, ("channel_delay",): 0.2}
     beside |= {("channel_delay", slug): 0.2 for slug in ("pressure_offset", "torque_zero_shift")}
@@ -254,67 +244,46 @@ def test_a_certain_cause_with_sized_companions_keeps_to_the_words() -> None:
         replace(each, estimate=replace(each.estimate, stated_interval=(0.2, 0.5), stated_sign=0.995))
         for each in found.candidates
     )
-    sweep = Step(
-        kind="stationary_stribeck", pressures=(1e5, 4e5), speeds=(2.0944, 206.3), temperature=None, cycles=1, minutes=3
-    )
-    steps = (sweep, replace(sweep, kind="dynamic_stribeck", frequency=0.3, temperature=333.15))
-    advice = replace(found.advice[0], test=TRIALS["all_loads_and_60c"].text, steps=steps, narrows=0.44)
-    why = "No extended model is offered: its error on left-out runs is larger than the baseline's."
-    changed = replace(
-        found, explanations=explanations_of(beside), candidates=stated, advice=(advice,), not_adoptable=why
-    )
-    said = summarise(changed)
+    advice = replace(found.advice[0], test=LONG_TEST, steps=(SWEEP, SWING), narrows=0.44)
+    found = replace(found, explanations=explanations_of(beside), candidates=stated)
+    said = summarise(replace(found, advice=(advice,), not_adoptable=WHY))
     assert len(said.split()) <= MAX_WORDS
     assert "pressure offset (0.20)" in said
 
 
 def test_a_test_of_many_words_is_put_into_a_short_line() -> None:
-    """A test of 60 words stood before the uncertainty that it leaves."""
     found = findings(Verdict.CAUSE_NAMED, "inertia_torque")
-    sweep = Step(
-        kind="stationary_stribeck",
-        pressures=(75e3, 175e3),
-        speeds=(2.0944, 206.3),
-        temperature=None,
-        cycles=1,
-        minutes=3,
-    )
-    swing = replace(sweep, kind="dynamic_stribeck", speeds=(0.0, 209.44), frequency=0.3, temperature=333.15)
-    advice = replace(found.advice[0], test=TRIALS["all_loads_and_60c"].text, steps=(sweep, swing), narrows=0.3)
+    light = {"pressures": (75e3, 175e3)}
+    steps = (replace(SWEEP, **light), replace(SWING, speeds=(0.0, 209.44), **light))
+    advice = replace(found.advice[0], test=LONG_TEST, steps=steps, narrows=0.3)
     said = summarise(replace(found, advice=(advice,)))
     assert (
         "Next, to measure the viscous step better: stationary tests at 0.75 to 1.8 bar, 20 to 1,970 rpm, "
         "and dynamic tests at 0.3 Hz, 0.75 to 1.8 bar, up to 2,000 rpm, also at 60 °C (steps in the report); its "
         "uncertainty falls by 70 %."
     ) in said
-    opened = (replace(sweep, pressures=(0.0, 75e3)), replace(swing, pressures=(0.0,), speeds=(0.0, 209.34)))
+    opened = (replace(SWEEP, pressures=(0.0, 75e3)), replace(SWING, pressures=(0.0,), speeds=(0.0, 209.34)))
     said = summarise(replace(found, advice=(replace(advice, steps=opened),)))
     assert "stationary tests at 0.75 bar, 20 to 1,970 rpm, also with the clutch open" in said
     assert "dynamic tests with the clutch open at 0.3 Hz, up to 2,000 rpm" in said
 
 
 def test_pauses_and_further_use_are_never_left_out_of_a_test() -> None:
-    """Three tests after further use, with pauses, were shortened to their pressures and speeds."""
     found = findings(Verdict.CAUSE_NAMED, "rest_recovery")
-    sweep = Step(
-        kind="stationary_stribeck", pressures=(4e5, 7e5), speeds=(2.0, 206.3), temperature=None, cycles=1, minutes=3
-    )
     text = f"{TRIALS['rests'].text} and with the pressures and the speeds as usual"
-    rested, used = replace(sweep, pause=48 * 3600.0), replace(sweep, cycles=2)
-    for steps in ((rested,), (sweep, used)):
-        assert text in summarise(replace(found, advice=(replace(found.advice[0], test=text, steps=steps),)))
-    assert text not in summarise(replace(found, advice=(replace(found.advice[0], test=text, steps=(sweep,)),)))
+    rested, used = replace(SWEEP, pause=48 * 3600.0), replace(SWEEP, cycles=2)
+    for steps, whole in (((rested,), True), ((SWEEP, used), True), ((SWEEP,), False)):
+        advice = replace(found.advice[0], test=text, steps=steps)
+        assert (text in summarise(replace(found, advice=(advice,)))) == whole
 
 
 def test_an_error_as_large_as_noise_is_not_called_correlated_along_cycles() -> None:
     found = replace(findings(Verdict.UNEXPLAINED_STRUCTURE), baseline=replace(MISFIT, rmse=0.1))
-    assert "as much as noise alone gives, but in a pattern that depends on oil temperature and cycles." in summarise(
-        found
-    )
+    said = summarise(found)
+    assert "as much as noise alone gives, but in a pattern that depends on oil temperature and cycles." in said
 
 
 def test_a_swing_without_a_name_is_said_as_what_it_is() -> None:
-    """The paragraph sent an engineer to look for what depends on frequency, and gave the gain of a smooth correction."""
     misfit = replace(MISFIT, where=(Where(axis=FREQUENCY, strength=40.0), *MISFIT.where))
     notes = ("fixed_line: torque swings at 12.5 Hz at all speeds alike.",)
     said = summarise(replace(findings(Verdict.UNEXPLAINED_STRUCTURE), baseline=misfit, notes=notes))
@@ -336,21 +305,14 @@ def test_notes_on_single_runs_stay_in_the_report() -> None:
 
 
 def test_pairs_beside_a_long_test_and_a_reason_against_it_are_shortened() -> None:
-    """Two paragraphs had 107 and 116 words: eight pairs were listed whatever else had to be said."""
     slugs = [effect.slug for effect in CATALOGUE[:9]]
     pairs = dict.fromkeys(pairwise(slugs), 0.13)
-    sweep = Step(
-        kind="stationary_stribeck", pressures=(1e5, 4e5), speeds=(2.0944, 206.3), temperature=None, cycles=1, minutes=3
-    )
     found = findings(Verdict.CAUSE_AMBIGUOUS, *slugs)
-    advice = replace(
-        found.advice[0], test=TRIALS["all_loads_and_60c"].text, steps=(sweep, replace(sweep, kind="dynamic_stribeck"))
-    )
-    why = "No extended model is offered: its error on held-out runs is larger than the baseline's."
-    said = summarise(replace(found, explanations=explanations_of(pairs), advice=(advice,), not_adoptable=why))
+    advice = replace(found.advice[0], test=LONG_TEST, steps=(SWEEP, replace(SWEEP, kind="dynamic_stribeck")))
+    said = summarise(replace(found, explanations=explanations_of(pairs), advice=(advice,), not_adoptable=WHY))
     assert len(said.split()) <= MAX_WORDS
     assert all(slug.replace("_", " ") in said for slug in slugs)
-    assert why in said
+    assert WHY in said
     assert 2 <= said.count("(0.1") < 8
 
 
@@ -369,14 +331,10 @@ def test_many_alternatives_are_shortened() -> None:
             Hardest(axis="cycles", value=10000.0, rmse=2.5, beyond=1000.0),
             "tests at 10,000 cycles, 1,000 cycles outside",
         ),
-        (
-            Hardest(axis="pressure_bar", value=5e5, rmse=2.5, beyond=0.0),
-            "curves at 5 bar, within",
-        ),
+        (Hardest(axis="pressure_bar", value=5e5, rmse=2.5, beyond=0.0), "curves at 5 bar, within"),
     ],
 )
 def test_held_out_errors_far_beyond_the_fit_are_explained(hardest: Hardest, place: str) -> None:
-    """1.52 Nm were stated beside a fit of 0.0217 Nm, and nothing more."""
     found = findings(Verdict.CAUSE_NAMED, "oil_change")
     far = replace(GAIN, rmse_after=1.52, rmse_before=1.9, hardest=hardest)
     found = replace(found, gain=far, extended=replace(MISFIT, rmse=0.0217))
@@ -398,7 +356,6 @@ def test_any_amplitude_can_be_written():
         estimate = Estimate(name="step of C_v", value=value, sd=float(rng.choice([0.0, sd])), unit="%")
         said = summarise(replace(found, candidates=(replace(found.candidates[0], estimate=estimate),)))
         told = re.search(r"Step of C_v: (-?[\d.,e+-]+)", said.replace("−", "-"))
-        assert told is not None
         number = float(told.group(1).replace(",", "").rstrip("."))
         assert abs(number - value) <= max(0.006 * abs(value), 0.06 * estimate.sd)
 

@@ -8,11 +8,14 @@ from scipy.stats import multivariate_normal
 
 from models.diagnosis.baseline.laws import ATTRACTOR, Scene
 from models.diagnosis.design.autocorrelation import Correlation
+from models.diagnosis.design.design import CYCLES as BY_CYCLES
+from models.diagnosis.design.design import PHASE, PRESSURE, SPEED
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import amplitude_precision
 from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns, law_columns
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.validation.extended_model import SLUG, smooth_fit
 from models.diagnosis.validation.held_out import (
     _STEPS,
     Gain,
@@ -23,8 +26,7 @@ from models.diagnosis.validation.held_out import (
     _without,
     measure_gain,
 )
-from tests.models.diagnosis.campaigns import CYCLES, campaign
-from tests.models.diagnosis.fitted import Study, study, warmth
+from tests.models.diagnosis.campaigns import CYCLES, Study, bump, campaign, study, warmth
 
 TEMPERATURE = ("oil_temperature", 0.3, (0.5, AT_ONCE))
 
@@ -41,9 +43,7 @@ def plain() -> Study:
 
 def gain_of(given: Study, extended: Fit) -> Gain:
     rng = np.random.default_rng(0)
-    found = measure_gain(given.problem, given.baseline.fit, extended, rng)
-    assert found is not None
-    return found
+    return measure_gain(given.problem, given.baseline.fit, extended, rng)
 
 
 def test_a_planted_effect_gains_on_what_was_held_out(warm):
@@ -82,7 +82,6 @@ def test_what_was_learned_of_single_curves_does_not_gain(plain):
     learned = null.cost - memorised.cost
     assert learned > 100
     found = measure_gain(problem, null, memorised, np.random.default_rng(0))
-    assert found is not None
     assert found.log_score_gain < 0.15 * learned
     inside = 100 * (1 - np.std(memorised.residual) / np.std(null.residual))
     assert found.reduction_percent < 0.25 * inside
@@ -116,7 +115,6 @@ def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
     noise = replace(given.problem.noise, plateaus=Correlation(), loops=Correlation(), run_gain=0.0, curve_gain=0.0)
     extended = given.extended(TEMPERATURE)
     out = _ahead(given.design)
-    assert out is not None
     for model in (given.baseline.fit, extended):
         masked = given.problem.with_noise(_without(noise, out))
         found = fit(masked, model.laws, model.effects, steps=_STEPS)
@@ -166,3 +164,49 @@ def test_one_state_and_one_pressure_leave_nothing_out():
     one = replace(design, level=np.full_like(design.level, 5e5))
     fitted = alone.baseline.fit
     assert measure_gain(replace(alone.problem, design=one), fitted, fitted, np.random.default_rng(0)) is None
+
+
+# --- Structure without a name, filled in smoothly: it fits what was planted, and nothing where nothing was.
+
+
+@pytest.fixture(scope="module")
+def bumped() -> Study:
+    return study(campaign(41, bump, loops=False))
+
+
+def smoothed(given: Study, *axes: str):
+    return smooth_fit(given.problem, given.baseline.fit, axes)
+
+
+def test_a_bump_in_speed_is_filled_in(bumped):
+    found = smoothed(bumped, SPEED)
+    assert {each.effect.slug for each in found.effects} == {SLUG}
+    assert bumped.baseline.fit.cost - found.cost > 20
+    # what the fit adds to the baseline peaks where the bump is, relative to the curve
+    velocity = bumped.design.rows.velocity
+    near, far = np.abs(velocity - 3) < 0.6, velocity > 8
+    off = (bumped.design.torque - found.torque)[near].mean()
+    assert abs(off) < 0.4 * abs(bumped.baseline.fit.residual[near].mean())
+    assert abs((bumped.design.torque - found.torque)[far].mean()) < 0.1
+    gain = measure_gain(bumped.problem, bumped.baseline.fit, found, np.random.default_rng(0))
+    assert gain.log_score_gain > 10
+    assert gain.rmse_after < gain.rmse_before
+
+
+def test_the_wrong_axis_and_no_structure_gain_nothing(bumped):
+    wrong = smoothed(bumped, BY_CYCLES)
+    assert bumped.baseline.fit.cost - wrong.cost < 5
+    plain = study(campaign(41, loops=False))
+    found = smoothed(plain, SPEED)
+    assert plain.baseline.fit.cost - found.cost < 5
+    gain = measure_gain(plain.problem, plain.baseline.fit, found, np.random.default_rng(0))
+    assert abs(gain.log_score_gain) < 5
+
+
+def test_axes_that_cannot_carry_it(bumped):
+    assert smoothed(bumped) is None
+    assert smoothed(bumped, "noise") is None
+    assert smoothed(bumped, PHASE) is None  # no loops
+    assert smoothed(bumped, PRESSURE) is not None
+    one = study(campaign(42, loops=False, cycles=(500.0,)))
+    assert smoothed(one, BY_CYCLES) is None

@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.diagnosis.diagnose import diagnose
+from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.fitted_effect import Draw, Estimate
 from models.diagnosis.explanations.decide import judge
 from models.diagnosis.explanations.posterior import Posterior, posterior_of
 from models.diagnosis.explanations.sizes import Size, Sizes, sizes_of
 from models.diagnosis.explanations.verdict import Judgement, Verdict
 from models.diagnosis.pooled_fit.gauss_newton import FitStatus
+from models.diagnosis.pooled_fit.projection import without_likely_gains
 from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.assemble import candidates_of, reason_against, report_of
-from models.diagnosis.report.report import Isolability
+from models.diagnosis.report.maps import MOST_BINS, SHOWN, loop_traces, residual_maps
+from models.diagnosis.report.report import Isolability, misfit_of
 from models.diagnosis.report.summary import signed
 from models.diagnosis.validation.extended_model import Validation
-from models.diagnosis.validation.held_out import Gain
-from tests.models.diagnosis.campaigns import campaign
-from tests.models.diagnosis.fitted import Study, study
+from tests.models.diagnosis.campaigns import CYCLES, PRESSURES, SPEEDS, Study, bump, campaign, look, study
 from tests.models.diagnosis.report.test_summary import GAIN
 from tests.models.diagnosis.test_diagnose import late
 
@@ -46,9 +46,7 @@ def posterior(given: Study) -> Posterior:
         (LARGER, "error on left-out runs is larger"),
     ],
 )
-def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(
-    given: Study, posterior: Posterior, gain: Gain | None, why: str
-) -> None:
+def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(given, posterior, gain, why):
     judgement = judge(posterior)
     assert (judgement.verdict, judgement.causes) == (Verdict.CAUSE_NAMED, ("unsettled_dwell",))
     validation = Validation(extended=judgement.stand[0].fit, gain=gain)
@@ -77,7 +75,6 @@ def test_a_fit_that_ran_out_of_steps_is_said_with_what_follows_from_it(given: St
 
 
 def test_what_no_reading_shows_is_no_candidate(given: Study, posterior: Posterior) -> None:
-    """Without loops a delay of 80 ms stood among the candidates."""
     report = report_of(
         given.baseline, posterior, judge(posterior), (), Validation(extended=None, gain=None), Sizes(by_slug={}), ()
     )
@@ -108,9 +105,7 @@ def test_why_an_extension_is_not_proposed_is_said(given: Study) -> None:
 def isolability(*, loops: bool) -> Isolability:
     """Of a simulated campaign without an effect and without a thermometer."""
     tests = campaign(3, loops=loops, temperature=False)
-    found = diagnose(tests, rng=np.random.default_rng(0), isolability=True).isolability
-    assert found is not None
-    return found
+    return look(tests, 0, isolability=True).isolability
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +136,7 @@ def test_pairs_come_hardest_first_and_only_those_get_a_test(sweeps: Isolability)
 
 
 def test_it_is_computed_on_request_only() -> None:
-    assert diagnose(campaign(3, loops=False), rng=np.random.default_rng(0)).isolability is None
+    assert look(campaign(3, loops=False), 0).isolability is None
 
 
 def test_the_size_of_a_swing_has_no_sign(given: Study) -> None:
@@ -150,3 +145,102 @@ def test_the_size_of_a_swing_has_no_sign(given: Study) -> None:
     found = posterior_of(given.baseline, raw)
     (ripple,) = (c for c in candidates_of(found.problem, judge(found), raw, {}) if c.effect == "shaft_ripple")
     assert signed(ripple.estimate) == "ripple amplitude: 0.500 ± 0.020 Nm"
+
+
+# --- Residual maps against means taken row by row, NaN where nothing was measured, loops as they were measured.
+
+
+@pytest.fixture(scope="module")
+def bumped() -> Study:
+    return study(campaign(31, bump))
+
+
+def test_cells_are_means_of_residual_over_noise(bumped):
+    found = residual_maps(bumped.problem, bumped.baseline.fit, None)
+    assert np.allclose(found.pressure, PRESSURES)
+    assert np.allclose(found.speed, SPEEDS)
+    assert np.array_equal(found.cycles, CYCLES)
+    design, noise = bumped.design, bumped.problem.noise
+    left = without_likely_gains(bumped.problem, bumped.baseline.fit)
+    white, rows = (left / noise.deviation)[: design.plateaus], design.rows.take(design.rows.steady)
+    for p in (0, 3):
+        here = np.abs(rows.pressure - PRESSURES[p]) < 1
+        for s in (1, 12):
+            cell = white[here & (np.abs(rows.velocity / 0.058 - SPEEDS[s]) < 1e-6)]
+            assert cell.size == len(CYCLES)
+            assert found.speed_pressure_before[p, s] == pytest.approx(cell.mean())
+        for c in (0, 4):
+            cell = white[here & (rows.cycles == CYCLES[c])]
+            assert found.pressure_cycles_before[c, p] == pytest.approx(cell.mean())
+    # without an extension after is before
+    assert np.array_equal(found.speed_pressure_before, found.speed_pressure_after)
+
+
+def test_what_maps_and_loops_show_is_the_error_that_the_report_states(bumped: Study) -> None:
+    """Runs that are off by gains of their own are shown without them."""
+    design, off = bumped.design, 1.0 + 0.15 * (1.0 + bumped.design.rows.run % 2)
+    noise = replace(bumped.problem.noise, run_gain=0.02)
+    problem = replace(bumped.problem, design=replace(design, torque=off * design.torque), noise=noise)
+    fit = replace(bumped.baseline.fit, residual=problem.design.torque - bumped.baseline.fit.torque)
+    rmse = misfit_of(problem, fit).rmse
+    found = residual_maps(problem, bumped.baseline.fit, fit)
+    assert rmse < 0.5
+    assert np.nanmean(np.abs(found.speed_pressure_after)) < 2
+    for loop in loop_traces(problem, fit, None):
+        assert np.sqrt(np.mean((loop.measured - loop.baseline) ** 2)) < 0.5
+
+
+def test_the_bump_shows_where_it_is(bumped):
+    found = residual_maps(bumped.problem, bumped.baseline.fit, None)
+    by_speed = found.speed_pressure_before.mean(axis=0)
+    velocity = found.speed * 0.058
+    assert abs(velocity[int(by_speed.argmax())] - 3.0) < 1.0
+    assert by_speed.max() > 1
+    # the control: over cycles nothing stands out
+    assert np.abs(found.pressure_cycles_before.mean(axis=1)).max() < 0.5 * by_speed.max()
+
+
+def test_nothing_measured_is_not_a_number():
+    given = campaign(31, bump, loops=False)
+    table = given.stationary[0].plateaus
+    keep = (table.pressure < 6.9e5) | (table.speed * 0.058 < 5)
+    runs = [replace(run, plateaus=run.plateaus.take(keep)) for run in given.stationary]
+    thinned = study(replace(given, stationary=tuple(runs)))
+    found = residual_maps(thinned.problem, thinned.baseline.fit, None)
+    missing = np.isnan(found.speed_pressure_before)
+    assert missing.any()
+    assert missing[:-1].sum() == 0
+    assert np.array_equal(missing[-1], found.speed * 0.058 > 5)
+
+
+def test_many_speeds_and_states_are_gathered(bumped):
+    rng = np.random.default_rng(1)
+    many = replace(
+        bumped.design, rows=replace(bumped.design.rows, velocity=rng.uniform(0.1, 12, bumped.design.torque.size))
+    )
+    found = residual_maps(replace(bumped.problem, design=many), bumped.baseline.fit, None)
+    assert found.speed.size == MOST_BINS
+    assert found.speed_pressure_before.shape == (PRESSURES.size, MOST_BINS)
+    assert np.all(np.diff(found.speed) > 0)
+
+
+def test_loops_are_shown_as_measured_and_as_models_have_them(bumped):
+    shape = BY_SLUG["squeeze_film"].grid(bumped.design.facts)[0].shape
+    extended = bumped.extended(("squeeze_film", 1e-3, shape))
+    found = loop_traces(bumped.problem, bumped.baseline.fit, extended)
+    assert len(found) == SHOWN**2
+    assert {each.cycles for each in found} == {CYCLES[0], CYCLES[-1], CYCLES[len(CYCLES) // 2]} or len(found) == 9
+    for each in found:
+        assert each.frequency == pytest.approx(0.1, rel=1e-2)
+        assert each.speed.min() >= -1
+        assert each.measured.shape == each.baseline.shape == each.extended.shape == each.speed.shape
+        # a loop's torque, and no other's
+        assert np.abs(each.measured - each.baseline).max() < 0.15 * each.measured.max()
+    assert any(not np.allclose(each.baseline, each.extended) for each in found)
+    # the control: without an extension both models are one
+    assert all(np.array_equal(t.baseline, t.extended) for t in loop_traces(bumped.problem, bumped.baseline.fit, None))
+
+
+def test_without_loops_no_traces():
+    given = study(campaign(32, loops=False, cycles=(0.0, 2000.0, 9000.0)))
+    assert loop_traces(given.problem, given.baseline.fit, None) == ()
