@@ -243,11 +243,11 @@ def stored_elsewhere(
 ) -> list[tuple[int, str]]:
     """(run_key, name) of channels that a move to `store` (None: to the database) is still to take there, in order, behind
     `after`: those in other stores and, for a store, long ones in the database."""
-    wanted: ColumnElement[bool] = channel.c.blob.is_not(None)
+    condition: ColumnElement[bool] = channel.c.blob.is_not(None)
     if store is not None:
-        wanted = or_(and_(channel.c.blob.is_not(None), channel.c.store_key != store.store_key), and_(*_LONG_HERE))
+        condition = or_(and_(channel.c.blob.is_not(None), channel.c.store_key != store.store_key), and_(*_LONG_HERE))
     values = {"after_key": after[0], "after_name": after[1], "most": most}
-    return [(run_key, name) for run_key, name in connection.execute(_elsewhere.where(wanted), values)]
+    return [(run_key, name) for run_key, name in connection.execute(_elsewhere.where(condition), values)]
 
 
 def move(connection: Connection, column: Stored, data: bytes, store: RawStore | None) -> None:

@@ -80,9 +80,9 @@ def json_length(column: sa.ColumnElement[str], *path: str) -> sa.ColumnElement[i
 
 def among(column: sa.ColumnElement[Any], parameter: str) -> sa.ColumnElement[bool]:
     """Whether a column's value is one of the list that the parameter holds as JSON text, however long that is."""
-    given = sa.bindparam(parameter, type_=sa.Text)
-    of_sqlite = sa.func.json_each(given).table_valued("value").c.value
-    of_postgresql = sa.func.json_array_elements_text(sa.cast(given, sa.JSON)).table_valued("value").c.value
+    parameter_list = sa.bindparam(parameter, type_=sa.Text)
+    of_sqlite = sa.func.json_each(parameter_list).table_valued("value").c.value
+    of_postgresql = sa.func.json_array_elements_text(sa.cast(parameter_list, sa.JSON)).table_valued("value").c.value
     return Pair(column.in_(sa.select(of_sqlite)), column.in_(sa.select(sa.cast(of_postgresql, column.type))))
 
 
@@ -95,14 +95,14 @@ def now_in_seconds() -> sa.ColumnElement[float]:
 def upsert(table: sa.Table) -> dict[str, sa.Insert]:
     """dialect -> the INSERT that puts a row in the place of the one with the same primary key."""
     keys = [column.name for column in table.primary_key]
-    others = [column.name for column in table.columns if not column.primary_key]
+    value_columns = [column.name for column in table.columns if not column.primary_key]
     of_sqlite, of_postgresql = sqlite.insert(table), postgresql.insert(table)
     return {
         "sqlite": of_sqlite.on_conflict_do_update(
-            index_elements=keys, set_={name: of_sqlite.excluded[name] for name in others}
+            index_elements=keys, set_={name: of_sqlite.excluded[name] for name in value_columns}
         ),
         "postgresql": of_postgresql.on_conflict_do_update(
-            index_elements=keys, set_={name: of_postgresql.excluded[name] for name in others}
+            index_elements=keys, set_={name: of_postgresql.excluded[name] for name in value_columns}
         ),
     }
 

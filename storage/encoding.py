@@ -112,8 +112,8 @@ def unpack(data: bytes) -> dict[str, NDArray[np.float64]]:
         index = json.loads(bytes(body[_NUMBER.size : start]))
         arrays = {}
         for name, shape, *form in index:
-            arrays[name], taken = _unpacked(body, start, shape, form)
-            start += taken
+            arrays[name], length = _unpacked(body, start, shape, form)
+            start += length
     except (ValueError, TypeError) as error:
         raise DamagedData(f"packed arrays do not unpack: {error}") from error
     if start != len(body):
@@ -232,14 +232,14 @@ def encode_decimals(column: NDArray[np.float64]) -> bytearray | None:
         return None
     folded, last = np.empty(column.size, dtype="<u4"), head
     for start in range(0, column.size, _PIECE):
-        whole = _whole(column[start : start + _PIECE], decimals)
-        if whole is None:
+        integers = _whole(column[start : start + _PIECE], decimals)
+        if integers is None:
             return None
-        steps = np.diff(whole, prepend=last)
+        steps = np.diff(integers, prepend=last)
         if int(steps.max()) >= _LARGEST_STEP or int(steps.min()) <= -_LARGEST_STEP:
             return None
         folded[start : start + _PIECE] = (steps << 1) ^ (steps >> 63)
-        last = whole[-1:]
+        last = integers[-1:]
     minus = np.flatnonzero((column == 0) & np.signbit(column))
     data = bytearray(_CHECKSUM_SIZE + _HEAD.size)
     sizes = append_planes(data, folded.view(np.uint8).reshape(-1, _STEP_PLANES).T)
@@ -257,8 +257,8 @@ def _whole(column: NDArray[np.float64], decimals: int) -> NDArray[np.int64] | No
         np.rint(scaled, out=scaled)
         if not (np.abs(scaled) < 2.0**53).all():
             return None
-        whole = scaled.astype(np.int64)
-    return whole if np.array_equal(whole / scale, column) else None
+        integers = scaled.astype(np.int64)
+    return integers if np.array_equal(integers / scale, column) else None
 
 
 def decode_decimals(data: bytes | bytearray, length: int) -> NDArray[np.float64]:
@@ -317,10 +317,10 @@ class Rows(Generic[Value]):
     def reader(self, rows: Result[*tuple[Any, ...]]) -> Callable[[Row[*tuple[Any, ...]]], Value]:
         """What makes a value of each of these rows: where its fields stand is found once for all."""
         columns = list(rows.keys())
-        taken = itemgetter(*map(columns.index, self.names))
+        fields_of = itemgetter(*map(columns.index, self.names))
 
         def of(row: Row[*tuple[Any, ...]]) -> Value:
-            fields = dict(zip(self.names, taken(row), strict=True))
+            fields = dict(zip(self.names, fields_of(row), strict=True))
             for name, (_, decode) in self._coded.items():
                 fields[name] = None if fields[name] is None else decode(fields[name])
             return self._kind(**fields)

@@ -151,8 +151,8 @@ def claim(connection: Connection, claimer: str, kinds: Collection[str], *, lease
 
 def renew(connection: Connection, job_id: str, claimer: str, *, lease: float, progress: Json | None) -> bool:
     """Hold the job for `lease` [s] more; False where it is no longer the claimer's: cancelled, or claimed by another."""
-    held = {"wanted": job_id, "claimer": claimer, "lease": lease}
-    return connection.execute(_renew, held | _rows.columns(progress=progress)).rowcount == 1
+    claim = {"wanted": job_id, "claimer": claimer, "lease": lease}
+    return connection.execute(_renew, claim | _rows.columns(progress=progress)).rowcount == 1
 
 
 def release(connection: Connection, job_id: str, claimer: str) -> None:

@@ -49,25 +49,27 @@ def evaluate(connection: Connection, clutch_id: str) -> None:
     if row is None:
         raise LookupError(f"clutch {clutch_id!r} is not stored")
     record, at = ClutchIn.model_validate(row.record), _now()
-    own = [] if row.archived else [(rule_row, rule) for rule_row, rule in _rules(in_use) if concerns(rule, record)]
-    kept: set[str] = set()
+    clutch_rules = (
+        [] if row.archived else [(rule_row, rule) for rule_row, rule in _rules(in_use) if concerns(rule, record)]
+    )
+    still_raised: set[str] = set()
     for of_silence in (True, False):  # a silent rig is a state, which other rules look at
         facts = _facts(connection, row, record, at)
-        for rule_row, rule in own:
+        for rule_row, rule in clutch_rules:
             if (rule.quantity == SILENT) is of_silence:
-                kept |= _judged(connection, rule_row, rule, facts, before.get(rule_row.alarm_id))
+                still_raised |= _judged(connection, rule_row, rule, facts, before.get(rule_row.alarm_id))
         if of_silence:
-            row = _with_silence(connection, row, kept, facts)
+            row = _with_silence(connection, row, still_raised, facts)
     for alarm_id, event in before.items():
-        if alarm_id not in kept:
+        if alarm_id not in still_raised:
             _clear(connection, event, facts)
 
 
 def concerns(rule: AlarmIn, record: ClutchIn) -> bool:
     if rule.clutch_id is not None:
         return rule.clutch_id == record.clutch_id
-    wanted = {} if rule.kind is None else rule.kind.model_dump(exclude_none=True)
-    return all(getattr(record, name) == value for name, value in wanted.items())
+    kind_fields = {} if rule.kind is None else rule.kind.model_dump(exclude_none=True)
+    return all(getattr(record, name) == value for name, value in kind_fields.items())
 
 
 def rule_of(row: AlarmRow) -> AlarmIn:
@@ -75,8 +77,8 @@ def rule_of(row: AlarmRow) -> AlarmIn:
 
 
 def event_out(row: EventRow) -> dict[str, Any]:
-    said = {name: value for name, value in row.content.items() if name != _ENDED_LIFE}
-    return schema_fields(EventOut, row, **said)
+    content = {name: value for name, value in row.content.items() if name != _ENDED_LIFE}
+    return schema_fields(EventOut, row, **content)
 
 
 def to_receivers(connection: Connection, kind: str, event: EventRow, receivers: Iterable[WebhookRow]) -> list[str]:

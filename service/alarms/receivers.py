@@ -182,11 +182,11 @@ def _status(parts: SplitResult, address: tuple[Any, ...], body: bytes, headers: 
         cut.daemon = True
         cut.start()
         try:
-            made = (
+            opened = (
                 ssl.create_default_context().wrap_socket(raw, server_hostname=host) if parts.scheme == "https" else raw
             )
-            with closing(made):
-                connection.sock = made
+            with closing(opened):
+                connection.sock = opened
                 connection.request("POST", path, body, headers)
                 with closing(connection.getresponse()) as answer:
                     return answer.status

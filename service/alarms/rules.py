@@ -80,9 +80,9 @@ def keeps(rule: AlarmIn, result: Finding | None) -> bool:
 
 def message(rule: AlarmIn, facts: Facts, result: Finding) -> str:
     """An alarm as a sentence, with how many runs are held beside it."""
-    unit, held = _UNITS.get(rule.quantity), facts.summary.get("held", 0)
+    unit, held_count = _UNITS.get(rule.quantity), facts.summary.get("held", 0)
     limit = "" if rule.limit is None or unit is None else f" (limit: {rule.limit:,.6g}{unit})"
-    waiting = f"; {held_in_words(held)}" if held and rule.quantity != "held_runs" else ""
+    waiting = f"; {held_in_words(held_count)}" if held_count and rule.quantity != "held_runs" else ""
     return f"{facts.clutch_id}: {result.words}{limit}{waiting}"
 
 
@@ -118,8 +118,8 @@ def _remaining(rule: AlarmIn, facts: Facts) -> float | None:
     if summary["status"] == PassageStatus.REACHED.value:
         return 0.0
     if rule.probability == _SAFE:
-        among = summary.get("with_held")
-        bound = lower_bound(summary["at_least"], among and among[SHOWN])
+        with_held = summary.get("with_held")
+        bound = lower_bound(summary["at_least"], with_held and with_held[SHOWN])
         return math.inf if bound is None else float(bound)
     quantile = summary["remaining_cycles"][f"{rule.probability:g}"]
     return math.inf if quantile is None else float(quantile)
@@ -182,8 +182,13 @@ def _off_course(_rule: AlarmIn, facts: Facts) -> Finding | None:
 
 def _verdict(rule: AlarmIn, facts: Facts) -> Finding | None:
     newest = facts.verdict
-    wanted = tuple(DISAGREES) if rule.any_of is None else rule.any_of
-    if newest is None or newest.adopted or newest.verdict not in wanted or newest.life != facts.summary.get("life", ""):
+    verdicts = tuple(DISAGREES) if rule.any_of is None else rule.any_of
+    if (
+        newest is None
+        or newest.adopted
+        or newest.verdict not in verdicts
+        or newest.life != facts.summary.get("life", "")
+    ):
         return None
     causes = ", ".join(cause.replace("_", " ") for cause in newest.causes)
     words = str(newest.verdict).replace("_", " ") + (f" ({causes})" if causes else "")

@@ -26,8 +26,8 @@ def alarms(
         items = service.pages("/v1/alarms")
     else:
         chosen = {"state": None if everything else "open", "clutch_id": clutch}
-        given = {name: value for name, value in chosen.items() if value is not None}
-        items = service.pages("/v1/alarms/events", **given)
+        options = {name: value for name, value in chosen.items() if value is not None}
+        items = service.pages("/v1/alarms/events", **options)
     if rules and acknowledge is None:
         listed(items, as_json, _show_rules, "no alarm rule exists: add one on the page Alarms")
     else:

@@ -196,9 +196,9 @@ def _quantiles(answer: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, An
     """(name, quantiles, how one is written) of each row."""
     yield "remaining cycles", answer["remaining_cycles"], cycles
     yield "end of life, cycles", answer["end_of_life_cycles"], cycles
-    held = answer.get("held_runs")
-    if held is not None:
-        yield f"with {held['count']} held", held["remaining_cycles"], cycles
+    held_runs = answer.get("held_runs")
+    if held_runs is not None:
+        yield f"with {held_runs['count']} held", held_runs["remaining_cycles"], cycles
     if "remaining_blocks" in answer:
         yield "remaining blocks", answer["remaining_blocks"], number
         yield "under recent duty", answer["recent_duty_cycles"], cycles

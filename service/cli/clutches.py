@@ -84,7 +84,7 @@ def list_clutches(
 
 
 def _row(item: dict[str, Any]) -> list[str]:
-    held = str(item["held"]) if item["held"] else ""
+    held_count = str(item["held"]) if item["held"] else ""
     summary, numbers = item["summary"], ["-", "-", "-"]
     if summary:
         if summary["as_of_cycles"] is not None:
@@ -95,7 +95,7 @@ def _row(item: dict[str, Any]) -> list[str]:
             numbers[2] = cycles(summary["remaining_cycles"]["0.5"])
     state = item["state"]["name"].replace("_", " ")
     ended = "ended, " if summary and summary["ended"] else ""
-    return [item["clutch_id"], ended + state, *numbers, held]
+    return [item["clutch_id"], ended + state, *numbers, held_count]
 
 
 def status(clutch: ClutchId, as_json: Json = False, url: Url = URL, key: Key = None, patience: Patience = 10.0) -> None:
@@ -187,10 +187,10 @@ def _assign(fields: dict[str, Any], record: dict[str, Any], assignment: str) -> 
     if not dot:
         fields[field] = value
         return
-    whole = fields.get(field, record.get(field, {}))
-    if not isinstance(whole, dict):
+    parent = fields.get(field, record.get(field, {}))
+    if not isinstance(parent, dict):
         fail(f"{field} is a single value: set it as {field}=VALUE", EX_USAGE)
-    fields[field] = whole | {part: value}
+    fields[field] = parent | {part: value}
 
 
 @asking

@@ -65,10 +65,10 @@ def restore(
 
     with errors_in_a_line():
         require_file(database, "stop the service, then restore a dump with pg_restore")
-        kept = put_back(database, backup)
+        replaced_file = put_back(database, backup)
     print_line(f"{database} now holds the backup {backup}")
-    if kept is not None:
-        print_line(f"the old database is kept as {kept}")
+    if replaced_file is not None:
+        print_line(f"the old database is kept as {replaced_file}")
 
 
 if TYPE_CHECKING:
@@ -92,9 +92,9 @@ def replay(
     def replay_all(at_once: "AtOnce") -> list[str]:
         from service.workflows import replay as workflow  # start-up time, in the background
 
-        wanted, left = clutch_ids_given or workflow.clutch_ids(opened), []
-        advance(0, total=len(wanted))
-        for replayed in workflow.replay(opened, wanted, computing, at_once=at_once):
+        clutch_ids, left = clutch_ids_given or workflow.clutch_ids(opened), []
+        advance(0, total=len(clutch_ids))
+        for replayed in workflow.replay(opened, clutch_ids, computing, at_once=at_once):
             if replayed.error is not None:
                 left.append(replayed.clutch_id)
                 err.print(f"{replayed.clutch_id}: not replayed: {replayed.error}", markup=False, soft_wrap=True)

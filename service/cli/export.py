@@ -51,9 +51,9 @@ def export(
     with tempfile.TemporaryDirectory(prefix="clutchlife-export-") as place:
         folder = Path(place) / _safe(clutch)
         _export(service, clutch, folder)
-        made = Path(shutil.make_archive(str(Path(place) / "archive"), "zip", place, folder.name))
+        archive_path = Path(shutil.make_archive(str(Path(place) / "archive"), "zip", place, folder.name))
         out_folder.parent.mkdir(parents=True, exist_ok=True)
-        shutil.move(made, out_folder)
+        shutil.move(archive_path, out_folder)
     print_line(f"all of it is in {out_folder}")
 
 

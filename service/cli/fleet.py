@@ -78,9 +78,9 @@ def refresh(
 
 def _line(item: dict[str, Any]) -> str:
     kind, population = item["kind"], item["population"]
-    made = f"{kind['friction_material']} on {kind['reaction_plate']} in {kind['fluid']}, {kind['origin']}"
+    kind_text = f"{kind['friction_material']} on {kind['reaction_plate']} in {kind['fluid']}, {kind['origin']}"
     return (
-        f"{made}: version {item['version']}, {item['clutches']} clutches; "
+        f"{kind_text}: version {item['version']}, {item['clutches']} clutches; "
         f"change {population['change']['median']:.2f} of the initial value, "
         f"scale {population['scale_cycles']['median']:.0f} cycles"
     )

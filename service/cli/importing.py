@@ -39,14 +39,14 @@ def import_file(
 
     For the next file of the rig use `clutchlife push --rig NAME`, or import again.
     """
-    given: dict[str, Any] = {"kind": kind, "cycles": cycles, "rig": rig}
-    given |= {"map": channel_map, "decimal": decimal, "missing": missing}
+    options: dict[str, Any] = {"kind": kind, "cycles": cycles, "rig": rig}
+    options |= {"map": channel_map, "decimal": decimal, "missing": missing}
     profile: dict[str, Any] | None = None
-    shown = _preview(service, file, clutch, given, profile)
+    shown = _preview(service, file, clutch, options, profile)
     _show(shown)
     while shown["missing"] and shown["problem"] is None and not yes:
-        profile = _answered(shown, given, profile)
-        shown = _preview(service, file, clutch, given, profile)
+        profile = _answered(shown, options, profile)
+        shown = _preview(service, file, clutch, options, profile)
         _show(shown)
     if shown["problem"] is not None:
         fail(shown["problem"], EX_DATAERR)
@@ -63,11 +63,11 @@ def import_file(
         )
     if save is not None:
         _save(service, save, shown)
-        given, profile = given | {"rig": save, "map": None}, None
+        options, profile = options | {"rig": save, "map": None}, None
     elif profile is None:
-        given["rig"] = shown["rig"]
-    given |= {"kind": given["kind"] or shown["kind"], "cycles": shown["cycles"]}
-    receipt = _sent(service, f"/v1/clutches/{clutch}/runs/file", file, given, profile)
+        options["rig"] = shown["rig"]
+    options |= {"kind": options["kind"] or shown["kind"], "cycles": shown["cycles"]}
+    receipt = _sent(service, f"/v1/clutches/{clutch}/runs/file", file, options, profile)
     print_line(run_line(receipt) + ("  stored before" if receipt["duplicate"] else ""))
 
 
@@ -132,8 +132,8 @@ def _answered(shown: dict[str, Any], given: dict[str, Any], profile: dict[str, A
         elif name == "cycles":
             given["cycles"] = typer.prompt("Duty cycles since new", type=float)
         elif name.startswith("unit of "):
-            own = next(column for column in columns if column["title"] == name.removeprefix("unit of "))
-            own |= {"unit": _choice(name[0].upper() + name[1:], shown["units"][own["channel"]])}
+            own_column = next(column for column in columns if column["title"] == name.removeprefix("unit of "))
+            own_column |= {"unit": _choice(name[0].upper() + name[1:], shown["units"][own_column["channel"]])}
             edited = True
         else:
             title = _choice(f"Column of {name}", [column["title"] for column in columns if column["channel"] is None])

@@ -121,8 +121,8 @@ def executor(scheduler: str) -> Iterator["Executor"]:
 
     with errors_in_a_line():
         try:
-            with executors.executor_of(scheduler) as made:
-                yield made
+            with executors.executor_of(scheduler) as chosen_executor:
+                yield chosen_executor
         except executors.ExecutorUnavailableError as error:
             fail(str(error), EX_TEMPFAIL)
 
@@ -172,7 +172,7 @@ def service_at(url: str, key: str | None, patience: float) -> Iterator[Service]:
 
 def asking(command: Callable[..., None]) -> Callable[..., None]:
     """The command with --url, --key and --patience in the place of its first parameter, the service that they make."""
-    _, *own = inspect.signature(command, eval_str=True).parameters.values()
+    _, *parameters = inspect.signature(command, eval_str=True).parameters.values()
     kind = inspect.Parameter.KEYWORD_ONLY
     shared = [inspect.Parameter(name, kind, default=usual, annotation=of) for name, (of, usual) in _OPTIONS.items()]
 
@@ -181,8 +181,8 @@ def asking(command: Callable[..., None]) -> Callable[..., None]:
         with service_at(url, key, patience) as service:
             command(service, **given)
 
-    with_service.__signature__ = inspect.Signature([*own, *shared])  # type: ignore[attr-defined]
-    with_service.__annotations__ = {parameter.name: parameter.annotation for parameter in [*own, *shared]}
+    with_service.__signature__ = inspect.Signature([*parameters, *shared])  # type: ignore[attr-defined]
+    with_service.__annotations__ = {parameter.name: parameter.annotation for parameter in [*parameters, *shared]}
     return with_service
 
 

@@ -76,10 +76,12 @@ def confirm(
     if bool(runs) + every + bool(doubt) != 1:
         fail("name the runs, or use --all or --doubt CODE", EX_USAGE)
     if not runs:
-        held = service.pages(f"/v1/clutches/{clutch}/runs", state="held")
-        runs = [run["run_id"] for run in held if every or doubt in {question["code"] for question in run["doubts"]}]
+        held_runs = service.pages(f"/v1/clutches/{clutch}/runs", state="held")
+        runs = [
+            run["run_id"] for run in held_runs if every or doubt in {question["code"] for question in run["doubts"]}
+        ]
     if not runs:
-        print_line(f"{clutch} has no {f'runs held for {doubt}' if doubt else 'held runs'}")
+        print_line(f"{clutch} has no {f'runs held_runs for {doubt}' if doubt else 'held_runs runs'}")
         return
     for receipt in service.post(f"/v1/clutches/{clutch}/runs/confirm", {"run_ids": runs, "reason": reason})["items"]:
         _show(receipt)

@@ -113,10 +113,10 @@ def simulate(
             for run in runs:
                 description = f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles"
                 progress.update(task, description=description, completed=run.wear)
-                made = hidden.hidden_in(run, clutch, sizes)
+                record = hidden.hidden_in(run, clutch, sizes)
                 if plate_rise is not None:
-                    made = temperatures.with_plate(made, clutch.geometry, plate_rise)
-                listed += _write(out_folder, made, record_format)
+                    record = temperatures.with_plate(record, clutch.geometry, plate_rise)
+                listed += _write(out_folder, record, record_format)
                 if run.kind is RunKind.STATIONARY_STRIBECK:
                     _inspect(out_folder, surface.surface(clutch, run.wear), run.cycles)
                     inspections += 1
@@ -165,13 +165,13 @@ def _run_plan(folder: Path, plan: Path, alternative: int) -> None:
         made=answer["planned_tests"],
     )
     for run in runs:
-        made = hidden.hidden_in(run, clutch, sizes)
+        record = hidden.hidden_in(run, clutch, sizes)
         if answer["plate_rise"] is not None:
-            made = temperatures.with_plate(made, clutch.geometry, answer["plate_rise"])
-        manifest.write(folder / f"{made.run_id}.json", simulated.simulated_body(made))
-        answer |= {"cycles": made.cycles, "wear": made.wear}
-        answer["planned_tests"] += made.duty is None
-        print_line(f"{made.kind.value.replace('_', ' ')} at {made.cycles} cycles: {made.run_id}")
+            record = temperatures.with_plate(record, clutch.geometry, answer["plate_rise"])
+        manifest.write(folder / f"{record.run_id}.json", simulated.simulated_body(record))
+        answer |= {"cycles": record.cycles, "wear": record.wear}
+        answer["planned_tests"] += record.duty is None
+        print_line(f"{record.kind.value.replace('_', ' ')} at {record.cycles} cycles: {record.run_id}")
     manifest.write(folder / manifest.ANSWER, answer)
     print_line(f"now push {folder} again, and diagnose")
 

@@ -74,8 +74,8 @@ def _cell(text: str) -> str:
         return "<c/>"
     if (number := _number(text)) is not None:
         return f"<c><v>{number!r}</v></c>"
-    kept = escape(_ILLEGAL.sub("", text)[:_MAX_CELL])
-    return f'<c t="inlineStr"><is><t xml:space="preserve">{kept}</t></is></c>'
+    escaped = escape(_ILLEGAL.sub("", text)[:_MAX_CELL])
+    return f'<c t="inlineStr"><is><t xml:space="preserve">{escaped}</t></is></c>'
 
 
 def _number(text: str) -> float | None:

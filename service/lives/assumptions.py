@@ -159,5 +159,5 @@ def kind_of(record: ClutchIn, severity: Severity) -> dict[str, Any]:
 
 def may_be_of(record: ClutchIn, kind: Mapping[str, Any]) -> bool:
     """Whether a clutch is of that kind but for its severity, which follows from what was adopted, too."""
-    own = kind_of(record, Severity()) | {"severity": kind["severity"]}
-    return own == kind
+    kind_fields = kind_of(record, Severity()) | {"severity": kind["severity"]}
+    return kind_fields == kind

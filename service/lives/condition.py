@@ -62,9 +62,9 @@ def with_held_runs(
     """What an answer says beside its prediction: `held_runs` with what these, `count`, would make of it, which is `among`
     (None: none is held), and the safe bound as the lower of both, with its date at the pace of the runs; `summary` is that
     of the clutch, empty where the answer is of an earlier time or life."""
-    held, warnings = None, list(payload["warnings"])
+    held_runs, warnings = None, list(payload["warnings"])
     if among is not None:
-        held = {"count": count} | {name: among[name] for name in ("status", "remaining_cycles")}
+        held_runs = {"count": count} | {name: among[name] for name in ("status", "remaining_cycles")}
         warnings.append(_warning_about_held_runs(payload, among, count))
     at_least = lower_bound(payload["at_least"], among)
     at, since = None, None
@@ -74,7 +74,7 @@ def with_held_runs(
         "at_least": at_least,
         "at_least_at": at,
         "counted_from": since,
-        "held_runs": held,
+        "held_runs": held_runs,
         "statement": statement_of(payload, at_least),
         "warnings": warnings,
     }

@@ -178,12 +178,12 @@ def engagements_over_life(stored: Sequence[StoredEngagement], lives: Sequence[Co
     """The evaluated engagements in the order given, each with all indicators; `lives` are the run_ids of each life."""
     rows = []
     for life in lives:
-        own = [engagement for engagement in stored if engagement.run_id in life and engagement.course is not None]
-        first = [engagement for engagement in own if engagement.receipt["kind"] == DUTY_KINDS[0]]
+        of_life = [engagement for engagement in stored if engagement.run_id in life and engagement.course is not None]
+        first = [engagement for engagement in of_life if engagement.receipt["kind"] == DUTY_KINDS[0]]
         first = [engagement for engagement in first if engagement.has_duty_of(first[0])][:3]  # three make the reference
         courses = [engagement.course for engagement in first if engagement.course is not None]
         reference = reference_of(courses) if courses else None
-        for engagement in own:
+        for engagement in of_life:
             basis = None if reference is None or not engagement.has_duty_of(first[0]) else reference
             rows.append(_row(engagement, basis))
     return rows

@@ -241,14 +241,14 @@ class Life:
         draws = []
         for draw, weight in enumerate(weights):
             own_reference = first.cofs_under(draw)
-            own = [value(own_reference, self.events[index].cofs_under(draw)) for index in series.events]
-            taken = off[min(draw, len(off) - 1)].tolist()
+            cofs = [value(own_reference, self.events[index].cofs_under(draw)) for index in series.events]
+            offsets = off[min(draw, len(off) - 1)].tolist()
             draws.append(
                 (
                     weight,
                     tuple(
                         replace(measured, value=at[0] - added)
-                        for measured, at, added in zip(series.measurements, own, taken, strict=True)
+                        for measured, at, added in zip(series.measurements, cofs, offsets, strict=True)
                         if at is not None
                     ),
                 )
@@ -297,9 +297,9 @@ def order(events: Sequence[Event]) -> tuple[Event, ...]:
     """
     arrived = sorted((event for event in events if not event.dated), key=lambda event: event.arrived)
     moments = itertools.accumulate((event.moment for event in arrived), max)
-    made = {event.run_id: (moment, place) for place, (event, moment) in enumerate(zip(arrived, moments, strict=True))}
+    places = {event.run_id: (moment, place) for place, (event, moment) in enumerate(zip(arrived, moments, strict=True))}
     return tuple(
-        sorted(events, key=lambda event: (event.cycles, *made.get(event.run_id, (event.moment, 0)), event.run_id))
+        sorted(events, key=lambda event: (event.cycles, *places.get(event.run_id, (event.moment, 0)), event.run_id))
     )
 
 
@@ -346,7 +346,7 @@ def beyond_end(events: Sequence[Event]) -> tuple[Event, Event] | None:
 
 def life_with(events: Sequence[Event], event: Event) -> Life:
     """The life of an ordered history to which one of its events belongs, whatever became of it since."""
-    return next(life for life in lives_of(events) if any(own.run_id == event.run_id for own in life.events))
+    return next(life for life in lives_of(events) if any(member.run_id == event.run_id for member in life.events))
 
 
 def stationary_tests_of(events: Sequence[Event]) -> dict[str, str | None]:

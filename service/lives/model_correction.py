@@ -128,7 +128,7 @@ def _means_over(
         rows = np.flatnonzero((level_of == place) & (plateaus.speed != 0))
         rows = rows[np.argsort(speed[rows], kind="stable")]
         sign = np.sign(plateaus.speed[rows])
-        over = [np.interp(velocities, speed[rows], sign * own[rows]).mean() for own in torque]
+        over = [np.interp(velocities, speed[rows], sign * torques_here[rows]).mean() for torques_here in torque]
         means[level] = np.array(over) / geometry.torque_per_cof(level)
     return means
 

@@ -40,7 +40,11 @@ def summarised(state: ClutchState, tracking: Tracking, evidence: Evidence | None
     if not state.events:
         return held_summary(state, {}, evidence)
     last, life = state.events[-1].cycles, state.lives[-1]
-    payload = next(made.payload for made in tracking.predictions if (made.cycles, made.method) == (last, SHOWN))
+    payload = next(
+        prediction.payload
+        for prediction in tracking.predictions
+        if (prediction.cycles, prediction.method) == (last, SHOWN)
+    )
     if evidence is not None:
         payload = payload | by_own_criteria(state, SHOWN, payload, evidence, tracking.filters)
     pace, pooled = pace_of(life.events), life.pooled(state.assumptions())
@@ -61,19 +65,19 @@ def held_summary(state: ClutchState, filters: States, evidence: Evidence | None)
     """What a summary says of the held runs: how many there are, and by each filter what would be predicted with them."""
     if not state.held or evidence is None:
         return {"held": len(state.held), "with_held": None}
-    among = with_held(state, evidence)
+    state_with_held = with_held(state, evidence)
     return {
         "held": len(state.held),
-        "with_held": {method: outlook(among, method, evidence, filters) for method in CARRIED},
+        "with_held": {method: outlook(state_with_held, method, evidence, filters) for method in CARRIED},
     }
 
 
 def with_held(state: ClutchState, evidence: Evidence) -> ClutchState:
     """The clutch as it would be were its held runs accepted."""
-    among = replace(state, events=order([*state.events, *state.held]), held=())
+    state_with_held = replace(state, events=order([*state.events, *state.held]), held=())
     if evidence.reader is None:
         raise ValueError("a history with held runs needs a reader of them")
-    return with_cofs(among, evidence.levels, evidence.reader)[0]
+    return with_cofs(state_with_held, evidence.levels, evidence.reader)[0]
 
 
 def outlook(state: ClutchState, method: str, evidence: Evidence, filters: States) -> dict[str, Any]:

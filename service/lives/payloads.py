@@ -49,9 +49,9 @@ def not_eq_6(courses: Sequence[CourseShare]) -> list[Notice]:
     if any(share.name is CourseName.EQ_6 and share.probability >= EQ_6_DOUBTED for share in courses):
         return []
     named = [share for share in courses if share.name is not CourseName.EQ_6]
-    others = ", ".join(f"{share.name.value.replace('_', ' ')}: {share.probability:.0%}" for share in named)
+    shares = ", ".join(f"{share.name.value.replace('_', ' ')}: {share.probability:.0%}" for share in named)
     message = (
-        f"the clutch does not age by the usual law ({others}). The forecast follows the trend of the tests and allows for "
+        f"the clutch does not age by the usual law ({shares}). The forecast follows the trend of the tests and allows for "
         "further changes"
     )
     return [Notice(code=NOT_EQ_6, message=message)]
@@ -89,11 +89,12 @@ def filters_disagree(answers: Mapping[str, Mapping[str, Any]]) -> list[Notice]:
     """The warning where a filter's median lies outside another's 90 % interval, of predictions by their method."""
     predictions = {m: a["remaining_cycles"] for m, a in answers.items() if a["status"] not in (INSUFFICIENT, ENDED)}
     ends = [
-        [math.inf if given[q] is None else given[q] for q in ("0.05", "0.5", "0.95")] for given in predictions.values()
+        [math.inf if prediction[q] is None else prediction[q] for q in ("0.05", "0.5", "0.95")]
+        for prediction in predictions.values()
     ]
     if all(low <= median <= high for low, _, high in ends for _, median, _ in ends):
         return []
-    intervals = "; ".join(f"{interval_in_words(given)} by {method}" for method, given in predictions.items())
+    intervals = "; ".join(f"{interval_in_words(prediction)} by {method}" for method, prediction in predictions.items())
     message = f"the methods disagree about the remaining cycles: {intervals}. Plan with the lowest, and test again soon"
     return [Notice(code=FILTERS_DISAGREE, message=message)]
 

@@ -208,13 +208,13 @@ def cofs_among(state: ClutchState, event: Event, levels: Sequence[LevelFit]) -> 
 
 def computed_aside(state: ClutchState, event: Event, levels: Levels, reader: RunReader) -> tuple[ByPressure, Receipt]:
     """The mean COFs of a run that is none of the history, as they would be among it, and what its receipt says of it."""
-    own = levels.get(event.run_id, ())
-    among = replace(state, events=order([*state.events, event]))
-    evaluated = stationary_tests_of(among.events)
+    fits = levels.get(event.run_id, ())
+    state_with_event = replace(state, events=order([*state.events, event]))
+    evaluated = stationary_tests_of(state_with_event.events)
     evaluated.pop(event.run_id, None)
-    cofs = cofs_among(state, event, own)
-    loops = loops_again(among, levels, reader, evaluated)
-    return cofs, {"fits": fit_items(own, cofs), "loops": loops.get(event.run_id, [])}
+    cofs = cofs_among(state, event, fits)
+    loops = loops_again(state_with_event, levels, reader, evaluated)
+    return cofs, {"fits": fit_items(fits, cofs), "loops": loops.get(event.run_id, [])}
 
 
 def set_aside(
@@ -233,8 +233,8 @@ def _cofs_of_tests(lives: Sequence[Life], levels: Levels, geometry: Geometry) ->
         velocities = None if life.speed_range is None else reference_velocities(life.speed_range, geometry)
         for event in life.events:
             if levels.get(event.run_id):
-                own = levels[event.run_id]
-                cofs[event.run_id] = {} if velocities is None else mean_cofs(own, velocities, geometry)
+                fits = levels[event.run_id]
+                cofs[event.run_id] = {} if velocities is None else mean_cofs(fits, velocities, geometry)
     return cofs
 
 
@@ -271,12 +271,12 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
     predictions: dict[tuple[float, str], Prediction] = {}
     filters: States = {}
     warnings: dict[str, list[dict[str, str]]] = {}
-    for life, whole, start, first_event in walks:
-        measured = set(whole.events)
-        walk = follow(life, whole, assumptions, state.fraction, start, first_event=first_event)
-        for index, (after_event, made) in enumerate(walk, start=first_event):
+    for life, full_life, start, first_event in walks:
+        measured = set(full_life.events)
+        walk = follow(life, full_life, assumptions, state.fraction, start, first_event=first_event)
+        for index, (after_event, after_test) in enumerate(walk, start=first_event):
             filters = after_event
-            predictions |= {(prediction.cycles, prediction.method): prediction for prediction in made}
+            predictions |= {(prediction.cycles, prediction.method): prediction for prediction in after_test}
             if index in measured:
                 shown = predictions[life.events[index].cycles, SHOWN].payload
                 odd = [warning for warning in shown["warnings"] if warning["code"] == OFF_TRACK]
@@ -307,9 +307,9 @@ def loops_again(
     loops = {}
     for run_id, test in stationary_tests_of(state.events).items():
         if run_id not in evaluated or evaluated[run_id] != test:
-            own = [] if test is None else levels.get(test, [])
+            fits = [] if test is None else levels.get(test, [])
             loops[run_id] = loop_items(
-                loops_of(reader.read(run_id).channels, state.geometry, state.record.torque_filter, own)
+                loops_of(reader.read(run_id).channels, state.geometry, state.record.torque_filter, fits)
             )
     return loops
 

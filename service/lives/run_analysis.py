@@ -60,16 +60,16 @@ class Analysis:
     def details_to_store(self, run: IncomingRun) -> dict[str, Any]:
         """What is kept beside a run's channels: what was sent with them, its range of speeds [rad/s] and its oil [K], the
         course of an engagement."""
-        kept = dict(run.details) | {"origin": run.origin}
+        details = dict(run.details) | {"origin": run.origin}
         if run.file is not None:
-            kept["file"] = dict(run.file)
+            details["file"] = dict(run.file)
         if self.engagement is not None:
-            return kept | course_item(self.engagement)
+            return details | course_item(self.engagement)
         if self.speed_range is not None:
-            kept["speed_range"] = list(self.speed_range)
+            details["speed_range"] = list(self.speed_range)
         if self.oil_temperature is not None:
-            kept["oil_temperature"] = self.oil_temperature
-        return kept
+            details["oil_temperature"] = self.oil_temperature
+        return details
 
 
 def analyse(run: IncomingRun, geometry: Geometry, torque_filter: float) -> Analysis:

@@ -84,7 +84,7 @@ class Tracked:
             owner, _, part = name.partition("/")
             parts.setdefault(owner, {})[part] = array
         back_cast = BackCast(**parts.pop(_BACK_CAST))
-        states = {prior: _STATES[method].from_arrays(own) for prior, own in parts.items()}
+        states = {prior: _STATES[method].from_arrays(arrays_of_prior) for prior, arrays_of_prior in parts.items()}
         return cls(runs=runs, states=states, back_cast=back_cast)
 
 
@@ -186,10 +186,10 @@ def _continues(tracked: Tracked, branches: Mapping[str, tuple[Prior, tuple[Measu
     if tracked.states.keys() != branches.keys():
         return False
     for name, state in tracked.states.items():
-        prior, own = branches[name]
-        if state.prior != prior or tracked.runs > len(own):
+        prior, branch_state = branches[name]
+        if state.prior != prior or tracked.runs > len(branch_state):
             return False
-        measurements, history = own[: tracked.runs], state.history
+        measurements, history = branch_state[: tracked.runs], state.history
         rows = zip(
             measurements, history.progress.tolist(), history.value.tolist(), history.epoch.tolist(), strict=False
         )

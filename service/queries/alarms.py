@@ -95,6 +95,6 @@ def delivered(database: Database, delivery_ids: Collection[str]) -> list[dict[st
 
 
 def delivery_out(row: DeliveryRow) -> dict[str, Any]:
-    again = row.state == webhooks.WAITING and row.due > 0.0
-    next_attempt = datetime.fromtimestamp(row.due, UTC).isoformat(timespec="seconds") if again else None
+    will_retry = row.state == webhooks.WAITING and row.due > 0.0
+    next_attempt = datetime.fromtimestamp(row.due, UTC).isoformat(timespec="seconds") if will_retry else None
     return schema_fields(DeliveryOut, row, next_attempt_at=next_attempt)

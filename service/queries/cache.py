@@ -93,15 +93,15 @@ def revision_and_json(
     """
     with database.reading() as connection:
         revision = clutches.revision(connection, clutch_id) or 0
-    kept = None if arguments else shared_answer(database, query, clutch_id)
-    if kept is not None and kept[0] >= revision:
-        return kept
+    shared = None if arguments else shared_answer(database, query, clutch_id)
+    if shared is not None and shared[0] >= revision:
+        return shared
     body = to_json(query(database, clutch_id, *arguments))
     if database.answers is not None and not arguments:
         name = name_of(query)
-        made = SharedAnswer(clutch_id=clutch_id, name=name, release=BUILD, revision=revision, body=body)
+        new_answer = SharedAnswer(clutch_id=clutch_id, name=name, release=BUILD, revision=revision, body=body)
         try:
-            database.answers.keep(made)
+            database.answers.keep(new_answer)
         except StorageError as error:  # as after a restart of the server: it is an answer all the same
             _log.warning("an answer could not be shared: %s", error)
     return revision, body
@@ -113,11 +113,11 @@ def shared_answer(database: Database, query: Callable[..., object], clutch_id: s
     if database.answers is None:
         return None
     try:
-        kept = database.answers.newest(clutch_id, name_of(query), BUILD)
+        newest = database.answers.newest(clutch_id, name_of(query), BUILD)
     except StorageError as error:
         _log.warning("a shared answer could not be read: %s", error)
         return None
-    return None if kept is None else (kept.revision, kept.body)
+    return None if newest is None else (newest.revision, newest.body)
 
 
 class AnswerCache:
@@ -163,24 +163,24 @@ class AnswerCache:
         """The answer for `key`, made by `make` where that of `version` is not there. What `make` raises is raised for all
         who wait."""
         with self._lock:
-            held = self._current(key, version)
-            if held is not None:
-                return held
+            cached = self._current(key, version)
+            if cached is not None:
+                return cached
             pending = self._making.get((key, version))
             if pending is not None:
-                mine = False
+                makes_it = False
             else:
-                mine, pending = True, Future()
+                makes_it, pending = True, Future()
                 self._making[key, version] = pending
                 self._begun += 1
             begun = self._begun
-        if mine:
+        if makes_it:
             self._make(key, version, make, pending, begun)
         return pending.result()
 
     def _current(self, key: Hashable, version: Hashable) -> Answer | None:
-        held, answer, _ = self._answers.get(key, (None, None, 0))
-        if answer is None or held != version:
+        cached_version, answer, _ = self._answers.get(key, (None, None, 0))
+        if answer is None or cached_version != version:
             return None
         self._answers.move_to_end(key)
         return answer

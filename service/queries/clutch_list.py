@@ -91,9 +91,9 @@ def page_as_json(
         cache.answer(
             ("clutch", row.clutch_id),
             (row.revision, row.state, to_json(verdict)),
-            partial(_as_json, row, held, verdict, state),
+            partial(_as_json, row, held_count, verdict, state),
         )
-        for row, held, verdict, state in clutches_shown
+        for row, held_count, verdict, state in clutches_shown
     ]
     places = {
         "worst": lambda row: (row.rank, row.clutch_id),
@@ -136,17 +136,21 @@ def _shown(
     """Clutches, each with the number of its held runs, its newest finished diagnosis as it goes out, and its state with
     headline and action."""
     names = [row.clutch_id for row in rows]
-    newest, held = diagnoses.newest(connection, names), runs.held(connection, names)
+    newest, held_counts = diagnoses.newest(connection, names), runs.held(connection, names)
     shown = []
     for row in rows:
         diagnosis = records.latest_diagnosis(row, newest.get(row.clutch_id))
         first = records.first_line(row, diagnosis)
         state = {"state": records.condition(row)}
-        shown.append((row, held.get(row.clutch_id, 0), diagnosis, state | first))
+        shown.append((row, held_counts.get(row.clutch_id, 0), diagnosis, state | first))
     return shown
 
 
 def _item(row: ClutchRow, held: int, diagnosis: dict[str, Any] | None, state: dict[str, Any]) -> dict[str, Any]:
-    said = {"runs": row.summary.get("runs", 0), "recent": row.summary.get("recent"), "summary": stated(row.summary)}
-    beside = state | said | {"held": held, "diagnosis": diagnosis}
-    return schema_fields(ClutchOut, row, **records.record(row).model_dump(mode="json") | beside)
+    from_summary = {
+        "runs": row.summary.get("runs", 0),
+        "recent": row.summary.get("recent"),
+        "summary": stated(row.summary),
+    }
+    extra = state | from_summary | {"held": held, "diagnosis": diagnosis}
+    return schema_fields(ClutchOut, row, **records.record(row).model_dump(mode="json") | extra)

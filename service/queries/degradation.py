@@ -68,30 +68,30 @@ def degradation(
     As it was at `at_cycles`, of the present life or of an earlier one by its number; with so many joint `draws` of the
     coefficients, and trajectories up to `until` cycles. Raises NotFoundError, and InvalidError for a quantity that is none.
     """
-    wanted = None if quantity is None else quantity_named(quantity)
+    asked_quantity = None if quantity is None else quantity_named(quantity)
     with database.reading() as connection:
         state = records.state(connection, clutch_id)
         chosen = chosen_life(state, life, at_cycles)
         evidence = stored_runs.evidence(connection, clutch_id)
     measured = measured_life(state, chosen, evidence)
-    held = held_runs_left_out(len(chosen.held))
+    held_fields = held_runs_left_out(len(chosen.held))
     head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}
-    if measured is None or (wanted is None and not measured.life.reference):
+    if measured is None or (asked_quantity is None and not measured.life.reference):
         nothing: dict[str, Any] = {"items": [], "rebuilt": None, "severity_estimate": None}
-        return head | nothing | held | chosen.assumptions.named() | {"next": None}
+        return head | nothing | held_fields | chosen.assumptions.named() | {"next": None}
     estimate = None
-    if wanted is None:
-        items, again = _all_tracks(measured, method, draws, until)
+    if asked_quantity is None:
+        items, from_parameters = _all_tracks(measured, method, draws, until)
         estimate = severity_estimate(measured.life, measured.assumptions)
     else:
-        items, again = _items(measured, wanted, method, draws, until), None
+        items, from_parameters = _items(measured, asked_quantity, method, draws, until), None
     doubted = [] if estimate is None else estimate.doubts(measured.assumptions.severity)
     answered = {
         "items": items,
-        "rebuilt": again,
+        "rebuilt": from_parameters,
         "severity_estimate": _severity_item(estimate),
-        "held_runs": held["held_runs"],
-        "warnings": [*notice_items([*_disagreements(again), *doubted]), *held["warnings"]],
+        "held_runs": held_fields["held_runs"],
+        "warnings": [*notice_items([*_disagreements(from_parameters), *doubted]), *held_fields["warnings"]],
     }
     return head | answered | chosen.assumptions.named() | {"next": None}
 
@@ -105,8 +105,8 @@ def arguments(
     until: float | None = None,
 ) -> tuple[Hashable, ...]:
     """The arguments of `degradation` behind the clutch; none where all are left out: so the answer is kept under one key."""
-    whole = (method, quantity, at_cycles, life, draws, until)
-    return () if whole == ("grid", None, None, None, 0, None) else whole
+    all_arguments = (method, quantity, at_cycles, life, draws, until)
+    return () if all_arguments == ("grid", None, None, None, 0, None) else all_arguments
 
 
 def _all_tracks(
@@ -115,13 +115,15 @@ def _all_tracks(
     """Mean COF, every parameter, and mean COF from the parameters."""
     direct = _tracked(measured, measured.series(_MEAN_COF), method)
     tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, method)
-    again = _from_parameters(measured, tracks, {series.pressure: (series, posterior) for series, posterior in direct})
+    from_parameters = _from_parameters(
+        measured, tracks, {series.pressure: (series, posterior) for series, posterior in direct}
+    )
     named = {quantity.internal: quantity for quantity in QUANTITIES.values()}
     items = [
         track_item(named[series.quantity], series, posterior, measured.assumptions, draws, until)
         for series, posterior in (*direct, *tracks.values())
     ]
-    return items, again
+    return items, from_parameters
 
 
 def _items(
@@ -237,7 +239,7 @@ def _payload(paths: CofPaths, direct: Track, assumptions: Assumptions, fraction:
     shown = paths.progress <= max(1.0, now) * 1.5
     cap = float(series.scale.cycles(paths.progress[-1]))
     quantiles = np.quantile(np.minimum(ends, 10 * cap), QUANTILES).tolist()
-    apart = _apart(paths, ends, direct, assumptions, fraction)
+    differences = _apart(paths, ends, direct, assumptions, fraction)
     return {
         "trajectory": {
             "cycles": series.scale.cycles(paths.progress)[shown].tolist(),
@@ -246,7 +248,7 @@ def _payload(paths: CofPaths, direct: Track, assumptions: Assumptions, fraction:
         "end_of_life_cycles": {
             f"{q:g}": None if value > cap else value for q, value in zip(QUANTILES, quantiles, strict=True)
         },
-        "disagreement": {"now_sd": apart.now, "end_of_life_sd": apart.end_of_life},
+        "disagreement": {"now_sd": differences.now, "end_of_life_sd": differences.end_of_life},
     }
 
 

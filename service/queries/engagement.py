@@ -79,8 +79,8 @@ def _simulated(capacity: Capacity, geometry: Geometry) -> dict[str, Any]:
 
 
 def _compared_row(measured: Sequence[dict[str, Any]], life: Life, run_id: str | None) -> dict[str, Any] | None:
-    own = {event.run_id for event in life.events}
-    rows = [row for row in measured if row["run_id"] in own]
+    run_ids = {event.run_id for event in life.events}
+    rows = [row for row in measured if row["run_id"] in run_ids]
     if run_id is None:
         return rows[-1] if rows else None
     row = next((row for row in rows if row["run_id"] == run_id), None)
@@ -98,12 +98,12 @@ def _comparison(run: IncomingRun, row: dict[str, Any], capacity: Capacity, geome
     at = trace_times(slip)
     columns = {"pressure_bar": slip.pressure, "speed_rpm": slip.speed, "torque_nm": slip.torque}
     means = {name: bin_means(slip.time, column, at) for name, column in columns.items()}
-    found = discrepancy(engagement, capacity, geometry.mean_radius)
+    differences = discrepancy(engagement, capacity, geometry.mean_radius)
     return {
         "run_id": row["run_id"],
         "cycles": row["cycles"],
         "channels": public_channels({"time_s": at - slip.contact} | means),
-        "model": None if found is None else _model_part(found, slip.contact),
+        "model": None if differences is None else _model_part(differences, slip.contact),
     }
 
 

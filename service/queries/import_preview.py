@@ -58,32 +58,32 @@ def preview(
     if profile is None:
         rig, profile = _fitting(database, shown, filename)
         shown = preview_file(path, filename=filename, reading=reading_with(profile, reading)) if profile else shown
-    own = Named() if profile is None else named(profile, filename, shown["labels"])
+    from_profile = Named() if profile is None else named(profile, filename, shown["labels"])
     used = _by_titles(shown) if profile is None else profile
     if used is not None:
         stated = {name: value for name in ("decimal", "missing") if (value := getattr(reading, name))}
         used = used.model_copy(update=stated)
         if reading.mapping and (titled := _by_titles(shown)):
             used = used.model_copy(update={"columns": titled.columns})
-    kind, cycles = kind or own.kind, own.cycles if cycles is None else cycles
+    kind, cycles = kind or from_profile.kind, from_profile.cycles if cycles is None else cycles
     by_titles = profile is None and shown["problem"] is None  # as a push reads it; else with what is open left open
     read_by = reading_with(None if by_titles else used, reading if by_titles else Reading())
     evaluated = _evaluated(path, filename, None if used is None else read_by, kind, geometry, torque_filter)
     kind = kind or (evaluated["kinds"][0] if len(evaluated["kinds"]) == 1 else None)
-    kept = _first_of_each(shown["columns"])
-    columns = [_column(shown["columns"][index], used) for index in kept]
+    usable = _first_of_each(shown["columns"])
+    columns = [_column(shown["columns"][index], used) for index in usable]
     return {
         "filename": filename,
         "above": shown["above"],
         "tables": shown["tables"],
         "columns": columns,
-        "first_rows": [[row[index] if index < len(row) else "" for index in kept] for row in shown["head"]],
+        "first_rows": [[row[index] if index < len(row) else "" for index in usable] for row in shown["head"]],
         "units": {name: spellings(name).split(", ") for name in CHANNELS},
         "rig": rig,
         "profile": _saveable(shown, used, kind, filename, cycles),
         "kind": kind,
         "cycles": cycles,
-        "run_id": own.run_id,
+        "run_id": from_profile.run_id,
         **evaluated,
         "missing": [
             *evaluated["missing"],
@@ -135,8 +135,8 @@ def _by_titles(shown: Mapping[str, Any]) -> RigProfile | None:
     for column, channel in zip(shown["columns"], channels, strict=True):
         if column["name"]:
             only = channel is not None and channels.count(channel) == 1
-            kept = {"channel": channel, "unit": column["stated"]} if only else {"channel": None}
-            columns.setdefault(_title(column), {"title": _title(column)} | kept)
+            entry = {"channel": channel, "unit": column["stated"]} if only else {"channel": None}
+            columns.setdefault(_title(column), {"title": _title(column)} | entry)
     if not any(column["channel"] for column in columns.values()):
         return None
     return RigProfile.model_validate({"columns": list(columns.values())})
@@ -144,16 +144,16 @@ def _by_titles(shown: Mapping[str, Any]) -> RigProfile | None:
 
 def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, Any]:
     title = _title(column)
-    own = next((item for item in profile.columns if item.title == title), None) if profile else None
-    channel = None if own is None else own.channel
+    profile_column = next((item for item in profile.columns if item.title == title), None) if profile else None
+    channel = None if profile_column is None else profile_column.channel
     return {
         "title": title,
         "stated_unit": column["unit"],
         "unit": column["read_in"] if channel == column["channel"] else None,
         "channel": channel,
         "in_part": channel is not None and column["in_part"],
-        "scale": 1.0 if own is None else own.scale,
-        "offset": 0.0 if own is None else own.offset,
+        "scale": 1.0 if profile_column is None else profile_column.scale,
+        "offset": 0.0 if profile_column is None else profile_column.offset,
     }
 
 
@@ -167,15 +167,19 @@ def _saveable(
 ) -> dict[str, Any]:
     """The profile as it could be saved: with all columns, and a pattern of the file's name where the cycles are in that."""
     titles = dict.fromkeys(_title(column) for column in shown["columns"] if column["name"])
-    own = {column.title: column.model_dump(mode="json") for column in used.columns} if used else {}
-    others = {} if used is None else used.model_dump(mode="json")
+    profile_columns = {column.title: column.model_dump(mode="json") for column in used.columns} if used else {}
+    profile_fields = {} if used is None else used.model_dump(mode="json")
     suggested = {
-        "file_name": others.get("file_name") or pattern_for(filename, cycles),
-        "kind": others.get("kind") or kind,
+        "file_name": profile_fields.get("file_name") or pattern_for(filename, cycles),
+        "kind": profile_fields.get("kind") or kind,
     }
-    columns = [own.get(title, {"title": title, "channel": None}) for title in titles]
-    kept = set(RigProfile.model_fields)
-    return {name: value for name, value in (others | suggested | {"columns": columns}).items() if name in kept}
+    columns = [profile_columns.get(title, {"title": title, "channel": None}) for title in titles]
+    field_names = set(RigProfile.model_fields)
+    return {
+        name: value
+        for name, value in (profile_fields | suggested | {"columns": columns}).items()
+        if name in field_names
+    }
 
 
 def _evaluated(

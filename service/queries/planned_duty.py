@@ -47,10 +47,10 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
     of_runs = pace_of(events)
     pace = stated or (None if of_runs is None else of_runs * _SECONDS_PER_HOUR)
     prediction = _prediction(state, method, planned)
-    among = None
+    prediction_with_held = None
     if state.held:
         evidence = stored_runs.evidence_for(database, state, stored_runs.run_reader(database, clutch_id))
-        among = None if evidence is None else _prediction(with_held(state, evidence), method, planned)
+        prediction_with_held = None if evidence is None else _prediction(with_held(state, evidence), method, planned)
     summary: dict[str, Any] = {}
     if pace is not None and events:
         a_second = pace / _SECONDS_PER_HOUR
@@ -63,7 +63,7 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
         "end_of_life_at": _dates(prediction["end_of_life_cycles"], events, pace),
         "pace_cycles_per_hour": pace,
         "pace_from": None if pace is None else "runs" if stated is None else "request",
-        **with_held_runs(prediction, summary, among, len(state.held)),
+        **with_held_runs(prediction, summary, prediction_with_held, len(state.held)),
     }
 
 

@@ -67,10 +67,12 @@ def remaining_life(
         state = records.state(connection, clutch_id, carried=carried_on) if stored is None or earlier else None
     head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": row.record["origin"]}
     summary, count = row.summary if now else {}, row.summary.get("held", 0)
-    among = (summary.get("with_held") or {}).get(method)
+    outlook_with_held = (summary.get("with_held") or {}).get(method)
     if state is not None:
         count = len(chosen_life(state, at_cycles=None if now else at_cycles).held)
-        among = _with_held(database, state, method, pressure_bar, None if now else at_cycles) if count else None
+        outlook_with_held = (
+            _with_held(database, state, method, pressure_bar, None if now else at_cycles) if count else None
+        )
     if stored is not None:
         payload = stored.payload
     elif state is None:
@@ -78,7 +80,7 @@ def remaining_life(
     else:
         payload = _predicted(state, method, pressure_bar, at_cycles)
     payload = {**payload, "warnings": [*payload["warnings"], *disagree]}
-    answer = head | payload | with_held_runs(payload, summary, among, count)
+    answer = head | payload | with_held_runs(payload, summary, outlook_with_held, count)
     return answer | {"criteria": _criteria(payload)}
 
 
@@ -116,9 +118,9 @@ def _with_held(
 def _criteria(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The one criterion of a stored prediction, as `criteria` lists it: mean COF, which is surely the first."""
     criterion, current = payload["criterion"], payload["current"]
-    given = {name: criterion.get(name) for name in GIVEN}
+    fields = {name: criterion.get(name) for name in GIVEN}
     return [
-        given
+        fields
         | {"initial": criterion["initial_mean_cof"], "limit": criterion["threshold_mean_cof"]}
         | {name: payload[name] for name in ("end_of_life_cycles", "remaining_cycles", "probability_of_reaching")}
         | {"current": {"value": current["mean_cof"], "sd": current["mean_cof_sd"]}}
@@ -127,7 +129,7 @@ def _criteria(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    held = payload["held_runs"]
+    held_runs = payload["held_runs"]
     for quantile, remaining in payload["remaining_cycles"].items():
         yield {
             "as_of_cycles": payload["as_of_cycles"],
@@ -136,8 +138,8 @@ def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             "remaining_cycles": remaining,
             "end_of_life_cycles": payload["end_of_life_cycles"][quantile],
             "at_least": payload["at_least"],
-            "held_runs": 0 if held is None else held["count"],
-            "remaining_cycles_with_held": None if held is None else held["remaining_cycles"][quantile],
+            "held_runs": 0 if held_runs is None else held_runs["count"],
+            "remaining_cycles_with_held": None if held_runs is None else held_runs["remaining_cycles"][quantile],
         }
 
 
@@ -177,13 +179,15 @@ def life_by_criteria(
     answer = _by_criteria(state, chosen, evidence, request)
     answer["warnings"] = [*answer["warnings"], *disagree]
     now = chosen.number == chosen.of and (at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf))
-    among = None
+    answer_with_held = None
     if chosen.held:
         evidence = replace(evidence, reader=stored_runs.run_reader(database, clutch_id))
-        held = with_held(state, evidence)
-        among = _by_criteria(held, chosen_life(held, life, None if now else at_cycles), evidence, request)
+        state_with_held = with_held(state, evidence)
+        answer_with_held = _by_criteria(
+            state_with_held, chosen_life(state_with_held, life, None if now else at_cycles), evidence, request
+        )
     head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": state.record.origin}
-    return head | answer | with_held_runs(answer, row.summary if now else {}, among, len(chosen.held))
+    return head | answer | with_held_runs(answer, row.summary if now else {}, answer_with_held, len(chosen.held))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,28 +207,32 @@ def _by_criteria(state: ClutchState, chosen: ChosenLife, evidence: Evidence, req
     measured = measured_life(state, chosen, evidence)
     if measured is None:
         return answer
-    wanted = _requested_criteria(
+    requested = _requested_criteria(
         state.record.end_of_life, measured, request.quantity, request.criterion, request.pressure_bar
     )
-    if all(criterion_in.quantity != MEAN_COF for criterion_in in wanted):
+    if all(criterion_in.quantity != MEAN_COF for criterion_in in requested):
         answer |= _NOT_OF_MEAN_COF
-    ends = [criterion_end(measured, criterion_in, request.method) for criterion_in in wanted]
+    ends = [criterion_end(measured, criterion_in, request.method) for criterion_in in requested]
     return ended(answer | criteria_answer(measured, ends, answer["current"]), measured.life.end)
 
 
 def _requested_criteria(
     record: EndOfLifeIn, measured: MeasuredLife, quantity: str | None, criterion: str | None, pressure_bar: float | None
 ) -> Sequence[CriterionIn]:
-    own = record.criteria or (CriterionIn(quantity="mean_cof", fraction=record.cof_fraction),)
+    of_clutch = record.criteria or (CriterionIn(quantity="mean_cof", fraction=record.cof_fraction),)
     if quantity is None and criterion is None and pressure_bar is None:
-        return own
+        return of_clutch
     name = quantity_named(quantity or criterion or MEAN_COF).name
-    chosen = [given for given in own if given.quantity == name and pressure_bar in (None, given.pressure_bar)]
+    chosen = [
+        candidate
+        for candidate in of_clutch
+        if candidate.quantity == name and pressure_bar in (None, candidate.pressure_bar)
+    ]
     if chosen:
         return chosen
     if criterion is not None:
         raise NotFoundError(
-            f"the clutch has no criterion on {name}; it has: {', '.join(given.quantity for given in own)}"
+            f"the clutch has no criterion on {name}; it has: {', '.join(candidate.quantity for candidate in of_clutch)}"
         )
     return [_usual(name, record.cof_fraction, measured, pressure_bar)]
 
@@ -237,9 +245,9 @@ def _usual(name: str, fraction: float, measured: MeasuredLife, pressure_bar: flo
     if not tracks:
         raise NotFoundError(f"{name} is not measured in this life")
     first = min(tracks, key=lambda series: (series.frequency_hz or 0.0, series.pressure))
-    given: dict[str, Any] = {"quantity": name, "pressure_bar": pressure_bar}
+    fields: dict[str, Any] = {"quantity": name, "pressure_bar": pressure_bar}
     if pressure_bar is None and first.pressure != ALL_PRESSURES:
-        given["pressure_bar"] = first.pressure / 1e5
+        fields["pressure_bar"] = first.pressure / 1e5
     if quantity.family is Family.SLOPE:
-        return CriterionIn(**given, speed_rpm=SLOPE_SPEEDS[1])
-    return CriterionIn(**given, fraction=fraction, frequency_hz=first.frequency_hz)
+        return CriterionIn(**fields, speed_rpm=SLOPE_SPEEDS[1])
+    return CriterionIn(**fields, fraction=fraction, frequency_hz=first.frequency_hz)

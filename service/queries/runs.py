@@ -63,8 +63,8 @@ def loops(database: Database, clutch_id: str) -> tuple[list[dict[str, Any]], int
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED)
-        held = runs.held(connection, [clutch_id]).get(clutch_id, 0)
-    found = [
+        held_count = runs.held(connection, [clutch_id]).get(clutch_id, 0)
+    loop_rows = [
         {"run_id": row.run_id, "cycles": whole(row.cycles)} | loop for row in rows for loop in row.receipt["loops"]
     ]
-    return found, held
+    return loop_rows, held_count

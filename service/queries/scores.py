@@ -41,8 +41,8 @@ def scores_of_clutch(database: Database, clutch_id: str, method: str) -> dict[st
     for life in state.lives:
         end = end_of_life(life, assumptions, state.fraction)
         if end is not None:
-            made = stored if method in CARRIED else _predictions(life, assumptions, state.fraction, method)
-            items.append(_scored(life, assumptions, end, made))
+            predictions = stored if method in CARRIED else _predictions(life, assumptions, state.fraction, method)
+            items.append(_scored(life, assumptions, end, predictions))
     return {"clutch_id": clutch_id, "method": method, "revision": state.revision, "items": items, "next": None}
 
 
@@ -82,12 +82,12 @@ def end_of_life(life: Life, assumptions: Assumptions, fraction: float) -> float 
 
 def _predictions(life: Life, assumptions: Assumptions, fraction: float, method: str) -> dict[float, dict[str, Any]]:
     """What a method whose predictions are not stored would have predicted at each test."""
-    made = {}
+    predictions = {}
     for index, event in enumerate(life.events):
         if event.cofs:
             happened: Sequence[Event] = life.events[: index + 1]
-            made[event.cycles] = predict_at(happened, assumptions, fraction, method=method)
-    return made
+            predictions[event.cycles] = predict_at(happened, assumptions, fraction, method=method)
+    return predictions
 
 
 def _scored(life: Life, assumptions: Assumptions, end: float, made: dict[float, dict[str, Any]]) -> dict[str, Any]:

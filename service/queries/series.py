@@ -49,13 +49,17 @@ def series(database: Database, clutch_id: str, quantity: str | None) -> list[dic
         dynamic = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED) if of_loops else []
         engaged = stored_runs.engagements(connection, clutch_id)
         predicted = results.predictions_of(connection, clutch_id, SHOWN, ALL_PRESSURES)
-        held = runs.held(connection, [clutch_id]).get(clutch_id, 0)
+        held_count = runs.held(connection, [clutch_id]).get(clutch_id, 0)
     measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))
     slopes = _slopes(records.record(clutch), rows, levels)
     lags = (item for row in dynamic for loop in row.receipt["loops"] for item in _rows_of_loop(row.receipt, loop))
     indicators = (item for row in engaged for item in _indicators(row))
     ahead = (item for row in predicted for item in _predicted(row))
-    waiting = [_ahead_row(predicted[-1].cycles if predicted else 0.0, "held_runs", "1", float(held))] if held else []
+    waiting = (
+        [_ahead_row(predicted[-1].cycles if predicted else 0.0, "held_runs", "1", float(held_count))]
+        if held_count
+        else []
+    )
     return [
         item
         for items in (measured, slopes, lags, indicators, ahead, waiting)

@@ -27,9 +27,9 @@ def curves(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
         records.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, limit=part.most, after=part.after, fitted=True, state=runs.ACCEPTED)
         levels = records.levels(connection, clutch_id)
-        held = runs.held(connection, [clutch_id]).get(clutch_id, 0)
+        held_count = runs.held(connection, [clutch_id]).get(clutch_id, 0)
     tests = part.of(rows, by_cycles("run_id"), lambda row: _item(row, levels.get(row.run_id, [])))
-    return held_runs_left_out(held) | tests  # the next page last, where it is found
+    return held_runs_left_out(held_count) | tests  # the next page last, where it is found
 
 
 def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:

@@ -106,12 +106,12 @@ def check_results(database: Database, clutch_id: str) -> CheckedResults:
             state = records.state(connection, clutch_id)
             stored = _stored(connection, clutch_id)
         try:
-            again = _recomputed(stored_runs.recomputed(stored_runs.recorded(database, state)))
+            recomputed = _recomputed(stored_runs.recomputed(stored_runs.recorded(database, state)))
         except (InvalidError, DamagedData) as error:
             return CheckedResults(findings=(f"{clutch_id}: results cannot be computed again: {error}",), earlier={})
         with database.reading() as connection:
             if records.unchanged(connection, clutch_id, state.revision):
-                return _compared(clutch_id, stored, again)
+                return _compared(clutch_id, stored, recomputed)
 
 
 def _compared(clutch_id: str, stored: _Results, again: Mapping[str, Any]) -> CheckedResults:
@@ -134,8 +134,8 @@ def _stored(connection: Connection, clutch_id: str) -> _Results:
     fits = results.fits_of(connection, clutch_id)
     named = {f"the receipt of run {row.run_id}": (row.code_version, row.receipt) for row in rows}
     for row in rows:
-        own = fits.get(row.run_key, [])
-        named |= {_fit(row.run_id, fit.pressure): (fit.code_version, _plain(asdict(fit))) for fit in own}
+        stored_fits = fits.get(row.run_key, [])
+        named |= {_fit(row.run_id, fit.pressure): (fit.code_version, _plain(asdict(fit))) for fit in stored_fits}
     for method in CARRIED:
         predictions = results.predictions_of(connection, clutch_id, method, ALL_PRESSURES)
         named |= {_prediction(method, item.cycles): (item.code_version, item.payload) for item in predictions}

@@ -102,9 +102,9 @@ def _paired(tree: Tree) -> Tree:
     headers = {key.lower(): value for key, value in tree.items() if isinstance(value, Mapping)}
     for key, value in tree.items():
         base, _, kind = key.rpartition("_")
-        held = [headers[name] for end in _HEADERS if (name := f"{base}_{end}".lower()) in headers]
-        if isinstance(value, Leaf) and kind.lower() in _DATA and held:
-            paired[base] = {**held[0], kind: paired.pop(key)}
+        header_values = [headers[name] for end in _HEADERS if (name := f"{base}_{end}".lower()) in headers]
+        if isinstance(value, Leaf) and kind.lower() in _DATA and header_values:
+            paired[base] = {**header_values[0], kind: paired.pop(key)}
     return paired
 
 
@@ -124,14 +124,14 @@ def _sources(tree: Tree, group: str, depth: int, above: Tree) -> Iterator[_Sourc
         if isinstance(node, Mapping):
             lowered = {key.lower(): value for key, value in node.items()}
             data = next((lowered[key] for key in _DATA if isinstance(lowered.get(key), Leaf)), None)
-            rest = [
+            remaining = [
                 key for key, value in node.items() if isinstance(value, Leaf) and value is not data and _rows(value)
             ]
-            if data is not None and all(known_channel(key) == "time_s" for key in rest):
+            if data is not None and all(known_channel(key) == "time_s" for key in remaining):
                 label = next((_text(lowered[key]) for key in _LABELS if _text(lowered.get(key))), name)
                 data = replace(data, attributes={**node, **data.attributes})
-                for title, leaf in [*((key, node[key]) for key in rest), (label, data)]:
-                    yield from _columns(title, leaf, path if rest else group, {**stated, **node})
+                for title, leaf in [*((key, node[key]) for key in remaining), (label, data)]:
+                    yield from _columns(title, leaf, path if remaining else group, {**stated, **node})
             elif depth < _DEEPEST:
                 yield from _sources(node, path, depth + 1, stated)
         elif isinstance(node, Leaf):
@@ -174,7 +174,7 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
 def _unit(names: Sequence[str], attributes: Tree, beside: Tree, *, whole: bool) -> str:
     """The unit that stands at an array or beside it under one of its names; `whole`: or without any, as it is one column."""
     at_data = beside if whole and any(key.lower() in _DATA for key in beside) else {}
-    named = (stated_unit(name, held) for held in (attributes, beside) for name in names)
+    named = (stated_unit(name, stated) for stated in (attributes, beside) for name in names)
     return next(filter(None, [unit_of_array(attributes if whole else {}), *named, unit_of_array(at_data)]), "")
 
 
@@ -215,17 +215,17 @@ def _rows(leaf: Leaf) -> int:
 
 def _scalars(tree: Tree) -> dict[str, float | str]:
     """The single numbers and texts of a folder, and of folders in it that hold nothing else; a number's unit beside it."""
-    held: dict[str, float | str] = {}
+    scalars: dict[str, float | str] = {}
     for key, value in tree.items():
         number = _number(value)
         if isinstance(value, Mapping):
             if not any(isinstance(node, Leaf) and node.data.size > 1 for node in value.values()):
-                held = _scalars(value) | held
+                scalars = _scalars(value) | scalars
         elif number is not None or _text(value):
-            held[key] = _text(value) if number is None else number
+            scalars[key] = _text(value) if number is None else number
             attributes = value.attributes if isinstance(value, Leaf) else {}
-            held |= {f"{key}_{name}": _text(attributes[name]) for name in UNITS if _text(attributes.get(name))}
-    return held
+            scalars |= {f"{key}_{name}": _text(attributes[name]) for name in UNITS if _text(attributes.get(name))}
+    return scalars
 
 
 def _clock(leaf: Leaf, beside: Tree, rows: int) -> Clock | None:
@@ -258,14 +258,14 @@ def _texts(value: Any) -> list[str]:
 
 def refuse_counts(shown: str, values: NDArray[Any], stated: Mapping[str, Any]) -> None:
     """Raise InvalidError on whole numbers beside a factor, which may be raw counts or values that it was applied to."""
-    for name, held in stated.items() if values.dtype.kind in "iu" else ():
-        words, number = set(re.split(r"[\W_]+|(?<=[a-z])(?=[A-Z])", name)), _number(held)
+    for name, value in stated.items() if values.dtype.kind in "iu" else ():
+        words, number = set(re.split(r"[\W_]+|(?<=[a-z])(?=[A-Z])", name)), _number(value)
         words = {word.lower() for word in words}
         if number is not None and ((words & _GAINS and number != 1) or (words & _OFFSETS and number != 0)):
-            own = "scale_factor" if words & _GAINS else "add_offset"
+            attribute = "scale_factor" if words & _GAINS else "add_offset"
             message = (
                 f"{shown} holds whole numbers beside {name} = {number:g}: raw counts or physical values? For raw counts, "
-                f"rename {name} to {own}, and the service applies it; for physical values, delete {name}"
+                f"rename {name} to {attribute}, and the service applies it; for physical values, delete {name}"
             )
             raise InvalidError.of(message, code="raw_counts")
 

@@ -83,9 +83,9 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     many values.
     """
     table, reading = widened(table, reading)
-    taken = choose(table.columns, reading)
-    series, table, taken, counts = _read(table, taken, reading, limits)
-    notices = [*table.notices, *_left_out(table.columns, taken, reading)]
+    chosen = choose(table.columns, reading)
+    series, table, chosen, counts = _read(table, chosen, reading, limits)
+    notices = [*table.notices, *_left_out(table.columns, chosen, reading)]
     columns = _on_one_clock(series, notices)
     columns, first = _chosen_table(columns, table, reading)
     line_in_file = table.line_of
@@ -126,8 +126,8 @@ def _chosen_table(columns: dict[str, FloatArray], table: Table, reading: Reading
         steps = np.diff(time_s)
         if all(0 < steps[row - 1] < _LONGEST_PAUSE * np.median(steps) for row in table.breaks):
             return columns, 0
-    wanted = reading.table if table.breaks and reading.table != table.name else ""
-    number = index_of_wanted(tables, wanted, "table")
+    asked_table = reading.table if table.breaks and reading.table != table.name else ""
+    number = index_of_wanted(tables, asked_table, "table")
     return {name: column[starts[number] : starts[number + 1]] for name, column in columns.items()}, starts[number]
 
 
@@ -139,9 +139,9 @@ def _clocks(
     clocks: dict[int, Clock | None] = {}
     for index in (column.index for column in taken if column.channel != "time_s"):
         recorder = columns[index].clock
-        own = [at for at in times if columns[at].group == columns[index].group]
-        if own:
-            chosen = max((at for at in own if at < index), default=own[0])
+        of_group = [at for at in times if columns[at].group == columns[index].group]
+        if of_group:
+            chosen = max((at for at in of_group if at < index), default=of_group[0])
             coarse = np.unique(values[chosen]).size < values[chosen].size
             finer = recorder if recorder is not None and coarse and _agree(recorder.read(), values[chosen]) else None
             clocks[index] = finer or times[chosen]
@@ -169,9 +169,9 @@ def _agree(times: FloatArray, others: FloatArray) -> bool:
     """Whether two columns tell the same time since their beginning, within the resolution of the coarser."""
     if times.size != others.size:
         return False
-    steps = [own[own > 0].min(initial=np.inf) for own in (np.diff(times), np.diff(others))]
-    apart = np.abs(times - times[0] - others + others[0]).max()
-    return bool(apart <= max(steps) * (1 + 1e-9))
+    steps = [step[step > 0].min(initial=np.inf) for step in (np.diff(times), np.diff(others))]
+    max_difference = np.abs(times - times[0] - others + others[0]).max()
+    return bool(max_difference <= max(steps) * (1 + 1e-9))
 
 
 def _runs_on(times: FloatArray) -> bool:
@@ -193,56 +193,58 @@ def _add_parts(times: FloatArray, parts: Mapping[str, tuple[FloatArray, float]])
 
 
 def _read(
-    table: Table, taken: Sequence[Taken], reading: Reading, limits: Limits
+    table: Table, chosen: Sequence[Taken], reading: Reading, limits: Limits
 ) -> tuple[dict[str, _Series], Table, list[Taken], bool]:
     """The channels' values and times, the table without totals at its end, the columns that they are from, and whether their
     one clock may only count."""
-    indices = [column.index for column in taken]
+    indices = [column.index for column in chosen]
     stated = sum(table.columns[index].rows or 0 for index in indices)
     if stated > limits.most_values:
         raise TooLargeError(f"a file must not hold more than {limits.most_values} values, got {stated}")
-    channels = {column.index: column.channel for column in taken}
+    channels = {column.index: column.channel for column in chosen}
     says = [] if reading.missing == NO_MISSING else [i for i, own in enumerate(table.columns) if says_valid(own)]
     parts = {
         at: factor for at, own in enumerate(table.columns) if at not in indices and (factor := part_of_second(own))
     }
     parts = {} if reading.time == NO_TIME or "time_s" not in channels.values() else parts
     read = read_cells(table, dict.fromkeys(says, "") | dict.fromkeys(parts, "time_s") | channels, reading)
-    read, table = drop_totals(read, [column.index for column in taken if column.channel != "time_s"], table)
-    for column in taken:
+    read, table = drop_totals(read, [column.index for column in chosen if column.channel != "time_s"], table)
+    for column in chosen:
         read[column.index] = mask_stated_marks(read[column.index], reading)
         refuse_stand_ins(column.channel, read[column.index], table.line_of, reading)
     values: dict[int, FloatArray] = {}
     valid: dict[int, NDArray[np.bool_] | None] = {}
-    dated = [read[column.index] for column in taken if read[column.index].dtype.kind == "M"]
+    dated = [read[column.index] for column in chosen if read[column.index].dtype.kind == "M"]
     start = min((moments[~np.isnat(moments)].min() for moments in dated if not np.isnat(moments).all()), default=None)
-    for column in taken:
+    for column in chosen:
         values[column.index], valid[column.index] = _numbers(column, read.pop(column.index), start)
         if column.channel == "time_s" and column.unit is None:
-            found = _in_seconds(table.columns[column.index], values[column.index], reading)
-            table = table if found is None else replace(table, notices=[*table.notices, found])
-    beside = {table.columns[at].shown(): (plain(read.pop(at)), factor) for at, factor in parts.items()}
-    for column in taken:
-        if column.channel == "time_s" and (found := _add_parts(values[column.index], beside)):
-            table = replace(table, notices=[*table.notices, found])
-    taken = [column for column in taken if not column.guessed or _runs_on(values[column.index])]
-    clocks = {} if reading.time == NO_TIME else _clocks(table.columns, taken, values)
+            seconds = _in_seconds(table.columns[column.index], values[column.index], reading)
+            table = table if seconds is None else replace(table, notices=[*table.notices, seconds])
+    second_parts = {table.columns[at].shown(): (plain(read.pop(at)), factor) for at, factor in parts.items()}
+    for column in chosen:
+        if column.channel == "time_s" and (seconds := _add_parts(values[column.index], second_parts)):
+            table = replace(table, notices=[*table.notices, seconds])
+    chosen = [column for column in chosen if not column.guessed or _runs_on(values[column.index])]
+    clocks = {} if reading.time == NO_TIME else _clocks(table.columns, chosen, values)
     used = {clock.key: clock for clock in clocks.values() if clock is not None}
     times = {key: clock.read() for key, clock in used.items()}
     marked = [valid_rows(table.columns[index], read[index]) for index in says if index in read]
     series = {}
-    for column in taken:
+    for column in chosen:
         if column.channel != "time_s":
             clock = clocks.get(column.index)
             key = None if clock is None else clock.key
-            whole = _Series(values[column.index], valid[column.index], key, times.get(key))
-            own = series[column.channel] = _drop_empty_rows(column.channel, whole, table, bool(marks(reading.missing)))
+            whole_series = _Series(values[column.index], valid[column.index], key, times.get(key))
+            own = series[column.channel] = _drop_empty_rows(
+                column.channel, whole_series, table, bool(marks(reading.missing))
+            )
             for good in marked:
                 if good is not None and good.size == own.values.size:
                     own.valid = good if own.valid is None else own.valid & good
     if not series:  # a time alone: shown as such, and refused for what it lacks
         series = {"time_s": _Series(values[indices[0]], None, None, None)}
-    return series, table, taken, len(used) == 1 and all(clock.counts for clock in used.values())
+    return series, table, chosen, len(used) == 1 and all(clock.counts for clock in used.values())
 
 
 def _drop_empty_rows(name: str, own: _Series, table: Table, leave_out: bool) -> _Series:
@@ -256,14 +258,14 @@ def _drop_empty_rows(name: str, own: _Series, table: Table, leave_out: bool) -> 
         own.valid = None  # a cell's mask says that it is empty
     if own.times is not None and own.times.size == missing.size and not missing.all():
         timeless = np.isnan(own.times)
-        held = ~timeless if leave_out else ~(missing & timeless)
-        gaps = np.count_nonzero(missing & held)
-        if gaps >= _MIN_GAPS and 2 * gaps >= np.count_nonzero(held) - 1:
-            held &= ~missing
-        if not held.all():
-            valid = None if own.valid is None else own.valid[held]
-            own = _Series(own.values[held], valid, (own.clock, name), own.times[held])
-            missing, invalid = missing[held], None if invalid is None else invalid[held]
+        keep = ~timeless if leave_out else ~(missing & timeless)
+        gaps = np.count_nonzero(missing & keep)
+        if gaps >= _MIN_GAPS and 2 * gaps >= np.count_nonzero(keep) - 1:
+            keep &= ~missing
+        if not keep.all():
+            valid = None if own.valid is None else own.valid[keep]
+            own = _Series(own.values[keep], valid, (own.clock, name), own.times[keep])
+            missing, invalid = missing[keep], None if invalid is None else invalid[keep]
     if table.line_of is not None and not leave_out and invalid is not None and not invalid.all():
         raise empty_cells(name, np.flatnonzero(~invalid).tolist(), table.line_of, missing.size - 1)
     if own.times is not None and table.line_of is not None and np.isnan(own.times).any():
@@ -326,7 +328,7 @@ def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> Notice |
 def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Reading) -> list[Notice]:
     """What of the table is not used."""
     used = {column.index for column in taken}
-    others = [
+    other_columns = [
         column.shown()
         for index, column in enumerate(columns)
         if index not in used and (column.title or column.name) and not (reading.time == NO_TIME and _is_time(column))
@@ -342,10 +344,10 @@ def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Readin
         if part
         else []
     )
-    if not others:
+    if not other_columns:
         return notices
-    more = f" and {len(others) - _MAX_NAMED} more" if len(others) > _MAX_NAMED else ""
-    message = f"columns left out, because their titles name no channel: {', '.join(others[:_MAX_NAMED])}{more}"
+    more = f" and {len(other_columns) - _MAX_NAMED} more" if len(other_columns) > _MAX_NAMED else ""
+    message = f"columns left out, because their titles name no channel: {', '.join(other_columns[:_MAX_NAMED])}{more}"
     return [*notices, Notice(code=LEFT_OUT, message=message)]
 
 
@@ -359,40 +361,46 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
         return {"time_s": series["time_s"].values}
     leading = next((name for name in _LEADING if name in series), next(iter(series)))
     lead = series[leading]
-    same = all(_same_clock(own, lead) for own in series.values())
-    sizes = {own.values.size for own in series.values()}
-    ragged = any(own.times is not None and own.times.size != own.values.size for own in series.values())
-    if ragged or (len(sizes) > 1 if same else any(own.times is None for own in series.values())):
-        rows = [f"{name} has {own.values.size}{' without times' * (own.times is None)}" for name, own in series.items()]
+    same = all(_same_clock(channel_series, lead) for channel_series in series.values())
+    sizes = {channel_series.values.size for channel_series in series.values()}
+    ragged = any(
+        channel_series.times is not None and channel_series.times.size != channel_series.values.size
+        for channel_series in series.values()
+    )
+    if ragged or (len(sizes) > 1 if same else any(channel_series.times is None for channel_series in series.values())):
+        rows = [
+            f"{name} has {channel_series.values.size}{' without times' * (channel_series.times is None)}"
+            for name, channel_series in series.items()
+        ]
         message = f"channels without times of their own must have the same number of rows, got: {', '.join(rows)}"
         raise InvalidError.of(message, code="ragged")
     columns: dict[str, FloatArray] = {} if lead.times is None else {"time_s": lead.times}
-    kept = np.ones(lead.values.size, dtype=np.bool_)
+    keep = np.ones(lead.values.size, dtype=np.bool_)
     invalid: dict[str, int] = {}
-    for name, own in series.items():
-        valid = own.valid
-        if own is lead or _same_clock(own, lead):
-            columns[name] = own.values
+    for name, channel_series in series.items():
+        valid = channel_series.valid
+        if channel_series is lead or _same_clock(channel_series, lead):
+            columns[name] = channel_series.values
         else:
-            columns[name], valid, inside = _resampled(name, own, lead)
-            kept &= inside
+            columns[name], valid, inside = _resampled(name, channel_series, lead)
+            keep &= inside
         if valid is not None:
             invalid[name] = int(np.count_nonzero(~valid))
-            kept &= valid
+            keep &= valid
     if not same:
-        notices.append(_brought(series, leading, kept))
+        notices.append(_brought(series, leading, keep))
     if invalid:
         shown = ", ".join(f"{name} {count}" for name, count in invalid.items())
         message = f"samples with invalid values were left out of all channels; invalid values: {shown}"
         notices.append(Notice(code="invalid_samples", message=message))
-    if kept.all():
+    if keep.all():
         return columns
-    if not kept.any():
+    if not keep.any():
         message = (
             "no sample is left: at each time at least one channel has no valid value. Send channels recorded together"
         )
         raise InvalidError.of(message, code="empty", pointer="/channels")
-    return {name: column[kept] for name, column in columns.items()}
+    return {name: column[keep] for name, column in columns.items()}
 
 
 def _same_clock(series: _Series, other: _Series) -> bool:
@@ -428,10 +436,12 @@ def _step(times: FloatArray) -> float:
 def _brought(series: Mapping[str, _Series], leading: str, kept: NDArray[np.bool_]) -> Notice:
     lead = series[leading]
     rates = []
-    for name, own in series.items():
-        if name != leading and not _same_clock(own, lead) and own.times is not None:
-            step = _step(own.times)
-            rates.append(f"{name} ({own.values.size} samples, {step:.6g} s apart, from {own.times[0]:.9g} s)")
+    for name, channel_series in series.items():
+        if name != leading and not _same_clock(channel_series, lead) and channel_series.times is not None:
+            step = _step(channel_series.times)
+            rates.append(
+                f"{name} ({channel_series.values.size} samples, {step:.6g} s apart, from {channel_series.times[0]:.9g} s)"
+            )
     shown = ", ".join(rates)[: 5 * MAX_QUOTED]
     cut = int(np.count_nonzero(~kept))
     more = (

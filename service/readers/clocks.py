@@ -58,8 +58,8 @@ def stated_clock(held: Mapping[str, float | str], rows: Callable[[], int], count
     steps = [one for one in steps if not re.fullmatch(_COUNTED, one[2])] or ([] if rates else steps)
     if not steps + rates or not (steps + rates)[0][0] > 0:
         return None
-    others = [one for one in _stated(named, _ANY_RATE) if one[1].lower() not in ("", "s-1")]
-    first, ways = starts[0] if starts else (0.0, "", ""), [*steps, *rates, *others]
+    other_clocks = [one for one in _stated(named, _ANY_RATE) if one[1].lower() not in ("", "s-1")]
+    first, ways = starts[0] if starts else (0.0, "", ""), [*steps, *rates, *other_clocks]
 
     def read() -> FloatArray:
         seconds = {one[2]: in_seconds(*one, rate=one not in steps) for one in ways if one[0] > 0}
@@ -105,9 +105,11 @@ def _stated(named: Mapping[str, float | str], names: str) -> Iterator[tuple[floa
         if unit and (_HERTZ.get(unit) if of_rates else conversion("time_s", unit)) is None:
             continue
         number = float(text[1].replace(",", ".")) if text else float(value)
-        beside = [f"{key}_{name}" for name in UNITS] + ([] if of_rates else [*_X_UNITS])
+        unit_names = [f"{key}_{name}" for name in UNITS] + ([] if of_rates else [*_X_UNITS])
         stated = (
-            unit or (text[2].strip() if text else "") or next((named[name] for name in beside if named.get(name)), "")
+            unit
+            or (text[2].strip() if text else "")
+            or next((named[name] for name in unit_names if named.get(name)), "")
         )
         yield number, str(stated), key
 

@@ -158,40 +158,42 @@ def meaning(name: str, unit: str | None = None) -> tuple[str | None, Sense]:
     parts = [(word, next((end for end in _ENDS if word.endswith(end)), word)) for word in words]
     parts = [(word, word if word in _QUANTITIES else noun) for word, noun in parts]
     quantities = {_QUANTITIES[noun] for _, noun in parts if noun in _QUANTITIES}
-    rest = {word.removesuffix(noun) if noun in _QUANTITIES else word for word, noun in parts} - {""}
+    unknown_words = {word.removesuffix(noun) if noun in _QUANTITIES else word for word, noun in parts} - {""}
     by_noun = bool(quantities)
     if not by_noun:
         symbol = next((word for word in words if word in _SYMBOLS), "")
         quantities = {q for q in _SYMBOLS.get(symbol, ()) if (len(words) > 1 and unit is None) or _measures(q, unit)}
         if len(quantities) > 1:
-            quantities = {"temperature"} & quantities if rest & (_OIL | _PLATE) else quantities - {"temperature"}
+            quantities = (
+                {"temperature"} & quantities if unknown_words & (_OIL | _PLATE) else quantities - {"temperature"}
+            )
     if len(quantities) != 1:
         return None, Sense.UNKNOWN
     (quantity,) = quantities
-    rest -= {word for word, of in _SYMBOLS.items() if quantity in of} | _NEUTRAL[quantity]
+    unknown_words -= {word for word, of in _SYMBOLS.items() if quantity in of} | _NEUTRAL[quantity]
     channel = quantity
     if quantity == "temperature":
-        hot = rest | set(words)
+        hot = unknown_words | set(words)
         channel = "oil_temperature_c" if hot & _OIL else "plate_temperature_" + ("rear_c" if hot & _REAR else "front_c")
         if not hot & (_OIL | _PLATE):
             return None, Sense.UNKNOWN
-        rest -= _OIL | _PLATE | _REAR | {"front", "vorn", "vorne"}
-    elif quantity == "torque_nm" and rest & _SPREAD:
-        channel, rest = "torque_sd_nm", rest - _SPREAD
-    if any(map(_OTHER.match, rest)):
+        unknown_words -= _OIL | _PLATE | _REAR | {"front", "vorn", "vorne"}
+    elif quantity == "torque_nm" and unknown_words & _SPREAD:
+        channel, unknown_words = "torque_sd_nm", unknown_words - _SPREAD
+    if any(map(_OTHER.match, unknown_words)):
         return None, Sense.OTHER
-    if any(_FREQUENCY.search(noun) for _, noun in parts) and (rest or len(words) == 1 == len(set(parts[0]))):
+    if any(_FREQUENCY.search(noun) for _, noun in parts) and (unknown_words or len(words) == 1 == len(set(parts[0]))):
         return None, Sense.UNKNOWN
-    if not rest and (by_noun or unit is None or _measures(quantity, unit)):
+    if not unknown_words and (by_noun or unit is None or _measures(quantity, unit)):
         return channel, Sense.WHOLE
     return (channel, Sense.PART) if _measures(quantity, unit) else (None, Sense.UNKNOWN)
 
 
 def _words(name: str) -> list[str]:
     """The words of a name in small letters, without labels that end in a number."""
-    apart = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name)
+    split_words = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name)
     return re.findall(
-        r"[^\W\d_]+", re.sub(r"(?<![^\W_])(?:ch|ai|cnt|kanal|max_?|[a-z])?\d+(?![^\W_])", " ", _key(apart))
+        r"[^\W\d_]+", re.sub(r"(?<![^\W_])(?:ch|ai|cnt|kanal|max_?|[a-z])?\d+(?![^\W_])", " ", _key(split_words))
     )
 
 
@@ -239,13 +241,15 @@ def column_of(text: str, unit: str | None = None, group: str = "", *, moments: b
             f"a column's title must not be longer than {LONGEST_TITLE} characters, got {len(title)}: {shown!r} ..."
         )
         raise InvalidError.of(message, code="title_too_long", value=shown)
-    name, own = _taken_apart(" ".join(title.translate(_WIDE).split()))
-    column = Column(name, "s" if moments else own, group, title)
+    name, title_unit = _taken_apart(" ".join(title.translate(_WIDE).split()))
+    column = Column(name, "s" if moments else title_unit, group, title)
     return column if unit is None or moments else with_unit(column, unit)
 
 
 def _taken_apart(title: str) -> tuple[str, str | None]:
-    units = [found for found in _BRACKET.finditer(title) if found.start() and is_unit(bare_unit(found[1]) or "")]
+    units = [
+        bracket for bracket in _BRACKET.finditer(title) if bracket.start() and is_unit(bare_unit(bracket[1]) or "")
+    ]
     if len(units) == 1:
         name = f"{title[: units[0].start()].rstrip(' /')} {title[units[0].end() :].strip(' :.')}".strip()
         return name, bare_unit(units[0][1])
@@ -332,13 +336,13 @@ def named_columns(reading: Reading) -> list[str]:
 
 def recognised(titles: Sequence[str], named: Sequence[str]) -> int:
     """How many titles are those of channels or are `named`: by it the row of titles is found."""
-    wanted = {_key(name) for name in named} | {_key(column_of(name).name) for name in named}
+    wanted_keys = {_key(name) for name in named} | {_key(column_of(name).name) for name in named}
     channels: set[str] = set()
     for title in titles:
         if 0 < len(title) <= LONGEST_TITLE:
             column = column_of(title)
             channel = "time_s" if is_time(column) else meaning(column.name, column.unit)[0]
-            keys = {_key(title), _key(column.name)} & wanted
+            keys = {_key(title), _key(column.name)} & wanted_keys
             channels |= keys or ({channel} if channel else set())
     return len(channels)
 
@@ -348,12 +352,12 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
 
     Raises InvalidError where two columns are the same channel, or a unit is unknown or not stated.
     """
-    taken, errors = understood(columns, reading)
+    chosen, errors = understood(columns, reading)
     if errors:
         raise errors[0]
-    if not taken:
+    if not chosen:
         raise InvalidError(f"the file holds no known channel: it has {_list(columns)}; {remedy(columns)}")
-    return taken
+    return chosen
 
 
 def understood(columns: Sequence[Column], reading: Reading) -> tuple[list[Taken], list[InvalidError]]:
@@ -377,43 +381,48 @@ def understood(columns: Sequence[Column], reading: Reading) -> tuple[list[Taken]
     for channel in CHANNELS:
         if channel in named or (channel == "time_s" and reading.time == NO_TIME):
             continue
-        whole, part = (
+        whole_seconds, part = (
             [index for index in free if senses[index] == (channel, sense)] for sense in (Sense.WHOLE, Sense.PART)
         )
         # neither a mean beside the signal itself nor what stands in a group of set points
-        plain = [at for at in whole if not (_MEANS & {*_words(columns[at].name)} or _is_another(columns[at].group))]
-        found, rivals = plain or whole or part, [index for index in free if senses[index][1] is Sense.UNKNOWN]
-        rivals = [] if whole else [index for index in rivals if _measures(channel, columns[index].unit)]
+        plain = [
+            at for at in whole_seconds if not (_MEANS & {*_words(columns[at].name)} or _is_another(columns[at].group))
+        ]
+        candidates, rivals = (
+            plain or whole_seconds or part,
+            [index for index in free if senses[index][1] is Sense.UNKNOWN],
+        )
+        rivals = [] if whole_seconds else [index for index in rivals if _measures(channel, columns[index].unit)]
         if channel == "time_s":
-            found = found or ([] if by_map else rivals)
-            guessed = set() if whole else {*found}
-            chosen |= dict.fromkeys(found, channel)
-        elif len(found) == 1 and not (rivals and channel in _MEASURED):
-            chosen[found[0]] = channel
-            in_part |= set() if whole else {*found}
-        elif found and (whole or channel in _MEASURED):
-            errors.append(_twice(channel, *(columns[index] for index in found + rivals)))
+            candidates = candidates or ([] if by_map else rivals)
+            guessed = set() if whole_seconds else {*candidates}
+            chosen |= dict.fromkeys(candidates, channel)
+        elif len(candidates) == 1 and not (rivals and channel in _MEASURED):
+            chosen[candidates[0]] = channel
+            in_part |= set() if whole_seconds else {*candidates}
+        elif candidates and (whole_seconds or channel in _MEASURED):
+            errors.append(_twice(channel, *(columns[index] for index in candidates + rivals)))
     if not {*chosen} - guessed:
         return [], errors
-    taken: list[Taken] = []
+    columns_taken: list[Taken] = []
     unstated: list[tuple[str, Column]] = []
     for index, channel in sorted(chosen.items()):
-        own = named.get(channel) if index in by_map else None
+        asked_column = named.get(channel) if index in by_map else None
         public = _key(columns[index].name) == channel
         unit, converted = None, Conversion()
         try:
-            unit = _unit(channel, columns[index], own)
-            converted = _conversion(channel, columns[index], own, unit)
+            unit = _unit(channel, columns[index], asked_column)
+            converted = _conversion(channel, columns[index], asked_column, unit)
         except InvalidError as error:
             unit = None
             errors.append(error)
         else:
-            unstated += [(channel, columns[index])] if unit is None and own is None and not public else []
+            unstated += [(channel, columns[index])] if unit is None and asked_column is None and not public else []
         unit = CHANNELS[channel].unit if unit is None and public else unit
-        taken.append(Taken(channel, index, converted, unit, index in guessed, index in in_part))
+        columns_taken.append(Taken(channel, index, converted, unit, index in guessed, index in in_part))
     if any(channel != "time_s" for channel, _ in unstated):
         errors.append(no_unit(unstated, reading))
-    return taken, errors
+    return columns_taken, errors
 
 
 def _may_be_time(column: Column) -> bool:
@@ -446,11 +455,11 @@ def remedy(columns: Sequence[Column]) -> str:
 
 def _find(columns: Sequence[Column], channel: str, name: str) -> int:
     """The index of the column that a map names: by its exact title or name, else whatever its case, blanks and unit."""
-    wanted = column_of(name)
+    asked_column = column_of(name)
     exact = [
         i for i, column in enumerate(columns) if name in (column.title, column.name, f"{column.group}/{column.name}")
     ]
-    alike = [i for i, column in enumerate(columns) if _key(wanted.name) == _key(column.name)]
+    alike = [i for i, column in enumerate(columns) if _key(asked_column.name) == _key(column.name)]
     for matches in (exact, alike):
         if len(matches) == 1:
             return matches[0]
@@ -510,25 +519,28 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
     """
     public = _key(column.name) == channel
     scaled = None if public else _SCALED.search(column.name[:LONGEST_NAME])
-    wanted = None if choice is None else choice.unit
+    asked_unit = None if choice is None else choice.unit
     if choice is not None and choice.column != column.title:
-        wanted = wanted or column_of(choice.column).unit
-    if scaled and wanted is None and (choice is None or choice.factor == 1):
+        asked_unit = asked_unit or column_of(choice.column).unit
+    if scaled and asked_unit is None and (choice is None or choice.factor == 1):
         number = float(re.findall(r"-?\d+(?:[.,]\d+)?", scaled[0])[-1].replace(",", "."))
         number = 10**number if "^" in scaled[0] else number
-        own = column.unit or CHANNELS[channel].unit
+        assumed_unit = column.unit or CHANNELS[channel].unit
         factor = number if "/" in scaled[0] else 1 / number
-        mapped, others = f"map={channel}:{column.name}", f"[x{1 / factor:g} {own}] or [x1 {own}]"
-        rule = f"may contain a factor: state it with {mapped} [x{factor:g} {own}], {others}"
+        mapped, alternatives = (
+            f"map={channel}:{column.name}",
+            f"[x{1 / factor:g} {assumed_unit}] or [x1 {assumed_unit}]",
+        )
+        rule = f"may contain a factor: state it with {mapped} [x{factor:g} {assumed_unit}], {alternatives}"
         raise _wrong_unit(channel, column, "missing_unit", rule, "no clear one")
     if choice is None:
         return "s" if column.unit is None and _key(column.name) in _SECONDS else column.unit
     stated = column.unit or (None if public or scaled else unit_in_title(channel, column.name))
-    differ = stated not in (None, choice.stated) and wanted and not scaled and is_unit(stated or "")
-    if differ and conversion(channel, stated or "") != conversion(channel, wanted or ""):
-        rule = f"must be {wanted}, as the rig profile or map says"
+    differ = stated not in (None, choice.stated) and asked_unit and not scaled and is_unit(stated or "")
+    if differ and conversion(channel, stated or "") != conversion(channel, asked_unit or ""):
+        rule = f"must be {asked_unit}, as the rig profile or map says"
         raise _wrong_unit(channel, column, "mixed_units", rule, repr((stated or "")[:MAX_QUOTED]))
-    unit = wanted or stated
+    unit = asked_unit or stated
     if unit is None and not public and (word := _may_state(channel, column.name)):
         rule = f"may be {word}: state it with map={channel}:{column.name} [{word}], or [{CHANNELS[channel].unit}]"
         raise _wrong_unit(channel, column, "missing_unit", rule, "no clear one")
@@ -540,14 +552,14 @@ def _conversion(channel: str, column: Column, choice: Choice | None, unit: str |
 
     A column that a map names without a unit is in the channel's unit.
     """
-    own, public = CHANNELS[channel].unit, _key(column.name) == channel
+    channel_unit, public = CHANNELS[channel].unit, _key(column.name) == channel
     converted = Conversion() if unit is None else conversion(channel, unit)
     if converted is None:
         rule = f"must be one of {spellings(channel)}"
         way = "" if is_unit(unit or "") else f"; state it with map={channel}:{column.shown()} [UNIT]"
         raise _wrong_unit(channel, column, "unknown_unit", rule, repr((unit or "")[:MAX_QUOTED]) + way)
     if public and not converted.is_identity() and choice is None:
-        rule = f"must be {own}, as the title says"
+        rule = f"must be {channel_unit}, as the title says"
         raise _wrong_unit(channel, column, "mixed_units", rule, repr((unit or "")[:MAX_QUOTED]))
     if choice is not None:
         converted = Conversion(converted.factor * choice.factor, converted.offset * choice.factor + choice.offset)

@@ -121,7 +121,7 @@ def close_network_and_processes() -> None:
     """
     if not _has_seccomp():
         return
-    architecture, seccomp, clone, clone3, own, refused = _ARCHITECTURES[platform.machine()]
+    architecture, seccomp, clone, clone3, native, refused = _ARCHITECTURES[platform.machine()]
 
     def refuse(number: int, code: int = errno.EPERM) -> list[bytes]:
         return [_line(_EQUAL, number, 0, 1), _line(_RETURN, _REFUSE | code)]
@@ -132,7 +132,7 @@ def close_network_and_processes() -> None:
     for number in refused:
         lines += refuse(number)
     # a signal names the own process by its number, the others call it 0
-    for number, itself in zip(own, (os.getpid(), 0, 0), strict=True):
+    for number, itself in zip(native, (os.getpid(), 0, 0), strict=True):
         lines += [_line(_EQUAL, number, 0, 4), _line(_LOAD, _FIRST_ARGUMENT_AT), _line(_EQUAL, itself, 0, 1)]
         lines += [_line(_RETURN, _ALLOW), _line(_RETURN, _REFUSE | errno.EPERM)]
     lines += [_line(_EQUAL, clone, 0, 3), _line(_LOAD, _FIRST_ARGUMENT_AT), _line(_ANY_BIT, _CLONE_THREAD, 1, 0)]

@@ -94,18 +94,18 @@ class DataRows:
 
     def of(self, rows: Iterable[tuple[int, Row]], before: int, *, last: bool) -> tuple[list[int], list[Any]]:
         """Numbers and cells of those of the next rows that are data; `before` were found already, `last`: none follow."""
-        held: list[tuple[int, Row]] = []
+        data_rows: list[tuple[int, Row]] = []
         for number, row in rows:
-            if row == self.titles and before + len(held):
-                self._split_footer(held)
-                self.breaks.append(before + len(held))
+            if row == self.titles and before + len(data_rows):
+                self._split_footer(data_rows)
+                self.breaks.append(before + len(data_rows))
             elif not is_blank(row) and tuple(row) not in self._above:
                 summary = not self._summarised and _is_summary(row) and any(map(is_value, row))
                 self._summaries += [row] if summary else []
-                held += [] if summary else [(number, row)]
-        if last and (footer := self._split_footer(held)):
+                data_rows += [] if summary else [(number, row)]
+        if last and (footer := self._split_footer(data_rows)):
             self._leave_out(footer, "below")
-        return [number for number, _ in held], [row for _, row in held]
+        return [number for number, _ in data_rows], [row for _, row in data_rows]
 
     def end(self) -> None:
         """Say what was left out among the rows, once all are read."""
@@ -147,9 +147,9 @@ def table_in(
         if is_counter(column) and shown(data.first)[place : place + 1] == ("",):
             columns.append(Column("", title=column.title))
             continue
-        own = [row for row in above if len(row) > place and row[place]]
-        beside = [(row[0], row[place]) if place and row in own else row for row in above]
-        clock = stated_clock(labels([*beside, *((row[place],) for row in own)]), rows_read, counted)
+        own_rows = [row for row in above if len(row) > place and row[place]]
+        labelled = [(row[0], row[place]) if place and row in own_rows else row for row in above]
+        clock = stated_clock(labels([*labelled, *((row[place],) for row in own_rows)]), rows_read, counted)
         columns.append(replace(column, clock=clock))
     return Table(
         columns=tuple(columns),
@@ -260,10 +260,11 @@ def refuse_factors(above: Sequence[Sequence[str]]) -> None:
             if _FACTORS.match(cell) and len(under) > 1 and {*map(float, under)} != {1.0}:
                 row = (cell, *under)
         numbers = [cell for cell in row[1:] if NUMBER.fullmatch(cell.replace(",", "."))]
-        others = [cell for cell in numbers if float(cell.replace(",", ".")) != 1]
-        if len(numbers) > 1 and others and _FACTORS.match(row[0]):
-            what = f"the line {row[0][:MAX_QUOTED]!r} holds factors, such as {others[0]}: are the values already multiplied?"
-            raise InvalidError.of(f"{what} If so, delete this line; if not, multiply them first", code="raw_counts")
+        factors = [cell for cell in numbers if float(cell.replace(",", ".")) != 1]
+        if len(numbers) > 1 and factors and _FACTORS.match(row[0]):
+            what = f"the line {row[0][:MAX_QUOTED]!r} holds factors, such as {factors[0]}"
+            ask = "are the values already multiplied? If so, delete this line; if not, multiply them first"
+            raise InvalidError.of(f"{what}: {ask}", code="raw_counts")
 
 
 def is_footer(row: Row, other: Row) -> bool:
@@ -271,8 +272,8 @@ def is_footer(row: Row, other: Row) -> bool:
     place, cell = next(((place, cell) for place, cell in enumerate(row) if cell not in (None, "")), (0, None))
     if cell is None or is_value(cell):
         return False
-    beside = other[place] if place < len(other) else None
-    return beside in (None, "") or is_value(beside) or not any(map(is_value, row))
+    neighbour = other[place] if place < len(other) else None
+    return neighbour in (None, "") or is_value(neighbour) or not any(map(is_value, row))
 
 
 def _is_moment(cell: Any) -> bool:
@@ -312,8 +313,8 @@ def _layout(
     units = _units(rows, [row for row in above if row > at], at, start, titles, width)
     groups = _filled([_text(cell) for cell in rows[at - 1]], len(titles)) if at - 1 in above else []
     twice = len(set(filter(None, titles))) < sum(map(bool, titles))
-    beside = (units[: len(titles)], groups if twice else (), rows[start][: len(titles)])
-    headings = tuple(zip_longest(titles, *beside, fillvalue=""))
+    extra_rows = (units[: len(titles)], groups if twice else (), rows[start][: len(titles)])
+    headings = tuple(zip_longest(titles, *extra_rows, fillvalue=""))
     misfits = sum(bool(unit) and not _fits(title, unit) for title, unit, _, _ in headings)
     score = (rank[0] - misfits, rank[1], min(length - labelled, _LONG_RUN), sum(map(is_value, rows[start])))
     return Layout(headings=headings, titles=at, start=start, labelled=labelled, score=score)
@@ -337,20 +338,20 @@ def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) 
 def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int, data: Sequence[Row]) -> Iterator[list[str]]:
     """The titles that a row may give: its own texts, those of all columns but the first, its gaps filled from above, and
     both rows' texts joined."""
-    own = [_text(cell) for cell in rows[upwards[0]]]
-    while own and not own[-1]:
-        own.pop()
-    yield own
-    if _are_units(own):
+    titles_row = [_text(cell) for cell in rows[upwards[0]]]
+    while titles_row and not titles_row[-1]:
+        titles_row.pop()
+    yield titles_row
+    if _are_units(titles_row):
         return
-    if len(own) == width - 1 and _have_names(data, own):
-        yield ["", *own]
-    for row in upwards[1:2] if len(own) > 1 else upwards[1:]:
+    if len(titles_row) == width - 1 and _have_names(data, titles_row):
+        yield ["", *titles_row]
+    for row in upwards[1:2] if len(titles_row) > 1 else upwards[1:]:
         above = [_text(cell) for cell in rows[row]]
-        if sum(map(bool, above)) < 2 or (len(own) < 2 and _are_units(above)):
+        if sum(map(bool, above)) < 2 or (len(titles_row) < 2 and _are_units(above)):
             continue
-        size = max(len(own), min(len(above), width))
-        padded = own + [""] * (size - len(own))
+        size = max(len(titles_row), min(len(above), width))
+        padded = titles_row + [""] * (size - len(titles_row))
         above += [""] * (size - len(above))
         yield [name or other for name, other in zip(padded, above, strict=False)]
         yield [f"{other} {name}".strip() for name, other in zip(padded, _filled(above, size), strict=False)]

@@ -78,8 +78,8 @@ def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
         columns, [index for index, cells in head.items() if cells and all(map(is_value, cells))], best, reading
     )
     marked = next((index for index, column in enumerate(columns) if says_valid(column)), None)
-    wanted = {index: "" for index in (best, unit, marked) if index is not None} | {value: columns[value].shown()}
-    cells = read_cells(table, wanted | ({} if timed is None else {timed[0]: "time_s"}), reading)
+    index_titles = {index: "" for index in (best, unit, marked) if index is not None} | {value: columns[value].shown()}
+    cells = read_cells(table, index_titles | ({} if timed is None else {timed[0]: "time_s"}), reading)
     names = np.array([str(cell).strip() for cell in cells[best].tolist()], dtype=object)
     units = np.array(
         [str(cell).strip() for cell in cells[unit].tolist()] if unit is not None else [""] * names.size, dtype=object
@@ -100,9 +100,17 @@ def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
     )
     wide = replace(
         table,
-        columns=tuple(_column(name, set(units[own].tolist()), own, times) for name, own in rows.items()),
+        columns=tuple(
+            _column(name, set(units[rows_of_channel].tolist()), rows_of_channel, times)
+            for name, rows_of_channel in rows.items()
+        ),
         read=read,
-        head=tuple(zip(*(map(str, cells[value][own[:_MAX_LOOKED_AT]]) for own in rows.values()), strict=False)),
+        head=tuple(
+            zip(
+                *(map(str, cells[value][rows_of_channel[:_MAX_LOOKED_AT]]) for rows_of_channel in rows.values()),
+                strict=False,
+            )
+        ),
         line_of=None,
         breaks=(),
         notices=[*table.notices, Notice(code="long_table", message=message)],
@@ -136,28 +144,28 @@ def _time(columns: Sequence[Column], reading: Reading) -> tuple[int, Any] | None
     if not places:
         return None
     mapping = {} if named is None else {"time_s": named}
-    (taken, *_) = [
-        taken
-        for taken in choose([columns[index] for index in places], Reading(mapping=mapping))
-        if taken.channel == "time_s"
+    (chosen, *_) = [
+        chosen
+        for chosen in choose([columns[index] for index in places], Reading(mapping=mapping))
+        if chosen.channel == "time_s"
     ]
-    return places[taken.index], taken.conversion
+    return places[chosen.index], chosen.conversion
 
 
 def _value(columns: Sequence[Column], numeric: Sequence[int], names: int, reading: Reading) -> int:
     """The column of values: the only one of numbers that is no time, or the one that is called so."""
     timed = choices_of(reading).get("time_s")
-    others = [
+    candidates = [
         index
         for index in numeric
         if not is_time(columns[index])
         and (timed is None or timed.column not in (columns[index].title, columns[index].name))
     ]
-    called = [index for index in others if _VALUES.search(columns[index].name)]
-    for places in (called, others):
+    called = [index for index in candidates if _VALUES.search(columns[index].name)]
+    for places in (called, candidates):
         if len(places) == 1:
             return places[0]
-    shown = ", ".join(columns[index].shown() for index in called or others) or "none"
+    shown = ", ".join(columns[index].shown() for index in called or candidates) or "none"
     message = (
         f"each row holds one value, of the channel named in {columns[names].shown()}. The column of values is not clear, "
         f"got {shown}: name one column 'value', or save the table with a column for each channel"

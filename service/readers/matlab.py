@@ -18,9 +18,9 @@ from service.readers.table import Reading, Table
 
 def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     """The table of the file's variables."""
-    held = scipy.io.loadmat(io.BytesIO(path.read_bytes()), squeeze_me=True, struct_as_record=False)
-    unread = [name for name, value in held.items() if isinstance(value, MatlabOpaque | MatlabFunction)]
-    named = {name: value for name, value in held.items() if name not in unread and not name.startswith("__")}
+    variables = scipy.io.loadmat(io.BytesIO(path.read_bytes()), squeeze_me=True, struct_as_record=False)
+    unread = [name for name, value in variables.items() if isinstance(value, MatlabOpaque | MatlabFunction)]
+    named = {name: value for name, value in variables.items() if name not in unread and not name.startswith("__")}
     return table_of({name: _node(value) for name, value in named.items()}, reading, limits, tuple(map(str, unread)))
 
 

@@ -55,9 +55,9 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
 
 def _places(file: Any, *, masters: bool, table: str) -> Iterator[tuple[int, int]]:
     """Group and index of all channels with values."""
-    for group, held in enumerate(file.groups):
-        if held.channel_group.cycles_nr and table in ("", _name(file, group)):
-            for index in range(len(held.channels)):
+    for group, channel_group in enumerate(file.groups):
+        if channel_group.channel_group.cycles_nr and table in ("", _name(file, group)):
+            for index in range(len(channel_group.channels)):
                 if masters or index != file.masters_db.get(group):
                     yield group, index
 

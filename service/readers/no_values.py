@@ -92,37 +92,37 @@ def _stand_in(column: FloatArray, *, unbounded: bool) -> float | None:
     """A value of a column [n] that stands for none; `unbounded`: values may grow for as long as a record lasts, as times
     do."""
     finite = np.isfinite(column)
-    held = column if finite.all() else column[finite]
-    if held.size < 2:
+    finite_values = column if finite.all() else column[finite]
+    if finite_values.size < 2:
         return None
-    outermost = float(held.min()), float(held.max())
-    usual = float(np.median(np.abs(held[:: max(1, held.size // _MAX_SAMPLED)])))
+    outermost = float(finite_values.min()), float(finite_values.max())
+    usual = float(np.median(np.abs(finite_values[:: max(1, finite_values.size // _MAX_SAMPLED)])))
     if not any(map(_nines, outermost)) and max(map(abs, outermost)) < _FAR_NINES * usual:
-        return None if unbounded else _jumped_to(held, *outermost)  # no value is far off by any rule
-    ends = sorted(_ends(held, np.min) | _ends(held, np.max), key=abs, reverse=True)
-    others = held[~np.isin(held, [end for end in ends if _nines(end)])]
+        return None if unbounded else _jumped_to(finite_values, *outermost)  # no value is far off by any rule
+    ends = sorted(_ends(finite_values, np.min) | _ends(finite_values, np.max), key=abs, reverse=True)
+    other_values = finite_values[~np.isin(finite_values, [end for end in ends if _nines(end)])]
     for end in ends:
         nines = _nines(end)
-        apart = others if nines else others[np.abs(others) < abs(end)]
-        if apart.size < 2 or (unbounded and not nines):
+        usual_values = other_values if nines else other_values[np.abs(other_values) < abs(end)]
+        if usual_values.size < 2 or (unbounded and not nines):
             continue
-        low, high = apart.min(), apart.max()
+        low, high = usual_values.min(), usual_values.max()
         scale = max(-low, high)
         below = end < 0 and low > -_CLOSE * scale  # zero, with its noise, and no other value below it
-        common = np.count_nonzero(np.abs(held) >= abs(end)) > max(1.0, _RARE * held.size)
+        common = np.count_nonzero(np.abs(finite_values) >= abs(end)) > max(1.0, _RARE * finite_values.size)
         far = (_FAR_BELOW if below else _FAR_NINES) / 10.0 ** (nines - 3) if nines else _FAR_COMMON if common else _FAR
         far = min(far, _FAR_NINES) if below and not common else far
         if 0 < far * scale <= max(low - end, end - high):
             return end
-    return None if unbounded else _jumped_to(held, *outermost)
+    return None if unbounded else _jumped_to(finite_values, *outermost)
 
 
-def _ends(held: FloatArray, end_of: Callable[[FloatArray], Any]) -> set[float]:
+def _ends(inner_values: FloatArray, end_of: Callable[[FloatArray], Any]) -> set[float]:
     """The outermost values at one end."""
     ends: set[float] = set()
-    while held.size and len(ends) < _MAX_KINDS:
-        ends.add(float(end_of(held)))
-        held = held[held != end_of(held)]
+    while inner_values.size and len(ends) < _MAX_KINDS:
+        ends.add(float(end_of(inner_values)))
+        inner_values = inner_values[inner_values != end_of(inner_values)]
     return ends
 
 
@@ -154,17 +154,22 @@ def drop_totals(
     columns: Mapping[int, NDArray[Any]], measured: list[int], table: Table
 ) -> tuple[dict[int, NDArray[Any]], Table]:
     """Columns [n] by index and their table without the rows at its end that are the means, sums, maxima of those above."""
-    taken = [columns[index] for index in measured]
-    sizes = {column.size for column in taken}
-    if not taken or len(sizes) > 1 or max(sizes) > _LONGEST or any(column.dtype.kind not in "iuf" for column in taken):
+    measured_columns = [columns[index] for index in measured]
+    sizes = {column.size for column in measured_columns}
+    if (
+        not measured_columns
+        or len(sizes) > 1
+        or max(sizes) > _LONGEST
+        or any(column.dtype.kind not in "iuf" for column in measured_columns)
+    ):
         return dict(columns), table
     starts = [0, *table.breaks, *sizes]
-    kept = np.ones(max(sizes), dtype=np.bool_)
+    keep = np.ones(max(sizes), dtype=np.bool_)
     notices = []
     for start, end in pairwise(starts):
-        made_of = _totals([plain(column[start:end]) for column in taken])
+        made_of = _totals([plain(column[start:end]) for column in measured_columns])
         if made_of:
-            kept[end - len(made_of) : end] = False
+            keep[end - len(made_of) : end] = False
             line = end - len(made_of)
             where = f"line {table.line_of(line)}" if table.line_of else f"row {line + 1}"
             noun, rows_of = "row" if len(made_of) == 1 else "rows", f"the {', '.join(made_of)} of the rows above"
@@ -172,14 +177,14 @@ def drop_totals(
             notices.append(Notice(code="lines_left_out", message=message))
     if not notices:
         return dict(columns), table
-    rows, line_of = np.flatnonzero(kept), table.line_of
+    rows, line_of = np.flatnonzero(keep), table.line_of
     table = replace(
         table,
         line_of=None if line_of is None else lambda row: line_of(int(rows[row])),
-        breaks=[int(np.count_nonzero(kept[:row])) for row in table.breaks],
+        breaks=[int(np.count_nonzero(keep[:row])) for row in table.breaks],
         notices=[*table.notices, *notices],
     )
-    return {index: column[kept] if column.size == kept.size else column for index, column in columns.items()}, table
+    return {index: column[keep] if column.size == keep.size else column for index, column in columns.items()}, table
 
 
 def _totals(columns: list[FloatArray]) -> list[str]:

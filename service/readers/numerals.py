@@ -99,8 +99,8 @@ class Numerals:
                     if len(_decimals(cell)) > 1:
                         raise _doubtful(name, before + row, with_unit_apart(cell)[0].strip(), line_of)
         for index, cells in zip(channels, columns, strict=True):
-            apart = (with_unit_apart(cell)[1] for cell in cells if any(map(str.isdigit, _shown(cell))))
-            self._units.setdefault(index, "" if before else next(apart, ""))
+            units = (with_unit_apart(cell)[1] for cell in cells if any(map(str.isdigit, _shown(cell))))
+            self._units.setdefault(index, "" if before else next(units, ""))
         read: list[NDArray[Any]] = []
         wrong: list[tuple[int, str, str, str]] = []
         total = 0
@@ -118,9 +118,9 @@ class Numerals:
     def _column(self, index: int, name: str, cells: Sequence[Any]) -> NDArray[Any] | None:
         """One column; None where a cell is no number by this file's decimal sign, in the unit behind the first number."""
         if not name:
-            held = np.empty(len(cells), dtype=object)
-            held[:] = cells
-            return held
+            objects = np.empty(len(cells), dtype=object)
+            objects[:] = cells
+            return objects
         values = self._moments(index, cells) if name == "time_s" else None
         unit = self._units.get(index, "")
         values = self._floats(cells) if values is None and not unit else values

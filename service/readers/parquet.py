@@ -36,8 +36,8 @@ def read_table(path: Path, _: Reading, limits: Limits) -> Table:
             refuse_counts(field.name[:MAX_QUOTED], columns[-1], _stated(field.metadata))
         return columns
 
-    beside = _stated(file.schema_arrow.metadata)
-    columns = [_column(field, file, beside) for field in fields]
+    file_metadata = _stated(file.schema_arrow.metadata)
+    columns = [_column(field, file, file_metadata) for field in fields]
     return Table(columns=tuple(columns), read=read)
 
 
@@ -45,9 +45,9 @@ def _stated(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
     """What the file says of its columns, as texts and folders, those of pandas' `attrs` among them."""
     stated: dict[str, Any] = {}
     for key, value in (metadata or {}).items():
-        held = parsed(value.decode("utf-8", "replace"))
-        stated |= {key.decode("utf-8", "replace"): held} | (
-            held if key == b"PANDAS_ATTRS" and isinstance(held, dict) else {}
+        decoded = parsed(value.decode("utf-8", "replace"))
+        stated |= {key.decode("utf-8", "replace"): decoded} | (
+            decoded if key == b"PANDAS_ATTRS" and isinstance(decoded, dict) else {}
         )
     return stated
 
@@ -63,8 +63,8 @@ def _column(field: Any, file: Any, beside: Mapping[str, Any]) -> Column:
 def _values(column: Any) -> NDArray[Any]:
     kind = column.type.value_type if kinds.is_dictionary(column.type) else column.type
     if kinds.is_time(kind):
-        whole = column.cast("int64" if kinds.is_time64(kind) else "int32").to_numpy()
-        return np.asarray(whole.astype(f"timedelta64[{kind.unit}]"))
+        counts = column.cast("int64" if kinds.is_time64(kind) else "int32").to_numpy()
+        return np.asarray(counts.astype(f"timedelta64[{kind.unit}]"))
     if kinds.is_decimal(kind):
         column = column.cast("float64")
     values = column.to_numpy()

@@ -21,24 +21,24 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
     """
     try:
         table, reading = widened(table, reading)
-        taken, errors = understood(table.columns, reading)
+        chosen, errors = understood(table.columns, reading)
     except InvalidError as error:
-        taken, errors = [], [error]
-    by_index = {column.index: column for column in taken if not column.guessed or _differ(table, column.index)}
+        chosen, errors = [], [error]
+    by_index = {column.index: column for column in chosen if not column.guessed or _differ(table, column.index)}
     stated_in_map = {channel: column_of(choice.column).unit for channel, choice in choices_of(reading).items()}
     columns = []
     for index, column in enumerate(table.columns):
-        own = by_index.get(index)
+        chosen_here = by_index.get(index)
         columns.append(
             {
                 "title": column.title or column.name,
                 "name": column.name,
                 "group": column.group,
                 "unit": column.unit,
-                "stated": None if own is None else stated_in_map.get(own.channel),
-                "channel": None if own is None else own.channel,
-                "read_in": None if own is None else own.unit,
-                "in_part": own is not None and own.in_part,
+                "stated": None if chosen_here is None else stated_in_map.get(chosen_here.channel),
+                "channel": None if chosen_here is None else chosen_here.channel,
+                "read_in": None if chosen_here is None else chosen_here.unit,
+                "in_part": chosen_here is not None and chosen_here.in_part,
             }
         )
     return {

@@ -39,9 +39,9 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     channels = [channel for group in groups for channel in group.channels() if len(channel)]
     limits.require_columns(len(channels))
     scales = [_scales(channel) for channel in channels]
-    beside = {group.name: _stated({**file.properties, **group.properties}) for group in groups}
+    group_properties = {group.name: _stated({**file.properties, **group.properties}) for group in groups}
     clocks = [
-        clock or stated_clock(beside[channel.group_name] | _stated(channel.properties), partial(len, channel))
+        clock or stated_clock(group_properties[channel.group_name] | _stated(channel.properties), partial(len, channel))
         for channel, clock in zip(channels, _clocks(channels), strict=True)
     ]
 

@@ -100,12 +100,12 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[tuple[str, bool]]:
     """
     decoder = codecs.getincrementaldecoder("utf-8-sig" if encoding == "utf-8" else encoding)()
     lines = io.IncrementalNewlineDecoder(decoder, translate=True)
-    rest, line, block = "", 1, source.read(_BLOCK)
+    unfinished, line, block = "", 1, source.read(_BLOCK)
     while block:
         following = source.read(_BLOCK)
         last = not following
         try:
-            text = rest + lines.decode(block, last)
+            text = unfinished + lines.decode(block, last)
         except UnicodeError:
             rule = f"or a line soon after it is not {encoding.upper()}, unlike the lines before: save the file as UTF-8"
             raise wrong_line(line, rule, "not_text") from None
@@ -118,14 +118,16 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[tuple[str, bool]]:
         if last:
             text += "" if end == len(text) else "\n"
             end = len(text)
-        whole, rest = text[:end], text[end:]
-        if (nul := whole.find("\0")) >= 0:
+        complete, unfinished = text[:end], text[end:]
+        if (nul := complete.find("\0")) >= 0:
             raise wrong_line(
-                line + whole.count("\n", 0, nul), "has a NUL byte, which is no text: save the file as UTF-8", "not_text"
+                line + complete.count("\n", 0, nul),
+                "has a NUL byte, which is no text: save the file as UTF-8",
+                "not_text",
             )
-        if whole:
-            yield whole, last
-        line += whole.count("\n")
+        if complete:
+            yield complete, last
+        line += complete.count("\n")
         block = following
 
 
@@ -135,8 +137,11 @@ def _encodings(head: bytes) -> list[str]:
         return ["utf-16"]
     sample = head[:512]
     half = len(sample) // 2
-    for name, zeros, others in (("utf-16-le", sample[1::2], sample[::2]), ("utf-16-be", sample[::2], sample[1::2])):
-        if half and zeros.count(0) > 0.9 * half and others.count(0) == 0:
+    for name, zeros, other_bytes in (
+        ("utf-16-le", sample[1::2], sample[::2]),
+        ("utf-16-be", sample[::2], sample[1::2]),
+    ):
+        if half and zeros.count(0) > 0.9 * half and other_bytes.count(0) == 0:
             return [name]
     if _decodes(head, "utf-8"):
         return ["utf-8"]
@@ -201,8 +206,8 @@ def _separators(lines: Sequence[str]) -> list[str]:
     lines = lines[:MAX_ROWS]
     if stated := next(filter(None, map(_SEPARATOR_LINE.fullmatch, lines)), None):
         return [stated[1] or "\t"]
-    held = [separator for separator in "\t;,|" if any(separator in line for line in lines)]
-    return [*held, "  ", " "] if any(" " in line.strip() for line in lines) else held or [","]
+    present = [separator for separator in "\t;,|" if any(separator in line for line in lines)]
+    return [*present, "  ", " "] if any(" " in line.strip() for line in lines) else present or [","]
 
 
 def _rows(lines: Sequence[str], separator: str, skipped: int = 0) -> Iterator[tuple[int, list[str], bool]]:
@@ -388,10 +393,10 @@ class _Body:
             even = [cells[index : -1 : self._width + 1] for index in channels]
             return self._numerals.values(channels, even, self.line_of, self._rows)
         titles = self.data.titles
-        found = (
+        readings = (
             (self._line + at, cells) for at, cells, comment in self._parsed(block) if not comment or cells == titles
         )
-        lines, rows = self.data.of(found, self._rows, last=last)
+        lines, rows = self.data.of(readings, self._rows, last=last)
         self._lines.append((self._rows, lines))
         errors = [
             self._ragged(self._rows + row, cells)

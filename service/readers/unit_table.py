@@ -136,8 +136,8 @@ def conversion(channel: str, unit: str) -> Conversion | None:
     """
     table = _BY_KEY[CHANNELS[channel].unit]
     unit = re.sub(r" since .*", "", unit) if channel == "time_s" else unit
-    if (found := table.get(_key(unit))) is not None:
-        return found
+    if (known := table.get(_key(unit))) is not None:
+        return known
     short = _AFTER.sub(r"\g<number> \g<unit>", unit[:LONGEST_UNIT])
     short = _RAISED.sub(lambda power: "^" + unicodedata.normalize("NFKC", power[0]).replace("−", "-"), short)
     multiple = _MULTIPLE.fullmatch(short)

@@ -51,7 +51,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     if not tables and refused:
         raise refused[0]
     visible = {sheet.name for sheet in book.sheets_metadata if sheet.visible == SheetVisibleEnum.Visible}
-    tables = {name: held for name, held in tables.items() if name in visible} or tables
+    tables = {name: cells for name, cells in tables.items() if name in visible} or tables
     name = list(tables)[index_of_wanted(list(tables) or sheets, "", "sheet")]
     table = _table(name, *tables[name], tuple(sheets), limits)
     return replace(table, notices=[*table.notices, was_turned()]) if name in on_side else table
@@ -68,17 +68,17 @@ def _trimmed(row: Sequence[Any]) -> Sequence[Any]:
 def _table(name: str, rows: list[Sequence[Any]], layout: Layout, sheets: tuple[str, ...], limits: Limits) -> Table:
     limits.require_columns(len(layout.headings))
     data = DataRows(rows, layout)
-    lines, held = data.of(enumerate(rows[layout.start :], layout.start + 1), 0, last=True)
+    lines, cells = data.of(enumerate(rows[layout.start :], layout.start + 1), 0, last=True)
     data.end()
 
     def read(channels: Mapping[int, str]) -> list[NDArray[Any]]:
         columns = []
         for index in channels:
-            columns.append(np.empty(len(held), dtype=object))
-            columns[-1][:] = [row[index] if index < len(row) else "" for row in held]
+            columns.append(np.empty(len(cells), dtype=object))
+            columns[-1][:] = [row[index] if index < len(row) else "" for row in cells]
         return columns
 
     return table_in(
-        rows, layout, data, first_line=layout.start + 1, rows_read=lambda: len(held), read=read, line_of=lines.__getitem__,
+        rows, layout, data, first_line=layout.start + 1, rows_read=lambda: len(cells), read=read, line_of=lines.__getitem__,
         name=name, others=sheets,
     )  # fmt: skip

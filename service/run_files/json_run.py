@@ -53,8 +53,8 @@ def read_run(body: bytes) -> IncomingRun:
 def _run(sent: Any) -> IncomingRun:
     run = _validated(RUN_IN.validate_json, sent)
     channels = getattr(run, "channels", None)
-    given = () if channels is None else channels.model_dump(exclude_none=True)
-    columns = {name: sent["channels"][name] for name in given}
+    channel_values = () if channels is None else channels.model_dump(exclude_none=True)
+    columns = {name: sent["channels"][name] for name in channel_values}
     details: dict[str, Any] = {}
     if isinstance(run, DutyRunIn):
         # a field that was added later must not change the hash of a run that was sent without it
@@ -202,7 +202,7 @@ def _field_error(loc: tuple[int | str, ...], code: str, rule: str, value: object
     name = ".".join(str(part) for part in place) or "the body"
     shown = "" if code == "missing" else repr(value)[:MAX_QUOTED]
     rule = rule_in_words(code, rule)
-    said = shown and "got" not in rule and code not in _WITHOUT_VALUE
-    message = f"{name}: {rule}" + (f", got {shown}" if said else "")
+    states_value = shown and "got" not in rule and code not in _WITHOUT_VALUE
+    message = f"{name}: {rule}" + (f", got {shown}" if states_value else "")
     row = place[-1] + 1 if place and isinstance(place[-1], int) else None
     return FieldError(pointer=pointer, code=code, message=message, row=row, value=shown)

@@ -68,8 +68,8 @@ def named(profile: RigProfile, filename: str, cells: Mapping[str, str]) -> Named
     words = {word.casefold(): kind for word, kind in profile.kinds.items()}
     cycles = _count(groups.get("cycles"))
     if cycles is None and profile.cycles_cell is not None:
-        beside = {label.strip().rstrip(":=").strip().casefold(): text for label, text in cells.items()}
-        cycles = _count(beside.get(profile.cycles_cell.strip().rstrip(":=").strip().casefold()))
+        label_texts = {label.strip().rstrip(":=").strip().casefold(): text for label, text in cells.items()}
+        cycles = _count(label_texts.get(profile.cycles_cell.strip().rstrip(":=").strip().casefold()))
     return Named(
         kind=words.get((groups.get("kind") or "").casefold(), profile.kind), cycles=cycles, run_id=groups.get("run_id")
     )
@@ -82,9 +82,9 @@ def pattern_for(filename: str, cycles: float | None) -> str | None:
     """
     if cycles is None or not cycles.is_integer():
         return None
-    whole, thousands = str(int(cycles)), f"{int(cycles) // 1000}k" if cycles and cycles % 1000 == 0 else None
+    digits, thousands = str(int(cycles)), f"{int(cycles) // 1000}k" if cycles and cycles % 1000 == 0 else None
     parts = re.split(r"(\d+k?(?![^\W\d_]))", PurePath(filename).name, flags=re.IGNORECASE)
-    places = [place for place, part in enumerate(parts) if place % 2 and _is(part, whole, thousands)]
+    places = [place for place, part in enumerate(parts) if place % 2 and _is(part, digits, thousands)]
     if len(places) != 1:
         return None
     for place in range(1, len(parts), 2):

@@ -86,8 +86,8 @@ class AlarmIn(base.Schema):
         """A limit on the side that the quantity is watched at, and nothing that says nothing."""
         side, usual = LIMITS.get(self.quantity, (None, None))
         for name in ("below", "above"):
-            given = getattr(self, name)
-            if given is not None and name != side:
+            value = getattr(self, name)
+            if value is not None and name != side:
                 instead = f"its limit is {side!r}" if side else "it has no limit"
                 raise ValueError(f"{self.quantity} cannot be watched with {name!r}: {instead}")
         if side is not None and getattr(self, side) is None:

@@ -163,8 +163,8 @@ class ClutchEdit(base.Schema):
 
     def fields(self) -> dict[str, Any]:
         """The fields of the record that were given, as JSON."""
-        given = self.model_fields_set - {"reason", "archived"}
-        return self.model_dump(mode="json", include=given)
+        sent = self.model_fields_set - {"reason", "archived"}
+        return self.model_dump(mode="json", include=sent)
 
 
 class ClutchSummary(base.Answer):

@@ -80,8 +80,8 @@ class RigProfile(Schema):
     @model_validator(mode="after")
     def _titles_and_channels_are_unique(self) -> Self:
         for name in ("title", "channel"):
-            given = [value for column in self.columns if (value := getattr(column, name)) is not None]
-            twice = next((value for value, count in Counter(given).items() if count > 1), None)
+            values = [value for column in self.columns if (value := getattr(column, name)) is not None]
+            twice = next((value for value, count in Counter(values).items() if count > 1), None)
             if twice is not None:
                 raise ValueError(f"each {name} must stand once among the columns, {twice!r} stands twice")
         if not any(column.channel for column in self.columns):

@@ -177,9 +177,9 @@ async def clutch_answer(of: OfClutch, name: str, make: Callable[[], bytes], *arg
     context, revision = of.context, _revision(of.request, of.clutch_id)
     # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
     key = (of.clutch_id, name, *arguments)
-    held = await cached_answer(context, key, revision, make)
+    answer = await cached_answer(context, key, revision, make)
     remember(of.request, repeated_answer(context, key))
-    return tagged(of.request, held, JSON_TYPE, revision)
+    return tagged(of.request, answer, JSON_TYPE, revision)
 
 
 async def clutch_table(of: OfClutch, name: str, make: Callable[[], Page], *arguments: Hashable) -> Response:
@@ -200,13 +200,13 @@ async def computed_answer(
     its items where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError."""
     request, context, clutch_id = of.request, of.context, of.clutch_id
     revision = _revision(request, clutch_id)
-    revision, whole = await _computed(request, context, clutch_id, revision, query, arguments, prefer, lane)
+    revision, answer = await _computed(request, context, clutch_id, revision, query, arguments, prefer, lane)
     if of.part == WHOLE:
         remember(request, repeated_answer(context, (clutch_id, name_of(query), *arguments)))
-        return tagged(request, whole, JSON_TYPE, revision)
+        return tagged(request, answer, JSON_TYPE, revision)
 
     def page_of_cached() -> bytes:
-        payload = json.loads(whole.body)
+        payload = json.loads(answer.body)
         return to_json(payload | of.part.sliced(payload["items"]))
 
     key = (clutch_id, f"{name_of(query)}.page", *arguments, of.part)
@@ -218,11 +218,11 @@ async def computed_table(
 ) -> Response:
     """The CSV export of the same: a page of the rows of its JSON, which goes on where that does. Raises NotFoundError."""
     revision = _revision(of.request, of.clutch_id)
-    revision, whole = await _computed(of.request, of.context, of.clutch_id, revision, query, arguments, prefer)
+    revision, answer = await _computed(of.request, of.context, of.clutch_id, revision, query, arguments, prefer)
 
     def page_of_cached() -> Page:
-        page = table.sliced(json.loads(whole.body), of.part)
-        return Page(page.body, page.next or whole.next)
+        page = table.sliced(json.loads(answer.body), of.part)
+        return Page(page.body, page.next or answer.next)
 
     key = (of.clutch_id, f"{name_of(query)}.csv", *arguments, of.part)
     return tagged(of.request, await cached_answer(of.context, key, revision, page_of_cached), CSV_TYPE, revision)
@@ -240,14 +240,14 @@ async def computed_of_each(
         with context.database.reading() as connection:
             return clutches.revisions(connection)
 
-    made = []
+    items = []
     for clutch_id, revision in (await run_in_threadpool(newest)).items():
         if await request.is_disconnected():
             raise ClientDisconnect
         wait = f"wait={LONGEST_WAIT_SECONDS}"
-        _, whole = await _computed(request, context, clutch_id, revision, query, arguments, wait)
-        made.append(await run_in_threadpool(json.loads, whole.body))
-    return made
+        _, answer = await _computed(request, context, clutch_id, revision, query, arguments, wait)
+        items.append(await run_in_threadpool(json.loads, answer.body))
+    return items
 
 
 async def _computed(
@@ -264,9 +264,9 @@ async def _computed(
     wait = preferred if preferred is not None else WAIT_SECONDS if context.workers.are_idle() else 0
 
     def compute(waited_for: bool) -> "Future[Made]":
-        among = lane if waited_for or lane is not Lane.ANSWERS else Lane.RENEWALS
-        turn = f"{among.name} for {name_of_caller(request)}"
-        return context.workers.submit(among, revision_and_json, query, clutch_id, arguments, turn=turn)
+        lane_used = lane if waited_for or lane is not Lane.ANSWERS else Lane.RENEWALS
+        turn = f"{lane_used.name} for {name_of_caller(request)}"
+        return context.workers.submit(lane_used, revision_and_json, query, clutch_id, arguments, turn=turn)
 
     key = (clutch_id, name_of(query), *arguments)
     if not arguments and not context.revalidation.knows(key):
@@ -288,8 +288,8 @@ def repeated_answer(context: Context, key: Hashable, *, of_clutch: bool = True) 
 
     def again(request: Request) -> Response | None:
         snapshot = snapshot_of(request)
-        held = context.cache.held(key, snapshot.revision if of_clutch else snapshot.version)
-        return None if held is None else tagged(request, held, JSON_TYPE, snapshot.revision if of_clutch else None)
+        cached = context.cache.held(key, snapshot.revision if of_clutch else snapshot.version)
+        return None if cached is None else tagged(request, cached, JSON_TYPE, snapshot.revision if of_clutch else None)
 
     return again
 
@@ -368,10 +368,10 @@ def taking(
     other statuses `also` mean that come with the same answer."""
     described = body if isinstance(body, dict) else body.model_json_schema()
     content = {"application/json": {"schema": described, "example": example}}
-    others = {status: {"model": answered, "description": meaning} for status, meaning in (also or {}).items()}
+    other_responses = {status: {"model": answered, "description": meaning} for status, meaning in (also or {}).items()}
     return {
         "response_model": answered,
-        "responses": dict(responses) | others,
+        "responses": dict(responses) | other_responses,
         "openapi_extra": {"requestBody": {"required": required, "content": content}},
     }
 

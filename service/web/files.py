@@ -49,17 +49,17 @@ def emptied_folder(database: Path | None) -> Path:
 @asynccontextmanager
 async def body_or_file(request: Request, folder: Path) -> AsyncIterator[bytes | Path]:
     """A request's body: in memory where it is short, else as a file in the folder, which is removed in the end."""
-    pieces, taken = request.stream(), bytearray()
+    pieces, received = request.stream(), bytearray()
     async for piece in pieces:
-        taken += piece
-        if len(taken) > MAX_BYTES_IN_MEMORY:
+        received += piece
+        if len(received) > MAX_BYTES_IN_MEMORY:
             break
     else:
-        yield bytes(taken)
+        yield bytes(received)
         return
     with tempfile.NamedTemporaryFile(dir=folder) as file:
-        file.write(taken)
-        taken.clear()
+        file.write(received)
+        received.clear()
         await written(pieces, file)
         yield Path(file.name)
 

@@ -76,14 +76,16 @@ class Processes(Collector):
             if not Path("/proc", number).exists():
                 mark_process_dead(int(number), str(self._folder))  # type: ignore[no-untyped-call]
                 continue
-            own = CollectorRegistry()
-            ProcessCollector(registry=own, pid=partial(int, number))
-            for metric in own.collect():
+            registry = CollectorRegistry()
+            ProcessCollector(registry=registry, pid=partial(int, number))
+            for metric in registry.collect():
                 sum_up = min if metric.name == "process_start_time_seconds" else add
-                kept = metrics.setdefault(metric.name, metric)
-                if kept is not metric:
-                    pairs = zip(kept.samples, metric.samples, strict=True)
-                    kept.samples = [sample._replace(value=sum_up(sample.value, other.value)) for sample, other in pairs]
+                merged = metrics.setdefault(metric.name, metric)
+                if merged is not metric:
+                    pairs = zip(merged.samples, metric.samples, strict=True)
+                    merged.samples = [
+                        sample._replace(value=sum_up(sample.value, other.value)) for sample, other in pairs
+                    ]
         yield from metrics.values()
 
 

@@ -112,15 +112,15 @@ def _named(schema: Json, schemas: Json) -> Json:
     A reference finds its schema there alone, and who writes a client from the description names its types by it.
     """
     parts = schema.pop("$defs", {})
-    own = schema.get("title") if "properties" in schema else None
-    if own is not None:
-        parts = parts | {own: schema}
+    title = schema.get("title") if "properties" in schema else None
+    if title is not None:
+        parts = parts | {title: schema}
     names = {name: _free_name(name, part, schemas) for name, part in parts.items()}
     for part in (schema, *parts.values()):
         _refer(part, names)
     for name, part in parts.items():
         schemas.setdefault(names[name], part | {"title": names[name]})
-    return schema if own is None else {"$ref": f"#/components/schemas/{names[own]}"}
+    return schema if title is None else {"$ref": f"#/components/schemas/{names[title]}"}
 
 
 def _free_name(name: str, part: Json, schemas: Json) -> str:

@@ -130,8 +130,8 @@ def available_memory() -> int | None:
         group = _GROUPS / _GROUP.read_text(encoding="utf-8").strip().rpartition("::")[2].lstrip("/")
         most = int((group / "memory.max").read_text(encoding="ascii"))
         statistics = dict(line.split() for line in (group / "memory.stat").read_text(encoding="ascii").splitlines())
-        taken = int((group / "memory.current").read_text(encoding="ascii"))
-        left.append(most - taken + sum(int(statistics[name]) for name in _GIVEN_BACK))
+        used = int((group / "memory.current").read_text(encoding="ascii"))
+        left.append(most - used + sum(int(statistics[name]) for name in _GIVEN_BACK))
     except (OSError, ValueError, KeyError):  # no such group, or one without a bound ("max")
         pass
     return min(left, default=None)

@@ -68,8 +68,8 @@ class Revalidation:
             ended, _ = await asyncio.wait(running, timeout=left, return_when=asyncio.FIRST_COMPLETED)
             if not ended:
                 break
-            made = [task.result() for task in ended if task is making or not _failed(task)]
-            newest = max([newest, *made], key=lambda answered: answered[0])
+            results = [task.result() for task in ended if task is making or not _failed(task)]
+            newest = max([newest, *results], key=lambda answered: answered[0])
         return newest
 
     def _begin(self, key: Hashable, compute: Compute, *, waits: bool) -> "asyncio.Task[tuple[int, Answer]]":
@@ -89,12 +89,12 @@ class Revalidation:
             del tasks[key]
             if key not in self._making and key not in self._renewing:
                 self._cache.pinned.discard(key)
-        held = self._cache.newest(key)
-        if held is not None and revision < held[0]:  # a later one was quicker
-            return held
-        made = revision, Answer.of(body)
-        self._cache.put(key, *made)
-        return made
+        cached = self._cache.newest(key)
+        if cached is not None and revision < cached[0]:  # a later one was quicker
+            return cached
+        result = revision, Answer.of(body)
+        self._cache.put(key, *result)
+        return result
 
 
 def _failed(task: "asyncio.Task[tuple[int, Answer]]") -> bool:

@@ -99,7 +99,7 @@ def read_life(
         return DiagnosedLife(record=record)
     life = lives[-1]
     samples = {run_id: by_key[row.run_key] for run_id, row in rows.items() if row.run_key in by_key}
-    kept = records_to_keep([event.run_id for event in life.events], samples)
+    with_records = records_to_keep([event.run_id for event in life.events], samples)
     reader = stored_runs.run_reader(database, clutch_id)
     campaign: list[CampaignRun] = []
     notes = []
@@ -107,11 +107,13 @@ def read_life(
         say({"step": "reads the runs", "done": number, "of": len(life.events)})
         try:
             sent = replace(reader.read(event.run_id), cycles=event.cycles)  # corrected meanwhile: the history's hold
-            keep = event.run_id in kept
+            keep = event.run_id in with_records
             campaign.append(run_of(sent, origin=life.origin, torque_filter=record.torque_filter, keep_record=keep))
         except ValueError as error:
             notes.append(f"{event.run_id} is left out: {error}")
-    left_out = [event for event in life.events if event.kind == STATIONARY and event.run_id in samples.keys() - kept]
+    left_out = [
+        event for event in life.events if event.kind == STATIONARY and event.run_id in samples.keys() - with_records
+    ]
     if left_out:
         notes.append(
             f"The raw records of {len(left_out)} stationary tests are left out for their size; their plateaus count."

@@ -394,21 +394,23 @@ class Cluster(_Elsewhere):
                 f"{self.address}: the Dask scheduler has no worker: dask worker {self.address} --nthreads 1"
             ) from error
         try:
-            others: Mapping[str, str | None] = self._client.run(_difference, release())
+            worker_differences: Mapping[str, str | None] = self._client.run(_difference, release())
         except Exception as error:  # a worker without this program cannot read the question
             raise ExecutorUnavailableError(
                 f"{self.address}: a worker cannot import clutchlife ({error}): install this release there"
             ) from error
-        for worker, difference in others.items():
+        for worker, difference in worker_differences.items():
             if difference is not None:
                 raise ExecutorUnavailableError(f"worker {worker}: {difference}")
 
 
 def _difference(wanted: Mapping[str, str]) -> str | None:
     """How this process's release differs from what is wanted, in words; None where it does not."""
-    own = release()
+    this_release = release()
     differing = [
-        f"{name} {own.get(name)} instead of {wanted[name]}" for name in wanted if own.get(name) != wanted[name]
+        f"{name} {this_release.get(name)} instead of {wanted[name]}"
+        for name in wanted
+        if this_release.get(name) != wanted[name]
     ]
     return f"it has {', '.join(differing)}: results could differ" if differing else None
 
@@ -479,7 +481,7 @@ def in_rounds(
     for number in range(rounds):
         sent: dict[int, tuple[str, Item]] = {}
         ended: list[Ended[Result]] = []
-        again: list[str] = []
+        to_repeat: list[str] = []
 
         def items(
             names: Iterable[str] = names, sent: dict[int, tuple[str, Item]] = sent, ended: list[Ended[Result]] = ended
@@ -505,10 +507,10 @@ def in_rounds(
             elif store(item, outcome.value()):
                 ended.append(Ended(name=name, ending=Ending.STORED, result=outcome.value()))
             elif number + 1 < rounds:
-                again.append(name)
+                to_repeat.append(name)
             else:
                 ended.append(Ended(name=name, ending=Ending.LEFT))
             yield from ended
             ended.clear()
         yield from ended
-        names = again
+        names = to_repeat

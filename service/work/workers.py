@@ -286,18 +286,18 @@ class Workers:
 
     def _do(self, call: _Call, worker: _Worker) -> None:
         error: BaseException | None = None
-        result, again = None, False
+        result, retry = None, False
         try:
             result = worker.call(call)
         except _LostError:
             waited = time.monotonic() - call.queued_at
-            again = not (call.retried or call.answer.done() or waited > call.patience)
+            retry = not (call.retried or call.answer.done() or waited > call.patience)
             error = BusyError("the process for this request ended unexpectedly: send the request again")
         except BaseException as raised:  # noqa: BLE001  (raised again for who asked)
             error = raised
         with self._lock:
             self._workers[worker] = (call.lane, None)
-            if again and not self._closing:
+            if retry and not self._closing:
                 call.retried, call.begun = True, None
                 self._queues[call.lane].appendleft(call)
                 self._ready[call.lane].notify()

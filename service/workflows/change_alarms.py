@@ -27,14 +27,14 @@ def save(database: Database, rule: AlarmIn, *, by: str, at: str, alarm_id: str |
     with database.writing() as connection:
         if rule.clutch_id is not None:
             records.clutch(connection, rule.clutch_id)
-        beside = [row for row in alarms.page(connection, limit=ALL_ROWS) if row.clutch_id == rule.clutch_id]
+        same_clutch = [row for row in alarms.page(connection, limit=ALL_ROWS) if row.clutch_id == rule.clutch_id]
         if alarm_id is None:
-            same = [row for row in beside if row.content == content]
+            same = [row for row in same_clutch if row.content == content]
             if same:
                 return same[0], False
         else:
             found(alarms.get(connection, alarm_id), "alarm", alarm_id)
-        if sum(row.alarm_id != alarm_id for row in beside) >= MAX_RULES:
+        if sum(row.alarm_id != alarm_id for row in same_clutch) >= MAX_RULES:
             whose = "rules of several clutches" if rule.clutch_id is None else f"rules of clutch {rule.clutch_id!r}"
             raise NotPossibleNowError(f"there are {MAX_RULES} {whose}, which is the maximum: change or delete one")
         row = AlarmRow(

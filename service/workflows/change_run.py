@@ -211,16 +211,17 @@ def _change(
         loaded = _load(database, request)
         if again is not None:
             loaded = _with(loaded, again)
-        wanted = {row.run_id: row for row in _as_asked(database, loaded, request)}
+        asked_rows = {row.run_id: row for row in _as_asked(database, loaded, request)}
         same = [
             row
             for row in loaded.rows
-            if again is None and (row.state, row.cycles) == (wanted[row.run_id].state, wanted[row.run_id].cycles)
+            if again is None
+            and (row.state, row.cycles) == (asked_rows[row.run_id].state, asked_rows[row.run_id].cycles)
         ]
         if len(same) == len(loaded.rows):
             return [records.receipt(row) for row in same]
         loaded = loaded.without(same)
-        changed = _computed(database, loaded, [wanted[row.run_id] for row in loaded.rows])
+        changed = _computed(database, loaded, [asked_rows[row.run_id] for row in loaded.rows])
         with database.writing(of=request.clutch_id) as connection:
             if records.unchanged(connection, request.clutch_id, loaded.state.revision):
                 if columns is not None:
@@ -298,17 +299,21 @@ def _one_as_asked(database: Database, loaded: _Loaded, request: _Request) -> Run
 def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     """The run at other cycles: accepted where it is plausible there, else held."""
     row, sent_cycles = loaded.row, loaded.row.cycles if loaded.row.sent_cycles is None else loaded.row.sent_cycles
-    others = _state_without_these(loaded)
+    other_runs = _state_without_these(loaded)
     sent = replace(loaded.reader(database).read(row.run_id), cycles=cycles)
     event = loaded.event.at(cycles)
-    event = replace(event, cofs=cofs_among(others, event, loaded.levels.get(row.run_id, ())))
-    again = loaded.again
-    analysis = analyse(sent, others.geometry, others.record.torque_filter) if again is None else again.analysis
+    event = replace(event, cofs=cofs_among(other_runs, event, loaded.levels.get(row.run_id, ())))
+    read_again = loaded.again
+    analysis = (
+        analyse(sent, other_runs.geometry, other_runs.record.torque_filter)
+        if read_again is None
+        else read_again.analysis
+    )
     if "time_s" in sent.channels and sent.kind == STATIONARY:  # as on arrival: its plateaus stand for a long record
         sent = replace(sent, channels={})
-    shown, doubtful = doubts_alone(sent, analysis, others.geometry)
+    shown, doubtful = doubts_alone(sent, analysis, other_runs.geometry)
     if not doubtful:
-        doubtful = _together(others, replace(event, shown=shown, confirmed=False)).doubts.get(row.run_id, ())
+        doubtful = _together(other_runs, replace(event, shown=shown, confirmed=False)).doubts.get(row.run_id, ())
     return replace(
         row,
         cycles=cycles,
@@ -334,32 +339,32 @@ def _together(others: ClutchState, incoming: Event | None, changed: Sequence[Eve
 
 def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
     """What becomes of the other runs; the runs themselves are as they were asked for, these of them `accepted`."""
-    others = _state_without_these(loaded)
+    other_runs = _state_without_these(loaded)
     for event in accepted:
-        cofs = cofs_among(others, event, loaded.levels.get(event.run_id, ()))
-        others = replace(others, events=order([*others.events, replace(event, cofs=cofs, confirmed=True)]))
-    return _together(others, None, [*loaded.events, *accepted])
+        cofs = cofs_among(other_runs, event, loaded.levels.get(event.run_id, ()))
+        other_runs = replace(other_runs, events=order([*other_runs.events, replace(event, cofs=cofs, confirmed=True)]))
+    return _together(other_runs, None, [*loaded.events, *accepted])
 
 
 def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _Changed:
     """All that follows from the runs as they are to be."""
-    before, others = loaded.state, _state_without_these(loaded)
+    before, other_runs = loaded.state, _state_without_these(loaded)
     pairs = [(row, event.at(row.cycles)) for row, event in zip(rows, loaded.events, strict=True)]
-    own = [event for row, event in pairs if row.state == runs.ACCEPTED]
+    accepted = [event for row, event in pairs if row.state == runs.ACCEPTED]
     out = [event for row, event in pairs if row.state != runs.ACCEPTED]
-    judged = _judged_with(loaded, own)
-    require_within_ends(order([*others.events, *own]))
-    held = judged.aside(others.held, [event for row, event in pairs if row.state == runs.HELD])
-    after = replace(before, events=judged.settled(others.events, own), held=held)
+    judged = _judged_with(loaded, accepted)
+    require_within_ends(order([*other_runs.events, *accepted]))
+    held_runs = judged.aside(other_runs.held, [event for row, event in pairs if row.state == runs.HELD])
+    after = replace(before, events=judged.settled(other_runs.events, accepted), held=held_runs)
     receipts = {**loaded.receipts}
     receipts |= {row.run_id: receipts[row.run_id] | {"cycles": whole(row.cycles)} for row in rows}
     reader = loaded.reader(database)
     computed = Results()
-    if own or judged.changes or any(row.state == runs.ACCEPTED for row in loaded.rows):
+    if accepted or judged.changes or any(row.state == runs.ACCEPTED for row in loaded.rows):
         evaluated = stationary_tests_of(before.events)
         if loaded.again is not None:  # its own loops, and those that are held against its curves
-            again = loaded.row.run_id
-            evaluated = {loop: test for loop, test in evaluated.items() if again not in (loop, test)}
+            rejudged = loaded.row.run_id
+            evaluated = {loop: test for loop, test in evaluated.items() if rejudged not in (loop, test)}
         after, computed = computed_again(after, loaded.levels, receipts, reader, evaluated=evaluated)
     aside = {}
     for other in [*judged.held, *out]:
@@ -422,9 +427,9 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
             after |= _read_as(loaded.again.run.file or {})
         if before["doubts"] == after["doubts"]:
             del before["doubts"], after["doubts"]
-        asked = {"at": request.at, "by": request.by, "reason": request.reason}
+        request_fields = {"at": request.at, "by": request.by, "reason": request.reason}
         changes.insert(
-            connection, clutch_id, request.action, before, after, run_id=row.run_id, revision=revision, **asked
+            connection, clutch_id, request.action, before, after, run_id=row.run_id, revision=revision, **request_fields
         )
 
 

@@ -94,8 +94,8 @@ def ingest_posted(
     TooLargeError where the file is too long to be kept."""
     if path is None:
         return ingest(database, clutch_id, read(), received_at=received_at, by=by)
-    with ThreadPoolExecutor(1) as beside:  # deflating lets the reader run
-        packing = beside.submit(channels.packed, path)
+    with ThreadPoolExecutor(1) as deflating:  # deflating lets the reader run
+        packing = deflating.submit(channels.packed, path)
         run, file = read(), packing.result()
     if len(file.data) > MAX_FILE_BYTES:
         raise TooLargeError(
@@ -128,8 +128,8 @@ def ingest(
     record, sampled = records.record(clutch), "time_s" in run.channels
     geometry, torque_filter = record.geometry.to_model(), record.torque_filter
     if sampled:
-        with ThreadPoolExecutor(1) as beside:  # deflating a long record lets its cutting run
-            encoding = beside.submit(channels.encoded, run.channels, file)
+        with ThreadPoolExecutor(1) as deflating:  # deflating a long record lets its cutting run
+            encoding = deflating.submit(channels.encoded, run.channels, file)
             analysis = analyse(run, geometry, torque_filter)
             columns = encoding.result()
     else:  # a thread takes longer to begin than a few plateaus to deflate
@@ -199,20 +199,22 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
     if judged.changes:
         return _with_others(database, before, event, answer, arrival, judged)
     if doubtful:
-        held = replace(before, held=(*before.held, event))
-        part = held_summary(held, before.filters or {}, _evidence(database, held, arrival, answer))
+        state_with_held = replace(before, held=(*before.held, event))
+        part = held_summary(
+            state_with_held, before.filters or {}, _evidence(database, state_with_held, arrival, answer)
+        )
         results_of_others = Results(summary={**before.summary, **part})
         return _Outcome(
             revision=before.revision, receipt=answer, cofs=event.cofs, results=results_of_others, doubts=doubtful
         )
     computed = _among(database, before, state, event, levels, answer, arrival)
     answer = computed.receipts.get(event.run_id, answer)
-    others = {run_id: other for run_id, other in computed.receipts.items() if run_id != event.run_id}
+    other_receipts = {run_id: other for run_id, other in computed.receipts.items() if run_id != event.run_id}
     return _Outcome(
         revision=before.revision,
         receipt=answer,
         cofs=event.cofs,
-        results=replace(computed, receipts=others),
+        results=replace(computed, receipts=other_receipts),
         teaches=state.kind if life_with(state.events, event).end is not None else None,
     )
 
@@ -227,10 +229,10 @@ def _with_others(
         events=judged.settled(before.events, [] if doubtful else [event]),
         held=judged.aside(before.held, [event] if doubtful else []),
     )
-    own = {event.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
+    own_fits = {event.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
     with database.reading() as connection:
         receipts = records.receipts(connection, before.clutch_id) | {event.run_id: answer}
-        levels = records.levels(connection, before.clutch_id) | own
+        levels = records.levels(connection, before.clutch_id) | own_fits
     reader = reader_with(stored_runs.run_reader(database, before.clutch_id), arrival)
     evaluated = stationary_tests_of(before.events)
     final, computed = computed_again(state, levels, receipts, reader, evaluated=evaluated)
@@ -328,11 +330,11 @@ def _evaluated(before: ClutchState, state: ClutchState, event: Event) -> dict[st
 
 def _levels(database: Database, state: ClutchState, event: Event, arrival: Arrival) -> Mapping[str, Sequence[LevelFit]]:
     """The levels of all tests where they are needed, else those of the run alone."""
-    own = {event.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
+    own_fits = {event.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
     if event.kind != DYNAMIC and event is state.events[-1] and not event.rebuild and state.adoption is None:
-        return own
+        return own_fits
     with database.reading() as connection:
-        return records.levels(connection, state.clutch_id) | own
+        return records.levels(connection, state.clutch_id) | own_fits
 
 
 def _store(

@@ -199,8 +199,8 @@ def as_job(
 
     def gives_way() -> bool:
         with database.reading() as connection:
-            others = jobs.open_of(connection, jobs.FLEET_REFRESH)
-        return any(row.state == jobs.WAITING and not row.arguments.get("learned", False) for row in others)
+            open_jobs = jobs.open_of(connection, jobs.FLEET_REFRESH)
+        return any(row.state == jobs.WAITING and not row.arguments.get("learned", False) for row in open_jobs)
 
     say_so()
     done = refresh(

@@ -118,9 +118,9 @@ def _collected(database: Database, store: RawStore, *, before: float, now: float
     listed = opened.names()
     while batch := list(islice(listed, _BATCH)):
         with database.reading() as connection:
-            taken = raw_stores.named(connection, store.store_key, [name for name, _ in batch])
-        named += len(taken)
-        left = [(name, put) for name, put in batch if name not in taken]
+            still_named = raw_stores.named(connection, store.store_key, [name for name, _ in batch])
+        named += len(still_named)
+        left = [(name, put) for name, put in batch if name not in still_named]
         old = [name for name, put in left if put < before]
         new += len(left) - len(old)
         removed += _remove(database, opened, store, old, at=now)

@@ -122,8 +122,8 @@ def names_in_store(connection: Connection, store_key: int, *, after: str, most: 
 
 def mark_removed(connection: Connection, store_key: int, names: Sequence[str], *, at: float) -> list[str]:
     """Note that those of the names which no row has are being removed from `at` on [s since 1970]; which these are."""
-    taken = named(connection, store_key, names)
-    unnamed = [name for name in names if name not in taken]
+    still_named = named(connection, store_key, names)
+    unnamed = [name for name in names if name not in still_named]
     if unnamed:
         connection.execute(_one_more, {"of_store": store_key})
         number = connection.execute(_removals, {"of_store": store_key}).scalar_one()

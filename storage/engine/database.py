@@ -140,9 +140,9 @@ class Database(ABC):
         except (OperationalError, ProgrammingError) as error:
             if not self._found or (revision := self._revision()) == head():
                 raise
-            kept = "" if self.path is None else ", and keeps a copy of the file beside it"
+            note = "" if self.path is None else ", and keeps a copy of the file beside it"
             raise DatabaseTooOld(
-                f"{self.name} is at revision {revision}, this program needs {head()}: `clutchlife serve` migrates it{kept}"
+                f"{self.name} is at revision {revision}, this program needs {head()}: `clutchlife serve` migrates it{note}"
             ) from error
 
     @abstractmethod

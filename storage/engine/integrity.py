@@ -30,9 +30,9 @@ def other_schema(connection: Connection) -> list[str]:
             f"the database is at revision {current(connection)}: its runs can be checked only at {head()}. "
             "`clutchlife serve` migrates it, and keeps a copy of an SQLite file"
         )
-    own = _SERVER_TABLES if connection.dialect.name == "postgresql" else ()
+    server_tables = _SERVER_TABLES if connection.dialect.name == "postgresql" else ()
     context = MigrationContext.configure(
-        connection, opts={"include_object": lambda _, name, kind, *__: not (kind == "table" and name in own)}
+        connection, opts={"include_object": lambda _, name, kind, *__: not (kind == "table" and name in server_tables)}
     )
     return [f"the schema differs: {difference}" for difference in compare_metadata(context, metadata)]
 

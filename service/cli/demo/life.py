@@ -115,11 +115,11 @@ def _capacity(truth: SimulatedClutch, cycles: int, fastest: float) -> Capacity:
 
 def _recorded(record: Record) -> Record:
     """The part of a record at the recorded pressures."""
-    kept = np.any([np.abs(record.pressure - level) < _NEAR for level in _RECORDED], axis=0)
+    near_level = np.any([np.abs(record.pressure - level) < _NEAR for level in _RECORDED], axis=0)
     return Record(
-        time=record.time[kept],
-        pressure=record.pressure[kept],
-        speed=record.speed[kept],
-        torque=record.torque[kept],
-        oil_temperature=None if record.oil_temperature is None else record.oil_temperature[kept],
+        time=record.time[near_level],
+        pressure=record.pressure[near_level],
+        speed=record.speed[near_level],
+        torque=record.torque[near_level],
+        oil_temperature=None if record.oil_temperature is None else record.oil_temperature[near_level],
     )

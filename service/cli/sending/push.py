@@ -106,8 +106,8 @@ def _request(
     """A file and the parameters of its request; None for a JSON body."""
     if file.path.suffix == ".json":
         return file.path, None
-    given = {name: value for name, value in {**reading, "rig": rig}.items() if value is not None}
-    return file.path, given | _parameters(file, kind, cycles, by_rig=rig is not None)
+    options = {name: value for name, value in {**reading, "rig": rig}.items() if value is not None}
+    return file.path, options | _parameters(file, kind, cycles, by_rig=rig is not None)
 
 
 def _replacement(spool: Spool, entry: Entry) -> str:
@@ -122,10 +122,10 @@ def _replacement(spool: Spool, entry: Entry) -> str:
 
 def _warn_of_others(spool: Spool, digests: set[str]) -> None:
     """One line where other runs of the clutch wait than those that were just given; refusals were said when they came."""
-    others = [entry for entry in spool.waiting() if entry.digest not in digests]
-    if others:
-        oldest = min(entry.since for entry in others)
-        count = "1 other run waits" if len(others) == 1 else f"{len(others)} other runs wait"
+    other_entries = [entry for entry in spool.waiting() if entry.digest not in digests]
+    if other_entries:
+        oldest = min(entry.since for entry in other_entries)
+        count = "1 other run waits" if len(other_entries) == 1 else f"{len(other_entries)} other runs wait"
         say(f"{count} for {spool.clutch_id} since {oldest} and will be sent too: see clutchlife spool list")
 
 
@@ -134,8 +134,8 @@ def _parameters(file: manifest.RunFile, kind: str | None, cycles: float | None, 
     if file.parameters is not None:
         return dict(file.parameters)
     if by_rig:
-        given = {"kind": kind, "cycles": None if cycles is None else repr(cycles), "filename": file.path.name}
-        return {name: value for name, value in given.items() if value is not None}
+        parameters = {"kind": kind, "cycles": None if cycles is None else repr(cycles), "filename": file.path.name}
+        return {name: value for name, value in parameters.items() if value is not None}
     if kind is None or cycles is None:
         fail(f"the kind and the cycles of {file.path} are not known. {_REMEDY}", EX_USAGE)
     return {"kind": kind, "cycles": repr(cycles), "filename": file.path.name}
@@ -185,12 +185,12 @@ def list_runs(
 ) -> None:
     """List the runs that wait, with the last answer; the refused runs, with the reason; and the replaced versions."""
     with errors_in_a_line():
-        kept = _spooled_entries(spool, clutch)
+        entries = _spooled_entries(spool, clutch)
         if as_json:
-            typer.echo(json.dumps({"items": [_item(spool, entry) for entry in kept]}, indent=1, ensure_ascii=False))
+            typer.echo(json.dumps({"items": [_item(spool, entry) for entry in entries]}, indent=1, ensure_ascii=False))
             return
-        _print(spool, kept)
-        if not kept:
+        _print(spool, entries)
+        if not entries:
             print_line(f"nothing is in the spool {spool}")
 
 
@@ -201,18 +201,26 @@ def send(
     """Send the runs that wait for the service at --url. Runs for other addresses stay, because the key belongs to this
     service."""
     with errors_in_a_line():
-        spools = [kept for kept in Spool.every(spool) if kept.waiting()]
+        spools = [waiting_spool for waiting_spool in Spool.every(spool) if waiting_spool.waiting()]
         if clutch is not None:
-            spools = [kept for kept in [Spool.of(spool, url, clutch)] if kept.waiting()]
-        here = [kept for kept in spools if kept.url == url.rstrip("/")]
-        for kept in spools:
-            if kept not in here:
-                whose = f"{kept.clutch_id} at {kept.url}"
-                say(f"{len(kept.waiting())} runs in {kept.folder} are not sent: they belong to {whose}")
-        if not here:
+            spools = [waiting_spool for waiting_spool in [Spool.of(spool, url, clutch)] if waiting_spool.waiting()]
+        same_service = [waiting_spool for waiting_spool in spools if waiting_spool.url == url.rstrip("/")]
+        for waiting_spool in spools:
+            if waiting_spool not in same_service:
+                whose = f"{waiting_spool.clutch_id} at {waiting_spool.url}"
+                say(
+                    f"{len(waiting_spool.waiting())} runs in {waiting_spool.folder} are not sent: they belong to {whose}"
+                )
+        if not same_service:
             print_line(f"nothing waits for {url}")
             return
-        transmit(here, url, key, patience, lambda service, kept: service.get(f"/v1/clutches/{kept.clutch_id}"))
+        transmit(
+            same_service,
+            url,
+            key,
+            patience,
+            lambda service, waiting_spool: service.get(f"/v1/clutches/{waiting_spool.clutch_id}"),
+        )
 
 
 @app.command()
@@ -224,22 +232,22 @@ def empty(
 ) -> None:
     """Show what is in the spool, ask whether to delete it, and then delete it for good."""
     with errors_in_a_line():
-        kept = [entry for entry in _spooled_entries(spool, clutch) if entry.state != WAITING or not refused]
-        if not kept:
+        listed = [entry for entry in _spooled_entries(spool, clutch) if entry.state != WAITING or not refused]
+        if not listed:
             print_line("nothing to delete")
             return
-        _print(spool, kept)
-        waiting = sum(entry.state == WAITING for entry in kept)
-        question = f"Delete these {len(kept)} for good? {waiting} of them were never stored by the service."
+        _print(spool, listed)
+        waiting = sum(entry.state == WAITING for entry in listed)
+        question = f"Delete these {len(listed)} for good? {waiting} of them were never stored by the service."
         if not yes and not typer.confirm(question, err=True):
             fail("nothing was deleted")
         try:
-            for owner, entries in groupby(kept, _owner):
+            for owner, entries in groupby(listed, _owner):
                 with Spool.of(spool, *owner).sending(0.0):
                     Spool.of(spool, *owner).discard(entries)
         except HeldError:
             fail("another process is sending from the spool: try again when it has ended", EX_TEMPFAIL)
-        print_line(f"{len(kept)} deleted; the service never stored {waiting} of them")
+        print_line(f"{len(listed)} deleted; the service never stored {waiting} of them")
 
 
 def _spooled_entries(folder: Path, clutch: str | None) -> list[Entry]:

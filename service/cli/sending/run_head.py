@@ -34,8 +34,8 @@ def head_of_body(body: bytes) -> RunHead:
     head = _stated(run)
     if head.started_at is None:
         return head
-    rest = {name: value for name, value in run.items() if name not in _DESCRIBING}
-    digest = hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
+    measured_fields = {name: value for name, value in run.items() if name not in _DESCRIBING}
+    digest = hashlib.sha256(json.dumps(measured_fields, sort_keys=True).encode()).hexdigest()
     return _stated(run, measurements=digest)
 
 

@@ -203,11 +203,11 @@ class Spool:
     def begin(self) -> None:
         """Finish what a killed process began; to be called before the first run is sent."""
         with self._changing() as database:
-            kept = {_body(*row): row[0] for row in database.execute("SELECT number, digest FROM entry")}
-            there = {path.name for path in self.folder.iterdir() if path.suffix in (BODY, PARTIAL)}
-            for name in sorted(there - kept.keys()):
+            numbers = {_body(*row): row[0] for row in database.execute("SELECT number, digest FROM entry")}
+            names = {path.name for path in self.folder.iterdir() if path.suffix in (BODY, PARTIAL)}
+            for name in sorted(names - numbers.keys()):
                 (self.folder / name).unlink()
-            self._remove(database, [(number, name) for name, number in kept.items() if name not in there])
+            self._remove(database, [(number, name) for name, number in numbers.items() if name not in names])
 
     def add(self, files: RunFiles, resource: str = RUNS) -> tuple[set[str], list[Entry]]:
         """Keep runs: JSON bodies (no parameters), or files with the parameters of their requests; or inspections' bodies.

@@ -15,24 +15,24 @@ def bound(host: str, port: int) -> list[socket.socket]:
 
     Raises OSError, a line that says what to do, where the port is not free or is none of this machine's to take.
     """
-    with ExitStack() as held:
-        taken: list[socket.socket] = []
+    with ExitStack() as open_sockets:
+        sockets: list[socket.socket] = []
         for family, kind, protocol, _, address in _addresses(host, port):
             # where asyncio knows the protocol it sends at once: else a body waits 40 ms for the receipt of its head
-            at = held.enter_context(socket.socket(family, kind, protocol))
+            at = open_sockets.enter_context(socket.socket(family, kind, protocol))
             at.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             if family == socket.AF_INET6:
                 at.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
             try:
-                at.bind((address[0], port_of(taken) if taken else port, *address[2:]))
+                at.bind((address[0], port_of(sockets) if sockets else port, *address[2:]))
             except OSError as error:
-                if error.errno == errno.EADDRNOTAVAIL and taken:  # a name with an address that this machine lacks
+                if error.errno == errno.EADDRNOTAVAIL and sockets:  # a name with an address that this machine lacks
                     continue
                 raise OSError(_why(error, host, port)) from None
             at.set_inheritable(True)
-            taken.append(at)
-        held.pop_all()
-        return taken
+            sockets.append(at)
+        open_sockets.pop_all()
+        return sockets
 
 
 def port_of(taken: list[socket.socket]) -> int:

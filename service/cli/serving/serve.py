@@ -59,9 +59,16 @@ def serve(
     from storage.engine.opening import database_exists  # start-up time
     from storage.engine.postgresql.connect import is_on_server  # start-up time
 
-    given = {"insecure_local": insecure_local or None, "log_level": log_level, "raw": raw, "root_path": root_path}
-    with errors_in_a_line(), ExitStack() as taken:
-        settings = Settings.from_environment(database, **{name: value for name, value in given.items() if value})
+    settings_given = {
+        "insecure_local": insecure_local or None,
+        "log_level": log_level,
+        "raw": raw,
+        "root_path": root_path,
+    }
+    with errors_in_a_line(), ExitStack() as resources:
+        settings = Settings.from_environment(
+            database, **{name: value for name, value in settings_given.items() if value}
+        )
         configure(settings.log_format, settings.log_level)
         if processes > 1 and not is_on_server(settings.database):
             raise ValueError(
@@ -70,16 +77,16 @@ def serve(
             )
         # a port that is not free ends the start before anything is made; without a database there are no keys
         first = host if is_loopback(host) or database_exists(settings.database) else LOOPBACK
-        sockets = [taken.enter_context(at_address) for at_address in listening.bound(first, port)]
+        sockets = [resources.enter_context(at_address) for at_address in listening.bound(first, port)]
         start.info("settings", extra={"fields": settings.shown()})
         for line in Settings.misspelt():
             start.warning(line)
         host = _allowed(host, settings)
         if host != first:
-            taken.close()
-            sockets = [taken.enter_context(at_address) for at_address in listening.bound(host, port)]
+            resources.close()
+            sockets = [resources.enter_context(at_address) for at_address in listening.bound(host, port)]
         shown = (listening.page(host, listening.port_of(sockets), settings.root_path), _place(settings.database))
-        taken.pop_all()
+        resources.pop_all()
     from service.cli.serving import services  # start-up time
 
     def announce() -> None:

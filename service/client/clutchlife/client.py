@@ -96,9 +96,9 @@ class Client:
             path = Path(run)
             if path.suffix == _JSON_SUFFIX:
                 return self.service.post(address, json.loads(path.read_bytes()) | _content(fields))
-            given = {"filename": path.name} | {name: value for name, value in fields.items() if value is not None}
-            profile = given.pop("profile", None)
-            parameters = {name: str(value) for name, value in given.items()}
+            query = {"filename": path.name} | {name: value for name, value in fields.items() if value is not None}
+            profile = query.pop("profile", None)
+            parameters = {name: str(value) for name, value in query.items()}
             if profile is not None:
                 return self.service.post_form(f"{address}/file", path, profile, parameters)
             return self.service.post_file(f"{address}/file", path, parameters)

@@ -169,10 +169,10 @@ def _misfit(misfit: Misfit | None) -> dict[str, Any]:
 
 def _gain(gain: Gain | None, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
     numbers = [name for name in shapes.GainOut.model_fields if name not in {"held_out_runs", "remaining_useful_life"}]
-    found = {name: _GAIN.get(name, name.removesuffix("_nm")) for name in numbers}
+    attributes = {name: _GAIN.get(name, name.removesuffix("_nm")) for name in numbers}
     return {
         "held_out_runs": [] if gain is None else list(gain.held_out_runs),
-        **{name: None if gain is None else finite(getattr(gain, own)) for name, own in found.items()},
+        **{name: None if gain is None else finite(getattr(gain, attribute)) for name, attribute in attributes.items()},
         "remaining_useful_life": {"before": dict(before), "after": dict(after)},
     }
 

@@ -240,7 +240,7 @@ def _levels(events: Sequence[Event], judgement: Judgement) -> dict[str, bool]:
 
 def _names_of_nearest_runs(event: Event, counted: Sequence[Event]) -> str:
     """The runs nearest to one in the history, of its kind where there are any, by their names."""
-    others = [other for other in counted if other.run_id != event.run_id]
-    alike = [other for other in others if other.kind == event.kind] or others
+    other_runs = [other for other in counted if other.run_id != event.run_id]
+    alike = [other for other in other_runs if other.kind == event.kind] or other_runs
     nearest = sorted(alike, key=lambda other: (abs(other.cycles - event.cycles), other.run_id))[:_NAMED]
     return ", ".join(other.run_id for other in nearest) or "no other run"

@@ -173,8 +173,8 @@ class _Comparison:
 
     def in_other_oil(self, event: Event) -> bool:
         """Whether a test was made at another oil temperature than is usual: its COF is none of the course."""
-        there = self.oil is not None and event.oil_temperature is not None
-        return there and abs((event.oil_temperature or 0.0) - (self.oil or 0.0)) > OTHER_OIL
+        both_known = self.oil is not None and event.oil_temperature is not None
+        return both_known and abs((event.oil_temperature or 0.0) - (self.oil or 0.0)) > OTHER_OIL
 
     def reading(self, event: Event, shown: Shown, cofs: Mapping[float, tuple[float, float]] | None) -> Reading:
         """The reading of a run that shows this."""
@@ -188,8 +188,8 @@ class _Comparison:
         self, event: Event, shown: Shown, mean_cof: Mapping[float, tuple[float, float]] | None
     ) -> tuple[float, float] | None:
         """log COF of a run as the tests of its life show it, and its deviation; None where it shows none."""
-        own = {STATIONARY: 0.0, DYNAMIC: DYNAMIC_SD}.get(event.kind, ENGAGEMENT_SD)
-        spread = math.hypot(own, odds.STEP_SD if self.corrected else 0.0)
+        run_sd = {STATIONARY: 0.0, DYNAMIC: DYNAMIC_SD}.get(event.kind, ENGAGEMENT_SD)
+        spread = math.hypot(run_sd, odds.STEP_SD if self.corrected else 0.0)
         first = self.reference
         if self.oil is not None and shown.oil is not None:
             beyond = max(abs(shown.oil - self.oil) - OTHER_OIL, 0.0)
@@ -202,8 +202,8 @@ class _Comparison:
         else:
             cof, spread = shown.cof or 0.0, math.hypot(spread, ROWS_SD)
         if first is not None and shown.pressure is not None and event.kind in (STATIONARY, DYNAMIC):
-            apart = math.log(shown.pressure / max(first.cofs))
-            spread = math.hypot(spread, OTHER_PRESSURE_SD * apart)
+            log_ratio = math.log(shown.pressure / max(first.cofs))
+            spread = math.hypot(spread, OTHER_PRESSURE_SD * log_ratio)
         return (math.log(cof), spread) if cof > 0 else None
 
     @cached_property
@@ -219,18 +219,20 @@ class _Comparison:
     def _log_protocol(self, event: Event, shown: Shown) -> float:
         """log density of pressures, speeds and oil temperature: those of another test of the life, or others."""
         is_test = event.kind in (STATIONARY, DYNAMIC)
-        own = event.shown if event.cofs and event.shown is not None else Shown()
+        measured = event.shown if event.cofs and event.shown is not None else Shown()
         declared = None if event.duty is None else event.duty.speed
         pressure, speed, oil = self.usual
         total = 0.0
         if is_test and shown.pressure:
-            total += pressure.log_of(math.log(shown.pressure), math.log(own.pressure) if own.pressure else None)
+            total += pressure.log_of(
+                math.log(shown.pressure), math.log(measured.pressure) if measured.pressure else None
+            )
         if declared and shown.speed:
             total += _SPEED.with_tests([math.log(declared)]).log_of(math.log(shown.speed), None)
         elif is_test and shown.speed:
-            total += speed.log_of(math.log(shown.speed), math.log(own.speed) if own.speed else None)
+            total += speed.log_of(math.log(shown.speed), math.log(measured.speed) if measured.speed else None)
         if shown.oil is not None:
-            total += oil.log_of(shown.oil, own.oil)
+            total += oil.log_of(shown.oil, measured.oil)
         if shown.open_torque is not None and shown.open_torque > 0:  # an open clutch's drag
             total += _log_normal(self._pressed(shown), *LOG_DRAG)
         return total
@@ -348,14 +350,14 @@ class _Usual:
         """log density of a value: that of a test again, but for its `own` one (None: it has none), or any."""
         anywhere = _log_normal(value, self.mean, self.deviation)
         place = None if own is None else self._place(own)
-        others = {at: count - (at == place) for at, count in self.tests.items()}
-        total = sum(others.values())
+        other_counts = {at: count - (at == place) for at, count in self.tests.items()}
+        total = sum(other_counts.values())
         if total <= 0:
             return anywhere
-        again = sum(
-            count * math.exp(_log_normal(value, 0.1 * self.same * at, self.same)) for at, count in others.items()
+        repeated = sum(
+            count * math.exp(_log_normal(value, 0.1 * self.same * at, self.same)) for at, count in other_counts.items()
         )
-        return math.log((1.0 - OTHER_PROTOCOL) * again / total + OTHER_PROTOCOL * math.exp(max(anywhere, _LEAST)))
+        return math.log((1.0 - OTHER_PROTOCOL) * repeated / total + OTHER_PROTOCOL * math.exp(max(anywhere, _LEAST)))
 
 
 _PRESSURE = _Usual(math.log(PRESSURE), LOG_PRESSURE_SD, SAME_PROTOCOL_SD)

@@ -96,8 +96,10 @@ def criterion_end(measured: MeasuredLife, criterion: CriterionIn, method: str) -
 def _series_at(measured: MeasuredLife, quantity: Quantity, criterion: CriterionIn) -> Series | None:
     """The series of the criterion's quantity at its pressure, speed and frequency; None where it was not measured yet."""
     speeds = () if criterion.speed_rpm is None else (criterion.speed_rpm,)
-    wanted = None if criterion.frequency_hz is None else rounded_frequency(criterion.frequency_hz)
-    tracks = [series for series in measured.series(quantity, speeds) if wanted is None or series.frequency_hz == wanted]
+    frequency = None if criterion.frequency_hz is None else rounded_frequency(criterion.frequency_hz)
+    tracks = [
+        series for series in measured.series(quantity, speeds) if frequency is None or series.frequency_hz == frequency
+    ]
     if not tracks:
         return None
     by_pressure = {series.pressure: series for series in tracks}
@@ -154,8 +156,8 @@ def criteria_answer(measured: MeasuredLife, ends: Sequence[CriterionEnd], curren
     if not samples:
         nothing = {"status": INSUFFICIENT, "probability_of_reaching": None, "at_least": None}
         items = [_item(end, now, 0.0) for end in ends]
-        asked = {"current": {**current, "health": None}, "criterion": _criterion(ends[0]), "criteria": items}
-        return _quantiles(None, now) | nothing | asked
+        answer = {"current": {**current, "health": None}, "criterion": _criterion(ends[0]), "criteria": items}
+        return _quantiles(None, now) | nothing | answer
     shares: FloatArray = np.ones(1)
     first: Sample = samples[0]
     if len(samples) > 1:
@@ -202,27 +204,29 @@ def _item(end: CriterionEnd, now: float, first: float) -> dict[str, Any]:
     """One criterion, with its own end, and how probably it is the first."""
     value, sd = end.current or (None, None)
     reaching = None if end.ends is None else end.probability_by(np.nextafter(np.inf, 0.0))
-    own = {"current": {"value": value, "sd": sd}, "probability_of_reaching": reaching, "probability_first": first}
-    return _criterion_item(end) | _quantiles(end.ends, now) | own | {"tests": end.tests}
+    fields = {"current": {"value": value, "sd": sd}, "probability_of_reaching": reaching, "probability_first": first}
+    return _criterion_item(end) | _quantiles(end.ends, now) | fields | {"tests": end.tests}
 
 
 def _criterion_item(end: CriterionEnd) -> dict[str, Any]:
-    given = {name: getattr(end.criterion, name) for name in GIVEN}
-    return given | {"initial": end.initial, "limit": _limit(end)}
+    fields = {name: getattr(end.criterion, name) for name in GIVEN}
+    return fields | {"initial": end.initial, "limit": _limit(end)}
 
 
 def _limit(end: CriterionEnd) -> float | None:
-    given = end.criterion
-    if given.fraction is not None and end.initial is None:
+    criterion = end.criterion
+    if criterion.fraction is not None and end.initial is None:
         return None
-    return float(Limit(fraction=given.fraction, below=given.below, above=given.above).level(end.initial or 0.0))
+    return float(
+        Limit(fraction=criterion.fraction, below=criterion.below, above=criterion.above).level(end.initial or 0.0)
+    )
 
 
 def _criterion(end: CriterionEnd) -> dict[str, Any]:
     """The leading criterion as the answer's own; mean COF's numbers only where it is mean COF."""
     of_cof = end.criterion.quantity == MEAN_COF
-    given = _criterion_item(end)
-    return given | {
+    fields = _criterion_item(end)
+    return fields | {
         "initial_mean_cof": end.initial if of_cof else None,
-        "threshold_mean_cof": given["limit"] if of_cof else None,
+        "threshold_mean_cof": fields["limit"] if of_cof else None,
     }

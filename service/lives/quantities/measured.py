@@ -130,14 +130,20 @@ def chosen_life(state: ClutchState, number: int | None = None, at_cycles: float 
         raise NotFoundError(f"the clutch has {len(lives)} lives, there is no life {number}")
     until = lives if at_cycles is None else lives_of([event for event in state.events if event.cycles <= at_cycles])
     index = len(until) if number is None else number
-    held = _held_runs_of_life(state, index, at_cycles)
+    held_runs = _held_runs_of_life(state, index, at_cycles)
     if not 1 <= index <= len(until):
-        return ChosenLife(life=None, assumptions=state.assumptions(), number=max(index, 1), of=len(lives), held=held)
+        return ChosenLife(
+            life=None, assumptions=state.assumptions(), number=max(index, 1), of=len(lives), held=held_runs
+        )
     life = until[index - 1]
     adopted = next((a for a in state.adoptions if a is not None and a.life == lives[index - 1].name), None)
     under = state.extension if index == len(lives) else None if adopted is None else adopted.extension
     return ChosenLife(
-        life=life, assumptions=state.assumptions_under(under, lives[index - 1]), number=index, of=len(lives), held=held
+        life=life,
+        assumptions=state.assumptions_under(under, lives[index - 1]),
+        number=index,
+        of=len(lives),
+        held=held_runs,
     )
 
 
@@ -148,12 +154,12 @@ def _held_runs_of_life(state: ClutchState, number: int, at_cycles: float | None)
     if now and number >= len(lives):
         return state.held
     starts = {life.events[0].run_id for life in lives[1:]}
-    names, place, held = {event.run_id for event in state.held}, 1, []
+    names, place, held_runs = {event.run_id for event in state.held}, 1, []
     for event in order([*state.events, *state.held]):
         place += event.run_id in starts
         if event.run_id in names and place == max(number, 1) and (now or event.cycles <= (at_cycles or 0.0)):
-            held.append(event)
-    return tuple(held)
+            held_runs.append(event)
+    return tuple(held_runs)
 
 
 #: A series and a weighted sample of its eq. 6.

@@ -66,20 +66,20 @@ async def list_events(
     clutch_id: OfClutch = None,
 ) -> Response:
     """Alarms, newest first. A key that is bound to clutches gets those of these clutches."""
-    own = auth.clutches_of_key(request)
+    clutches = auth.clutches_of_key(request)
     if clutch_id is not None:
         auth.require_clutch(request, clutch_id)
-        own = frozenset({clutch_id})
+        clutches = frozenset({clutch_id})
     return await answer(
-        request, partial(alarms.events, context.database, part, state=state, alarm_id=alarm_id, only=own)
+        request, partial(alarms.events, context.database, part, state=state, alarm_id=alarm_id, only=clutches)
     )
 
 
 @router.get("/events/{event_id}", response_model=schemas.EventOut, responses=READING)
 async def read_event(request: Request, context: auth.OwnReader, event_id: EventId) -> Response:
     """One alarm."""
-    own = auth.clutches_of_key(request)
-    return await answer(request, lambda: alarms.event(context.database, event_id, only=own))
+    clutches = auth.clutches_of_key(request)
+    return await answer(request, lambda: alarms.event(context.database, event_id, only=clutches))
 
 
 @router.post(
@@ -98,8 +98,8 @@ async def acknowledge_event(request: Request, context: auth.OwnIngester, event_i
 @router.get("/{alarm_id}", response_model=schemas.AlarmOut, responses=READING)
 async def read_alarm(request: Request, context: auth.OwnReader, alarm_id: AlarmId) -> Response:
     """A rule in force."""
-    own = auth.clutches_of_key(request)
-    return await answer(request, lambda: alarms.look_up(context.database, alarm_id, only=own))
+    clutches = auth.clutches_of_key(request)
+    return await answer(request, lambda: alarms.look_up(context.database, alarm_id, only=clutches))
 
 
 @router.put("/{alarm_id}", **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE))
@@ -147,8 +147,8 @@ async def post_webhook(request: Request, context: auth.Admin) -> Response:
     await run_in_threadpool(require_address, receiver.url, private=private)
     add = partial(change_alarms.add_receiver, by=auth.name_of_caller(request), at=now())
     row = await run_in_threadpool(add, context.database, receiver)
-    made = None if receiver.secret else row.secret
-    return json_answer(alarms.receiver_out(row, secret=made), 201, Location=f"/v1/webhooks/{row.webhook_id}")
+    new_secret = None if receiver.secret else row.secret
+    return json_answer(alarms.receiver_out(row, secret=new_secret), 201, Location=f"/v1/webhooks/{row.webhook_id}")
 
 
 @webhook_router.get("/{webhook_id}", response_model=schemas.WebhookOut, responses=READING)
@@ -193,6 +193,6 @@ async def _tested(context: Context, names: list[str]) -> Response:
         lambda rows: all(row["state"] != "waiting" for row in rows),
         _TEST_SECONDS,
     )
-    taken = sum(row["state"] == "delivered" for row in items)
-    message = f"{taken} of {len(items)} receivers took the test" if items else "there is no receiver: add a webhook"
+    delivered = sum(row["state"] == "delivered" for row in items)
+    message = f"{delivered} of {len(items)} receivers took the test" if items else "there is no receiver: add a webhook"
     return json_answer({"deliveries": items, "message": message})

@@ -48,9 +48,9 @@ EXAMPLE = {
 async def register_clutch(request: Request, context: auth.OwnIngester) -> Response:
     """Register a clutch. Everything but `clutch_id` has a default: the reference's clutch."""
     body = await answers.json_body(request)
-    wanted = checked(ClutchIn, body)
-    auth.require_clutch(request, wanted.clutch_id)
-    clutch, new = await run_in_threadpool(_register, context, wanted)
+    fields = checked(ClutchIn, body)
+    auth.require_clutch(request, fields.clutch_id)
+    clutch, new = await run_in_threadpool(_register, context, fields)
     if new:
         await answers.begin_computed(context, str(clutch["clutch_id"]), degradation)
     return answers.json_answer(clutch, 201 if new else 200, Location=f"/v1/clutches/{clutch['clutch_id']}")
@@ -95,10 +95,10 @@ async def _answer_about_all_clutches(
 ) -> Response:
     """A GET's answer that any commit may change, made once for what is committed."""
     # the version before the rows are read: what is committed meanwhile makes another
-    held = await answers.cached_answer(context, key, auth.snapshot_of(request).version, make)
+    answer = await answers.cached_answer(context, key, auth.snapshot_of(request).version, make)
     if auth.clutches_of_key(request) is None:
         remember(request, answers.repeated_answer(context, key, of_clutch=False))
-    return answers.tagged(request, held, answers.JSON_TYPE)
+    return answers.tagged(request, answer, answers.JSON_TYPE)
 
 
 @router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)
@@ -119,12 +119,12 @@ async def edit_clutch(request: Request, context: auth.Admin, clutch_id: ClutchId
     """Edit a clutch's record (each field in the request replaces the whole field), archive the clutch or bring it
     back. Results are computed again.
     """
-    wanted = checked(ClutchEdit, await answers.json_body(request))
-    made = partial(
-        edit, archived=wanted.archived, reason=wanted.reason, by=auth.name_of_caller(request), at=answers.now()
+    fields = checked(ClutchEdit, await answers.json_body(request))
+    change = partial(
+        edit, archived=fields.archived, reason=fields.reason, by=auth.name_of_caller(request), at=answers.now()
     )
     editing = context.workers.submit(
-        Lane.RUNS, made, clutch_id, wanted.fields(), turn=clutch_id, seconds=CHANGE_SECONDS
+        Lane.RUNS, change, clutch_id, fields.fields(), turn=clutch_id, seconds=CHANGE_SECONDS
     )
     await asyncio.wrap_future(editing)
     return answers.json_answer(await run_in_threadpool(clutch_list.look_up, context.database, clutch_id))

@@ -89,8 +89,8 @@ async def read_model(of: answers.Of) -> Response:
 @router.put("/model", **answers.taking(ModelIn, ModelOut, {"diagnosis_id": "3f9a1c0b7d2e4f56"}, SENDING))
 async def put_model(request: Request, context: Admin, clutch_id: ClutchId) -> Response:
     """Adopt the extended model of a diagnosis, or return to the baseline. The clutch is tracked again before the answer."""
-    wanted = checked(ModelIn, await answers.json_body(request))
-    arguments = (clutch_id, wanted.diagnosis_id, answers.now(), name_of_caller(request))
+    model = checked(ModelIn, await answers.json_body(request))
+    arguments = (clutch_id, model.diagnosis_id, answers.now(), name_of_caller(request))
     adopting = context.workers.submit(Lane.RUNS, adopt_model.adopt, *arguments, turn=clutch_id, seconds=CHANGE_SECONDS)
     await asyncio.wrap_future(adopting)
     return answers.json_answer(await run_in_threadpool(diagnoses.model, context.database, clutch_id))

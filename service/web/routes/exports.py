@@ -135,8 +135,8 @@ async def loops_csv(of: answers.WholeOf) -> Response:
     """Friction loops, one row each."""
 
     def make() -> Page:
-        found, held = runs.loops(of.database, of.clutch_id)
-        return _LOOPS.sliced([loop | {"held_runs": held} for loop in found], of.part)
+        rows, held_count = runs.loops(of.database, of.clutch_id)
+        return _LOOPS.sliced([loop | {"held_runs": held_count} for loop in rows], of.part)
 
     return await answers.clutch_table(of, "loops", make)
 

@@ -62,7 +62,7 @@ async def post_run_file(
     profile = None if rig is None else await run_in_threadpool(rigs.rig_profile, context.database, rig)
     with tempfile.TemporaryDirectory(dir=context.folder) as folder:
         path = Path(folder) / "run"
-        filename, own = await received(request, path, filename)
+        filename, content = await received(request, path, filename)
         read = partial(
             read_file_run,
             path,
@@ -70,8 +70,8 @@ async def post_run_file(
             kind=kind,
             cycles=cycles,
             reading=reading_of(map, table=table, time=time, decimal=decimal, skip_rows=skip_rows, missing=missing),
-            profile=own or profile,
-            rig=None if own else rig,
+            profile=content or profile,
+            rig=None if content else rig,
             run_id=run_id,
             started_at=started_at,
             origin=origin,

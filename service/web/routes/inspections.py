@@ -150,6 +150,6 @@ async def _file(request: Request) -> bytes:
 
 async def _changed(change: Callable[..., dict[str, Any]], of: answers.OfClutch, inspection_id: str) -> Response:
     """The inspection after a change."""
-    wanted = checked(Withdrawal, await answers.json_body(of.request))
-    made = partial(change, reason=wanted.reason, by=name_of_caller(of.request), at=answers.now())
-    return answers.json_answer(await run_in_threadpool(made, of.database, of.clutch_id, inspection_id))
+    withdrawal = checked(Withdrawal, await answers.json_body(of.request))
+    edit = partial(change, reason=withdrawal.reason, by=name_of_caller(of.request), at=answers.now())
+    return answers.json_answer(await run_in_threadpool(edit, of.database, of.clutch_id, inspection_id))

@@ -39,8 +39,8 @@ Prefer = Annotated[
 )
 async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -> Response:
     """Start a replay or a fleet refresh. If the same job already waits or runs, the answer is that job."""
-    wanted = checked(JobIn, await json_body(request))
-    require_clutch(request, wanted.clutch_id)
+    job_in = checked(JobIn, await json_body(request))
+    require_clutch(request, job_in.clutch_id)
     ask = partial(
         ask_job.ask,
         by=name_of_caller(request),
@@ -48,7 +48,7 @@ async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -
         most=context.settings.most_replays,
         asked_at=now(),
     )
-    new_or_open = await run_in_threadpool(ask, context.database, wanted.kind, wanted.clutch_id)
+    new_or_open = await run_in_threadpool(ask, context.database, job_in.kind, job_in.clutch_id)
     context.jobs.wake()
     wait = preferred_wait(prefer)
     look = partial(jobs.find, context.database, new_or_open.job_id, only=None)
@@ -69,8 +69,8 @@ async def list_jobs(request: Request, context: OwnReader, part: Paged, state: Of
 @router.get("/{job_id}", response_model=JobOut, responses=READING)
 async def read_job(request: Request, context: OwnReader, job_id: JobId) -> Response:
     """One job, with its progress and result."""
-    own = clutches_of_key(request)
-    return await answer(request, lambda: jobs.shown(jobs.find(context.database, job_id, only=own)))
+    clutches = clutches_of_key(request)
+    return await answer(request, lambda: jobs.shown(jobs.find(context.database, job_id, only=clutches)))
 
 
 @router.delete("/{job_id}", response_model=JobOut, responses=READING)

@@ -129,8 +129,8 @@ async def loops(of: answers.WholeOf) -> Response:
     """Friction loops of the dynamic tests by cycles and pressure."""
 
     def make() -> bytes:
-        found, held = runs.loops(of.database, of.clutch_id)
-        return to_json(held_runs_left_out(held) | of.part.sliced(found))
+        rows, held_count = runs.loops(of.database, of.clutch_id)
+        return to_json(held_runs_left_out(held_count) | of.part.sliced(rows))
 
     return await answers.clutch_answer(of, "loops", make, of.part)
 

@@ -85,8 +85,8 @@ async def _saved(request: Request, context: Context, name: str | None) -> Respon
         message = f"name must be that of the address, {name!r}, got {rig.name!r}"
         raise InvalidError(message, errors=[FieldError(pointer="/name", code="other_name", message=message)])
     replacing = name is not None
-    made = partial(save, context.database, rig, by=name_of_caller(request), at=now(), replacing=replacing)
-    saved, new = await run_in_threadpool(made)
+    saving = partial(save, context.database, rig, by=name_of_caller(request), at=now(), replacing=replacing)
+    saved, new = await run_in_threadpool(saving)
     return json_answer(saved.model_dump(mode="json"), 201 if new else 200, Location=f"/v1/rigs/{saved.name}")
 
 
@@ -112,7 +112,7 @@ async def preview_file(
     with tempfile.TemporaryDirectory(dir=context.folder) as folder:
         path = Path(folder) / "run"
         filename, profile = await received(request, path, filename)
-        made = partial(
+        computing = partial(
             preview,
             filename=filename,
             rig=rig,
@@ -122,5 +122,5 @@ async def preview_file(
             clutch_id=clutch_id,
             reading=reading_of(map, decimal=decimal, missing=missing),
         )
-        shown = await asyncio.wrap_future(context.workers.submit(Lane.FILES, made, path))
+        shown = await asyncio.wrap_future(context.workers.submit(Lane.FILES, computing, path))
     return json_answer(shown)

@@ -116,11 +116,11 @@ async def correct_run(of: answers.ChangeOf, run_id: RunId) -> Response:
     """Correct a run's cycles, or read its file again with a rig profile. If it is plausible then, it counts. What was
     sent stays stored.
     """
-    wanted = checked(Correction, await answers.json_body(of.request))
-    if wanted.rig is not None:
-        again = partial(change_run.read_again, rig=wanted.rig, folder=of.context.folder)
-        return await _changed(again, of, run_id, wanted.reason)
-    return await _changed(change_run.correct, of, run_id, wanted.reason, cycles=wanted.cycles)
+    correction = checked(Correction, await answers.json_body(of.request))
+    if correction.rig is not None:
+        reread = partial(change_run.read_again, rig=correction.rig, folder=of.context.folder)
+        return await _changed(reread, of, run_id, correction.reason)
+    return await _changed(change_run.correct, of, run_id, correction.reason, cycles=correction.cycles)
 
 
 @router.post("/{run_id}/withdraw", **answers.taking(Withdrawal, Receipt, {"reason": "the torque sensor was unplugged"}))
@@ -147,8 +147,8 @@ async def confirm_runs(of: answers.ChangeOf) -> Response:
     """Accept several held runs as they were sent, in one step. If one does not exist, none is accepted. Runs that are
     not held stay unchanged.
     """
-    wanted = checked(Confirmations, await answers.json_body(of.request))
-    return await _changed(_confirmed, of, wanted.run_ids, wanted.reason)
+    confirmations = checked(Confirmations, await answers.json_body(of.request))
+    return await _changed(_confirmed, of, confirmations.run_ids, confirmations.reason)
 
 
 @router.post(
@@ -168,7 +168,7 @@ async def _changed(
     change: Callable[..., dict[str, Any]], of: answers.OfClutch, run_id: str | Sequence[str], reason: str, **more: Any
 ) -> Response:
     """The receipt, or receipts, after a change."""
-    made = partial(change, reason=reason, **more, by=name_of_caller(of.request), at=answers.now())
+    edit = partial(change, reason=reason, **more, by=name_of_caller(of.request), at=answers.now())
     clutch_id, submit = of.clutch_id, of.context.workers.submit
-    changing = submit(Lane.RUNS, made, clutch_id, run_id, turn=clutch_id, seconds=CHANGE_SECONDS)
+    changing = submit(Lane.RUNS, edit, clutch_id, run_id, turn=clutch_id, seconds=CHANGE_SECONDS)
     return Response(content=to_text(await asyncio.wrap_future(changing)), media_type=answers.JSON_TYPE)

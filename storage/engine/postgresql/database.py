@@ -229,12 +229,12 @@ class ServerDatabase(Database):
 
     def migrate(self) -> None:
         """Make the tables of an empty database, or run the steps that it lacks, not under a running service."""
-        found = self._to_migrate()
-        if found is None:
+        to_migrate = self._to_migrate()
+        if to_migrate is None:
             return
         try:
             with (
-                migration_lock(self._address, self._lock_timeout) if found == "older" else nullcontext(),
+                migration_lock(self._address, self._lock_timeout) if to_migrate == "older" else nullcontext(),
                 self.writing() as connection,
             ):
                 revision = current(connection)  # another process may have been before

@@ -147,24 +147,24 @@ def restore(url: str, backup: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> Pa
                     copy_whole(backup, partial, lock_timeout)
                 except sqlite3.DatabaseError as error:
                     raise StorageUnavailable(f"{backup} cannot be restored: {error}") from error
-            kept = _keep_replaced_file(path) if path.exists() else None
+            replaced_file = _keep_replaced_file(path) if path.exists() else None
             renamed(partial, path)
         finally:
             partial.unlink(missing_ok=True)
-    return kept
+    return replaced_file
 
 
 def _keep_replaced_file(path: Path) -> Path:
     """The file under a second name, with its log; nothing beside it that would be taken for the restored one's log."""
     _settle(path)
-    kept = next(name for name in names_beside(path, "replaced") if not name.exists())
+    kept_file = next(name for name in names_beside(path, "replaced") if not name.exists())
     log = path.with_name(path.name + _LOG)
     if log.exists():
-        _second_name(log, kept.with_name(kept.name + _LOG))
-    _second_name(path, kept)
+        _second_name(log, kept_file.with_name(kept_file.name + _LOG))
+    _second_name(path, kept_file)
     log.unlink(missing_ok=True)
     path.with_name(path.name + _SHARED).unlink(missing_ok=True)
-    return kept
+    return kept_file
 
 
 def _settle(path: Path) -> None:

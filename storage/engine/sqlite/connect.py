@@ -90,13 +90,13 @@ _MODE_RETRY = 0.02
 
 def path_of(url: str) -> Path:
     """The file of `sqlite:///path`; ValueError on anything else."""
-    scheme, separator, rest = url.partition("://")
+    scheme, separator, remainder = url.partition("://")
     if not separator or scheme != "sqlite":
         raise ValueError(
             f"the database must be given as sqlite:///path, got the scheme {scheme if separator else ''!r}"
         )
-    path = rest.removeprefix("/")
-    if not rest.startswith("/") or not path or path.startswith(":memory:"):
+    path = remainder.removeprefix("/")
+    if not remainder.startswith("/") or not path or path.startswith(":memory:"):
         raise ValueError("a database needs a file, as in sqlite:///clutchlife.db")  # the address may hold a password
     if "?" in path or path.startswith("file:"):
         shown = re.sub(r"\?.*", "?...", url)  # an option may be a password
@@ -248,8 +248,8 @@ def service_lock(path: Path) -> Iterator[None]:
 
     Raises ServiceRuns where another holds it, StorageUnavailable where its file cannot be made.
     """
-    beside = path.with_name(f"{path.name}-service")
-    with open(_lock_file(beside), "rb+") as file:
+    lock_file = path.with_name(f"{path.name}-service")
+    with open(_lock_file(lock_file), "rb+") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
