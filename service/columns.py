@@ -232,7 +232,7 @@ def content_of(record: Mapping[str, Any] | Sequence[Any]) -> str:
 
 
 def content_with_columns(record: Sequence[Any], columns: Mapping[str, FloatArray]) -> str:
-    """The same of a record and columns [n] of finite numbers, of which each bit counts but the sign of a zero."""
+    """The hash of a record with columns [n] of finite numbers: every bit counts, except the sign of a zero."""
     digest = _digest(record)
     for name in sorted(columns):
         column = columns[name]

@@ -73,7 +73,7 @@ class Part:
         return place(rows[self.limit - 1]) if len(rows) > self.limit else None
 
     def sliced(self, items: Sequence[Any]) -> dict[str, Any]:
-        """The same out of a list that is known whole: the place in it is the cursor."""
+        """The page cut from a complete list; the cursor is the position in the list."""
         start = int(max(0.0, self.number or 0.0))
         stop = start + self.limit
         return page(items[start:stop], (float(stop), "") if stop < len(items) else None)
@@ -104,5 +104,5 @@ def page(items: Sequence[Any], after: Place | None) -> dict[str, Any]:
 
 
 def page_as_bytes(items: Sequence[bytes], after: Place | None) -> bytes:
-    """The same as JSON, of items that are JSON."""
+    """A page as JSON bytes, from items that are JSON already."""
     return b'{"items":[' + b",".join(items) + b'],"next":' + json.dumps(to_cursor(after)).encode() + b"}"

@@ -85,7 +85,7 @@ class JsonLines(logging.Formatter):
 
 
 class TextLines(logging.Formatter):
-    """The same for people: `time LEVEL logger: message name=value ...`, and a traceback below."""
+    """Log lines for people: `time LEVEL logger: message name=value ...`, with the traceback below."""
 
     def format(self, record: logging.LogRecord) -> str:
         fields = dict(getattr(record, "fields", {}))

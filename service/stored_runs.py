@@ -49,7 +49,7 @@ def evidence_for(database: Database, state: ClutchState, reader: RunReader) -> E
 
 
 def tracked_again(database: Database, state: ClutchState, levels: Levels, receipts: Mapping[str, Receipt]) -> Results:
-    """What follows from a clutch's state where that is another than the stored one, and its runs are the same."""
+    """Results of a clutch whose state has changed while its runs are unchanged."""
     reader = run_reader(database, state.clutch_id)
     final, computed = computed_again(state, levels, receipts, reader, evaluated=stationary_tests_of(state.events))
     evidence = evidence_for(database, final, reader)
@@ -110,7 +110,7 @@ def placed(database: Database, columns: channels.Encoded) -> channels.Encoded:
 
 
 def _loaded_reader(database: Database, record: ClutchIn, rows: Sequence[RunRow]) -> RunReader:
-    """The same runs with their channels as they are stored, all in memory: needs no database any more."""
+    """A reader of runs whose stored channels are all in memory, so that it needs no database."""
     loaded = {}
     for row in rows:
         with database.reading() as connection:

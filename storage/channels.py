@@ -82,7 +82,7 @@ class Encoded:
         return any(len(data) > MAX_INLINE for *_, data in self.columns)
 
     def put(self, store: RawStore) -> "Encoded":
-        """The same with the long columns in the store; `store` must have been read before. Raises RawStoreUnavailable."""
+        """Put the long columns into the store; `store` must have been read before. Raises RawStoreUnavailable."""
         opened = open_store(store.address)
         long = {name: data for name, _, _, data in self.columns if len(data) > MAX_INLINE}
         blobs = {name: name_of(data) for name, data in long.items()}
@@ -179,7 +179,7 @@ class Stored:
         return fetched(open_store(self.address), self.blob)
 
     def loaded(self) -> "Stored":
-        """The same with its bytes, wherever they lay: what is computed elsewhere needs no store. Raises as `values` does."""
+        """The channel with its bytes in memory, so that another process needs no store. Raises as `values` does."""
         return replace(self, data=self.encoded(), blob=None, address=None)
 
     def require_whole(self) -> None:
@@ -275,7 +275,7 @@ def values_of(columns: Sequence[Stored]) -> dict[str, NDArray[np.float64]]:
 
 
 def read(connection: Connection, run_key: int) -> dict[str, NDArray[np.float64]]:
-    """The same at once, while the transaction waits. Raises as `Stored.values` does."""
+    """Read all channels of a run inside the transaction. Raises as `Stored.values` does."""
     return values_of(stored_of_run(connection, run_key))
 
 

@@ -178,7 +178,7 @@ def receipts(
     state: str | None = None,
     kind: str | None = None,
 ) -> list[ReceiptRow]:
-    """The same, as much as a list shows."""
+    """Receipts with only the fields that a list shows."""
     query, values = _behind(_receipts, after)
     values |= {"of_clutch": clutch_id, "of_kind": kind, "of_state": state, "most": limit}
     return _listed.all(connection.execute(query, values))

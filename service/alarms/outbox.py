@@ -155,7 +155,7 @@ class Outbox:
 
 
 def _store(connection: Connection, row: DeliveryRow, ended: Attempt) -> None:
-    """How an attempt ended; a test is tried once."""
+    """Store how an attempt ended. A test message is tried only once."""
     now = datetime.now(UTC)
     state, pause = webhooks.DELIVERED, 0.0
     if ended.problem is not None:

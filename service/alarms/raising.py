@@ -227,7 +227,7 @@ def _facts(connection: Connection, row: ClutchRow, record: ClutchIn, at: str) ->
 
 
 def _newest_fits(connection: Connection, clutch_id: str) -> list[FitRow]:
-    """Those of the stationary test of most cycles, where it counts and has curves."""
+    """Fits of the latest stationary test (by cycles), if it counts and has curves."""
     fits = results.fits_of(connection, clutch_id)
     tests = [row for row in runs.in_order(connection, clutch_id) if row.kind == STATIONARY and row.run_key in fits]
     return fits[tests[-1].run_key] if tests else []

@@ -168,7 +168,7 @@ def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str
 
 
 def silence_in_words(since: str) -> str:
-    """That no run arrived since a moment (ISO 8601), as a clause."""
+    """The clause that says that no run has arrived since a moment (ISO 8601)."""
     return f"the rig is silent, no run arrived since {since[:16].replace('T', ' ')} UTC"
 
 

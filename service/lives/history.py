@@ -93,7 +93,7 @@ class Event:
     under: Mapping[float, tuple[float, ...]] = field(default_factory=dict)
 
     def corrected(self, cofs: Corrected | None) -> "Event":
-        """The same run with its mean COF as the model in force corrects it; unchanged where that does not."""
+        """The event with the mean COF that the model in force corrects; unchanged if that corrects nothing."""
         if cofs is None:
             return self
         means = {level: (mean, sd) for level, (mean, sd, _) in cofs.items()}
@@ -106,7 +106,7 @@ class Event:
         return {level: (self.under[level][draw], sd) for level, (_, sd) in self.cofs.items()}
 
     def at(self, cycles: float) -> "Event":
-        """The same run at other cycles since new."""
+        """The event at other cycles since new."""
         return replace(self, cycles=cycles, duty=None if self.duty is None else replace(self.duty, end=cycles))
 
 
@@ -166,7 +166,7 @@ class Life:
 
     @property
     def speed_range(self) -> Value | None:
-        """That of the first stationary test: it sets the protocol over which means are taken."""
+        """The speed range of the first stationary test, over which mean COFs are taken."""
         return next((event.speed_range for event in self.events if event.speed_range is not None), None)
 
     @property
@@ -291,7 +291,7 @@ class Life:
 
 
 def order(events: Sequence[Event]) -> tuple[Event, ...]:
-    """By cycles, at equal cycles by when they were made: whatever the order of arrival, the history is the same.
+    """Events sorted by cycles, and at equal cycles by when they were made: the order of arrival does not matter.
 
     Where the rig did not say when, a run is no earlier than those that had arrived before it, whatever the clock said then.
     """

@@ -90,7 +90,7 @@ def outlook(state: ClutchState, method: str, evidence: Evidence, filters: States
 def by_own_criteria(
     state: ClutchState, method: str, payload: Mapping[str, Any], evidence: Evidence, filters: States
 ) -> dict[str, Any]:
-    """What of a prediction is another by the criteria of the clutch's record; nothing where mean COF alone ends its life."""
+    """The fields of a prediction that the criteria of the record change; empty if only mean COF ends its life."""
     criteria = state.record.end_of_life.criteria
     measured = measured_life(state, chosen_life(state), evidence, filters) if criteria else None
     if measured is None:

@@ -220,7 +220,7 @@ def computed_aside(state: ClutchState, event: Event, levels: Levels, reader: Run
 def set_aside(
     state: ClutchState, event: Event, levels: Levels, receipt: Receipt, reader: RunReader
 ) -> tuple[ByPressure, Receipt]:
-    """The same of a run that is taken out of the history, with its whole receipt: without what the history noticed."""
+    """The complete receipt of a run that is taken out of the history, without the warnings that came from the history."""
     cofs, parts = computed_aside(state, event, levels, reader)
     warnings = [warning for warning in receipt["warnings"] if warning["code"] not in OF_HISTORY]
     return cofs, receipt | parts | {"warnings": warnings}

@@ -80,7 +80,7 @@ def to_json(payload: object) -> bytes:
 
 
 def name_of(query: Callable[..., object]) -> str:
-    """What tells the answers of a query from those of others."""
+    """The name of a query in the cache: its module and function."""
     return f"{query.__module__}.{query.__qualname__}"
 
 

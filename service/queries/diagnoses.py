@@ -50,7 +50,7 @@ def plan(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str, Any
 
 
 def plan_rows(protocol: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """The same as rows of a table: numbers of one cell with a space between them."""
+    """A test protocol as rows of a table; several numbers in one cell are separated by spaces."""
     for number, test in enumerate(protocol["tests"], start=1):
         for place, step in enumerate(test["steps"], start=1):
             lists = {name: " ".join(f"{value:g}" for value in step[name]) for name in ("pressures_bar", "speeds_rpm")}

@@ -54,7 +54,7 @@ def _item(row: FleetPriorRow) -> dict[str, Any]:
 
 
 def _severity_exponent(row: FleetPriorRow) -> dict[str, float] | None:
-    """By which power of a cycle's energy the ended lives were shorter; None where they cannot tell it."""
+    """The power of a cycle's energy with which ended lives were shorter; None if they do not determine it."""
     lives = [EndedLife.from_dict(stored) for stored in row.content.get("ended", ())]
     by_energy = [(life.end, life.energy) for life in lives if life.energy]
     if len(by_energy) < FEWEST_SEVERITIES or len({energy for _, energy in by_energy}) == 1:

@@ -108,7 +108,7 @@ def _predicted(state: ClutchState, method: str, pressure_bar: float | None, at_c
 def _with_held(
     database: Database, state: ClutchState, method: str, pressure_bar: float | None, at_cycles: float | None
 ) -> dict[str, Any]:
-    """The same with the held runs, where it is not stored."""
+    """Compute the prediction that counts the held runs too."""
     evidence = stored_runs.evidence_for(database, state, stored_runs.run_reader(database, state.clutch_id))
     if evidence is None:
         raise AssertionError("runs are held: the evidence was loaded")
@@ -192,7 +192,7 @@ def life_by_criteria(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Request:
-    """By which filter and criteria an answer is asked for."""
+    """The filter and the criteria that a request names."""
 
     method: str
     quantity: str | None

@@ -39,7 +39,7 @@ def _as_json(row: runs.ReceiptRow) -> bytes:
 
 
 def rows(items: Iterable[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """The same as rows of a table, warnings and fits counted."""
+    """Receipts as rows of a table, with the number of warnings and fits."""
     for item in items:
         counted = {name: len(item[name]) for name in ("warnings", "fits")}
         yield {name: item[name] for name in COLUMNS} | counted

@@ -326,7 +326,7 @@ def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> Notice |
 
 
 def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Reading) -> list[Notice]:
-    """What of the table is not used."""
+    """Notices about columns of the table that are not used."""
     used = {column.index for column in taken}
     other_columns = [
         column.shown()

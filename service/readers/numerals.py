@@ -353,7 +353,7 @@ class Stamps:
         return times + days * _DAY
 
     def _iso(self, cells: Sequence[str]) -> NDArray[np.int64] | None:
-        """By numpy where all are ISO 8601 without a zone."""
+        """Times parsed by numpy if all are ISO 8601 without a time zone; else None."""
         if any(
             cell[:2] not in ("19", "20")
             or len(cell) < 16

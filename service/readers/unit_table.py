@@ -129,7 +129,7 @@ _RAISED = re.compile(r"(?<=10)[⁺⁻]?[⁰¹²³⁴-⁹]")
 
 
 def conversion(channel: str, unit: str) -> Conversion | None:
-    """From a stated unit to the channel's own; None where the unit is not in the table.
+    """The conversion from a stated unit to the channel's own unit; None if the unit is not in the table.
 
     A unit may be a multiple of one in the table; but `10 bar`, and any other whole number without a sign, may be a sensor's
     range, where it is no time's and no thousand turns. NetCDF's times end in the moment from which they count.

@@ -77,7 +77,7 @@ def _run(sent: Any) -> IncomingRun:
 
 
 def read_run_on_disk(path: Path) -> IncomingRun:
-    """The same of a body that was kept as a file while it waited."""
+    """Read a run from a body that was kept as a file while it waited."""
     return read_run(path.read_bytes())
 
 

@@ -121,7 +121,7 @@ class OfClutch:
 
     @property
     def whole(self) -> "OfClutch":
-        """The same of all, where the query itself makes the page."""
+        """The request for all items, for queries that cut the page themselves."""
         return replace(self, part=WHOLE)
 
 
@@ -165,7 +165,7 @@ WholeOf = Annotated[OfClutch, Depends(_whole_of_clutch)]
 
 
 async def clutch_bytes(of: OfClutch, name: str, make: Callable[[], bytes]) -> bytes:
-    """What follows from a clutch's revision and is needed to answer, not the answer itself. Raises NotFoundError."""
+    """An intermediate result of a clutch's revision that an answer needs. Raises NotFoundError."""
     return (await cached_answer(of.context, (of.clutch_id, name), _revision(of.request, of.clutch_id), make)).body
 
 
@@ -301,7 +301,7 @@ def preferred_wait(prefer: str | None) -> int | None:
 
 
 def _revision(request: Request, clutch_id: str) -> int:
-    """That of the clutch in the path when the request came in. Raises NotFoundError."""
+    """The revision of the clutch in the path when the request came in. Raises NotFoundError."""
     revision = snapshot_of(request).revision
     if revision is None:
         raise unknown_clutch(clutch_id)
@@ -383,7 +383,7 @@ _FIRST_PAUSE, _GROWTH, _LONGEST_PAUSE = 0.05, 1.5, 0.4
 
 
 async def until_ended(look: Callable[[], Looked], has_ended: Callable[[Looked], bool], wait: float) -> Looked:
-    """What a look gives once that has ended, or as it is after `wait` [s]."""
+    """Look repeatedly until the thing has ended, at most for `wait` [s]; returns the last look."""
     deadline = time.monotonic() + wait
     pause = _FIRST_PAUSE
     while True:

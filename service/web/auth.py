@@ -49,7 +49,7 @@ class Caller:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grant:
-    """Who asks, and what they may: `clutches` None where all, `key_id` None where no key exists."""
+    """What a caller may do: `clutches` is None if all are allowed, `key_id` is None if no key exists."""
 
     name: str
     scope: Scope
@@ -91,7 +91,7 @@ def authorise(snapshot: Snapshot, caller: Caller, scope: Scope, clutch_id: str |
 
 
 def identify(snapshot: Snapshot, caller: Caller) -> Grant:
-    """Who asks; raises UnauthorizedError, or ForbiddenError where no key exists and the caller is not local."""
+    """The grant of a caller. Raises UnauthorizedError, or ForbiddenError if no key exists and the caller is not local."""
     if not snapshot.keys_are_needed:
         _require_loopback(caller)
         return _LOCAL_GRANT

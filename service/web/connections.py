@@ -109,7 +109,7 @@ def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Proto
                 self._end_parsing(*_HEAD_TOO_LARGE)
 
         def _end_parsing(self, status: http.HTTPStatus, text: str) -> NoReturn:
-            """From within the parser: it then calls `send_400_response`."""
+            """Raise inside the parser, which then calls `send_400_response`."""
             self._wrong = status, text
             raise ValueError(text)
 

@@ -46,7 +46,7 @@ class Metrics:
             self.note_calls(lane, 0)
 
     def note_calls(self, lane: Lane, count: int) -> None:
-        """So many calls of a lane wait or run in this process."""
+        """Note how many calls of a lane wait or run in this process."""
         self._calls.labels(lane.name.lower()).set(count)
 
     def exposition(self, database: Database) -> bytes:

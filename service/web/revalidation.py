@@ -102,6 +102,6 @@ def _failed(task: "asyncio.Task[tuple[int, Answer]]") -> bool:
 
 
 def _logged(task: "asyncio.Task[tuple[int, Answer]]") -> None:
-    """Who was given the last answer does not hear that the next one failed."""
+    """Log a failed renewal: the caller has already got the previous answer and does not see the error."""
     if not task.cancelled() and task.exception() is not None:
         _log.warning("an answer could not be computed again: %s", task.exception())

@@ -40,7 +40,7 @@ class WorkerLostError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome(Generic[Result]):
-    """What came of the input number `index` (from 0): a result, or the error that the function raised."""
+    """The outcome of input number `index` (from 0): a result, or the error that the function raised."""
 
     index: int
     result: Result | None = None

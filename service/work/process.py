@@ -154,7 +154,7 @@ def answer(ended: Mapping[str, Any]) -> None:
 
 
 def _end_with_standard_input() -> None:
-    """It is a pipe whose other end nobody writes to: it ends when the service does."""
+    """End this process when its standard input ends: that is a pipe held open by the service."""
     while os.read(0, 1):  # not by way of sys.stdin, whose lock would be in the way when this process ends
         pass
     os._exit(3)

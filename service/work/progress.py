@@ -16,7 +16,7 @@ class Advance(Protocol):
     """Called as an input is done with; a `total` is given once it is known."""
 
     def __call__(self, count: int = 1, *, total: int | None = None) -> None:
-        """So many more are done."""
+        """Report `count` more items as done."""
 
 
 @contextmanager

@@ -306,7 +306,7 @@ class Workers:
         _answer(call, error, result)
 
     def _count(self, lane: Lane, change: int) -> None:
-        """So many more calls of a lane wait or run; the lock is held."""
+        """Change the count of calls of a lane that wait or run; the lock must be held."""
         self._calls[lane] += change
         self._note(lane, self._calls[lane])
 
@@ -468,7 +468,7 @@ class _Elsewhere(_Worker):
             self._starting, self._heard = None, time.monotonic()
 
     def _lose(self) -> None:
-        """It has ended, was ended, or could not be started: the next look starts another."""
+        """Forget the process, which has ended, was ended or could not start; the next look starts another."""
         self.lost = True
         if self._line is not None:
             _kill(self._process.pid)

@@ -92,7 +92,7 @@ class _Loaded:
         return event
 
     def without(self, rows: Collection[RunRow]) -> "_Loaded":
-        """The same of the other runs."""
+        """What was loaded, without these runs."""
         gone = {row.run_id for row in rows}
         return replace(
             self,

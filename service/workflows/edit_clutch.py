@@ -74,7 +74,7 @@ def _computed(database: Database, clutch_id: str, fields: Mapping[str, Any], arc
 
 
 def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results | Recomputed:
-    """What follows from the record as it is to be."""
+    """The results that the changed record gives."""
     with database.reading() as connection:
         state = records.state(connection, record.clutch_id, edited=record)
         levels, receipts = records.levels(connection, record.clutch_id), records.receipts(connection, record.clutch_id)

@@ -90,7 +90,7 @@ def ingest_posted(
     by: str,
     path: Path | None = None,
 ) -> tuple[dict[str, Any], bool]:
-    """The same of a run that `read` makes of what was posted; a file, at `path`, is kept. Also raises what `read` does, and
+    """Ingest a run that `read` makes from what was posted; a file at `path` is kept. Also raises what `read` does, and
     TooLargeError where the file is too long to be kept."""
     if path is None:
         return ingest(database, clutch_id, read(), received_at=received_at, by=by)
@@ -222,7 +222,7 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
 def _with_others(
     database: Database, before: ClutchState, event: Event, answer: dict[str, Any], arrival: Arrival, judged: Judged
 ) -> _Outcome:
-    """What follows where the run is evidence for or against others: they are accepted or held, and all is computed again."""
+    """Outcome of a run that is evidence for or against others: these are accepted or held, and everything is recomputed."""
     doubtful = judged.doubts.get(event.run_id, ())
     state = replace(
         before,

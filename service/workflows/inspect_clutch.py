@@ -104,7 +104,7 @@ def restore(database: Database, clutch_id: str, inspection_id: str, *, reason: s
 def _change(
     database: Database, clutch_id: str, inspection_id: str, action: str, state: str, reason: str, by: str, at: str
 ) -> dict[str, Any]:
-    """What is so already is not changed; else the audit trail says it, and the clutch's revision moves on with it."""
+    """Change an inspection, unless it is so already; the audit trail and the clutch's revision move on with it."""
     with database.writing(of=clutch_id) as connection:
         row = inspection(connection, clutch_id, inspection_id)
         if row.state != state:

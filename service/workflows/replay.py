@@ -18,7 +18,7 @@ from storage.engine.errors import DamagedData
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replayed:
-    """What became of a clutch: how many runs were computed again, or why it keeps the results that it had."""
+    """Outcome of a clutch's replay: how many runs were recomputed, or why its results are kept."""
 
     clutch_id: str
     runs: int = 0

@@ -110,7 +110,7 @@ def numbers(connection: Connection) -> dict[str, tuple[int, int]]:
 
 
 def named(connection: Connection, store_key: int, names: Iterable[str]) -> set[str]:
-    """Those of the names that a row has in the store."""
+    """The subset of the names that rows use in the store."""
     return set(connection.execute(_named, {"of_store": store_key, "of_names": to_text(list(names))}).scalars())
 
 

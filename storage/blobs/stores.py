@@ -53,7 +53,7 @@ class BlobStore(ABC):
 
     @abstractmethod
     def read(self, name: str) -> bytes | None:
-        """The same, the mark's too; None where there is none, whether the place is a store or not."""
+        """A blob's bytes, or the mark's; None if there is none, whether or not the place is a store."""
 
     @abstractmethod
     def exists(self, name: str) -> bool:

@@ -63,18 +63,18 @@ class Watch(ABC):
 
     @abstractmethod
     def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
-        """What is so now, question by question, all at the same moment."""
+        """Snapshots for several questions, all of the same moment."""
 
     @abstractmethod
     async def look(self, question: Question) -> Snapshot:
-        """What is so now, for one who asks from the event loop, which does not wait for another process meanwhile."""
+        """A snapshot for a caller on the event loop, which must not wait for another process."""
 
     @abstractmethod
     def close(self) -> None:
         """Ask nothing any more."""
 
     def snapshot(self, clutch_id: str | None = None, secret_sha256: str | None = None) -> Snapshot:
-        """What is so now, of one clutch and one key."""
+        """A snapshot of one clutch and one key."""
         return self.snapshots([Question(clutch_id, secret_sha256)])[0]
 
 

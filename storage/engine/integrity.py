@@ -49,7 +49,7 @@ def pending(connection: Connection) -> str | None:
 
 
 def mark(connection: Connection, source: str) -> None:
-    """From now on the database is incomplete."""
+    """Mark the database as incomplete."""
     _own.create_all(connection)
     connection.execute(_pending.insert(), {"source": source})
 

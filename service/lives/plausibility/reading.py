@@ -340,7 +340,7 @@ class _Usual:
     tests: Mapping[int, int] = field(default_factory=dict)
 
     def with_tests(self, values: Iterable[float]) -> "_Usual":
-        """The same with these values of tests."""
+        """This prior knowledge, updated with the values of tests."""
         return replace(self, tests=Counter(self._place(value) for value in values))
 
     def _place(self, value: float) -> int:

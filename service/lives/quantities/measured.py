@@ -298,7 +298,7 @@ class MeasuredLife:
         return None if near is None else slope_of(curves[near], self.geometry, speed_rpm)
 
     def _loop_series(self, quantity: Quantity) -> Iterator[Series]:
-        """Each pressure by itself, and never two frequencies in one series."""
+        """One series for each pressure and frequency of the friction loops."""
         by_event = [
             self.receipts[event.run_id]["loops"] if event.kind == DYNAMIC and event.run_id in self.receipts else []
             for event in self.life.events

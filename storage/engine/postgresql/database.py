@@ -65,7 +65,7 @@ _keep = _new.on_conflict_do_update(
 
 
 class ServerAnswers(SharedAnswers):
-    """Each is read and written by one statement outside transactions."""
+    """Shared answers in PostgreSQL, each read and written by one statement outside transactions."""
 
     def __init__(self, statements: SingleStatements) -> None:
         self._statements = statements

@@ -107,7 +107,7 @@ class FileWatch(Watch):
             return [self._snapshot(version, question) for question in questions]
 
     async def look(self, question: Question) -> Snapshot:
-        """What is so now, for one who asks from the event loop: the file answers at once."""
+        """A snapshot for a caller on the event loop: the file answers at once."""
         return self.snapshots([question])[0]
 
     def _snapshot(self, version: int, question: Question) -> Snapshot:
