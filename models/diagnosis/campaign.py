@@ -104,3 +104,8 @@ class Campaign:
     dynamic: tuple[DynamicRun, ...] = ()
     duty: tuple[DutyRun, ...] = ()
     maintenance: tuple[MaintenanceEvent, ...] = ()
+
+    @property
+    def tests(self) -> tuple[StationaryRun | DynamicRun, ...]:
+        """The stationary tests, then the dynamic ones."""
+        return (*self.stationary, *self.dynamic)

@@ -21,7 +21,7 @@ from models.clutch import Geometry
 from models.diagnosis.baseline.laws import Frame, Laws, scene_of
 from models.diagnosis.campaign import Campaign, Oil, StationaryRun
 from models.diagnosis.design.design import Points, build_design, points_of
-from models.diagnosis.design.facts import Facts, facts_of
+from models.diagnosis.design.facts import REFERENCES, Facts, facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import Discrepancy, Kind
 from models.diagnosis.effects.fitted_effect import Draw, FittedEffect, Ranges, drawn_change
@@ -62,15 +62,11 @@ class Extension:
         usable = np.flatnonzero(run.plateaus.speed != 0)  # as a design takes them: clocks and neighbours are the same
         for rows in np.array_split(usable, max(1, math.ceil(usable.size / _PART))):
             if rows.size:
-                torque[:, rows] = self._on(run, rows, campaign)
+                clock = None if run.time is None else tuple(np.asarray(run.time)[rows].tolist())
+                part = replace(run, plateaus=run.plateaus.take(rows), time=clock, record=None)
+                points = build_design(replace(campaign, stationary=(part,), dynamic=())).points
+                torque[:, rows] = points.sign * self._changes(points, self._facts(campaign), Kind.ARTEFACT)
         return torque
-
-    def _on(self, run: StationaryRun, rows: np.ndarray[Any, np.dtype[np.intp]], campaign: Campaign) -> FloatArray:
-        part = run.plateaus.take(rows)
-        clock = None if run.time is None else tuple(np.asarray(run.time)[rows].tolist())
-        alone = replace(campaign, stationary=(replace(run, plateaus=part, time=clock, record=None),), dynamic=())
-        points = build_design(alone).points
-        return np.asarray(points.sign * self._changes(points, self._facts(campaign), Kind.ARTEFACT))
 
     @property
     def has_course(self) -> bool:
@@ -94,16 +90,8 @@ class Extension:
     def _facts(self, campaign: Campaign) -> Facts:
         """The campaign's facts, with the temperature, the states and the days that the diagnosis referred to."""
         kept = facts_from(self.content["facts"])
-        return replace(
-            facts_of(campaign),
-            reference_temperature=kept.reference_temperature,
-            states=kept.states,
-            first_moment=kept.first_moment,
-            last_moment=kept.last_moment,
-            usual_torque=kept.usual_torque,
-            usual_pressure=kept.usual_pressure,
-            plate_warming=kept.plate_warming,
-        )
+        names = ("states", "first_moment", "last_moment", "plate_warming", *REFERENCES)
+        return replace(facts_of(campaign), **{name: getattr(kept, name) for name in names})
 
     def _changes(self, points: Points, facts: Facts, kind: Kind) -> FloatArray:
         """Changes [d, P] Nm of one kind under each draw."""
@@ -121,8 +109,7 @@ class Extension:
                         factors=tuple(stored["factors"]),
                     )
                     change += drawn_change(drawn, scenes[draw["laws"]], ranges)
-                    if not np.isfinite(change).all():
-                        lost = np.count_nonzero(~np.isfinite(change))
+                    if lost := np.count_nonzero(~np.isfinite(change)):
                         raise NotFiniteError(
                             f"the change of {effect.slug} is not finite at {lost} of {change.size} points"
                         )

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.diagnosis.design import criteria
+from models.diagnosis import criteria
 from models.records.periods import harmonics
 
 

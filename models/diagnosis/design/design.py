@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
-from models.diagnosis.design import criteria
 from models.diagnosis.design.autocorrelation import bin_autocorrelation
 from models.diagnosis.design.facts import Facts, facts_of
 from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
@@ -27,7 +27,6 @@ from models.records.runs import plate_rise
 
 SPEED, PRESSURE, TORQUE, TEMPERATURE = "speed_rpm", "pressure_bar", "torque_nm", "oil_temperature_c"
 CYCLES, CLOCK, PHASE, FREQUENCY = "cycles", "test_clock_s", "loop_phase", "frequency_hz"
-
 
 IntArray = NDArray[np.intp]
 
@@ -112,8 +111,14 @@ def concatenate(blocks: list[Points]) -> Points:
 
 def thinned(campaign: Campaign, notes: list[str]) -> Campaign:
     """The campaign with states left out evenly where it is too large; `notes` gets a sentence on what was left out."""
-    campaign = _with_fewer_loops(campaign, notes)
-    states = np.unique([*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)])
+    looped = np.unique([run.cycles for run in campaign.dynamic])
+    if looped.size > criteria.MOST_LOOP_STATES:
+        kept = _evenly(looped, criteria.MOST_LOOP_STATES)
+        notes.append(
+            f"Dynamic tests of {len(kept)} of {looped.size} states were used, spread evenly, because there are very many."
+        )
+        campaign = replace(campaign, dynamic=tuple(run for run in campaign.dynamic if run.cycles in kept))
+    states = np.unique([run.cycles for run in campaign.tests])
     size = sum(min(run.plateaus.torque.size, criteria.MOST_PLATEAUS) for run in campaign.stationary)
     size += sum(8 * BINS for _ in campaign.dynamic)  # some eight pressures each
     if size <= criteria.MOST_ROWS or states.size < 3:
@@ -129,17 +134,6 @@ def thinned(campaign: Campaign, notes: list[str]) -> Campaign:
     )
 
 
-def _with_fewer_loops(campaign: Campaign, notes: list[str]) -> Campaign:
-    states = np.unique([run.cycles for run in campaign.dynamic])
-    if states.size <= criteria.MOST_LOOP_STATES:
-        return campaign
-    kept = _evenly(states, criteria.MOST_LOOP_STATES)
-    notes.append(
-        f"Dynamic tests of {len(kept)} of {states.size} states were used, spread evenly, because there are very many."
-    )
-    return replace(campaign, dynamic=tuple(run for run in campaign.dynamic if run.cycles in kept))
-
-
 def _evenly(states: FloatArray, count: int) -> set[float]:
     return set(states[np.linspace(0, states.size - 1, count).round().astype(int)].tolist())
 
@@ -150,7 +144,6 @@ class RunInfo:
 
     run_id: str
     cycles: float
-    dynamic: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,7 +154,6 @@ class Design:
     rows [N]                plateaus first, then the loops' bins
     torque [N] Nm           measured, folded
     samples [N]             how many were averaged in each row
-    torque_sd [N] Nm        as sent, NaN where not
     level [N] Pa            pressure level, 0 where the clutch is open
     curve [N]               an index that the rows of one run at one level share
     bins [N - plateaus]     which bin of the flat (loop, bin) order each loop row is
@@ -179,7 +171,6 @@ class Design:
     rows: Points
     torque: FloatArray
     samples: FloatArray
-    torque_sd: FloatArray
     level: FloatArray
     curve: IntArray
     bins: IntArray
@@ -228,15 +219,14 @@ def build_design(campaign: Campaign) -> Design:
     kept = thinned(campaign, notes)
     runs: list[RunInfo] = []
     blocks: list[Points] = []
-    torques, deviations = [np.zeros(0)], [np.zeros(0)]
+    torques = [np.zeros(0)]
     plateaus = 0
     for run in kept.stationary:
-        points, torque, sd = _plateaus(run, kept, len(runs), plateaus, notes)
+        points, torque = _plateaus(run, kept, len(runs), plateaus, notes)
         if torque.size:
-            runs.append(RunInfo(run_id=run.run_id, cycles=run.cycles, dynamic=False))
+            runs.append(RunInfo(run_id=run.run_id, cycles=run.cycles))
             blocks.append(points)
             torques.append(torque)
-            deviations.append(sd)
             plateaus += torque.size
     loops: list[BinnedLoop] = []
     reasons: list[str] = []  # why a dynamic test gave no loop at all
@@ -248,7 +238,7 @@ def build_design(campaign: Campaign) -> Design:
             blocks.append(_loop_points(loop, dynamic, len(runs), len(loops)))
             loops.append(loop)
         if test_loops:
-            runs.append(RunInfo(run_id=dynamic.run_id, cycles=dynamic.cycles, dynamic=True))
+            runs.append(RunInfo(run_id=dynamic.run_id, cycles=dynamic.cycles))
     if reasons:
         count = f"{len(reasons)} of {len(kept.dynamic)} ({reasons[0].rstrip('.')})"
         notes.append(f"Dynamic tests that could not be evaluated and were left out: {count}.")
@@ -269,7 +259,6 @@ def build_design(campaign: Campaign) -> Design:
         rows=rows,
         torque=np.concatenate([*torques, binned[bins]]),
         samples=np.concatenate([np.ones(plateaus), filled[bins]]),
-        torque_sd=np.concatenate([*deviations, np.full(bins.size, np.nan)]),
         level=level,
         curve=np.asarray(curve, dtype=np.intp).reshape(-1),
         bins=np.asarray(bins, dtype=np.intp),
@@ -311,8 +300,8 @@ def _chains(rows: Points) -> tuple[IntArray, ...]:
 
 def _plateaus(
     run: StationaryRun, campaign: Campaign, index: int, offset: int, notes: list[str]
-) -> tuple[Points, FloatArray, FloatArray]:
-    """Points, folded torque and torque_sd of a run's plateaus in motion; `offset` is its first row."""
+) -> tuple[Points, FloatArray]:
+    """Points and folded torque of a run's plateaus in motion; `offset` is its first row."""
     table = run.plateaus
     usable = np.flatnonzero(table.speed != 0)
     if usable.size < table.torque.size:
@@ -340,25 +329,17 @@ def _plateaus(
         moment=None if run.moment is None else run.moment + clock,
         previous=consecutive[:count],
     )
-    stated = np.full(count, np.nan) if table.torque_sd is None else table.torque_sd[usable]
-    return points, sign * table.torque[usable], stated
+    return points, sign * table.torque[usable]
 
 
 def _loop_points(loop: BinnedLoop, run: DynamicRun, index: int, number: int) -> Points:
     """Points of the loop of that number, of a run of that index."""
+    own = {field.name for field in fields(BinnedLoop)} & {field.name for field in fields(Points)}
     return points_of(
         loop.velocity.size,
         run=index,
         cycles=float(run.cycles),
-        pressure=loop.pressure,
-        velocity=loop.velocity,
-        sign=loop.sign,
-        acceleration=loop.acceleration,
-        temperature=loop.temperature,
-        plate_rise=loop.plate_rise,
-        clock=loop.clock,
         moment=None if run.moment is None else run.moment + loop.clock,
-        angular_frequency=loop.angular_frequency,
-        phase=loop.phase,
         loop=number,
+        **{name: getattr(loop, name) for name in own},
     )

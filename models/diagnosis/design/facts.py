@@ -8,12 +8,14 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.diagnosis import criteria
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, Oil, StationaryRun
-from models.diagnosis.design import criteria
 from models.records.criteria import UNLOADED
 from models.records.runs import Plateaus, Record, plate_rise
 
 Run: TypeAlias = StationaryRun | DynamicRun | DutyRun
+#: The facts that amplitudes and their priors refer to: they stay those of the campaign that was diagnosed.
+REFERENCES = ("reference_temperature", "usual_torque", "usual_pressure")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,8 +82,7 @@ def facts_of(campaign: Campaign) -> Facts:
         table.oil_temperature[rows] for _, table, rows in under_load if table.oil_temperature is not None and rows.any()
     ]
     rests = _rests(campaign)
-    moments = [*(run.moment for run in campaign.stationary), *(run.moment for run in campaign.dynamic)]
-    timed = [moment for moment in moments if moment is not None]
+    timed = [run.moment for run in campaign.tests if run.moment is not None]
     spread = bool(timed) and max(timed) > min(timed)
     torques, pressures = (
         np.concatenate([np.abs(getattr(table, name)[rows]) for _, table, rows in under_load] or [np.zeros(0)])
@@ -143,8 +144,7 @@ def _rests(campaign: Campaign) -> dict[float, tuple[float, float]]:
     rests: dict[float, tuple[float, float]] = {}
     for end, length, cycles in _long_gaps(campaign):
         rests.setdefault(cycles, (end, length))
-    tests: list[StationaryRun | DynamicRun] = [*campaign.stationary, *campaign.dynamic]
-    tested = sorted(run.moment for run in tests if run.moment is not None)
+    tested = sorted(run.moment for run in campaign.tests if run.moment is not None)
     for event in campaign.maintenance:
         if event.event is EventKind.REST:
             after = [moment for moment in tested if event.moment is not None and moment >= event.moment]
@@ -159,12 +159,12 @@ def _long_gaps(campaign: Campaign) -> list[tuple[float, float, float]]:
     """When long gaps between runs ended [s], how long the rig was idle in them [s], and the cycles of the run after them.
 
     Idle is the time between two runs less what the engagements between them took, at the pace of the fast blocks."""
-    runs: list[Run] = [*campaign.stationary, *campaign.dynamic, *campaign.duty]
+    runs: list[Run] = [*campaign.tests, *campaign.duty]
     timed = [(run.moment, run) for run in runs if run.moment is not None]
     timed.sort(key=lambda moment_and_run: (moment_and_run[0], moment_and_run[1].cycles))
     if len(timed) < 4:
         return []
-    gaps = np.diff(np.array([moment for moment, _ in timed]))
+    gaps = np.diff([moment for moment, _ in timed])
     # some rigs send when a block began, some when it was over: the right reading gives the longer time per engagement
     readings = [_idle_time(gaps, timed, gap_follows_block) for gap_follows_block in (True, False)]
     _, idle = max(readings, key=lambda reading: reading[0])
@@ -189,9 +189,6 @@ def _idle_time(gaps: FloatArray, timed: list[tuple[float, Run]], gap_follows_blo
     worked = (engagements > 0) & np.isfinite(gaps)
     if np.count_nonzero(worked) < 3:
         return 0.0, gaps
-    pace = min(
-        # in slower blocks the rig rested as well; an engagement takes two minutes at most
-        float(np.quantile(gaps[worked] / engagements[worked], 0.2)),
-        120.0,
-    )
+    # in slower blocks the rig rested as well; an engagement takes two minutes at most
+    pace = min(float(np.quantile(gaps[worked] / engagements[worked], 0.2)), 120.0)
     return pace, np.maximum(gaps - pace * engagements, 0.0)

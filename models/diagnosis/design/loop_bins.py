@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.diagnosis.design import criteria
+from models.diagnosis import criteria
 from models.diagnosis.design.autocorrelation import SampleAutocorrelation, sample_autocorrelation
 from models.friction.stribeck import GAMMA
 from models.records.criteria import SPEED_HARMONICS

@@ -13,10 +13,9 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.prediction import Prediction
 from models.diagnosis.design.design import Design
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Effect, Shape, sized, unit_changes
+from models.diagnosis.effects.effect import Effect, Shape, begins, sized, unit_changes
 from models.diagnosis.effects.history import ACCELERATED_WEAR, LOAD_SEVERITY, OIL_CHANGE, REST_RECOVERY, RUNNING_IN
 from models.diagnosis.effects.moving import INERTIA_TORQUE, SHAFT_RIPPLE, SQUEEZE_FILM, STICK_SLIP
-from models.diagnosis.effects.onset import begins
 from models.diagnosis.effects.readings import CHANNEL_DELAY, PRESSURE_OFFSET, TORQUE_ZERO_SHIFT, UNSETTLED_DWELL
 from models.diagnosis.effects.thermal import HYDRODYNAMIC_DRAG, INTERFACE_HEATING, OIL_TEMPERATURE, VISCOUS_EXPONENT
 

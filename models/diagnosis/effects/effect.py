@@ -21,10 +21,11 @@ from typing import TypeAlias
 
 import numpy as np
 from scipy.linalg import solve_banded
+from scipy.special import logsumexp
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import Scene
-from models.diagnosis.design import criteria
 from models.diagnosis.design.design import IntArray, Points
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.design.loop_bins import PHASES
@@ -43,18 +44,6 @@ class Kind(StrEnum):
     COURSE = "course"
     LAG = "lag"
     VIBRATION = "vibration"
-
-
-class Family(StrEnum):
-    """Effects that resemble each other most."""
-
-    THERMAL = "thermal"
-    SENSOR = "sensor"
-    VISCOUS = "viscous"
-    DWELL = "dwell"
-    DYNAMIC = "dynamic"
-    VIBRATION = "vibration"
-    HISTORY = "history"
 
 
 class Measure(StrEnum):
@@ -117,7 +106,7 @@ class Effect:
     discrepancies: along what its form is uncertain (`effects.fitted_effect`); an exact law has none.
     courses(facts) gives the shapes between which a size is averaged; None: as it was fitted.
     several(scene, settings) -> [P, m] Nm is its change for many (amplitude, shape) at once, where that is cheaper.
-    begins: whether its last shape is the cycle from which on it is at work (`effects.onset`).
+    begins: whether its last shape is the cycle from which on it is at work (`begins` below).
     tails: degrees of freedom of the amplitude's prior (`effects.effect`), infinite for a normal one.
     counts_in_severity: its amplitude is the exponent by which ζ counts engagements (no torque is added along a life).
     named: whether it may be named as a cause; where not, what it explains is uncatalogued and lies on `axis`
@@ -131,7 +120,6 @@ class Effect:
     physics: str
     formula: str
     source: str
-    family: Family
     kind: Kind
     channels: tuple[str, ...] = ()
     amplitude: str
@@ -182,6 +170,46 @@ class Effect:
         if self.before_lag is not None:
             return self.before_lag
         return any(value > 0.5 for value, parameter in zip(shape, self.shapes, strict=False) if parameter.lags)
+
+
+def begins(effect: Effect) -> Effect:
+    """An effect whose last shape is the cycle from which on it is at work: from the start or from a state on, the one as
+    probable as the other, and each state as probable as the next. What is wrong need not have been wrong in the first test,
+    and were a step in the template of one effect alone, any step would be taken for that effect. A step is tried with its
+    likeliest kinds of shapes, and of each with the likeliest shape: a refit moves the others."""
+    own = len(effect.shapes)
+
+    def grid(facts: Facts) -> tuple[Tried, ...]:
+        tried = effect.grid(facts)
+        always = [Tried(shape=(*t.shape, FROM_THE_START), log_weight=t.log_weight) for t in tried]
+        if not tried or facts.states.size < 3:
+            return tuple(always)
+        kinds: dict[Shape, list[Tried]] = {}
+        for one in tried:
+            kinds.setdefault(effect.stiff(one.shape), []).append(one)
+        weights = [float(logsumexp([one.log_weight for one in kind])) for kind in kinds.values()]
+        likeliest = [k for k, w in zip(kinds.values(), weights, strict=True) if w > max(weights) - 1e-6]
+        shapes = [max(kind, key=lambda one: one.log_weight).shape for kind in likeliest]
+        onsets = [onset for _, onset, _ in facts.onsets]
+        weight = float(logsumexp(weights) - np.log(len(shapes) * len(onsets)))
+        later = [Tried(shape=(*shape, onset), log_weight=weight) for shape in shapes for onset in onsets]
+        return (*always, *later)
+
+    def several(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
+        onsets = np.array(
+            [max(shape[own:], default=FROM_THE_START) for _, shape in settings]
+        )  # stored ones may have none
+        at_work = scene.points.cycles[:, None] > onsets
+        return np.where(at_work, effect.changes(scene, [(size, shape[:own]) for size, shape in settings]), 0.0)
+
+    return replace(
+        effect,
+        shapes=(*effect.shapes, ShapeParameter(name="onset ζ_k", unit="cycles")),
+        begins=True,
+        grid=grid,
+        change=lambda scene, amplitude, shape: several(scene, [(amplitude, shape)])[:, 0],
+        several=None if effect.several is None else several,
+    )
 
 
 def sized(effect: Effect, facts: Facts) -> Effect:

@@ -7,6 +7,7 @@ axis, and the report describes it. Their size is a share of the torque, of the s
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,8 +15,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene, curve
 from models.diagnosis.design.design import CLOCK, CYCLES, PRESSURE, SPEED, IntArray
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried, life_of
-from models.diagnosis.effects.onset import begins
+from models.diagnosis.effects.effect import Effect, Kind, Shape, ShapeParameter, Tried, begins, life_of
 from models.friction.stribeck import PARAMETER_NAMES
 
 #: Powers of the cycles in which a gain creeps [-].
@@ -42,10 +42,6 @@ def direction_if_both(scene: Scene, values: FloatArray) -> FloatArray:
     return direction if each_way >= max(least, 1.0) else np.zeros_like(direction)
 
 
-def _onsets(facts: Facts) -> tuple[Tried, ...]:
-    return tuple(Tried(shape=(onset,)) for _, onset, _ in facts.onsets) if facts.states.size > 2 else ()
-
-
 def _gains_with_life(facts: Facts) -> tuple[Tried, ...]:
     if facts.states.size < 3:
         return ()
@@ -53,10 +49,6 @@ def _gains_with_life(facts: Facts) -> tuple[Tried, ...]:
     steps = tuple(Tried(shape=(_STEP, onset), log_weight=weight) for _, onset, _ in facts.onsets)
     weight = -float(np.log(len(CREEP_POWERS)))
     return steps + tuple(Tried(shape=(_CREEP, power), log_weight=weight) for power in CREEP_POWERS)
-
-
-def _gains_with_clock(_facts: Facts) -> tuple[Tried, ...]:
-    return tuple(Tried(shape=(time, in_loops)) for time in (0.0, 60.0, 150.0, 400.0) for in_loops in (0.0, 1.0))
 
 
 def _gain_with_life(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
@@ -73,25 +65,11 @@ def _gain_with_clock(scene: Scene, amplitude: float, shape: Shape) -> FloatArray
     return np.asarray(amplitude * np.where(shown, share, 0.0) * scene.curve, dtype=np.float64)
 
 
-def _stepped(change: Callable[[Scene, float], FloatArray]) -> Callable[[Scene, float, Shape], FloatArray]:
-    """A change [P] Nm after the cycle in the first shape, 0 before."""
-
-    def stepped(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-        return np.asarray(np.where(scene.points.cycles > shape[0], change(scene, amplitude), 0.0), dtype=np.float64)
-
-    return stepped
-
-
-def _speed_scaled(scene: Scene, amplitude: float) -> FloatArray:
-    """S((1 + a) v) - S(v) [P] Nm."""
-    return scene.curve_at(velocity=scene.points.velocity * _factor(amplitude)) - scene.curve
-
-
-def _parameter_scaled(parameter: str) -> Callable[[Scene, float], FloatArray]:
+def _parameter_scaled(parameter: str) -> Callable[[Scene, float, Shape], FloatArray]:
     """S with (1 + a) θ less S with θ [P] Nm, θ a parameter of eq. 3 (one of PARAMETER_NAMES)."""
     place = PARAMETER_NAMES.index(parameter)
 
-    def change(scene: Scene, amplitude: float) -> FloatArray:
+    def change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
         parameters = scene.parameters.copy()
         parameters[:, place] *= _factor(amplitude)
         return scene.points.engaged * curve(scene.points.velocity, parameters) - scene.curve
@@ -103,22 +81,13 @@ def _factor(amplitude: float) -> float:
     return max(1.0 + amplitude, 0.05)  # a fit may try what is no speed
 
 
-def _gauge_hysteresis(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
-    pressure = scene.points.pressure
-    return np.asarray(amplitude * (direction_if_both(scene, pressure) * pressure * scene.by_pressure), dtype=np.float64)
-
-
-def _speed_hysteresis(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
-    return np.asarray(amplitude * direction_if_both(scene, scene.points.velocity) * scene.curve, dtype=np.float64)
-
-
 def _fault(
     slug: str,
     title: str,
     formula: str,
     axis: str,
-    grid: Callable[[Facts], tuple[Tried, ...]],
     change: Callable[[Scene, float, Shape], FloatArray],
+    grid: Callable[[Facts], tuple[Tried, ...]] = lambda _: (Tried(shape=()),),
     shapes: int = 0,
     *,
     before_lag: bool = False,
@@ -130,7 +99,6 @@ def _fault(
         physics=title,
         formula=formula,
         source="faults of rigs",
-        family=Family.SENSOR,
         kind=Kind.ARTEFACT,
         amplitude="size",
         unit="-",
@@ -144,6 +112,16 @@ def _fault(
     )
 
 
+def _step(slug: str, title: str, formula: str, change: Callable[[Scene, float, Shape], FloatArray]) -> Effect:
+    """A fault from a cycle on, and not from the start: the baseline has absorbed it there."""
+    fault = begins(_fault(slug, title, f"{formula} from a cycle on", CYCLES, change, before_lag=True))
+
+    def grid(facts: Facts) -> tuple[Tried, ...]:
+        return tuple(Tried(shape=(onset,)) for _, onset, _ in facts.onsets) if facts.states.size > 2 else ()
+
+    return replace(fault, grid=grid)
+
+
 FAULTS: tuple[Effect, ...] = (
     begins(
         _fault(
@@ -151,8 +129,8 @@ FAULTS: tuple[Effect, ...] = (
             "a gain of the torque that drifts while a test lasts, as a sensor's does that warms up",
             "a S t/30 min, or a S (1 - e^{-t/τ})",
             CLOCK,
-            _gains_with_clock,
             _gain_with_clock,
+            lambda _: tuple(Tried(shape=(time, loops)) for time in (0.0, 60.0, 150.0, 400.0) for loops in (0.0, 1.0)),
             shapes=2,
         )
     ),
@@ -161,39 +139,27 @@ FAULTS: tuple[Effect, ...] = (
         "a gain of the torque that steps or creeps over the life, as after another calibration",
         "a S from a cycle on, or a S (ζ/ζ_last)^q",
         CYCLES,
-        _gains_with_life,
         _gain_with_life,
+        _gains_with_life,
         shapes=2,
     ),
-    _fault(
+    _step(
         "speed_scale_step",
         "another scale of the speed from a cycle on, as of another encoder or belt",
-        "S((1 + a) v) - S(v) from a cycle on",
-        CYCLES,
-        _onsets,
-        _stepped(_speed_scaled),
-        shapes=1,
-        before_lag=True,
+        "S((1 + a) v) - S(v)",
+        lambda scene, a, _: scene.curve_at(velocity=scene.points.velocity * _factor(a)) - scene.curve,
     ),
-    _fault(
+    _step(
         "static_torque_step",
         "a static torque that steps at a cycle",
-        "S with (1 + a) M_s from a cycle on",
-        CYCLES,
-        _onsets,
-        _stepped(_parameter_scaled("static_torque")),
-        shapes=1,
-        before_lag=True,
+        "S with (1 + a) M_s",
+        _parameter_scaled("static_torque"),
     ),
-    _fault(
+    _step(
         "stribeck_velocity_step",
         "a Stribeck velocity that steps at a cycle",
-        "S with (1 + a) V_S from a cycle on",
-        CYCLES,
-        _onsets,
-        _stepped(_parameter_scaled("stribeck_velocity")),
-        shapes=1,
-        before_lag=True,
+        "S with (1 + a) V_S",
+        _parameter_scaled("stribeck_velocity"),
     ),
     begins(
         _fault(
@@ -201,8 +167,9 @@ FAULTS: tuple[Effect, ...] = (
             "a pressure that depends on whether it was last raised or lowered",
             "± a p ∂S/∂p",
             PRESSURE,
-            lambda _: (Tried(shape=()),),
-            _gauge_hysteresis,
+            lambda scene, a, _: (
+                a * direction_if_both(scene, scene.points.pressure) * scene.points.pressure * scene.by_pressure
+            ),
         )
     ),
     begins(
@@ -211,8 +178,7 @@ FAULTS: tuple[Effect, ...] = (
             "a torque that depends on whether the speed was last raised or lowered",
             "± a S",
             SPEED,
-            lambda _: (Tried(shape=()),),
-            _speed_hysteresis,
+            lambda scene, a, _: a * direction_if_both(scene, scene.points.velocity) * scene.curve,
         )
     ),
 )

@@ -120,7 +120,7 @@ def free_shapes(fitted: FittedEffect) -> NDArray[np.bool_]:
 Ranges: TypeAlias = Mapping[Discrepancy, tuple[float, float]]
 #: Orders of the cosines by which an effect's form is uncertain, and of those by which any template may be a little off;
 #: and the harmonics of a loop of the latter.
-_ORDERS = {Discrepancy.SPEED: (1, 2), Discrepancy.LIFE: (1,), Discrepancy.CLOCK: (1,), Discrepancy.MOTION: (1,)}
+_ORDERS = {Discrepancy.SPEED: 2}  # one in all others
 _SMALL = {Discrepancy.SPEED: 4, Discrepancy.PRESSURE: 2, Discrepancy.LIFE: 3, Discrepancy.CLOCK: 3}
 
 
@@ -143,29 +143,29 @@ def ranges_of(rows: Points) -> Ranges:
 def factors_at(points: Points, effect: Effect, ranges: Ranges) -> FloatArray:
     """φ [P, m] at points, each within ±1, along what the effect's form is uncertain in and a campaign varied; beyond its
     range that at its end."""
-    values, factors = _coordinates(points), list[FloatArray]()
-    for discrepancy in effect.discrepancies:
-        low, width = ranges[discrepancy]
-        if width > 0:
-            unit = np.clip((values[discrepancy] - low) / width, 0.0, 1.0)
-            factors += [np.cos(order * np.pi * unit) for order in _ORDERS[discrepancy]]
-    return np.stack(factors, axis=1) if factors else np.zeros((points.run.size, 0))
+    return _cosines(points, {along: _ORDERS.get(along, 1) for along in effect.discrepancies}, ranges)
 
 
 def small_factors_at(points: Points, ranges: Ranges) -> FloatArray:
     """φ [P, m] within ±1 at points: smooth factors over every axis that a campaign varied, by which any template may be a
     little wrong; beyond its range that at its end."""
-    values, factors = _coordinates(points), [np.zeros((points.run.size, 0))]
-    for along, orders in _SMALL.items():
-        low, width = ranges[along]
-        if width > 0:
-            unit = np.clip((values[along] - low) / width, 0.0, 1.0)
-            factors.append(np.cos(np.pi * unit[:, None] * np.arange(1, orders + 1)))
+    factors = [_cosines(points, _SMALL, ranges)]
     if ranges[Discrepancy.MOTION][1] > 0:
         turns = points.phase[:, None] * np.arange(1, 2 + 1)
         waves = np.where(points.steady[:, None], 0.0, np.concatenate([np.cos(turns), np.sin(turns)], axis=1))
         factors += [np.where(points.steady, 1.0, 0.0)[:, None], waves]
     return np.concatenate(factors, axis=1)
+
+
+def _cosines(points: Points, orders: Mapping[Discrepancy, int], ranges: Ranges) -> FloatArray:
+    """[P, m] of the orders 1 ... n along each axis that was varied."""
+    values, waves = _coordinates(points), [np.zeros((points.run.size, 0))]
+    for along, most in orders.items():
+        low, width = ranges[along]
+        if width > 0:
+            unit = np.clip((values[along] - low) / width, 0.0, 1.0)
+            waves.append(np.cos(np.pi * unit[:, None] * np.arange(1, most + 1)))
+    return np.concatenate(waves, axis=1)
 
 
 def _coordinates(points: Points) -> dict[Discrepancy, FloatArray]:

@@ -12,7 +12,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Kind, Shape, ShapeParameter, Tried
 
 #: Whether what a rest did settles with use alone, or by the test's clock as well; and the log of its settling time [s],
 #: which with use alone stays where it is.
@@ -36,9 +36,8 @@ def _running_in_grid(facts: Facts) -> tuple[Tried, ...]:
 
 def _running_in_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     log_length, part = shape
-    return np.asarray(
-        amplitude * _carried(scene, part) * np.exp(-scene.points.cycles / np.exp(log_length)), dtype=np.float64
-    )
+    left = np.exp(-scene.points.cycles / np.exp(log_length))
+    return np.asarray(amplitude * _carried(scene, part) * left, dtype=np.float64)
 
 
 RUNNING_IN = Effect(
@@ -48,7 +47,6 @@ RUNNING_IN = Effect(
     physics="The first cycles polish the lining; friction starts away from the course that eq. 6 follows later.",
     formula="a M_s ∂S/∂M_s e^{-ζ/ζ_r}, or a S e^{-ζ/ζ_r}",
     source="Ompusunggu et al. 2013, section 2.3.1: 200 cycles of running-in before cycle 0",
-    family=Family.HISTORY,
     kind=Kind.COURSE,
     amplitude="share when new",
     unit="%",
@@ -95,7 +93,6 @@ OIL_CHANGE = Effect(
     "little.",
     formula="a (C_v |v|^γ + k M̄_c ∂S/∂M̄_c) (1 - l (1 - e^{-2(ζ - ζ_k)/ζ_last})) after ζ_k",
     source="maintenance practice; friction modifiers deplete with use",
-    family=Family.HISTORY,
     kind=Kind.COURSE,
     amplitude="viscous step",
     unit="%",
@@ -124,9 +121,7 @@ def _accelerated_wear_grid(facts: Facts) -> tuple[Tried, ...]:
 def _accelerated_wear_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     onset, power = shape
     late = np.maximum(scene.points.cycles - onset, 0.0) / max(float(scene.facts.states[-1]) - onset, 1.0)
-    return np.asarray(
-        -amplitude * scene.gradient[:, 0] * scene.parameters[:, 0] * np.minimum(late, 10.0) ** power, dtype=np.float64
-    )
+    return np.asarray(-amplitude * _carried(scene, STATIC) * np.minimum(late, 10.0) ** power, dtype=np.float64)
 
 
 ACCELERATED_WEAR = Effect(
@@ -136,7 +131,6 @@ ACCELERATED_WEAR = Effect(
     "course.",
     formula="-a M_s ∂S/∂M_s ((ζ - ζ_k)₊/(ζ_last - ζ_k))^q",
     source="Ompusunggu et al. 2013, figs. 4 and 5: glazing and lost porosity",
-    family=Family.HISTORY,
     kind=Kind.COURSE,
     amplitude="further loss of static torque by the last state",
     unit="%",
@@ -172,11 +166,6 @@ def effective_cycles(cycles: FloatArray, facts: Facts, exponent: float) -> Float
     return np.asarray(np.interp(cycles, ends, grown) + beyond, dtype=np.float64)
 
 
-def _load_severity_change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
-    counted = effective_cycles(scene.points.cycles, scene.facts, amplitude)
-    return scene.curve_at(cycles=counted) - scene.curve
-
-
 LOAD_SEVERITY = Effect(
     slug="load_severity",
     title="Some duty was harder than other",
@@ -184,7 +173,6 @@ LOAD_SEVERITY = Effect(
     physics="The rate of eq. 6's kinetics grows with the energy of an engagement: harder blocks age the clutch faster.",
     formula="S(ζ_e) - S(ζ), ζ_e = Σ (E/E_usual)^m over the engagements whose energy was sent",
     source="models.degradation.general_order: dD/dζ = -k Dⁿ with k by the load's severity",
-    family=Family.HISTORY,
     kind=Kind.COURSE,
     channels=("energy_per_cycle_kj",),
     amplitude="severity exponent m",
@@ -192,7 +180,9 @@ LOAD_SEVERITY = Effect(
     prior_sd=0.7,
     positive=True,
     grid=_load_severity_grid,
-    change=_load_severity_change,
+    change=lambda scene, amplitude, _: (
+        scene.curve_at(cycles=effective_cycles(scene.points.cycles, scene.facts, amplitude)) - scene.curve
+    ),
     before_lag=True,
     discrepancies=(Discrepancy.LIFE,),
     counts_in_severity=True,
@@ -243,7 +233,6 @@ REST_RECOVERY = Effect(
     formula="a S (ln(1 + rest/1 h)/ln(1 + longest/1 h))^r e^{-(ζ - ζ_rest)/ζ_c}, S or M_s ∂S/∂M_s; with the clock also "
     "e^{-(t - t_rest)/τ}",
     source="boundary films of friction modifiers re-form at rest",
-    family=Family.HISTORY,
     kind=Kind.COURSE,
     channels=("started_at",),
     amplitude="change of friction at the end of the longest rest",

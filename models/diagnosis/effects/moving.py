@@ -5,7 +5,9 @@ torque while accelerating, less while decelerating. Torque may swing with the sh
 itself at low speed; both average out of plateaus.
 """
 
+import math
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,6 @@ from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import (
     Discrepancy,
     Effect,
-    Family,
     Kind,
     Measure,
     Shape,
@@ -27,11 +28,6 @@ from models.diagnosis.effects.effect import (
 )
 from models.friction.stribeck import GAMMA
 
-
-def _inertia_torque_change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
-    return np.asarray(amplitude * scene.points.acceleration / scene.facts.geometry.mean_radius, dtype=np.float64)
-
-
 INERTIA_TORQUE = Effect(
     slug="inertia_torque",
     title="Inertia is in the measured torque",
@@ -40,14 +36,13 @@ INERTIA_TORQUE = Effect(
     "accelerates it.",
     formula="J dω/dt",
     source="Newton; on the reference's rig the sensor stands on the grounded side, on others it does not",
-    family=Family.DYNAMIC,
     kind=Kind.LAG,
     channels=("time_s",),
     amplitude="moment of inertia",
     unit="kg m²",
     prior_sd=0.004,
     positive=True,
-    change=_inertia_torque_change,
+    change=lambda scene, amplitude, _: amplitude * scene.points.acceleration / scene.facts.geometry.mean_radius,
     grows_with=Measure.TORQUE,
     before_lag=False,
 )
@@ -57,7 +52,7 @@ INERTIA_TORQUE = Effect(
 REFERENCE_PRESSURE = 5e5
 #: How the film is followed: to first order by powers of speed, by its own equation, or as a thickness that relaxes and
 #: whose strength and time are independent of each other.
-FIRST_ORDER, FILM, THICKNESS = 0.0, 1.0, 2.0
+FIRST_ORDER, FILM, THICKNESS = map(float, range(3))
 #: The least time of such a thickness [s], and the power of speed that it stays below: with more it would be inertia.
 LEAST_TIME, MOST_POWER = 0.15, 0.55
 #: A film is followed for this share of a period before its course is taken: it no longer depends on where it began.
@@ -67,24 +62,16 @@ _SWING = 24
 
 
 def _squeeze_film_grid(_facts: Facts) -> tuple[Tried, ...]:
-    powers = [(x, y, f, 0.5, FIRST_ORDER, 0.0) for x in (0.0, 0.6) for y in (0.5, 1.0, 1.5) for f in (0.02, 0.06, 0.15)]
-    films = [
-        (0.4, y, f, sheared, FILM, lags)
-        for y in (0.4, 0.8, 1.2)
-        for f in (0.05, 0.2)
-        for sheared in (0.2, 0.7)
-        for lags in (0.0, 1.0)
-    ]
-    layers = [(-0.2, y, f, time, THICKNESS, 0.0) for y in (0.5, 1.2) for f in (0.03, 0.15) for time in (0.2, 0.8)]
-    return tuple(
-        Tried(shape=shape, log_weight=weight - float(np.log(len(shapes))))
-        for shapes, weight in ((powers, 0.0), (films, 0.0), (layers, (-1.0)))  # eq. 7 ties strength and time together
-        for shape in shapes
+    forms = (  # powers of pressure and speed, least film, shear or time, form, lag; eq. 7 ties strength and time together
+        ([(0.0, 0.6), (0.5, 1.0, 1.5), (0.02, 0.06, 0.15), (0.5,), (FIRST_ORDER,), (0.0,)], 0.0),
+        ([(0.4,), (0.4, 0.8, 1.2), (0.05, 0.2), (0.2, 0.7), (FILM,), (0.0, 1.0)], 0.0),
+        ([(-0.2,), (0.5, 1.2), (0.03, 0.15), (0.2, 0.8), (THICKNESS,), (0.0,)], -1.0),
     )
-
-
-def _squeeze_film_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    return _squeeze_film_changes(scene, [(amplitude, shape)])[:, 0]
+    return tuple(
+        Tried(shape=shape, log_weight=weight - math.log(math.prod(map(len, values))))
+        for values, weight in forms
+        for shape in product(*values)
+    )
 
 
 def _squeeze_film_changes(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
@@ -180,7 +167,6 @@ SQUEEZE_FILM = Effect(
     "ẇ = (v - w)(w/v_0 + f)^y/τ; or a' (p/5 bar)^(1 + x/2) (H - h), τ ḣ = H - h, "
     "H = (v/v_0 + f)^(0.55/(1 + y))",
     source="Ompusunggu et al. 2013, eq. 7 and section 3.2",
-    family=Family.DYNAMIC,
     kind=Kind.LAG,
     channels=("time_s",),
     amplitude="torque per acceleration at 5 bar and mid speed",
@@ -196,7 +182,6 @@ SQUEEZE_FILM = Effect(
         ShapeParameter(name="whether friction lags behind it", unit="-", lags=True),
     ),
     grid=_squeeze_film_grid,
-    change=_squeeze_film_change,
     several=_squeeze_film_changes,
     grows_with=Measure.TORQUE,
     before_lag=None,
@@ -204,38 +189,38 @@ SQUEEZE_FILM = Effect(
 )
 
 
-SHAFT_RIPPLE = Effect(
-    slug="shaft_ripple",
-    title="Torque swings with the shaft's turns",
-    physics="Misalignment, run-out or a coupling: torque swings once or a few times a turn, at a frequency that follows "
-    "the speed.",
-    formula="a cos(k ∫ω dt + φ), k = 1, 2, ...",
-    source="order analysis of rotating machinery",
-    family=Family.VIBRATION,
-    kind=Kind.VIBRATION,
-    channels=("time_s",),
-    amplitude="amplitude of the ripple",
-    unit="Nm",
-    prior_sd=0.5,
-    positive=True,
-    grid=lambda _: (),
-    before_lag=False,
+def _vibration(slug: str, title: str, amplitude: str, physics: str, formula: str, source: str) -> Effect:
+    """An effect that averages of plateaus and loops do not show."""
+    return Effect(
+        slug=slug,
+        title=title,
+        physics=physics,
+        formula=formula,
+        source=source,
+        kind=Kind.VIBRATION,
+        channels=("time_s",),
+        amplitude=amplitude,
+        unit="Nm",
+        prior_sd=0.5,
+        positive=True,
+        grid=lambda _: (),
+        before_lag=False,
+    )
+
+
+SHAFT_RIPPLE = _vibration(
+    "shaft_ripple",
+    "Torque swings with the shaft's turns",
+    "amplitude of the ripple",
+    "Misalignment, run-out or a coupling: torque swings once or a few times a turn, at a frequency that follows the speed.",
+    "a cos(k ∫ω dt + φ), k = 1, 2, ...",
+    "order analysis of rotating machinery",
 )
-
-
-STICK_SLIP = Effect(
-    slug="stick_slip",
-    title="Stick-slip or shudder",
-    physics="Where friction falls with speed the driveline vibrates by itself, at its own frequency and at low speed.",
-    formula="a cos(2π f t + φ) with f that does not follow the speed",
-    source="Ompusunggu et al. 2013, section 3.1.1: positive slope is anti-shudder",
-    family=Family.VIBRATION,
-    kind=Kind.VIBRATION,
-    channels=("time_s",),
-    amplitude="amplitude of the vibration",
-    unit="Nm",
-    prior_sd=0.5,
-    positive=True,
-    grid=lambda _: (),
-    before_lag=False,
+STICK_SLIP = _vibration(
+    "stick_slip",
+    "Stick-slip or shudder",
+    "amplitude of the vibration",
+    "Where friction falls with speed the driveline vibrates by itself, at its own frequency and at low speed.",
+    "a cos(2π f t + φ) with f that does not follow the speed",
+    "Ompusunggu et al. 2013, section 3.1.1: positive slope is anti-shudder",
 )

@@ -6,6 +6,7 @@ channel.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import (
     Discrepancy,
     Effect,
-    Family,
     Kind,
     Measure,
     Shape,
@@ -29,15 +29,16 @@ from models.diagnosis.effects.effect import (
 
 #: Courses of the zero: one offset from a cycle on, along the test's clock (straight, or settling), along the life by cycles
 #: or by the days that it took.
-STEP, CLOCK, SETTLING, LIFE, DAYS = 0.0, 1.0, 2.0, 3.0, 4.0
+STEP, CLOCK, SETTLING, LIFE, DAYS, *_BETWEEN = map(float, range(9))
 #: Between these too a size is averaged: x^q and x (1 + s)/(x + s) along the life, without knots that may be off, by cycles
 #: or by days; their powers q, and s (chosen: so close that the size moves by about its own deviation from one to the next).
-EVEN, EVEN_DAYS, FLATTENING, FLATTENING_DAYS = 5.0, 6.0, 7.0, 8.0
+EVEN, EVEN_DAYS, FLATTENING, FLATTENING_DAYS = _BETWEEN
 POWERS, FLATTENED = (0.5, 0.7, 1.0, 1.4, 2.0), (0.1, 0.3, 1.0)
 #: Times [s] after which a zero has settled to 1/e, each refined by the factor e^x, x the first of the knots below.
 TIMES = (120.0, 400.0)
 #: Knots over life at which a zero may be off its straight course, in amplitudes; on a straight course it is off by none.
-KNOTS, STRAIGHT = (0.0, 1 / 3, 2 / 3, 1.0), (0.0, 0.0)
+KNOTS: FloatArray = np.linspace(0.0, 1.0, 4)
+STRAIGHT = (0.0,) * (KNOTS.size - 2)
 
 
 def _torque_zero_shift_grid(facts: Facts) -> tuple[Tried, ...]:
@@ -106,7 +107,6 @@ TORQUE_ZERO_SHIFT = Effect(
     formula="a · step(ζ > ζ_k), a · t/30 min, a (1 - e^{-t/τ}), or a · (ζ/ζ_last)^q or the same in days, with the sensor's "
     "sign",
     source="strain-gauge transducers: ISO 376, zero drift and creep",
-    family=Family.SENSOR,
     kind=Kind.ARTEFACT,
     channels=("oil_temperature_c",),
     amplitude="zero shift",
@@ -136,32 +136,28 @@ TORQUE_ZERO_SHIFT = Effect(
 
 
 #: Courses of the offset over life x = ζ/ζ_last, 1 at its end: constant, x^q, from a cycle on, or x (1 + s)/(x + s).
-OFFSET_CONSTANT, OFFSET_GROWING, OFFSET_STEP, OFFSET_SETTLING = 0.0, 1.0, 2.0, 3.0
+OFFSET_CONSTANT, OFFSET_GROWING, OFFSET_STEP, OFFSET_SETTLING = map(float, range(4))
 #: Powers q from which a fit starts, and those between which a size is averaged (chosen as those of a zero).
 OFFSET_STARTS, OFFSET_POWERS = (0.5, 1.0, 2.0), (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 2.8)
 
 
 def _pressure_offset_grid(facts: Facts) -> tuple[Tried, ...]:
-    tried = [Tried(shape=(OFFSET_CONSTANT, 0.0, 0.0))]
-    if facts.states.size > 2:
-        tried += [Tried(shape=(OFFSET_GROWING, 0.0, math.log(power))) for power in OFFSET_STARTS]
-        tried += _offset_steps(facts)
-    return tuple(tried)
+    return _offsets(facts, [(OFFSET_GROWING, 0.0, math.log(power)) for power in OFFSET_STARTS])
 
 
 def _pressure_offset_courses(facts: Facts) -> tuple[Tried, ...]:
+    growing = [(OFFSET_GROWING, 0.0, math.log(power)) for power in OFFSET_POWERS]
+    return _offsets(facts, [*growing, *((OFFSET_SETTLING, share, 0.0) for share in FLATTENED)])
+
+
+def _offsets(facts: Facts, growing: Sequence[Shape]) -> tuple[Tried, ...]:
+    """Constant; along the life, as probable together as the starts; from a cycle on."""
     tried = [Tried(shape=(OFFSET_CONSTANT, 0.0, 0.0))]
     if facts.states.size > 2:
-        log_weight = math.log(len(OFFSET_STARTS) / (len(OFFSET_POWERS) + len(FLATTENED)))
-        tried += [Tried(shape=(OFFSET_GROWING, 0.0, math.log(power)), log_weight=log_weight) for power in OFFSET_POWERS]
-        tried += [Tried(shape=(OFFSET_SETTLING, share, 0.0), log_weight=log_weight) for share in FLATTENED]
-        tried += _offset_steps(facts)
+        tried += [Tried(shape=shape, log_weight=math.log(len(OFFSET_STARTS) / len(growing))) for shape in growing]
+        weight = -math.log(len(facts.onsets))
+        tried += [Tried(shape=(OFFSET_STEP, onset, 0.0), log_weight=weight) for _, onset, _ in facts.onsets]
     return tuple(tried)
-
-
-def _offset_steps(facts: Facts) -> list[Tried]:
-    weight = -math.log(max(len(facts.onsets), 1))
-    return [Tried(shape=(OFFSET_STEP, onset, 0.0), log_weight=weight) for _, onset, _ in facts.onsets]
 
 
 def _pressure_offset_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
@@ -186,7 +182,6 @@ PRESSURE_OFFSET = Effect(
     physics="The pressure at the clutch differs from the gauge's reading; the torque changes as it does with pressure.",
     formula="S(p + a) - S(p), a constant, growing as (ζ/ζ_last)^q or towards an end, or from a cycle on",
     source="Ompusunggu et al. 2013, fig. 1: one gauge in the line, none at the piston",
-    family=Family.SENSOR,
     kind=Kind.ARTEFACT,
     amplitude="pressure offset",
     unit="bar",
@@ -210,11 +205,7 @@ PRESSURE_OFFSET = Effect(
 
 #: What a plateau starts from: the torque before, or the speed before (the film's), at the same pressure or across a change
 #: too.
-TORQUE, TORQUE_WITHIN, SPEED = 0.0, 1.0, 2.0
-
-
-def _unsettled_dwell_grid(_facts: Facts) -> tuple[Tried, ...]:
-    return tuple(Tried(shape=(start, 0.5)) for start in (TORQUE, TORQUE_WITHIN, SPEED))
+TORQUE, TORQUE_WITHIN, SPEED = map(float, range(3))
 
 
 def _unsettled_dwell_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
@@ -246,7 +237,6 @@ UNSETTLED_DWELL = Effect(
     formula="a (x_before - S), x = S + k a (x_before - S) what a plateau ends with; a = e^{-dwell/τ} averaged over what was "
     "read",
     source="Ompusunggu et al. 2013, section 2.3.3: 5 s a plateau; real transients in tests/real",
-    family=Family.DWELL,
     kind=Kind.ARTEFACT,
     amplitude="share of the plateau before",
     unit="%",
@@ -257,7 +247,7 @@ UNSETTLED_DWELL = Effect(
         ShapeParameter(name="what a plateau starts from", unit="-"),
         ShapeParameter(name="of the share, what is carried on, k", unit="-", lowest=0.0, highest=1.0, smooth=True),
     ),
-    grid=_unsettled_dwell_grid,
+    grid=lambda _: tuple(Tried(shape=(start, 0.5)) for start in (TORQUE, TORQUE_WITHIN, SPEED)),
     change=_unsettled_dwell_change,
     before_lag=False,
     discrepancies=(Discrepancy.SPEED,),
@@ -293,7 +283,6 @@ CHANNEL_DELAY = Effect(
     "belongs to an earlier, lower speed.",
     formula="S(v(t - δ)) - S(v(t)), to first order -δ dS/dt",
     source="anti-aliasing filters and multiplexed recorders; no friction is in it",
-    family=Family.DYNAMIC,
     kind=Kind.LAG,
     channels=("time_s",),
     amplitude="delay",

@@ -24,7 +24,6 @@ from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import (
     Discrepancy,
     Effect,
-    Family,
     Kind,
     Measure,
     Shape,
@@ -91,7 +90,6 @@ OIL_TEMPERATURE = Effect(
     formula="C_v |v|^γ ((ν(T)/ν_ref)^β - 1), and V_S (ν(T)/ν_ref)^{κβ} for V_S, ν by ASTM D341 at a film's "
     "temperature, which follows the oil's within τ; κ = -1/γ with β = γ is Hersey's similarity",
     source="ASTM D341-20; M. D. Hersey, J. Wash. Acad. Sci. 4 (1914) 542; Ompusunggu et al. 2013, section 2.3 (80 to 90 °C)",
-    family=Family.THERMAL,
     kind=Kind.ARTEFACT,
     channels=("oil_temperature_c",),
     amplitude="viscosity exponent β",
@@ -168,7 +166,6 @@ INTERFACE_HEATING = Effect(
     formula="-S (1 - e^{-a w}), w the heat flux |S| ω/A over 0.32 W/mm², saturating by s and lagging by τ; S or its "
     "viscous part; where the plate's temperature was measured w is its rise above the oil over that at 0.32 W/mm²",
     source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
-    family=Family.THERMAL,
     kind=Kind.ARTEFACT,
     amplitude="loss of torque at 0.32 W/mm²",
     unit="%",
@@ -201,7 +198,6 @@ VISCOUS_EXPONENT = Effect(
     "another one.",
     formula="C_v |v|^γ ((|v|/v_0)^δ - 1), v_0 the middle of the speeds",
     source="Ompusunggu et al. 2013, section 3.1.2: γ = 0.3 fixed beforehand",
-    family=Family.VISCOUS,
     kind=Kind.ARTEFACT,
     amplitude="change of exponent δ",
     unit="-",
@@ -239,7 +235,6 @@ HYDRODYNAMIC_DRAG = Effect(
     physics="Oil sheared in grooves and gaps adds a torque that grows with speed and viscosity, whatever the pressure.",
     formula="a (v/v_0)^m (1 + r)/(1 + r (v/v_0)²) (ν(T)/ν_ref)^t, v_0 the middle of the speeds",
     source="Kato et al., drag torque of disengaged wet clutches; Newtonian shear in an annular gap",
-    family=Family.VISCOUS,
     kind=Kind.ARTEFACT,
     amplitude="drag in mid speed",
     unit="Nm",

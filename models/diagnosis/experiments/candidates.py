@@ -14,15 +14,14 @@ from typing import TypeVar
 import numpy as np
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
-from models.diagnosis.design import criteria
 from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
 
 #: Samples a period of a dynamic test.
 _SAMPLES = 200
-_HOUR = 3600.0
 #: Light pressures of loops, as multiples: far enough apart to be distinguished.
 LIGHT = (1.0, 1.5, 2.0)
 #: Sweeps over the speeds in a run with the clutch open: there is one pressure only, none.
@@ -45,7 +44,7 @@ class Trial:
 
     text: str
     loops: bool = False
-    frequency: float = 0.1
+    frequency: float = 0.3
     temperature: float | None = None
     falling: bool = False
     pressure: float = 1.0
@@ -58,46 +57,42 @@ class Trial:
 
 _LOOPS = "dynamic test at 0.3 Hz, ten periods a pressure, 60 samples a second, at the usual speeds"
 _LIGHT_SWEEP = "stationary test at a quarter of the usual pressures"
-_OPEN_SWEEP = "stationary test with the clutch open (no pressure), at the usual speeds, five times over"
-_OPEN_LOOPS = "dynamic test at 0.3 Hz with the clutch open, ten periods"
 _LIGHT = "at a quarter, three eighths and a half of the lowest usual pressure"
+_LIGHT_TESTS = f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}"
+_ALL_LOADS = f"{_LIGHT_SWEEP}, and {_LOOPS}, at the usual pressures and then {_LIGHT}"
+_OPEN_SWEEP = "stationary test with the clutch open (no pressure), at the usual speeds, five times over"
+_OPEN_TESTS = f"{_OPEN_SWEEP}, and dynamic test at 0.3 Hz with the clutch open, ten periods"
+_SIXTY, _HUNDRED = 333.15, 373.15
 
 TRIALS: dict[str, Trial] = {
-    "loops_0.3hz": Trial(text=f"{_LOOPS}, at the usual pressures", loops=True, frequency=0.3),
-    "light_loops": Trial(text="", loops=True, frequency=0.3, pressure=0.25),
-    "light_loops_60c": Trial(text="", loops=True, frequency=0.3, pressure=0.25, temperature=333.15),
-    "light_tests": Trial(text=f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}", parts=("light_sweep", "light_loops")),
-    "light_tests_60c": Trial(
-        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}, with the oil at 60 °C", parts=("light_sweep", "light_loops_60c")
-    ),
+    "loops_0.3hz": Trial(text=f"{_LOOPS}, at the usual pressures", loops=True),
+    "light_loops": Trial(text="", loops=True, pressure=0.25),
+    "light_loops_60c": Trial(text="", loops=True, pressure=0.25, temperature=_SIXTY),
+    "light_tests": Trial(text=_LIGHT_TESTS, parts=("light_sweep", "light_loops")),
+    "light_tests_60c": Trial(text=f"{_LIGHT_TESTS}, with the oil at 60 °C", parts=("light_sweep", "light_loops_60c")),
     "warm_and_cool": Trial(
-        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}, first with the oil as usual, then at 60 °C",
+        text=f"{_LIGHT_TESTS}, first with the oil as usual, then at 60 °C",
         parts=("light_sweep", "light_loops", "light_loops_60c"),
     ),
-    "all_loads": Trial(
-        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, at the usual pressures and then {_LIGHT}",
-        parts=("light_sweep", "loops_0.3hz", "light_loops"),
-    ),
+    "all_loads": Trial(text=_ALL_LOADS, parts=("light_sweep", "loops_0.3hz", "light_loops")),
     "all_loads_and_60c": Trial(
         text=f"{_LIGHT_SWEEP}, and {_LOOPS}: at the usual pressures, then {_LIGHT}, then there once more with the oil "
         "at 60 °C",
         parts=("light_sweep", "loops_0.3hz", "light_loops", "light_loops_60c"),
     ),
     "open_sweep": Trial(text=_OPEN_SWEEP, pressure=0.0),
-    "open_loops": Trial(text="", loops=True, frequency=0.3, pressure=0.0),
-    "open_clutch": Trial(text=f"{_OPEN_SWEEP}, and {_OPEN_LOOPS}", parts=("open_sweep", "open_loops")),
+    "open_loops": Trial(text="", loops=True, pressure=0.0),
+    "open_clutch": Trial(text=_OPEN_TESTS, parts=("open_sweep", "open_loops")),
     "open_clutch_and_light": Trial(
-        text=f"{_OPEN_SWEEP}, and {_OPEN_LOOPS}; then {_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}",
-        parts=("open_sweep", "open_loops", "light_sweep", "light_loops"),
+        text=f"{_OPEN_TESTS}; then {_LIGHT_TESTS}", parts=("open_sweep", "open_loops", "light_sweep", "light_loops")
     ),
     "all_loads_and_open": Trial(
-        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, at the usual pressures and then {_LIGHT}; then {_OPEN_SWEEP}, and "
-        f"{_OPEN_LOOPS}",
+        text=f"{_ALL_LOADS}; then {_OPEN_TESTS}",
         parts=("light_sweep", "loops_0.3hz", "light_loops", "open_sweep", "open_loops"),
     ),
-    "sweep_60c": Trial(text="stationary test with the oil at 60 °C", temperature=333.15),
-    "sweeps_60c": Trial(text="stationary test with the oil at 60 °C, three times", temperature=333.15, times=3),
-    "sweep_100c": Trial(text="stationary test with the oil at 100 °C", temperature=373.15),
+    "sweep_60c": Trial(text="stationary test with the oil at 60 °C", temperature=_SIXTY),
+    "sweeps_60c": Trial(text="stationary test with the oil at 60 °C, three times", temperature=_SIXTY, times=3),
+    "sweep_100c": Trial(text="stationary test with the oil at 100 °C", temperature=_HUNDRED),
     "falling_speeds": Trial(
         text="stationary test with the speeds falling instead of rising, three times", falling=True, times=3
     ),
@@ -109,18 +104,16 @@ TRIALS: dict[str, Trial] = {
         text="three more stationary tests after further use, spaced as before, with two days' rest before the first and the "
         "third",
         later=3,
-        rest=48 * _HOUR,
+        rest=48 * 3600.0,
     ),
-    "half_energy": Trial(
-        text="two more stationary tests after further use, with engagements of half the usual energy",
-        later=2,
-        energy=0.5,
-    ),
-    "twice_energy": Trial(
-        text="two more stationary tests after further use, with engagements of twice the usual energy",
-        later=2,
-        energy=2.0,
-    ),
+    **{
+        f"{name}_energy": Trial(
+            text=f"two more stationary tests after further use, with engagements of {name} the usual energy",
+            later=2,
+            energy=energy,
+        )
+        for name, energy in (("half", 0.5), ("twice", 2.0))
+    },
 }
 
 
@@ -140,22 +133,23 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
     """The campaign with the trial's runs added at its end (torques 0), the first of those that are alike; None where the
     campaign has no pattern for it."""
     trial = TRIALS[key]
-    pattern = _usual([(run, run.plateaus) for run in campaign.stationary], trial)
     if trial.parts:
         whole: Campaign | None = campaign
         for part in trial.parts:
             whole = None if whole is None else with_trial(whole, part)
         return whole
-    states = np.unique([*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)])
+    states = np.unique([run.cycles for run in campaign.tests])
     if states.size == 0 or (trial.later and states.size < 2):
         return None
     last = float(states[-1])
     if trial.loops:
         swung = _usual([(run, run.record) for run in campaign.dynamic], trial)
         return None if swung is None else replace(campaign, dynamic=(*campaign.dynamic, _loops(swung, trial, last)))
+    pattern = _usual([(run, run.plateaus) for run in campaign.stationary], trial)
     if pattern is None:
         return None
-    step = _distance(states) if trial.later else 0.0
+    # the usual distance of two states late in life
+    step = float(np.median(np.diff(states[min(states.size // 2, states.size - 2) :]))) if trial.later else 0.0
     ahead = [last + step * (k + 1) for k in range(trial.later)] or [last]
     rested = [trial.rest * float(k % 2 == 0) for k in range(len(ahead))]
     tests = tuple(
@@ -164,7 +158,13 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
     )
     added = replace(campaign, stationary=(*campaign.stationary, *tests))
     if trial.later:
-        added = replace(added, duty=(*campaign.duty, *_duty(campaign, trial, ahead, step)))
+        energies = [run.energy for run in campaign.duty if run.energy is not None]
+        energy = trial.energy * float(np.median(energies)) if energies else None
+        duty = (
+            DutyRun(run_id=f"trial-duty-{k}", cycles=cycles, engagements=step, energy=energy)
+            for k, cycles in enumerate(ahead)
+        )
+        added = replace(added, duty=(*campaign.duty, *duty))
     rests = tuple(
         MaintenanceEvent(
             run_id=f"trial-rest-{k}",
@@ -188,11 +188,6 @@ def _usual(runs: Sequence[tuple[Run, Plateaus | Record]], trial: Trial) -> Run |
     run, table = usual[-1]
     lowest = trial.pressure * float(table.pressure[table.pressure >= UNLOADED].min())
     return run if trial.pressure == 0.0 or lowest >= UNLOADED else None
-
-
-def _distance(states: FloatArray) -> float:
-    """The usual distance [cycles] of two states [s >= 2] late in life."""
-    return float(np.median(np.diff(states[max(0, min(states.size // 2, states.size - 2)) :])))
 
 
 def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, rested: float) -> StationaryRun:
@@ -249,20 +244,6 @@ def _loops(pattern: DynamicRun, trial: Trial, cycles: float) -> DynamicRun:
     )
 
 
-def _duty(campaign: Campaign, trial: Trial, ahead: list[float], step: float) -> list[DutyRun]:
-    energies = [run.energy for run in campaign.duty if run.energy is not None]
-    usual = float(np.median(energies)) if energies else None
-    return [
-        DutyRun(
-            run_id=f"trial-duty-{k}",
-            cycles=cycles,
-            engagements=step,
-            energy=None if usual is None else usual * trial.energy,
-        )
-        for k, cycles in enumerate(ahead)
-    ]
-
-
 #: Minutes that a rig needs for another oil temperature (chosen: as long as the reference's warming up), and seconds of a
 #: duty cycle where the campaign does not say how fast it was run (the reference's cycle, section 2.3.1).
 OIL_SETTLING, DUTY_CYCLE = 60.0, 20.0
@@ -296,8 +277,7 @@ def steps_of(campaign: Campaign, key: str) -> tuple[Step, ...]:
         return ()
     settling = 0.0 if trial.temperature is None else OIL_SETTLING
     steps = list[Step]()
-    cycles = [*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)]
-    before = max(cycles, default=0.0)
+    before = max((run.cycles for run in campaign.tests), default=0.0)
     for number, run in enumerate(then.stationary[len(campaign.stationary) :]):
         table, pause = run.plateaus, trial.rest * float(number % 2 == 0)
         minutes = criteria.PLATEAU_DURATION * table.torque.size / 60.0 * trial.times + settling + pause / 60.0

@@ -10,7 +10,7 @@ bound, and of its model discrepancy, each held by its prior. Rows to come have t
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -34,15 +34,6 @@ from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import Gram, gram_of, project
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Rows:
-    """What is predicted for some rows: each candidate's prediction and torque [N] Nm, and the noise [N] Nm."""
-
-    problem: FitProblem
-    predictions: tuple[Prediction, ...]
-    torques: tuple[FloatArray, ...]
-
-
 class CandidateDistances:
     """Distances of candidates, on what was measured and with rows to come."""
 
@@ -52,25 +43,20 @@ class CandidateDistances:
         problem = replace(problem, priors=replace(problem.priors, free=free))
         self._problem, self._fits = problem, fits
         self._ranges = ranges_of(problem.design.rows)
-        rows = _Rows(
-            problem=problem,
-            predictions=tuple(fit.prediction for fit in fits),
-            torques=tuple(_torque(problem.design, fit.prediction, fit) for fit in fits),
-        )
         self._law = _noise_law(problem, fits[0].torque)
-        self._measured = [self._gram(rows, k) for k in range(len(fits))]
+        self._measured = self._grams(problem, [fit.prediction for fit in fits])
 
     def ahead(self, added: Design) -> list[Gram]:
         """What rows to come would show, candidate by candidate as the one to be distinguished from."""
-        predictions = tuple(predict(added, fit.laws) for fit in self._fits)
-        torques = tuple(_torque(added, at, fit) for at, fit in zip(predictions, self._fits, strict=True))
-        noise = replace(self._problem.noise, deviation=_usual_deviation(self._law, added, torques[0]))
+        predictions = [predict(added, fit.laws) for fit in self._fits]
+        # rows to come have the noise of those measured at their torque
+        steady = np.arange(added.torque.size) < added.plateaus
+        constant, share = np.where(steady[:, None], self._law[0], self._law[1]).T
+        torque = _torque(added, predictions[0], self._fits[0])
+        noise = replace(self._problem.noise, deviation=np.sqrt((constant + share * torque**2) / added.samples))
         priors = self._problem.priors  # they are in the measured rows already
         none = replace(priors, rows=priors.rows[:0], means=priors.means[:0])
-        rows = _Rows(
-            problem=FitProblem(design=added, noise=noise, priors=none), predictions=predictions, torques=torques
-        )
-        return [self._gram(rows, k) for k in range(len(self._fits))]
+        return self._grams(FitProblem(design=added, noise=noise, priors=none), predictions)
 
     def distances(self, ahead: Sequence[list[Gram]]) -> FloatArray:
         """λ [k, k] nats of each candidate (row), if it is true, against each other one (column), with runs to come."""
@@ -96,27 +82,30 @@ class CandidateDistances:
             deviations.append(float(np.sqrt(max(variance, 0.0))))
         return deviations[1] / max(deviations[0], 1e-300)
 
-    def _gram(self, rows: _Rows, rival: int) -> Gram:
-        """What rows show of all candidates' differences from a rival, and of what that one can absorb; without priors
-        where they are added to others, which have them already."""
-        fit, prediction, design = self._fits[rival], rows.predictions[rival], rows.problem.design
-        own, precisions = [], []
-        for effect in fit.effects:
-            changes = effect_rows(design, prediction, effect)
-            discrepancy = changes[:, None] * factors_at(design.rows, effect.effect, self._ranges)
-            free = free_shapes(effect)
-            own += [effect_columns(design, prediction, effect)[:, free], discrepancy]
-            precisions += [*effect_precisions(effect)[free], *[criteria.DISCREPANCY_SD**-2.0] * discrepancy.shape[1]]
-        apart = np.stack([torque - rows.torques[rival] for torque in rows.torques], axis=1)
-        silent = replace(
-            fit, prediction=prediction, torque=rows.torques[rival], residual=np.zeros(apart.shape[0]), effects=()
-        )
-        columns = np.concatenate([*own, apart], axis=1)
-        gram = gram_of(rows.problem, silent, columns)
-        if rows.problem.priors.rows.size:
-            diagonal = gram.base + np.arange(len(precisions))
-            gram.matrix[diagonal, diagonal] += precisions
-        return replace(gram, base=gram.base + len(precisions))
+    def _grams(self, problem: FitProblem, predictions: Sequence[Prediction]) -> list[Gram]:
+        """What rows show of all candidates' differences from each, and of what that one can absorb; without priors where
+        they are added to others, which have them already."""
+        design, grams = problem.design, list[Gram]()
+        torques = [_torque(design, at, fit) for at, fit in zip(predictions, self._fits, strict=True)]
+        for fit, prediction, mine in zip(self._fits, predictions, torques, strict=True):
+            own, precisions = [], []
+            for effect in fit.effects:
+                changes = effect_rows(design, prediction, effect)
+                discrepancy = changes[:, None] * factors_at(design.rows, effect.effect, self._ranges)
+                free = free_shapes(effect)
+                own += [effect_columns(design, prediction, effect)[:, free], discrepancy]
+                precisions += [
+                    *effect_precisions(effect)[free],
+                    *[criteria.DISCREPANCY_SD**-2.0] * discrepancy.shape[1],
+                ]
+            apart = np.stack([torque - mine for torque in torques], axis=1)
+            silent = replace(fit, prediction=prediction, torque=mine, residual=np.zeros(mine.size), effects=())
+            gram = gram_of(problem, silent, np.concatenate([*own, apart], axis=1))
+            if problem.priors.rows.size:
+                diagonal = gram.base + np.arange(len(precisions))
+                gram.matrix[diagonal, diagonal] += precisions
+            grams.append(replace(gram, base=gram.base + len(precisions)))
+        return grams
 
 
 def _torque(design: Design, prediction: Prediction, fit: Fit) -> FloatArray:
@@ -152,10 +141,3 @@ def _noise_law(problem: FitProblem, torque: FloatArray) -> FloatArray:
         # data under torque hardly determine the noise at zero
         laws.append([max(law[0], 0.2**2 * float(np.median(variance[part]))), law[1]])
     return np.array(laws)
-
-
-def _usual_deviation(law: FloatArray, added: Design, torque: FloatArray) -> FloatArray:
-    """The noise [n] Nm that rows to come will have."""
-    steady = np.arange(added.torque.size) < added.plateaus
-    constant, share = np.where(steady[:, None], law[0], law[1]).T
-    return np.asarray(np.sqrt((constant + share * torque**2) / added.samples), dtype=np.float64)

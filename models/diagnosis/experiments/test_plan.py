@@ -17,9 +17,8 @@ from scipy.special import ndtr, softmax
 from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.design import criteria as design_criteria
 from models.diagnosis.design.design import Design, build_design
-from models.diagnosis.design.facts import facts_of
+from models.diagnosis.design.facts import REFERENCES, facts_of
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.readings import TORQUE_ZERO_SHIFT
 from models.diagnosis.effects.thermal import AT_ONCE, OIL_TEMPERATURE
@@ -204,7 +203,7 @@ def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[Fit]) -
     mistaken = any(effect.effect.slug == shift for fit in fits for effect in fit.effects)
     if problem.design.facts.temperature_measured or not mistaken or added is None:
         return []
-    added = replace(added, facts=replace(added.facts, reference_temperature=design_criteria.REFERENCE_TEMPERATURE))
+    added = replace(added, facts=replace(added.facts, reference_temperature=criteria.REFERENCE_TEMPERATURE))
     effect = OIL_TEMPERATURE
     usual = replace(fits[0], effects=(FittedEffect(effect=effect, amplitude=effect.prior_sd, shape=(0.0, AT_ONCE)),))
     distances = CandidateDistances(problem, (usual, bare(fits[0])))
@@ -222,13 +221,6 @@ def _added(campaign: Campaign, design: Design, key: str) -> Design | None:
     if then is None:
         return None
     stationary, dynamic = then.stationary[len(campaign.stationary) :], then.dynamic[len(campaign.dynamic) :]
-    before = design.facts
-    facts = replace(
-        facts_of(then),
-        states=before.states,
-        reference_temperature=before.reference_temperature,
-        usual_torque=before.usual_torque,
-        usual_pressure=before.usual_pressure,
-    )
+    facts = replace(facts_of(then), **{name: getattr(design.facts, name) for name in ("states", *REFERENCES)})
     added = replace(build_design(replace(then, stationary=stationary, dynamic=dynamic)), facts=facts)
     return added if added.torque.size else None

@@ -60,7 +60,7 @@ def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = No
         contrasts.columns,
         off_by(design, fitted, factors),
     )
-    gram = gram_of(problem, exactly(fitted), np.concatenate(changes, axis=1))
+    gram = gram_of(problem, fitted, np.concatenate(changes, axis=1))
     gram, outward = _held_at_bounds(gram, int(problem.priors.free.sum()), fitted)
     ends = np.cumsum([outward.size, *(change.shape[1] for change in changes)])
     held, catalogue, contrasted, wrong = (slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
@@ -94,13 +94,6 @@ def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = No
             for axis, mine in places.items()
         },
         screened=tuple(screened),
-    )
-
-
-def exactly(fitted: Fit) -> Fit:
-    """A fit whose templates are exact: their errors are columns of their own."""
-    return replace(
-        fitted, effects=tuple(replace(e, effect=replace(e.effect, discrepancies=())) for e in fitted.effects)
     )
 
 

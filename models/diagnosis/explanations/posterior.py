@@ -38,7 +38,7 @@ from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.history import OIL_CHANGE
 from models.diagnosis.effects.thermal import OIL_TEMPERATURE
 from models.diagnosis.explanations.evidence import Evidence, evidence_of
-from models.diagnosis.explanations.shapeless import lines, outlier_evidence, temperature_evidence
+from models.diagnosis.explanations.shapeless import highest_line, line_evidence, outlier_evidence, temperature_evidence
 from models.diagnosis.explanations.verdict import LINE, LINES, NOTHING, OUTLIER, Alternative, is_axis
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, refit, refit_beside
@@ -158,12 +158,8 @@ class Prior:
             return float(wrong + of_unknown)
         value = wrong + of_effect
         if len(alternative.causes) > 1:  # in either order
-            value += (
-                np.log(criteria.ANYTHING_WRONG)
-                + np.log(2.0)
-                + np.log1p(-criteria.UNCATALOGUED_SHARE)
-                - np.log(max(self.effects - 1, 1))
-            )
+            of_second = np.log1p(-criteria.UNCATALOGUED_SHARE) - np.log(max(self.effects - 1, 1))
+            value += np.log(2.0 * criteria.ANYTHING_WRONG) + of_second
         if alternative.unknown:
             value += np.log(criteria.ANYTHING_WRONG) + of_unknown
         return float(value)
@@ -310,16 +306,16 @@ class Search:
     def _down(self, leader: Alternative) -> None:
         """The leader with one thing less, from where it has the rest."""
         node = self.nodes[leader][0]
-        if is_axis(leader.unknown):
-            less = Alternative(leader.causes)
-            self._add(less, node.fit, node.fit.effects, node.shape_evidence, -np.inf)
-            self._screen({less} & self._unscreened)
-            return
-        for place, effect in enumerate(node.fit.effects):
+        places = [None] if is_axis(leader.unknown) else range(len(node.fit.effects))
+        fewer = set[Alternative]()
+        for place in places:
             effects = tuple(e for k, e in enumerate(node.fit.effects) if k != place)
             shape_evidence = tuple(x for k, x in enumerate(node.shape_evidence) if k != place)
-            self._add(leader.without(effect.effect.slug), node.fit, effects, shape_evidence, -np.inf)
-        self._screen({leader.without(effect.effect.slug) for effect in node.fit.effects} & self._unscreened)
+            gone = leader.unknown if place is None else node.fit.effects[place].effect.slug
+            less = leader.without(gone)
+            self._add(less, node.fit, effects, shape_evidence, -np.inf)
+            fewer.add(less)
+        self._screen(fewer & self._unscreened)
 
     def _add(
         self,
@@ -410,7 +406,7 @@ class Search:
         null = self.null
         left = without_likely_gains(self._null_problem, null.fit)
         swinging = [(record.effect, record.log_evidence) for record in raw if record.effect in LINES]
-        for unknown, value in [(LINE, lines(self._null_problem, left).evidence), *swinging]:
+        for unknown, value in [(LINE, line_evidence(highest_line(self._null_problem, left))), *swinging]:
             line = Alternative((), unknown)
             weights[line] = max(null.log_evidence + value + self.prior(line), weights.get(line, -np.inf))
         outlier = Alternative((), OUTLIER)
@@ -419,13 +415,12 @@ class Search:
         if not facts.temperature_measured and OIL_TEMPERATURE.slug not in without:
             warm = Alternative((OIL_TEMPERATURE.slug,))
             weights[warm] = null.log_evidence + temperature_evidence(self._null_problem, null.fit) + self.prior(warm)
-            if (
-                not facts.oil_changes
-            ):  # oil of another temperature from some state on is oil of another viscosity as well
-                for alternative in [a for a in weights if OIL_CHANGE.slug in a.causes]:
-                    causes = {*alternative.causes} - {OIL_CHANGE.slug} | {*warm.causes}
-                    twin = Alternative(tuple(sorted(causes)), alternative.unknown)
-                    weights[twin] = float(np.logaddexp(weights.get(twin, -np.inf), weights[alternative]))
+            # oil of another temperature from some state on is oil of another viscosity as well
+            changed = () if facts.oil_changes else [a for a in weights if OIL_CHANGE.slug in a.causes]
+            for alternative in changed:
+                causes = {*alternative.causes} - {OIL_CHANGE.slug} | {*warm.causes}
+                twin = Alternative(tuple(sorted(causes)), alternative.unknown)
+                weights[twin] = float(np.logaddexp(weights.get(twin, -np.inf), weights[alternative]))
         single = self.prior(Alternative(("",)))
         swings = {record.effect: record.log_evidence for record in raw if is_vibration(record)}
         misfit = min(nodes[0].evidence.misfit for nodes in self.nodes.values())

@@ -50,17 +50,11 @@ _SLOWER = 3
 _FEWEST_IN_A_RUN = 32
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HighestLine:
-    """The p-value of the highest line among all that were looked at."""
-
-    p_value: float = 1.0
-
-    @property
-    def evidence(self) -> float:
-        """What the p-value is worth at most [nats], 1/(-e p ln p) (Sellke, Bayarri and Berger, Am. Stat. 55 (2001) 62)."""
-        rare = -float(np.log(max(self.p_value, 1e-300)))
-        return rare - 1.0 - float(np.log(rare)) if rare > 1.0 else 0.0
+def line_evidence(p_value: float) -> float:
+    """What the p-value of the highest line is worth at most [nats], 1/(-e p ln p) (Sellke, Bayarri and Berger, Am. Stat. 55
+    (2001) 62)."""
+    rare = -float(np.log(max(p_value, 1e-300)))
+    return rare - 1.0 - float(np.log(rare)) if rare > 1.0 else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,19 +75,19 @@ class _Run:
         return np.asarray(np.abs(sums) ** 2 / np.maximum((self.weights**2).sum(axis=0), 1e-300), dtype=np.float64)
 
 
-def lines(problem: FitProblem, residual: FloatArray) -> HighestLine:
-    """The highest line in a residual [N] Nm, summed over the runs. The likely gains of curves are to be taken out before: at
-    one pressure after the other they are steps at even times."""
+def highest_line(problem: FitProblem, residual: FloatArray) -> float:
+    """The p-value of the highest line in a residual [N] Nm, summed over the runs, among all that were looked at. The likely
+    gains of curves are to be taken out before: at one pressure after the other they are steps at even times."""
     runs = _runs(problem.design, problem.noise, residual)
     longest = max((run.time.size for run in runs), default=0)
     if sum(run.time.size for run in runs) < 64 or longest < _FEWEST_IN_A_RUN:
-        return HighestLine()
+        return 1.0
     kept = [run for run in runs if run.time.size > 0.5 * longest]
     duration = float(np.median([run.time[-1] * run.time.size / (run.time.size - 1) for run in kept]))
     step = float(np.median([np.median(np.diff(run.time)) for run in kept]))
     last = min(int(duration / step), 4000) if step > 0.0 else 0
     if last < _FEWEST_IN_A_RUN:
-        return HighestLine()
+        return 1.0
     # from two and a half cycles a test on, beside three slower steps
     power = np.sum([run.power(5 - _SLOWER, last, np.pi / duration) for run in kept], axis=0)
     # a line is above its neighbourhood: noise whose autocorrelation was misjudged is not
@@ -104,7 +98,7 @@ def lines(problem: FitProblem, residual: FloatArray) -> HighestLine:
     slower = np.maximum.accumulate(power, axis=0)[_SLOWER - 1 : -1]
     power = np.where(power[_SLOWER:] >= slower, power[_SLOWER:], 0.0)
     tests = 1.5 * power.size
-    return HighestLine(p_value=min(1.0, tests * float(gammaincc(len(kept), power.max()))))
+    return min(1.0, tests * float(gammaincc(len(kept), power.max())))
 
 
 def _runs(design: Design, noise: Noise, residual: FloatArray) -> list[_Run]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.effects.effect import Effect, Tried
+from models.diagnosis.effects.effect import Tried
 from models.diagnosis.effects.fitted_effect import (
     Draw,
     FittedEffect,
@@ -28,7 +28,7 @@ from models.diagnosis.effects.fitted_effect import (
     smooth_places,
 )
 from models.diagnosis.explanations.amplitudes import Proportional
-from models.diagnosis.explanations.evidence import evidence_of, exactly, off_by, projections_beside, template_errors
+from models.diagnosis.explanations.evidence import evidence_of, off_by, projections_beside, template_errors
 from models.diagnosis.explanations.verdict import Judgement
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
@@ -73,10 +73,6 @@ class _Component:
     trend: tuple[float, FloatArray]
     last: tuple[FloatArray, ...]
 
-    def drawn(self, normals: FloatArray) -> FloatArray:
-        """Samples [n, m] of what the mean is of."""
-        return np.asarray(self.mean + normals[:, : self.mean.size] @ self.root.T)
-
     def effects(self, off: FloatArray) -> tuple[FittedEffect, ...]:
         """The effects at one sample [m]."""
         drawn, at, after = [], 0, sum(1 + len(smooth_places(fitted.effect)) for fitted in self.fit.effects)
@@ -118,18 +114,16 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
     samples: list[tuple[float, int, tuple[FittedEffect, ...]]] = []
     sized: dict[str, list[tuple[float, int]]] = {}
     for index, (component, count) in enumerate(zip(components, counts.tolist(), strict=True)):
-        offs = component.drawn(rng.standard_normal((count, width)))
+        offs = component.mean + rng.standard_normal((count, width))[:, : component.mean.size] @ component.root.T
         trends = component.trend[0] + offs @ component.trend[1]
         for off, trend in zip(offs, trends.tolist(), strict=True):
             effects = component.effects(off)
             for effect, size in zip(effects, component.sizes(effects), strict=True):
                 form = float(np.exp(criteria.SIZE_FORM * rng.standard_normal()))
                 sized.setdefault(effect.effect.slug, []).append((size * form, id(component.fit)))
-            samples.append(
-                (trend, index, tuple(effect for effect in effects if effect.effect.slug in judgement.causes))
-            )
-    nothing = max(criteria.SIZES_SAMPLED - len(samples), 0)
-    samples += [(0.0, 0, ())] * nothing
+            named = tuple(effect for effect in effects if effect.effect.slug in judgement.causes)
+            samples.append((trend, index, named))
+    samples += [(0.0, 0, ())] * (criteria.SIZES_SAMPLED - len(samples))  # nothing at work
     samples.sort(key=lambda sample: sample[0])
     strata = np.array_split(np.arange(len(samples)), min(criteria.DRAWS, len(samples)))
     chosen = [samples[stratum[stratum.size // 2]] for stratum in strata]
@@ -170,7 +164,10 @@ def _size(pairs: Sequence[tuple[float, int]]) -> Size:
 
 def _components(problem: FitProblem, original: Fit, share: float, rng: np.random.Generator) -> Iterator[_Component]:
     """A fit's effects refitted under each of their courses, weighed by evidence; as they were found where they have none."""
-    fitted = replace(original, effects=tuple(_unshrunk(effect) for effect in original.effects))
+    # a prior that is nearly flat in a size's logarithm: that the effect is at work is decided already
+    flat = [replace(e.effect, tails=min(e.effect.tails, criteria.SIZE_TAILS)) for e in original.effects]
+    effects = [replace(e, effect=effect) for e, effect in zip(original.effects, flat, strict=True)]
+    fitted = replace(original, effects=tuple(effects))
     courses = list(_courses(problem, fitted))
     if not courses:
         courses = [(0.0, fit(problem, fitted.laws, fitted.effects, steps=criteria.COURSE_STEPS))]
@@ -179,11 +176,6 @@ def _components(problem: FitProblem, original: Fit, share: float, rng: np.random
     for weight, (_, fitted) in zip((share * weights / weights.sum()).tolist(), courses, strict=True):
         if weight > share / criteria.SIZES_SAMPLED:
             yield from _components_of(problem, fitted, weight, rng)
-
-
-def _unshrunk(fitted: FittedEffect) -> FittedEffect:
-    """An effect whose size has a prior that is nearly flat in its logarithm: that it is at work is decided already."""
-    return replace(fitted, effect=replace(fitted.effect, tails=min(fitted.effect.tails, criteria.SIZE_TAILS)))
 
 
 def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
@@ -197,7 +189,10 @@ def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
             effect.effect,
             shapes=tuple(replace(shape, smooth=shape.smooth and not shape.held) for shape in effect.effect.shapes),
         )
-        for kind in _kinds(effect.effect, problem):
+        kinds: dict[float, list[Tried]] = {}  # by the first of the shapes
+        for one in effect.effect.courses(problem.design.facts):
+            kinds.setdefault(one.shape[0], []).append(one)
+        for kind in kinds.values():
             first = _most_alike(fitted, effect, kind)
             for way in (range(first, len(kind)), range(first - 1, -1, -1)):
                 near, laws = fitted.effects, fitted.laws
@@ -213,14 +208,6 @@ def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
                         break
                     near, laws = refit.effects, refit.laws
                     yield log, refit
-
-
-def _kinds(effect: Effect, problem: FitProblem) -> list[list[Tried]]:
-    """The courses of an effect by their kind, the first of its shapes."""
-    kinds: dict[float, list[Tried]] = {}
-    for tried in effect.courses(problem.design.facts) if effect.courses is not None else ():
-        kinds.setdefault(tried.shape[0], []).append(tried)
-    return list(kinds.values())
 
 
 def _with_free(shape: tuple[float, ...], fitted: FittedEffect) -> tuple[float, ...]:
@@ -245,7 +232,7 @@ def _components_of(problem: FitProblem, fitted: Fit, weight: float, rng: np.rand
     design, free = problem.design, int(problem.priors.free.sum())
     factors, own = template_errors(design, fitted)
     errors = off_by(design, fitted, factors)
-    gram = replace(gram_of(problem, exactly(fitted), errors), base=free)
+    gram = replace(gram_of(problem, fitted, errors), base=free)
     effects, places = fitted.effects, np.arange(len(fitted.effects))
     priors = [np.array([np.inf, *(effect_precisions(effect)[1:] ** -0.5)]) for effect in effects]
     of_shapes, of_errors = [prior.size for prior in priors], [off.shape[1] for off in factors]

@@ -94,7 +94,11 @@ def _pieces(
             phase = design.rows.phase[piece]
             key = phase.tobytes()  # all zeros for plateaus: their number alone counts
             if key not in cache:
-                cache[key] = _contrasts(_harmonics(phase) if looping else _polynomials(piece.size, degree))
+                smooth = legvander(np.linspace(-1.0, 1.0, piece.size), degree)
+                if looping:
+                    angles = np.arange(1, criteria.SMOOTH_HARMONICS + 1) * phase[:, None]
+                    smooth = np.column_stack([np.ones_like(phase), np.cos(angles), np.sin(angles)])
+                cache[key] = np.linalg.qr(smooth, mode="complete")[0][:, smooth.shape[1] :]
             pieces.append(Piece(rows=piece, contrasts=cache[key]))
     return pieces
 
@@ -110,20 +114,6 @@ def calm_pieces(design: Design, part: NDArray[np.bool_], residual: FloatArray) -
         return whole
     typical = float(np.median(of_short))
     return [piece for piece, square in zip(short, of_short, strict=True) if square < criteria.SHARP * typical]
-
-
-def _polynomials(count: int, degree: int) -> FloatArray:
-    return np.asarray(legvander(np.linspace(-1.0, 1.0, count), degree), dtype=np.float64)
-
-
-def _harmonics(phase: FloatArray) -> FloatArray:
-    angles = np.arange(1, criteria.SMOOTH_HARMONICS + 1) * phase[:, None]
-    return np.column_stack([np.ones_like(phase), np.cos(angles), np.sin(angles)])
-
-
-def _contrasts(smooth: FloatArray) -> FloatArray:
-    """An orthonormal basis [n, n - k] of what is orthogonal to smooth [n, k]."""
-    return np.linalg.qr(smooth, mode="complete")[0][:, smooth.shape[1] :]
 
 
 #: The grid of ρ and of w.
@@ -196,11 +186,8 @@ def _restricted_likelihood(
 
 def first_noise(design: Design) -> Noise:
     """Before anything is fitted: the assumed share of the torque."""
-    level = design.usual_torque
-    deviation = (criteria.ASSUMED * np.abs(design.torque) + 0.2 * criteria.ASSUMED * level + 1e-12) / np.sqrt(
-        np.minimum(design.samples, 30)
-    )
-    white = Correlation()
+    of_sample = criteria.ASSUMED * np.abs(design.torque) + 0.2 * criteria.ASSUMED * design.usual_torque + 1e-12
+    deviation, white = of_sample / np.sqrt(np.minimum(design.samples, 30)), Correlation()
     # some tenths of a percent are usual
     return Noise(deviation=deviation, plateaus=white, loops=white, run_gain=0.002, curve_gain=0.0)
 

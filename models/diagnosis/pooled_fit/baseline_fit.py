@@ -51,22 +51,16 @@ def starting_laws(design: Design, frame: Frame) -> Laws:
     theta[FALL] = np.log(0.6 * frame.span), np.log(criteria.USUAL_CURVATURE)
     for k in range(4):
         best = np.inf
-        for scale, decay in product(
-            (0.05, 0.15, 0.4, 1.2), (0.25, 0.6, 1.5) if k == RATIO and design.levels.size > 2 else (0.6,)
-        ):
+        decays = (0.25, 0.6, 1.5) if k == RATIO and design.levels.size > 2 else (0.6,)
+        for scale, decay in product((0.05, 0.15, 0.4, 1.2), decays):
             phi = scale * design.facts.life
             fall = falling_weight(high, frame.span, np.array([np.log(decay * frame.span), theta[LOG_CURVATURE]]))[0]
             first, second = (fall, 1 - fall) if k == RATIO else (1 - high, high)
-            fresh, cost = _along(
-                first, second, progress_fraction(cycles, phi, _EXPONENT), values[:, k], deviations[:, k]
-            )
+            done = progress_fraction(cycles, phi, _EXPONENT)
+            fresh, cost = _along(first, second, done, values[:, k], deviations[:, k])
             if cost < best:
-                best = cost
-                theta[k * BLOCK : (k + 1) * BLOCK] = [
-                    *fresh,
-                    np.log(phi * np.expm1(np.log(2.0) / _EXPONENT)),
-                    np.log(_EXPONENT),
-                ]
+                best, half = cost, np.log(phi * np.expm1(np.log(2.0) / _EXPONENT))
+                theta[k * BLOCK : (k + 1) * BLOCK] = [*fresh, half, np.log(_EXPONENT)]
                 if k == RATIO:
                     theta[LOG_DECAY] = np.log(decay * frame.span)
     if _speeds(design).size < criteria.CURVE_SPEEDS:
@@ -123,9 +117,8 @@ def _along(
     cost = float(np.log1p((off / (2 * usual)) ** 2).sum()) + off.size * float(np.log(usual))
     u_1, u_2, lost_1, lost_2 = solution.tolist()
     least = 1e-2 * scale
-    shares = [
-        float(np.clip(lost / (u if abs(u) > least else least), -1.2, 3.0)) for u, lost in ((u_1, lost_1), (u_2, lost_2))
-    ]
+    ends = ((u_1, lost_1), (u_2, lost_2))
+    shares = [float(np.clip(lost / (u if abs(u) > least else least), -1.2, 3.0)) for u, lost in ends]
     return [u_1, u_2, *shares], cost
 
 
@@ -139,15 +132,8 @@ def _curve_values(design: Design) -> tuple[FloatArray, FloatArray, FloatArray, F
         rows = plateaus[design.curve[plateaus] == index]
         if design.rows.run[rows[0]] not in chosen:
             continue
-        level = float(design.level[rows[0]])
-        curves.append(
-            Curve(
-                pressure=level,
-                mean_pressure=level,
-                velocity=design.rows.velocity[rows],
-                torque=design.torque[rows],
-            )
-        )
+        level, velocity = float(design.level[rows[0]]), design.rows.velocity[rows]
+        curves.append(Curve(pressure=level, mean_pressure=level, velocity=velocity, torque=design.torque[rows]))
         cycles.append(float(design.rows.cycles[rows[0]]))
     fits = fit_curves(curves)
     values = np.stack([curve_fit.parameters.as_array() for curve_fit in fits])
@@ -199,7 +185,7 @@ def fit_baseline(design: Design) -> Baseline:
     # with more every curve is determined and one start is enough
     starts = (start, cautious_laws(design, start)) if design.plateaus < 8000 else (start,)
     first = _best_of(problem, starts, _ROUGH)
-    problem, _ = _with_estimated_noise(problem, first)
+    problem = problem.with_noise(estimate_noise(design, first.residual, first.torque, problem.noise)[0])
     # with a noise that was only assumed the first fit may have ended in another valley
     second = _best_of(problem, starts, _ROUGH)
     return _with_its_noise(problem, _best_of(problem, (first.laws, second.laws), STEPS))
@@ -207,7 +193,8 @@ def fit_baseline(design: Design) -> Baseline:
 
 def _with_its_noise(problem: FitProblem, fitted: Fit) -> Baseline:
     """A fit followed to its end under the noise that its residuals show."""
-    problem, assumed = _with_estimated_noise(replace(problem, fitted=fitted.torque), fitted)
+    noise, assumed = estimate_noise(problem.design, fitted.residual, fitted.torque, problem.noise)
+    problem = replace(problem, noise=noise, fitted=fitted.torque)
     fitted = fit(problem, fitted.laws)
     _require_weights(problem, fitted)
     curve_gain = likely_curve_gain(gram_of(problem, fitted))
@@ -237,12 +224,6 @@ def _require_weights(problem: FitProblem, fitted: Fit) -> None:
 
 def _best_of(problem: FitProblem, starts: Sequence[Laws], steps: int) -> Fit:
     return min((fit(problem, laws, steps=steps) for laws in starts), key=lambda fitted: fitted.cost)
-
-
-def _with_estimated_noise(problem: FitProblem, fitted: Fit) -> tuple[FitProblem, bool]:
-    """The problem with the noise that a fit's residuals show, and whether that had to be assumed."""
-    noise, assumed = estimate_noise(problem.design, fitted.residual, fitted.torque, problem.noise)
-    return problem.with_noise(noise), assumed
 
 
 def _notes(design: Design, assumed: bool) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.baseline.laws import BLOCK, LOG_CURVATURE, LOG_DECAY, POWERS, Laws
+from models.diagnosis.baseline.laws import BLOCK, BLOCKS, COURSE, LOG_CURVATURE, LOG_DECAY, POWERS, SHARES, Laws
 from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.effects.effect import amplitude_cost
 from models.diagnosis.effects.fitted_effect import (
@@ -130,14 +130,11 @@ def _evaluated(problem: FitProblem, white: Whiten, laws: Laws, effects: tuple[Fi
         for effect in effects:
             torque += effect_rows(design, prediction, effect)
         residual = design.torque - torque
-        if not np.isfinite(residual).all():
-            cost = float("inf")
-        else:
-            cost = 0.5 * float((white(residual[:, None]) ** 2).sum()) + 0.5 * float(
-                ((priors.rows @ laws.theta - priors.means) ** 2).sum()
-            )
-            for effect in effects:
-                cost += amplitude_cost(effect.effect, effect.amplitude)
+        cost = float("inf")
+        if np.isfinite(residual).all():
+            cost = 0.5 * float((white(residual[:, None]) ** 2).sum())
+            cost += 0.5 * float(((priors.rows @ laws.theta - priors.means) ** 2).sum())
+            cost = sum((amplitude_cost(effect.effect, effect.amplitude) for effect in effects), cost)
     return Fit(
         laws=laws,
         prediction=prediction,
@@ -150,27 +147,36 @@ def _evaluated(problem: FitProblem, white: Whiten, laws: Laws, effects: tuple[Fi
     )
 
 
+def sensitivities(problem: FitProblem, fitted: Fit) -> FloatArray:
+    """∂torque/∂(free θ, then amplitude and smooth shapes of each effect) [N, m]."""
+    design, prediction = problem.design, fitted.prediction
+    of_effects = [effect_columns(design, prediction, effect) for effect in fitted.effects]
+    of_laws = law_columns(design, prediction, fitted.effects)[:, problem.priors.free]
+    return np.concatenate([of_laws, *of_effects], axis=1)
+
+
+def prior_gram(priors: Priors, fitted: Fit) -> FloatArray:
+    """What priors add [m + 1, m + 1] to the Gram matrix of (sensitivities, residual)."""
+    rows, off = priors.rows[:, priors.free], priors.means - priors.rows @ fitted.laws.theta
+    free, own = rows.shape[1], [effect_precisions(effect) for effect in fitted.effects]
+    gram = np.diag(np.concatenate([np.zeros(free), *own, [0.0]]))
+    gram[:free, :free] = rows.T @ rows
+    gram[:free, -1] = rows.T @ off
+    at = free
+    for effect, precisions in zip(fitted.effects, own, strict=True):
+        gram[at, -1] = -precisions[0] * effect.amplitude
+        at += precisions.size
+    gram[-1] = gram[:, -1]
+    costs = (2.0 * amplitude_cost(effect.effect, effect.amplitude) for effect in fitted.effects)
+    gram[-1, -1] = sum(costs, float(off @ off))
+    return gram
+
+
 def _normal(problem: FitProblem, white: Whiten, state: Fit) -> tuple[FloatArray, FloatArray]:
     """Gram matrix and gradient over the free θ and the effects' parameters."""
-    design, priors = problem.design, problem.priors
-    columns = [law_columns(design, state.prediction, state.effects)[:, priors.free]]
-    columns += [effect_columns(design, state.prediction, fitted) for fitted in state.effects]
-    jacobian = np.concatenate(columns, axis=1)
-    rows_white = white(np.column_stack([jacobian, state.residual]))
-    size = jacobian.shape[1]
-    count = int(priors.free.sum())
-    gram = rows_white[:, :size].T @ rows_white[:, :size]
-    gradient = rows_white[:, :size].T @ rows_white[:, size]
-    rows = priors.rows[:, priors.free]
-    gram[:count, :count] += rows.T @ rows
-    gradient[:count] -= rows.T @ (priors.rows @ state.laws.theta - priors.means)
-    at = count
-    for fitted in state.effects:
-        precisions = effect_precisions(fitted)
-        diagonal = np.arange(at, at + precisions.size)
-        gram[diagonal, diagonal] += precisions
-        gradient[at] -= fitted.amplitude * precisions[0]
-        at += precisions.size
+    columns = white(np.column_stack([sensitivities(problem, state), state.residual]))
+    free, left, prior = columns[:, :-1], columns[:, -1], prior_gram(problem.priors, state)
+    gram, gradient = free.T @ free + prior[:-1, :-1], free.T @ left + prior[:-1, -1]
     diagonal = np.diag(gram)
     gram[np.diag_indices_from(gram)] = np.where(diagonal > 0, (1.0 + 1e-12) * diagonal, 1.0)
     return gram, gradient
@@ -183,14 +189,12 @@ def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fi
     count = int(priors.free.sum())
     move = np.zeros(state.laws.theta.size)
     move[priors.free] = step[:count]
-    for k in range(4):
-        block = k * BLOCK
-        move[block + 2 : block + BLOCK] = np.clip(move[block + 2 : block + BLOCK], -_LARGEST_STEP, _LARGEST_STEP)
-    move[LOG_DECAY:-POWERS] = np.clip(move[LOG_DECAY:-POWERS], -_LARGEST_STEP, _LARGEST_STEP)
+    for limited in (move[:LOG_DECAY].reshape(BLOCKS, BLOCK)[:, SHARES.start :], move[LOG_DECAY:-POWERS]):
+        limited[:] = np.clip(limited, -_LARGEST_STEP, _LARGEST_STEP)
     theta = state.laws.theta + move
     theta[LOG_CURVATURE] = np.clip(theta[LOG_CURVATURE], *np.log(criteria.CURVATURE_BOUNDS))
-    for k in range(4):
-        theta[k * BLOCK + 4 : k * BLOCK + 6] = np.clip(theta[k * BLOCK + 4 : k * BLOCK + 6], -3.0, 25.0)
+    courses = theta[:LOG_DECAY].reshape(BLOCKS, BLOCK)[:, COURSE]  # a view
+    courses[:] = np.clip(courses, -3.0, 25.0)
     at, effects = count, []
     for fitted in state.effects:
         size = fitted.amplitude + float(step[at])

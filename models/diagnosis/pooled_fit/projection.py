@@ -26,16 +26,9 @@ from scipy.special import logsumexp
 from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.design.design import IntArray
-from models.diagnosis.effects.effect import amplitude_cost
-from models.diagnosis.effects.fitted_effect import (
-    discrepancy_columns,
-    discrepancy_factors,
-    effect_columns,
-    effect_precisions,
-    law_columns,
-)
+from models.diagnosis.effects.fitted_effect import discrepancy_columns, effect_precisions
 from models.diagnosis.noise.covariance import Noise, by_curve, gains_of, whitened
-from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gauss_newton import Fit, prior_gram, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
 
 
@@ -70,38 +63,26 @@ class Gram:
         return np.asarray(inverse * scale[:, None] * scale, dtype=np.float64)
 
 
-def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None) -> Gram:
-    """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows, none if None."""
-    design, noise, priors = problem.design, problem.noise, problem.priors
+def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None, *, exact: bool = True) -> Gram:
+    """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows, none if None.
+    Where templates are not `exact` their discrepancies belong to the baseline too."""
+    design, noise = problem.design, problem.noise
     changes = np.zeros((design.torque.size, 0)) if changes is None else changes
-    own = [effect_columns(design, fit.prediction, effect) for effect in fit.effects]
-    discrepancy = [discrepancy_columns(design, fit.prediction, effect) for effect in fit.effects]
-    jacobian = np.concatenate(
-        [law_columns(design, fit.prediction, fit.effects)[:, priors.free], *own, *discrepancy], axis=1
-    )
-    white = whitened(np.column_stack([jacobian, changes, fit.residual]), design, noise)
+    jacobian = sensitivities(problem, fit)
+    off = [] if exact else [discrepancy_columns(design, fit.prediction, effect) for effect in fit.effects]
+    white = whitened(np.column_stack([jacobian, *off, changes, fit.residual]), design, noise)
     gains = gains_of(design, fit.torque, noise)
     matrix = white.T @ white
-    free, base = int(priors.free.sum()), jacobian.shape[1]
-    rows = priors.rows[:, priors.free]
-    off = priors.means - priors.rows @ fit.laws.theta
-    matrix[:free, :free] += rows.T @ rows
-    matrix[:free, -1] += rows.T @ off
-    matrix[-1, :free] += rows.T @ off
-    matrix[-1, -1] += float(off @ off)
-    at = free
-    for effect, columns in zip(fit.effects, own, strict=True):
-        precisions = effect_precisions(effect)
-        diagonal = np.arange(at, at + columns.shape[1])
-        matrix[diagonal, diagonal] += precisions
-        matrix[at, -1] -= precisions[0] * effect.amplitude
-        matrix[-1, at] -= precisions[0] * effect.amplitude
-        matrix[-1, -1] += 2.0 * amplitude_cost(effect.effect, effect.amplitude)
-        at += columns.shape[1]
-    diagonal = np.arange(at, base)
-    matrix[diagonal, diagonal] += criteria.DISCREPANCY_SD**-2.0
+    own = np.append(np.arange(jacobian.shape[1]), -1)
+    matrix[np.ix_(own, own)] += prior_gram(problem.priors, fit)
+    loose = jacobian.shape[1] + np.arange(sum(columns.shape[1] for columns in off))
+    matrix[loose, loose] += criteria.DISCREPANCY_SD**-2.0
     return Gram(
-        matrix=matrix, along=by_curve(white, gains), squares=gains.squares, run_of_curve=gains.run_of_curve, base=base
+        matrix=matrix,
+        along=by_curve(white, gains),
+        squares=gains.squares,
+        run_of_curve=gains.run_of_curve,
+        base=jacobian.shape[1] + loose.size,
     )
 
 
@@ -132,7 +113,8 @@ class Projected:
 def projections_of(gram: Gram, noise: Noise) -> Iterator[Projected]:
     """With every scatter of the gains that is considered, one after the other: of the runs' gains, and of the curves' up to
     what the noise has or next above. Where the data ask for none of the latter without an effect, they do not with one."""
-    curves = [gain for gain in criteria.CURVE_GAINS if gain <= criteria.MORE_CURVE_GAIN * noise.curve_gain]
+    place = int(np.searchsorted(criteria.CURVE_GAINS, noise.curve_gain))  # 0 for none
+    curves = criteria.CURVE_GAINS[: place + 2 if place else 1]
     return (project(gram, gain, curve) for curve in curves for gain in GAINS.tolist())
 
 
@@ -188,11 +170,10 @@ def _factor(correlation: FloatArray) -> FloatArray:
 
 def amplitude_deviations(problem: FitProblem, fitted: Fit) -> list[float]:
     """Standard deviations of the amplitudes of the fit's effects, everything else free."""
-    gram = gram_of(problem, fitted)
+    gram = gram_of(problem, fitted, exact=False)
     inverse = gram.covariance(problem.noise.run_gain, problem.noise.curve_gain)
-    sizes = [1 + sum(shape.smooth for shape in effect.effect.shapes) for effect in fitted.effects]
-    discrepancies = sum(discrepancy_factors(problem.design, effect.effect).shape[1] for effect in fitted.effects)
-    places = gram.base - discrepancies - sum(sizes) + np.concatenate([[0], np.cumsum(sizes)])[: len(sizes)].astype(int)
+    sizes = [0, *(effect_precisions(effect).size for effect in fitted.effects[:-1])]
+    places = int(problem.priors.free.sum()) + np.cumsum(sizes)[: len(fitted.effects)]
     return [float(np.sqrt(max(inverse[place, place], 0.0))) for place in places]
 
 

@@ -13,6 +13,7 @@ and its law, order or frequency, how long the phase is kept, below which speed):
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -54,8 +55,10 @@ def raw_evidence(campaign: Campaign, without: frozenset[str] = frozenset()) -> t
     """What the raw records of a campaign show; nothing where there are none or they are too slow or too short. A swing of a
     kind that the catalogue is `without` has no name."""
     stationary = [(run, run.record) for run in campaign.stationary if run.record is not None]
-    cuts = [(record, _cut(record)) for _, record in _evenly(stationary)]
-    dwells = [(record, cut) for record, cut in cuts if cut is not None]
+    dwells = list[tuple[Record, PlateauCut]]()
+    for _, record in _evenly(stationary):
+        with suppress(UnusableRecordError):  # a record without dwells: the run that it came with has reported it
+            dwells.append((record, cut_plateaus(record)))
     records = [whitened_record(record, np.stack([cut.start, cut.stop], axis=1)) for record, cut in dwells]
     records += [whitened_record(record) for _, record in _evenly([(run, run.record) for run in campaign.dynamic])]
     swings = _lines([record for record in records if record is not None])
@@ -70,13 +73,6 @@ def _evenly(runs: Sequence[tuple[Run, Record]]) -> Sequence[tuple[Run, Record]]:
     if len(runs) <= most:
         return runs
     return [runs[i] for i in np.linspace(0, len(runs) - 1, most).round().astype(int)]
-
-
-def _cut(record: Record) -> PlateauCut | None:
-    try:
-        return cut_plateaus(record)
-    except UnusableRecordError:  # a record without dwells: the run that it came with has reported it
-        return None
 
 
 def _lines(records: list[WhitenedRecord]) -> list[RawEvidence]:

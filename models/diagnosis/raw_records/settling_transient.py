@@ -43,7 +43,9 @@ def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> SettlingEv
         transients = list(_transients(record, cut))
         if len(transients) < 2:
             continue
-        correlation = _neighbour_correlation([torque for _, torque, _ in transients])
+        neighbours = sum(float(torque[1:] @ torque[:-1]) for _, torque, _ in transients)
+        squares = sum(float(torque @ torque) for _, torque, _ in transients)
+        correlation = np.clip(neighbours / max(squares, 1e-300), 0.0, 0.98)  # of neighbouring samples
         for time, torque, step in transients:
             columns = np.column_stack([torque, step * np.exp(-time[:, None] / times)])
             white = columns[1:] - correlation * columns[:-1]
@@ -82,10 +84,3 @@ def _transients(record: Record, cut: PlateauCut) -> Iterator[tuple[FloatArray, F
         torque = record.torque[used]
         if torque.size >= 20 and np.isfinite(torque).all():
             yield record.time[used] - begin, torque - torque.mean(), float(means[i - 1] - means[i])
-
-
-def _neighbour_correlation(dwells: list[FloatArray]) -> float:
-    """ρ of neighbouring samples, pooled over dwells."""
-    along = sum(float(torque[1:] @ torque[:-1]) for torque in dwells)
-    squares = sum(float(torque @ torque) for torque in dwells)
-    return float(np.clip(along / max(squares, 1e-300), 0.0, 0.98))

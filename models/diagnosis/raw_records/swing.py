@@ -31,6 +31,9 @@ from models.arrays import FloatArray
 from models.diagnosis.design.design import IntArray
 from models.diagnosis.raw_records.whitened_torque import WhitenedRecord
 
+Bools: TypeAlias = NDArray[np.bool_]
+ComplexArray: TypeAlias = NDArray[np.complex128]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
@@ -48,7 +51,8 @@ class Line:
 #: Amplitudes tried, as multiples of the one at which all stretches together show about 4 nats, and their prior weights: a
 #: loud swing is evident with any.
 AMPLITUDES = np.array([0.9, 1.1, 1.35, 1.65, 2.0, 2.5, 3.2, 4.5, 7.0, 12.0, 25.0, 60.0])
-AMPLITUDE_WEIGHTS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.5, 0.2, 0.1, 0.1, 0.1]) / 8.0
+AMPLITUDE_WEIGHTS = np.repeat([1.0, 0.5, 0.2, 0.1], [7, 1, 1, 3])
+AMPLITUDE_WEIGHTS /= AMPLITUDE_WEIGHTS.sum()
 #: One stretch counts for at most so many nats: one burst is not an order.
 MOST_PER_STRETCH = 10.0
 #: The noise level beside a line is taken for 1 unless more than so many stretches show another.
@@ -85,11 +89,6 @@ def trial_amplitudes(weight: FloatArray) -> FloatArray:
     return np.asarray(2.0 * np.sqrt(np.multiply.outer(AMPLITUDES**2, faint)))
 
 
-def noise_level(*sides: tuple[float, float]) -> float:
-    """The mean of u beside an order, from (sum, count) on either side: that of the louder side."""
-    return max((total + PRIOR_STRETCHES) / (count + PRIOR_STRETCHES) for total, count in sides)
-
-
 def log_likelihood_ratios(power: FloatArray, weight: FloatArray, amplitudes: FloatArray) -> FloatArray:
     """log L(a)/L(0) [s] (or [s, f]) of u and N [j] (or [j, f]) at a [s] (or [s, f])."""
     return np.stack([np.minimum(rice(power, 0.25 * weight * a**2), MOST_PER_STRETCH).sum(axis=0) for a in amplitudes])
@@ -104,33 +103,30 @@ def amplitude(power: FloatArray, weight: FloatArray) -> float:
 ORDERS = {0.5: 0.05, 1.0: 0.25, 1.5: 0.03, 2.0: 0.20, 3.0: 0.08, 4.0: 0.07, 5.0: 0.03, 6.0: 0.05, 8.0: 0.04}
 ORDERS |= {10.0: 0.02, 12.0: 0.03}
 #: Offsets [per revolution] of the orders beside one, which give the noise level: it does not show there.
-_BELOW, _ABOVE = (-0.3, -0.2), (0.2, 0.3)
+_BESIDE = (0.2, 0.3)
 #: Numbers of stretches over which the phase may be kept.
 _COHERENT = (1, 2, 4, 12)
 #: Laws of the size: with the load (the torque's root, between independent of it and proportional), or with the speed.
 _LAWS = ("load", "speed")
 #: D and N [b] of an order in the stretches of all records.
-Demodulated: TypeAlias = tuple[NDArray[np.complex128], FloatArray]
+Demodulated: TypeAlias = tuple[ComplexArray, FloatArray]
 
 
 def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> Line:
     """The evidence of ripple and its best order; samples in which `line` would lie on the order are left out."""
-    stretches = [_stretch_starts(record) for record in records]
-    groups = _coherent_groups(records)
+    stretches, groups = _stretches(records)
     sizes = _relative_sizes(records, stretches)
-    orders = sorted({round(k + offset, 1) for k in ORDERS for offset in (*_BELOW, 0.0, *_ABOVE)})
+    orders = sorted({round(k + side * offset, 1) for k in ORDERS for side in (-1.0, 0.0, 1.0) for offset in _BESIDE})
     demodulated = _demodulated(records, stretches, orders, line)
     by_order: dict[float, FloatArray] = {}
     best, highest = Line(), -np.inf
     for order, probability in ORDERS.items():
         logs = np.zeros((len(_LAWS), len(_COHERENT)))
-        for i, law in enumerate(_LAWS):
-            for j, kept in enumerate(_COHERENT):
-                evidence, size, peak = _order_evidence(demodulated, order, sizes[law], groups[kept])
-                logs[i, j] = evidence
-                if evidence + np.log(probability) > highest and peak > 0:
-                    highest = evidence + float(np.log(probability))
-                    best = Line(position=order, amplitude=size, peak=peak)
+        for (i, law), (j, kept) in itertools.product(enumerate(_LAWS), enumerate(_COHERENT)):
+            found = _order_evidence(demodulated, order, sizes[law], groups[kept])
+            logs[i, j] = found.evidence
+            if found.evidence + np.log(probability) > highest and found.peak > 0:
+                highest, best = found.evidence + float(np.log(probability)), found
         by_order[order] = logs
     parts = [np.log(probability / by_order[k].size) + by_order[k].ravel() for k, probability in ORDERS.items()]
     both = by_order[1.0] + by_order[2.0]
@@ -138,49 +134,35 @@ def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> L
     return replace(best, evidence=float(logsumexp(np.concatenate(parts))))
 
 
-def _stretch_count(record: WhitenedRecord, first: int, stop: int) -> int:
-    return max(1, round((stop - first) * record.step / 1.25))  # stretches of 1.25 s
-
-
-def _stretch_starts(record: WhitenedRecord) -> IntArray:
-    """First samples of the stretches of a record."""
-    starts = []
-    for first, stop in zip(record.starts[:-1], record.starts[1:], strict=True):
-        count = _stretch_count(record, first, stop)
-        starts.append(np.linspace(first, stop, count + 1)[:-1].astype(np.intp))
-    return np.concatenate(starts)
-
-
-def _coherent_groups(records: Sequence[WhitenedRecord]) -> dict[int, IntArray]:
-    """For each number of stretches over which the phase is kept: the first stretches of the groups, which stay within a
-    piece."""
-    groups: dict[int, list[int]] = {kept: [] for kept in _COHERENT}
-    before = 0
+def _stretches(records: Sequence[WhitenedRecord]) -> tuple[list[IntArray], dict[int, IntArray]]:
+    """The first samples of each record's stretches, and for each number of stretches over which the phase is kept the first
+    stretches of the groups, which stay within a piece."""
+    starts, groups, before = [], {kept: list[IntArray]() for kept in _COHERENT}, 0
     for record in records:
-        for first, stop in zip(record.starts[:-1], record.starts[1:], strict=True):
-            count = _stretch_count(record, first, stop)
+        own = []
+        for first, stop in itertools.pairwise(record.starts):
+            count = max(1, round((stop - first) * record.step / 1.25))  # stretches of 1.25 s
+            own.append(np.linspace(first, stop, count + 1)[:-1].astype(np.intp))
             for kept in _COHERENT:
                 parts = max(1, round(count / kept))
-                groups[kept] += (before + np.linspace(0, count, parts + 1)[:-1].astype(np.intp)).tolist()
+                groups[kept].append(before + np.linspace(0, count, parts + 1)[:-1].astype(np.intp))
             before += count
-    return {kept: np.array(firsts, dtype=np.intp) for kept, firsts in groups.items()}
+        starts.append(np.concatenate(own))
+    return starts, {kept: np.concatenate(firsts) for kept, firsts in groups.items()}
 
 
 def _relative_sizes(records: Sequence[WhitenedRecord], stretches: list[IntArray]) -> dict[str, FloatArray]:
     """Each law's relative size [b] in the stretches, 1 on average."""
-
-    def means(channels: list[FloatArray]) -> FloatArray:
+    sizes = {}
+    for law, name in (("load", "torque"), ("speed", "speed")):
+        channels = [getattr(record, name) for record in records]
         by_record = [
             np.add.reduceat(np.abs(channel), firsts) / np.diff(np.append(firsts, channel.size))
             for channel, firsts in zip(channels, stretches, strict=True)
         ]
         values = np.concatenate(by_record)
-        return values / max(float(np.sqrt(np.mean(values**2))), 1e-300)
-
-    return {
-        "load": np.sqrt(means([record.torque for record in records])),
-        "speed": means([record.speed for record in records]),
-    }
+        sizes[law] = values / max(float(np.sqrt(np.mean(values**2))), 1e-300)
+    return sizes | {"load": np.sqrt(sizes["load"])}
 
 
 def _demodulated(
@@ -229,28 +211,23 @@ def _powers(order: Demodulated, size: FloatArray, firsts: IntArray) -> tuple[Flo
     return np.abs(total[visible]) ** 2 / weight[visible], weight[visible]
 
 
-def _order_evidence(
-    demodulated: dict[float, Demodulated], order: float, size: FloatArray, firsts: IntArray
-) -> tuple[float, float, float]:
-    """Evidence of an order, its amplitude, and the largest log likelihood ratio."""
+def _order_evidence(demodulated: dict[float, Demodulated], order: float, size: FloatArray, firsts: IntArray) -> Line:
+    """The evidence of an order whose relative size is as given, its phase kept within the groups."""
     power, weight = _powers(demodulated[order], size, firsts)
     if power.size < 4:
-        return 0.0, 0.0, 0.0
-    sides = []
-    for offsets in (_BELOW, _ABOVE):
-        beside = [_powers(demodulated[round(order + offset, 1)], size, firsts)[0] for offset in offsets]
-        sides.append((float(sum(values.sum() for values in beside)), float(sum(values.size for values in beside))))
-    noise = noise_level(*sides)
+        return Line()
+    noise = 0.0  # that of the louder side
+    for side in (-1.0, 1.0):
+        beside = [_powers(demodulated[round(order + side * offset, 1)], size, firsts)[0] for offset in _BESIDE]
+        total, count = sum(float(values.sum()) for values in beside), sum(values.size for values in beside)
+        noise = max(noise, (total + PRIOR_STRETCHES) / (count + PRIOR_STRETCHES))
     logs = log_likelihood_ratios(power / noise, weight / noise, trial_amplitudes(weight / noise))
-    return (
-        float(logsumexp(logs, b=AMPLITUDE_WEIGHTS)),
-        amplitude(power / noise, weight / noise),
-        float(logs.max()),
+    return Line(
+        evidence=float(logsumexp(logs, b=AMPLITUDE_WEIGHTS)),
+        position=order,
+        amplitude=amplitude(power / noise, weight / noise),
+        peak=float(logs.max()),
     )
-
-
-Bools: TypeAlias = NDArray[np.bool_]
-ComplexArray: TypeAlias = NDArray[np.complex128]
 
 
 #: Shares [-] of the highest speed below which stick-slip is looked for; spacing of the frequencies [Hz].
@@ -341,7 +318,7 @@ def _passages(
     passages = []
     speed = uniform_filter1d(np.abs(record.speed), max(1, round(0.1 / record.step)), mode="nearest")
     within = (speed >= above) & (speed <= below)
-    for first, stop in zip(record.starts[:-1], record.starts[1:], strict=True):
+    for first, stop in itertools.pairwise(record.starts):
         edges = np.flatnonzero(np.diff(np.concatenate([[False], within[first:stop], [False]]).astype(np.int8)))
         for enter, leave in zip(first + edges[::2], first + edges[1::2], strict=True):
             if (leave - enter) * record.step < 0.5:
@@ -365,21 +342,16 @@ def best_slow_line(records: Sequence[WhitenedRecord], order: Line | None = None)
         if windows is not None:
             size = np.sqrt(windows.torque / max(float(np.mean(windows.torque)), 1e-300))
             lines.append(_line(windows, size, order, share))
-    return _averaged(lines, len(_SLOW_SHARES))
+    if not lines:
+        return Line()
+    average = float(logsumexp([line.evidence for line in lines]) - np.log(len(_SLOW_SHARES)))
+    return replace(max(lines, key=lambda line: line.evidence), evidence=average)
 
 
 def best_line(records: Sequence[WhitenedRecord], order: Line | None = None, above: float = 0.0) -> Line:
     """The evidence of a line at all speeds alike, or at all above a share of the highest."""
     windows = windows_of(records, 1.0, 2.0, np.inf, above)
-    return Line() if windows is None else _averaged([_line(windows, np.ones_like(windows.torque), order, 1.0)], 1)
-
-
-def _averaged(lines: list[Line], tried: int) -> Line:
-    """The best line, with the evidence averaged over as many speed shares as were tried."""
-    if not lines:
-        return Line()
-    best = max(lines, key=lambda line: line.evidence)
-    return replace(best, evidence=float(logsumexp([line.evidence for line in lines]) - np.log(tried)))
+    return Line() if windows is None else _line(windows, np.ones_like(windows.torque), order, 1.0)
 
 
 def _line(windows: Windows, size: FloatArray, order: Line | None, share: float) -> Line:
@@ -401,9 +373,8 @@ def _line(windows: Windows, size: FloatArray, order: Line | None, share: float) 
     evidence = float(logsumexp(logs, b=AMPLITUDE_WEIGHTS[:, np.newaxis] * prior))
     _, _, column = np.unravel_index(int(logs.argmax()), logs.shape)
     near = frequencies[np.abs(frequencies - frequencies[column]) < _NEAREST_BIN]
-    best = near[
-        int((power[:, near] * weight[:, near]).sum(axis=0).argmax())
-    ]  # where the windows with most weight agree
+    # where the windows with most weight agree
+    best = near[int((power[:, near] * weight[:, near]).sum(axis=0).argmax())]
     shown = visible[:, best]
     return Line(
         evidence=evidence,
@@ -444,10 +415,8 @@ def _tied(sums: ComplexArray, weight: FloatArray, amplitudes: FloatArray) -> Flo
     lags = np.exp(-2j * np.pi * np.arange(_LAGS) / _LAGS)
     first = (sums[:, :1] * phases).real
     second = (lags[:, np.newaxis, np.newaxis] * (sums[:, 1:] * phases**2)).real
-    along, cost = (
-        first + _SECOND_HARMONIC * second,
-        0.25 * (weight[:, 0] + _SECOND_HARMONIC**2 * weight[:, 1]),
-    )
+    along = first + _SECOND_HARMONIC * second
+    cost = 0.25 * (weight[:, 0] + _SECOND_HARMONIC**2 * weight[:, 1])
     top = along.max(axis=-1)
     logs = []
     for a in amplitudes:

@@ -148,26 +148,15 @@ def whitened_record(record: Record, spans: FloatArray | None = None) -> Whitened
     # knots are closer than 0.25 s and a fortieth of the speed's own period
     spacing = min(0.25, *((1 / 40) * _speed_period(piece.speed, step) for piece in pieces))
     between = round(spacing / step)
-    if (
-        between < 5  # with fewer samples between knots the spline leaves nothing
-        or not LOWEST_CYCLES / (between * step) < HIGHEST_SHARE / step
-    ):
+    # with fewer than five samples between knots the spline leaves nothing
+    if between < 5 or not LOWEST_CYCLES / (between * step) < HIGHEST_SHARE / step:
         return None
     averaged_out = cleaned.torque[: cleaned.torque.size // count * count].reshape(-1, count).var(axis=1).mean()
-    return _whitened(
-        # noise of less than 0.45 counts does not blur the recorder's steps, which then look like a swing
-        pieces,
-        step,
-        between,
-        (0.45 * _recorder_count(cleaned.torque)) ** 2 - float(averaged_out),
-    )
-
-
-def _recorder_count(torque: FloatArray) -> float:
-    """The least step [Nm] between recorded values."""
-    steps = np.abs(np.diff(torque[:5000]))
-    steps = steps[steps > 1e-9 * float(np.abs(torque).max())]
-    return float(steps.min()) if steps.size else 0.0
+    steps = np.abs(np.diff(cleaned.torque[:5000]))
+    counts = steps[steps > 1e-9 * float(np.abs(cleaned.torque).max())]
+    # noise of less than 0.45 counts does not blur the recorder's steps, which then look like a swing
+    blurred = (0.45 * float(counts.min(initial=np.inf))) ** 2 if counts.size else 0.0
+    return _whitened(pieces, step, between, blurred - float(averaged_out))
 
 
 def _speed_period(speed: FloatArray, step: float) -> float:

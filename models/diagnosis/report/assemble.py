@@ -12,7 +12,7 @@ from models.diagnosis.design.design import Design
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import FROM_THE_START, sized
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
-from models.diagnosis.effects.fitted_effect import Estimate, FittedEffect, ranges_of
+from models.diagnosis.effects.fitted_effect import Estimate, ranges_of
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.posterior import Posterior
 from models.diagnosis.explanations.shapeless import outlying_run
@@ -45,16 +45,20 @@ def candidates_of(
         fitted = next((f for f in (*judgement.stand, *alone, *judgement.others) if slug in f.slugs), None)
         evidence = judgement.evidence.get(slug, 0.0)
         if fitted is not None:
-            place = fitted.slugs.index(slug)
-            estimate = _estimate(
-                slug, fitted.fit.effects[place].amplitude, amplitude_deviations(problem, fitted.fit)[place]
-            )
+            place, evidence = fitted.slugs.index(slug), fitted.evidence
+            effect = fitted.fit.effects[place]
+            estimate = _estimate(slug, effect.amplitude, amplitude_deviations(problem, fitted.fit)[place])
             if slug in sizes:
-                estimate = _sized(slug, sizes[slug])
-            estimate = _with_onset(estimate, fitted.fit.effects[place])
-            evidence = fitted.evidence
+                size, scale = sizes[slug], effect.effect.scale
+                low, high = (_finite(scale * end) for end in size.interval)
+                estimate = _estimate(slug, size.value, size.sd)
+                estimate = replace(estimate, stated_interval=(low, high), stated_sign=1.0 - size.other_sign)
+            onset = effect.effect.onset(effect.shape)
+            if onset != FROM_THE_START:
+                estimate = replace(estimate, name=f"{estimate.name} (from about {number(onset)} cycles on)")
         elif slug in records:
-            estimate, evidence = _finite_estimate(records[slug].estimate), records[slug].log_evidence
+            estimate, evidence = records[slug].estimate, records[slug].log_evidence
+            estimate = replace(estimate, value=_finite(estimate.value), sd=_finite(estimate.sd))
         else:  # screened only, or an oil temperature that was not measured
             estimate = _estimate(slug, 0.0, sized(BY_SLUG[slug], problem.design.facts).prior_sd)
         candidates.append(
@@ -82,36 +86,14 @@ def _estimate(slug: str, amplitude: float, deviation: float) -> Estimate:
     )
 
 
-def _sized(slug: str, size: Size) -> Estimate:
-    scale = BY_SLUG[slug].scale
-    low, high = (_finite(scale * end) for end in size.interval)
-    return replace(_estimate(slug, size.value, size.sd), stated_interval=(low, high), stated_sign=1.0 - size.other_sign)
-
-
-def _with_onset(estimate: Estimate, fitted: FittedEffect) -> Estimate:
-    """With the cycle from which on the effect is at work, where it was not from the start."""
-    onset = fitted.effect.onset(fitted.shape)
-    if onset == FROM_THE_START:
-        return estimate
-    return replace(estimate, name=f"{estimate.name} (from about {number(onset)} cycles on)")
-
-
-def _finite_estimate(estimate: Estimate) -> Estimate:
-    return replace(estimate, value=_finite(estimate.value), sd=_finite(estimate.sd))
-
-
 def with_signs(explanations: Iterable[Explanation], candidates: Iterable[Candidate]) -> tuple[Explanation, ...]:
     """Explanations with the probability that the least certain of their effects' signs is right."""
     signs = {candidate.effect: candidate.estimate.sign_probability for candidate in candidates}
-    return tuple(
-        replace(
-            explanation,
-            sign_probability=min(
-                (sign for slug in explanation.effects if (sign := signs.get(slug)) is not None), default=None
-            ),
-        )
-        for explanation in explanations
-    )
+    certain = []
+    for explanation in explanations:
+        known = [sign for slug in explanation.effects if (sign := signs.get(slug)) is not None]
+        certain.append(replace(explanation, sign_probability=min(known, default=None)))
+    return tuple(certain)
 
 
 def _finite(value: float) -> float:
@@ -135,20 +117,17 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
         return "No extended model is offered: its error on left-out runs is larger than the baseline's."
     if gain is not None and gain.log_score_gain < 0:
         return "No extended model is offered: the baseline predicts left-out runs better."
-    return " ".join(
-        _unsure(slug, size) for slug, size in sizes.by_slug.items() if size.other_sign > criteria.SIGN_UNDETERMINED
-    )
-
-
-def _unsure(slug: str, size: Size) -> str:
-    effect = BY_SLUG[slug]
-    low, high = (number(effect.scale * end) for end in size.interval)
-    wrong = f"its sign may be wrong with probability {size.other_sign:.2f}"
-    why = f"it depends on the assumed course over life, and {wrong}" if size.courses else wrong
-    return (
-        f"No extended model is offered: these data do not determine the size of {effect_name(slug)} "
-        f"(90 % interval {low} to {high} {effect.unit}); {why}."
-    )
+    sentences = []
+    for slug, size in sizes.by_slug.items():
+        if size.other_sign > criteria.SIGN_UNDETERMINED:
+            effect = BY_SLUG[slug]
+            low, high = (number(effect.scale * end) for end in size.interval)
+            course = "it depends on the assumed course over life, and " if size.courses else ""
+            sentences.append(
+                f"No extended model is offered: these data do not determine the size of {effect_name(slug)} (90 % interval "
+                f"{low} to {high} {effect.unit}); {course}its sign may be wrong with probability {size.other_sign:.2f}."
+            )
+    return " ".join(sentences)
 
 
 def statistics_of(posterior: Posterior, judgement: Judgement, scatter: RunScatter) -> dict[str, float]:
@@ -182,7 +161,7 @@ def report_of(
     """Candidates, misfits, gain, advice, maps, loops, extension, summary."""
     problem, fitted = posterior.problem, posterior.null.fit
     reason = reason_against(validation.gain, sizes)
-    notes = tuple(note for note in _notes(baseline, posterior, judgement, raw) if note)
+    notes = _notes(baseline, posterior, judgement, raw)
     scatter = run_scatter(posterior.null.evidence.screened)
     candidates = candidates_of(problem, judgement, raw, sizes.by_slug)
     extended = validation.extended
@@ -229,10 +208,8 @@ def _notes(
     ]
     if posterior.null.fit.status is FitStatus.OUT_OF_STEPS and posterior.probabilities[NOTHING] > criteria.NEGLIGIBLE:
         unfinished.append("nothing at work")
-    notes += [
-        f"The fit with {name} ended before its optimum: its probability may be larger than stated."
-        for name in unfinished
-    ]
+    ended = "ended before its optimum: its probability may be larger than stated."
+    notes += [f"The fit with {name} {ended}" for name in unfinished]
     if judgement.open:
         # an effect in one run alone may bend a better baseline's laws until that run fits
         alone = outlying_run(baseline.problem, baseline.fit)

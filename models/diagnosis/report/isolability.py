@@ -117,9 +117,12 @@ def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
         ways = []
         for true, rival in ((first, second), (second, first)):
             column, size = own[true]
-            imitation = _best_imitation(info, place_of[id(column)], [place_of[id(c)] for c, _ in visible[rival]], size)
-            other = posterior.columns[imitation[0]]
-            ways.append((_with(null, column, size), _with(null, other, imitation[1])))
+            at, others = place_of[id(column)], [place_of[id(other)] for other, _ in visible[rival]]
+            # the rival's column that imitates it best, at the amplitude at which it does
+            absorbed = np.maximum(np.diag(info)[others], 1e-300)
+            best = int(np.argmax(info[at, others] ** 2 / absorbed))
+            likest, imitated = others[best], float(size * info[at, others[best]] / absorbed[best])
+            ways.append((_with(null, column, size), _with(null, posterior.columns[likest], imitated)))
         pairs.append(_pair(campaign, posterior, (first, second), ways))
     return Isolability(
         pairs=tuple(sorted(pairs, key=lambda pair: pair.probability)),
@@ -131,13 +134,6 @@ def _likeliest(shapes: Sequence[tuple[Column, float]]) -> tuple[Column, float]:
     """The most probable shape in which an effect is seen, and the amplitude [SI] that is thought to be at work."""
     column, size = max((shape for shape in shapes if np.isfinite(shape[1])), key=lambda shape: shape[0].log_weight)
     return column, _TIMES_VISIBLE * size
-
-
-def _best_imitation(info: FloatArray, true: int, rivals: Sequence[int], size: float) -> tuple[int, float]:
-    """Which of the rival's columns imitates a column of that size best, and at which amplitude."""
-    own = np.maximum(np.diag(info)[rivals], 1e-300)
-    best = int(np.argmax(info[true, rivals] ** 2 / own))
-    return rivals[best], float(size * info[true, rivals[best]] / own[best])
 
 
 def _with(null: Fit, column: Column, amplitude: float) -> Fit:

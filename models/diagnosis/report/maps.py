@@ -1,19 +1,49 @@
 """Maps of a model's error: whitened residuals over speed and pressure and over cycles, and loops beside what models
 predict. As in the models' RMSE (`report.report`), the likeliest gains of runs and curves are no error."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.design.design import Design, IntArray
+from models.diagnosis.design.design import IntArray
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import without_likely_gains
-from models.diagnosis.report.report import LoopTrace, Maps
 
 #: Speeds are gathered into at most this many bins, states into as many (resolution of a map).
 MOST_BINS = 24
 #: Loops shown: so many states by so many pressures, spread evenly.
 SHOWN = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Maps:
+    """Mean whitened residuals [-] before and after the extension; NaN where nothing was measured.
+
+    Axes: pressure [p] Pa, speed [s] rad/s, cycles [c]. `speed_pressure` are [p, s], `pressure_cycles` [c, p].
+    """
+
+    pressure: FloatArray
+    speed: FloatArray
+    cycles: FloatArray
+    speed_pressure_before: FloatArray
+    speed_pressure_after: FloatArray
+    pressure_cycles_before: FloatArray
+    pressure_cycles_after: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopTrace:
+    """A loop over one period: speed [n] rad/s, torque [n] Nm measured, and what baseline and extended model give."""
+
+    pressure: float
+    cycles: float
+    frequency: float
+    speed: FloatArray
+    measured: FloatArray
+    baseline: FloatArray
+    extended: FloatArray
 
 
 def residual_maps(problem: FitProblem, baseline: Fit, extended: Fit | None) -> Maps | None:
@@ -28,17 +58,11 @@ def residual_maps(problem: FitProblem, baseline: Fit, extended: Fit | None) -> M
     cycles, of_cycles = _binned(design.rows.cycles[rows])
     after = baseline if extended is None else extended
     white = [without_likely_gains(problem, model)[rows] / noise.deviation[rows] for model in (baseline, after)]
-    by_speed = [_means(residual, of_level, of_speed, (levels.size, speeds.size)) for residual in white]
-    by_cycles = [_means(residual, of_cycles, of_level, (cycles.size, levels.size)) for residual in white]
-    return Maps(
-        pressure=levels,
-        speed=speeds,
-        cycles=cycles,
-        speed_pressure_before=by_speed[0],
-        speed_pressure_after=by_speed[1],
-        pressure_cycles_before=by_cycles[0],
-        pressure_cycles_after=by_cycles[1],
-    )
+    maps = {}
+    for when, residual in zip(("before", "after"), white, strict=True):
+        maps[f"speed_pressure_{when}"] = _means(residual, of_level, of_speed, (levels.size, speeds.size))
+        maps[f"pressure_cycles_{when}"] = _means(residual, of_cycles, of_level, (cycles.size, levels.size))
+    return Maps(pressure=levels, speed=speeds, cycles=cycles, **maps)
 
 
 def _binned(values: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -75,21 +99,23 @@ def loop_traces(problem: FitProblem, baseline: Fit, extended: Fit | None) -> tup
     ]
     before = design.torque - without_likely_gains(problem, baseline)
     after = before if extended is None else design.torque - without_likely_gains(problem, extended)
-    return tuple(_trace(design, before, after, np.flatnonzero(number == loop)) for loop in chosen)
+    traces = []
+    for loop in chosen:
+        rows = np.flatnonzero(number == loop)
+        at = int(rows[0])
+        traces.append(
+            LoopTrace(
+                pressure=float(design.level[at]),
+                cycles=float(design.rows.cycles[at]),
+                frequency=float(design.rows.angular_frequency[at]) / (2 * np.pi),
+                speed=design.rows.velocity[rows] / design.facts.geometry.mean_radius,
+                measured=design.torque[rows],
+                baseline=before[rows],
+                extended=after[rows],
+            )
+        )
+    return tuple(traces)
 
 
 def _spread(values: FloatArray) -> FloatArray:
     return np.asarray(values[np.unique(np.linspace(0, values.size - 1, SHOWN).round().astype(int))])
-
-
-def _trace(design: Design, baseline: FloatArray, extended: FloatArray, rows: IntArray) -> LoopTrace:
-    at = int(rows[0])
-    return LoopTrace(
-        pressure=float(design.level[at]),
-        cycles=float(design.rows.cycles[at]),
-        frequency=float(design.rows.angular_frequency[at]) / (2 * np.pi),
-        speed=design.rows.velocity[rows] / design.facts.geometry.mean_radius,
-        measured=design.torque[rows],
-        baseline=baseline[rows],
-        extended=extended[rows],
-    )

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from models.arrays import FloatArray
 from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import Explanation, Verdict, Where
@@ -22,6 +21,7 @@ from models.diagnosis.extension import Extension
 from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import RunScatter, without_likely_gains
+from models.diagnosis.report.maps import LoopTrace, Maps
 from models.diagnosis.validation.held_out import Gain
 
 
@@ -94,35 +94,6 @@ class Isolability:
 
     pairs: tuple[Pair, ...]
     unseen: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Maps:
-    """Mean whitened residuals [-] before and after the extension; NaN where nothing was measured.
-
-    Axes: pressure [p] Pa, speed [s] rad/s, cycles [c]. `speed_pressure` are [p, s], `pressure_cycles` [c, p].
-    """
-
-    pressure: FloatArray
-    speed: FloatArray
-    cycles: FloatArray
-    speed_pressure_before: FloatArray
-    speed_pressure_after: FloatArray
-    pressure_cycles_before: FloatArray
-    pressure_cycles_after: FloatArray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LoopTrace:
-    """A loop over one period: speed [n] rad/s, torque [n] Nm measured, and what baseline and extended model give."""
-
-    pressure: float
-    cycles: float
-    frequency: float
-    speed: FloatArray
-    measured: FloatArray
-    baseline: FloatArray
-    extended: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,7 +19,7 @@ from models.diagnosis.explanations.shapeless import ADVICE
 from models.diagnosis.explanations.verdict import UNCATALOGUED, Verdict, probabilities_by_slug
 from models.diagnosis.pooled_fit.projection import RunScatter
 from models.diagnosis.raw_records.evidence import FIXED_LINE
-from models.diagnosis.report.report import Candidate, Misfit, Report, Visible
+from models.diagnosis.report.report import Misfit, Report, Visible
 from models.diagnosis.validation.held_out import Gain
 
 _AXES = {
@@ -53,18 +53,13 @@ def _capitalised(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}"
 
 
-def conjunction(parts: Sequence[str]) -> str:
+def listed(parts: Sequence[str], word: str = "and") -> str:
     """`a`, `a and b`, `a, b and c`."""
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
-
-
-def count_of(number: int, noun: str) -> str:
-    """`1 test`, `2 tests`."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    return f" {word} ".join(part for part in (", ".join(parts[:-1]), parts[-1]) if part)
 
 
 def _points_of_life(count: int) -> str:
-    return f"{count_of(count, 'point')} of the clutch's life"
+    return f"{count} point{'s' * (count != 1)} of the clutch's life"
 
 
 def probability(value: float) -> str:
@@ -79,13 +74,13 @@ def with_unit(text: str, unit: str) -> str:
 
 def estimated(estimate: Estimate) -> str:
     """Value and deviation to the deviation's second digit."""
-    if not estimate.sd > 0:
-        return with_unit(f"{estimate.name}: {number(estimate.value)}", estimate.unit)
-    digits = max(0, 1 - math.floor(math.log10(estimate.sd)))
-    if digits > 5:
-        return with_unit(f"{estimate.name}: {number(estimate.value)} ± {number(estimate.sd)}", estimate.unit)
-    value = _signed(f"{estimate.value:.{digits}f}")
-    return with_unit(f"{estimate.name}: {value} ± {estimate.sd:.{digits}f}", estimate.unit)
+    size = number(estimate.value)
+    if estimate.sd > 0:
+        digits = max(0, 1 - math.floor(math.log10(estimate.sd)))
+        size = f"{size} ± {number(estimate.sd)}"
+        if digits <= 5:
+            size = f"{_signed(f'{estimate.value:.{digits}f}')} ± {estimate.sd:.{digits}f}"
+    return with_unit(f"{estimate.name}: {size}", estimate.unit)
 
 
 def signed(estimate: Estimate) -> str:
@@ -96,7 +91,7 @@ def signed(estimate: Estimate) -> str:
     size = estimated(estimate)
     if estimate.stated_interval is not None:
         size = with_unit(f"{estimate.name}: {number(estimate.value)}", estimate.unit)
-        size += f", 90 % interval {number(low)} to {_amount(high, estimate.unit)}"
+        size += f", 90 % interval {number(low)} to {with_unit(number(high), estimate.unit)}"
     if sign is None:
         return size
     if estimate.stated_interval is not None and not low < 0.0 < high and sign > 0.99:
@@ -135,28 +130,19 @@ def summarise(report: Report) -> str:
         Verdict.CAUSE_NAMED: _named,
         Verdict.CAUSE_AMBIGUOUS: _ambiguous,
         Verdict.UNEXPLAINED_STRUCTURE: _unexplained,
-        Verdict.INSUFFICIENT_DATA: _insufficient,
-    }[report.verdict]
-    data = f"{count_of(report.tests, 'test')} at {_points_of_life(report.states)} were examined."
-    if report.tests == 1:
-        data = data.replace("were", "was")
-    said = {sentence.text: sentence for sentence in (Sentence(data, MAY), *say(report), *_noted(report.notes))}
-    sentences = list(said.values())  # each once
-    return " ".join(sentence.text for sentence in _short(sentences) if sentence.text)
-
-
-def _insufficient(_: Report) -> list[Sentence]:
-    return [Sentence("These data are too few to judge the model.")]
-
-
-def _short(sentences: Sequence[Sentence]) -> list[Sentence]:
-    """Without what matters least, from the end, as long as there are more than MAX_WORDS words."""
-    kept = list(sentences)
+    }
+    found = [Sentence("These data are too few to judge the model.")]
+    if report.verdict in say:
+        found = say[report.verdict](report)
+    tests = f"{report.tests} tests" if report.tests != 1 else "1 test"
+    data = f"{tests} at {_points_of_life(report.states)} {'were' if report.tests != 1 else 'was'} examined."
+    said = {sentence.text: sentence for sentence in (Sentence(data, MAY), *found, *_noted(report.notes))}
+    kept = list(said.values())  # each once
     for matters in (MAY, SHOULD):
         for place in range(len(kept) - 1, -1, -1):
             if _words(kept) > criteria.MAX_WORDS and kept[place].matters == matters:
                 del kept[place]
-    return kept
+    return " ".join(sentence.text for sentence in kept if sentence.text)
 
 
 def _words(sentences: Sequence[Sentence]) -> int:
@@ -173,24 +159,18 @@ def _adequate(report: Report) -> list[Sentence]:
         )
     ]
     others, mass = list[str](), nothing
-    for item in (item for item in report.explanations if item.effects):
-        if mass >= criteria.SURE:
-            break
-        names = " together with ".join(map(_cause_name, item.effects))
-        others.append(f"{names} (probability {probability(item.probability)})")
-        mass += item.probability
+    for item in report.explanations:
+        if item.effects and mass < criteria.SURE:
+            names = " together with ".join(map(_cause_name, item.effects))
+            others.append(f"{names} (probability {probability(item.probability)})")
+            mass += item.probability
     if others:
-        sentences.append(Sentence(f"Not excluded: {conjunction(others)}."))
+        sentences.append(Sentence(f"Not excluded: {listed(others)}."))
+    after = "Nothing needs to be done; diagnose again after the next tests."
     if report.scatter is not None and report.scatter.lower > criteria.USUAL_GAIN:
-        sentences.append(
-            Sentence(
-                "The runs scatter more than usual. A zero that drifts between runs would also cause this: repeat a test "
-                "at once."
-            )
-        )
-    else:
-        sentences.append(Sentence("Nothing needs to be done; diagnose again after the next tests."))
-    sentences += _unseen(report)
+        after = "The runs scatter more than usual. A zero that drifts between runs would also cause this: "
+        after += "repeat a test at once."
+    sentences += [Sentence(after), *_unseen(report)]
     if report.states < 3:
         say = "says" if report.states == 1 else "say"
         sentences.append(Sentence(f"{_points_of_life(report.states)} {say} little about its course.", SHOULD))
@@ -207,15 +187,15 @@ def _unseen(report: Report) -> list[Sentence]:
     and a pressure first, then effects that must be largest against what is usual, those with a unit before the others."""
     order = sorted(report.visible, key=lambda v: (v.unit == "-", -v.least / v.usual, -v.amplitude / v.usual))
     first = [v for slug in _ASKED_FIRST for v in order if v.effect == slug]
-    listed = [*first, *(v for v in order if v not in first)][: criteria.VISIBLE_MENTIONED]
-    shown = [_shown(visible) for visible in listed]
+    first = [*first, *(v for v in order if v not in first)][: criteria.VISIBLE_MENTIONED]
     sentences = []
-    if shown:
-        before, form, after = conjunction(shown).partition(_HARDEST_FORM)
+    if first:
+        shown = [_shown(visible) for visible in first]
+        before, form, after = listed(shown).partition(_HARDEST_FORM)
         sizes = f"{before}{form}{after.replace(_HARDEST_FORM, '')}"  # explained once
         sentences = [Sentence(f"These data would show, in nine of ten cases, {sizes}.")]
     if report.unseen:
-        names = conjunction([effect_name(slug) for slug in report.unseen])
+        names = listed([effect_name(slug) for slug in report.unseen])
         sentences.append(Sentence(f"These data cannot show, at any size: {names}.", SHOULD))
     return sentences
 
@@ -229,10 +209,6 @@ def _shown(visible: Visible) -> str:
     if math.isfinite(visible.amplitude):
         hardest = f"from {_threshold(visible.amplitude, visible.unit)}{_HARDEST_FORM}"
     return f"{name} from {_threshold(visible.least, visible.unit)} ({hardest})"
-
-
-def _amount(value: float, unit: str) -> str:
-    return with_unit(number(value), unit)
 
 
 def _threshold(value: float, unit: str) -> str:
@@ -251,14 +227,16 @@ def _scatter(scatter: RunScatter | None) -> str:
 
 def _named(report: Report) -> list[Sentence]:
     causes = set(report.causes)
-    chosen = [candidate for candidate in report.candidates if candidate.effect in causes]
     names = " together with ".join(_with_article(slug) for slug in report.causes)
     share = sum(item.probability for item in report.explanations if causes <= set(item.effects))
     sentences = [
         Sentence(f"The cause{'s are' if len(causes) > 1 else ' is'} {names} (probability {probability(share)}).")
     ]
-    for candidate in chosen:
-        sentences += [Sentence(_physics(candidate), SHOULD), Sentence(f"{_capitalised(signed(candidate.estimate))}.")]
+    for item in report.candidates:
+        if item.effect in causes:
+            effect, below = BY_SLUG[item.effect], item.estimate.value < 0
+            physics = effect.opposite_physics if below and effect.opposite_physics else effect.physics
+            sentences += [Sentence(physics, SHOULD), Sentence(f"{_capitalised(signed(item.estimate))}.")]
     sentences.append(Sentence(_error(report), MAY))
     companions = [
         f"{effect_name(item.effect)} (probability {probability(item.probability)})"
@@ -266,18 +244,9 @@ def _named(report: Report) -> list[Sentence]:
         if item.effect not in causes and item.probability >= 0.3
     ]
     if companions:
-        sentences.append(
-            Sentence(
-                f"Something else may also be at work; these data do not show it clearly: {_either(companions)}.", SHOULD
-            )
-        )
+        also = "Something else may also be at work; these data do not show it clearly"
+        sentences.append(Sentence(f"{also}: {listed(companions, 'or')}.", SHOULD))
     return [*sentences, *_gained(report), *_next(report)]
-
-
-def sure_causes(report: Report) -> tuple[str, ...]:
-    """The causes that are as good as certain: the explanations that hold them have a probability of SURE together."""
-    shares = probabilities_by_slug(report.explanations)
-    return tuple(slug for slug in report.causes if shares.get(slug, 0.0) >= criteria.SURE)
 
 
 #: Instead of the size of an effect that was not fitted, or whose quantity was not measured.
@@ -288,9 +257,10 @@ def _ambiguous(report: Report) -> list[Sentence]:
     """What is certain with its size, then the explanations among which the choice is, each with its probability, and each
     effect's size where it first comes."""
     sized = {candidate.effect: candidate.estimate for candidate in report.candidates}
-    sure = sure_causes(report)
+    shares = probabilities_by_slug(report.explanations)
+    sure = tuple(slug for slug in report.causes if shares.get(slug, 0.0) >= criteria.SURE)
     near = smallest({item.effects: item.probability for item in report.explanations})
-    listed = []
+    choices = []
     for item in (item for item in report.explanations if item.effects in near and set(sure) <= set(item.effects)):
         names = [_cause_name(slug) for slug in item.effects if slug not in sure]
         if UNCATALOGUED in item.effects and report.resembles:
@@ -300,15 +270,15 @@ def _ambiguous(report: Report) -> list[Sentence]:
             for slug in item.effects
             if slug not in sure and (estimate := sized.pop(slug, None)) is not None
         ]
-        listed.append((" together with ".join(names) or "nothing", probability(item.probability), sizes))
+        choices.append((" together with ".join(names) or "nothing", probability(item.probability), sizes))
     certain = [Sentence(f"{_capitalised(signed(sized[slug]))}.") for slug in sure if slug in sized]
     rest = [Sentence(_error(report), MAY), *_gained(report), *_next(report)]
-    whole = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in listed]
+    whole = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in choices]
     ways = [whole]  # then without sizes, which are in the report's fields, and with fewer probabilities
-    for shown in range(min(len(listed), 8), 0, -1):
+    for shown in range(min(len(choices), 8), 0, -1):
         brief = [
             f"{name.partition(', such as ')[0]} ({'; '.join((chance, *(size for size in sizes if size == _NO_SIZE)))})"
-            for name, chance, sizes in listed[:shown]
+            for name, chance, sizes in choices[:shown]
         ]
         others = [effect_name(slug) for slug in report.causes if slug not in {*sure, UNCATALOGUED}]
         ways.append([*brief, *(name for name in others if not any(name in alternative for alternative in brief))])
@@ -331,15 +301,15 @@ def _open(
         disagree = f"probably disagree with the model (probability {probability(wrong)})"
         if wrong > 0.99:
             disagree = "disagree with the model"
-        return [Sentence(f"The data {disagree}. {first}: {conjunction(alternatives)}.")]
+        return [Sentence(f"The data {disagree}. {first}: {listed(alternatives)}.")]
     share = sum(item.probability for item in report.explanations if set(sure) <= set(item.effects))
     verb = "is at work" if len(sure) == 1 else "are at work"
-    said = f"{conjunction([_with_article(slug) for slug in sure])} {verb} (probability {probability(share)})"
+    said = f"{listed([_with_article(slug) for slug in sure])} {verb} (probability {probability(share)})"
     sentences = [Sentence(f"{_capitalised(said)}."), *certain]
     if len(alternatives) == 1:
         sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
     elif alternatives:
-        sentences.append(Sentence(f"What else may be at work (with probabilities): {_either(alternatives)}."))
+        sentences.append(Sentence(f"What else may be at work (with probabilities): {listed(alternatives, 'or')}."))
     return sentences
 
 
@@ -347,25 +317,20 @@ def _cause_name(slug: str) -> str:
     return "something that is not in the catalogue" if slug == UNCATALOGUED else effect_name(slug)
 
 
-def _either(parts: Sequence[str]) -> str:
-    """`a`, `a or b`, `a, b or c`."""
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} or {parts[-1]}"
-
-
 def _unexplained(report: Report) -> list[Sentence]:
     unknown = sum(item.probability for item in report.explanations if UNCATALOGUED in item.effects)
     resembles = f" It most resembles {report.resembles}." if report.resembles else ""
-    first = Sentence(
-        f"The model is wrong in a way that no effect of the catalogue explains (probability {probability(unknown)}), so "
-        f"no cause is named.{resembles}"
+    first = (
+        f"The model is wrong in a way that no effect of the catalogue explains (probability {probability(unknown)}), "
     )
+    first += f"so no cause is named.{resembles}"
     again = "Next: repeat the last test at once. If the error is gone, it came from one run; if it stays, look for"
     swings = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{FIXED_LINE}: ")]
     if swings and _axes(report.baseline).startswith(axis_name(FREQUENCY)):
         found = [Sentence(f"In the raw records {swing}") for swing in swings]
-        return [first, *found, Sentence(f"{again} what turns, or is driven, like that.")]
+        return [Sentence(first), *found, Sentence(f"{again} what turns, or is driven, like that.")]
     where = _axes(report.baseline) or "the rig"
-    return [first, Sentence(_error(report)), *_gained(report), Sentence(f"{again} what depends on {where}.")]
+    return [Sentence(first), Sentence(_error(report)), *_gained(report), Sentence(f"{again} what depends on {where}.")]
 
 
 def _error(report: Report) -> str:
@@ -483,10 +448,3 @@ def _noted(notes: Sequence[str]) -> list[Sentence]:
     """Notes on the whole campaign; those on single runs or effects, which begin with a name, stay in the report."""
     whole = [note for note in notes if " " in note.split(":")[0] or ":" not in note]
     return [Sentence(note if note.endswith(".") else f"{note}.", MUST if ADVICE in note else SHOULD) for note in whole]
-
-
-def _physics(candidate: Candidate) -> str:
-    if candidate.effect not in BY_SLUG:
-        return ""
-    effect = BY_SLUG[candidate.effect]
-    return effect.opposite_physics if candidate.estimate.value < 0 and effect.opposite_physics else effect.physics

@@ -11,15 +11,16 @@ is kept, and nothing of it is followed into the future of a life.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.baseline.prediction import Prediction
 from models.diagnosis.design.design import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE, Design, Points
 from models.diagnosis.effects.catalogue import change_columns
-from models.diagnosis.effects.effect import Effect, Family, Kind
+from models.diagnosis.effects.effect import Effect, Kind
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.explanations.verdict import Judgement, Verdict
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
@@ -52,38 +53,38 @@ def smooth_fit(problem: FitProblem, baseline: Fit, axes: Sequence[str]) -> Fit |
     if not effects:
         return None
     size = _size(problem, baseline, effects)
-    scaled = [replace(effect, prior_sd=size * effect.prior_sd) for effect in effects]
-    start = [FittedEffect(effect=effect, amplitude=0.0, shape=()) for effect in scaled]
+    start = [
+        FittedEffect(effect=replace(effect, prior_sd=size * effect.prior_sd), amplitude=0.0, shape=())
+        for effect in effects
+    ]
     return fit(problem, baseline.laws, start, steps=_STEPS)
 
 
 def _along(design: Design, axis: str) -> list[Effect]:
     """One effect a function: cosines over the axis's range, or a loop's harmonics."""
-    if axis == PHASE:
-        orders = range(1, 5 + 1) if design.loops else ()
-        return [_harmonic(k, wave) for k in orders for wave in (np.cos, np.sin)]
+    if axis == PHASE and design.loops:
+        waves: tuple[Callable[[FloatArray], FloatArray], ...] = (np.cos, np.sin)
+        orders = product(range(1, 5 + 1), waves)
+        return [_effect(k, partial(_harmonic, k=k, wave=wave), before_lag=False) for k, wave in orders]
     if axis not in _OF_POINTS:
         return []
     place = _OF_POINTS[axis]
-    values = place(design.points)
-    measured = values[np.isfinite(values)]
-    if measured.size == 0 or not np.ptp(measured) > 0:
+    measured = place(design.points)
+    measured = np.unique(measured[np.isfinite(measured)])
+    if measured.size < 2:
         return []
-    low, high = float(measured.min()), float(measured.max())
+    low, high = float(measured[0]), float(measured[-1])
 
-    def unit(points: Points) -> FloatArray:
-        return np.clip((place(points) - low) / (high - low), 0.0, 1.0)  # NaN where it was not measured
+    def cosine(points: Points, k: int) -> FloatArray:
+        unit = np.clip((place(points) - low) / (high - low), 0.0, 1.0)  # NaN where it was not measured
+        return np.asarray(np.nan_to_num(np.cos(np.pi * k * unit), nan=0.0), dtype=np.float64)
 
-    count = min(10, np.unique(measured).size - 1)
-    return [_cosine(k, unit, before_lag=axis != CLOCK) for k in range(1, count + 1)]
-
-
-def _cosine(k: int, unit: Callable[[Points], FloatArray], *, before_lag: bool) -> Effect:
-    return _effect(k, lambda points: np.nan_to_num(np.cos(np.pi * k * unit(points)), nan=0.0), before_lag=before_lag)
+    count = min(10, measured.size - 1)
+    return [_effect(k, partial(cosine, k=k), before_lag=axis != CLOCK) for k in range(1, count + 1)]
 
 
-def _harmonic(k: int, wave: Callable[[FloatArray], FloatArray]) -> Effect:
-    return _effect(k, lambda points: np.where(points.steady, 0.0, wave(k * points.phase)), before_lag=False)
+def _harmonic(points: Points, k: int, wave: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    return np.where(points.steady, 0.0, wave(k * points.phase))
 
 
 def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool) -> Effect:
@@ -94,7 +95,6 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
         physics="",
         formula="S(v; p, ζ) a cos(π k x)",
         source="this module",
-        family=Family.SENSOR,
         kind=Kind.LAG,
         amplitude="share of the torque",
         unit="-",
@@ -107,13 +107,8 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
 
 def _size(problem: FitProblem, baseline: Fit, effects: Sequence[Effect]) -> float:
     """τ of the largest marginal likelihood, in units of the prior's deviations."""
-    prediction: Prediction = baseline.prediction
-    changes = change_columns(
-        problem.design,
-        prediction,
-        [(effect.change(prediction.scene, 1.0, ()), effect.lags(())) for effect in effects],
-    )
-    gram = gram_of(problem, baseline, changes)
+    unit_changes = [(effect.change(baseline.prediction.scene, 1.0, ()), effect.lags(())) for effect in effects]
+    gram = gram_of(problem, baseline, change_columns(problem.design, baseline.prediction, unit_changes))
     projected = project(gram, problem.noise.run_gain, problem.noise.curve_gain)
     unit = np.array([effect.prior_sd for effect in effects])
     return max(criteria.CORRECTION_SIZES, key=lambda size: log_gain(projected.info, projected.score, size * unit))

@@ -19,9 +19,8 @@ from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import KAPPA, Laws
 from models.diagnosis.design.design import CYCLES, PRESSURE, Design
-from models.diagnosis.effects.fitted_effect import effect_columns, effect_precisions, law_columns
 from models.diagnosis.noise.covariance import Noise, whitening
-from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, prior_gram, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
 
 #: Gauss-Newton steps from the fit to all rows: enough that nothing of the held-out rows is left in the fit.
@@ -151,18 +150,14 @@ def _without(noise: Noise, out: BoolArray) -> Noise:
 
 def _forecast_score(problem: FitProblem, model: Fit, out: BoolArray) -> float:
     """The log score [nats] of rows that are held out, the uncertainty of what was fitted to the others included."""
-    design, noise, priors = problem.design, problem.noise, problem.priors
+    design, noise = problem.design, problem.noise
     before = _without(noise, out)
     refit = fit(problem.with_noise(before), model.laws, model.effects, steps=_STEPS)
-    own = [effect_columns(design, refit.prediction, effect) for effect in refit.effects]
-    jacobian = np.concatenate([law_columns(design, refit.prediction, refit.effects)[:, priors.free], *own], axis=1)
+    jacobian = sensitivities(problem, refit)
     fitted = whitening(design, problem.gained, before)(jacobian)
     held = whitening(design, problem.gained, _without(noise, ~out))(np.column_stack([jacobian, refit.residual]))
-    precision = fitted.T @ fitted
-    rows = priors.rows[:, priors.free]
-    precision[: rows.shape[1], : rows.shape[1]] += rows.T @ rows
-    weak = np.concatenate([np.zeros(rows.shape[1]), *(effect_precisions(effect) for effect in refit.effects)])
-    precision[np.diag_indices_from(precision)] += weak + 1e-12 * np.diag(precision)
+    precision = fitted.T @ fitted + prior_gram(problem.priors, refit)[:-1, :-1]
+    precision[np.diag_indices_from(precision)] *= 1.0 + 1e-12
     columns, residual = held[:, :-1], held[:, -1]
     scale = 1 / np.sqrt(np.diag(precision))
     inner = (precision + columns.T @ columns) * scale[:, None] * scale

@@ -16,7 +16,8 @@ from service.schemas.base import Answer
 
 if TYPE_CHECKING:  # start-up time: they load the whole diagnosis
     from models.diagnosis.experiments.candidates import Step
-    from models.diagnosis.report.report import LoopTrace, Maps, Misfit, Report
+    from models.diagnosis.report.maps import LoopTrace, Maps
+    from models.diagnosis.report.report import Misfit, Report
     from models.diagnosis.validation.held_out import Gain
 
 #: Maps and traces are looked at: more digits than these only weigh.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
-from models.diagnosis.design.criteria import MOST_PLATEAUS
+from models.diagnosis.criteria import MOST_PLATEAUS
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.fitted_effect import Draw, FittedEffect, ranges_of, small_factors_at
 from models.diagnosis.effects.readings import DAYS, STRAIGHT

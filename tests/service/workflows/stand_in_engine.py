@@ -19,7 +19,8 @@ from models.diagnosis.experiments.candidates import Step
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import Explanation, Verdict, Where
 from models.diagnosis.extension import Extension
-from models.diagnosis.report.report import Candidate, Isolability, LoopTrace, Maps, Misfit, Pair, Report, Visible
+from models.diagnosis.report.maps import LoopTrace, Maps
+from models.diagnosis.report.report import Candidate, Isolability, Misfit, Pair, Report, Visible
 from models.diagnosis.validation.held_out import Gain
 
 #: Nm that the stand-in takes off every plateau from a cycle on, and that its course loses by 1,000 cycles.

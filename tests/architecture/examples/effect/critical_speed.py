@@ -5,7 +5,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Effect, Kind, Measure, Shape, ShapeParameter, Tried
 
 #: Half the width of the resonance [m/s].
 _WIDTH = 0.8
@@ -27,7 +27,6 @@ CRITICAL_SPEED = Effect(
     physics="Unbalance loads the bearings most at the critical speed: a torque that peaks there, whatever the pressure.",
     formula="a / (1 + ((v - v_c)/w)²), w = 0.8 m/s",
     source="made up for docs/explanation/architecture.md",
-    family=Family.DYNAMIC,
     kind=Kind.ARTEFACT,
     channels=(),
     amplitude="torque at the critical speed",

@@ -7,9 +7,9 @@ import pytest
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.diagnosis import criteria
 from models.diagnosis.baseline.prediction import lag_of
 from models.diagnosis.campaign import Campaign, DynamicRun
-from models.diagnosis.design import criteria
 from models.diagnosis.design.design import Design, Points, build_design
 from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
 from models.friction.stribeck import GAMMA, StribeckParameters, torque

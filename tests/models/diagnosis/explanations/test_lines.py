@@ -16,7 +16,7 @@ from models.diagnosis.explanations import contrasts
 from models.diagnosis.explanations.contrasts import contrasts_of
 from models.diagnosis.explanations.evidence import evidence_of, structure_gain
 from models.diagnosis.explanations.posterior import posterior_of
-from models.diagnosis.explanations.shapeless import HighestLine, lines
+from models.diagnosis.explanations.shapeless import highest_line
 from models.diagnosis.explanations.verdict import LINE, Alternative
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.noise.estimate import first_noise
@@ -42,14 +42,14 @@ def noise(design: Design) -> Noise:
     return replace(first_noise(design), plateaus=Correlation(), deviation=0.01 * design.torque)
 
 
-def line_of(design: Design, noise: Noise, residual: FloatArray) -> HighestLine:
+def line_of(design: Design, noise: Noise, residual: FloatArray) -> float:
     """The highest line in a residual; no prior is in it."""
-    return lines(FitProblem(design=design, noise=noise, priors=cast(Priors, None)), residual)
+    return highest_line(FitProblem(design=design, noise=noise, priors=cast(Priors, None)), residual)
 
 
-def raised(line: HighestLine) -> bool:
+def raised(line: float) -> bool:
     """Rarer than one in a thousand."""
-    return line.p_value < 1e-3
+    return line < 1e-3
 
 
 def drawn(design: Design, noise: Noise, seed: int) -> FloatArray:
@@ -62,7 +62,7 @@ def test_noise_alone_has_no_line(design: Design, noise: Noise) -> None:
     found = [line_of(design, noise, drawn(design, noise, seed)) for seed in range(200)]
     assert not any(raised(each) for each in found)
     # p-values are bounds: no more of them are small than should be (10 of 200 below 0.05, deviation 3.1)
-    assert 1 <= sum(each.p_value < 0.05 for each in found) <= 20
+    assert 1 <= sum(each < 0.05 for each in found) <= 20
 
 
 def test_a_line_that_is_nearly_as_slow_as_a_test_stands_out(design: Design, noise: Noise) -> None:
@@ -82,8 +82,8 @@ def test_a_swing_is_found_whatever_its_phase_in_each_run(design: Design, noise: 
     swing = 0.005 * wave * (design.torque if share else np.median(design.torque))
     found = line_of(design, noise, drawn(design, noise, 0) + swing)
     assert raised(found)
-    assert found.p_value < 1e-3
-    assert line_of(design, noise, drawn(design, noise, 0) + 0.02 * swing).p_value > 0.01
+    assert found < 1e-3
+    assert line_of(design, noise, drawn(design, noise, 0) + 0.02 * swing) > 0.01
 
 
 #: Courses [n] over a test, 0 ... 1, that have no period, of about unit size.
