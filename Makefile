@@ -28,8 +28,8 @@
 # make scale    requests and commands with 1,000 clutches of 200 tests in one file, beside 10: a table of docs/appendix/scale.md
 #              (ARGS="--clutches 10000 --states 5"); needs 7 GB of disk. python -m tests.scale.replay --clutches 300: a replay
 #              in one process, in a pool and on a Dask cluster of which a worker is killed
-# make plausibility  sends mistyped and honest runs: the tables of docs/appendix/plausibility.md; ARGS="--store FILE" goes on where
-#              it ended                                          (SEED= CAMPAIGNS= HONEST= LIVES= ARGS=--write)
+# make plausibility  sends mistyped and honest runs: the tables of docs/appendix/plausibility.md; STORE=FILE goes on where it
+#              ended                                    (SEED= CAMPAIGNS= HONEST= LIVES= ABLATED= ARGS=--write)
 # make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
 #              make figures: the figures of docs/
 # make docs    the site of docs/, which the service serves at /help; warnings and dead links are errors
@@ -117,8 +117,7 @@ lowest: $(VENV)-lowest/.tests
 	sha256sum tests/requirements-lowest.txt > tests/lowest.tried
 
 picture: $(VENV)/.tests
-	$(BIN)/python -m tests.picture
-	$(BIN)/python -m tests.screenshots
+	$(BIN)/python -m tests.pictures
 
 benchmark: $(VENV)/.tests
 	$(BIN)/python -m tests.benchmarks $(ARGS)
@@ -166,13 +165,13 @@ adoption: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.adoption $(ARGS)
 
 plausibility: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.plausibility $(if $(SEED),--seed $(SEED)) $(if $(CAMPAIGNS),--campaigns $(CAMPAIGNS)) $(if $(HONEST),--honest $(HONEST)) $(if $(LIVES),--lives $(LIVES)) $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.plausibility $(ARGS)
 
 score: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.score $(PARTS) $(if $(SEED),--seed $(SEED)) $(if $(SIZE),--size $(SIZE)) $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.score $(ARGS)
 
 rivals: $(VENV)-rivals/.ready
-	OPENBLAS_NUM_THREADS=1 $(VENV)-rivals/bin/python -m tests.rivals $(if $(SEED),--seed $(SEED)) $(if $(SIZE),--size $(SIZE)) $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(VENV)-rivals/bin/python -m tests.rivals $(ARGS)
 
 $(VENV)-rivals/.ready: pyproject.toml | $(VENV)/.python
 	$(PYTHON) -m venv $(VENV)-rivals

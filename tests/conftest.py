@@ -105,8 +105,7 @@ def on_server(postgresql: PostgresServer) -> Iterator[Database]:
 
 @pytest.fixture(params=["in_file", "on_server"])
 def database(request: pytest.FixtureRequest) -> Database:
-    opened: Database = request.getfixturevalue(request.param)
-    return opened
+    return request.getfixturevalue(request.param)
 
 
 @pytest.fixture(scope="session")
@@ -130,5 +129,4 @@ def in_bucket(s3: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 @pytest.fixture(params=["in_folder", "in_bucket"])
 def raw_address(request: pytest.FixtureRequest) -> str:
     """Where raw records go: each kind of store."""
-    address: str = request.getfixturevalue(request.param)
-    return address
+    return request.getfixturevalue(request.param)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rich.console import Console
+from scipy.stats import binomtest
 
 from service.work.executor import executor_of
 from service.work.progress import progress
@@ -23,7 +24,7 @@ APPENDIX = ROOT / "docs" / "appendix"
 
 @dataclass(frozen=True)
 class Asked:
-    """What `make` passes on: SEED= (1; several with commas where a tool counts them together), SIZE= small, full or a share
+    """What `make` passes on: SEED= (several with commas where a tool counts them together), SIZE= small, full or a share
     of the whole, ONLY= beginnings of names."""
 
     seeds: tuple[int, ...]
@@ -31,12 +32,14 @@ class Asked:
     only: tuple[str, ...]
 
     @classmethod
-    def here(cls, size: str = "small") -> "Asked":
-        """By the environment."""
-        seed, chosen, only = (os.environ.get(name) or "" for name in ("SEED", "SIZE", "ONLY"))
+    def here(cls, size: str = "small", seed: int = 1) -> "Asked":
+        seeds, chosen, only = (os.environ.get(name) or "" for name in ("SEED", "SIZE", "ONLY"))
         share = {"small": 0.1, "full": 1.0}.get(chosen or size)
-        seeds = tuple(int(one) for one in (seed or "1").split(","))
-        return cls(seeds, float(chosen) if share is None else share, tuple(only.split(",")))
+        return cls(
+            seeds=tuple(map(int, (seeds or str(seed)).split(","))),
+            size=float(chosen) if share is None else share,
+            only=tuple(only.split(",")),
+        )
 
     @property
     def seed(self) -> int:
@@ -48,11 +51,17 @@ class Asked:
         return f"SEED={','.join(map(str, self.seeds))} SIZE={self.size:g}{only}"
 
 
+def number(name: str, otherwise: int) -> int:
+    """A number that `make` passes on, such as COUNT=."""
+    return int(os.environ.get(name) or otherwise)
+
+
 def where(processes: int) -> str:
-    """Where work is done: what follows `--scheduler`, else by PROCESSES= of this machine."""
+    """Where work is done: what follows `--scheduler`, else by PROCESSES= of this machine; 0: here."""
     if "--scheduler" in sys.argv:
         return sys.argv[sys.argv.index("--scheduler") + 1]
-    return f"processes:{os.environ.get('PROCESSES') or processes}"
+    processes = number("PROCESSES", processes)
+    return f"processes:{processes}" if processes else "local"
 
 
 def each(work: Callable[[Job], Result], jobs: Iterable[Job], place: str) -> Iterator[Result]:
@@ -77,10 +86,10 @@ def kept(path: Path, make: Callable[[], bytes]) -> bytes:
 class Lines:
     """What was computed, a line of JSON each, so that a run goes on where it ended; in memory without a file."""
 
-    def __init__(self, path: Path | None) -> None:
-        self.path, self.known = path, dict[str, Any]()
-        if path is not None and path.exists():
-            self.known = dict(json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
+    def __init__(self, path: Path | str | None) -> None:
+        self.path, self.known = Path(path) if path else None, dict[str, Any]()
+        if self.path is not None and self.path.exists():
+            self.known = dict(json.loads(line) for line in self.path.read_text(encoding="utf-8").splitlines())
 
     def get(self, name: str, make: Callable[[], Any]) -> Any:
         """What is known by a name, or is made and noted."""
@@ -96,6 +105,25 @@ def table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
     """Lines of a table in Markdown; a pipe within a cell is escaped."""
     lines = [[*titles], ["---"] * len(titles), *([str(cell) for cell in row] for row in rows)]
     return ["| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines]
+
+
+def show(title: str, titles: str, rows: Iterable[Sequence[object]]) -> None:
+    """Print a table under its title; `titles` with bars between them."""
+    print("\n".join([f"## {title}", "", *table(titles.split(" | "), rows), ""]), flush=True)
+
+
+def wilson(hits: int, count: int) -> tuple[float, float]:
+    """The 95 % interval of a share after Wilson (1927)."""
+    found = binomtest(hits, count).proportion_ci(method="wilson")
+    return found.low, found.high
+
+
+def shared(hits: int, count: int) -> tuple[str, str]:
+    """A share and its 95 % interval, in per cent."""
+    if count == 0:
+        return "-", "-"
+    low, high = wilson(hits, count)
+    return f"{hits / count:.0%}", f"{low:.0%} to {high:.0%}"
 
 
 def parts(text: str) -> dict[str, str]:
@@ -116,5 +144,4 @@ def filled(text: str, bodies: Mapping[str, str]) -> str:
 
 
 def fill(page: Path, bodies: Mapping[str, str]) -> None:
-    """Write these parts of a page again."""
     page.write_text(filled(page.read_text(encoding="utf-8"), bodies), encoding="utf-8")

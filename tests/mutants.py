@@ -20,8 +20,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.blind.rows import wilson
-from tests.measuring import ROOT, Asked, Lines, each, table, where
+from tests.measuring import ROOT, Asked, Lines, each, number, shared, table, where
 
 PACKAGES = ("models", "storage", "service")
 PATIENCE = 900.0
@@ -41,7 +40,7 @@ class Mutant:
 
     def made(self) -> tuple[str, str]:
         """The whole text with the fault, and what was changed, with its line."""
-        tree = ast.parse((ROOT / self.path).read_text(encoding="utf-8"))
+        tree = tree_of(self.path)
         node = places(tree)[self.place]
         before = ast.unparse(node)
         change(node)
@@ -55,6 +54,10 @@ class Mutant:
             folder = folder.parent
         named = folder / f"test_{Path(self.path).stem}.py"
         return [str(named), str(folder)] if (root / named).exists() else [str(folder)]
+
+
+def tree_of(path: str) -> ast.Module:
+    return ast.parse((ROOT / path).read_text(encoding="utf-8"))
 
 
 def places(tree: ast.Module) -> list[ast.AST]:
@@ -86,7 +89,6 @@ def _changeable(node: ast.AST) -> bool:
 
 
 def change(node: ast.AST) -> None:
-    """Put the fault in."""
     match node:
         case ast.Compare(ops=[one]):
             node.ops = [TURNED[type(one)]()]
@@ -109,37 +111,21 @@ def change(node: ast.AST) -> None:
 def drawn(seed: int, count: int, only: tuple[str, ...]) -> list[Mutant]:
     """So many different faults, every place as likely as every other."""
     files = sorted(path.relative_to(ROOT).as_posix() for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
-    every = [
-        Mutant(path, place)
-        for path in files
-        if path.startswith(only)
-        for place in range(len(places(ast.parse((ROOT / path).read_text(encoding="utf-8")))))
-    ]
+    sizes = {path: len(places(tree_of(path))) for path in files if path.startswith(only)}
+    every = [Mutant(path, place) for path, size in sizes.items() for place in range(size)]
     return random.Random(seed).sample(every, min(count, len(every)))  # noqa: S311 -- a sample, no secret
 
 
 def tried(mutant: Mutant) -> tuple[str, str]:
-    """Whether it was found, and what it was."""
     text, what = mutant.made()
     with tempfile.TemporaryDirectory() as place:
         root = Path(place) / "tree"
-        kept_out = shutil.ignore_patterns(".*", "node_modules", "help", "__pycache__")
-        shutil.copytree(ROOT, root, ignore=kept_out)
+        shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(".*", "node_modules", "help", "__pycache__"))
         (root / mutant.path).write_text(text, encoding="utf-8")
-        command = [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-x",
-            "-q",
-            "-p",
-            "no:cacheprovider",
-            "-m",
-            "not slow and not browser",
-        ]
+        options = ["-x", "-q", "-p", "no:cacheprovider", "-m", "not slow and not browser"]
         try:
             ended = subprocess.run(
-                [*command, *mutant.tests(root)],
+                [sys.executable, "-m", "pytest", *options, *mutant.tests(root)],
                 cwd=root,
                 env={**os.environ, "PYTHONPATH": str(root), "OPENBLAS_NUM_THREADS": "1"},
                 capture_output=True,
@@ -152,22 +138,17 @@ def tried(mutant: Mutant) -> tuple[str, str]:
 
 
 def main() -> None:
-    """Print how many were found, and those that were not."""
     asked = Asked.here()
-    mutants = drawn(asked.seed, int(os.environ.get("COUNT") or 200), asked.only)
-    store = Lines(Path(os.environ["STORE"]) if os.environ.get("STORE") else None)
+    mutants = drawn(asked.seed, number("COUNT", 200), asked.only)
+    store = Lines(os.environ.get("STORE"))
     unknown = [one for one in mutants if str(one) not in store.known]
     for one, outcome in zip(unknown, each(tried, unknown, where(2)), strict=True):
         store.get(str(one), lambda outcome=outcome: list(outcome))
     outcomes = [(one, *store.known[str(one)]) for one in mutants]
     counted = Counter((one.path.split("/")[0], ended != "survived") for one, ended, _ in outcomes)
-    rows = []
-    for package in PACKAGES:
-        found, missed = counted[package, True], counted[package, False]
-        if count := found + missed:
-            low, high = wilson(found, count)
-            rows.append((package, count, f"{found / count:.0%}", f"{low:.0%} to {high:.0%}"))
-    print("\n".join(table(("faults in", "drawn", "found", "95 % interval"), rows)))
+    pairs = {package: (counted[package, True], counted[package, False]) for package in PACKAGES}
+    rows = [(package, found + missed, *shared(found, found + missed)) for package, (found, missed) in pairs.items()]
+    print("\n".join(table(("faults in", "drawn", "found", "95 % interval"), (row for row in rows if row[1]))))
     print("\n".join(what for _, ended, what in outcomes if ended == "survived"))
 
 

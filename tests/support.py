@@ -81,7 +81,6 @@ ONCE = httpx2.Client(timeout=120, limits=httpx2.Limits(max_keepalive_connections
 
 
 def free_port() -> int:
-    """A port that was free a moment ago."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
@@ -126,7 +125,7 @@ def _run(arguments: list[str], environment: dict[str, str], output: Path | None 
     from service.cli.main import app
 
     gc.freeze()  # what was loaded before the fork is nothing to look through
-    process.subprocess = FORKING  # type: ignore[assignment]
+    process.subprocess = FORKING
     forkserver._forkserver.ensure_running = lambda: None  # it is there; this process did not begin it
     multiprocessing.current_process()._config["daemon"] = False  # else it may have no processes of its own
     engine = environment.get("CLUTCHLIFE_ENGINE")
@@ -167,8 +166,7 @@ class _Passed:
 
 
 def _received(passed: Any) -> int:
-    number: int = passed.detach()
-    return number
+    return passed.detach()
 
 
 class _Forked:
@@ -242,7 +240,6 @@ class Server:
         self.process: subprocess.Popen[bytes] | BaseProcess | None = None
 
     def start(self) -> None:
-        """Start and wait until it is ready."""
         arguments = ["serve", "--port", str(self.port), "--log-level", "warning"]
         arguments += ["--database", self.address]
         environment = os.environ | self.environment
@@ -259,9 +256,6 @@ class Server:
 
     @property
     def pid(self) -> int:
-        """The process's number."""
-        assert self.process is not None
-        assert self.process.pid is not None
         return self.process.pid
 
     def exit_code(self, within: float = 0.0) -> int | None:
@@ -270,7 +264,6 @@ class Server:
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(timeout=within)
             return self.process.returncode
-        assert self.process is not None
         self.process.join(within)
         return self.process.exitcode
 
@@ -299,3 +292,14 @@ def serving(
     finally:
         if server.exit_code() is None:
             server.stop()
+
+
+@contextmanager
+def served() -> Iterator[tuple[Server, httpx2.Client]]:
+    """A service on a new database of its own, and a client of it."""
+    with (
+        TemporaryDirectory() as folder,
+        serving(Path(folder) / "clutches.db") as server,
+        httpx2.Client(base_url=server.url, timeout=120) as http,
+    ):
+        yield server, http

@@ -4,8 +4,7 @@ SEED= other campaigns (1)    SIZE= small, full, or a share of the full table    
 ONLY= trials whose names begin with these    ARGS="--scheduler WHERE" as in `make blind`
 ARGS=--write puts the table into docs/appendix/diagnosis.md, ARGS=--list lists every trial, ARGS=--stored what is stored
 
-Campaigns and results are stored in .adoption, a file each: the next run goes on where this one ended. After a change of
-code remove .adoption/results.
+Results are stored in .adoption, a file each: the next run goes on where this one ended. After a change of code remove it.
 """
 
 import sys
@@ -85,6 +84,8 @@ def rows(results: Sequence[Adopted]) -> list[str]:
     lines = []
     for title, slugs, lams in [*groups, ("all artefacts", ARTEFACTS, LOUD)]:
         mine = [one for one in results if one.made and one.trial.slug in slugs and one.trial.lam in lams]
+        if not mine:
+            continue
         right = [one for one in mine if one.named_right]
         offered = [one for one in mine if one.adoptable]
         distorted = [one for one in offered if one.clean]
@@ -92,28 +93,28 @@ def rows(results: Sequence[Adopted]) -> list[str]:
         scores = [
             np.mean([crps(getattr(one, name), one.end) for one in offered]) for name in ("before", "after") if offered
         ]
-        if mine:
-            cells = [
-                str(len(mine)),
-                str(len(right)),
+        lines.append(
+            (
+                title,
+                len(mine),
+                len(right),
                 _share(right, lambda one: one.adoptable),
-                str(len(offered)),
+                len(offered),
                 _share(offered, lambda one: held(one.before, one.end)),
                 _share(offered, lambda one: held(one.after, one.end)),
                 _share(distorted, lambda one: held(one.clean, one.end)),
                 _share(offered, nearer),
                 _share(offered, worse),
                 _share(distorted, worse_than_clean),
-                str(sum(wrong_sign(one) for one in ours)),
+                sum(wrong_sign(one) for one in ours),
                 _share([one for one in right if one.clean], size_held),
                 ", ".join(f"{score:.3f}" for score in scores),
-            ]
-            lines.append([title, *cells])
+            )
+        )
     return table(TITLES, lines)
 
 
 def meaning(results: Sequence[Adopted], command: str) -> list[str]:
-    """What the table shows."""
     commits = sorted({one.commit for one in results})
     unmade = sum(not one.made for one in results)
     wanted = (
@@ -133,7 +134,6 @@ def meaning(results: Sequence[Adopted], command: str) -> list[str]:
 
 
 def listed(one: Adopted) -> str:
-    """A line a trial."""
     if not one.made:
         return f"{one.trial.name:44s} unreachable"
     estimate = one.estimates.get(one.trial.slug)
@@ -152,11 +152,10 @@ def listed(one: Adopted) -> str:
 
 
 def main() -> None:
-    """Print the table."""
     asked = Asked.here()
     chosen = [trial for trial in trials(asked.seed, asked.size) if trial.name.startswith(asked.only)]
     if "--stored" in sys.argv:
-        chosen = [trial for trial in chosen if (STORE / "results" / f"{trial.name}.json").exists()]
+        chosen = [trial for trial in chosen if (STORE / f"{trial.name}.json").exists()]
     results = list(each(adopted, chosen, where(1)))
     if "--list" in sys.argv:
         print("\n".join(listed(one) for one in results))

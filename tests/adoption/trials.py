@@ -1,10 +1,9 @@
 """One trial: an effect is hidden, what the diagnosis offers is adopted, and remaining life is held against the truth.
 
-Campaigns are those of the blind rig in its own forms (`tests.blind.rig`), lives end as in `tests.blind.lives`. Both the
-campaign and what came of it are stored, a file each, so that a run goes on where it ended.
+Campaigns are those of the blind rig in its own forms (`tests.blind.rig`), lives end as in `tests.blind.lives`. What came of
+a trial is stored, a file each, so that a run goes on where it ended.
 """
 
-import gzip
 import json
 import subprocess
 import time
@@ -33,8 +32,6 @@ STORE = ROOT / ".adoption"
 
 @dataclass(frozen=True)
 class Trial:
-    """An effect at a loudness, with dynamic tests or without, and its number."""
-
     slug: str
     lam: float
     loops: bool
@@ -49,14 +46,13 @@ class Trial:
 @dataclass(frozen=True)
 class Campaign:
     """What is posted, the same runs without the artefact in the same noise (none of what moves a life), and the truth: the
-    share of its first mean COF at which the clutch ends, its end [cycles], the cycles measured, the artefact's size in the
-    catalogue's unit and sense after the last state. None: it could not be made."""
+    share of its first mean COF at which the clutch ends, its end [cycles], the artefact's size in the catalogue's unit and
+    sense after the last state."""
 
     sent: list[dict[str, Any]]
     clean: list[dict[str, Any]]
     fraction: float
     end: float
-    span: float
     size: float
 
 
@@ -71,13 +67,11 @@ class Adopted:
     causes: list[str] = field(default_factory=list)
     adoptable: bool = False
     reason: str = ""
-    summary: str = ""
     estimates: dict[str, list[float]] = field(default_factory=dict)
     before: dict[str, float | None] = field(default_factory=dict)
     after: dict[str, float | None] = field(default_factory=dict)
     clean: dict[str, float | None] = field(default_factory=dict)
     end: float = 0.0
-    span: float = 0.0
     size: float = 0.0
     seconds: float = 0.0
 
@@ -103,17 +97,7 @@ def trials(seed: int, size: float) -> list[Trial]:
 
 
 def made(trial: Trial) -> Campaign | None:
-    """The campaign of a trial, made or read."""
-
-    def packed() -> bytes:
-        campaign = _made(trial)
-        return gzip.compress(json.dumps(None if campaign is None else asdict(campaign)).encode(), 3)
-
-    stored = json.loads(gzip.decompress(kept(STORE / "campaigns" / f"{trial.name}.json.gz", packed)))
-    return None if stored is None else Campaign(**stored)
-
-
-def _made(trial: Trial) -> Campaign | None:
+    """The campaign of a trial; None where none of its draws can be made."""
     seed = (trial.seed, zlib.crc32(b"adoption"), zlib.crc32(trial.name.encode()))
     for k in range(DRAWS):
         try:
@@ -124,7 +108,7 @@ def _made(trial: Trial) -> Campaign | None:
         fraction = passed_at(hidden, end)
         if fraction is not None:
             clean = runs(without(hidden)) if trial.slug in ARTEFACTS else []
-            return Campaign(runs(hidden), clean, fraction, end, hidden.plan.life.span, size_of(hidden))
+            return Campaign(runs(hidden), clean, fraction, end, size_of(hidden))
     return None
 
 
@@ -143,7 +127,6 @@ def size_of(hidden: Hidden) -> float:
     if effect.reading is not None:
         return float(effect.reading(amplitude, site, site.bar)[last].mean())
     if effect.slug == "pressure_offset":
-        assert effect.friction is not None
         change = effect.friction(amplitude, site, hidden.clutch.law(site.bar, site.cycles))
         return float(np.sign(change[last].mean()) * amplitude)
     return amplitude
@@ -151,7 +134,7 @@ def size_of(hidden: Hidden) -> float:
 
 def adopted(trial: Trial) -> Adopted:
     """What comes of a trial, computed or read."""
-    path = STORE / "results" / f"{trial.name}.json"
+    path = STORE / f"{trial.name}.json"
     stored = json.loads(kept(path, lambda: json.dumps(asdict(_adopted(trial))).encode()))
     return Adopted(**(stored | {"trial": Trial(**stored["trial"])}))
 
@@ -169,13 +152,11 @@ def _adopted(trial: Trial) -> Adopted:
         causes=report["causes"],
         adoptable=report["adoptable"],
         reason=report.get("not_adoptable") or "",
-        summary=report["summary"],
         estimates={candidate["effect"]: _estimate(candidate["estimate"]) for candidate in report["candidates"]},
         before=before["end_of_life_cycles"],
         after=after["end_of_life_cycles"],
         clean=forecast_of(campaign.clean, campaign.fraction)["end_of_life_cycles"] if campaign.clean else {},
         end=campaign.end,
-        span=campaign.span,
         size=campaign.size,
         seconds=time.monotonic() - began,
     )
@@ -188,7 +169,6 @@ def _estimate(estimate: dict[str, Any]) -> list[float]:
 
 
 def commit() -> str:
-    """The commit that is tested."""
     asked = ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"]
     said = subprocess.run(asked, capture_output=True, text=True, check=False)
     return said.stdout.strip() or "unknown"

@@ -1,18 +1,10 @@
-"""`make architecture`: the picture, and the parts of docs/explanation/architecture.md that come from the code."""
-
-import sys
+"""`make architecture`: the picture, and what of docs/explanation and docs/reference comes from the code."""
 
 from tests.architecture import document, picture
-from tests.documents import __main__ as reference
+from tests.documents import reference
 from tests.measuring import fill
 
-
-def main() -> int:
-    """Write both, and the pages of docs/reference."""
+if __name__ == "__main__":
     picture.main()
     fill(document.DOCUMENT, document.written() | document.measured())
-    return reference.main()
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    reference.write()

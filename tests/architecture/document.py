@@ -37,10 +37,14 @@ def chapters() -> str:
 
 
 def written() -> dict[str, str]:
-    """The parts that need nothing to be run."""
     return {"chapters": chapters()} | {f"example-{name}": examples.shown(name) for name in examples.NAMES}
 
 
 def measured() -> dict[str, str]:
     """The parts that are taken down from a running service."""
-    return {"get": way(rooms.of_get()), "post": way(rooms.of_post()), "diagnosis": way(rooms.of_diagnosis())}
+    errands = {
+        "get": rooms.entered(rooms.get_life),
+        "post": rooms.entered(rooms.post_run),
+        "diagnosis": rooms.of_diagnosis(),
+    }
+    return {name: way(paths) for name, paths in errands.items()}

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from tests.architecture.source import PACKAGES, Module, by_name, first_sentence, imports, modules
+from tests.architecture.source import PACKAGES, by_name, first_sentence, imports
 
 #: Files directly in storage hold the rows of one table each: one box, but for the schema.
 ROWS, SCHEMA = "storage.rows", "storage.tables"
@@ -25,13 +25,11 @@ class Box:
 
 def package_of(module: str) -> str | None:
     """The box of the large picture that a module belongs to; None for the three packages themselves."""
-    parts = module.split(".")
-    if parts[0] not in PACKAGES or len(parts) < 2:
+    package, *below = module.split(".")
+    if not below:
         return None
-    name = ".".join(parts[:2])
-    if parts[0] == "storage" and not by_name()[name].is_package and name != SCHEMA:
-        return ROWS
-    return name
+    name = f"{package}.{below[0]}"
+    return ROWS if package == "storage" and not by_name()[name].is_package and name != SCHEMA else name
 
 
 def chapter_of(module: str) -> str | None:
@@ -41,24 +39,27 @@ def chapter_of(module: str) -> str | None:
 
 def boxes(belongs: Mapping[str, str | None]) -> dict[str, Box]:
     """The boxes by name; `belongs`: module -> box."""
-    names = sorted({name for name in belongs.values() if name is not None})
-    return {name: _box(name, [module for module in modules() if belongs[module.name] == name]) for name in names}
+    return {name: _box(name, belongs) for name in sorted({name for name in belongs.values() if name is not None})}
 
 
-def _box(name: str, members: list[Module]) -> Box:
+def _box(name: str, belongs: Mapping[str, str | None]) -> Box:
+    members = {module for module, box in belongs.items() if box == name}
     introduced = by_name().get(name)
     docstring = "The rows of each table, a file a table." if introduced is None else introduced.docstring
-    files, names = sum(not module.is_package for module in members), {module.name for module in members}
-    tops = {statement.imported.split(".")[0] for statement in imports() if statement.importer in names}
-    lower = tuple(package for package in reversed(PACKAGES) if package in tops - {name.split(".")[0]})
-    return Box(name=name, files=files, lower=lower, introduction=first_sentence(docstring))
+    tops = {imported.split(".")[0] for importer, imported in imports() if importer in members} - {name.split(".")[0]}
+    return Box(
+        name=name,
+        files=sum(not by_name()[module].is_package for module in members),
+        lower=tuple(package for package in reversed(PACKAGES) if package in tops),
+        introduction=first_sentence(docstring),
+    )
 
 
 def edges(belongs: Mapping[str, str | None]) -> dict[str, frozenset[str]]:
-    """box -> the boxes of its package that its modules import, itself left out; imports for types too."""
+    """box -> the boxes of its package that its modules import, itself left out."""
     targets: dict[str, set[str]] = {name: set() for name in belongs.values() if name is not None}
-    for statement in imports():
-        importer, imported = belongs.get(statement.importer), belongs.get(statement.imported)
+    for pair in imports():
+        importer, imported = (belongs.get(name) for name in pair)
         if importer is None or imported is None or importer == imported:
             continue
         if importer.split(".")[0] == imported.split(".")[0]:

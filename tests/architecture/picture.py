@@ -5,14 +5,12 @@ below it; an arrow that a longer way implies is left out, and what a box takes f
 a circle, which import-linter forbids, is dashed red.
 """
 
-import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from xml.sax.saxutils import escape
 
 from tests.architecture import graph
 from tests.architecture.graph import Box
-from tests.architecture.source import PACKAGES, ROOT, modules
+from tests.architecture.source import PACKAGES, ROOT, by_name
 
 PICTURE = ROOT / "docs" / "figures" / "architecture.svg"
 
@@ -34,9 +32,7 @@ Place = tuple[float, float, float]  # left, top, width
 
 
 def draw() -> str:
-    """The picture as SVG text."""
-    packages = {module.name: graph.package_of(module.name) for module in modules()}
-    chapters = {module.name: graph.chapter_of(module.name) for module in modules()}
+    packages, chapters = ({name: of(name) for name in by_name()} for of in (graph.package_of, graph.chapter_of))
     large, inside = graph.edges(packages), graph.edges(chapters)
     bands = [
         (package, graph.rows(large, [n for n in large if n.startswith(f"{package}.")]))
@@ -45,10 +41,12 @@ def draw() -> str:
     bands.append(("the diagnosis", graph.rows(inside, inside)))
     described = graph.boxes(packages) | graph.boxes(chapters)
     places, grounds, height = _placed(bands, {**large, **inside}, described)
-    arrows = [*_arrows(large, places), *_arrows(inside, places)]
-    parts = [_band(label, top, tall) for label, top, tall in grounds]
-    parts += arrows
-    parts += [_box(described[name], place) for name, place in places.items()]
+    parts = [
+        *(_band(*ground) for ground in grounds),
+        *_arrows(large, places),
+        *_arrows(inside, places),
+        *(_box(described[name], place) for name, place in places.items()),
+    ]
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}" '
         f'font-family="Helvetica, Arial, sans-serif" font-size="12"><style>{_STYLE}</style>'
@@ -97,7 +95,6 @@ def _reading_order(rows: list[list[str]], edges: Mapping[str, frozenset[str]]) -
 
 
 def _broken(row: list[Box]) -> list[list[Box]]:
-    """A row in as many lines as it needs."""
     lines: list[list[Box]] = [[]]
     for box in row:
         if lines[-1] and sum(_width(other) + _GAP for other in (*lines[-1], box)) > _ROOM:
@@ -161,12 +158,10 @@ def _arrow(start: Place, end: Place, kind: str) -> str:
     )
 
 
-def main(path: Path = PICTURE) -> int:
-    """Draw the picture."""
-    path.write_text(draw(), encoding="utf-8")
-    print(f"{path.relative_to(ROOT)}: {path.stat().st_size} bytes")
-    return 0
+def main() -> None:
+    PICTURE.write_text(draw(), encoding="utf-8")
+    print(f"{PICTURE.relative_to(ROOT)}: {PICTURE.stat().st_size} bytes")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

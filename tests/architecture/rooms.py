@@ -7,7 +7,7 @@ routes run in a pool of threads, so that every thread is watched. A file is ente
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator, Set
+from collections.abc import Callable, Iterator, Set
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -76,46 +76,30 @@ def watched_service(but: Set[str] = JOBS) -> Iterator[tuple[TestClient, Watch]]:
                 yield http, watch
     finally:
         sys.setprofile(before)
-        threading.setprofile(before_threads)  # type: ignore[arg-type]
+        threading.setprofile(before_threads)
 
 
-def post_run(http: TestClient, clutch_id: str, cycles: float) -> None:
-    """Post a stationary run."""
+def post_run(http: TestClient, clutch_id: str, cycles: float = 1000.0 * EARLIER_RUNS) -> None:
     body = stationary(cycles, pressures=PRESSURES)
     http.post(f"/v1/clutches/{clutch_id}/runs", json=body).raise_for_status()
 
 
 def get_life(http: TestClient, clutch_id: str) -> None:
-    """Get the remaining life."""
     http.get(f"/v1/clutches/{clutch_id}/remaining-useful-life").raise_for_status()
 
 
-def post_diagnosis(http: TestClient, clutch_id: str) -> None:
-    """Start a diagnosis and wait for its report."""
-    address = f"/v1/clutches/{clutch_id}/diagnoses"
-    http.post(address, json={"adopt": False}, headers={"Prefer": "wait=120"}).raise_for_status()
-
-
-def of_get() -> list[str]:
-    """The files that a GET of the remaining life enters after a run has changed it."""
+def entered(errand: Callable[[TestClient, str], None]) -> list[str]:
+    """The files that an errand enters: a GET of the remaining life after a run has changed it, a POST of one more run."""
     with watched_service() as (http, watch):
-        get_life(http, "warm-up")
+        errand(http, "warm-up")
         with watch.watching() as paths:
-            get_life(http, "watched")
-    return paths
-
-
-def of_post() -> list[str]:
-    """The files that a POST of one more stationary run enters."""
-    with watched_service() as (http, watch):
-        post_run(http, "warm-up", 1000.0 * EARLIER_RUNS)
-        with watch.watching() as paths:
-            post_run(http, "watched", 1000.0 * EARLIER_RUNS)
+            errand(http, "watched")
     return paths
 
 
 def of_diagnosis() -> list[str]:
     """The files of this process that a POST of a diagnosis enters until its report is there; it is computed in another."""
     with watched_service(but=frozenset()) as (http, watch), watch.watching() as paths:
-        post_diagnosis(http, "watched")
+        asked = {"json": {"adopt": False}, "headers": {"Prefer": "wait=120"}}
+        http.post("/v1/clutches/watched/diagnoses", **asked).raise_for_status()
     return paths

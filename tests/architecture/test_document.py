@@ -1,8 +1,11 @@
-"""docs/explanation/architecture.md and its picture are those of the code as it is."""
+"""docs/explanation/architecture.md and its picture are those of the code as it is, and its ways those of the errands."""
+
+from collections.abc import Callable
 
 import pytest
+from fastapi.testclient import TestClient
 
-from tests.architecture import document, graph, picture
+from tests.architecture import document, graph, picture, rooms
 from tests.architecture.source import ROOT, none_of
 from tests.measuring import filled, parts
 
@@ -44,3 +47,15 @@ def test_only_arrows_that_no_longer_way_implies_are_drawn() -> None:
     assert graph.reduced(edges) == {"a": {"b"}, "b": {"c"}, "c": set(), "d": set(), "e": set()}
     assert graph.circles(edges) == {("d", "e"), ("e", "d")}
     assert graph.rows(edges, edges) == [["a"], ["b"], ["c", "d", "e"]]
+
+
+@pytest.mark.parametrize(("name", "errand"), [("get", rooms.get_life), ("post", rooms.post_run)])
+def test_the_document_names_the_files_of_an_errand(name: str, errand: Callable[[TestClient, str], None]) -> None:
+    paths = rooms.entered(errand)
+    print("\n".join(f"{number:2d} {path}" for number, path in enumerate(paths, start=1)))
+    assert paths, "nothing was watched"
+    documented = document.paths_of(PARTS[name])
+    if set(documented) != set(paths):  # what another thread entered meanwhile is entered once
+        again = rooms.entered(errand)
+        paths = [path for path in paths if path in again]
+    assert set(documented) == set(paths), "docs/explanation/architecture.md names other files: make architecture"

@@ -5,13 +5,13 @@ import re
 from collections import Counter
 from pathlib import Path
 
-from tests.architecture.source import PACKAGES, ROOT, modules, none_of
+from tests.architecture.source import PACKAGES, ROOT, by_name, none_of
 
 
 def test_an_import_inside_a_function_says_why() -> None:
     functions = (
         (module, node)
-        for module in modules()
+        for module in by_name().values()
         for node in ast.walk(module.tree)
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
     )
@@ -38,7 +38,7 @@ def test_what_a_folder_says_it_holds_is_there() -> None:
     """Names in its docstring that end in .py, and those in backticks after "Open": modules and folders."""
     wrong = [
         f"{module.shown}: {name}"
-        for module in modules()
+        for module in by_name().values()
         if module.is_package
         for name in re.findall(r"[\w/]+\.py\b|`[a-z_/]+`", module.docstring.partition("Open ")[2])
         + re.findall(r"[\w/]+\.py\b", module.docstring.partition("Open ")[0])

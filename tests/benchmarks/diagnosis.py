@@ -3,9 +3,7 @@
 import itertools
 import json
 import statistics
-import tempfile
 import time
-from pathlib import Path
 
 import httpx2
 import numpy as np
@@ -13,13 +11,13 @@ import numpy as np
 from models.diagnosis.diagnose import diagnose
 from models.rig import campaign
 from models.rig.programme import QUICK, WHOLE, Programme
-from models.rig.simulated_runs import SimulatedRun
 from models.rig.temperatures import warmed
 from service.run_files.simulated import simulated_body
 from tests.blind.rig import sent
 from tests.blind.rig.hide import hide
 from tests.blind.test_blind import FAMILIES
-from tests.support import serving
+from tests.measuring import show
+from tests.support import served
 
 #: Seconds between two questions: a dashboard's, but far more often.
 _PAUSE = 0.01
@@ -32,22 +30,15 @@ def post_life(http: httpx2.Client, clutch_id: str, states: int, programme: Progr
     clutch = campaign.simulated_clutch(1)
     http.post("/v1/clutches", json={"clutch_id": clutch_id})
     for run in campaign.simulate(1, programme=programme, stop_fraction=0.01, most_tests=states):
-        answer = http.post(f"/v1/clutches/{clutch_id}/runs", content=_body(run, clutch), headers=_JSON)
-        assert answer.status_code == 201, answer.text
+        body = simulated_body(run)
+        if run.plateaus is not None:
+            body["channels"]["torque_nm"] = warmed(run.plateaus, clutch, run.wear).torque.tolist()
+        headers = {"Content-Type": "application/json"}
+        http.post(f"/v1/clutches/{clutch_id}/runs", content=json.dumps(body), headers=headers).raise_for_status()
 
 
-_JSON = {"Content-Type": "application/json"}
-
-
-def _body(run: SimulatedRun, clutch: campaign.SimulatedClutch) -> bytes:
-    body = simulated_body(run)
-    if run.plateaus is not None:
-        body["channels"]["torque_nm"] = warmed(run.plateaus, clutch, run.wear).torque.tolist()
-    return json.dumps(body).encode()
-
-
-def get_times(http: httpx2.Client, clutch_id: str, until: str | None, seconds: float) -> tuple[list[float], float]:
-    """Times of GETs [ms] while the diagnosis `until` runs, or for so many seconds; and how long that was [s]."""
+def get_times(http: httpx2.Client, clutch_id: str, until: str | None) -> tuple[list[float], float]:
+    """Times of GETs [ms] while the diagnosis `until` runs, or for five seconds; and how long that was [s]."""
     taken, began = [], time.perf_counter()
     for name in itertools.cycle(_PAGES):
         start = time.perf_counter()
@@ -55,7 +46,7 @@ def get_times(http: httpx2.Client, clutch_id: str, until: str | None, seconds: f
         taken.append(1e3 * (time.perf_counter() - start))
         assert answer.status_code == 200
         over = time.perf_counter() - began
-        if until is None and over > seconds:
+        if until is None and over > 5.0:
             break
         if until is not None and len(taken) % 20 == 0 and http.get(until).json()["status"] != "running":
             break
@@ -63,13 +54,10 @@ def get_times(http: httpx2.Client, clutch_id: str, until: str | None, seconds: f
     return taken, over
 
 
-def row(name: str, taken: list[float]) -> str:
+def row(name: str, taken: list[float]) -> tuple[object, ...]:
     """One line of the table: how many, median, 99 of 100, longest."""
-    return f"| {name} | {len(taken)} | {statistics.median(taken):.1f} | {_most(taken):.1f} | {max(taken):.1f} |"
-
-
-def _most(taken: list[float]) -> float:
-    return statistics.quantiles(taken, n=100)[-1]
+    times = (statistics.median(taken), statistics.quantiles(taken, n=100)[-1], max(taken))
+    return name, len(taken), *(f"{each:.1f}" for each in times)
 
 
 def verdict_seconds(slugs: tuple[str, ...], lam: float, count: int) -> list[float]:
@@ -83,48 +71,38 @@ def verdict_seconds(slugs: tuple[str, ...], lam: float, count: int) -> list[floa
     return taken
 
 
-def verdicts() -> list[str]:
-    """The table of what verdicts take where nothing, one effect or two effects are hidden."""
-    table = [
-        "| verdict on 10 states with loops | campaigns | median, s of one core | longest, s |",
-        "|---|---|---|---|",
-    ]
+def verdicts() -> list[tuple[object, ...]]:
+    """What verdicts take where nothing, one effect or two effects are hidden."""
     hidden = {
         "nothing hidden": [((), 0.0, 6)],
         "one effect, λ = 50": [((slug,), 50.0, 1) for slug in FAMILIES.values()],
+        "two effects, λ = 50 each": [(("oil_temperature", "inertia_torque"), 50.0, 2)],
+        "one effect, λ = 1000": [((slug,), 1000.0, 1) for slug in FAMILIES.values()],
     }
-    hidden["two effects, λ = 50 each"] = [(pair, 50.0, 2) for pair in (("oil_temperature", "inertia_torque"),)]
-    hidden["one effect, λ = 1000"] = [((slug,), 1000.0, 1) for slug in FAMILIES.values()]
+    rows = []
     for name, kinds in hidden.items():
-        taken = list(itertools.chain.from_iterable(verdict_seconds(*kind) for kind in kinds))
-        table.append(f"| {name} | {len(taken)} | {statistics.median(taken):.1f} | {max(taken):.1f} |")
-    return table
+        taken = [seconds for kind in kinds for seconds in verdict_seconds(*kind)]
+        rows.append((name, len(taken), f"{statistics.median(taken):.1f}", f"{max(taken):.1f}"))
+    return rows
 
 
 def main() -> None:
     """Lives of two lengths, with and without a diagnosis that runs."""
-    lines = ["| GETs | asked | median, ms | 99 %, ms | longest, ms |", "|---|---|---|---|---|"]
-    times = []
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        serving(Path(folder) / "bench.db") as server,
-        httpx2.Client(base_url=server.url, timeout=120) as http,
-    ):
+    gets, times = [], []
+    with served() as (_, http):
         for name, states, programme in (("10 states with loops", 10, WHOLE), ("60 states", 60, QUICK)):
             clutch_id = name.replace(" ", "-")
             post_life(http, clutch_id, states, programme)
             http.get(f"/v1/clutches/{clutch_id}/degradation")
-            lines.append(row(f"{name}, idle", get_times(http, clutch_id, None, 5.0)[0]))
+            gets.append(row(f"{name}, idle", get_times(http, clutch_id, None)[0]))
             posted = http.post(f"/v1/clutches/{clutch_id}/diagnoses", json={}, headers={"Prefer": "wait=0"})
-            taken, over = get_times(http, clutch_id, posted.headers["Location"], 0.0)
-            lines.append(row(f"{name}, while it is diagnosed", taken))
+            taken, over = get_times(http, clutch_id, posted.headers["Location"])
+            gets.append(row(f"{name}, while it is diagnosed", taken))
             report = http.get(posted.headers["Location"]).json()
-            times.append(f"| {name} | {over:.1f} | {report['verdict']}: {', '.join(report['causes'])} |")
-    print("\n".join(lines))
-    print("\n| diagnosis, its process' start and remaining life included | s | verdict |\n|---|---|---|")
-    print("\n".join(times))
-    print()
-    print("\n".join(verdicts()))
+            times.append((name, f"{over:.1f}", f"{report['verdict']}: {', '.join(report['causes'])}"))
+    show("A diagnosis, and GETs meanwhile", "GETs | asked | median, ms | 99 %, ms | longest, ms", gets)
+    show("Its time", "diagnosis, its process' start and remaining life included | s | verdict", times)
+    show("Verdicts", "verdict on 10 states with loops | campaigns | median, s of one core | longest, s", verdicts())
 
 
 if __name__ == "__main__":

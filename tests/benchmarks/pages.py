@@ -1,9 +1,8 @@
 """How long the pages take in a real browser: from the data's arrival until a person can use them."""
 
 import statistics
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
+from contextlib import closing
 
 import httpx2
 from playwright.sync_api import Browser, Page
@@ -13,7 +12,8 @@ from storage import clutches
 from storage.engine.opening import open_database
 from tests.browser.driving import chromium, pointed_at
 from tests.browser.lives import demo
-from tests.support import serving
+from tests.measuring import show
+from tests.support import Server, served
 
 CLUTCHES, REPEATS = 1000, 5
 _LAST = "performance.getEntriesByType('resource').filter((entry) => entry.name.includes({0!r})).at(-1).responseEnd"
@@ -23,14 +23,12 @@ _MARK = "performance.getEntriesByName({0!r})[0].startTime"
 
 def pages() -> None:
     """The fleet with 1,000 clutches; the clutch page on the demo's life."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "pages.db"
-        with serving(path) as server, httpx2.Client(base_url=server.url, timeout=120) as http, chromium() as browser:
-            demo(http)
-            _multiply(path, http)
-            size = len(http.get("/v1/clutches?limit=80").content)
-            fleet = [_fleet(browser, server.url) for _ in range(REPEATS)]
-            clutch = [_clutch(browser, server.url) for _ in range(REPEATS)]
+    with served() as (server, http), chromium() as browser:
+        demo(http)
+        _multiply(server, http)
+        size = len(http.get("/v1/clutches?limit=80").content)
+        fleet = [_fleet(browser, server.url) for _ in range(REPEATS)]
+        clutch = [_clutch(browser, server.url) for _ in range(REPEATS)]
     rows = {
         f"fleet, {CLUTCHES} clutches ({size / 1000:.0f} kB of rows): a full screen that answers, after the data arrived": (
             _middle(fleet, 0)
@@ -42,28 +40,22 @@ def pages() -> None:
         "the chart that can be zoomed in its place, after it was pointed at, nothing cached": _middle(clutch, 3),
         "the same, the library cached": _middle(clutch, 4),
     }
-    print("\n## The pages, in Chromium\n\n| what | ms |\n|---|---|")
-    for name, taken in rows.items():
-        print(f"| {name} | {taken:.0f} |")
+    show("The pages, in Chromium", "what | ms", ((name, f"{taken:.0f}") for name, taken in rows.items()))
 
 
 def _middle(found: Sequence[tuple[float, ...]], place: int) -> float:
     return statistics.median(each[place] for each in found)
 
 
-def _multiply(path: Path, http: httpx2.Client) -> None:
+def _multiply(server: Server, http: httpx2.Client) -> None:
     """The demo's summary under 999 more names, a little worse each."""
     for index in range(CLUTCHES - 1):
         http.post("/v1/clutches", json={"clutch_id": f"bench-{index:03}"}).raise_for_status()
-    database = open_database(f"sqlite:///{path}")
-    with database.writing() as connection:
+    with closing(open_database(server.address)) as database, database.writing() as connection:
         row = clutches.get(connection, "sim-1")
-        assert row is not None
         for index in range(CLUTCHES - 1):
-            remaining = {
-                q: (value or 0.0) + 7 * index
-                for q, value in {"0.05": 900, "0.25": 1000, "0.5": 1100, "0.75": 1200, "0.95": 1400}.items()
-            }
+            quantiles = {"0.05": 900, "0.25": 1000, "0.5": 1100, "0.75": 1200, "0.95": 1400}
+            remaining = {q: value + 7.0 * index for q, value in quantiles.items()}
             current = dict(row.summary["current"]) | {"health": index / CLUTCHES}
             summary = dict(row.summary) | {
                 "status": "predicted",
@@ -75,7 +67,6 @@ def _multiply(path: Path, http: httpx2.Client) -> None:
             clutches.set_summary(
                 connection, f"bench-{index:03}", remaining["0.5"], summary, life="", state=state, if_disputed=state
             )
-    database.close()
 
 
 def _fleet(browser: Browser, url: str) -> tuple[float, float]:

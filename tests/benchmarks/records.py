@@ -1,16 +1,19 @@
 """A raw record of 1,400 s at 1 kHz and five channels, from a file to the fitted receipt, through the service."""
 
+import statistics
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
 import httpx2
 import numpy as np
 
 from tests.benchmarks.memory import added, processor_seconds
+from tests.measuring import show
 from tests.models.records.raw_records import RPM, make, protocol
 from tests.service.readers.sample_files import UNITS, write_mdf, write_parquet, write_tdms
-from tests.support import Server, serving
+from tests.support import served
 
 SEED = 20131113
 _DIGITS = {"time_s": 3, "pressure_bar": 4, "speed_rpm": 2, "torque_nm": 4, "oil_temperature_c": 3}
@@ -20,7 +23,6 @@ _TIMES = 3
 def write_records(folder: Path) -> dict[str, Path]:
     """The same record, rounded as recorders round, in every format that is read."""
     record = make(*protocol(), np.random.default_rng(SEED), tau=0.1).record
-    assert record.oil_temperature is not None
     columns = {
         "time_s": record.time,
         "pressure_bar": record.pressure / 1e5,
@@ -49,30 +51,25 @@ def write_records(folder: Path) -> dict[str, Path]:
 
 def records() -> None:
     """Time from the file to the receipt, the best and the median of three; the service's own time of the processor, its
-    children's included, which others at work do not lengthen as much; and what a fresh service grew by before them.
-    """
-    print("\n## A record of 1,400 s at 1 kHz, five channels: from the file to the fitted receipt, over a socket\n")
-    print("| file | MB | best, s | median, s | of the processor, least, s | added memory at most, MB |")
-    print("|---|---|---|---|---|---|")
+    children's included, which others at work do not lengthen as much; and what a fresh service grew by before them."""
+    rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, path in write_records(Path(folder)).items():
-            with (
-                serving(Path(folder) / f"{path.name}.db") as server,
-                httpx2.Client(base_url=server.url, timeout=120) as client,
-            ):
+            with served() as (server, client):
                 client.post("/v1/clutches", json={"clutch_id": "bench"})
-                grown = added(_pid(server), lambda client=client, path=path: _posted(client, path, 0))  # type: ignore[misc]
+                grown = added(server.pid, partial(_posted, client, path, 0))
                 taken, worked = [], []
                 for number in range(1, _TIMES + 1):
-                    before = processor_seconds(_pid(server))
+                    before = processor_seconds(server.pid)
                     taken.append(_posted(client, path, number))
-                    worked.append(processor_seconds(_pid(server)) - before)
-            times = f"{min(taken):.2f} | {sorted(taken)[_TIMES // 2]:.2f} | {min(worked):.2f}"
-            print(f"| {name} | {path.stat().st_size / 1e6:.0f} | {times} | {grown / 2**20:.0f} |")
-
-
-def _pid(server: Server) -> int:
-    return server.pid
+                    worked.append(processor_seconds(server.pid) - before)
+            times = (f"{seconds:.2f}" for seconds in (min(taken), statistics.median(taken), min(worked)))
+            rows.append((name, f"{path.stat().st_size / 1e6:.0f}", *times, f"{grown / 2**20:.0f}"))
+    show(
+        "A record of 1,400 s at 1 kHz, five channels: from the file to the fitted receipt, over a socket",
+        "file | MB | best, s | median, s | of the processor, least, s | added memory at most, MB",
+        rows,
+    )
 
 
 def _posted(client: httpx2.Client, path: Path, cycles: int) -> float:

@@ -1,14 +1,13 @@
 """`make gallery`: the figures of docs/gallery.md, by its own lines from a simulated clutch, into docs/figures/gallery."""
 
 import re
-import sys
 import tempfile
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from service.cli.main import app
-from tests.documents.reference import ROOT
+from tests.measuring import ROOT
 from tests.support import serving
 
 PAGE = ROOT / "docs" / "gallery.md"
@@ -49,15 +48,13 @@ def simulated(url: str, folder: Path) -> None:
     called(["push", campaign, "--clutch", "sim-7", "--url", url, "--spool", str(folder / "spool")])
 
 
-def main() -> int:
-    """Draw all of them."""
+def main() -> None:
     FIGURES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder, serving(Path(folder) / "gallery.db") as server:
         simulated(server.url, Path(folder))
         for path in draw(server.url, FIGURES):
             print(path.relative_to(ROOT), path.stat().st_size)
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

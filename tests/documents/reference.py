@@ -7,6 +7,7 @@ Each is a function from the code to Markdown. Tables of docs/appendix that other
 import ast
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -21,9 +22,10 @@ from service.cli import options
 from service.settings import PREFIX, Settings
 from service.web.metrics import Metrics
 from storage.engine.opening import open_database
+from tests import measuring
+from tests.measuring import ROOT
 from tests.service.clients import described
 
-ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "reference"
 #: Statuses that every address with a key may answer with.
 ANYWHERE = (401, 403, 422, 429, 503)
@@ -37,17 +39,10 @@ Json = Mapping[str, Any]
 
 
 def pages() -> dict[Path, str]:
-    """All pages by their path."""
     description = described()
-    made = {
-        "settings": settings(),
-        "commands": commands(),
-        "routes": routes(description),
-        "fields": fields(description),
-        "codes": codes(),
-        "metrics": metrics(),
-    }
-    own = {FOLDER / f"{name}.md": text for name, text in made.items()}
+    made = (settings(), commands(), routes(description), fields(description), codes(), metrics())
+    names = ("settings", "commands", "routes", "fields", "codes", "metrics")
+    own = {FOLDER / f"{name}.md": text for name, text in zip(names, made, strict=True)}
     others = [path for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")] if path not in own]
     return own | {path: quoting(path) for path in others if "<!-- quote " in path.read_text(encoding="utf-8")}
 
@@ -76,44 +71,40 @@ def quoted(lines: Sequence[str], keys: Sequence[str]) -> str:
     raise ValueError(f"no table has all of {keys}")
 
 
+def write() -> None:
+    for path, text in pages().items():
+        path.write_text(text, encoding="utf-8")
+        print(f"{path.relative_to(ROOT)}: {len(text.splitlines())} lines")
+
+
 def page(title: str, introduction: str, parts: Iterable[str]) -> str:
-    """A page from its parts."""
     return "\n\n".join([f"# {title}", f"{introduction} {WRITTEN}", *parts]) + "\n"
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of Markdown; bars and line breaks in cells are escaped."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(_cell(cell) for cell in line) + " |" for line in lines)
-
-
-def _cell(text: str) -> str:
-    text = " ".join(text.split()).replace("\\|", "|").replace("|", "\\|")
-    return re.sub(r"<(?=[a-zA-Z/])", "&lt;", text)
+def table(titles: str, rows: Iterable[Sequence[str]]) -> str:
+    """A table of Markdown, `titles` with bars between them; bars and line breaks in cells are escaped."""
+    cells = [[_text(" ".join(cell.split()).replace("\\|", "|")) for cell in row] for row in rows]
+    return "\n".join(measuring.table(titles.split(" | "), cells))
 
 
 def settings() -> str:
-    """Every environment variable of the service and of the commands."""
-    rows = [
-        [f"`{PREFIX}{name.upper()}`", f"`{_default(field.default)}`", field.description or ""]
+    fields_of_settings = (
+        (name, field, str(field.default).lower() if isinstance(field.default, bool | None) else str(field.default))
         for name, field in Settings.model_fields.items()
+    )
+    rows = [
+        [f"`{PREFIX}{name.upper()}`", f"`{default or 'none'}`", field.description or ""]
+        for name, field, default in fields_of_settings
     ]
     parts = [
         "## The service",
         "A wrong value ends the start with a line that names it. A misspelt name causes a warning.",
-        table(["environment", "default", "meaning"], rows),
+        table("environment | default | meaning", rows),
         "## The commands",
         "Commands that talk to a service read two more.",
-        table(
-            ["environment", "meaning"],
-            [[f"`{name}`", meaning] for name, meaning in sorted(_command_variables().items())],
-        ),
+        table("environment | meaning", [[f"`{name}`", text] for name, text in sorted(_command_variables().items())]),
     ]
     return page("Settings", "Settings come from the environment.", parts)
-
-
-def _default(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else "none" if value is None else str(value) or "none"
 
 
 def _command_variables() -> dict[str, str]:
@@ -139,12 +130,11 @@ def walk() -> Iterator[tuple[str, click.Command]]:
         for child, found in children.items():
             yield from below(f"{name} {child}", found)
 
-    for name, command in typer.main.get_command(command_line.app).commands.items():  # type: ignore[attr-defined]
+    for name, command in typer.main.get_command(command_line.app).commands.items():
         yield from below(f"clutchlife {name}", command)
 
 
 def commands() -> str:
-    """Every command with its arguments and options."""
     parts = []
     for name, command in walk():
         rows = [
@@ -153,10 +143,10 @@ def commands() -> str:
             if not getattr(option, "hidden", False) and not set(_names(option)) & set(ASKING)
         ]
         text = re.sub(r"\n\n\s*", "\n\n", (command.help or "").strip())
-        parts += [f"## {name}", text, table(["argument or option", "meaning"], rows)] if rows else [f"## {name}", text]
+        parts += [f"## {name}", text, table("argument or option | meaning", rows)] if rows else [f"## {name}", text]
     introduction = "`clutchlife COMMAND --help` says the same. [Exit codes](operations.md#exit-codes)."
     every = {name: _meaning(option) for _, command in walk() for option in command.params for name in _names(option)}
-    shared = table(["option", "meaning"], [[f"`{name}`", every[name]] for name in ASKING])
+    shared = table("option | meaning", [[f"`{name}`", every[name]] for name in ASKING])
     return page("Commands", introduction, ["Commands that ask a service have three more options:", shared, *parts])
 
 
@@ -193,21 +183,21 @@ def _route(method: str, address: str, route: Json) -> str:
         for each in route.get("parameters", [])
     ]
     if arguments:
-        parts.append(table(["argument", "in", "type", "meaning"], arguments))
+        parts.append(table("argument | in | type | meaning", arguments))
     body = route.get("requestBody", {}).get("content", {})
     if body:
-        parts.append("Body: " + ", ".join(f"`{media}` {kind(each.get('schema', {}))}" for media, each in body.items()))
+        parts.append("Body: " + ", ".join(f"`{media}` {_kind_of(each)}" for media, each in body.items()))
     answers = [
-        [status, each.get("description", ""), ", ".join(sorted({kind(c.get("schema", {})) for c in _contents(each)}))]
+        [status, each.get("description", ""), ", ".join(sorted(set(map(_kind_of, each.get("content", {}).values()))))]
         for status, each in route["responses"].items()
         if int(status) not in ANYWHERE
     ]
-    parts.append(table(["status", "when", "content"], answers))
+    parts.append(table("status | when | content", answers))
     return "\n\n".join(part for part in parts if part)
 
 
-def _contents(answer: Json) -> Iterable[Json]:
-    return answer.get("content", {}).values()
+def _kind_of(content: Json) -> str:
+    return kind(content.get("schema", {}))
 
 
 def kind(schema: Json) -> str:
@@ -232,7 +222,6 @@ def kind(schema: Json) -> str:
 
 
 def fields(description: Json) -> str:
-    """Every field of every body and answer."""
     parts = []
     for name, schema in sorted(description["components"]["schemas"].items()):
         parts += [f"## {name}", _text(schema.get("description", ""))]
@@ -241,7 +230,7 @@ def fields(description: Json) -> str:
             [f"`{field}`{'' if field in required else ' (optional)'}", kind(each), each.get("description", "")]
             for field, each in schema.get("properties", {}).items()
         ]
-        parts.append(table(["field", "type", "meaning"], rows) if rows else f"One of {kind(schema)}.")
+        parts.append(table("field | type | meaning", rows) if rows else f"One of {kind(schema)}.")
     return page(
         "Fields", "What goes over the wire. A unit is in the name of its field.", [part for part in parts if part]
     )
@@ -263,14 +252,14 @@ def codes() -> str:
     parts = [
         "## Problems",
         "The `type` of `application/problem+json`, the status, and when.",
-        table(["type", "status", "title", "when"], problems),
+        table("type | status | title | when", problems),
         "## Errors of a place",
         "The `code` of an entry of `errors`; `…` stands for the value. Codes of pydantic (`missing`, `extra_forbidden`, "
         "`greater_than_equal` and the like) say that a field is not there, not known or out of its range.",
-        table(["code", "message"], [[f"`{code}`", message] for code, message in sorted(said["FieldError"].items())]),
+        table("code | message", [[f"`{code}`", message] for code, message in sorted(said["FieldError"].items())]),
         "## Warnings and doubts",
         "The `code` of an entry of `warnings` or `doubts`: something was noticed, and the run was taken in.",
-        table(["code", "message"], [[f"`{code}`", message] for code, message in sorted(said["Notice"].items())]),
+        table("code | message", [[f"`{code}`", message] for code, message in sorted(said["Notice"].items())]),
     ]
     return page("Errors and warnings", "What the service may object to or notice.", parts)
 
@@ -297,7 +286,7 @@ def _constants(tree: ast.Module) -> Iterator[tuple[str, str]]:
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
             target, value = node.targets[0], node.value
             together = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
-            pairs = zip(target.elts, value.elts, strict=False) if together else [(target, value)]  # type: ignore[attr-defined]
+            pairs = zip(target.elts, value.elts, strict=False) if together else [(target, value)]
             for name, text in pairs:
                 if isinstance(name, ast.Name) and isinstance(text, ast.Constant) and isinstance(text.value, str):
                     yield name.id, text.value
@@ -321,47 +310,44 @@ def _of_function(function: ast.AST, constants: Mapping[str, str]) -> Iterator[tu
 
 
 def _codes(node: ast.expr | None, constants: Mapping[str, str]) -> list[str]:
-    if isinstance(node, ast.Constant):
-        return [str(node.value)]
-    if isinstance(node, ast.Name) and node.id in constants:
-        return [constants[node.id]]
-    if isinstance(node, ast.Attribute) and node.attr in constants:
-        return [constants[node.attr]]
-    if isinstance(node, ast.IfExp):
-        return _codes(node.body, constants) + _codes(node.orelse, constants)
+    match node:
+        case ast.Constant(value=value):
+            return [str(value)]
+        case ast.Name(id=name) | ast.Attribute(attr=name) if name in constants:
+            return [constants[name]]
+        case ast.IfExp():
+            return _codes(node.body, constants) + _codes(node.orelse, constants)
     return []
 
 
 def _said(node: ast.expr | None, assigned: Sequence[ast.Assign | ast.Return], line: int) -> str:
     """The words of an expression; of a name those that it was last given above that line."""
-    if isinstance(node, ast.Constant):
-        return str(node.value)
-    if isinstance(node, ast.JoinedStr):
-        return "".join(str(part.value) if isinstance(part, ast.Constant) else "…" for part in node.values)
-    if isinstance(node, ast.BinOp):
-        return _said(node.left, assigned, line) + _said(node.right, assigned, line)
-    if isinstance(node, ast.IfExp):
-        return _said(node.body, assigned, line)
-    if isinstance(node, ast.Name):
-        before = [
-            each
-            for each in assigned
-            if isinstance(each, ast.Assign)
-            and each.lineno < line
-            and any(isinstance(target, ast.Name) and target.id == node.id for target in each.targets)
-        ]
-        return _said(max(before, key=lambda each: each.lineno).value, [], line) if before else "…"
+    match node:
+        case ast.Constant(value=value):
+            return str(value)
+        case ast.JoinedStr(values=values):
+            return "".join(str(part.value) if isinstance(part, ast.Constant) else "…" for part in values)
+        case ast.BinOp(left=left, right=right):
+            return _said(left, assigned, line) + _said(right, assigned, line)
+        case ast.IfExp(body=body):
+            return _said(body, assigned, line)
+        case ast.Name(id=name):
+            before = [each for each in assigned if each.lineno < line and name in _targets(each)]
+            return _said(max(before, key=lambda each: each.lineno).value, [], line) if before else "…"
     return "…"
 
 
+def _targets(statement: ast.Assign | ast.Return) -> list[str]:
+    targets = statement.targets if isinstance(statement, ast.Assign) else []
+    return [target.id for target in targets if isinstance(target, ast.Name)]
+
+
 def metrics() -> str:
-    """Every series of `/metrics`."""
-    with TemporaryDirectory() as folder:
-        database = open_database(f"sqlite:///{folder}/metrics.db", serving=False)
-        try:
-            text = Metrics(each_clutch=True).exposition(database).decode()
-        finally:
-            database.close()
+    with (
+        TemporaryDirectory() as folder,
+        closing(open_database(f"sqlite:///{folder}/metrics.db", serving=False)) as database,
+    ):
+        text = Metrics(each_clutch=True).exposition(database).decode()
     rows = sorted(
         [f"`{family.name}{'_total' if family.type == 'counter' else ''}`", family.type, family.documentation]
         for family in text_string_to_metric_families(text)
@@ -370,4 +356,4 @@ def metrics() -> str:
         "`/metrics` in Prometheus' format, with a key of scope `read` that is bound to no clutch. Series "
         "`clutchlife_clutch_…` are there with `CLUTCHLIFE_CLUTCH_METRICS=true` only."
     )
-    return page("Metrics", introduction, [table(["series", "type", "meaning"], rows)])
+    return page("Metrics", introduction, [table("series | type | meaning", rows)])

@@ -2,94 +2,49 @@
 
 import numpy as np
 
-from tests.figures.svg import Panel, Series, chart
-from tests.real.lag import branches_of, loop_courses, micro_loops, step_fits, traction_branches
+from models.arrays import FloatArray
+from tests.figures.svg import Chart
+from tests.real.lag import Row, branches_of, loop_courses, micro_loops, step_fits, traction_branches
 
 
 def loops() -> str:
     """Force over speed, the mean course of ten cycles, and the loops' areas by cycles with their deviation."""
-    rows = micro_loops()
-    middle = np.array([5.5 + 10 * number for number in range(len(rows))])
-    courses = loop_courses()
-    return chart(
-        [
-            Panel(
-                title="force over speed",
-                x_label="speed [mm/s]",
-                y_label="friction [N]",
-                series=[Series(x=v, y=force, name=f"cycles {name}") for name, v, force in (courses[0], courses[-1])],
-            ),
-            *(
-                Panel(
-                    title=title,
-                    x_label="cycle",
-                    y_label=unit,
-                    series=[
-                        Series(
-                            x=middle,
-                            y=np.array([row[value] for row in rows]),
-                            deviation=np.array([row[deviation] for row in rows]),
-                            points=True,
-                        )
-                    ],
-                )
-                for title, unit, value, deviation in (
-                    ("area over speed (eq. 8)", "∮F dv [N mm/s]", "∮F dv [N mm/s]", "its deviation"),
-                    ("work of a cycle", "∮F dx [mJ]", "∮F dx [mJ]", "deviation of that"),
-                )
-            ),
-        ]
-    )
+    rows, courses, chart = micro_loops(), loop_courses(), Chart(3)
+    panel = chart.panel("force over speed", "speed [mm/s]", "friction [N]")
+    for name, speed, force in (courses[0], courses[-1]):
+        panel.line(speed, force, f"cycles {name}")
+    middle = 5.5 + 10.0 * np.arange(len(rows))
+    panel = chart.panel("area over speed (eq. 8)", "cycle", "∮F dv [N mm/s]")
+    panel.points(middle, _column(rows, "∮F dv [N mm/s]"), _column(rows, "its deviation"))
+    panel = chart.panel("work of a cycle", "cycle", "∮F dx [mJ]")
+    panel.points(middle, _column(rows, "∮F dx [mJ]"), _column(rows, "deviation of that"))
+    return chart.drawn()
 
 
 def transient() -> str:
     """Friction after the step, and the attractor law fitted over windows of growing length."""
-    fits = step_fits()
+    fits, chart = step_fits(), Chart(2)
     longest = fits[-1]
-    measured = Series(x=longest.time, y=longest.measured, name="measured", colour="#999999")
-    panels = []
     for title, until in (("the first 20 s", 20.0), ("all 180 s", 180.0)):
         inside = longest.time <= until
-        shown = [fit for fit in fits if fit.window <= until]
-        panels.append(
-            Panel(
-                title=title,
-                x_label="time after the step [s]",
-                y_label="friction [-]",
-                series=[
-                    Series(x=measured.x[inside], y=measured.y[inside], name=measured.name, colour=measured.colour),
-                    *(Series(x=fit.time, y=fit.fitted, name=f"one attractor, {fit.window:g} s") for fit in shown),
-                ],
-            )
-        )
-    return chart(panels)
+        panel = chart.panel(title, "time after the step [s]", "friction [-]")
+        panel.line(longest.time[inside], longest.measured[inside], "measured", colour="#999999")
+        for fit in fits:
+            if fit.window <= until:
+                panel.line(fit.time, fit.fitted, f"one attractor, {fit.window:g} s")
+    return chart.drawn()
 
 
 def branches() -> str:
     """The mean up and down branches of all sweeps, and how far they lie apart by sweep."""
-    grid, down, up = branches_of()
-    rows = traction_branches()
-    return chart(
-        [
-            Panel(
-                title="mean of 200 sweeps",
-                x_label="sliding speed [mm/s]",
-                y_label="traction [-]",
-                series=[Series(x=grid, y=down.mean(axis=0), name="down"), Series(x=grid, y=up.mean(axis=0), name="up")],
-            ),
-            Panel(
-                title="up less down, by sweeps",
-                x_label="sweep (fifths)",
-                y_label="∮μ dv [mm/s]",
-                zero=True,
-                series=[
-                    Series(
-                        x=np.array([20.5 + 40 * number for number in range(len(rows))]),
-                        y=np.array([row["∮μ dv [mm/s]"] for row in rows]),
-                        deviation=np.array([row["its deviation"] for row in rows]),
-                        points=True,
-                    )
-                ],
-            ),
-        ]
-    )
+    (grid, down, up), rows, chart = branches_of(), traction_branches(), Chart(2)
+    panel = chart.panel("mean of 200 sweeps", "sliding speed [mm/s]", "traction [-]")
+    panel.line(grid, down.mean(axis=0), "down")
+    panel.line(grid, up.mean(axis=0), "up")
+    panel = chart.panel("up less down, by sweeps", "sweep (fifths)", "∮μ dv [mm/s]", zero=True)
+    panel.points(20.5 + 40.0 * np.arange(len(rows)), _column(rows, "∮μ dv [mm/s]"), _column(rows, "its deviation"))
+    return chart.drawn()
+
+
+def _column(rows: list[Row], name: str) -> FloatArray:
+    return np.array([row[name] for row in rows])

@@ -13,7 +13,7 @@ from models.loops.squeeze_film import film_time_at, squeeze_film_torque
 from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.stationary import Sensor
 from models.rig.truth import SimulatedClutch
-from tests.figures.svg import COLOURS, Panel, Series, chart
+from tests.figures.svg import COLOURS, Chart
 from tests.real.lag import ATTRACTOR, FILM_TIME, FREQUENCY, loop_signs
 
 SEED = 20131113
@@ -28,87 +28,42 @@ def signs() -> str:
     turn = 2 * math.pi * FREQUENCY * fine
     v = clutch.geometry.mean_radius * 1000 * 2 * math.pi / 60 * (1 + np.sin(turn))
     curve = replace(clutch.parameters(4e5, 0.0), coulomb_ratio=1.0)
-    panels = []
+    chart = Chart(3)
     for title, course in (
         ("attractor: S rises, loop negative", attractor_torque(fine, v, curve, ATTRACTOR)),
         ("squeezed film: S rises, loop positive", squeeze_film_torque(fine, v, curve, film_time_at(4e5, FILM_TIME))),
     ):
         off, last = course - torque(v, curve), (fine >= 0) & (v > 0.2)
-        branches = (("accelerating", np.cos(turn) > 0), ("decelerating", np.cos(turn) <= 0))
-        panels.append(
-            Panel(
-                title=title,
-                x_label="velocity [m/s], 4 bar",
-                y_label="M - S(v) [Nm]",
-                zero=True,
-                series=[_sorted(v[last & branch], off[last & branch], name) for name, branch in branches],
-            )
-        )
+        panel = chart.panel(title, "velocity [m/s], 4 bar", "M - S(v) [Nm]", zero=True)
+        for name, branch in (("accelerating", np.cos(turn) > 0), ("decelerating", np.cos(turn) <= 0)):
+            x, y = v[last & branch], off[last & branch]
+            order = np.argsort(x, kind="stable")
+            panel.line(x[order], y[order], name)
     rows = loop_signs()
-    areas = []
+    panel = chart.panel("area of a loop", "pressure [bar]", "∮M dv [Nm m/s]", zero=True)
     for law, name, colour in (
         ("∮M dv, attractor", "attractor", COLOURS[0]),
         ("∮M dv, squeeze film", "squeezed film", COLOURS[1]),
     ):
         for kind, dashed in (("rising", False), ("nominal", True)):
-            some = [row for row in rows if row["curve"] == kind]
-            areas.append(
-                Series(
-                    x=np.array([row["pressure [bar]"] for row in some]),
-                    y=np.array([row[law] for row in some]),
-                    name=f"{name}, {kind} curve",
-                    dashed=dashed,
-                    colour=colour,
-                )
-            )
-    panels.append(
-        Panel(title="area of a loop", x_label="pressure [bar]", y_label="∮M dv [Nm m/s]", zero=True, series=areas)
-    )
-    return chart(panels)
-
-
-def _sorted(x: FloatArray, y: FloatArray, name: str) -> Series:
-    order = np.argsort(x, kind="stable")
-    return Series(x=x[order], y=y[order], name=name)
+            x, y = np.array([(row["pressure [bar]"], row[law]) for row in rows if row["curve"] == kind]).T
+            panel.line(x, y, f"{name}, {kind} curve", dashed=dashed, colour=colour)
+    return chart.drawn()
 
 
 def life() -> str:
     """Figs. 14, 16 and 17 of the nominal simulated clutch: areas with their deviation from noisy dynamic tests."""
-    clutch = SimulatedClutch()
+    clutch, chart = SimulatedClutch(), Chart(3)
     found = {cycles: _loops(clutch, cycles) for cycles in LIFE}
-    fresh, (at_five,) = found[0], [[_at(found[cycles], AT_BAR) for cycles in LIFE]]
     over = np.array(LIFE, dtype=np.float64)
-    by_pressure = [
-        Series(
-            x=over,
-            y=_areas([_at(found[cycles], loop.pressure / 1e5) for cycles in LIFE]),
-            name=f"{loop.pressure / 1e5:g} bar",
-        )
-        for loop in fresh
-    ]
-    return chart(
-        [
-            Panel(
-                title="new, by pressure (fig. 14)",
-                x_label="pressure [bar]",
-                y_label="loop area [Nm m/s]",
-                zero=True,
-                series=[_measured(np.array([loop.pressure / 1e5 for loop in fresh]), fresh)],
-            ),
-            Panel(
-                title=f"at {AT_BAR:g} bar, over life (fig. 16)",
-                x_label="duty cycles",
-                y_label="loop area [Nm m/s]",
-                series=[_measured(over, at_five)],
-            ),
-            Panel(
-                title="by cycles and pressure (fig. 17)",
-                x_label="duty cycles",
-                y_label="loop area [Nm m/s]",
-                series=by_pressure,
-            ),
-        ]
-    )
+    panel = chart.panel("new, by pressure (fig. 14)", "pressure [bar]", "loop area [Nm m/s]", zero=True)
+    panel.points(np.array([loop.pressure / 1e5 for loop in found[0]]), *_areas(found[0]))
+    panel = chart.panel(f"at {AT_BAR:g} bar, over life (fig. 16)", "duty cycles", "loop area [Nm m/s]")
+    panel.points(over, *_areas([_at(found[cycles], AT_BAR) for cycles in LIFE]))
+    panel = chart.panel("by cycles and pressure (fig. 17)", "duty cycles", "loop area [Nm m/s]")
+    for bar in (loop.pressure / 1e5 for loop in found[0]):
+        panel.line(over, _areas([_at(found[cycles], bar) for cycles in LIFE])[0], f"{bar:g} bar")
+    return chart.drawn()
 
 
 def _loops(clutch: SimulatedClutch, cycles: int) -> list[Loop]:
@@ -121,10 +76,5 @@ def _at(loops: list[Loop], bar: float) -> Loop:
 
 
 def _areas(loops: list[Loop]) -> FloatArray:
-    return np.array([loop.area for loop in loops], dtype=np.float64)
-
-
-def _measured(x: FloatArray, loops: list[Loop]) -> Series:
-    return Series(
-        x=x, y=_areas(loops), deviation=np.array([loop.area_sd for loop in loops], dtype=np.float64), points=True
-    )
+    """Areas and their deviations [2, n]."""
+    return np.array([(loop.area, loop.area_sd) for loop in loops], dtype=np.float64).T

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, replace
 from time import process_time
 from typing import Any
 
+import numpy as np
+
 from service.errors import InvalidError
 from service.lives.history import (
     REBUILD,
@@ -30,6 +32,16 @@ Body = dict[str, Any]
 REFUSED = "refused"
 #: When the spool delivers everything: it says nothing of when runs were made.
 RECEIVED = "2026-11-02T00:00:00+00:00"
+
+
+def with_values(run: Body, channel: str, values: np.ndarray) -> Body:
+    """The run with other values of a channel."""
+    return run | {"channels": run["channels"] | {channel: values.tolist()}}
+
+
+def with_gain(run: Body, gain: float) -> Body:
+    """The run with its torque times a gain."""
+    return with_values(run, "torque_nm", gain * np.array(run["channels"]["torque_nm"]))
 
 
 @dataclass(frozen=True)
@@ -68,8 +80,7 @@ class Bench:
         except InvalidError as error:
             return Answer(codes=(REFUSED,), message=str(error), without=dict.fromkeys(WITHOUT, True))
         began = process_time()
-        shown, notices = doubts.doubts_alone(run, analysis, self.geometry)
-        event = replace(event, shown=shown)
+        _, notices = doubts.doubts_alone(run, analysis, self.geometry)
         together = {} if notices else self._together(event).doubts
         seconds = process_time() - began
         left_out = {}

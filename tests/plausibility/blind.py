@@ -1,10 +1,8 @@
 """Campaigns of the blind rig, with and without hidden effects, and of real measurements: plausibility never saw them."""
 
-import csv
 import zlib
 from collections.abc import Iterator
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +11,7 @@ from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.makers import ALL
 from tests.blind.rig.more import with_test
 from tests.blind.rig.sent import runs
-from tests.plausibility.bench import Body
+from tests.plausibility.bench import Body, with_gain
 from tests.plausibility.simulated import Campaign
 from tests.real import loaders
 from tests.support import stationary
@@ -70,61 +68,43 @@ def share_lives() -> dict[str, list[list[tuple[float, float]]]]:
     """Measured lives as cycles and the share of the first COF, by what was measured; none where the folder is not there."""
     if not loaders.FOLDER.is_dir():
         return {}
-    return {
-        "filters": list(_filters()),
-        "lasers": list(_lasers()),
-        "cracks": list(_cracks()),
-        "batteries": list(_batteries()),
-    }
+    found = {"filters": _filters(), "lasers": _lasers(), "cracks": _cracks(), "batteries": _batteries()}
+    return {name: list(histories) for name, histories in found.items()}
 
 
 def _batteries() -> Iterator[list[tuple[float, float]]]:
     """Capacity as what friction is left: a half at the threshold; some fifteen tests along each life."""
-    rows = _rows("battery_lives", "battery_lives.csv")
-    lives: dict[str, list[tuple[float, float]]] = {}
-    for row in rows:
-        left = 1.0 - 0.5 * (1.0 - float(row["relative_capacity"])) / (1.0 - float(row["threshold"]))
-        lives.setdefault(f"{row['group']}/{row['life']}", []).append((float(row["cycle"]), left))
-    for history in lives.values():
-        yield history[:: max(len(history) // 15, 1)]
+    for rows in loaders.cells().values():
+        yield [
+            (float(row["cycle"]), 1.0 - 0.5 * (1.0 - float(row["relative_capacity"])) / (1.0 - float(row["threshold"])))
+            for row in rows[:: max(len(rows) // 15, 1)]
+        ]
 
 
 def _test(run_id: str, cycles: float, share: float) -> Body:
     """A stationary test whose mean COF is that share of when new."""
-    body: dict[str, Any] = stationary(round(cycles), run_id=run_id, wear=0.0, noise=0.01)
-    torque = (np.array(body["channels"]["torque_nm"]) * share).tolist()
-    return body | {"channels": body["channels"] | {"torque_nm": torque}}
-
-
-def _rows(*path: str) -> list[dict[str, str]]:
-    with loaders.FOLDER.joinpath(*path).open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    return with_gain(stationary(round(cycles), run_id=run_id, wear=0.0, noise=0.01), share)
 
 
 def _lasers() -> Iterator[list[tuple[float, float]]]:
-    rows = _rows("laser_degradation", "gaaslaser.csv")
-    for unit in sorted({row["unit"] for row in rows}):
-        yield [(float(row["hours"]), 1.0 - float(row["increase"]) / 100.0) for row in rows if row["unit"] == unit]
+    for _, (hours, rise) in sorted(loaders.lasers().items(), key=lambda each: str(each[0])):
+        yield list(zip(hours.tolist(), (1.0 - rise).tolist(), strict=True))
 
 
 def _filters() -> Iterator[list[tuple[float, float]]]:
     """As a falling quantity: a half at 600 Pa; twelve tests along each life."""
-    rows = _rows("filter_lives", "filters_odd.csv")
-    for life in sorted({row["life"] for row in rows}, key=int)[::3]:
-        time, drop = np.array(
-            [(float(row["time_s"]), float(row["differential_pressure_pa"])) for row in rows if row["life"] == life]
-        ).T
+    data = loaders.columns("filter_lives", "filters_odd.csv")
+    for life in np.unique(data["life"])[::3]:
+        time, drop = (data[name][data["life"] == life] for name in ("time_s", "differential_pressure_pa"))
         when = np.linspace(0, time[-1], 12)
         fallen = np.interp(when, time, drop)
-        yield [
-            (float(at), 1.0 - 0.5 * float(p - fallen[0]) / (600.0 - float(fallen[0])))
-            for at, p in zip(when, fallen, strict=True)
-        ]
+        share = 1.0 - 0.5 * (fallen - fallen[0]) / (600.0 - fallen[0])
+        yield list(zip(when.tolist(), share.tolist(), strict=True))
 
 
 def _cracks() -> Iterator[list[tuple[float, float]]]:
     """A crack's length as what friction has lost: a half at the longest; time in thousands of cycles."""
-    rows = _rows("crack_growth", "crack_growth.csv")
+    data = loaders.columns("crack_growth", "crack_growth.csv")
     for unit in range(1, 11):
-        length = [float(row[f"unit{unit}"]) for row in rows]
-        yield [(1e4 * float(row["time"]), 1.0 - 0.5 * x / max(length)) for row, x in zip(rows, length, strict=True)]
+        share = 1.0 - 0.5 * data[f"unit{unit}"] / data[f"unit{unit}"].max()
+        yield list(zip((1e4 * data["time"]).tolist(), share.tolist(), strict=True))

@@ -5,12 +5,11 @@
 
 from collections.abc import Callable
 from datetime import timedelta
-from typing import Any
 
 import numpy as np
 
 from models.arrays import FloatArray
-from tests.plausibility.bench import Body
+from tests.plausibility.bench import Body, with_gain
 from tests.plausibility.blind import share_lives
 from tests.plausibility.simulated import BEGUN
 from tests.support import stationary
@@ -21,9 +20,8 @@ Life = list[Body]
 
 def _test(run_id: str, cycles: float, share: float, rng: np.random.Generator) -> Body:
     """A stationary test whose mean COF is that share of when new, its gain off by half a per cent."""
-    body: dict[str, Any] = stationary(cycles, run_id=run_id, wear=0.0, noise=0.01, pressures=(4.0, 6.0))
-    gain = share * (1.0 + 0.005 * rng.standard_normal())
-    return body | {"channels": body["channels"] | {"torque_nm": [gain * t for t in body["channels"]["torque_nm"]]}}
+    body = stationary(cycles, run_id=run_id, wear=0.0, noise=0.01, pressures=(4.0, 6.0))
+    return with_gain(body, share * (1.0 + 0.005 * rng.standard_normal()))
 
 
 def _tests(cycles: FloatArray, share: FloatArray, rng: np.random.Generator) -> Life:
@@ -34,31 +32,29 @@ def _even(rng: np.random.Generator, count: int = 14) -> FloatArray:
     return float(rng.choice([10, 200, 1000, 5000, 50_000, 1_000_000])) * np.arange(count)
 
 
-def knee(rng: np.random.Generator) -> Life:
+def _evenly(course: Callable[[np.random.Generator, FloatArray], FloatArray]) -> Callable[[np.random.Generator], Life]:
+    """A life of even tests; `course`: rng, share of the life -> share of the first COF."""
+
+    def life(rng: np.random.Generator) -> Life:
+        cycles = _even(rng)
+        return _tests(cycles, course(rng, np.linspace(0, 1, cycles.size)), rng)
+
+    return life
+
+
+def knee(rng: np.random.Generator, u: FloatArray) -> FloatArray:
     """Slow, then from some test on ten times as fast."""
-    cycles = _even(rng)
-    u, at = np.linspace(0, 1, cycles.size), rng.uniform(0.4, 0.8)
-    return _tests(cycles, 1.0 - 0.1 * u - 0.7 * np.maximum(u - at, 0.0), rng)
+    return 1.0 - 0.1 * u - 0.7 * np.maximum(u - rng.uniform(0.4, 0.8), 0.0)
 
 
-def levels_off(rng: np.random.Generator) -> Life:
-    """Straight down, then level."""
-    cycles = _even(rng)
-    u, at = np.linspace(0, 1, cycles.size), rng.uniform(0.3, 0.6)
-    return _tests(cycles, 1.0 - 0.8 * np.minimum(u, at), rng)
+def levels_off(rng: np.random.Generator, u: FloatArray) -> FloatArray:
+    return 1.0 - 0.8 * np.minimum(u, rng.uniform(0.3, 0.6))
 
 
-def turns_up(rng: np.random.Generator) -> Life:
+def turns_up(rng: np.random.Generator, u: FloatArray) -> FloatArray:
     """Falls, then rises: the oil ages."""
-    cycles = _even(rng)
-    u, at = np.linspace(0, 1, cycles.size), rng.uniform(0.3, 0.6)
-    return _tests(cycles, 1.0 - 0.5 * np.minimum(u, at) + 0.4 * np.maximum(u - at, 0.0), rng)
-
-
-def constant(rng: np.random.Generator) -> Life:
-    """COF does not change."""
-    cycles = _even(rng)
-    return _tests(cycles, np.ones(cycles.size), rng)
+    at = rng.uniform(0.3, 0.6)
+    return 1.0 - 0.5 * np.minimum(u, at) + 0.4 * np.maximum(u - at, 0.0)
 
 
 def step_after_event(rng: np.random.Generator) -> Life:
@@ -71,11 +67,10 @@ def step_after_event(rng: np.random.Generator) -> Life:
     return [*runs[:at], {"kind": "maintenance", "event": "oil_change", "run_id": "m", "cycles": when}, *runs[at:]]
 
 
-def undeclared_step(rng: np.random.Generator) -> Life:
+def undeclared_step(rng: np.random.Generator, u: FloatArray) -> FloatArray:
     """Steps by 15 to 30 % and stays there; nobody says why."""
-    cycles = _even(rng)
     at, step = int(rng.integers(4, 10)), float(rng.choice([-1, 1]) * rng.uniform(0.15, 0.3))
-    return _tests(cycles, 1.0 - 0.2 * np.linspace(0, 1, cycles.size) + step * (np.arange(cycles.size) >= at), rng)
+    return 1.0 - 0.2 * u + step * (np.arange(u.size) >= at)
 
 
 def kilometres(rng: np.random.Generator) -> Life:
@@ -99,7 +94,7 @@ def first_late(rng: np.random.Generator) -> Life:
 
 def odd_order(rng: np.random.Generator) -> Life:
     """An even campaign that arrives in any order."""
-    runs = knee(rng)
+    runs = _evenly(knee)(rng)
     return [runs[k] for k in rng.permutation(len(runs))]
 
 
@@ -126,12 +121,12 @@ def real(rng: np.random.Generator) -> Life:
 
 
 KINDS: dict[str, Callable[[np.random.Generator], Life]] = {
-    "a knee": knee,
-    "levelling off": levels_off,
-    "turning up": turns_up,
-    "constant": constant,
+    "a knee": _evenly(knee),
+    "levelling off": _evenly(levels_off),
+    "turning up": _evenly(turns_up),
+    "constant": _evenly(lambda _, u: np.ones(u.size)),
     "a step after an event": step_after_event,
-    "a step that nobody declared": undeclared_step,
+    "a step that nobody declared": _evenly(undeclared_step),
     "kilometres": kilometres,
     "random spacings": random_spacings,
     "a first test that comes late": first_late,

@@ -12,7 +12,7 @@ from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor, stationary_test
 from models.rig.truth import SimulatedClutch
 from service.run_files.simulated import simulated_body
-from tests.plausibility.bench import Body
+from tests.plausibility.bench import Body, with_gain
 
 BEGUN = datetime(2026, 1, 5, 8, tzinfo=UTC)
 SCHEDULES = ("rig", "even", "geometric", "bursts", "uneven", "pause")
@@ -98,19 +98,12 @@ def _maintained(rng: np.random.Generator, runs: list[Body]) -> list[Body]:
     for kind in rng.choice(["oil_change", "rest", "sensor_zero", "other"], int(rng.integers(1, 3))):
         at = int(rng.integers(0, latest + 1)) if rng.random() < 0.5 else int(rng.choice([r["cycles"] for r in runs]))
         shift = 1.0 + (0.04 * rng.standard_normal() if kind == "oil_change" else 0.0)
-        kept = [_shifted(run, shift) if run["cycles"] > at else run for run in kept]
+        kept = [with_gain(run, shift) if run["cycles"] > at and "channels" in run else run for run in kept]
         index = next((k for k, run in enumerate(kept) if run["cycles"] > at), len(kept))
         if index < len(kept) and "duty" in kept[index]:  # within a block, which began before
             index += 1
         kept.insert(index, {"run_id": f"m-{kind}-{at}", "kind": "maintenance", "event": str(kind), "cycles": at})
     return kept
-
-
-def _shifted(run: Body, factor: float) -> Body:
-    if "channels" not in run or factor == 1.0:
-        return run
-    torque = (np.array(run["channels"]["torque_nm"]) * factor).tolist()
-    return run | {"channels": run["channels"] | {"torque_nm": torque}}
 
 
 def _rebuilt(rng: np.random.Generator, runs: list[Body], seed: int, sensor: Sensor) -> list[Body]:

@@ -1,11 +1,10 @@
 """One slip each: an honest run -> the same run as a mistyped number, a wrong unit, a wrong file or a loose cable make it."""
 
-import copy
 from collections.abc import Callable
 
 import numpy as np
 
-from tests.plausibility.bench import Body
+from tests.plausibility.bench import Body, with_gain, with_values
 from tests.plausibility.simulated import Campaign
 
 #: A run with its slip, None where this slip changes nothing of this run.
@@ -49,8 +48,7 @@ def _scaled(channel: str, factor: float, offset: float = 0.0) -> Slip:
     def slip(_: np.random.Generator, run: Body) -> Body | None:
         if channel not in run.get("channels", {}):
             return None
-        values = (np.array(run["channels"][channel]) * factor + offset).tolist()
-        return run | {"channels": run["channels"] | {channel: values}}
+        return with_values(run, channel, np.array(run["channels"][channel]) * factor + offset)
 
     return slip
 
@@ -62,7 +60,7 @@ def _dead(channel: str, reading: Callable[[np.random.Generator, np.ndarray], np.
         values = reading(rng, np.array(run["channels"][channel]))
         if "time_s" not in run["channels"] and channel in ("pressure_bar", "speed_rpm"):
             values = np.abs(values)
-        return run | {"channels": run["channels"] | {channel: values.tolist()}}
+        return with_values(run, channel, values)
 
     return slip
 
@@ -115,10 +113,8 @@ def other_size(rng: np.random.Generator, run: Body, made: Campaign, other: Campa
     tests = _like(other, run)
     if not tests:
         return None
-    theirs = copy.deepcopy(min(tests, key=lambda test: abs(test["cycles"] - run["cycles"])))
-    torque = np.array(theirs["channels"]["torque_nm"]) * float(rng.choice(SIZES))
-    theirs["channels"]["torque_nm"] = torque.tolist()
-    return _noticeable(rng, run, theirs, made)
+    theirs = min(tests, key=lambda test: abs(test["cycles"] - run["cycles"]))
+    return _noticeable(rng, run, with_gain(theirs, float(rng.choice(SIZES))), made)
 
 
 def other_age(rng: np.random.Generator, run: Body, made: Campaign, other: Campaign) -> Body | None:

@@ -61,6 +61,6 @@ def test_a_slip_changes_the_run_or_is_none() -> None:
 @pytest.mark.slow
 def test_each_group_of_slips_is_drawn() -> None:
     for group in slips.GROUPS:
-        outcome = trials.one_slip(np.random.default_rng([7, 1]), trials.of_simulated, "simulated rig", group)
+        outcome = trials.one_slip(np.random.default_rng([7, 1]), trials.RIGS["simulated rig"], "simulated rig", group)
         assert outcome.slip
         assert outcome.answer.without or outcome.held

@@ -1,7 +1,6 @@
 """Honest lives are not shut out: whatever is asked about on the way, nothing is held in the end."""
 
 import json
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,12 +8,10 @@ import pytest
 from models.rig import campaign
 from service.run_files.simulated import simulated_body
 from tests.plausibility import slips
-from tests.plausibility.bench import Bench
+from tests.plausibility.bench import Bench, Body, with_gain
 from tests.plausibility.honest_lives import KINDS, life
 from tests.real import loaders
 from tests.support import one_quick, stationary
-
-Body = dict[str, Any]
 
 
 def even(step: float, share: float = 0.96, count: int = 8, start: float = 0.0) -> list[Body]:
@@ -22,8 +19,7 @@ def even(step: float, share: float = 0.96, count: int = 8, start: float = 0.0) -
     runs = []
     for k in range(count):
         body = stationary(start + k * step, run_id=f"t{k}", wear=0.0, pressures=(4.0, 6.0))
-        torque = [share**k * value for value in body["channels"]["torque_nm"]]
-        runs.append(body | {"channels": body["channels"] | {"torque_nm": torque}})
+        runs.append(with_gain(body, share**k))
     return runs
 
 
@@ -53,10 +49,7 @@ def test_a_first_test_that_comes_late_shuts_nothing_out(start: float) -> None:
 def test_a_new_level_is_asked_about_at_most_once(share: float) -> None:
     """After a declared oil change, and with nothing declared."""
     before = even(1000.0, share=0.99, count=14)
-    after = [
-        run | {"channels": run["channels"] | {"torque_nm": [share * t for t in run["channels"]["torque_nm"]]}}
-        for run in before[7:]
-    ]
+    after = [with_gain(run, share) for run in before[7:]]
     for declared in (True, False):
         event: list[Body] = [{"kind": "maintenance", "event": "oil_change", "run_id": "m", "cycles": 6500}]
         bench, states = sent([*before[:7], *(event if declared else []), *after])
@@ -87,7 +80,6 @@ def test_the_order_of_arrival_does_not_matter() -> None:
     """Nine tests and one with a zero too many, in several orders: the same run is held in the end."""
     runs = even(1000.0, share=0.97, count=10)
     slipped = slips.CYCLES["cycles x 10"](np.random.default_rng(1), runs[4])
-    assert slipped is not None
     runs[4] = slipped
     for seed in range(4):
         order = np.random.default_rng(seed).permutation(10)
@@ -106,7 +98,6 @@ def test_a_slip_that_was_accepted_is_held_once_others_contradict_it() -> None:
 def test_a_slip_stays_held_among_honest_runs() -> None:
     runs = even(1000.0, share=0.98, count=18)
     slipped = slips.OTHERS["torque at a wrong gain"](np.random.default_rng(3), runs[7])
-    assert slipped is not None
     bench, states = sent([*runs[:7], slipped, *runs[8:]])
     assert states[7] == "h"
     assert [event.run_id for event in bench.held] == ["t7"]

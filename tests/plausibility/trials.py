@@ -1,6 +1,6 @@
 """Campaigns with one slip each, and honest runs: what of them is held, and how many of each there are."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,17 +41,13 @@ class Outcome:
         return bool(self.answer.codes)
 
 
-def of_simulated(rng: np.random.Generator) -> Campaign:
-    return simulated.campaign(rng)
-
-
 def of_blind(rng: np.random.Generator) -> Campaign:
     """Half of the campaigns hide an effect; some end with an advised test."""
     slug = str(rng.choice(blind.SLUGS)) if rng.random() < 0.5 else ""
     return blind.campaign(rng, slug, advised=bool(rng.random() < 0.15))
 
 
-RIGS: dict[str, Draw] = {"simulated rig": of_simulated, "blind rig": of_blind}
+RIGS: dict[str, Draw] = {"simulated rig": simulated.campaign, "blind rig": of_blind}
 
 
 def slipped(seed: int, rig: str, number: int, *, ablated: bool = False) -> Outcome:
@@ -159,8 +155,3 @@ def everything(made: Campaign, *, ablated: bool = False) -> Iterator[Outcome]:
         yield Outcome(made.source, "", str(run["kind"]), float(run["cycles"]), before, answer)
         if answer.codes and REFUSED not in answer.codes:
             bench.accept(run)
-
-
-def share(outcomes: Sequence[Outcome]) -> float:
-    """Share of runs that were held."""
-    return sum(outcome.held for outcome in outcomes) / max(len(outcomes), 1)

@@ -25,7 +25,7 @@ KELVIN = 273.15
 
 def traction_campaign(count: int) -> Campaign:
     """`count` of the sweeps, evenly taken."""
-    geometry: dict[str, float] = TRACTION_CLUTCH["geometry"]  # type: ignore[assignment]
+    geometry: dict[str, float] = TRACTION_CLUTCH["geometry"]
     runs = traction_runs()
     chosen = [runs[i] for i in np.linspace(0, len(runs) - 1, count).round().astype(int)]
     return Campaign(
@@ -54,7 +54,6 @@ def _run(run_id: str, cycles: float, channels: dict[str, Sequence[float]]) -> St
 
 
 def report_of(count: int) -> Report:
-    """The report on a campaign of `count` sweeps."""
     return diagnose(traction_campaign(count), rng=np.random.default_rng(2013))
 
 

@@ -34,7 +34,6 @@ Row = dict[str, Any]
 
 
 def table(rows: Iterable[Row]) -> str:
-    """A Markdown table, its head the rows' keys."""
     rows = list(rows)
     cells = [[f"{v:.4g}" if isinstance(v, float) else v for v in row.values()] for row in rows]
     return "\n".join(measuring.table(list(rows[0]), cells))
@@ -200,7 +199,6 @@ def _step_fit(clock: FloatArray, friction: FloatArray, noise: float, window: flo
 
 
 def velocity_step() -> list[Row]:
-    """`step_fits` as rows."""
     return [
         {
             "window [s]": fit.window,
@@ -259,7 +257,6 @@ def traction_branches() -> list[Row]:
 
 
 def main() -> None:
-    """All of them, as Markdown."""
     for title, rows in (
         ("GMS loops are negative where the curve rises, positive with the squeeze film (simulated)", loop_signs()),
         ("Reciprocating contact: loops and areas", micro_loops()),

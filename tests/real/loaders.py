@@ -11,6 +11,10 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from models.arrays import FloatArray
+
 FOLDER = Path(__file__).parents[3] / "shared" / "data"
 SCREW_DRIVES = FOLDER / "screw_drive_friction" / "steady_state_summary.csv"
 TRACTION_SWEEPS = FOLDER / "traction_sweeps" / "traction_sweeps_001_200.csv"
@@ -30,6 +34,27 @@ _RADIUS = 0.010
 def _rows(path: Path) -> list[dict[str, str]]:
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
+
+
+def columns(*path: str) -> dict[str, FloatArray]:
+    """The columns of numbers of a table."""
+    rows = _rows(FOLDER.joinpath(*path))
+    return {name: np.array([float(row[name]) for row in rows if row[name]]) for name in rows[0] if name != "step_type"}
+
+
+def lasers() -> dict[int, tuple[FloatArray, FloatArray]]:
+    """Of each laser the hours, and how far its current has risen, as a share."""
+    data = columns("laser_degradation", "gaaslaser.csv")
+    of_each = {int(unit): data["unit"] == unit for unit in np.unique(data["unit"])}
+    return {unit: (data["hours"][here], data["increase"][here] / 100.0) for unit, here in of_each.items()}
+
+
+def cells() -> dict[tuple[str, str], list[dict[str, str]]]:
+    """The rows of each battery, by its kind and number."""
+    found = defaultdict(list)
+    for row in _rows(FOLDER / "battery_lives" / "battery_lives.csv"):
+        found[row["group"], row["life"]].append(row)
+    return found
 
 
 def screw_drive_runs() -> dict[str, dict[str, Any]]:

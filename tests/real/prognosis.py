@@ -12,7 +12,6 @@ Nothing of it is a clutch; eq. 6 and its filters are asked about what they were 
   block is predicted from the first ones.
 """
 
-import csv
 import math
 from collections.abc import Sequence
 
@@ -26,21 +25,15 @@ from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
+from tests.real import loaders
 from tests.real.lag import Row, table
-from tests.real.loaders import FOLDER
+from tests.statistical.lives import series
 
 SEED, DRAWS = 2013, 1_000
 GRID = Grid()
 #: A laser has failed where its current has risen by a tenth.
 LASER_FRACTION, LASER_END = 0.9, 4_000.0
 BLOCKS = 50
-
-
-def measured(progress: FloatArray, values: FloatArray, variance: float = 0.0) -> list[Measurement]:
-    return [
-        Measurement(progress=x, value=y, variance=variance)
-        for x, y in zip(progress.tolist(), values.tolist(), strict=True)
-    ]
 
 
 def drawn(prior: Prior, seen: Sequence[Measurement], rng: np.random.Generator) -> Posterior:
@@ -50,26 +43,12 @@ def drawn(prior: Prior, seen: Sequence[Measurement], rng: np.random.Generator) -
 def next_values(posterior: Posterior, progress: float, rng: np.random.Generator) -> FloatArray:
     """What a measurement at `progress` may be: the course of every draw and its scatter."""
     course = posterior.values(np.array([progress]))[0]
-    return np.asarray(course + posterior.scatter * rng.standard_normal(course.size))
-
-
-def columns(*path: str) -> dict[str, FloatArray]:
-    with FOLDER.joinpath(*path).open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    return {name: np.array([float(row[name]) for row in rows if row[name]]) for name in rows[0] if name != "step_type"}
-
-
-def laser_histories() -> list[list[Measurement]]:
-    data = columns("laser_degradation", "gaaslaser.csv")
-    return [
-        measured(data["hours"][here], 1.0 - data["increase"][here] / 100.0)
-        for here in (data["unit"] == unit for unit in np.unique(data["unit"]))
-    ]
+    return course + posterior.scatter * rng.standard_normal(course.size)
 
 
 def lasers() -> list[Row]:
     """By the hours seen and the prior: what of 15 left-out lasers is held."""
-    histories = laser_histories()
+    histories = [series(hours, 1.0 - rise) for hours, rise in loaders.lasers().values()]
     lessons = [taught(history) for history in histories]
     failed = [history[-1].value <= LASER_FRACTION for history in histories]
     rows = []
@@ -102,9 +81,8 @@ def wandering() -> tuple[float, float]:
     scatter in their place."""
     rng = np.random.default_rng(SEED)
     found = []
-    for history in laser_histories():
-        hours = np.array([m.progress for m in history])
-        pair = np.column_stack([[m.value for m in history], rng.standard_normal(hours.size)])
+    for hours, rise in loaders.lasers().values():
+        pair = np.column_stack([1.0 - rise, rng.standard_normal(hours.size)])
         off = pair - np.vander(hours, 3) @ np.linalg.lstsq(np.vander(hours, 3), pair, rcond=None)[0]
         found.append((off[1:] * off[:-1]).sum(axis=0) / np.square(off).sum(axis=0))
     ours, independent = np.mean(found, axis=0).tolist()
@@ -127,9 +105,8 @@ def _laser(posterior: Posterior, history: list[Measurement], rng: np.random.Gene
     ends = np.minimum(ends_of_life(posterior, LASER_FRACTION), 1e6)
     first, last = weighted_quantiles(ends, posterior.weight, (0.05, 0.95))
     passed = [m.progress for m in history if m.value <= LASER_FRACTION]
-    came, before = (
-        (passed[0], max(m.progress for m in history if m.progress < passed[0])) if passed else (1e6, LASER_END)
-    )
+    came = passed[0] if passed else 1e6
+    before = max(m.progress for m in history if m.progress < came)
     return (
         bool(low <= history[-1].value <= high),
         bool(first <= came and last >= before),
@@ -139,7 +116,7 @@ def _laser(posterior: Posterior, history: list[Measurement], rng: np.random.Gene
 
 def pins() -> list[Row]:
     """By law: CRPS of the scar of a left-out pin, and how often the 90 % interval holds it."""
-    data = columns("sliding_wear", "metalwear.csv")
+    data = loaders.columns("sliding_wear", "metalwear.csv")
     laws = {
         "one, over load times cycles": (data["grams"] * data["cycles"], np.zeros(data["unit"].size)),
         "one a load, over cycles": (data["cycles"], data["grams"]),
@@ -152,7 +129,7 @@ def pins() -> list[Row]:
             out = data["unit"] == unit
             others = ~out & (group == group[out][0])
             rng = np.random.default_rng([SEED, int(unit)])
-            posterior = drawn(_scar_prior(data["microns"]), measured(progress[others], data["microns"][others]), rng)
+            posterior = drawn(_scar_prior(data["microns"]), series(progress[others], data["microns"][others]), rng)
             for at, scar in zip(progress[out].tolist(), data["microns"][out].tolist(), strict=True):
                 sample = next_values(posterior, at, rng)
                 low, high = weighted_quantiles(sample, posterior.weight, (0.05, 0.95))
@@ -183,18 +160,18 @@ def running_in() -> list[Row]:
     """By contact and share seen: the last block's friction, predicted and measured."""
     rows = []
     for name in ("bod_10000s", "pod_7500s_a"):
-        data = columns("tribometer_running_in", f"{name}.csv")
+        data = loaders.columns("tribometer_running_in", f"{name}.csv")
         blocks = np.array_split(np.arange(data["Traction Coeff (-)"].size), BLOCKS)
         time = np.array([data["Step Time (s)"][each].mean() for each in blocks])
         friction = np.array([data["Traction Coeff (-)"][each].mean() for each in blocks])
-        history = measured(time, friction)
+        history = series(time, friction)
         for share in (0.2, 0.5, 0.8):
             rng = np.random.default_rng([SEED, int(10 * share)])
             seen = history[: round(share * BLOCKS)]
             posterior = drawn(weak(seen[0], falling=False), seen, rng)
             sample = next_values(posterior, history[-1].progress, rng)
             low, median, high = weighted_quantiles(sample, posterior.weight, (0.05, 0.5, 0.95)).tolist()
-            last = history[-1].value
+            last, beside = history[-1].value, posterior.discrepancy
             rows.append(
                 {
                     "contact": name,
@@ -204,20 +181,13 @@ def running_in() -> list[Row]:
                     "95 %": high,
                     "measured": last,
                     "held": "yes" if low <= last <= high else "no",
-                    "beside eq. 6, %": round(100 * _beside(posterior)),
+                    "beside eq. 6, %": 0 if beside is None else round(100 * posterior.weight[beside.present].sum()),
                 }
             )
     return rows
 
 
-def _beside(posterior: Posterior) -> float:
-    """How much of the posterior has a discrepancy."""
-    beside = posterior.discrepancy
-    return 0.0 if beside is None else float(posterior.weight[beside.present].sum())
-
-
 def main() -> None:
-    """The three tables, as Markdown."""
     print(f"### Lasers: failure at +10 %, each left out\n\n{table(lasers())}\n")
     print("Autocorrelation between inspections {:.2f}, of independent scatter {:.2f}.\n".format(*wandering()))
     print(f"### Pins: the wear scar of each from the others\n\n{table(pins())}\n")

@@ -1,9 +1,9 @@
 """`make rivals`: the same lives predicted by other packages, in one run: CRPS and time beside ours.
 
-SIZE scales the number of lives, SEED changes them; with --write the table takes its place in docs/appendix/prognosis.md.
+SIZE= scales the number of lives    SEED= other lives (2026)    ARGS=--write puts the table into docs/appendix/prognosis.md
 """
 
-import argparse
+import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.prior import weak
-from tests.measuring import APPENDIX, fill
+from tests.measuring import APPENDIX, Asked, fill, table
 from tests.rivals.others import CAP, DRAWS, PlainUkf, Progpy, Sample, Surpyval, fitted
 from tests.statistical.lives import STAGES, ends, typical
 
@@ -31,8 +31,6 @@ PACKAGES = ("numpy", "filterpy", "progpy", "surpyval", "scipy")
 
 
 class Tally:
-    """Scores and times by method."""
-
     def __init__(self) -> None:
         self.crps: dict[str, list[float]] = defaultdict(list)
         self.update: dict[str, list[float]] = defaultdict(list)
@@ -62,24 +60,24 @@ class Tally:
             self.update[name].append(time.process_time() - begun)
 
     def table(self) -> str:
-        """Means, medians and times, and how many times ours they are."""
         mean, middle = float(np.mean(self.crps["`grid`"])), float(np.median(self.crps["`grid`"]))
-        lines = [
-            "| method | CRPS, mean, lives | over `grid`'s | median over `grid`'s | update, ms | distribution, ms | failed |",
-            "|---|---|---|---|---|---|---|",
-        ]
+        rows = []
         for name in self.whole:
-            column = self.crps[name]
-            scores = (
-                [f"{np.mean(column):.3f}", f"{np.mean(column) / mean:.2f}", f"{np.median(column) / middle:.2f}"]
-                if column
-                else ["-"] * 3
-            )
-            times = [
+            scores = ["-"] * 3
+            if column := self.crps[name]:
+                scores = [
+                    f"{np.mean(column):.3f}",
+                    f"{np.mean(column) / mean:.2f}",
+                    f"{np.median(column) / middle:.2f}",
+                ]
+            times = (
                 f"{1e3 * np.median(each[name]):.3g}" if name in each else "-" for each in (self.update, self.whole)
-            ]
-            lines.append(f"| {name} | " + " | ".join([*scores, *times, str(self.failed[name])]) + " |")
-        return "\n".join(lines)
+            )
+            rows.append((name, *scores, *times, self.failed[name]))
+        titles = (
+            "method | CRPS, mean, lives | over `grid`'s | median over `grid`'s | update, ms | distribution, ms | failed"
+        )
+        return "\n".join(table(titles.split(" | "), rows))
 
 
 def sampled(tracker: Any, state: Any, rng: np.random.Generator) -> Sample:
@@ -89,10 +87,10 @@ def sampled(tracker: Any, state: Any, rng: np.random.Generator) -> Sample:
 
 def compared(count: int, seed: int) -> tuple[Tally, int]:
     """Lives like the reference's, predicted at 40, 60 and 80 % by every method."""
-    tally, done = Tally(), 0
-    for life in [replace(life, scatter=SCATTER * life.truth.initial) for life, _ in typical(count, seed)]:
-        rng = np.random.default_rng([seed, done])
-        done += 1
+    tally = Tally()
+    lives = [replace(life, scatter=SCATTER * life.truth.initial) for life, _ in typical(count, seed)]
+    for number, life in enumerate(lives):
+        rng = np.random.default_rng([seed, number])
         measurements = life.measured(0.8, round(0.8 * INSPECTIONS) + 1, rng)
         prior, gap = weak(measurements[0], falling=True), measurements[1].progress
         ours: dict[str, tuple[Any, Any]] = {
@@ -115,34 +113,30 @@ def compared(count: int, seed: int) -> tuple[Tally, int]:
                 tally.scored(name, partial(sampled, tracker, state, rng), life.end)
             for name, rival in theirs.items():
                 tally.scored(name, partial(rival.sample, rng), life.end)
-                if done <= SIMULATED and isinstance(rival, Progpy):
+                if number < SIMULATED and isinstance(rival, Progpy):
                     begun = time.process_time()
                     rival.simulated()
                     tally.whole[f"{name} and `MonteCarlo`, its own simulation"].append(time.process_time() - begun)
             seen = measurements[: index + 1]
             tally.scored("surpyval `predict_rul`", partial(unit.sample, seen, rng), life.end)
             tally.scored("scipy `curve_fit`, delta method", partial(fitted, seen, prior, rng), life.end)
-    return tally, done
+    return tally, len(lives)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="make rivals")
-    parser.add_argument("--size", type=float, default=1.0)
-    parser.add_argument("--seed", type=int, default=2026)
-    parser.add_argument("--write", action="store_true")
-    chosen = parser.parse_args()
-    np.random.seed(chosen.seed)  # noqa: NPY002 # progpy draws from the global generator
-    tally, done = compared(max(4, round(40 * chosen.size)), chosen.seed)
+    asked = Asked.here("full", 2026)
+    np.random.seed(asked.seed)  # noqa: NPY002 # progpy draws from the global generator
+    tally, done = compared(max(4, round(40 * asked.size)), asked.seed)
     releases = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
     head = (
         f"{done} lives like the reference's, {INSPECTIONS} inspections in a life, {100 * SCATTER:.0f} % scatter, at 40, 60 "
-        f"and 80 % of life, seed {chosen.seed}; {releases}"
+        f"and 80 % of life, seed {asked.seed}; {releases}"
     )
-    table = f"{head}\n\n{tally.table()}"
-    print(table)
-    if chosen.write:
-        command = f"`make rivals SIZE={chosen.size:g} SEED={chosen.seed}`"
-        fill(APPENDIX / "prognosis.md", {"score rivals": f"{command}: {table}"})
+    text = f"{head}\n\n{tally.table()}"
+    print(text)
+    if "--write" in sys.argv:
+        command = f"`make rivals SIZE={asked.size:g} SEED={asked.seed}`"
+        fill(APPENDIX / "prognosis.md", {"score rivals": f"{command}: {text}"})
 
 
 if __name__ == "__main__":

@@ -63,7 +63,7 @@ class PlainUkf:
         return ends_of(rng.multivariate_normal(self.filter.x, self.filter.P, DRAWS, check_valid="ignore"))
 
 
-class Law(PrognosticsModel):  # type: ignore[misc]
+class Law(PrognosticsModel):
     """Eq. 6 as a model of progpy: its coefficients do not move, progress goes on by `gap` in a unit of time."""
 
     inputs: ClassVar[list[str]] = []
@@ -126,7 +126,7 @@ class Progpy:
         return np.array([AHEAD if each["end"] is None else each["end"] for each in found.time_of_event], dtype=float)
 
 
-class Path(PathModel):  # type: ignore[misc]
+class Path(PathModel):
     """Eq. 6 as a path of surpyval."""
 
     name = "Eq. 6"

@@ -15,20 +15,14 @@ from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
-from tests.score.table import percents
-from tests.statistical.forecasts import STAGES, followed
-from tests.statistical.laws import LAWS, TESTS
-from tests.statistical.lives import CAP, PRIOR
+from tests.score.table import joined, percents, written
+from tests.statistical.forecasts import LAWS, STAGES, TESTS, followed
+from tests.statistical.lives import CAP, PRIOR, series
 
 
 def laws(count: int, seed: int) -> str:
     """By law: how often the interval holds the truth, begins after it, and how wide it is; of the filter, and as stated."""
-    lines = [
-        f"{count} lives a law, seed {seed}, {TESTS} tests, 0.3 % scatter; held, beginning after the end and median width in "
-        "lives at 20/40/60/80 % of life\n",
-        "| law | held, % | begins after it, % | width | as stated: held, % | begins after it, % | width |",
-        "|---" * 7 + "|",
-    ]
+    rows = []
     cases: dict[str, list[tuple[Callable[[float], float], float]]] = {
         name: [(course, 10_000.0)] * count for name, course in LAWS.items()
     }
@@ -38,12 +32,15 @@ def laws(count: int, seed: int) -> str:
             followed(course, np.random.default_rng([seed, index]), end) for index, (course, end) in enumerate(each)
         ]
         told = np.array([[by_stage[stage] for stage in STAGES] for by_stage in found])
-        cells = []
-        for held, late, width in ((0, 1, 2), (3, 4, 5)):
-            cells += [percents(told[:, :, column].mean(axis=0).tolist()) for column in (held, late)]
-            cells.append("/".join(f"{x:.2f}" for x in np.median(told[:, :, width], axis=0)))
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        means, medians = told.mean(axis=0).T.tolist(), np.median(told, axis=0).T.tolist()
+        cells = [(percents(means[k]), percents(means[k + 1]), joined("{:.2f}", medians[k + 2])) for k in (0, 3)]
+        rows.append((name, *cells[0], *cells[1]))
+    return written(
+        f"{count} lives a law, seed {seed}, {TESTS} tests, 0.3 % scatter; held, beginning after the end and median width in "
+        "lives at 20/40/60/80 % of life",
+        "law | held, % | begins after it, % | width | as stated: held, % | begins after it, % | width",
+        rows,
+    )
 
 
 def rig_lives(count: int, seed: int) -> list[tuple[Callable[[float], float], float]]:
@@ -63,24 +60,21 @@ def never(count: int, seed: int) -> str:
     lives of eq. 6 alone, and once for lives of all that is believed: some with a discrepancy, some runs outlying."""
     found = {"eq. 6 alone": stated(count, seed, whole=False), "the whole prior": stated(count, seed + 100, whole=True)}
     shares = ", ".join(f"{100 * np.mean(came):.0f} % of those of {name}" for name, (_, came) in found.items())
-    lines = [
-        f"{count} lives each, seeds {seed} and {seed + 100}; half of the COF is reached within a million cycles by "
-        f"{shares}; no prediction was infinite\n",
-        "| stated probability | "
-        + " | ".join(f"{name}: lives | mean stated, % | reached it, %" for name in found)
-        + " |",
-        "|---" * 7 + "|",
-    ]
-    edges = np.array([0.0, 0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0 + 1e-9])
+    edges, rows = np.array([0.0, 0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0 + 1e-9]), []
     for low, high in itertools.pairwise(edges.tolist()):
         cells = [f"{low:.2f} to {min(high, 1.0):.2f}"]
         for told, came in found.values():
             here = (told >= low) & (told < high)
             due = math.sqrt(float((told[here] * (1.0 - told[here])).mean()) / max(1, int(here.sum())))
             mean, share = 100 * told[here].mean(), 100 * came[here].mean()
-            cells.append(f"{here.sum()} | {mean:.1f} ± {100 * due:.1f} | {share:.1f}")
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+            cells += [str(here.sum()), f"{mean:.1f} ± {100 * due:.1f}", f"{share:.1f}"]
+        rows.append(cells)
+    return written(
+        f"{count} lives each, seeds {seed} and {seed + 100}; half of the COF is reached within a million cycles by "
+        f"{shares}; no prediction was infinite",
+        "stated probability | " + " | ".join(f"{name}: lives | mean stated, % | reached it, %" for name in found),
+        rows,
+    )
 
 
 def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -123,12 +117,8 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
             noise += outlying * PRIOR.outlying_size * PRIOR.size * rng.standard_normal(runs)
         zeta = np.linspace(0.0, last, runs)
         values = truth.values(zeta)[:, 0] + noise
-        seen = [
-            Measurement(progress=z, value=y, variance=0.0) for z, y in zip(zeta.tolist(), values.tolist(), strict=True)
-        ]
-        passage = predict_first_passage(
-            grid.posterior(grid.from_history(PRIOR, seen), 1_000, rng), fraction=0.5, as_of=last
-        )
+        drawn = grid.posterior(grid.from_history(PRIOR, series(zeta, values)), 1_000, rng)
+        passage = predict_first_passage(drawn, fraction=0.5, as_of=last)
         assert all(x is None or math.isfinite(x) for x in passage.end_of_life.values())
         told.append(passage.probability_of_reaching)
         came.append(float(ends_of_life(truth, 0.5)[0]) <= CAP)
@@ -160,14 +150,12 @@ def after_event(count: int, seed: int) -> str:
                 found = predict_first_passage(posterior, fraction=0.5, as_of=some[-1].progress).end_of_life
                 low, high = found[0.05] or math.inf, found[0.95] or math.inf
                 tallies.setdefault((known, since), []).append((low <= end <= high, min(high, CAP) - min(low, CAP)))
-    lines = [
-        f"{count} lives, seed {seed}\n",
-        "| the event is | tests since | 90 % interval holds the truth, % | median width, cycles |",
-        "|---|---|---|---|",
-    ]
+    rows = []
     for (known, since), told in tallies.items():
         held, width = np.array(told, dtype=float).T
-        lines.append(
-            f"| {'known' if known else 'not known'} | {since} | {100 * held.mean():.0f} | {np.median(width):.0f} |"
-        )
-    return "\n".join(lines)
+        rows.append(("known" if known else "not known", since, f"{100 * held.mean():.0f}", f"{np.median(width):.0f}"))
+    return written(
+        f"{count} lives, seed {seed}",
+        "the event is | tests since | 90 % interval holds the truth, % | median width, cycles",
+        rows,
+    )

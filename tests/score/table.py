@@ -2,6 +2,7 @@
 
 import math
 from collections import defaultdict
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,7 +10,11 @@ import numpy as np
 from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.scoring import crps_of_sample, pit_histogram, pit_of_sample
 from models.tracking.posterior import Posterior
-from tests.statistical.lives import ends
+from tests.measuring import table
+from tests.statistical.lives import STAGES, ends
+
+#: All stages together, then each alone.
+EVERY = (STAGES, *((stage,) for stage in STAGES))
 
 
 @dataclass(frozen=True)
@@ -41,36 +46,50 @@ def score(sample: np.ndarray, weight: np.ndarray, end: float) -> Score:
 class Scores:
     """Scores by who predicted and at what stage."""
 
-    kept: dict[tuple[str, float], list[Score]] = field(default_factory=lambda: defaultdict(list))
+    kept: dict[tuple[Hashable, float], list[Score]] = field(default_factory=lambda: defaultdict(list))
 
-    def add(self, name: str, stage: float, posterior: Posterior, end: float) -> None:
+    def add(self, name: Hashable, stage: float, posterior: Posterior, end: float) -> None:
         self.add_sample(name, stage, ends(posterior), posterior.weight, end)
 
-    def add_sample(self, name: str, stage: float, sample: np.ndarray, weight: np.ndarray, end: float) -> None:
+    def add_sample(self, name: Hashable, stage: float, sample: np.ndarray, weight: np.ndarray, end: float) -> None:
         self.kept[name, stage].append(score(sample, weight, end))
 
-    def column(self, name: str, stage: float, what: str) -> np.ndarray:
+    def column(self, name: Hashable, stage: float, what: str) -> np.ndarray:
         return np.array([getattr(each, what) for each in self.kept[name, stage]], dtype=float)
 
-    def ratio(self, name: str, other: str, stages: tuple[float, ...], what: str = "crps") -> tuple[float, float]:
-        """The ratio of mean scores, and its standard error by the jackknife over lives."""
+    def means(self, name: Hashable, what: str) -> list[float]:
+        return [float(self.column(name, stage, what).mean()) for stage in STAGES]
+
+    def medians(self, name: Hashable, what: str) -> list[float]:
+        return [float(np.median(self.column(name, stage, what))) for stage in STAGES]
+
+    def ratio(
+        self, name: Hashable, other: Hashable, stages: Sequence[float] = STAGES, what: str = "crps"
+    ) -> np.ndarray:
+        """The ratio of mean scores, and its standard error by the jackknife over lives [2]."""
         ours = np.sum([self.column(name, stage, what) for stage in stages], axis=0)
         theirs = np.sum([self.column(other, stage, what) for stage in stages], axis=0)
         left = (ours.sum() - ours) / (theirs.sum() - theirs)
-        return float(ours.sum() / theirs.sum()), float(left.std() * np.sqrt(max(ours.size - 1, 1)))
+        return np.array([ours.sum() / theirs.sum(), left.std() * np.sqrt(max(ours.size - 1, 1))])
 
-    def typical_ratio(self, name: str, other: str, stage: float, what: str) -> float:
+    def typical_ratio(self, name: Hashable, other: Hashable, stage: float, what: str) -> float:
         """The median of the ratios, life by life."""
         return float(np.median(self.column(name, stage, what) / self.column(other, stage, what)))
 
-    def histogram(self, name: str, stages: tuple[float, ...]) -> str:
-        pits = np.concatenate([self.column(name, stage, "pit") for stage in stages])
-        return "/".join(f"{100 * share:.0f}" for share in pit_histogram(pits.tolist()))
+    def histogram(self, name: Hashable) -> str:
+        pits = np.concatenate([self.column(name, stage, "pit") for stage in STAGES])
+        return percents(pit_histogram(pits.tolist()))
 
 
-def percents(numbers: list[float]) -> str:
-    return "/".join(f"{100 * number:.0f}" for number in numbers)
+def joined(form: str, numbers: Iterable[float]) -> str:
+    """The numbers of all stages in one cell."""
+    return "/".join(form.format(number) for number in numbers)
 
 
-def shares(numbers: list[float]) -> str:
-    return " | ".join(f"{100 * number:.1f}" for number in numbers)
+def percents(shares: Iterable[float]) -> str:
+    return joined("{:.0f}", (100 * share for share in shares))
+
+
+def written(head: str, titles: str, rows: Iterable[Sequence[object]]) -> str:
+    """A part's sentence and table; `titles` with bars between them."""
+    return "\n".join([head, "", *table(titles.split(" | "), rows)])

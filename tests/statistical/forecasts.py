@@ -1,4 +1,5 @@
-"""Forecasts along a life by the exact filter: as it has them, and as they are stated after what came of earlier ones."""
+"""Laws of degradation that are not eq. 6, and forecasts along a life by the exact filter: as it has them, and as they are
+stated after what came of earlier ones."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -12,11 +13,28 @@ from models.prognosis.stated_end import stated_end
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
-from tests.statistical.laws import observed
+from tests.statistical.lives import STAGES, series
 
-STAGES = (0.2, 0.4, 0.6, 0.8)
 DRAWS, FEWEST = 1_000, 3
 GRID = Grid()
+TESTS, SCATTER = 25, 0.003
+#: COF as a share of when new, by the share x of life at which it has halved; written apart from `models`.
+LAWS: dict[str, Callable[[float], float]] = {
+    "one eq. 6 (Δ = -0.75, ε = 0.8)": lambda x: 1 - 0.75 * (1 - (1 + 2.948 * x) ** -0.8),
+    "exponential to a floor": lambda x: 1 - 0.6 * (1 - math.exp(-1.792 * x)),
+    "logarithm": lambda x: 1 - 0.5 * math.log1p(20 * x) / math.log(21),
+    "straight line": lambda x: 1 - 0.5 * x,
+    "accelerating (n = -1)": lambda x: 1 - 0.75 * (1 - math.sqrt(1 - x / 1.125)),
+    "exponential growth": lambda x: 1 - 0.5 * math.expm1(3 * x) / math.expm1(3),
+    "two stages": lambda x: 1 - 0.25 * (1 - math.exp(-8 * x)) - 0.25 * max(0.0, x - 0.3) / 0.7,
+}
+
+
+def observed(course: Callable[[float], float], rng: np.random.Generator, end: float) -> list[Measurement]:
+    """Tests up to 80 % of a life."""
+    share = np.linspace(0.0, 0.8, TESTS)
+    cof = 0.1 * np.array([course(x) for x in share.tolist()]) * (1 + SCATTER * rng.standard_normal(TESTS))
+    return series(share * end, cof, (0.001 * cof) ** 2)
 
 
 def forecast(tests: Sequence[Measurement], end: float, rng: np.random.Generator) -> dict[float, tuple[float, ...]]:

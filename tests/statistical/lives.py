@@ -10,7 +10,6 @@ import numpy as np
 from models.degradation.general_order import Degradation, first_passage, value
 from models.prognosis.ended_lives import EndedLife, ended_life, new_and_laws
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
-from models.prognosis.scoring import crps_of_sample
 from models.tracking import linear_model, sampling
 from models.tracking.courses import FORM_COURSE, FORM_SIZE, SCALE_SIGN, log_form_weight
 from models.tracking.filters.particle import ParticleState
@@ -41,25 +40,34 @@ class Life:
         values = value(progress, self.truth) + self.scatter * rng.standard_normal(runs)
         if outlying > 0.0:
             values *= np.where(rng.random(runs) < outlying, 1.0 + 0.1 * rng.choice([-1.0, 1.0], runs), 1.0)
-        return [
-            Measurement(progress=float(z), value=float(y), variance=0.0) for z, y in zip(progress, values, strict=True)
-        ]
+        return series(progress, values)
 
 
-def lives(count: int, seed: int, prior: Prior = PRIOR) -> Iterator[tuple[Life, np.random.Generator]]:
+def series(progress: np.ndarray, values: np.ndarray, variance: np.ndarray | float = 0.0) -> list[Measurement]:
+    """Measurements at these progresses [n]; the variance of each, or of all."""
+    columns = (column.tolist() for column in np.broadcast_arrays(progress, values, variance))
+    return [Measurement(progress=z, value=y, variance=v) for z, y, v in zip(*columns, strict=True)]
+
+
+def upto(measurements: list[Measurement], stage: float) -> list[Measurement]:
+    """Those up to a stage of a life whose 25 runs end at 80 % of it."""
+    return measurements[: round(stage * 30) + 1]
+
+
+def lives(count: int, seed: int) -> Iterator[tuple[Life, np.random.Generator]]:
     """Lives drawn from the prior, of those that reach half of their COF between 100 and 1,000,000 cycles."""
     print(f"seed {seed}")
     rng = np.random.default_rng(seed)
     found = 0
     while found < count:
-        initial = rng.normal(prior.initial_mean, prior.initial_sd)
+        initial = rng.normal(PRIOR.initial_mean, PRIOR.initial_sd)
         truth = Degradation(
             initial=initial,
-            change=rng.normal(prior.change_mean, prior.change_sd),
-            scale=math.exp(rng.normal(prior.log_scale_mean, prior.log_scale_sd)),
-            exponent=math.exp(rng.normal(prior.log_exponent_mean, prior.log_exponent_sd)),
+            change=rng.normal(PRIOR.change_mean, PRIOR.change_sd),
+            scale=math.exp(rng.normal(PRIOR.log_scale_mean, PRIOR.log_scale_sd)),
+            exponent=math.exp(rng.normal(PRIOR.log_exponent_mean, PRIOR.log_exponent_sd)),
         )
-        scatter = math.exp(rng.normal(prior.log_scatter_mean, prior.log_scatter_sd))
+        scatter = math.exp(rng.normal(PRIOR.log_scatter_mean, PRIOR.log_scatter_sd))
         end = float(first_passage(0.5 * initial, truth))
         if initial > 0.0 and 100.0 < end < CAP:
             found += 1
@@ -97,13 +105,13 @@ def at_stages(
     way."""
     state, seen = tracker.start(prior), 0
     for stage in STAGES:
-        runs = round(stage * 30) + 1
+        runs = upto(measurements, stage)
         if tracker.name == "grid":
-            state = tracker.from_history(prior, measurements[:runs])
+            state = tracker.from_history(prior, runs)
         else:
-            for measurement in measurements[seen:runs]:
+            for measurement in runs[seen:]:
                 state = tracker.update(state, measurement, rng)
-        seen = runs
+        seen = len(runs)
         yield stage, state
 
 
@@ -134,14 +142,10 @@ def weighted(
         ]
     )
     log_weight = log_likelihood + log_prior(prior, points) - log_proposal
-    log_weight[_ended(points, max(m.progress for m in measurements))] = -np.inf
+    span, ending = max(m.progress for m in measurements), SCALE_SIGN[FORM_COURSE[points.form]] < 0.0
+    log_weight[ending & (np.exp(points.log_scale) <= span)] = -np.inf
     weight = np.exp(log_weight - log_weight.max())
     return log_weight, float(weight.sum() ** 2 / np.square(weight).sum())
-
-
-def _ended(points: Points, span: float) -> np.ndarray:
-    """Whether a point's course ends at |φ| up to that progress [n]."""
-    return np.asarray((SCALE_SIGN[FORM_COURSE[points.form]] < 0.0) & (np.exp(points.log_scale) <= span))
 
 
 def log_prior(prior: Prior, points: Points) -> np.ndarray:
@@ -149,7 +153,7 @@ def log_prior(prior: Prior, points: Points) -> np.ndarray:
     count, share = points.outlying.sum(axis=0), max(prior.outlying_share, 1e-300)
     chance = count * math.log(share) + (points.outlying.shape[0] - count) * math.log1p(-prior.outlying_share)
     flat = prior.log_density(points.log_scale, points.log_exponent, points.log_scatter)
-    return np.asarray(flat + log_form_weight(prior)[points.form] + chance)
+    return flat + log_form_weight(prior)[points.form] + chance
 
 
 def from_prior(
@@ -216,10 +220,8 @@ TURN = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 def taught(tests: Sequence[Measurement], end: float) -> EndedLife:
     """What a life with these tests teaches that ended at `end`, with half of its new value."""
     initial, laws = new_and_laws(tests)
-    progress, values = (np.array(column) for column in zip(*((t.progress, t.value) for t in tests), strict=True))
-    life = ended_life(progress, values, end, initial=initial, fraction=0.5, laws=laws)
-    assert life is not None
-    return life
+    progress, values = np.array([(test.progress, test.value) for test in tests]).T
+    return ended_life(progress, values, end, initial=initial, fraction=0.5, laws=laws)
 
 
 def ends(posterior: Posterior) -> np.ndarray:
@@ -238,17 +240,3 @@ def misplaced(reference: Posterior, other: Posterior, of: Callable[[Posterior], 
     below = np.array([reference.weight[sample < x - e].sum() for x, e in zip(found, slack, strict=True)])
     upto = np.array([reference.weight[sample <= x + e].sum() for x, e in zip(found, slack, strict=True)])
     return np.where(below > LEVELS, below - LEVELS, np.where(upto < LEVELS, LEVELS - upto, 0.0))
-
-
-def crps(posterior: Posterior, truth: float) -> float:
-    return crps_of_sample(ends(posterior), posterior.weight, truth)
-
-
-def interval(posterior: Posterior) -> tuple[float, float]:
-    low, high = weighted_quantiles(ends(posterior), posterior.weight, (0.05, 0.95))
-    return float(low), float(high)
-
-
-def covered(posterior: Posterior, truth: float) -> bool:
-    low, high = interval(posterior)
-    return low <= truth <= high

@@ -88,7 +88,7 @@ def _interior_point(one: Curve, rng: np.random.Generator) -> float:
 
 @pytest.mark.filterwarnings("ignore::UserWarning", "ignore::RuntimeWarning")  # the witnesses warn on degenerate curves
 @pytest.mark.parametrize(("witness", "curves"), [(_multistart, 250), (_interior_point, 50)])
-def test_never_a_worse_optimum_than_a_local_optimiser(witness, curves) -> None:  # type: ignore[no-untyped-def]
+def test_never_a_worse_optimum_than_a_local_optimiser(witness, curves) -> None:
     """Four starts of bounded least squares; the paper's own interior point method from one start on a subset."""
     rng = np.random.default_rng(SEED)
     tests = [hard_curve(rng) for _ in range(curves)]
@@ -123,7 +123,7 @@ def _coverage(fits: Sequence[StribeckFit], truth: FloatArray, shrink: float = 1.
     share = held.mean(axis=0)
     names = (*PARAMETER_NAMES, "mean_torque")
     print({name: round(100 * float(value), 1) for name, value in zip(names, share, strict=True)})
-    return np.asarray(share)
+    return share
 
 
 def test_the_error_of_eq_5_is_where_noise_alone_puts_it() -> None:

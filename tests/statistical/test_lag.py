@@ -7,7 +7,6 @@ import pytest
 
 from models.friction.criteria import Z90
 from models.friction.identification import fit_curves
-from models.friction.stribeck import StribeckParameters
 from models.friction.stribeck import torque as curve_torque
 from models.loops.attractor import attractor_torque
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, Law, StationaryCurve, fit_lag
@@ -44,33 +43,26 @@ def _dirty(torque: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np
     return time, velocity(time) + noise, measured
 
 
-def _made(law: Law, parameters: StribeckParameters, value: float) -> np.ndarray:
-    return (attractor_torque if law is ATTRACTOR else squeeze_film_torque)(FINE, velocity(FINE), parameters, value)
-
-
 def _loops(law: Law, records: int, rng: np.random.Generator) -> Iterator[tuple]:
     """The lag, the true curve, its torque, the samples and the swing of records of both curves by turns."""
     for i in range(records):
         parameters = (FALLING, RISING)[i % 2]
         value = float(np.exp(rng.uniform(*np.log([50.0, 500.0] if law is ATTRACTOR else [0.02, 0.3]))))
-        torque = _made(law, parameters, value)
+        lagging = attractor_torque if law is ATTRACTOR else squeeze_film_torque
+        torque = lagging(FINE, velocity(FINE), parameters, value)
         time, speed, measured = _dirty(torque, rng)
         cycle = fit_cycle(time, speed)
         yield value, parameters, torque, clean_samples(cycle, time, measured), cycle
-
-
-def _records(law: Law, records: int) -> Iterator[tuple]:
-    for value, parameters, torque, samples, cycle in _loops(law, records, np.random.default_rng(SEED)):
-        area = float(np.trapezoid(torque[PERIOD], velocity(FINE)[PERIOD]))
-        curve = StationaryCurve(parameters=parameters)
-        yield value, area, area_of(cycle, samples), fit_lag(law, cycle, samples.phase, samples.torque, curve)
 
 
 @pytest.mark.parametrize(("law", "records"), [(ATTRACTOR, 500), (SQUEEZE_FILM, 100)], ids=["attractor", "film"])
 def test_intervals_hold_what_they_promise(law, records):
     """C over 50 to 500 Nm/s (the interval of 1/C, open where C is only bounded), τ_1 over 0.02 to 0.3 s, the area."""
     held, held_area, halved, low, high = 0, 0, 0, 0, 0
-    for value, true_area, area, fit in _records(law, records):
+    for value, parameters, torque, samples, cycle in _loops(law, records, np.random.default_rng(SEED)):
+        true_area = float(np.trapezoid(torque[PERIOD], velocity(FINE)[PERIOD]))
+        area = area_of(cycle, samples)
+        fit = fit_lag(law, cycle, samples.phase, samples.torque, StationaryCurve(parameters=parameters))
         truth = 1 / value if law is ATTRACTOR else value
         centre, half = np.mean(fit.interval), np.ptp(fit.interval) / 2
         held += abs(truth - centre) <= half

@@ -12,11 +12,10 @@ import pytest
 
 from models.prognosis.first_passage import predict_first_passage
 from models.tracking.filters.grid import Grid
-from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.score.off_prior import rig_lives
-from tests.statistical.forecasts import STAGES, followed
-from tests.statistical.laws import LAWS
+from tests.statistical.forecasts import LAWS, STAGES, followed
+from tests.statistical.lives import series
 
 pytestmark = pytest.mark.slow
 
@@ -47,12 +46,8 @@ def test_a_filter_sure_of_eq_6_is_wrong_about_a_line() -> None:
     held = []
     for life in range(10):
         rng = np.random.default_rng([900, life])
-        seen = [
-            Measurement(
-                progress=1e4 * x, value=0.1 * (1 - 0.5 * x) * (1 + 0.003 * rng.standard_normal()), variance=1e-8
-            )
-            for x in np.linspace(0.0, 0.6, 19).tolist()
-        ]
+        x = np.linspace(0.0, 0.6, 19)
+        seen = series(1e4 * x, 0.1 * (1 - 0.5 * x) * (1 + 0.003 * rng.standard_normal(19)), 1e-8)
         prior = replace(weak(seen[0], falling=True), law_share=1.0, eq_6_share=1.0)
         posterior = Grid().posterior(Grid().from_history(prior, seen), 1_000, rng)
         found = predict_first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life

@@ -30,7 +30,7 @@ def _misses(record: Record, made: Made) -> FloatArray:
     of = np.searchsorted(made.start, 0.5 * (cut.start + cut.stop)) - 1
     assert np.unique(of).size >= made.start.size - 3
     misses = (cut.plateaus.torque - made.torque[of]) / cut.plateaus.torque_sd
-    return np.asarray(misses[cut.settled], dtype=np.float64)
+    return misses[cut.settled]
 
 
 def _assert_calibrated(misses: FloatArray) -> None:
@@ -41,17 +41,21 @@ def _assert_calibrated(misses: FloatArray) -> None:
     assert abs(coverage - COVERAGE) < WITHIN
 
 
+def _coloured(rate: float, memory: float) -> FloatArray:
+    rng = np.random.default_rng([SEED, int(rate), int(100 * memory)])
+    records = (
+        make(*protocol(rng, SPEEDS[::2]), rng, rate=rate, tau=0.1, sensors=Sensors(memory=memory))
+        for _ in range(RECORDS)
+    )
+    return np.concatenate([_misses(made.record, made) for made in records])
+
+
 @pytest.mark.parametrize(
     ("rate", "memory"),
     [(10.0, 0.0), (10.0, 0.5), (100.0, 0.0), (100.0, 0.9), (1000.0, 0.0), (1000.0, 0.95), (2000.0, 0.9)],
 )
 def test_deviations_cover_under_white_and_coloured_noise(rate: float, memory: float) -> None:
-    rng = np.random.default_rng([SEED, int(rate), int(100 * memory)])
-    misses = []
-    for _ in range(RECORDS):
-        made = make(*protocol(rng, SPEEDS[::2]), rng, rate=rate, tau=0.1, sensors=Sensors(memory=memory))
-        misses.append(_misses(made.record, made))
-    _assert_calibrated(np.concatenate(misses))
+    _assert_calibrated(_coloured(rate, memory))
 
 
 @pytest.mark.parametrize(("rate", "memory"), [(10.0, 0.8), (10.0, 0.9), (100.0, 0.97)])
@@ -62,13 +66,9 @@ def test_deviations_nearly_cover_under_noise_that_outlasts_the_dwells(rate: floa
     All dwells of a record share one estimate of its memory, so that eight records scatter by more than their dwells'
     number says: ten points are allowed.
     """
-    rng = np.random.default_rng([SEED, int(rate), int(100 * memory)])
-    misses = []
-    for _ in range(RECORDS):
-        made = make(*protocol(rng, SPEEDS[::2]), rng, rate=rate, tau=0.1, sensors=Sensors(memory=memory))
-        misses.append(_misses(made.record, made))
-    coverage = float((np.abs(np.concatenate(misses)) < 1.645).mean())
-    print(f"{np.concatenate(misses).size} plateaus, coverage {coverage:.3f}")
+    misses = _coloured(rate, memory)
+    coverage = float((np.abs(misses) < 1.645).mean())
+    print(f"{misses.size} plateaus, coverage {coverage:.3f}")
     assert abs(coverage - COVERAGE) < 0.10
 
 

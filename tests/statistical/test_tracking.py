@@ -16,13 +16,12 @@ from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
+from tests.score.table import Scores
 from tests.statistical.lives import (
     LEVELS,
     PRIOR,
     STAGES,
     at_stages,
-    covered,
-    crps,
     effective,
     ends,
     exact,
@@ -30,7 +29,9 @@ from tests.statistical.lives import (
     from_prior,
     lives,
     misplaced,
+    series,
     typical,
+    upto,
 )
 
 pytestmark = pytest.mark.slow
@@ -41,7 +42,7 @@ def check_against(reference: Posterior, count: float, found: Posterior) -> None:
     of equal weight were thinned out of weighted ones: they count for half."""
     error = math.sqrt(1.0 / min(count, 4_000) + 1.0 / min(effective(found), 2_000.0))
     for name in ("initial", "change", "scale", "exponent", "scatter"):
-        assert misplaced(reference, found, lambda p, n=name: getattr(p, n)).max() < 4.0 * error * 0.5, name  # type: ignore[misc]
+        assert misplaced(reference, found, lambda p, n=name: getattr(p, n)).max() < 4.0 * error * 0.5, name
     assert misplaced(reference, found).max() < 4.0 * error * 0.5
 
 
@@ -133,11 +134,7 @@ def weird(rng: np.random.Generator) -> list[Measurement]:
     values = value(progress, truth) + float(rng.choice([0.0, 1e-4, 0.01, 0.3])) * rng.standard_normal(runs)
     values = values + float(rng.choice([0.0, 0.0, 5.0, -1.0])) * (np.arange(runs) >= runs // 2)
     unit = float(rng.choice([1e-6, 0.13, 25.0, -4.0]))
-    variance = float(rng.choice([0.0, 1e-8, 1e-3])) * unit**2
-    return [
-        Measurement(progress=float(z), value=float(unit * y), variance=variance)
-        for z, y in zip(progress, values, strict=True)
-    ]
+    return series(progress, unit * values, float(rng.choice([0.0, 1e-8, 1e-3])) * unit**2)
 
 
 @pytest.mark.parametrize(
@@ -162,16 +159,17 @@ def test_weird_lives_are_survived(tracker: Any, count: int) -> None:
             assert np.abs(state.mean).max() <= 6.0
 
 
-def coverage(count: int, seed: int, belief: Prior, outlying: float = 0.0) -> dict[float, float]:
-    """How often the 90 % interval of the end of life holds the truth, at each stage of life."""
-    grid = Grid()
-    hits: dict[float, list[bool]] = {stage: [] for stage in STAGES}
+def coverage(count: int, seed: int, belief: Prior, outlying: float = 0.0) -> list[float]:
+    """How often the 90 % interval of the end of life holds the truth, by stage of life."""
+    grid, scores = Grid(), Scores()
     for life, rng in lives(count, seed):
         measurements = life.measured(0.8, 25, rng, outlying)
         for stage in STAGES:
-            seen = measurements[: round(stage * 30) + 1]
-            hits[stage].append(covered(grid.posterior(grid.from_history(belief, seen), 1_000, rng), life.end))
-    return {stage: float(np.mean(column)) for stage, column in hits.items()}
+            state = grid.from_history(belief, upto(measurements, stage))
+            scores.add("grid", stage, grid.posterior(state, 1_000, rng), life.end)
+    found = scores.means("grid", "held")
+    print("coverage", found)
+    return found
 
 
 def test_nine_in_ten_ends_of_life_lie_in_the_interval() -> None:
@@ -179,17 +177,17 @@ def test_nine_in_ten_ends_of_life_lie_in_the_interval() -> None:
     the filter. Lives that follow eq. 6 alone are held a little more often than nine times in ten, for a filter that is sure
     of eq. 6 keeps a twentieth of its belief for a discrepancy beside it; more often yet where it is not sure."""
     sure, family = (coverage(150, 600, replace(PRIOR, eq_6_share=share)) for share in (1.0, PRIOR.eq_6_share))
-    print("coverage, sure of eq. 6", sure, "and as believed", family)
     assert PRIOR.eq_6_share < 1.0
-    assert all(0.84 < share < 0.98 for share in sure.values())
-    assert all(share > 0.84 for share in family.values())
+    assert min(sure) > 0.84
+    assert max(sure) < 0.98
+    assert min(family) > 0.84
 
 
 def test_one_outlying_run_in_ten_leaves_the_intervals_right() -> None:
     """80 lives leave a deviation of 3.4 points."""
     found = coverage(80, 602, PRIOR, outlying=0.1)
-    print("coverage", found)
-    assert all(0.82 < share < 0.99 for share in found.values())
+    assert min(found) > 0.82
+    assert max(found) < 0.99
 
 
 def test_a_filter_sure_of_too_little_scatter_is_found_out() -> None:
@@ -203,30 +201,23 @@ def test_a_filter_sure_of_too_little_scatter_is_found_out() -> None:
         eq_6_share=1.0,
         outlying_share=0.0,
     )
-    found = coverage(60, 601, belief)
-    print("coverage", found)
-    assert max(found.values()) < 0.8
+    assert max(coverage(60, 601, belief)) < 0.8
 
 
 def test_crps_relative_to_the_grid() -> None:
     """On lives like the reference's, at 40 to 80 % of life, the prior taken from the first measurement: 30 lives leave
     about 5 % on a ratio; the exact posterior's own row is in `make score`."""
-    scores: dict[str, list[float]] = {"grid": [], "particle": [], "ukf": []}
-    held: dict[str, list[bool]] = {name: [] for name in scores}
+    scores, late = Scores(), STAGES[1:]
     for life, rng in typical(30, 700):
         measurements = life.measured(0.8, 25, rng)
         prior = weak(measurements[0], falling=True)
         for tracker in (Grid(), Particle(), Ukf()):
             for stage, state in at_stages(tracker, prior, measurements, rng):
-                if stage == STAGES[0]:
-                    continue
-                posterior = tracker.posterior(state, 1_000, rng)
-                scores[tracker.name].append(crps(posterior, life.end) / life.end)
-                held[tracker.name].append(covered(posterior, life.end))
-    for name, column in scores.items():
-        ratio = np.mean(column) / np.mean(scores["grid"])
-        print(f"{name}: CRPS {np.mean(column):.4f} lives, {ratio:.2f} of grid, coverage {np.mean(held[name]):.3f}")
-    assert np.mean(scores["particle"]) < 1.2 * np.mean(scores["grid"])
-    assert np.mean(scores["ukf"]) < 2.0 * np.mean(scores["grid"])
-    assert np.mean(held["ukf"]) > 0.8
-    assert np.mean(held["particle"]) == pytest.approx(np.mean(held["grid"]), abs=0.06)
+                scores.add(tracker.name, stage, tracker.posterior(state, 1_000, rng), life.end)
+    over = {name: scores.ratio(name, "grid", late)[0] for name in ("grid", "particle", "ukf")}
+    held = {name: np.mean(scores.means(name, "held")[1:]) for name in over}
+    print(f"CRPS over the grid's {over}, coverage {held}")
+    assert over["particle"] < 1.2
+    assert over["ukf"] < 2.0
+    assert held["ukf"] > 0.8
+    assert held["particle"] == pytest.approx(held["grid"], abs=0.06)

@@ -3,41 +3,32 @@
 SEED=  another seed       COUNT=  so many hidden effects (200)       STORE=  a file of results, from which a run goes on
 """
 
+import itertools
 import os
 import sys
 from collections import Counter
 from dataclasses import asdict
-from pathlib import Path
+from functools import partial
 from typing import Any
 
-from tests.blind.rows import wilson
-from tests.measuring import Asked, Lines, table
+from tests.measuring import Asked, Lines, number, shared, table
 from tests.visible.trial import SLUGS, Shown, shown
 
 
 def report(results: list[Shown], left_out: list[str]) -> list[str]:
-    """The table, effect by effect."""
-    rows = []
-    for slug in (*SLUGS, ""):
-        mine = [each for each in results if slug in {"", each.slug}]
-        if mine:
-            hits = sum(each.seen for each in mine)
-            low, high = wilson(hits, len(mine))
-            rows.append(
-                (f"`{slug}`" if slug else "all", len(mine), f"{hits / len(mine):.0%}", f"{low:.0%} to {high:.0%}")
-            )
+    seen = {f"`{slug}`": [each.seen for each in results if each.slug == slug] for slug in SLUGS}
+    seen["all"] = [each.seen for each in results]
+    rows = [(name, len(mine), *shared(sum(mine), len(mine))) for name, mine in seen.items() if mine]
     lines = table(("hidden at twice the stated amplitude", "effects", "raised an alarm", "95 % interval"), rows)
     return [*lines, "", f"Not tried: {', '.join(f'{slug} ({n})' for slug, n in Counter(left_out).items()) or 'none'}."]
 
 
 def main() -> None:
-    """Hide, print what was seen; results are kept as lines of JSON."""
-    asked, count = Asked.here(), int(os.environ.get("COUNT") or 200)
-    store = Lines(Path(os.environ.get("STORE") or f"visible-{asked.seed}.jsonl"))
+    seed, count = Asked.here().seed, number("COUNT", 200)
+    store = Lines(os.environ.get("STORE") or f"visible-{seed}.jsonl")
     results, left_out = list[Shown](), list[str]()
-    for k in range(10 * count):
-        slug = SLUGS[k % len(SLUGS)]
-        found = store.get(f"{k} {slug}", lambda k=k, slug=slug: _noted(shown((asked.seed, 7, k), slug)))  # type: ignore[misc]
+    for k, slug in enumerate(itertools.islice(itertools.cycle(SLUGS), 10 * count)):
+        found = store.get(f"{k} {slug}", partial(_noted, (seed, 7, k), slug))
         print(slug, found, file=sys.stderr, flush=True)
         if isinstance(found, str):
             left_out.append(slug)
@@ -45,11 +36,12 @@ def main() -> None:
             results.append(Shown(**found))
         if len(results) == count:
             break
-    print(f"`make visible SEED={asked.seed} COUNT={count}`\n")
+    print(f"`make visible SEED={seed} COUNT={count}`\n")
     print("\n".join(report(results, left_out)))
 
 
-def _noted(found: Shown | str) -> dict[str, Any] | str:
+def _noted(seed: tuple[int, ...], slug: str) -> dict[str, Any] | str:
+    found = shown(seed, slug)
     return found if isinstance(found, str) else asdict(found)
 
 

@@ -18,11 +18,10 @@ from models.diagnosis.explanations.posterior import Posterior, posterior_of
 from models.diagnosis.explanations.verdict import NOTHING
 from models.diagnosis.pooled_fit.baseline_fit import IndeterminateError, fit_baseline
 from models.diagnosis.report.isolability import visible_of
-from models.diagnosis.report.report import Visible
 from tests.blind.rig.clutch import Law
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.makers import CATALOGUED
-from tests.blind.rig.plan import RPM, Site
+from tests.blind.rig.plan import RPM, Life, Site
 from tests.blind.rig.sensor import measure
 from tests.blind.rig.sent import campaign
 from tests.blind.rig.steady import DWELL
@@ -58,7 +57,7 @@ def shown(seed: tuple[int, ...], slug: str) -> Shown | str:
     own = CATALOGUED[slug][1]
     needs = {name: getattr(own, name) for name in ("oil", "moments", "energy", "pauses", "early", "event")}
     blank = hide(seed, (), **{name: value for name, value in needs.items() if value}, **wanted)
-    stated = next((each for each in _visible(campaign(blank)) if each.effect == slug), None)
+    stated = next((each for each in visible_of(_posterior(campaign(blank))) if each.effect == slug), None)
     if stated is None or not np.isfinite(stated.amplitude):
         return "no amplitude is visible in whatever form"
     effect = CATALOGUED[slug][0](rng, blank.plan)
@@ -78,17 +77,12 @@ def shown(seed: tuple[int, ...], slug: str) -> Shown | str:
 
 def alarmed(given: Campaign) -> tuple[bool, float]:
     """Whether the diagnosis calls the model anything but adequate, and the log odds against it [nats]."""
-    probabilities = _posterior(given).probabilities
-    nothing = probabilities[NOTHING]
+    nothing = _posterior(given).probabilities[NOTHING]
     return nothing < LIKELY, float(np.log(max(1.0 - nothing, 1e-300) / max(nothing, 1e-300)))
 
 
 def _posterior(given: Campaign) -> Posterior:
     return posterior_of(fit_baseline(build_design(given)), ())
-
-
-def _visible(given: Campaign) -> tuple[Visible, ...]:
-    return visible_of(_posterior(given))
 
 
 def public(effect: Effect, amplitude: float, blank: Hidden) -> float:
@@ -97,11 +91,11 @@ def public(effect: Effect, amplitude: float, blank: Hidden) -> float:
     if slug == "interface_heating":  # loss of torque at the reference's heat flux, in %
         return 100 * _loss(effect, amplitude)
     if slug == "hydrodynamic_drag":
-        site = _site(np.array([_MIDDLE]), blank)
+        site = _site(np.array([_MIDDLE]), blank.plan.life)
         return float(effect.friction(amplitude, site, blank.clutch.law(site.bar, site.cycles))[0, 0])
     if slug == "unsettled_dwell":  # what a plateau still carries of the one before, in %
         torque = np.array([[20.0, 10.0]])
-        carried = effect.reading(amplitude, replace(_site(np.array([1.0, 1.0]), blank), step=DWELL), torque)
+        carried = effect.reading(amplitude, replace(_site(np.array([1.0, 1.0]), blank.plan.life), step=DWELL), torque)
         return float(10 * carried[0, 1])
     if slug == "accelerated_wear":
         return float(100 * -np.expm1(-amplitude))
@@ -112,11 +106,10 @@ def public(effect: Effect, amplitude: float, blank: Hidden) -> float:
 
 def _loss(effect: Effect, amplitude: float) -> float:
     """Share of the torque that is lost at REFERENCE_FLUX by the rig's formula, at 6 m/s."""
-    velocity = np.full((1, 2), _MIDDLE)
-    torque = REFERENCE_FLUX * _AREA * 0.058 / velocity
-    nothing = np.zeros_like(velocity)
+    site = _site(np.array([_MIDDLE, _MIDDLE]), _LIFE)
+    nothing = np.zeros_like(site.bar)
+    torque = REFERENCE_FLUX * _AREA * 0.058 / (_MIDDLE + nothing)
     law = Law(torque, 1 + nothing, 1 + nothing, nothing)
-    site = replace(_EMPTY, rpm=velocity / (RPM * 0.058), bar=5 + nothing, clock=nothing, oil=85 + nothing)
     return float(-effect.friction(amplitude, site, law)[0, -1] / torque[0, -1])
 
 
@@ -138,12 +131,11 @@ def _per_acceleration(effect: Effect, amplitude: float, blank: Hidden) -> float:
 
 
 _LIFE = hide((0,)).plan.life
-_EMPTY = Site("stationary", np.zeros(1, dtype=int), *np.ones((4, 1, 1)), _LIFE, DWELL)
 
 
-def _site(velocity: np.ndarray, blank: Hidden) -> Site:
+def _site(velocity: np.ndarray, life: Life) -> Site:
     """A stationary site of the fresh clutch at these velocities, 5 bar and 85 °C."""
-    row, life = velocity[None, :], blank.plan.life
+    row = velocity[None, :]
     nothing = np.zeros_like(row)
     return Site(
         "stationary", np.zeros(1, dtype=int), 5 + nothing, row / (RPM * 0.058), nothing, 85 + nothing, life, DWELL

@@ -1,44 +1,55 @@
-"""`make picture`: the dashboard's pictures in the README and docs, taken from a running service in a real browser."""
+"""`make picture`: the pictures in the README and docs: what `make demo` prints, and the dashboard in a real browser."""
 
+import re
+import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import httpx2
 from playwright.sync_api import Browser, Page
+from rich.console import Console
 
 from tests.browser.driving import chromium, pointed_at, turned
 from tests.browser.lives import demo, post
-from tests.support import serving, stationary
+from tests.measuring import ROOT
+from tests.support import served, stationary
 
-DOCS = Path(__file__).parents[1] / "docs" / "figures"
+FIGURES = ROOT / "docs" / "figures"
 MOST_BYTES = 300_000
 
 
-def main() -> None:
-    """Take all pictures."""
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        serving(Path(folder) / "pictures.db") as server,
-        httpx2.Client(base_url=server.url, timeout=120) as http,
-        chromium() as browser,
-    ):
+def demo_output() -> None:
+    """Of the demo: it is run, and what it printed is drawn."""
+    command = [sys.executable, "-m", "service.cli.main", "demo", "--exit"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    text = re.sub(r"its database in \S+", "its database in a temporary folder", done.stdout.replace("\r", ""))
+    console = Console(record=True, width=84, file=sys.stderr, highlight=False)
+    console.print(text.strip("\n"), markup=False)
+    drawn = console.export_svg(title="make demo")
+    # a picture that asks no other host for its font
+    drawn = re.sub(r"@font-face \{.*?\}\s*", "", drawn, flags=re.DOTALL)
+    (FIGURES / "demo.svg").write_text(drawn, encoding="utf-8")
+
+
+def dashboard() -> None:
+    with served() as (server, http), chromium() as browser:
         _fill(http)
         with _page(browser, 1280, 640) as page:
             page.goto(server.url)
             page.locator("table.fleet tbody tr").first.wait_for()
             _take(page, "fleet")
         with _page(browser, 1280, 960) as page:
-            _opened(page, f"{server.url}/clutches/sim-2")
+            page.goto(f"{server.url}/clutches/sim-2")
+            pointed_at(page)
             _take(page, "clutch")
             turned(page, "diagnosis").locator("#diagnosis").get_by_role("button", name="Run the diagnosis").click()
             page.locator("#diagnosis .verdict").wait_for(timeout=600_000)
             _section(page, "diagnosis", "diagnosis", height=1240)
             _section(page, "curves", "stribeck", height=720)
         with _page(browser, 1280, 900, scheme="dark") as page:
-            _opened(page, f"{server.url}/clutches/sim-2")
+            page.goto(f"{server.url}/clutches/sim-2")
+            pointed_at(page)
             _section(page, "curves", "parameters", height=900, name="dark")
             turned(page, "overview")
             page.locator("#report img").nth(1).wait_for(state="attached")
@@ -65,27 +76,20 @@ def _fill(http: httpx2.Client) -> None:
 
 @contextmanager
 def _page(browser: Browser, width: int, height: int, scheme: str = "light") -> Iterator[Page]:
-    context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)  # type: ignore[arg-type]
+    context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
     page = context.new_page()
     page.set_default_timeout(60_000)
     yield page
     context.close()
 
 
-def _opened(page: Page, address: str) -> None:
-    page.goto(address)
-    pointed_at(page)
-
-
 def _section(page: Page, tab: str, section: str, *, height: int, name: str = "") -> None:
     """A section of a tab from its heading on, its charts drawn."""
     turned(page, tab)
-    size = page.viewport_size
-    assert size is not None
-    page.set_viewport_size({"width": size["width"], "height": height})
+    page.set_viewport_size({"width": page.viewport_size["width"], "height": height})
     page.evaluate("(id) => document.getElementById(id).scrollIntoView()", section)
     for chart in page.locator(f"#{section} figure.chart:visible:not(.empty)").all():
-        if chart.bounding_box()["y"] < height:  # type: ignore[index]
+        if chart.bounding_box()["y"] < height:
             chart.and_(page.locator("[data-drawn]")).wait_for()
     page.evaluate("(id) => document.getElementById(id).scrollIntoView()", section)
     page.wait_for_timeout(1500)
@@ -93,7 +97,7 @@ def _section(page: Page, tab: str, section: str, *, height: int, name: str = "")
 
 
 def _take(page: Page, name: str) -> None:
-    path = DOCS / f"dashboard-{name}.png"
+    path = FIGURES / f"dashboard-{name}.png"
     page.screenshot(path=path)
     size = path.stat().st_size
     print(f"{path.name}: {size / 1000:.0f} kB", file=sys.stderr)
@@ -101,4 +105,5 @@ def _take(page: Page, name: str) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    demo_output()
+    dashboard()
