@@ -106,9 +106,3 @@ def reaches(level: Number, degradation: Degradation) -> np.ndarray[tuple[int, ..
     return np.asarray(
         (gap == 0.0) | ((towards > 0.0) & ((towards < np.abs(d.change)) | (np.sign(d.scale) * np.sign(d.exponent) < 0)))
     )
-
-
-def kinetics(degradation: Degradation) -> tuple[FloatArray, FloatArray]:
-    """The rate k = ε/φ [1/ζ] and the order n = 1 + 1/ε [-] of dD/dζ = -k Dⁿ, D(0) = 1."""
-    exponent = np.asarray(degradation.exponent, dtype=np.float64)
-    return np.asarray(exponent / degradation.scale), np.asarray(1.0 + 1.0 / exponent)

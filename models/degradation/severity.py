@@ -8,7 +8,8 @@ cycles are w times as severe as a reference cycle therefore counts w times:
 with N the duty cycles, w the sliding distance or the energy [J] of one cycle and q an exponent. The distance is given as
 an angle [rad]: the mean radius, the same in all of a clutch's cycles, cancels. ζ is still counted in cycles, those of the
 first block that states its severity. It is piecewise linear; beyond the last block it continues at the rate of recent
-duty, and so remaining cycles are cycles of recent duty.
+duty, and so remaining cycles are cycles of recent duty; or by a planned `Programme` of blocks that is run over and over.
+The work of a planned block may be uncertain, and is then log-normal, the same at every pass of the programme.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 6; J. F. Archard, J. Appl. Phys. 24 (1953) 981-988, for
 wear by work done.
@@ -22,7 +23,6 @@ from enum import StrEnum
 import numpy as np
 
 from models.arrays import FloatArray, require_finite
-from models.degradation import criteria
 from models.degradation.general_order import Number
 
 
@@ -32,13 +32,6 @@ class SeverityBasis(StrEnum):
     CYCLES = "cycles"
     SLIDING_DISTANCE = "sliding_distance"
     DISSIPATED_ENERGY = "dissipated_energy"
-
-
-#: The work of a standard cycle [J] or [rad].
-_STANDARD = {
-    SeverityBasis.DISSIPATED_ENERGY: criteria.STANDARD_ENERGY,
-    SeverityBasis.SLIDING_DISTANCE: criteria.STANDARD_ANGLE,
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,8 +77,8 @@ class Severity:
     exponent: float = 1.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.exponent <= criteria.LARGEST_EXPONENT:
-            raise ValueError(f"exponent must lie between 0 and {criteria.LARGEST_EXPONENT:g}, got {self.exponent}")
+        if not 0.0 <= self.exponent <= 10.0:
+            raise ValueError(f"exponent must lie between 0 and 10, got {self.exponent}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,14 +126,16 @@ def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
         return IDENTITY
     rates = [None if work is None else float(counted(work, reference, severity.exponent)) for _, work in pieces]
     lengths = np.array([length for length, _ in pieces])
-    stated = np.array([rate is not None for rate in rates])
     filled = np.array([math.nan if rate is None else rate for rate in rates])
+    stated = ~np.isnan(filled)
     filled[~stated] = np.average(filled[stated], weights=lengths[stated])
+    # what an engagement of the life test dissipates about [J], and how far it slides [rad]
+    standard = 20e3 if severity.basis is SeverityBasis.DISSIPATED_ENERGY else 100.0
     return SeverityMap(
         cycles=np.concatenate([[0.0], np.cumsum(lengths)]),
         zeta=np.concatenate([[0.0], np.cumsum(lengths * filled)]),
         rate=_recent(lengths, filled),
-        unit=(reference / _STANDARD[severity.basis]) ** severity.exponent,
+        unit=(reference / standard) ** severity.exponent,
         reference=reference,
     )
 
@@ -172,3 +167,44 @@ def _recent(lengths: FloatArray, rates: FloatArray) -> float:
     ends = np.cumsum(lengths)
     kept = np.clip(ends - (total - window), 0.0, lengths)
     return float(kept @ rates / kept.sum())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Programme:
+    """Blocks of `cycles` [b] > 0, and what a cycle of each adds to ζ [n, b] > 0, by draw.
+
+    Raises ValueError where there is no block or a number is not positive.
+    """
+
+    cycles: FloatArray
+    rates: FloatArray
+
+    def __post_init__(self) -> None:
+        if not (self.cycles.size and (self.cycles > 0.0).all() and (self.rates > 0.0).all()):
+            raise ValueError("a programme needs a block, and all its cycles and rates must be positive")
+
+    def cycles_until(self, progress: FloatArray) -> FloatArray:
+        """The cycles [n] after which ζ has gone on by `progress` [n] >= 0; inf where that is."""
+        steps = self.rates * self.cycles
+        ends = np.cumsum(steps, axis=1)
+        reached = np.isfinite(progress)
+        finite = np.where(reached, progress, 0.0)
+        passes = np.floor(finite / ends[:, -1])
+        rest = np.maximum(finite - passes * ends[:, -1], 0.0)
+        block = np.minimum((ends <= rest[:, None]).sum(axis=1), self.cycles.size - 1)
+        draws = np.arange(rest.size)
+        into = np.clip((rest - ends[draws, block]) / steps[draws, block] + 1.0, 0.0, 1.0)
+        begun = np.concatenate([[0.0], np.cumsum(self.cycles)])
+        return np.where(reached, passes * begun[-1] + begun[block] + into * self.cycles[block], np.inf)
+
+    def blocks_in(self, cycles: float) -> float:
+        """The blocks that so many cycles >= 0 are, the last one in part."""
+        ends = np.concatenate([[0.0], np.cumsum(self.cycles)])
+        passes, rest = divmod(cycles, float(ends[-1]))
+        return passes * self.cycles.size + float(np.interp(rest, ends, np.arange(ends.size)))
+
+
+def uncertain_work(mean: FloatArray | float, deviation: float, normals: FloatArray) -> FloatArray:
+    """Log-normal work [n] of a mean > 0, [n] or the same for all, and a deviation >= 0, both in its unit, by normals [n]."""
+    spread = np.log1p(np.square(deviation / np.asarray(mean)))
+    return np.asarray(mean * np.exp(np.sqrt(spread) * normals - 0.5 * spread))

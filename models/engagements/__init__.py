@@ -2,5 +2,5 @@
 
 In: Stribeck parameters by pressure, a profile of pressure and a drive; or the record of one engagement. Out: the trace of a
 simulated engagement; the indicators of a measured one, how far it is from the first ones, and from a model's. Open
-`capacity.py` first, then `simulation.py`; of measured ones `slip.py`, `measured.py`, `comparison.py`, `discrepancy.py`.
+`simulation.py` first; of measured ones `slip.py`, `measured.py`, `comparison.py`, `discrepancy.py`.
 """

@@ -22,5 +22,3 @@ LONGEST_GAP = 0.2
 START = 0.10
 #: Shares of the initial speed at which μ is initial, midpoint and endpoint.
 INITIAL, MIDPOINT, ENDPOINT = 0.9, 0.5, 0.1
-#: Moments of the slip at which torques are compared with a model's.
-TORQUES = 100

@@ -11,17 +11,15 @@ contact, where the discs only touch. What is left between both is model discrepa
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.arrays import FloatArray
-from models.engagements.capacity import Capacity
 from models.engagements.comparison import bin_means
-from models.engagements.criteria import ENDPOINT, INITIAL, TORQUES
+from models.engagements.criteria import ENDPOINT, INITIAL
 from models.engagements.measured import MeasuredEngagement
-from models.engagements.simulation import Drive, Engagement, engage
+from models.engagements.simulation import Capacity, Drive, Engagement, engage
 from models.engagements.slip import Estimate, Refusal, Slip, slip_of
 from models.records.runs import Record
 
@@ -53,8 +51,11 @@ class Discrepancy:
     stop_time_difference: Estimate | None
 
 
-def discrepancy(engagement: MeasuredEngagement, capacity: Capacity, mean_radius: float) -> Discrepancy | None:
-    """A measured engagement against a clutch of this capacity; None where the record does not show what slowed the shaft."""
+def discrepancy(
+    engagement: MeasuredEngagement, capacity: Capacity, mean_radius: float, moments: int = 100
+) -> Discrepancy | None:
+    """A measured engagement against a clutch of this capacity, torques compared at so many moments of the slip; None where
+    the record does not show what slowed the shaft."""
     slip = engagement.slip
     drive = _drive_of(slip, engagement.initial_speed.value)
     if drive is None:
@@ -62,36 +63,25 @@ def discrepancy(engagement: MeasuredEngagement, capacity: Capacity, mean_radius:
     duration = slip.end.value - slip.contact
     # it begins a tenth of the slip before contact, and may last four times the measured one
     origin = slip.contact - 0.1 * duration
-    profile = _profile_of(slip, engagement.maximum_pressure, origin, duration)
-    rate = 400 / duration
-    trace = engage(
-        capacity,
-        mean_radius,
-        profile=profile,
-        drive=drive,
-        longest=profile.contact + 4.0 * duration,
-        rate=rate,
-    )
+    profile = _profile_of(slip, engagement.maximum_pressure, origin, duration, moments)
+    longest = profile.contact + 4.0 * duration
+    trace = engage(capacity, mean_radius, profile=profile, drive=drive, longest=longest, rate=400 / duration)
     simulated = slip_of(Record(time=trace.time, pressure=profile(trace.time), speed=trace.speed, torque=trace.torque))
     stop = None if isinstance(simulated, Refusal) else simulated.duration.value
     both = duration if trace.duration is None else min(duration, trace.duration)
-    since = np.linspace(0.0, both, TORQUES)
+    since = np.linspace(0.0, both, moments)
     measured = bin_means(slip.time, slip.torque, slip.contact + since)
     modelled = np.interp(profile.contact + since, trace.time, trace.torque)
     inside = slice(1, -1)  # a bin at an end reaches beyond the slip
+    error, values = measured[inside] - modelled[inside], measured[inside]
+    of_stop = engagement.stop_time
     return Discrepancy(
         trace=replace(trace, time=trace.time + origin),
         drive=drive,
-        torque_share=_relative(measured[inside] - modelled[inside], measured[inside]),
+        torque_share=math.sqrt(float(error @ error) / float(values @ values)),
         simulated_stop_time=stop,
-        stop_time_difference=None
-        if stop is None
-        else Estimate(value=engagement.stop_time.value - stop, sd=engagement.stop_time.sd),
+        stop_time_difference=None if stop is None else Estimate(value=of_stop.value - stop, sd=of_stop.sd),
     )
-
-
-def _relative(error: FloatArray, values: FloatArray) -> float:
-    return math.sqrt(float(error @ error) / float(values @ values))
 
 
 def _drive_of(slip: Slip, speed: float) -> Drive | None:
@@ -104,23 +94,17 @@ def _drive_of(slip: Slip, speed: float) -> Drive | None:
     if np.count_nonzero(rows) < 3:
         return None
     time, torque = slip.time[rows], slip.torque[rows]
-    slowed = _slowed(time, slip.speed[rows])
+    first, last = np.polynomial.Polynomial.fit(time, slip.speed[rows], 2)(time[[0, -1]]).tolist()
+    slowed = first - last
     inertia = float(np.trapezoid(torque - limit, time)) / slowed if slowed > 0 else 0.0
     return Drive(speed=speed, limit=limit, inertia=inertia, drag=0.0) if inertia > 0 else None
 
 
-def _slowed(time: FloatArray, speed: FloatArray) -> float:
-    """How much a speed falls from its first to its last time, by a parabola through it."""
-    ends: Sequence[float] = np.polynomial.Polynomial.fit(time, speed, 2)(time[[0, -1]]).tolist()
-    return ends[0] - ends[1]
-
-
-def _profile_of(slip: Slip, maximum: float, origin: float, duration: float) -> RecordedPressure:
+def _profile_of(slip: Slip, maximum: float, origin: float, duration: float, moments: int) -> RecordedPressure:
     before = slip.pressure[slip.between(origin, slip.contact)]
     plateau = float(np.median(before)) if before.size else 0.0
-    at = np.linspace(
-        slip.contact, float(slip.time[-1]), max(3, math.ceil(TORQUES * (slip.time[-1] - slip.contact) / duration))
-    )
+    last = float(slip.time[-1])
+    at = np.linspace(slip.contact, last, max(3, math.ceil(moments * (last - slip.contact) / duration)))
     return RecordedPressure(
         time=at - origin,
         values=np.interp(at, slip.time, slip.pressure)

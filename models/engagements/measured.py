@@ -115,7 +115,7 @@ class _Channels:
         before = slip.speed[slip.between(slip.contact - 0.25 * (slip.end.value - slip.contact), slip.contact)]
         if before.size >= 3:
             return Estimate(value=float(before.mean()), sd=float(before.std(ddof=1)) / math.sqrt(before.size))
-        first = self.speed.at(self.speed.first_time, self.width)
+        first = self.speed.at(float(self.speed.time[0]), self.width)
         return Estimate(value=float(self.speed.values.max()), sd=self.noise(self.speed)) if first is None else first
 
     def moment(self, speed: float) -> float:
@@ -169,8 +169,8 @@ def _energy(slip: Slip, channels: _Channels) -> Estimate:
 def _peak_power(slip: Slip) -> Estimate | None:
     rows = slip.between(slip.contact, slip.end.value)
     power = channel_of(slip.time[rows], (slip.torque * slip.speed)[rows])
-    width = 0.12 * (power.last_time - power.first_time)
-    values = [power.at(moment, width) for moment in np.linspace(power.first_time, power.last_time, 61).tolist()]
+    first, last = power.time[[0, -1]].tolist()
+    values = [power.at(moment, 0.12 * (last - first)) for moment in np.linspace(first, last, 61).tolist()]
     return max((value for value in values if value is not None), key=lambda value: value.value, default=None)
 
 

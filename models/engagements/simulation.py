@@ -13,33 +13,53 @@ Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.1, 2
 """
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.arrays import FloatArray
-from models.engagements.capacity import Capacity
+from models.friction.criteria import FEWEST_PRESSURES
+from models.friction.pressure_laws import laws_of
+from models.friction.stribeck import StribeckParameters, torque
 
-#: The shaft counts as stopped below this share of the drive's speed.
-_STOPPED = 1e-3
+#: Torque [Nm] of the closed clutch at line pressure [Pa] and sliding velocity [m/s] >= 0.
+Capacity: TypeAlias = Callable[[float, float], float]
+
+
+def capacity_of(parameters: Mapping[float, StribeckParameters]) -> Capacity:
+    """Eq. 3 over pressure and velocity, from the parameters by pressure [Pa], one pressure or more.
+
+    From FEWEST_PRESSURES on the pressure laws of fig. 9 go through them; with fewer, torque goes with pressure from the
+    nearest one. Below the lowest pressure torque goes with pressure.
+    """
+    levels = np.array(sorted(parameters))
+    columns = np.stack([parameters[level].as_array() for level in levels.tolist()])
+    laws = laws_of(levels, columns) if levels.size >= FEWEST_PRESSURES else None
+
+    def capacity(pressure: float, velocity: float) -> float:
+        curve_pressure = max(pressure, float(levels[0]))
+        if laws is None:
+            curve_pressure = float(levels[np.argmin(np.abs(levels - pressure))])
+            curve = parameters[curve_pressure]
+        else:
+            curve = laws.parameters(np.array(curve_pressure))
+        return float(torque(np.array(velocity), curve)) * pressure / curve_pressure
+
+    return capacity
 
 
 class Profile(Protocol):
     """A course of line pressure: `contact` [s] is when the discs touch, at the pressure `plateau` [Pa]; `maximum` [Pa]."""
 
     @property
-    def contact(self) -> float:
-        """[s]."""
-
+    def contact(self) -> float: ...
     @property
-    def plateau(self) -> float:
-        """[Pa]."""
-
+    def plateau(self) -> float: ...
     @property
-    def maximum(self) -> float:
-        """[Pa]."""
+    def maximum(self) -> float: ...
 
     def __call__(self, time: FloatArray) -> FloatArray:
         """Line pressure [n] Pa at time [n] s."""
@@ -137,11 +157,11 @@ def engage(
 
     def slowing(time: float, state: FloatArray) -> list[float]:
         speed = max(float(state[0]), 0.0)
-        torque = clutch_torque(time, speed)
-        return [(drive.torque(speed) - torque) / drive.inertia, torque * speed]
+        carried = clutch_torque(time, speed)
+        return [(drive.torque(speed) - carried) / drive.inertia, carried * speed]
 
     def stopped(_time: float, state: FloatArray) -> float:
-        return float(state[0]) - _STOPPED * drive.speed
+        return float(state[0]) - 1e-3 * drive.speed  # slower it stands
 
     stopped.terminal = True  # type: ignore[attr-defined]
     start = [drive.speed - drive.drag * drive.speed / drive.gain, 0.0]

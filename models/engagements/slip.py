@@ -34,6 +34,7 @@ from models.arrays import FloatArray
 from models.engagements import criteria
 from models.engagements.criteria import FEWEST_LOCAL
 from models.records.criteria import UNLOADED
+from models.records.outliers import running_median
 from models.records.runs import Record
 
 
@@ -60,12 +61,6 @@ class Refusal:
     message: str
 
 
-#: Windows into which a channel is cut to see how its noise is autocorrelated.
-_WINDOWS = 8
-#: Noise is taken for no more correlated than this. Chosen: a factor of 19, beyond which no window holds samples enough.
-_MOST_CORRELATED = 0.9
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
     """A value with its standard error, in the value's unit."""
@@ -83,48 +78,38 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
-    """A channel over [first_time, last_time] s: time [n] s ascending, values [n]; `inflation` f >= 1 of its noise."""
+    """A channel: time [n] s ascending, values [n]; `inflation` f >= 1 of its noise."""
 
     time: FloatArray
     values: FloatArray
     inflation: float
 
-    @property
-    def first_time(self) -> float:
-        """[s]."""
-        return float(self.time[0])
-
-    @property
-    def last_time(self) -> float:
-        """[s]."""
-        return float(self.time[-1])
-
     def at(self, moment: float, half_width: float) -> Estimate | None:
         """The value at a moment [s] within the channel, by the samples within `half_width` [s] or, at an end, within twice
         that. None where too few lie near."""
-        centre = min(max(moment, self.first_time + half_width), self.last_time - half_width)
-        distance = np.abs(self.time - centre)
-        width = half_width
+        first, last = self.time[[0, -1]].tolist()
+        distance = np.abs(self.time - min(max(moment, first + half_width), last - half_width))
         if distance.size < FEWEST_LOCAL:
             return None
-        width = max(width, float(np.partition(distance, FEWEST_LOCAL - 1)[FEWEST_LOCAL - 1]))
-        if width > max(half_width, 0.25 * (self.last_time - self.first_time)):
+        width = max(half_width, float(np.partition(distance, FEWEST_LOCAL - 1)[FEWEST_LOCAL - 1]))
+        if width > max(half_width, 0.25 * (last - first)):
             return None
         rows = distance <= width * (1 + 1e-9)
         return _fitted((self.time[rows] - moment) / width, self.values[rows], self.inflation)
 
 
-def channel_of(time: FloatArray, values: FloatArray) -> Channel:
-    """A channel whose noise is that of the residuals of parabolas through equal parts of it."""
+def channel_of(time: FloatArray, values: FloatArray, parts: int = 8, most: float = 0.9) -> Channel:
+    """A channel whose noise is that of the residuals of parabolas through equal parts of it; its correlation is taken for
+    `most` at most: with a factor of 19 no window holds samples enough."""
     before, after = [np.zeros(0)], [np.zeros(0)]
-    for at, part in zip(np.array_split(time, _WINDOWS), np.array_split(values, _WINDOWS), strict=True):
+    for at, part in zip(np.array_split(time, parts), np.array_split(values, parts), strict=True):
         if at.size >= FEWEST_LOCAL:
             residual = part - np.polynomial.Polynomial.fit(at, part, 2)(at)
             before.append(residual[:-1])
             after.append(residual[1:])
     first, second = np.concatenate(before), np.concatenate(after)
     power = float(first @ first)
-    correlation = min(max(float(first @ second) / power, 0.0), _MOST_CORRELATED) if power > 0 else 0.0
+    correlation = min(max(float(first @ second) / power, 0.0), most) if power > 0 else 0.0
     return Channel(time=time, values=values, inflation=(1 + correlation) / (1 - correlation))
 
 
@@ -164,9 +149,7 @@ class Standstill:
 
 def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
     """How a shaft of time [n] s and speed [n] rad/s comes to rest, the first time that it does; or why it does not."""
-    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
-
-    smooth = median_filter(speed, 5, mode="nearest")
+    smooth = running_median(speed, 5)
     highest = float(smooth.max())
     if highest < criteria.LEAST_SPEED:
         rule = f"the shaft must turn at {_rpm(criteria.LEAST_SPEED)} or more, got at most {_rpm(highest)}"
@@ -211,12 +194,10 @@ def _rest(time: FloatArray, speed: FloatArray, earliest: float, latest: float) -
     """
     rest = _rest_of(2, time, speed, earliest, latest)
     # a shaft that its drive almost keeps turning creeps to rest, and a parabola places that 3 % too early
-    for power in range(3, 4 + 1):
+    for power in (3, 4):
         better = _rest_of(power, time, speed, earliest, latest)
-        if (
-            better.freedom < criteria.FEWEST_SLIPPING
-            or rest.misfit - better.misfit < 3.0**2 * better.misfit / better.freedom
-        ):
+        few = better.freedom < criteria.FEWEST_SLIPPING
+        if few or rest.misfit - better.misfit < 3.0**2 * better.misfit / better.freedom:
             break
         rest = better
     return rest.end, rest.zero
@@ -261,10 +242,6 @@ def _rest_of(power: int, time: FloatArray, speed: FloatArray, earliest: float, l
         misfit=misfit(end),
         freedom=freedom,
     )
-
-
-#: Half of all normal deviates are smaller than this. Derived: Φ⁻¹(0.75).
-_NORMAL_QUARTILE = 0.6745
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -382,7 +359,7 @@ def _contact_of(time: FloatArray, torque: FloatArray, slowing: int) -> _Contact 
     highest_row = int(np.argmax(smooth))
     highest = float(smooth[highest_row])
     low = float(smooth[: max(highest_row, 1)].min())
-    noise = float(np.median(np.abs(np.diff(torque, 2)))) / (_NORMAL_QUARTILE * math.sqrt(6))
+    noise = float(np.median(np.abs(np.diff(torque, 2)))) / (0.6745 * math.sqrt(6))  # 0.6745: a normal's upper quartile
     never_open = abs(low) > 0.2 * (highest - low)  # above a sensor's zero and an open clutch's drag together
     if highest - low <= criteria.LEAST_RISE * noise and not (never_open and highest > criteria.LEAST_RISE * noise):
         rule = f"torque must rise above its noise of {noise:.3g} Nm, but rises by only {highest - low:.3g} Nm"

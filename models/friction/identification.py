@@ -3,8 +3,8 @@
 The estimate is the global optimum of eq. 4 (see `friction.variable_projection`), weighted by 1/torque_sd where that is
 given.
 
-The covariance is always finite, and estimate ± 1.645 standard
-errors holds the truth in 90 % of tests for every parameter that is not called undetermined.
+The covariance is always finite, and estimate ± 1.645 standard errors holds the truth in 90 % of tests for every parameter
+that is not called undetermined.
 
 Where the optimum has M_s = 0 with M_s M̄_c finite (a torque that only rises), M_s is set to a millionth of the torque,
 so that M̄_c exists and the curve is right to a millionth; M̄_c is then called undetermined. Where V_S has no influence on
@@ -48,15 +48,21 @@ from scipy.special import chdtri, stdtrit
 from models.arrays import FloatArray
 from models.friction import criteria
 from models.friction.criteria import ACCEPTABLE_MSE, ASSUMED_NOISE
-from models.friction.stribeck import GAMMA, PARAMETER_NAMES, STANDSTILL, StribeckParameters, gradient, torque
+from models.friction.stribeck import (
+    GAMMA,
+    PARAMETER_NAMES,
+    STANDSTILL,
+    StribeckParameters,
+    gradient,
+    slope,
+    slope_gradient,
+    torque,
+)
 from models.friction.variable_projection import Problem, Profile, jacobian, make_problem, minimise
 from models.records.runs import Curve
 
 #: An eigenvalue of JᵀJ below this share of the largest is rounding.
 _ROUNDING = 1e-14
-#: A point that the fit passes through has no residual of its own: its 1 - h, and its variance over that of the others, are
-#: taken as no less than this in HC3; HC2 takes it for a point like the others.
-_LEAST_LEFT, _LEAST_SHARE = 0.05, 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,15 +79,18 @@ class Noise:
     shaped: NDArray[np.bool_]
 
 
-def estimate_noise(residual: FloatArray, freedom: FloatArray, given_sd: FloatArray, level: FloatArray) -> Noise:
-    """The noise of P curves from the weighted sum of squares [P], degrees of freedom [P] and known deviation [P].
+def estimate_noise(
+    residual: FloatArray, freedom: FloatArray, given_sd: FloatArray, level: FloatArray, disbelieved: float = 0.01
+) -> Noise:
+    """The noise of P curves from the weighted sum of squares [P], degrees of freedom [P] and given deviation [P], NaN where
+    it is not given; `level` [P] is the root mean square torque.
 
-    `known` is NaN where it is not given; `level` [P] is the root mean square torque.
+    A given deviation is `disbelieved` where the residuals exceed the 1 - this quantile of χ².
     """
     given, estimable = np.isfinite(given_sd), freedom >= 1
     spare = np.maximum(freedom, 1.0)
     given_sd = np.where(given, given_sd, 1.0)
-    inflated = given & estimable & (residual / given_sd**2 > chdtri(spare, criteria.DISBELIEVED))
+    inflated = given & estimable & (residual / given_sd**2 > chdtri(spare, disbelieved))
     estimated = (estimable & ~given) | inflated
     sd = np.where(estimated, np.sqrt(residual / spare), np.where(given, given_sd, criteria.ASSUMED_NOISE * level))
     return Noise(
@@ -143,15 +152,18 @@ def _covariance(
 
 def _shapes(problem: Problem, columns: FloatArray, optimum: Profile, noise: Noise) -> tuple[FloatArray, FloatArray]:
     """Variance of each point [P, n] over `noise.sd`²: its own r²/(1 - h)², and r²/(1 - h); both 1 where the deviations are
-    given, the first wider where they were raised. Where 1 - h is next to nothing so is r², whatever the noise: in the second
-    such a point has the variance of the others."""
+    given, the first wider where they were raised.
+
+    A point that the fit passes through has no residual of its own: in the first its 1 - h and its variance are taken as no
+    less than some, in the second it has the variance of the others."""
     fitted = (columns[:, :, :3] @ optimum.coefficients[:, 0, :, None])[..., 0]
     left = 1.0 - _leverage(columns)
     residual = np.square((problem.torque - fitted) / noise.sd[:, None])
-    floor = np.maximum(left, _LEAST_LEFT)
+    least_left, least = 0.05, 1e-4
+    floor = np.maximum(left, least_left)
     shaped = noise.shaped[:, None]
-    wide = np.where(shaped, np.maximum(residual / floor**2, _LEAST_SHARE), noise.widening[:, None] ** 2)
-    return wide, np.where(shaped & (left >= _LEAST_LEFT), np.maximum(residual / floor, _LEAST_SHARE), 1.0)
+    wide = np.where(shaped, np.maximum(residual / floor**2, least), noise.widening[:, None] ** 2)
+    return wide, np.where(shaped & (left >= least_left), np.maximum(residual / floor, least), 1.0)
 
 
 def _leverage(columns: FloatArray) -> FloatArray:
@@ -194,12 +206,6 @@ def _transform(problem: Problem, optimum: Profile) -> FloatArray:
     transform[:, 1, 0], transform[:, 1, 1], transform[:, 1, 3] = -b * per_a / a, per_a, b * per_a * peak
     transform[:, 2, 3] = v_s
     return transform
-
-
-#: Points that are fitted at once: this bounds the memory of a scan.
-_BATCH = 20_000
-#: Absurd torques or speeds can overflow a variance: it is cut here.
-_LARGEST = 1e300
 
 
 class FitStatus(StrEnum):
@@ -254,8 +260,9 @@ class _Folded:
     known_noise: float | None  # the deviation of a point of weight 1, in torque_scale
 
 
-def fit_curves(curves: Sequence[Curve]) -> tuple[StribeckFit, ...]:
-    """Eq. 4-5 for every curve: the global optimum with all four parameters >= 0, its covariance and status.
+def fit_curves(curves: Sequence[Curve], at_once: int = 20_000) -> tuple[StribeckFit, ...]:
+    """Eq. 4-5 for every curve: the global optimum with all four parameters >= 0, its covariance and status. So many points
+    are fitted at once, which bounds the memory of a scan.
 
     Velocity [n] m/s of either sign (the model is odd: folded by the sign bit), torque [n] Nm, n >= 1.
     Raises ValueError where a curve is empty, has unequal lengths, a value that is not finite, or torque_sd <= 0;
@@ -268,7 +275,7 @@ def fit_curves(curves: Sequence[Curve]) -> tuple[StribeckFit, ...]:
         stop, longest = start, 0
         while stop < len(folded):
             longest = max(longest, folded[stop].speed.size)
-            if stop > start and longest * (stop - start + 1) > _BATCH:
+            if stop > start and longest * (stop - start + 1) > at_once:
                 break
             stop += 1
         fits.extend(_fit_batch(folded[start:stop]))
@@ -276,14 +283,8 @@ def fit_curves(curves: Sequence[Curve]) -> tuple[StribeckFit, ...]:
     return tuple(fits)
 
 
-def mean_torque(fit: StribeckFit, velocities: FloatArray) -> tuple[float, float]:
-    """Mean of the fitted curve over velocities [m] m/s, and its standard deviation by the delta method [Nm]."""
-    mean, deviation = mean_torques([fit], velocities)[0].tolist()
-    return mean, deviation
-
-
 def mean_torques(fits: Sequence[StribeckFit], velocities: FloatArray) -> FloatArray:
-    """`mean_torque` of several fits at once, [n, 2]."""
+    """Means of the fitted curves over velocities [m] m/s, and their standard deviations by the delta method [Nm]; [n, 2]."""
     stacked = np.stack([fit.parameters.as_array() for fit in fits], axis=1)[:, :, None]
     parameters = StribeckParameters.from_array(stacked)
     direction = gradient(velocities, parameters).mean(axis=1)
@@ -295,15 +296,14 @@ def _fold(curve: Curve) -> _Folded:
     velocity, measured, sd = curve.velocity, curve.torque, curve.torque_sd
     if measured.ndim != 1 or measured.size == 0:
         raise ValueError(f"torque must be a column with at least one row, got shape {measured.shape}")
-    for name, column in (("velocity", velocity), ("torque", measured), ("torque_sd", sd)):
+    for name, column, least in (("velocity", velocity, -np.inf), ("torque", measured, -np.inf), ("torque_sd", sd, 0.0)):
         if column is None:
             continue
         if column.shape != measured.shape:
             raise ValueError(f"{name} must have the shape of torque {measured.shape}, got {column.shape}")
-        bad = ~np.isfinite(column) if name != "torque_sd" else ~(np.isfinite(column) & (column > 0))
+        bad = ~(np.isfinite(column) & (column > least))
         if bad.any():
-            row = int(bad.argmax())
-            rule = "finite" if name != "torque_sd" else "finite and positive"
+            row, rule = int(bad.argmax()), "finite and positive" if least == 0.0 else "finite"
             raise ValueError(f"{name}[{row}] must be {rule}, got {column[row]}")
     speed_scale = float(np.abs(velocity).max())
     speed_scale = speed_scale if speed_scale > STANDSTILL else 1.0
@@ -378,10 +378,11 @@ def _describe(
     fastest = 1.0 if folded.speed.any() else 0.0
     scale = np.array([folded.torque_scale, 1.0, folded.speed_scale, folded.torque_scale / folded.speed_scale**GAMMA])
     values = np.array([a, b * math.exp(v_s * fastest) / a, v_s, c]) * scale
-    parameters = StribeckParameters.from_array(np.minimum(values, _LARGEST))
+    largest = 1e300  # absurd torques or speeds can overflow a variance
+    parameters = StribeckParameters.from_array(np.minimum(values, largest))
     with np.errstate(over="ignore"):
         covariance, unbiased = (
-            np.clip(matrix[row] * (scale[:, None] * scale), -_LARGEST, _LARGEST)
+            np.clip(matrix[row] * (scale[:, None] * scale), -largest, largest)
             for matrix in (uncertainties.covariance, uncertainties.unbiased_covariance)
         )
     miss = folded.torque - np.abs(torque(folded.curve.velocity, parameters)) / folded.torque_scale
@@ -397,7 +398,7 @@ def _describe(
         parameters=parameters,
         covariance=covariance,
         unbiased_covariance=unbiased,
-        status=_status(undetermined, at_zero),
+        status=FitStatus.UNDETERMINED if undetermined else FitStatus.AT_BOUND if at_zero else FitStatus.DETERMINED,
         undetermined=undetermined,
         noise=float(noise.sd[row]) * sd_share * folded.torque_scale,
         mse_percent=mse,
@@ -419,12 +420,6 @@ def _undetermined(folded: _Folded, too_wide: NDArray[np.bool_]) -> tuple[str, ..
     )
 
 
-def _status(undetermined: tuple[str, ...], at_zero: tuple[str, ...]) -> FitStatus:
-    if undetermined:
-        return FitStatus.UNDETERMINED
-    return FitStatus.AT_BOUND if at_zero else FitStatus.DETERMINED
-
-
 def _message(folded: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str, ...], noise: Noise, row: int) -> str:
     """A sentence or two for a person."""
     parts = []
@@ -443,3 +438,31 @@ def _message(folded: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str,
     if noise.assumed[row]:
         parts.append(f"Too few points to estimate the noise: {ASSUMED_NOISE:.0%} of the torque is assumed.")
     return " ".join(parts)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slope:
+    """dμ/dv [s/m] at a sliding speed, its standard error, and the size of its terms; sd and size are positive."""
+
+    value: float
+    sd: float
+    size: float
+
+
+def cof_slope(fit: StribeckFit, velocity: float, torque_per_cof: float) -> Slope | None:
+    """dμ/dv at velocity > 0 [m/s] where a COF of one is `torque_per_cof` > 0 [Nm]; None of a curve without friction.
+
+    Its variance is gᵀ Σ g, with g the `slope_gradient`. Its two terms have opposite signs, so that it passes through 0 as a
+    clutch ages: it is tracked additively, and its `size` is that of the terms, not of their difference. A fit that leaves
+    V_S open still has a slope: its covariance is as wide as that. Raises ValueError where an argument is not positive.
+    """
+    if not velocity > 0.0:
+        raise ValueError(f"velocity must be positive, got {velocity}")
+    if not torque_per_cof > 0.0:
+        raise ValueError(f"torque_per_cof must be positive, got {torque_per_cof}")
+    gradient = slope_gradient(velocity, fit.parameters)
+    sd = math.sqrt(max(0.0, float(gradient @ fit.covariance @ gradient))) / torque_per_cof
+    value = float(slope(np.array(velocity), fit.parameters)) / torque_per_cof
+    viscous = float(fit.parameters.viscous_coefficient) * float(gradient[3]) / torque_per_cof
+    size = abs(value - viscous) + viscous
+    return Slope(value=value, sd=sd, size=size) if sd > 0.0 and size > 0.0 else None

@@ -21,9 +21,6 @@ from models.friction.criteria import FEWEST_PRESSURES
 from models.friction.identification import StribeckFit
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 
-#: The decay p_0 is sought between these multiples of the pressures' range.
-_DECAYS = np.geomspace(0.05, 20.0, 41)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearLaw:
@@ -114,8 +111,7 @@ def law_covariance(
 
 
 def laws_of(levels: FloatArray, columns: FloatArray) -> PressureLaws:
-    """The laws through parameters [l, 4] in the order of PARAMETER_NAMES at FEWEST_PRESSURES or more levels [l] Pa, equally
-    weighted."""
+    """The laws through parameters [l, 4] in the order of PARAMETER_NAMES at levels [l] Pa, equally weighted."""
     return _laws([(levels, column, np.ones_like(levels)) for column in columns.T])
 
 
@@ -160,7 +156,7 @@ def fit_asymptotic(pressure: FloatArray, value: FloatArray, deviation: FloatArra
         )
         return np.asarray(coefficients), float(norm)
 
-    logs = np.log(_DECAYS)
+    logs = np.log(np.geomspace(0.05, 20.0, 41))
     best = int(np.argmin([solve(float(log))[1] for log in logs]))
     around = (float(logs[max(best - 1, 0)]), float(logs[min(best + 1, logs.size - 1)]))
     refined = minimize_scalar(lambda log: solve(log)[1], bounds=around, method="bounded", options={"xatol": 1e-6})

@@ -107,3 +107,17 @@ def slope(velocity: FloatArray, parameters: StribeckParameters) -> FloatArray:
     falling = m_s * (m_c - 1) * (e / safe) * (parameters.stribeck_velocity / safe)
     at_rest = np.where(np.asarray(c_v) > 0, np.inf, 0.0)
     return np.where(moving, falling + GAMMA * c_v * safe ** (GAMMA - 1), at_rest)
+
+
+def slope_gradient(velocity: float, parameters: StribeckParameters) -> FloatArray:
+    """∂(dS/dv)/∂(M_s, M̄_c, V_S, C_v) [4] at velocity > 0 [m/s]:
+
+    (M̄_c - 1) e V_S/v²,   M_s e V_S/v²,   M_s (M̄_c - 1) e (1 - V_S/v)/v²,   γ v^(γ-1)
+    """
+    m_s, m_c, v_s, _ = parameters.as_array().tolist()
+    ratio = v_s / velocity
+    e = math.exp(-ratio)
+    bend = e * ratio / velocity
+    return np.array(
+        [(m_c - 1) * bend, m_s * bend, m_s * (m_c - 1) * e * (1 - ratio) / velocity**2, GAMMA * velocity ** (GAMMA - 1)]
+    )

@@ -21,6 +21,7 @@ Everything is vectorised over the P curves of a test and K values of V_S. Paddin
 Source of the method: G. H. Golub, V. Pereyra, "Separable nonlinear least squares", Inverse Problems 19 (2003) R1.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,13 +41,12 @@ SCAN = 64
 #: 0.02 in log V_S. The best goes on alone for as many rounds, its points crowded about the vertex of a parabola: the
 #: profile's slope is continuous (the envelope theorem), but its curvature jumps where a column drops out.
 MINIMA, POINTS, ROUNDS = 3, 9, 2
-#: Residuals within this share of the sum of squared torques are equal: V_S does not matter there.
-TIE = 1e-13
 #: Two columns whose squared sine is below this are one column; the third is in the span of two below its square root.
 PARALLEL = 1e-12
 #: The pairs of columns (1 - e, e, |v|^γ), and the rows of each set of one or two columns; 3 stands for none.
-_FIRST, _SECOND = [0, 0, 1], [1, 2, 2]
-_MEMBERS = np.array([[3, 3], [0, 3], [1, 3], [2, 3], [0, 1], [0, 2], [1, 2]])
+_PAIRS = list(itertools.combinations(range(3), 2))
+_FIRST, _SECOND = np.array(_PAIRS).T.tolist()
+_MEMBERS = np.array([(3, 3), *((column, 3) for column in range(3)), *_PAIRS])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -253,7 +253,8 @@ def _bracket(
 
 
 def _tolerance(problem: Problem) -> FloatArray:
-    return np.asarray(TIE * (problem.torque**2).sum(axis=1))
+    """Residuals within this of each other [P] are equal: V_S does not matter there."""
+    return np.asarray(1e-13 * (problem.torque**2).sum(axis=1))
 
 
 def _tie(problem: Problem, scan: Profile, lowest: FloatArray) -> FloatArray:

@@ -1,7 +1,5 @@
 """The numbers that decide which loops are evaluated and what is stated of their lag."""
 
-# The loop and its area (`loop_area`)
-
 #: Fewer samples give no loop. Chosen; no table.
 FEWEST_SAMPLES = 32
 #: A speed whose lowest is below this share of its swing comes near zero. Chosen; no table.
@@ -9,16 +7,12 @@ NEAR_ZERO = 0.05
 #: Residuals are not white where block means scatter by so many deviations more than white noise's. Chosen; no table.
 NOT_WHITE = 2.5
 
-# The lag (`lag_fit`)
-
 #: The gain's prior deviation [-]. Chosen: what a torque sensor's gain differs by from day to day.
 GAIN_SD = 0.05
 #: Fewer sliding samples give no lag. Chosen; no table.
 FEWEST_SLIDING = 20
 #: A lag is against the law where it is this many deviations below none. Chosen; no table.
 AGAINST = 3.0
-
-# A dynamic test (`loops`)
 
 #: One law is said to describe a loop better where the log likelihoods differ by this much. Chosen; no table.
 TELLING = 5.0

@@ -2,11 +2,10 @@
 
 One number u is estimated, 1/C [s/Nm] of the attractor law or τ_1 [s] of the squeezed film: the torque is nearly linear
 in it, so its likelihood is nearly normal, which that of C itself is not. Beside it a gain, a zero and single-valued shapes
-are fitted, none of which has a loop area, so that u follows from how the torque differs
-between accelerating and decelerating. u maximises the likelihood (the others are profiled out); its deviation comes from
-the curvature there, with the noise taken from the residual and raised where that is not white: what no u explains makes
-u less certain. What an error of the curve, as large as it is stated to be, would explain of that
-residual is left out of it, for it is counted by itself.
+are fitted, none of which has a loop area, so that u follows from how the torque differs between accelerating and
+decelerating. u maximises the likelihood (the others are profiled out); its deviation comes from the curvature there, with
+the noise taken from the residual and raised where that is not white: what no u explains makes u less certain. What an error
+of the curve, as large as it is stated to be, would explain of that residual is left out of it: it is counted by itself.
 
 The curve's own error contributes: the lag is S S' v̇/C, so that C is off by 9 to 18 % with M̄_c 2 % off, by up to 3 %
 with V_S 5 % off, by up to 5 % with C_v 5 % off. u's gradient by the four parameters, each from one Gauss-Newton step at a
@@ -35,13 +34,9 @@ from models.arrays import FloatArray
 from models.friction.criteria import Z90
 from models.friction.identification import StribeckFit
 from models.friction.stribeck import StribeckParameters, torque
-from models.loops.attractor import attractor_torque
 from models.loops.criteria import AGAINST, FEWEST_SLIDING, GAIN_SD, NOT_WHITE
-from models.loops.squeeze_film import squeeze_film_torque
+from models.loops.lag_laws import attractor_torque, squeeze_film_torque
 from models.records.periods import Cycle
-
-_SHAPES = 6
-_BLOCKS = 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +109,8 @@ class LagProblem:
         """The part of the speed's own noise: an error of the phase opens a curve into a loop."""
         order = np.argsort(np.mod(self.phase, 2 * math.pi))
         turned = np.empty_like(course)
-        turned[order] = np.gradient(course[order], np.maximum.accumulate(_spread(self.phase[order])))
+        distinct = np.mod(self.phase[order], 2 * math.pi) + 1e-9 * np.arange(order.size)
+        turned[order] = np.gradient(course[order], np.maximum.accumulate(distinct))
         shift = float(slope @ self.without(turned)) / (gain * max(float(slope @ slope), 1e-300))
         count = cycle.cosine.size
         lead = np.zeros(2 * count)
@@ -122,7 +118,7 @@ class LagProblem:
         lead /= cycle.amplitude**2
         return abs(shift) * math.sqrt(max(float(lead @ cycle.covariance @ lead), 0.0))
 
-    def _deviation(self, residual: FloatArray, taken: float = 0.0) -> float:
+    def _deviation(self, residual: FloatArray, taken: float = 0.0, blocks: int = 24) -> float:
         """Of a sample; raised where the means over blocks of phase scatter more than white noise would make them.
 
         `taken` degrees of freedom were taken out of the residual beside what is absorbed.
@@ -131,21 +127,19 @@ class LagProblem:
         free = max(residual.size - taken, 1)
         variance = float(residual @ residual) / free
         turn = np.mod(self.phase, 2 * math.pi)
-        block = np.minimum((turn * (_BLOCKS / (2 * math.pi))).astype(np.int64), _BLOCKS - 1)
-        count = np.bincount(block, minlength=_BLOCKS)
-        total = np.bincount(block, weights=residual, minlength=_BLOCKS)
+        block = np.minimum((turn * (blocks / (2 * math.pi))).astype(np.int64), blocks - 1)
+        count = np.bincount(block, minlength=blocks)
+        total = np.bincount(block, weights=residual, minlength=blocks)
         filled = count > 0
         freedom = max(int(filled.sum()) - taken, 4)
         ratio = float((total[filled] ** 2 / count[filled]).sum()) / freedom / max(variance, 1e-300)
         return math.sqrt(variance * (ratio if ratio > 1 + NOT_WHITE * math.sqrt(2 / freedom) else 1.0))
 
 
-def _spread(phase: FloatArray) -> FloatArray:
-    """Phases of one turn, ascending, made distinct."""
-    return np.asarray(np.mod(phase, 2 * math.pi) + 1e-9 * np.arange(phase.size), dtype=np.float64)
-
-
-def make_lag_problem(cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters) -> LagProblem:
+def make_lag_problem(
+    cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters, count: int = 6
+) -> LagProblem:
+    """The samples of torque [n] Nm at phase [n] rad that slide, with so many shapes beside the curve."""
     speed = cycle.value(phase)
     highest = float(speed.max())
     rows = speed > 0.01 * highest  # slower it sticks or is next to it, and no stationary test goes there
@@ -153,7 +147,7 @@ def make_lag_problem(cycle: Cycle, phase: FloatArray, measured: FloatArray, curv
         raise ValueError(f"at least {FEWEST_SLIDING} samples must slide, got {int(rows.sum())}")
     phase, speed, measured = phase[rows], speed[rows], measured[rows]
     span = max(highest - float(speed.min()), 1e-12)
-    shapes = np.polynomial.chebyshev.chebvander(2 * (speed - speed.min()) / span - 1, _SHAPES + 1)
+    shapes = np.polynomial.chebyshev.chebvander(2 * (speed - speed.min()) / span - 1, count + 1)
     frame, _ = np.linalg.qr(np.column_stack([np.ones_like(speed), torque(speed, curve)]))
     shapes = shapes[:, 1:] - frame @ (frame.T @ shapes[:, 1:])
     vectors, sizes, _ = np.linalg.svd(shapes, full_matrices=False)
@@ -165,7 +159,6 @@ def make_lag_problem(cycle: Cycle, phase: FloatArray, measured: FloatArray, curv
     return LagProblem(phase=phase, speed=speed, measured=measured, absorbed=absorbed, left=left, noise=noise)
 
 
-_GRID = 1000  # steps of a period
 #: A parameter is moved by this share of its deviation.
 _MOVED = 0.01
 
@@ -242,22 +235,22 @@ def fit_lag(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, cur
 
     Raises ValueError where fewer than 20 samples slide.
     """
-    posed = _posed(law, cycle, phase, measured, curve.parameters)
-    scanned = posed.course.at(law.lags, posed.problem.phase)
+    posed = _Posed(law, cycle, phase, measured, curve.parameters)
+    scanned = posed.at(law.lags)
     misfits = [posed.problem.misfit(row) for row in scanned]
     best = int(np.argmin(misfits))
     none, first = posed.near_none(scanned[0])
     if first < -AGAINST * none or (best == 0 and first <= Z90 * none):
-        slant = _by_curve(lambda moved: _posed(law, cycle, phase, measured, moved).near_none()[1], curve)
+        slant = _by_curve(lambda moved: _Posed(law, cycle, phase, measured, moved).near_none()[1], curve)
         estimate = _Estimate(first, none, slant)
         status = LagStatus.AGAINST_THE_LAW if first < -AGAINST * estimate.sd else LagStatus.UNRESOLVED
         return _result(posed.problem, torque(posed.problem.speed, curve.parameters), None, estimate, status)
-    lag = _refine(posed.problem, posed.course, law.lags, misfits, best)
+    lag = posed.refined(misfits, best)
     middle, change = posed.about(lag)
     courses: list[FloatArray] = []
 
     def stepped(moved: StribeckParameters) -> float:
-        after, course = _posed(law, cycle, phase, measured, moved).stepped(lag)
+        after, course = _Posed(law, cycle, phase, measured, moved).stepped(lag)
         courses.append(course)
         return after
 
@@ -325,18 +318,38 @@ def _erring(courses: Sequence[FloatArray], curve: StationaryCurve) -> FloatArray
     return np.asarray((vectors * np.sqrt(np.maximum(roots, 0.0))).T @ changes)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class _Posed:
-    """A law and a curve put to a record."""
+    """A law and a curve put to a record: the law's torque in its periodic state, over a grid of phases."""
 
-    law: Law
-    problem: LagProblem
-    course: "_Course"
+    def __init__(
+        self,
+        law: Law,
+        cycle: Cycle,
+        phase: FloatArray,
+        measured: FloatArray,
+        curve: StribeckParameters,
+        steps: int = 1000,  # of a period
+    ) -> None:
+        self.law, self.curve = law, curve
+        self.problem = make_lag_problem(cycle, phase, measured, curve)
+        self._steps = steps
+        self._start = round(steps * min(max(0.5, 5.0 * cycle.frequency), 12.0))
+        grid = 2 * math.pi * np.arange(-self._start, steps + 1) / steps
+        self._time = grid / (2 * math.pi * cycle.frequency)
+        self._velocity = np.maximum(cycle.value(grid), 0.0)
+
+    def at(self, lags: FloatArray) -> FloatArray:
+        """The torque [k, n] Nm at lags [k]."""
+        courses = self.law.respond(self._time, self._velocity, self.curve, lags[:, np.newaxis])[:, self._start :]
+        position = np.mod(self.problem.phase, 2 * math.pi) * (self._steps / (2 * math.pi))
+        cell = np.minimum(position.astype(np.int64), self._steps - 1)
+        part = position - cell
+        return np.asarray(courses[:, cell] * (1 - part) + courses[:, cell + 1] * part, dtype=np.float64)
 
     def about(self, lag: float) -> tuple[FloatArray, FloatArray]:
         """The torque [n] Nm at a lag, and how it changes with it."""
         step = 1e-3 * lag
-        low, middle, high = self.course.at(np.array([lag - step, lag, lag + step]), self.problem.phase)
+        low, middle, high = self.at(np.array([lag - step, lag, lag + step]))
         return middle, (high - low) / (2 * step)
 
     def stepped(self, lag: float) -> tuple[float, FloatArray]:
@@ -348,12 +361,29 @@ class _Posed:
     def near_none(self, little: FloatArray | None = None) -> tuple[float, float]:
         """Deviation and estimate of the lag, linearised about none; `little` [n] Nm is the torque at the least lag."""
         least = self.law.lags[:1]
-        row = self.course.at(least, self.problem.phase)[0] if little is None else little
-        return self.problem.linear(self.course.still(self.problem.speed), row, float(least[0]))
+        row = self.at(least)[0] if little is None else little
+        return self.problem.linear(torque(self.problem.speed, self.curve), row, float(least[0]))
 
-
-def _posed(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters) -> _Posed:
-    return _Posed(law=law, problem=make_lag_problem(cycle, phase, measured, curve), course=_Course(law, cycle, curve))
+    def refined(self, misfits: list[float], best: int) -> float:
+        """The minimum about the best of the scan, in log u: three finer scans, each a ninth of the last, and a parabola."""
+        lags = self.law.lags
+        low = math.log(lags[max(best - 1, 0)])
+        high = math.log(lags[min(best + 1, lags.size - 1)])
+        optimum, least = math.log(lags[best]), misfits[best]
+        for _ in range(3):
+            points = np.linspace(low, high, 9)
+            values = np.array([self.problem.misfit(row) for row in self.at(np.exp(points))])
+            i = int(np.argmin(values))
+            if values[i] <= least:
+                optimum, least = float(points[i]), float(values[i])
+            width = (high - low) / 8
+            if 0 < i < 8:
+                left, here, right = values[i - 1 : i + 2]
+                curvature = left - 2 * here + right
+                if curvature > 0:
+                    optimum = float(points[i] + 0.5 * width * (left - right) / curvature)
+            low, high = optimum - width, optimum + width
+        return math.exp(optimum)
 
 
 def _result(
@@ -372,48 +402,3 @@ def _result(
         log_likelihood=-0.5 * size * math.log(max(miss, 1e-300) / size),
         status=status,
     )
-
-
-class _Course:
-    """A law's torque in its periodic state, over a grid of phases."""
-
-    def __init__(self, law: Law, cycle: Cycle, curve: StribeckParameters) -> None:
-        self._law, self._curve = law, curve
-        self._start = round(_GRID * min(max(0.5, 5.0 * cycle.frequency), 12.0))
-        self._grid = 2 * math.pi * np.arange(-self._start, _GRID + 1) / _GRID
-        self._time = self._grid / (2 * math.pi * cycle.frequency)
-        self._velocity = np.maximum(cycle.value(self._grid), 0.0)
-
-    def still(self, speed: FloatArray) -> FloatArray:
-        """Torque [n] Nm without any lag at speed [n] m/s."""
-        return torque(speed, self._curve)
-
-    def at(self, lags: FloatArray, phase: FloatArray) -> FloatArray:
-        """[k, n] Nm for lags [k] at phase [n]."""
-        courses = self._law.respond(self._time, self._velocity, self._curve, lags[:, np.newaxis])[:, self._start :]
-        position = np.mod(phase, 2 * math.pi) * (_GRID / (2 * math.pi))
-        cell = np.minimum(position.astype(np.int64), _GRID - 1)
-        part = position - cell
-        return np.asarray(courses[:, cell] * (1 - part) + courses[:, cell + 1] * part, dtype=np.float64)
-
-
-def _refine(problem: LagProblem, course: _Course, lags: FloatArray, misfits: list[float], best: int) -> float:
-    """The minimum about the best of the scan, in log u: three finer scans, each a ninth of the last, and a parabola."""
-    low = math.log(lags[max(best - 1, 0)])
-    high = math.log(lags[min(best + 1, lags.size - 1)])
-    optimum = math.log(lags[best])
-    least = misfits[best]
-    for _ in range(3):
-        points = np.linspace(low, high, 9)
-        values = np.array([problem.misfit(row) for row in course.at(np.exp(points), problem.phase)])
-        i = int(np.argmin(values))
-        if values[i] <= least:
-            optimum, least = float(points[i]), float(values[i])
-        width = (high - low) / 8
-        if 0 < i < 8:
-            left, here, right = values[i - 1 : i + 2]
-            curvature = left - 2 * here + right
-            if curvature > 0:
-                optimum = float(points[i] + 0.5 * width * (left - right) / curvature)
-        low, high = optimum - width, optimum + width
-    return math.exp(optimum)

@@ -65,15 +65,6 @@ class Samples:
     outliers: int
 
 
-def measured_area(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Area:
-    """Eq. 8 of torque [n] Nm at time [n] s (ascending) over the whole periods of a cycle of sliding velocity in m/s.
-
-    The deviation is of the residual noise of torque and speed, and of the scatter from period to period where there are
-    three or more and that is larger. Raises ValueError where fewer than LEAST_SAMPLES lie in the whole periods.
-    """
-    return area_of(cycle, clean_samples(cycle, time, torque))
-
-
 def clean_samples(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Samples:
     """The samples of torque [n] Nm at time [n] s (ascending) within the whole periods, without outliers from the loop."""
     inside = (time >= cycle.start) & (time < cycle.stop)
@@ -90,7 +81,11 @@ def clean_samples(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Samples
 
 
 def area_of(cycle: Cycle, samples: Samples) -> Area:
-    """`measured_area` of samples that are clean already."""
+    """Eq. 8 over the whole periods of a cycle of sliding velocity in m/s.
+
+    The deviation is of the residual noise of torque and speed, and of the scatter from period to period where there are
+    three or more and that is larger. Raises ValueError where there are fewer samples than FEWEST_SAMPLES.
+    """
     phase, measured = samples.phase, samples.torque
     if phase.size < FEWEST_SAMPLES:
         raise ValueError(f"at least {FEWEST_SAMPLES} samples must lie in the whole periods, got {phase.size}")

@@ -2,7 +2,7 @@
 
 A record holds several pressures one after another, each with one period and a half or more of a swinging speed. The last
 whole periods of each give the loop area of eq. 8 (`loops.loop_area`) and, given the state's stationary curve, the
-attractor C and the film time τ_1 of the two laws of lag (`loops.attractor`, `loops.squeeze_film`, `loops.lag_fit`). Which
+attractor C and the film time τ_1 of the two laws of lag (`loops.lag_laws`, `loops.lag_fit`). Which
 law describes the loop better is stated where the likelihoods differ by enough; neither is thereby true.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, sections 2.3.4 and 3.2.
@@ -114,6 +114,7 @@ def _loop(
     area = area_of(cycle, samples)
     status, fits = _lags(cycle, samples, curve)
     attractor, film = fits if fits else (None, None)
+    better = None if attractor is None or film is None else _better(attractor, film)
     return Loop(
         pressure=level,
         mean_pressure=mean_pressure,
@@ -127,9 +128,9 @@ def _loop(
         attractor_interval=None if attractor is None else _inverted(attractor),
         film_time=None if film is None else film.lag,
         film_time_sd=None if film is None or film.lag is None else film.lag_sd,
-        better_law=None if attractor is None or film is None else _better(attractor, film),
+        better_law=better,
         status=status,
-        message=_message(status, area, attractor, film),
+        message=_message(status, area, better),
     )
 
 
@@ -164,7 +165,7 @@ def _better(attractor: LagFit, film: LagFit) -> str | None:
     return ATTRACTOR.name if lead > 0 else SQUEEZE_FILM.name
 
 
-def _message(status: LoopStatus, area: Area, attractor: LagFit | None, film: LagFit | None) -> str:
+def _message(status: LoopStatus, area: Area, better: str | None) -> str:
     """A sentence or two for a person."""
     sentence = {
         LoopStatus.DETERMINED: "The attractor is determined.",
@@ -175,10 +176,8 @@ def _message(status: LoopStatus, area: Area, attractor: LagFit | None, film: Lag
         LoopStatus.NO_PERIOD: "",
     }[status]
     parts = [sentence]
-    if attractor is not None and film is not None:
-        better = _better(attractor, film)
-        if better is not None:
-            parts.append(f"The {better} law describes the loop better.")
+    if better is not None:
+        parts.append(f"The {better} law describes the loop better.")
     if area.outliers:
         parts.append(f"{area.outliers} outlying samples were left out.")
     return " ".join(parts)

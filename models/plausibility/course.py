@@ -28,8 +28,6 @@ _NODES = np.array(
     [(scale, *size, scatter) for scale in criteria.SCALES for size in criteria.SIZES for scatter in criteria.SCATTERS]
 )
 _LOG_SCALES = np.log(np.array(criteria.SCALES))
-#: A probability of nothing.
-_NEVER = 1e-300
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,9 +124,8 @@ class Fit:
     @cached_property
     def log_evidence_by_node(self) -> FloatArray:
         """log density of the tests under every node [g]."""
-        log_volume = 0.5 * np.log(self.noise).sum(axis=1) - np.log(np.diagonal(self._root, axis1=1, axis2=2)).sum(
-            axis=1
-        )
+        roots = np.diagonal(self._root, axis1=1, axis2=2)
+        log_volume = 0.5 * np.log(self.noise).sum(axis=1) - np.log(roots).sum(axis=1)
         return np.asarray(-0.5 * (self.pull @ self._off) - log_volume - 0.5 * self._off.size * math.log(2.0 * math.pi))
 
     @property
@@ -198,7 +195,7 @@ class Predicted:
         off, variance, weight = log_cof - self.mean, self.variance + spread**2, self.log_weight[:, None]
         same = np.log1p(-new_level) + log_outlying(off, variance, weight)
         stepped = np.logaddexp.reduce(weight + log_normal(off, variance + criteria.LEVEL_SD**2), axis=0)
-        return np.asarray(np.logaddexp(same, np.log(np.maximum(new_level, _NEVER)) + stepped))
+        return np.asarray(np.logaddexp(same, np.log(np.maximum(new_level, 1e-300)) + stepped))
 
     def interval(self, index: int, spread: float) -> tuple[float, float]:
         """COF two deviations below and above its mean at the cycles of that index."""

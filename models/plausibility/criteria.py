@@ -4,8 +4,6 @@ A run is doubted where it is improbable as it was sent and a slip explains it: p
 the other runs predict it without the slip.
 """
 
-import math
-
 # How often which slip is made: prior odds against the run as it was sent [-]. Chosen: people mistype about one number in
 # some hundred.
 
@@ -65,6 +63,6 @@ AT_START = 0.5
 ROUND = 0.5
 #: Maintenance, or one of equal blocks, within the cycles that are known, and within as many again.
 WITHIN, BEYOND = 0.5, 0.4
-#: The most cycles that clutches see, with the deviation of the logarithm beyond, and the logarithm of their range: a life
-#: may be counted in kilometres or in slips. Chosen: 10 to 1e8; a test of 3·10⁹ cycles is none.
-MAX_CYCLES, BEYOND_SD, LOG_CYCLES = 1e8, 0.7, math.log(1e8 / 1e1)
+#: The most cycles that clutches see: a life may be counted in kilometres or in slips. Chosen: 10 to 1e8; a test of 3·10⁹
+#: cycles is none.
+MAX_CYCLES = 1e8

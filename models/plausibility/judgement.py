@@ -34,10 +34,6 @@ from models.plausibility.slips import OF_CLUTCH, OTHER_CLUTCH, OTHER_CYCLES, Rea
 _LEAST = math.log(1e-250)
 #: A change of belief that gains less is none.
 _WORTH = 1e-6
-#: So many runs that surprise are asked about at a time.
-SUSPECTS = 4
-#: Where not all tests are looked at, so many right before a test must be for a new level to be seen there. Chosen.
-FOLLOWS = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,9 +172,9 @@ class _Clutch:
 
     @cached_property
     def followed(self) -> frozenset[int]:
-        """The tests that are looked at with those right before them, by which a new level is seen."""
+        """The tests that are looked at with the five right before them, by which a new level is seen."""
         tests, seen = [i for i, run in enumerate(self.runs) if run.tests], set(self.tests)
-        return frozenset(i for k, i in enumerate(tests) if seen.issuperset(tests[max(k - FOLLOWS, 0) : k + 1]))
+        return frozenset(i for k, i in enumerate(tests) if seen.issuperset(tests[max(k - 5, 0) : k + 1]))
 
     @cached_property
     def compared(self) -> frozenset[int]:
@@ -318,15 +314,14 @@ class _Weighed:
             run = self.clutch.runs[i]
             total += run.sent.log_protocol
             if run.sent.log_cof is not None:
-                own = float(log_physics(np.array(run.sent.log_cof))) if run.tests else self.log_cof(i, [run.sent])[0]
-                total += own
+                total += float(log_physics(np.array(run.sent.log_cof))) if run.tests else self.log_cof(i, [run.sent])[0]
         return total + sum(slips[1] for i in self.belief.slipped if (slips := self.weigh(i)) is not None)
 
     @cached_property
     def base(self) -> float:
         """The part of the tests' course, of cycles and dates, and the prior of the belief."""
         total = sum(fit.log_evidence for fit, own in self.fits if own)
-        total += len(self.belief.outlying) * (math.log(criteria.OUTLYING_SHARE) - math.log1p(-criteria.OUTLYING_SHARE))
+        total += len(self.belief.outlying) * _log_odds(criteria.OUTLYING_SHARE)
         total += sum(self._log_level(i) for i in self.belief.levels)
         return total + float(self.clutch.log_cycles(self._sets([]))[0])
 
@@ -346,15 +341,13 @@ class _Weighed:
         return math.log(self._level_share(self.life_of[test], self.clutch.runs[test].sent.cycles))
 
     def _level_share(self, life: int, cycles: float) -> float:
-        """Prior probability that a new level begins with a test of a life at these cycles: after an event, or without."""
-        return criteria.LEVEL_AFTER_EVENT if self._declared(life, cycles) else criteria.LEVEL_UNDECLARED
-
-    def _declared(self, life: int, cycles: float) -> bool:
-        """Whether an event lies between a test of a life at these cycles and the one before it."""
+        """Prior probability that a new level begins with a test of a life at these cycles: an event lies between it and the
+        one before, or none."""
         runs, shifts = self.clutch.runs, self._shifts(life)
         earlier = (runs[i].sent.cycles for i in self.fits[life][1])
         before = max((at for at in earlier if at < cycles), default=0.0)  # tests at the same cycles step together
-        return bool(((shifts >= before) & (shifts <= cycles)).any())
+        declared = ((shifts >= before) & (shifts <= cycles)).any()
+        return criteria.LEVEL_AFTER_EVENT if declared else criteria.LEVEL_UNDECLARED
 
     def _new_level(self, index: int, life: int, cycles: float) -> float:
         """The same where no other test comes later: else they would have the new level too. 0 before the first test."""
@@ -464,7 +457,7 @@ class _Weighed:
                 surprise[i] += (of_tests | of_others)[i]
         least = math.log(criteria.HELD / criteria.DIGIT_SLIP)  # by less no slip is as probable as that
         odd = sorted((i for i in asked if surprise[i] > least), key=lambda i: (-surprise[i], i))
-        return frozenset(odd[:SUSPECTS])
+        return frozenset(odd[:4])
 
     def _misses(self, shows: Sequence[int], life: int, fit: Fit) -> FloatArray:
         """How far the COF of runs that are no tests [k] is from the course: log density lost against its middle."""
@@ -492,7 +485,6 @@ class _Weighed:
         for i, log_odds in self.log_odds.items():
             gain = -log_odds if i in belief.slipped else log_odds
             yield belief.turned(i), gain
-        to_outlying = math.log(criteria.OUTLYING_SHARE) - math.log1p(-criteria.OUTLYING_SHARE)
         for fit, own in self.fits:
             if not own:
                 continue
@@ -503,7 +495,7 @@ class _Weighed:
                 np.logaddexp.reduce(log_weight + log_normal(off, variance + more * criteria.OUTLYING_SD**2), axis=0)
                 for more in (0.0, sign)
             )
-            turned = then - now + sign * to_outlying
+            turned = then - now + sign * _log_odds(criteria.OUTLYING_SHARE)
             for i, gain in zip(own, turned.tolist(), strict=True):
                 if gain > _WORTH:
                     yield replace(belief, outlying=belief.outlying ^ {i}), gain
@@ -549,20 +541,20 @@ class _Weighed:
         return self._predicted(index, life, np.array([reading.cycles])).interval(0, reading.spread)
 
     def _against_time(self, index: int) -> bool:
+        """Whether a run that is as sent began at fewer cycles and later, or at more and earlier."""
         run = self.clutch.runs[index]
         if run.moment is None:
             return False
-        start = run.sent.cycles - (run.block or 0.0)
-        for i in self.kept:
-            other = self.clutch.runs[i]
-            if i == index or other.moment is None:
-                continue
-            begun = other.sent.cycles - (other.block or 0.0)
-            if (begun < start - 0.5 and other.moment > run.moment + 1.0) or (
-                begun > start + 0.5 and other.moment < run.moment - 1.0
-            ):
+        for other in (self.clutch.runs[i] for i in self.kept if i != index):
+            further = other.sent.cycles - (other.block or 0.0) - (run.sent.cycles - (run.block or 0.0))
+            later = 0.0 if other.moment is None else other.moment - run.moment
+            if (further < -0.5 and later > 1.0) or (further > 0.5 and later < -1.0):
                 return True
         return False
+
+
+def _log_odds(share: float) -> float:
+    return math.log(share) - math.log1p(-share)
 
 
 def _epoch(shifts: FloatArray, cycles: FloatArray) -> FloatArray:

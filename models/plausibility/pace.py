@@ -56,10 +56,10 @@ def log_anywhere(cycles: FloatArray | float) -> FloatArray:
 
 
 def _log_of_any(cycles: FloatArray | float) -> FloatArray:
-    """The same where no number is round."""
+    """The same where no number is round; 0.7 is the deviation of the logarithm beyond."""
     at = np.maximum(cycles, 1.0)
-    beyond = np.maximum(np.log(at / criteria.MAX_CYCLES), 0.0) / criteria.BEYOND_SD
-    return np.asarray(-np.log(at * criteria.LOG_CYCLES) - 0.5 * beyond**2)
+    beyond = np.maximum(np.log(at / criteria.MAX_CYCLES), 0.0) / 0.7
+    return np.asarray(-np.log(at * math.log(1e8 / 1e1)) - 0.5 * beyond**2)
 
 
 def log_probability(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArray) -> FloatArray:

@@ -41,11 +41,6 @@ class Slip:
     unit: str = ""
 
 
-def none() -> tuple[Slip, ...]:
-    """No slips."""
-    return ()
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
     """A run: `sent` as it came in, and the `slips` of its channels that are possible, made when they are asked for.
@@ -58,7 +53,7 @@ class Run:
     name: str
     kind: str
     sent: Reading
-    slips: Callable[[], Iterable[Slip]] = none
+    slips: Callable[[], Iterable[Slip]] = tuple
     tests: bool = False
     block: float | None = None
     moment: float | None = None
@@ -100,12 +95,5 @@ def mistyped(cycles: float) -> dict[str, list[float]]:
     }
     lost, extra = [10.0 * cycles], [cycles / 10.0] if cycles % 10 == 0 else []
     others = sorted(swapped - {int(cycles), *map(int, lost), *map(int, extra)})
-    return {
-        name: values
-        for name, values in (
-            (EXTRA_ZERO, extra),
-            (LOST_ZERO, lost),
-            (SWAPPED, [float(value) for value in others]),
-        )
-        if values
-    }
+    found = {EXTRA_ZERO: extra, LOST_ZERO: lost, SWAPPED: [float(value) for value in others]}
+    return {name: values for name, values in found.items() if values}

@@ -14,7 +14,7 @@ HORIZON_AGES = 10.0
 #: Nothing is predicted from fewer tests at different progress. Chosen; no table: eq. 6 has four coefficients.
 FEWEST_TESTS = 3
 
-# Where a clutch was new (`late_start`)
+# Where a clutch was new (`stated_end`)
 
 #: The probability that the counter of a clutch that is first tested late began with another one. Chosen: with 2, 5, 10 and
 #: 20 % 71, 86, 90 and 100 % of the ends of clutches whose counter began a life early are held at 80 % of their life, and all

@@ -62,12 +62,8 @@ _ENDS = 50
 _BEYOND = 0.7
 #: How far beyond the present age a clutch of another kind may end, in logarithms: a thousandfold.
 _ANYWHERE = 7.0
-#: A course crosses the threshold at most so much later than its end [T].
-_FARTHEST = 3.0
 #: Deviation of x: tests may begin when half of the way is behind.
 _LEVEL_SD = 0.5
-#: Means, and deviations, that a predictive with censored values is averaged over.
-_NODES = 16
 #: The laws of a life of which it is not known that it follows any.
 _NO_LAWS = (0.0,) * len(Course)
 
@@ -101,9 +97,8 @@ class EndedLife:
         return np.where(share > 1.0, 1.0 + self.final_pace * (share - 1.0), self._inside(share))
 
     def _inside(self, share: FloatArray) -> FloatArray:
-        return np.asarray(
-            np.interp(share, np.append(np.array(self.progress) / self.end, 1.0), np.append(self.damage, 1.0))
-        )
+        shares = np.append(np.array(self.progress) / self.end, 1.0)
+        return np.asarray(np.interp(share, shares, np.append(self.damage, 1.0)))
 
     def in_unit(self, cycles: float) -> "EndedLife":
         """The same life with ζ counted in units of so many cycles."""
@@ -256,10 +251,8 @@ def _as_its_kind(
     tests: tuple[Measurement, ...], as_of: float, lives: tuple[EndedLife, ...], offset: tuple[float, ...] | None
 ) -> Kin | None:
     exact = np.array([not life.censored for life in lives], dtype=bool)
-    if (
-        np.count_nonzero(exact) < 2  # two say more than none (`make real`)
-        or len({test.progress for test in tests}) < criteria.FEWEST_TESTS
-    ):
+    # two lives say more than none (`make real`)
+    if np.count_nonzero(exact) < 2 or len({test.progress for test in tests}) < criteria.FEWEST_TESTS:
         return None
     decline = _Decline.of(tests, None if offset is None else np.array(offset), lives[0].fraction)
     if decline is None:
@@ -412,19 +405,13 @@ class _Nodes:
         end, weight, variance = np.exp(log_end[e]), self.weight[e, k], np.square(self.size[e, k])
         ahead = np.maximum(end / decline.span, 1.0)
         across = _walked(decline.progress / decline.span, ahead[:, None]) @ decline.turn
-        left = (
-            decline.damage
-            - self.features[e, k, j] @ decline.features.T
-            - (1.0 + self.taller[e, k, j])[:, None] * self.courses[e, :, j]
-        )
-        beyond = (
-            self.taller[e, k, j]
-            + self.features[e, k, j] @ decline.sizes
-            + variance * (across * weight * left).sum(axis=1)
-        )
+        features, taller = self.features[e, k, j], self.taller[e, k, j]
+        left = decline.damage - features @ decline.features.T - (1.0 + taller)[:, None] * self.courses[e, :, j]
+        beyond = taller + features @ decline.sizes + variance * (across * weight * left).sum(axis=1)
         spread = variance * ahead**3 - np.square(variance) * (np.square(across) * weight).sum(axis=1)
         spread = np.maximum(spread, 0.0) + self.taller_variance[e, k, j]
-        early = np.clip(beyond / pace[j], -_FARTHEST, 1.0 - 1.0 / (1.0 + _FARTHEST))
+        farthest = 3.0  # a course crosses the threshold at most so much later than its end [T]
+        early = np.clip(beyond / pace[j], -farthest, 1.0 - 1.0 / (1.0 + farthest))
         to_come = np.maximum(1.0 - as_of / end, 0.0)
         step = (log_end[1] - log_end[0]) / math.sqrt(12.0)
         deviation = np.sqrt(spread / np.square(pace[j]) + np.square(wander[k] * to_come**1.5) + step**2)
@@ -470,11 +457,11 @@ class _Predictive:
         height -= 0.5 * math.log(math.pi * freedom) + math.log(scale)
         return np.asarray(height - 0.5 * (freedom + 1.0) * np.log1p(deviations**2 / freedom))
 
-    def _averaged(self, values: FloatArray) -> FloatArray:
+    def _averaged(self, values: FloatArray, nodes: int = 16) -> FloatArray:
         """Over means and deviations, evenly by their probability, each weighted by what lies beyond."""
-        even = (np.arange(_NODES) + 0.5) / _NODES
-        deviation = np.repeat(np.sqrt(self.rate / gammaincinv(self.shape, even)), _NODES)
-        mean = self.mean + deviation / math.sqrt(self.precision) * np.tile(ndtri(even), _NODES)
+        even = (np.arange(nodes) + 0.5) / nodes
+        deviation = np.repeat(np.sqrt(self.rate / gammaincinv(self.shape, even)), nodes)
+        mean = self.mean + deviation / math.sqrt(self.precision) * np.tile(ndtri(even), nodes)
         log_weight = log_ndtr((mean - self.beyond[:, None]) / deviation).sum(axis=0)
         log_weight -= logsumexp(log_weight) + np.log(deviation) + 0.5 * math.log(2.0 * math.pi)
         off = (values[:, None] - mean) / deviation

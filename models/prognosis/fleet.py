@@ -28,12 +28,13 @@ from scipy.special import gammaln, log_expit
 
 from models.arrays import FloatArray
 from models.prognosis import criteria
-from models.tracking.courses import WITHOUT_EXPONENT, Course, unit_of_change
+from models.tracking.courses import UNIT_OF_CHANGE, WITHOUT_EXPONENT, Course
 from models.tracking.criteria import REACH
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior, joined
 from models.tracking.prior import Prior, weak
+from models.tracking.sampling import normalised
 
 _GRID = Grid()
 
@@ -176,9 +177,7 @@ def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArra
     n, d = len(fleet), believed.size
     means, spread = np.zeros((n, d)), np.zeros((d, d))
     for index, clutch in enumerate(fleet):
-        log_weight = clutch.log_weight + population.log_density(clutch.x)
-        weight = np.exp(log_weight - log_weight.max())
-        weight /= weight.sum()
+        weight = normalised(clutch.log_weight + population.log_density(clutch.x))
         means[index] = weight @ clutch.x
         off = clutch.x - means[index]
         spread += (weight * off.T) @ off
@@ -198,15 +197,14 @@ def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArra
 
 def _coordinates(drawn: Posterior) -> FloatArray:
     """x [n, 4] of a sample."""
-    size = np.abs(drawn.initial)
-    log_scale, log_exponent = drawn.log_scale, drawn.log_exponent
-    return np.stack([drawn.change / drawn.initial, log_scale, log_exponent, np.log(drawn.scatter / size)], axis=1)
+    log_scatter = np.log(drawn.scatter / np.abs(drawn.initial))
+    return np.stack([drawn.change / drawn.initial, drawn.log_scale, drawn.log_exponent, log_scatter], axis=1)
 
 
 def _log_prior(drawn: Posterior, prior: Prior) -> FloatArray:
     """Log density of (Δ, log φ, log ε, log s) [n] under a prior; ξ0 has the same under all."""
     spread = math.log(prior.change_sd * prior.log_scale_sd * prior.log_exponent_sd * prior.log_scatter_sd)
-    off = (drawn.change * unit_of_change(drawn.course) - prior.change_mean) / prior.change_sd
+    off = (drawn.change * UNIT_OF_CHANGE[drawn.course] - prior.change_mean) / prior.change_sd
     rest = prior.log_density(drawn.log_scale, drawn.log_exponent, np.log(drawn.scatter))
     density = rest - 0.5 * off**2 - spread - 2.0 * math.log(2.0 * math.pi)
     no_exponent = WITHOUT_EXPONENT[drawn.course]
@@ -217,20 +215,19 @@ def _log_prior(drawn: Posterior, prior: Prior) -> FloatArray:
 
 def _within(drawn: Posterior, prior: Prior) -> NDArray[np.bool_]:
     """Which draws a grid under a prior can have [n]."""
-    log_scale, log_exponent = drawn.log_scale, drawn.log_exponent
+    of_exponent = (drawn.log_exponent - prior.log_exponent_mean) / prior.log_exponent_sd
     off = [
-        (log_scale - prior.log_scale_mean) / prior.log_scale_sd,
-        (log_exponent - prior.log_exponent_mean) / prior.log_exponent_sd,
+        (drawn.log_scale - prior.log_scale_mean) / prior.log_scale_sd,
+        np.where(WITHOUT_EXPONENT[drawn.course], 0.0, of_exponent),
         (np.log(drawn.scatter) - prior.log_scatter_mean) / prior.log_scatter_sd,
     ]
-    off[1] = np.where(WITHOUT_EXPONENT[drawn.course], 0.0, off[1])
     return np.asarray((np.abs(off) <= REACH).all(axis=0))
 
 
 def _possible(drawn: Posterior, prior: Prior) -> Posterior:
     """A sample under a prior without the draws whose Δ lies beyond the prior's range, if there are others: the normals of an
     unscented filter reach there, and one draw divided by a density that vanishes would have all of the weight."""
-    off = (drawn.change * unit_of_change(drawn.course) - prior.change_mean) / prior.change_sd
+    off = (drawn.change * UNIT_OF_CHANGE[drawn.course] - prior.change_mean) / prior.change_sd
     weight = np.where(np.abs(off) <= REACH, drawn.weight, 0.0)
     return replace(drawn, weight=weight / weight.sum()) if weight.any() else drawn
 

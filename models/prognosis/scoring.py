@@ -17,7 +17,6 @@ A. Saxena, J. Celaya, B. Saha, S. Saha, K. Goebel, Int. J. Prognostics and Healt
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -46,13 +45,9 @@ def crps_of_quantiles(levels: Sequence[float], quantiles: Sequence[float], truth
     if tau.size == 0 or tau.shape != x.shape or (np.diff(tau) <= 0).any() or tau[0] <= 0 or tau[-1] >= 1:
         raise ValueError("levels must ascend within (0, 1), one for each quantile")
     edges = np.concatenate([[0.0], 0.5 * (tau[1:] + tau[:-1]), [1.0]])
-    above = np.array([_pinball(low, high, q < truth) for (low, high), q in zip(pairwise(edges), x, strict=True)])
-    return float(2.0 * above @ np.abs(truth - x))
-
-
-def _pinball(low: float, high: float, under: bool) -> float:
-    """∫ τ dτ from low to high where the quantile is under the truth, ∫ (1 - τ) dτ where it is not."""
-    return 0.5 * (high**2 - low**2) if under else (high - low) - 0.5 * (high**2 - low**2)
+    under = 0.5 * np.diff(edges**2)  # ∫ τ dτ where the quantile is under the truth; ∫ (1 - τ) dτ where it is not
+    loss = np.where(x < truth, under, np.diff(edges) - under)
+    return float(2.0 * loss @ np.abs(truth - x))
 
 
 def covered(low: float | None, high: float | None, truth: float | None) -> bool:

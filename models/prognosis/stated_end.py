@@ -1,18 +1,98 @@
 """The end of life as it is stated: a filter's sample of it, and that of a clutch that was new at its first test as far as
 that is probable; wider where earlier forecasts of the clutch fared badly, and as lives of the same kind that have ended have
-it, as far as the clutch is of their kind."""
+it, as far as the clutch is of their kind.
 
+Progress counts from 0, and the value when new is that of the course there. But the counter of a clutch that is first tested
+late may have begun with another clutch, or before a new lining: then the clutch ages from its first test on, and was new
+there. That is the same model with progress ζ - ζ_1, and the evidence of the tests weighs it. A clutch is alive at its first
+test: with p the prior probability, Z the two evidences and A the share of the filter's draws that end after ζ_1,
+
+    P = p Z_1/(p Z_1 + (1 - p) Z_0 A),
+
+and those that end before are left out. A course led back over a long life that no test has seen asks for a value when new
+far above the first one, which has ended by then or is improbable. The exact filter computes both evidences under the weak
+prior, for whichever filter asks.
+"""
+
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit
 
 from models.arrays import FloatArray
+from models.prognosis.criteria import COUNTED_ELSEWHERE, FEWEST_TESTS, LATE_START
 from models.prognosis.ended_lives import EndedLife, as_its_kind
 from models.prognosis.first_passage import Offset, ends_of_life, paths, widened
-from models.prognosis.late_start import late_start
+from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
+from models.tracking.prior import weak
+
+_GRID, _DRAWS = Grid(nodes=13, rows=13, levels=7), 500
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LateStart:
+    """That a clutch was new at its first test, at ζ = `begun`: the log odds of it by the tests alone, and if so its ends of
+    life ζ [n] with weights [n] that sum to one, the forms of these draws [n] (`courses`) and the mean of its value when new.
+    """
+
+    begun: float
+    log_odds: float
+    ends: FloatArray
+    weight: FloatArray
+    form: NDArray[np.intp]
+    initial: float
+
+    def weighed(self, own: FloatArray, weight: FloatArray) -> tuple[float, FloatArray]:
+        """Its probability, and the weights of a filter's `own` ends [n] where the clutch was alive at its first test, from
+        weights [n] that sum to one: both sum to one together."""
+        alive = np.where(own > self.begun, weight, 0.0)
+        share = float(alive.sum())
+        if share == 0.0:
+            return 1.0, alive
+        probability = float(expit(self.log_odds - math.log(share)))
+        return probability, alive * ((1.0 - probability) / share)
+
+
+def late_start(
+    tests: Sequence[Measurement], fraction: float, *, offset: Offset | None, horizon: float
+) -> LateStart | None:
+    """Of a clutch by its tests; its end is where ξ + offset first is at a fraction of that when new. `offset` gives [1, k].
+
+    None where the first test came within the share LATE_START of what was measured, for where it was new is then much the
+    same; and of fewer than FEWEST_TESTS tests at different ζ.
+    """
+    progress = {test.progress for test in tests}
+    if len(progress) < FEWEST_TESTS or min(progress) <= LATE_START * max(progress):
+        return None
+    begun = min(progress)
+    log_odds, drawn = _weighed(tuple(tests), begun)
+    since = None if offset is None else lambda progress: offset(progress + begun)
+    return LateStart(
+        begun=begun,
+        log_odds=log_odds,
+        ends=begun + ends_of_life(drawn, fraction, offset=since, horizon=max(horizon - begun, 1.0)),
+        weight=drawn.weight,
+        form=drawn.form,
+        initial=float(drawn.weight @ paths(drawn, np.zeros(1), since)[0]),
+    )
+
+
+@lru_cache(maxsize=8)
+def _weighed(tests: tuple[Measurement, ...], begun: float) -> tuple[float, Posterior]:
+    """The log odds that the clutch was new at its first test, and draws if it was; kept for the next filter."""
+    prior = weak(min(tests, key=lambda test: test.progress), falling=True)
+    since = [replace(test, progress=test.progress - begun) for test in tests]
+    whole, later = (_GRID.from_history(prior, each) for each in (tests, since))
+    laid = _GRID.laid(later)
+    log_odds = laid.log_evidence - _GRID.laid(whole).log_evidence
+    log_odds += math.log(COUNTED_ELSEWHERE / (1.0 - COUNTED_ELSEWHERE))
+    return log_odds, _GRID.drawn(later, laid, _DRAWS, np.random.default_rng(0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,11 +23,8 @@ LEAVING_DEVIATIONS, STANDSTILL_SHARE, SHORTEST_DWELL = 5.0, 1e-3, 8
 #: Beside a transient faster than this share of its dwell, torque may drift; a slower one cannot be distinguished from a
 #: drift.
 DRIFT_SHARE = 1 / 6
-#: How far (in its logarithm, one deviation) a dwell's time constant lies from the record's at most.
-MOST_SPREAD = 0.5
-#: Squared deviations by which a single dwell must gain from a transient (derived: five deviations), and for which it counts
-#: at most among all.
-OWN_GAIN, GAIN_CAP = 25.0, 1e3
+#: Squared deviations by which a single dwell must gain from a transient. Derived: five deviations.
+OWN_GAIN = 25.0
 #: The share of a dwell that is dropped at most; deviations of amplitude and of the time constant that are allowed for.
 MOST_DROPPED, LATE = 0.75, 2.0
 #: The share of the sum of correlations that removing a mean and a trend may take off.
@@ -39,8 +36,7 @@ OUTLIER, OUTLIER_SHARE, NEIGHBOURS = 6.0, 0.005, 5
 
 #: Harmonics of the speed; of motions with corners, tried one after the other while the residual falls to the share TAKEN.
 SPEED_HARMONICS, CORNERS, TAKEN = 4, (8, 16, 32), 0.7
-#: Standing still for longer than this share of a period before or after is no part of the swing; between these shares of it
-#: the swing is away from its ends.
-REST_SHARE, INSIDE = 0.1, (0.1, 0.9)
+#: Standing still for longer than this share of a period before or after is no part of the swing.
+REST_SHARE = 0.1
 #: Pressure is looked at in medians over this long [s], and a stretch lasts so many of them or more.
 MEDIAN_DURATION, SHORTEST_STRETCH = 0.25, 8

@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 
-#: Rows that a channel adds to a bin at most: its lowest and its highest.
-_EXTREMES = 2
-
 
 def extreme_rows(columns: Iterable[FloatArray], count: int, *, samples: int, points: int) -> NDArray[np.intp]:
     """Rows [k] of `count` columns [samples] in ascending order, with each bin's lowest and highest sample of each column.
@@ -21,7 +18,7 @@ def extreme_rows(columns: Iterable[FloatArray], count: int, *, samples: int, poi
     The bins are of equal length but for the last one, as many as `points` allow and at least one; the first and the last
     row are kept. So k <= max(points, 2 count + 2). Of equal extremes the first is kept. `columns` are gone through once.
     """
-    bins = max(1, (points - 2) // (_EXTREMES * count))
+    bins = max(1, (points - 2) // (2 * count))
     length = -(-samples // bins)  # rounded up
     kept = np.zeros(samples, dtype=np.bool_)
     kept[[0, -1]] = True

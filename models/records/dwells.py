@@ -35,14 +35,6 @@ class Blocks:
     gap: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Dwell:
-    """Blocks start:stop lie on one level."""
-
-    start: int
-    stop: int
-
-
 def average(record: Sampled, cleaning: Cleaning) -> Blocks:
     """Means over blocks of about 10 ms of the kept rows of a record; a remainder at its end is left out."""
     period = cleaning.period
@@ -79,8 +71,9 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
     )
 
 
-def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
-    """The dwells in motion, and under pressure where there is any, in the order of time, and notes on those left out."""
+def find_dwells(blocks: Blocks) -> tuple[list[slice], list[Note]]:
+    """The dwells, slices of blocks on one level, in motion, and under pressure where there is any, in the order of time; and
+    notes on those left out."""
     if blocks.time.size < criteria.SHORTEST_DWELL:
         return [], []
     window = max(4, round(0.2 / blocks.duration))  # 0.2 s before and after, four blocks at least
@@ -165,7 +158,7 @@ def _merged(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Chann
     return merged
 
 
-def _widened(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Channel, ...]) -> list[Dwell]:
+def _widened(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Channel, ...]) -> list[slice]:
     """Up to where a channel begins to leave the level, or samples are missing."""
     dwells = []
     for row, (start, stop) in enumerate(cores):
@@ -177,7 +170,7 @@ def _widened(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Chan
             off = np.where(blocks.gap[first:last], np.inf, np.abs(channel.values[first:last] - level))
             back = min(back, _reach(off[: start - first][::-1], tolerance))
             on = min(on, _reach(off[stop - first :], tolerance))
-        dwells.append(Dwell(start=start - back, stop=stop + on))
+        dwells.append(slice(start - back, stop + on))
     return dwells
 
 
@@ -191,27 +184,26 @@ def _reach(off: FloatArray, tolerance: float) -> int:
 
 
 def _sorted_out(
-    dwells: list[Dwell], blocks: Blocks, channels: tuple[_Channel, ...], least: float
-) -> tuple[list[Dwell], list[Note]]:
+    dwells: list[slice], blocks: Blocks, channels: tuple[_Channel, ...], least: float
+) -> tuple[list[slice], list[Note]]:
     """The dwells that give a mean; the last of `channels` is speed, `least` [Pa] the pressure below which there is none."""
-    kept: list[Dwell] = []
+    kept: list[slice] = []
     speed = channels[-1]
     left: dict[str, list[float]] = {code: [] for code in _SENTENCES}
-    settled: Dwell | None = None
+    settled: slice | None = None
     for row, dwell in enumerate(dwells):
-        where = slice(dwell.start, dwell.stop)
         following = [later for later in dwells[row + 1 : row + 1 + 4] if not blocks.gap[dwell.stop : later.start].any()]
         if settled is not None and _crest(channels, settled, dwell, following):
             left["overshoot"].append(float(blocks.time[dwell.start]))
             continue
         settled = dwell
-        if float(blocks.pressure[where].mean()) <= least:
+        if float(blocks.pressure[dwell].mean()) <= least:
             reason = "no_pressure"
-        elif abs(float(blocks.speed[where].mean())) <= criteria.STANDSTILL_SHARE * speed.highest:
+        elif abs(float(blocks.speed[dwell].mean())) <= criteria.STANDSTILL_SHARE * speed.highest:
             reason = "standstill"
         elif dwell.stop - dwell.start < criteria.SHORTEST_DWELL:
             reason = "dwell_too_short"
-        elif any(_ramps(channel, where) for channel in channels):
+        elif any(_ramps(channel, dwell) for channel in channels):
             reason = "not_steady"
         else:
             kept.append(dwell)
@@ -222,7 +214,7 @@ def _sorted_out(
     ]
 
 
-def _crest(channels: tuple[_Channel, ...], before: Dwell, dwell: Dwell, following: list[Dwell]) -> bool:
+def _crest(channels: tuple[_Channel, ...], before: slice, dwell: slice, following: list[slice]) -> bool:
     """Whether a dwell is only a crest of an overshoot, or the trough after it, between the dwell before and the first long
     dwell that follows: speed or pressure went beyond the latter's level."""
     long = (later for later in following if dwell.stop - dwell.start < 0.25 * (later.stop - later.start))
@@ -231,7 +223,7 @@ def _crest(channels: tuple[_Channel, ...], before: Dwell, dwell: Dwell, followin
         return False
     beyond = False
     for channel in channels:
-        first, here, last = (float(channel.values[part.start : part.stop].mean()) for part in (before, dwell, after))
+        first, here, last = (float(channel.values[part].mean()) for part in (before, dwell, after))
         # off its level by 30 % of the step at most
         if abs(here - last) > 0.3 * abs(last - first) + channel.threshold:
             return False

@@ -22,17 +22,14 @@ from scipy.special import digamma, polygamma
 from models.arrays import FloatArray
 from models.records import criteria
 
-#: Averages of a dwell that are used, at most, and number of correlation times on the grid.
-_MOST_AVERAGES, _TIMES = 64, 16
 
-
-def slow_correlation(residuals: Sequence[FloatArray]) -> FloatArray:
+def slow_correlation(residuals: Sequence[FloatArray], most: int = 64) -> FloatArray:
     """ρ at lags 1, 2, ... up to the longest of residuals, each [m] free of mean and trend and of one clock.
 
-    Empty where none of them has as many as eight averages.
+    At `most` so many averages of each are used. Empty where none of them has as many as eight.
     """
     longest = max(residual.size for residual in residuals)
-    group = -(-longest // _MOST_AVERAGES)
+    group = -(-longest // most)
     means = [residual[: residual.size // group * group].reshape(-1, group).mean(axis=1) for residual in residuals]
     kept = [k for k, average in enumerate(means) if average.size >= 8 and float(average @ average) > 0]
     if not kept:
@@ -42,7 +39,7 @@ def slow_correlation(residuals: Sequence[FloatArray]) -> FloatArray:
     for column, k in enumerate(kept):
         table[: size[column], column] = means[k]
     # of correlation times and of shares of the variance all are equally probable
-    times = np.geomspace(0.5 * group, 2.0 * longest, _TIMES)
+    times = np.geomspace(0.5 * group, 2.0 * longest, 16)
     places = [(float(time), share) for time in times for share in (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 1.0)]
     restricted = [_restricted(table, size, _averaged(time, group, table.shape[0]), share) for time, share in places]
     fit = np.array([row[0] for row in restricted])

@@ -18,9 +18,14 @@ def inliers(residual: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
 
 def beside(value: FloatArray) -> NDArray[np.bool_]:
     """[n]: value [n] near its neighbours' median."""
+    return near(value - running_median(value, NEIGHBOURS), value)
+
+
+def running_median(value: FloatArray, count: int) -> FloatArray:
+    """The median [n] of `count` values about each [n], or of as many as there are; its ends are taken to go on."""
     from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
 
-    return near(value - median_filter(value, size=min(NEIGHBOURS, value.size), mode="nearest"), value)
+    return np.asarray(median_filter(value, size=min(count, value.size), mode="nearest"))
 
 
 def near(off: FloatArray, value: FloatArray) -> NDArray[np.bool_]:

@@ -19,11 +19,11 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.records import criteria
-from models.records.outliers import beside, leading, near
+from models.records.outliers import beside, leading, near, running_median
 
-#: Cuts of ends that do not swing, and steps of a fit, at most.
+#: Steps of a fit, at most.
 _STEPS = 25
-#: The frequency is refined to so much of 1/duration: with the first harmonic alone, and at last.
+#: The frequency is refined to so much of 1/duration at last.
 _EXACT = 1e-10
 #: A speed that a curve misses by so much of its amplitude does not swing; nor one with a larger share of samples off it.
 _MISS, _OFF = 0.15, 0.2
@@ -159,11 +159,9 @@ def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
 
 def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
     """Without the ends that do not follow the swing: holds between two pressures, the way to where the next begins."""
-    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
-
     residual = value - cycle.value(cycle.phase(time))
     usual = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
-    smooth = median_filter(residual, size=min(criteria.NEIGHBOURS, residual.size), mode="nearest")
+    smooth = running_median(residual, criteria.NEIGHBOURS)
     off = np.abs(smooth) > max(criteria.OUTLIER * usual, 0.02 * cycle.amplitude)  # it does not swing yet, or no more
     before, after = leading(off), leading(off[::-1])
     return slice(before, off.size - after) if before + after < off.size else slice(0, off.size)
@@ -171,9 +169,7 @@ def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
 
 def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
     """Without standing still before and after, where that lasts for a swing of this period [s] at most."""
-    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
-
-    smooth = median_filter(value, size=min(3, value.size), mode="nearest")
+    smooth = running_median(value, 3)
     swing, noise = float(np.ptp(smooth)), float(np.median(np.abs(value - smooth)))
     least = min(0.02 * swing + 4 * noise, 0.05 * swing)
     # the share of a period that a sine spends so near an end of its swing, where the record begins or stops there
@@ -183,7 +179,7 @@ def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
     def rest(course: FloatArray, passed: FloatArray) -> int:
         """Samples of the course that stand still at its beginning, `passed` [n] s being its clock."""
         off = np.abs(course - course[0])
-        inside = criteria.INSIDE[0] * swing < course[0] - lowest < criteria.INSIDE[1] * swing
+        inside = 0.1 * swing < course[0] - lowest < 0.9 * swing
         moved = np.flatnonzero(off > least)
         # away from the swing's ends 2 % of the record
         longest = 0.02 * (time[-1] - time[0]) if inside else min(criteria.REST_SHARE, lingers) * period
@@ -197,12 +193,10 @@ def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
 
 def _coarse_frequency(time: FloatArray, value: FloatArray) -> float:
     """The periodogram's highest frequency, then the best sine about it: within a twentieth of 1/duration."""
-    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
-
     duration = float(time[-1] - time[0])
     points = int(min(4096, max(64, time.size)))
     grid = np.linspace(0.0, duration, points)
-    y = np.interp(grid, time - time[0], median_filter(value, size=5, mode="nearest"))
+    y = np.interp(grid, time - time[0], running_median(value, 5))
     power = np.abs(np.fft.rfft(y - y.mean(), 4 * points)) ** 2
     frequencies = np.fft.rfftfreq(4 * points, grid[1])
     peak = float(frequencies[np.argmax(np.where(frequencies >= 0.5 / duration, power, 0.0))])
@@ -256,29 +250,13 @@ def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, t
             keep = near(residual, value) | steady
         elif abs(move) < tolerance:
             break
-    noise = math.sqrt(float((residual[keep] ** 2).sum()) / max(int(keep.sum()) - 2 * count - 2, 1))
-    inverse = np.asarray(np.linalg.pinv(gram, hermitian=True), dtype=np.float64)
-    covariance, converged = inverse[1:-1, 1:-1] * noise**2, abs(move) < tolerance
-    return _cycle(time, frequency, origin, coefficients, covariance, noise, int((~keep).sum()), converged)
-
-
-def _cycle(
-    time: FloatArray,
-    frequency: float,
-    origin: float,
-    coefficients: FloatArray,
-    covariance: FloatArray,
-    noise: float,
-    outliers: int,
-    converged: bool,
-) -> Cycle | str:
-    """The swing with its whole periods counted."""
     interval = sample_interval(time)
     sampled = (float(time[-1] - time[0]) + interval) * frequency
     periods = math.floor(sampled + 1 - 0.99)  # a fit of harmonics bridges the last 1 %
     if periods < 1:
         return f"No whole period: {sampled:.2f} periods of {1 / frequency:.4g} s were recorded."
-    count = coefficients.size // 2
+    noise = math.sqrt(float((residual[keep] ** 2).sum()) / max(int(keep.sum()) - 2 * count - 2, 1))
+    inverse = np.asarray(np.linalg.pinv(gram, hermitian=True), dtype=np.float64)
     stop = float(time[-1]) + 0.5 * interval
     return Cycle(
         frequency=frequency,
@@ -286,12 +264,12 @@ def _cycle(
         mean=float(coefficients[0]),
         cosine=coefficients[1 : count + 1],
         sine=coefficients[count + 1 :],
-        covariance=covariance,
+        covariance=inverse[1:-1, 1:-1] * noise**2,
         noise=noise,
         periods=periods,
         begin=float(time[0]),
         start=stop - periods / frequency,
         stop=stop,
-        outliers=outliers,
-        converged=converged,
+        outliers=int((~keep).sum()),
+        converged=abs(move) < tolerance,
     )

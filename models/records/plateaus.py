@@ -13,21 +13,11 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.records.cleaning import SCALE_SAMPLES, Note, Sampled, UnusableRecordError, plan_cleaning
-from models.records.dwells import Blocks, Dwell, average, find_dwells, listed
+from models.records.dwells import Blocks, average, find_dwells, listed
 from models.records.mean_deviation import Stretch, deviations
 from models.records.runs import Plateaus
-from models.records.settling import Transients, dropped, fit_transients, mean_decay
+from models.records.settling import dropped, fit_transients, mean_decay
 from models.records.torque_filter import filtered
-
-#: Dropping a transient makes the means' deviations smaller, so that more may have to be dropped: so often at most.
-_ROUNDS = 4
-#: No mean is known better than to this share of itself.
-_LEAST_SHARE = 1e-9
-SLOW_NOISE = (
-    "slow_noise",
-    "The noise of torque is autocorrelated over longer times than a dwell: deviations of means rest on a white and a slow "
-    "part of it, estimated from all dwells together.",
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,19 +63,18 @@ def cut_plateaus(record: Sampled, torque_filter: float = 0.0) -> PlateauCut:
     duration = np.array([blocks.time[dwell.stop - 1] - blocks.time[dwell.start] + blocks.duration for dwell in dwells])
     transients = fit_transients(_stretches(blocks, dwells), blocks.duration)
     used, drop, moments = dwells, np.zeros(duration.size), deviations(_stretches(blocks, dwells))
-    for _ in range(_ROUNDS):
+    for _ in range(4):  # dropping a transient makes the means' deviations smaller, so that more may have to be dropped
         further = np.maximum(drop, dropped(transients, duration, moments.mean * np.sqrt(1 - drop / duration)))
         if (further == drop).all():
             break
         drop = further
         used = [_used(blocks, dwell, float(drop[row])) for row, dwell in enumerate(dwells)]
         moments = deviations(_stretches(blocks, used))
-    settled = ~(
-        np.hypot(transients.amplitude, transients.amplitude_sd) * np.exp(-duration / transients.time_constant)
-        > moments.mean
-    )
+    amplitude = np.hypot(transients.amplitude, transients.amplitude_sd)
+    settled = ~(amplitude * np.exp(-duration / transients.time_constant) > moments.mean)
     noise = np.sqrt(_mean(blocks.scatter, used) + moments.average**2)
-    shift = np.nan_to_num(_shift(transients, drop, duration))
+    # of the mean by its transient, where one is resolved
+    shift = np.nan_to_num(amplitude * mean_decay(transients.time_constant, drop, duration))
     half = 0.5 * (blocks.duration - kept.period)
     cut = PlateauCut(
         plateaus=_plateaus(
@@ -101,8 +90,14 @@ def cut_plateaus(record: Sampled, torque_filter: float = 0.0) -> PlateauCut:
         stop=np.array([blocks.time[dwell.stop - 1] for dwell in used]) + half,
         notes=(*kept.notes, *left_out),
     )
-    slow = () if moments.resolved else (SLOW_NOISE,)
-    return replace(cut, notes=(*cut.notes, *_notes(cut, drop), *slow))
+    notes = [*cut.notes, *_notes(cut, drop)]
+    if not moments.resolved:
+        sentence = (
+            "The noise of torque is autocorrelated over longer times than a dwell: deviations of means rest on a white and "
+            "a slow part of it, estimated from all dwells together."
+        )
+        notes.append(("slow_noise", sentence))
+    return replace(cut, notes=tuple(notes))
 
 
 def _filtered(blocks: Blocks, torque_filter: float) -> Blocks:
@@ -113,27 +108,18 @@ def _filtered(blocks: Blocks, torque_filter: float) -> Blocks:
     return replace(blocks, pressure=pressure, speed=speed)
 
 
-def _stretches(blocks: Blocks, dwells: list[Dwell]) -> list[Stretch]:
-    stretches = []
-    for dwell in dwells:
-        time = blocks.time[dwell.start : dwell.stop]
-        stretches.append(Stretch(time=time - time[0], torque=blocks.torque[dwell.start : dwell.stop]))
-    return stretches
+def _stretches(blocks: Blocks, dwells: list[slice]) -> list[Stretch]:
+    times = ((blocks.time[dwell], blocks.torque[dwell]) for dwell in dwells)
+    return [Stretch(time=time - time[0], torque=torque) for time, torque in times]
 
 
-def _shift(transients: Transients, drop: FloatArray, duration: FloatArray) -> FloatArray:
-    """The estimated shift of the mean by its transient [n] Nm; nan where no transient is resolved."""
-    amplitude = np.hypot(transients.amplitude, transients.amplitude_sd)
-    return np.asarray(amplitude * mean_decay(transients.time_constant, drop, duration))
-
-
-def _plateaus(blocks: Blocks, used: list[Dwell], torque_sd: FloatArray) -> Plateaus:
+def _plateaus(blocks: Blocks, used: list[slice], torque_sd: FloatArray) -> Plateaus:
     torque = _mean(blocks.torque, used)
     return Plateaus(
         pressure=_mean(blocks.pressure, used),
         speed=_mean(blocks.speed, used),
         torque=torque,
-        torque_sd=np.maximum(torque_sd, _LEAST_SHARE * np.maximum(np.abs(torque), 1e-9)),
+        torque_sd=np.maximum(torque_sd, 1e-9 * np.maximum(np.abs(torque), 1e-9)),
         oil_temperature=None if blocks.oil_temperature is None else _mean(blocks.oil_temperature, used),
         plate_temperature=None if blocks.plate_temperature is None else _mean(blocks.plate_temperature, used),
     )
@@ -161,13 +147,13 @@ def _notes(cut: PlateauCut, drop: FloatArray) -> list[Note]:
     return notes
 
 
-def _used(blocks: Blocks, dwell: Dwell, drop: float) -> Dwell:
-    first = int(np.searchsorted(blocks.time[dwell.start : dwell.stop], blocks.time[dwell.start] + drop))
-    return Dwell(start=min(dwell.start + first, dwell.stop - 3), stop=dwell.stop)
+def _used(blocks: Blocks, dwell: slice, drop: float) -> slice:
+    first = int(np.searchsorted(blocks.time[dwell], blocks.time[dwell.start] + drop))
+    return slice(min(dwell.start + first, dwell.stop - 3), dwell.stop)
 
 
-def _mean(channel: FloatArray, dwells: list[Dwell]) -> FloatArray:
-    return np.array([channel[dwell.start : dwell.stop].mean() for dwell in dwells])
+def _mean(channel: FloatArray, dwells: list[slice]) -> FloatArray:
+    return np.array([channel[dwell].mean() for dwell in dwells])
 
 
 def _rounding(torque: FloatArray, noise: FloatArray) -> float:

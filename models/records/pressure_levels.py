@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE, LEVEL_STEP, MEDIAN_DURATION, SHORTEST_STRETCH
-from models.records.outliers import leading
+from models.records.outliers import leading, running_median
 from models.records.periods import sample_interval
 
 
@@ -45,10 +45,6 @@ def _rounded_level(median: float) -> float:
     return snapped if snapped > 0 and abs(median - snapped) <= 0.02e5 else round(median, 1)
 
 
-#: Ends are cut so many times at most.
-_CUTS = 6
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureStretch:
     """Consecutive rows [start, stop) at one pressure [Pa] (their median)."""
@@ -65,9 +61,7 @@ def pressure_stretches(time: FloatArray, pressure: FloatArray) -> Iterator[Press
     pressure still moves towards the level or already away from it is cut off. Ramps between levels give stretches that
     are too short (under 2 s) to count, or straight lines, which do not count either.
     """
-    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
-
-    smooth = median_filter(pressure, size=min(5, pressure.size), mode="nearest")
+    smooth = running_median(pressure, 5)
     block = np.floor((time - time[0]) / max(MEDIAN_DURATION, 5 * sample_interval(time))).astype(np.int64)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1, [time.size]])
     medians = _block_medians(smooth, block, edges)
@@ -116,7 +110,7 @@ def _without_ramps(smooth: FloatArray, start: int, stop: int, gap: float) -> tup
     Level and wander are those of the middle half, so that a pressure which wanders all the time keeps its ends. They are
     computed again after each cut: half of a long ramp may lie in the first middle.
     """
-    for _ in range(_CUTS):
+    for _ in range(6):
         quarter = (stop - start) // 4
         middle = smooth[start + quarter : stop - quarter]
         level = float(np.median(middle))

@@ -18,11 +18,6 @@ from models.arrays import FloatArray
 from models.records import criteria
 from models.records.mean_deviation import Stretch, pooled_correlation
 
-#: Time constants that are tried.
-_SCANNED = 40
-#: So many sets of times are cached.
-_CACHED_CLOCKS = 4
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transients:
@@ -47,13 +42,17 @@ class _Scan:
 def fit_transients(stretches: Sequence[Stretch], shortest: float) -> Transients:
     """The settling transient of every dwell. `shortest` [s] is a block."""
     longest = max(float(stretch.time[-1]) for stretch in stretches)
-    taus = np.geomspace(
-        shortest,
-        max(min(2.0 * longest, 6.0), 4 * shortest),  # no longer than two dwells or 6 s
-        _SCANNED,
-    )
-    basis = _Bases(taus)
-    scans = [_scan(stretch, basis.of(stretch.time)) for stretch in stretches]
+    longest_tau = max(min(2.0 * longest, 6.0), 4 * shortest)  # no longer than two dwells or 6 s
+    taus = np.geomspace(shortest, longest_tau, 40)
+    bases: dict[bytes, _Basis] = {}  # to the microsecond, most dwells have the same times
+    scans = []
+    for stretch in stretches:
+        clock = np.round(stretch.time, 6).tobytes()
+        if clock not in bases:
+            if len(bases) == 4:
+                bases.clear()
+            bases[clock] = _basis(stretch.time, taus)
+        scans.append(_scan(stretch, bases[clock]))
     correlation = pooled_correlation([scan.residual for scan in scans], removed=3)
     long_run = np.array([[scan.variance * correlation.factor(scan.residual.size)] for scan in scans])
     gain = np.stack([scan.gain for scan in scans]) / long_run
@@ -68,42 +67,23 @@ def fit_transients(stretches: Sequence[Stretch], shortest: float) -> Transients:
     return Transients(time_constant=tau, slowest=slowest, amplitude=amplitude, amplitude_sd=deviation)
 
 
-def _decays(time: FloatArray, taus: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """exp(-t/τ) [J, m] free of its mean and, where τ < a sixth of the dwell, of its trend; the unit trend [m]."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Basis:
+    decay: FloatArray  # [J, m] exp(-t/τ) free of its mean and, where torque may drift beside it, of its trend
+    trend: FloatArray  # [m], unit
+    square: FloatArray  # [J] of the decays
+    drifts: NDArray[np.bool_]  # [J] whether torque may drift beside a transient so fast: τ < a sixth of the dwell
+
+
+def _basis(time: FloatArray, taus: FloatArray) -> _Basis:
     decay = np.exp(-time / taus[:, np.newaxis])
     decay -= decay.mean(axis=1, keepdims=True)
     trend = time - time.mean()
     trend /= max(float(np.sqrt(trend @ trend)), 1e-300)
     drifts = taus < criteria.DRIFT_SHARE * time[-1]
     decay -= np.where(drifts, decay @ trend, 0.0)[:, np.newaxis] * trend
-    return decay, trend
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Basis:
-    decay: FloatArray  # [J, m] as `_decays` has it
-    trend: FloatArray  # [m]
-    square: FloatArray  # [J] of the decays
-    drifts: NDArray[np.bool_]  # [J] whether torque may drift beside a transient so fast
-
-
-class _Bases:
-    """The transients tried over the times of a dwell, cached: to the microsecond, most dwells have the same times."""
-
-    def __init__(self, taus: FloatArray) -> None:
-        self._taus = taus
-        self._cache: dict[bytes, _Basis] = {}
-
-    def of(self, time: FloatArray) -> _Basis:
-        key = np.round(time, 6).tobytes()
-        if key not in self._cache:
-            decay, trend = _decays(time, self._taus)
-            square = np.maximum(np.einsum("jk,jk->j", decay, decay), 1e-12)
-            if len(self._cache) == _CACHED_CLOCKS:
-                self._cache.clear()
-            drifts = self._taus < criteria.DRIFT_SHARE * time[-1]
-            self._cache[key] = _Basis(decay=decay, trend=trend, square=square, drifts=drifts)
-        return self._cache[key]
+    square = np.maximum(np.einsum("jk,jk->j", decay, decay), 1e-12)
+    return _Basis(decay=decay, trend=trend, square=square, drifts=drifts)
 
 
 def _scan(stretch: Stretch, basis: _Basis) -> _Scan:
@@ -119,30 +99,25 @@ def _scan(stretch: Stretch, basis: _Basis) -> _Scan:
     return _Scan(gain=gain, total=total, residual=residual, variance=variance)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Common:
-    """log τ of all dwells together, and how far that of one of them lies from it (one deviation)."""
-
-    place: float
-    spread: float
-
-
-def _common(worth: FloatArray, gain: FloatArray, place: FloatArray) -> _Common | None:
-    """What explains all dwells [n, J] best, None where no transient does."""
-    share = np.minimum(criteria.GAIN_CAP / np.maximum(worth.max(axis=1), criteria.GAIN_CAP), 1.0)
+def _common(
+    worth: FloatArray, gain: FloatArray, place: FloatArray, most_spread: float = 0.5, cap: float = 1e3
+) -> tuple[float, float] | None:
+    """log τ that explains all dwells [n, J] best, and how far that of one of them lies from it (one deviation); None where
+    no transient does. A dwell counts for `cap` squared deviations at most."""
+    share = np.minimum(cap / np.maximum(worth.max(axis=1), cap), 1.0)
     together = share @ worth
     dwells = worth.shape[0]
     if share @ gain[:, together.argmax()] - dwells <= 5.0 * np.sqrt(2.0 * dwells):
         return None
     own = np.array([_peak(row, place) for row in worth])
     visible = gain[np.arange(dwells), worth.argmax(axis=1)] > criteria.OWN_GAIN
-    determined = own[visible & (own[:, 1] < criteria.MOST_SPREAD)]
+    determined = own[visible & (own[:, 1] < most_spread)]
     centre = _peak(together, place)[0]
     if determined.shape[0] < 8:
-        return _Common(place=centre, spread=criteria.MOST_SPREAD)
+        return centre, most_spread
     # The median of a squared normal variable is 0.455 of its variance.
     beyond = float(np.median((determined[:, 0] - centre) ** 2)) / 0.455 - float(np.median(determined[:, 1] ** 2))
-    return _Common(place=centre, spread=min(max(float(np.sqrt(max(beyond, 0.0))), 0.1), criteria.MOST_SPREAD))
+    return centre, min(max(float(np.sqrt(max(beyond, 0.0))), 0.1), most_spread)
 
 
 def _peak(worth: FloatArray, place: FloatArray) -> tuple[float, float]:
@@ -158,15 +133,20 @@ def _peak(worth: FloatArray, place: FloatArray) -> tuple[float, float]:
 
 
 def _fit(
-    stretch: Stretch, place: FloatArray, worth: FloatArray, gain: FloatArray, long_run: float, common: _Common | None
+    stretch: Stretch,
+    place: FloatArray,
+    worth: FloatArray,
+    gain: FloatArray,
+    long_run: float,
+    common: tuple[float, float] | None,
 ) -> tuple[float, float, float, float]:
     """τ, its upper limit, A and its deviation."""
     if common is None and gain[worth.argmax()] < criteria.OWN_GAIN:
         return np.nan, np.nan, 0.0, 0.0
-    held = 0.0 if common is None else ((place - common.place) / common.spread) ** 2
+    held = 0.0 if common is None else ((place - common[0]) / common[1]) ** 2
     at, deviation = _peak(worth - held, place)
     tau = float(np.exp(at))
-    decay = _decays(stretch.time, np.array([tau]))[0][0]
+    decay = _basis(stretch.time, np.array([tau])).decay[0]
     square = max(float(decay @ decay), 1e-12)
     slowest = tau * float(np.exp(criteria.LATE * deviation))
     return tau, slowest, float(decay @ stretch.torque) / square, float(np.sqrt(long_run / square))

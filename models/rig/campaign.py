@@ -24,7 +24,7 @@ from models.rig.truth import SimulatedClutch, draw
 
 #: The streams of one seed: the clutch, by cycles the stationary test, the dynamic test and the engagement, and by number
 #: the tests of plans.
-_CLUTCH, _TEST, _DYNAMIC, _ENGAGEMENT, _PLANNED = 0, 1, 2, 3, 4
+_CLUTCH, _TEST, _DYNAMIC, _ENGAGEMENT, _PLANNED = range(5)
 
 #: 1200 rpm and 2000 rpm, both to 8 bar (sections 2.3.1, 2.3.2). The energies go as ω² and are assumed, none is printed:
 #: they stand where no engagement is integrated.

@@ -14,6 +14,7 @@ Source: this project's.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -24,11 +25,9 @@ from models.records.runs import Plateaus, Record
 from models.rig.hysteresis import ATTRACTOR, NO_LAG
 from models.rig.simulated_runs import SimulatedRun
 from models.rig.stationary import PLATEAU_DURATION
-from models.rig.temperatures import REFERENCE_FLUX, heat_flux, warmed
+from models.rig.temperatures import REFERENCE_FLUX, heat_flux, warm_torque
 from models.rig.truth import OPEN, SimulatedClutch
 
-#: Cycles at which late wear begins, and in which it then grows to its size.
-_LATE, _LATE_SPAN = 6_000.0, 9_000.0
 #: Middle of the protocol's velocities [m/s].
 _MIDDLE = 6.0
 
@@ -47,6 +46,9 @@ class Rows:
     wear: float
 
 
+Change: TypeAlias = Callable[[float, Rows], FloatArray]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HiddenEffect:
     """An effect by its slug: what its size means, in `unit`, a size that shows, and the change of torque [n] Nm by a size in
@@ -56,7 +58,7 @@ class HiddenEffect:
     meaning: str
     unit: str
     size: float
-    change: Callable[[float, Rows], FloatArray]
+    change: Change
     loops: bool = False
 
 
@@ -104,6 +106,21 @@ def clutch_for(clutch: SimulatedClutch, sizes: Mapping[str, float]) -> Simulated
     return replace(clutch, lag=lag)
 
 
+#: By their slugs.
+EFFECTS: dict[str, HiddenEffect] = {}
+
+
+def _hides(meaning: str, unit: str = "", *, size: float, loops: bool = False) -> Callable[[Change], Change]:
+    """Makes a change of torque an effect, whose slug is the function's name."""
+
+    def listed(change: Change) -> Change:
+        slug = change.__name__.removeprefix("_")
+        EFFECTS[slug] = HiddenEffect(slug=slug, meaning=meaning, unit=unit, size=size, change=change, loops=loops)
+        return change
+
+    return listed
+
+
 def _changed(
     effect: HiddenEffect, size: float, held: Plateaus | Record, clutch: SimulatedClutch, run: SimulatedRun
 ) -> Plateaus | Record:
@@ -122,20 +139,9 @@ def _changed(
     return replace(held, torque=held.torque + effect.change(size, rows))
 
 
-def _in_the_lag(_: float, rows: Rows) -> FloatArray:
-    """The clutch itself has the film: `clutch_for`."""
-    return np.zeros_like(rows.held.torque)
-
-
+@_hides("power of the viscosity's ratio", size=1.0)
 def _oil_temperature(size: float, rows: Rows) -> FloatArray:
-    """Hersey's similarity with Vogel's viscosity: `models.rig.temperatures`."""
-    measured = Plateaus(
-        pressure=rows.held.pressure,
-        speed=rows.held.speed,
-        torque=rows.held.torque,
-        oil_temperature=rows.held.oil_temperature,
-    )
-    return warmed(measured, rows.clutch, rows.wear, size).torque - rows.held.torque
+    return warm_torque(rows.held, rows.clutch, rows.wear, size) - rows.held.torque
 
 
 def _drift(cycles: float) -> float:
@@ -143,27 +149,32 @@ def _drift(cycles: float) -> float:
     return cycles / (cycles + 4_000.0)
 
 
+@_hides("loss of torque at 0.32 W/mm²", "%", size=15.0)
 def _interface_heating(size: float, rows: Rows) -> FloatArray:
     """Torque falls as 1/(1 + s P), P the power that the faces turn into heat."""
     warmth = heat_flux(rows.held, rows.clutch.geometry) / REFERENCE_FLUX
     return np.asarray(rows.held.torque * (1 / (1 + 0.01 * size * warmth) - 1), dtype=np.float64)
 
 
+@_hides("change of the exponent", size=0.3)
 def _viscous_exponent(size: float, rows: Rows) -> FloatArray:
     """C_v v^γ with ((1 + v)/(1 + v_m))^δ: the film thins with shear."""
     viscous = rows.curve.viscous_coefficient * rows.velocity**GAMMA
     return np.asarray(viscous * (((1 + rows.velocity) / (1 + _MIDDLE)) ** size - 1), dtype=np.float64)
 
 
+@_hides("drag in mid speed", "Nm", size=1.0)
 def _hydrodynamic_drag(size: float, rows: Rows) -> FloatArray:
     """Grooves shear oil whatever the pressure, full at high speed."""
     return np.asarray(size * np.tanh(rows.velocity / _MIDDLE) / np.tanh(1.0), dtype=np.float64)
 
 
+@_hides("zero shift in the end", "Nm", size=1.5)
 def _torque_zero_shift(size: float, rows: Rows) -> FloatArray:
     return np.full_like(rows.held.torque, size * _drift(rows.cycles))
 
 
+@_hides("offset in the end", "bar", size=0.5)
 def _pressure_offset(size: float, rows: Rows) -> FloatArray:
     """The clutch is pressed by more than the gauge says, by ever more bar."""
     pressed = np.maximum(rows.held.pressure + 1e5 * size * _drift(rows.cycles), OPEN)
@@ -171,6 +182,7 @@ def _pressure_offset(size: float, rows: Rows) -> FloatArray:
     return np.asarray(rows.held.torque * (really / torque(rows.velocity, rows.curve) - 1), dtype=np.float64)
 
 
+@_hides("share of the plateaus before", "%", size=10.0)
 def _unsettled_dwell(size: float, rows: Rows) -> FloatArray:
     """A plateau's mean still carries a share of the two plateaus before it."""
     if isinstance(rows.held, Record):
@@ -180,12 +192,14 @@ def _unsettled_dwell(size: float, rows: Rows) -> FloatArray:
     return np.asarray(0.01 * size * (0.8 * before + 0.2 * earlier - rows.held.torque), dtype=np.float64)
 
 
+@_hides("delay", "ms", size=80.0, loops=True)
 def _channel_delay(size: float, rows: Rows) -> FloatArray:
     return np.asarray(
         np.interp(rows.clock - 1e-3 * size, rows.clock, rows.held.torque) - rows.held.torque, dtype=np.float64
     )
 
 
+@_hides("moment of inertia", "kg m²", size=0.01, loops=True)
 def _inertia_torque(size: float, rows: Rows) -> FloatArray:
     """J dω/dt of the speed, smoothed over its sensor's noise."""
     window = min(51, rows.held.speed.size - 1 + rows.held.speed.size % 2)
@@ -193,12 +207,20 @@ def _inertia_torque(size: float, rows: Rows) -> FloatArray:
     return np.asarray(size * rate, dtype=np.float64)
 
 
+@_hides("film time when new", "s", size=0.1, loops=True)
+def _squeeze_film(_: float, rows: Rows) -> FloatArray:
+    """The clutch itself has the film: `clutch_for`."""
+    return np.zeros_like(rows.held.torque)
+
+
+@_hides("amplitude", "Nm", size=0.5, loops=True)
 def _shaft_ripple(size: float, rows: Rows) -> FloatArray:
     """Once a turn, and a little three times."""
     turn = np.concatenate([[0.0], np.cumsum(rows.held.speed[1:] * np.diff(rows.clock))])
     return np.asarray(size * (np.sin(turn) + 0.2 * np.sin(3 * turn)), dtype=np.float64)
 
 
+@_hides("amplitude", "Nm", size=1.0, loops=True)
 def _stick_slip(size: float, rows: Rows) -> FloatArray:
     """A skewed wave of 12 Hz that fades out from 0.5 to 1.2 m/s."""
     phase = 2 * np.pi * 12.0 * rows.clock
@@ -206,62 +228,14 @@ def _stick_slip(size: float, rows: Rows) -> FloatArray:
     return np.asarray(size * slow * np.sin(phase + 0.5 * np.sin(phase)), dtype=np.float64)
 
 
+@_hides("excess when new", "%", size=10.0)
 def _running_in(size: float, rows: Rows) -> FloatArray:
     """An excess of the new lining that goes as 1/(1 + ζ/ζ_r)²."""
     return np.asarray(0.01 * size * rows.held.torque / (1 + rows.cycles / 400.0) ** 2, dtype=np.float64)
 
 
+@_hides("further loss at 15,000 cycles", "%", size=20.0)
 def _accelerated_wear(size: float, rows: Rows) -> FloatArray:
     """A further loss that sets in late and grows as a square."""
-    late = max(rows.cycles - _LATE, 0.0) / _LATE_SPAN
+    late = max(rows.cycles - 6_000.0, 0.0) / 9_000.0
     return np.asarray(-0.01 * size * late**2 * rows.held.torque, dtype=np.float64)
-
-
-_ALL = (
-    HiddenEffect(
-        slug="oil_temperature", meaning="power of the viscosity's ratio", unit="", size=1.0, change=_oil_temperature
-    ),
-    HiddenEffect(
-        slug="interface_heating",
-        meaning="loss of torque at 0.32 W/mm²",
-        unit="%",
-        size=15.0,
-        change=_interface_heating,
-    ),
-    HiddenEffect(
-        slug="viscous_exponent", meaning="change of the exponent", unit="", size=0.3, change=_viscous_exponent
-    ),
-    HiddenEffect(slug="hydrodynamic_drag", meaning="drag in mid speed", unit="Nm", size=1.0, change=_hydrodynamic_drag),
-    HiddenEffect(
-        slug="torque_zero_shift", meaning="zero shift in the end", unit="Nm", size=1.5, change=_torque_zero_shift
-    ),
-    HiddenEffect(slug="pressure_offset", meaning="offset in the end", unit="bar", size=0.5, change=_pressure_offset),
-    HiddenEffect(
-        slug="unsettled_dwell",
-        meaning="share of the plateaus before",
-        unit="%",
-        size=10.0,
-        change=_unsettled_dwell,
-    ),
-    HiddenEffect(slug="channel_delay", meaning="delay", unit="ms", size=80.0, change=_channel_delay, loops=True),
-    HiddenEffect(
-        slug="inertia_torque",
-        meaning="moment of inertia",
-        unit="kg m²",
-        size=0.01,
-        change=_inertia_torque,
-        loops=True,
-    ),
-    HiddenEffect(slug="squeeze_film", meaning="film time when new", unit="s", size=0.1, change=_in_the_lag, loops=True),
-    HiddenEffect(slug="shaft_ripple", meaning="amplitude", unit="Nm", size=0.5, change=_shaft_ripple, loops=True),
-    HiddenEffect(slug="stick_slip", meaning="amplitude", unit="Nm", size=1.0, change=_stick_slip, loops=True),
-    HiddenEffect(slug="running_in", meaning="excess when new", unit="%", size=10.0, change=_running_in),
-    HiddenEffect(
-        slug="accelerated_wear",
-        meaning="further loss at 15,000 cycles",
-        unit="%",
-        size=20.0,
-        change=_accelerated_wear,
-    ),
-)
-EFFECTS: Mapping[str, HiddenEffect] = {effect.slug: effect for effect in _ALL}

@@ -1,6 +1,6 @@
 """How the simulated clutch's friction lags its speed: by a squeezed film, an attractor, or both.
 
-The film time τ_1 of `models.loops.squeeze_film` is largest when new and falls with use, the more the higher the pressure,
+The film time τ_1 of `models.loops.lag_laws` is largest when new and falls with use, the more the higher the pressure,
 
     τ_1(p, ζ) = τ_0 e^{-λ(p) g(ζ)},    λ(p) = max(α + β p, 0),    g(ζ) = 1 - (1 + ζ/φ)^-ε
 
@@ -9,13 +9,13 @@ slope of the stationary curve, which steepens as the curve sinks. The nominal va
 show figs. 14 and 17: areas nearly proportional to pressure when new, growing over life up to 6 bar, falling above, and
 in the end falling with pressure. The attractor C, where there is one, adds the difference of its torque from the
 stationary one: exact to the first order in both lags. Alone it gives loops of the wrong sign where curves rise (see
-`models.loops.attractor`).
+`models.loops.lag_laws`).
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 7 and section 3.2. The formulas of λ and g are this
 project's: the reference prints none.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,10 +23,8 @@ from models.arrays import FloatArray, require_finite
 from models.degradation.general_order import progress_fraction
 from models.friction.pressure_laws import LinearLaw
 from models.friction.stribeck import StribeckParameters, torque
-from models.loops.attractor import attractor_torque
-from models.loops.squeeze_film import squeeze_film_torque
+from models.loops.lag_laws import attractor_torque, squeeze_film_torque
 
-_LOSS = LinearLaw(intercept=-2.75, slope=0.7e-5)
 #: The attractor C [Nm/s] of a rig that shows both laws at once. Chosen among 100, 150, 200, 300 and 400: at 150 either law
 #: describes some loops better, C is determined in 85 % of them (in 45 % by a film alone), the film time in all but one of a
 #: hundred, and no area is negative, as one is at 100. What is lost is that areas are proportional to pressure when new.
@@ -39,7 +37,7 @@ class FrictionLag:
     `exponent` ε > 0 [-]; `attractor` C > 0 [Nm/s], None: none. Raises ValueError on values outside."""
 
     film_time: float = 0.1
-    loss: LinearLaw = _LOSS
+    loss: LinearLaw = field(default_factory=lambda: LinearLaw(intercept=-2.75, slope=0.7e-5))
     scale: float = 10_000.0
     exponent: float = 2.0
     attractor: float | None = None

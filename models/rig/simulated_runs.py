@@ -51,8 +51,9 @@ class SimulatedRun:
         if not self.run_id.startswith("sim-"):
             raise ValueError(f"run_id of a simulated run must start with sim-, got {self.run_id}")
         has = (self.plateaus is not None, self.record is not None, self.duty is not None)
-        if has not in _CARRIED[self.kind]:
-            raise ValueError(f"a {self.kind} run must carry {_RULES[self.kind]} and nothing else")
+        rule, allowed = _CARRIED[self.kind]
+        if has not in allowed:
+            raise ValueError(f"a {self.kind} run must carry {rule} and nothing else")
 
     def dissipated(self) -> float:
         """Energy [J] that a test turned into heat, by its own channels; of a block, what its engagements did."""
@@ -65,17 +66,11 @@ class SimulatedRun:
         return float(np.trapezoid(self.record.torque * self.record.speed, self.record.time))
 
 
-_BLOCK = ((False, False, True), (False, True, True))
-#: Which of plateaus, record and duty block a run of each kind has.
+_BLOCK = "a duty block, perhaps a record,", ((False, False, True), (False, True, True))
+#: What a run of each kind carries: in words, and which of plateaus, record and duty block.
 _CARRIED = {
     RunKind.RUN_IN: _BLOCK,
     RunKind.DUTY_CYCLES: _BLOCK,
-    RunKind.STATIONARY_STRIBECK: ((True, False, False), (False, True, False)),
-    RunKind.DYNAMIC_STRIBECK: ((False, True, False),),
-}
-_RULES = {
-    RunKind.RUN_IN: "a duty block, perhaps a record,",
-    RunKind.DUTY_CYCLES: "a duty block, perhaps a record,",
-    RunKind.STATIONARY_STRIBECK: "plateaus or a record",
-    RunKind.DYNAMIC_STRIBECK: "a record",
+    RunKind.STATIONARY_STRIBECK: ("plateaus or a record", ((True, False, False), (False, True, False))),
+    RunKind.DYNAMIC_STRIBECK: ("a record", ((False, True, False),)),
 }

@@ -23,9 +23,8 @@ from models.rig.truth import OPEN, PROTOCOL_PRESSURES, SimulatedClutch
 
 #: Time on one plateau [s] (section 2.3.3).
 PLATEAU_DURATION = 5.0
-#: Middle of the range in which the oil is kept, 80 to 90 °C [K], and the largest deviation of the simulated oil from it [K].
+#: Middle of the range in which the oil is kept, 80 to 90 °C [K].
 OIL_TEMPERATURE = 273.15 + 85.0
-OIL_SWING = 4.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +90,7 @@ def oil_temperature(
     time: FloatArray, rng: np.random.Generator, sensor: Sensor, kept_at: float = OIL_TEMPERATURE
 ) -> FloatArray:
     """Oil temperature [n] K at time [n] s: a swing of the thermostat by at most 4.5 K, in the recorder's counts."""
-    amplitude, period = rng.uniform(0.4, 1.0) * OIL_SWING, rng.uniform(600.0, 1500.0)
+    amplitude, period = rng.uniform(0.4, 1.0) * 4.5, rng.uniform(600.0, 1500.0)
     phase = rng.uniform(0.0, 2 * math.pi)
     swing = amplitude * np.sin(2 * math.pi * time / period + phase)
     return kept_at + rounded(swing, sensor.temperature_counts)

@@ -28,8 +28,6 @@ from models.rig.simulated_runs import SimulatedRun
 from models.rig.stationary import OIL_TEMPERATURE, rounded
 from models.rig.truth import OPEN, SimulatedClutch
 
-#: Vogel's B and C [K].
-_B, _C = 880.0, 170.0
 #: The flux [W/m²] at which a plate's rise and a loss by heating have their sizes.
 REFERENCE_FLUX = 0.32e6
 
@@ -37,16 +35,22 @@ Held = TypeVar("Held", Plateaus, Record)
 
 
 def warmed(held: Held, clutch: SimulatedClutch, wear: float, strength: float = 1.0) -> Held:
-    """A simulated test's plateaus or record as its oil's temperature makes them; `wear` is the ζ at which it was made.
+    """A simulated test's plateaus or record with `warm_torque`."""
+    return replace(held, torque=warm_torque(held, clutch, wear, strength))
+
+
+def warm_torque(held: Plateaus | Record, clutch: SimulatedClutch, wear: float, strength: float) -> FloatArray:
+    """A simulated test's torque [n] Nm as its oil's temperature makes it; `wear` is the ζ at which it was made.
 
     `strength` [-] is the power of the viscosity's ratio. Raises ValueError where no oil temperature was recorded.
     """
     if held.oil_temperature is None:
         raise ValueError("a test must have an oil_temperature, got None")
-    thinner = np.exp(strength * (_B / (held.oil_temperature - _C) - _B / (OIL_TEMPERATURE - _C)))
+    b, c = 880.0, 170.0  # Vogel's [K]
+    thinner = np.exp(strength * (b / (held.oil_temperature - c) - b / (OIL_TEMPERATURE - c)))
     velocity = clutch.geometry.sliding_velocity(held.speed)
     at = clutch.parameters(np.maximum(held.pressure, OPEN), wear)
-    return replace(held, torque=held.torque * torque(velocity * thinner, at) / torque(velocity, at))
+    return held.torque * torque(velocity * thinner, at) / torque(velocity, at)
 
 
 def heat_flux(held: Plateaus | Record, geometry: Geometry) -> FloatArray:

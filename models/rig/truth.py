@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.degradation.general_order import Degradation, value
-from models.engagements.capacity import Capacity
+from models.engagements.simulation import Capacity
 from models.friction.pressure_laws import AsymptoticLaw, LinearLaw
 from models.friction.speed_protocol import REFERENCE_SPEEDS
 from models.friction.stribeck import StribeckParameters, torque
@@ -34,20 +34,9 @@ PROTOCOL_PRESSURES: FloatArray = np.linspace(4.0e5, 7.0e5, 7)
 #: An open clutch is pressed by this [Pa], which transfers nothing that a recorder would see.
 OPEN = 1.0
 
-#: The end of life is sought between new and HORIZON duty cycles, on this grid.
-HORIZON = 1_000_000.0
-_BRACKETS = np.concatenate([[0.0], np.geomspace(1.0, HORIZON, 240)])
-
 
 def _share(change: float, scale: float, exponent: float) -> Degradation:
     return Degradation(initial=1.0, change=change, scale=scale, exponent=exponent)
-
-
-#: The nominal clutch's laws over pressure.
-_M_S = LinearLaw(intercept=1.0, slope=4.8e-5)
-_RATIO = AsymptoticLaw(asymptote=0.60, excess=4.2, decay=1.62e5)
-_V_S = LinearLaw(intercept=0.2, slope=0.96e-5)
-_C_V = LinearLaw(intercept=0.1, slope=0.24e-5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,10 +48,12 @@ class SimulatedClutch:
     """
 
     geometry: Geometry = field(default_factory=Geometry)
-    static_torque: LinearLaw = _M_S
-    coulomb_ratio: AsymptoticLaw = _RATIO
-    stribeck_velocity: LinearLaw = _V_S
-    viscous_coefficient: LinearLaw = _C_V
+    static_torque: LinearLaw = field(default_factory=lambda: LinearLaw(intercept=1.0, slope=4.8e-5))
+    coulomb_ratio: AsymptoticLaw = field(
+        default_factory=lambda: AsymptoticLaw(asymptote=0.60, excess=4.2, decay=1.62e5)
+    )
+    stribeck_velocity: LinearLaw = field(default_factory=lambda: LinearLaw(intercept=0.2, slope=0.96e-5))
+    viscous_coefficient: LinearLaw = field(default_factory=lambda: LinearLaw(intercept=0.1, slope=0.24e-5))
     static_torque_course: Degradation = field(default_factory=lambda: _share(-0.66, 3700.0, 0.55))
     coulomb_ratio_course: Degradation = field(default_factory=lambda: _share(-0.56, 4000.0, 0.80))
     stribeck_velocity_course: Degradation = field(default_factory=lambda: _share(-0.94, 2200.0, 1.00))
@@ -119,12 +110,12 @@ class SimulatedClutch:
         """
         if not 0 < fraction < 1:
             raise ValueError(f"fraction must lie between 0 and 1, got {fraction}")
-        excess = self.mean_cofs(_BRACKETS) - fraction * self.mean_cof(0.0)
-        below = np.flatnonzero(excess <= 0)
+        threshold = fraction * self.mean_cof(0.0)
+        places = np.concatenate([[0.0], np.geomspace(1.0, 1e6, 240)])
+        below = np.flatnonzero(self.mean_cofs(places) - threshold <= 0)
         if below.size == 0:
             return None
-        threshold = fraction * self.mean_cof(0.0)
-        low, high = _BRACKETS[below[0] - 1], _BRACKETS[below[0]]
+        low, high = places[below[0] - 1], places[below[0]]
         return float(brentq(lambda zeta: self.mean_cof(zeta) - threshold, low, high, xtol=1e-6))
 
 
@@ -165,4 +156,33 @@ def draw(rng: np.random.Generator) -> SimulatedClutch:
         stribeck_velocity_course=course(nominal.stribeck_velocity_course),
         viscous_coefficient_course=course(nominal.viscous_coefficient_course),
         lag=replace(nominal.lag, film_time=nominal.lag.film_time * factor(0.10), scale=nominal.lag.scale * rate),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surface:
+    """A surface profile's arithmetic mean roughness R_a > 0 [m] and the skewness R_sk [-] of its heights."""
+
+    roughness: float
+    skewness: float
+
+
+#: The lining before and after the reference's tests.
+FRESH, WORN = Surface(roughness=9.52e-6, skewness=-0.87), Surface(roughness=1.94e-6, skewness=-3.4)
+
+
+def surface(clutch: SimulatedClutch, wear: float) -> Surface:
+    """What a profilometer would measure along the sliding direction after wear ζ >= 0 [duty cycles]; ValueError on another.
+
+        R(ζ) = R_fresh + s(ζ) (R_worn - R_fresh),    s(ζ) = min(1, (1 - μ(ζ)/μ(0)) / 0.5)
+
+    for R_a and R_sk alike, with the mean COF μ. The reference measured both ends (section 3, figs. 4 and 5), each the
+    average of eight radial places of one wafer block. It says nothing of the states between, and nothing of other clutches:
+    that the surface goes with the loss of COF and is the reference's worn one where half of it is lost is assumed here. It
+    prints no scatter of its averages: none is added.
+    """
+    share = min(1.0, (1.0 - clutch.mean_cof(wear) / clutch.mean_cof(0.0)) / 0.5)
+    return Surface(
+        roughness=FRESH.roughness + share * (WORN.roughness - FRESH.roughness),
+        skewness=FRESH.skewness + share * (WORN.skewness - FRESH.skewness),
     )

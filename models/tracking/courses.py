@@ -38,10 +38,19 @@ class Course(IntEnum):
     EXPONENTIAL = 4
     LOGARITHM = 5
 
+    @property
+    def scale_sign(self) -> float:
+        """That of φ: negative where the course ends."""
+        return -1.0 if self in (Course.ENDING, Course.HYPERBOLIC) else 1.0
 
-#: Signs of φ and ε by course, and their product σ.
-SCALE_SIGN, EXPONENT_SIGN = np.array([1.0, -1.0, 1.0, -1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])
-SIGN = SCALE_SIGN * EXPONENT_SIGN
+    @property
+    def exponent_sign(self) -> float:
+        """That of ε."""
+        return -1.0 if self in (Course.ENDING, Course.POWER, Course.LOGARITHM) else 1.0
+
+
+#: Signs of φ and ε by course.
+SCALE_SIGN, EXPONENT_SIGN = np.array([(course.scale_sign, course.exponent_sign) for course in Course]).T
 #: The course by twice whether φ is positive, and once more whether ε is.
 _BY_SIGNS: NDArray[np.intp] = np.array([Course.ENDING, Course.HYPERBOLIC, Course.POWER, Course.EQ_6], dtype=np.intp)
 
@@ -49,14 +58,16 @@ _BY_SIGNS: NDArray[np.intp] = np.array([Course.ENDING, Course.HYPERBOLIC, Course
 #: and of the logarithm, whose change is counted in units of |ε|. Chosen: as far from 1 as leaves b its digits; no table.
 _LARGE, _SMALL = 1e4, 1e-4
 #: ε where it is fixed, and φ over exp of its coordinate, by course.
-_EXPONENT = np.array([np.nan, np.nan, np.nan, np.nan, _LARGE, -_SMALL])
-_PLAIN_SCALE = np.array([1.0, -1.0, 1.0, -1.0, _LARGE, 1.0])
-#: σ over the unit in which Δ counts, by course: what 1 - (1 + ζ/φ)^-ε is multiplied by.
-_HEIGHT = SIGN / np.array([1.0, 1.0, 1.0, 1.0, 1.0, _SMALL])
+_EXPONENT = np.array([{Course.EXPONENTIAL: _LARGE, Course.LOGARITHM: -_SMALL}.get(course, np.nan) for course in Course])
+_PLAIN_SCALE = np.array([_LARGE if course is Course.EXPONENTIAL else course.scale_sign for course in Course])
+#: What a Δ of b is to be divided by to be that of σ [1 - (1 + ζ/φ)^-ε], by course.
+UNIT_OF_CHANGE = np.array([_SMALL if course is Course.LOGARITHM else 1.0 for course in Course])
+#: What 1 - (1 + ζ/φ)^-ε is multiplied by.
+_HEIGHT = SCALE_SIGN * EXPONENT_SIGN / UNIT_OF_CHANGE
 #: Courses whose ε is fixed: their coordinate log ε stands for nothing.
 WITHOUT_EXPONENT = ~np.isnan(_EXPONENT)
-_COURSES = np.concatenate([np.zeros(SIZES.size), np.repeat([1, 2, 3, 4, 5], OTHER_SIZES.size)]).astype(np.intp)
-_SIZES = np.concatenate([SIZES, np.tile(OTHER_SIZES, 5)])
+_COURSES = np.array([course for course in Course for _ in (OTHER_SIZES if course else SIZES)], dtype=np.intp)
+_SIZES = np.concatenate([OTHER_SIZES if course else SIZES for course in Course])
 #: Of every form its course, its size q, and whether its scatter is a share of the value.
 FORM_COURSE: NDArray[np.intp] = np.tile(_COURSES, 2)
 FORM_SIZE = np.tile(_SIZES, 2)
@@ -92,11 +103,6 @@ def basis(
     power *= -height
     power += height
     return power
-
-
-def unit_of_change(course: NDArray[np.intp]) -> FloatArray:
-    """What a Δ of b is to be divided by to be that of σ [1 - (1 + ζ/φ)^-ε]; 1 but for the logarithm."""
-    return np.where(course == Course.LOGARITHM, _SMALL, 1.0)
 
 
 @lru_cache(maxsize=64)

@@ -65,18 +65,7 @@ REACH = 4.0
 DEPTH = 9.0
 #: Sets of outlying runs that are kept, at most. Chosen; no table.
 MOST = 6
-#: The share of the particles that every course keeps where the particle filter resamples. Chosen; no table.
-KEPT = 0.05
-#: Steps of a move, at most, and the share of particles after which they end. Chosen: on 60 lives, and on 60 with an outlying
-#: run in ten, 0.9, 0.8 and 0.7 have a CRPS of the end's logarithm of 1.03, 0.97 and 0.98, and 0.93, 0.92 and 0.90 times the
-#: exact filter's, and take 15, 12 and 10 ms a test.
-MOVES, MOVED = 8, 0.7
-#: The unscented filters' running mean of squared innovations forgets at this rate. Chosen; no table.
-FORGET = 0.3
 #: Deviations from the prior mean that an unscented filter's state may reach. Chosen; no table.
 DOMAIN = 6.0
 #: An innovation counts at most as one of this many deviations in an unscented filter. Chosen; no table.
 OUTLIER = 5.0
-#: The unscented filters start again where courses that end before what is measured have more than this share of the weight.
-#: Chosen: lives that fall at once (ad hoc) are forecast the same where they start again at every test; without it they end.
-MAX_OVER = 0.1

@@ -8,6 +8,7 @@ further terms go first: with M = I + σZᵀRZσ = LLᵀ and N = L⁻¹ σZᵀR (
 of N.
 """
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -21,7 +22,8 @@ from models.tracking.history import History
 from models.tracking.prior import Prior
 
 #: Which of N of the columns (1, y, b) each sum loses the product of.
-_PRODUCTS = {"r": (0, 0), "rb": (0, 2), "rbb": (2, 2), "ry": (0, 1), "rby": (1, 2), "ryy": (1, 1)}
+_SUMS = ("r", "ry", "rb", "ryy", "rby", "rbb")
+_PRODUCTS = dict(zip(_SUMS, itertools.combinations_with_replacement(range(3), 2), strict=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -274,36 +276,22 @@ def _disturbed(prior: Prior, size: FloatArray, history: History) -> tuple[NDArra
 def _eliminated(z: FloatArray, y: FloatArray, r: FloatArray, rb: FloatArray, sd: FloatArray) -> FloatArray:
     """`Terms.rows` from Z [t, p], y [t], r and r b [t, j], and σ [p, j]."""
     terms = z.shape[1]
-    rows = _with_gram(z, r, sd, 3)
+    rows = np.empty((terms, terms + 3, sd.shape[1]))
+    for k in range(terms):  # M = I + σZᵀRZσ
+        np.matmul((z[:, k:] * z[:, k : k + 1]).T, r, out=rows[k, k:terms])
+        rows[k, k:terms] *= sd[k:]
+        rows[k, k:terms] *= sd[k]
+        rows[k, k] += 1.0
     rows[:, terms : terms + 2] = (
         (np.concatenate([z, z * y[:, None]], axis=1).T @ r).reshape(2, terms, -1).swapaxes(0, 1)
     )
     rows[:, terms + 2] = z.T @ rb
     rows[:, terms:] *= sd[:, None]
-    _factor(rows)
-    return rows
-
-
-def _with_gram(z: FloatArray, r: FloatArray, sd: FloatArray, beside: int) -> FloatArray:
-    """M = I + σZᵀRZσ in the upper triangles of rows [p, p + beside, j], from Z [t, p], r [t, j] and σ [p, j]."""
-    terms = z.shape[1]
-    rows = np.empty((terms, terms + beside, sd.shape[1]))
-    for k in range(terms):
-        np.matmul((z[:, k:] * z[:, k : k + 1]).T, r, out=rows[k, k:terms])
-        rows[k, k:terms] *= sd[k:]
-        rows[k, k:terms] *= sd[k]
-        rows[k, k] += 1.0
-    return rows
-
-
-def _factor(rows: FloatArray) -> None:
-    """Cholesky's elimination of all points at once, which is quicker than a factorisation of each: M in the upper triangles
-    of rows [p, p + m, j] becomes Lᵀ, and the m columns beside it become L⁻¹ times them."""
-    terms = rows.shape[0]
-    for k in range(terms):
+    for k in range(terms):  # Cholesky's elimination of all points at once is quicker than a factorisation of each
         rows[k, k:] /= np.sqrt(rows[k, k])
         for below in range(k + 1, terms):
             rows[below, below:] -= rows[k, below] * rows[k, below:]
+    return rows
 
 
 def _without(sums: Sums, terms: Terms) -> Sums:

@@ -33,17 +33,9 @@ class Nodes:
     log_weight: FloatArray
 
 
-@dataclass(frozen=True, slots=True)
-class Verdicts:
+def verdicts(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) -> tuple[FloatArray, FloatArray]:
     """By how much the log posterior at every node would change if a run were turned [n, t], and the log probability of the
-    data at the node [n]."""
-
-    gain: FloatArray
-    log_evidence: FloatArray
-
-
-def verdicts(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) -> Verdicts:
-    """The verdicts of all nodes on sets of outlying runs, one for all [t] or one a node [n, t], of 0 and 1.
+    data at the node [n]; for sets of outlying runs, one for all [t] or one a node [n, t], of 0 and 1.
 
     With the rows x = (1, b, Z)σ of the linear terms, H = X (XᵀRX + I)⁻¹ Xᵀ and h = rH: a run lies off the prediction of
     the others by e/(1 - h), e being its residual, with the variance d/(1 - h).
@@ -72,12 +64,12 @@ def verdicts(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes)
     gain = 0.5 * (np.log(variance / turned) + off**2 / variance - off**2 / turned)
     quadratic = (y**2 / d).sum(axis=1) - (pull * solved).sum(axis=(1, 2))
     log_volume = np.linalg.slogdet(precision)[1] + np.log(2.0 * math.pi * d).sum(axis=1)
-    return Verdicts(gain + np.where(outlying > 0, -odds, odds), -0.5 * (log_volume + quadratic))
+    return gain + np.where(outlying > 0, -odds, odds), -0.5 * (log_volume + quadratic)
 
 
 def gains(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) -> FloatArray:
     """By how much turning each run [t] of one set [t] would change the log posterior, the nodes summed over."""
-    total = nodes.log_weight[:, None] + verdicts(prior, history, outlying, nodes).gain
+    total = nodes.log_weight[:, None] + verdicts(prior, history, outlying, nodes)[0]
     top = total.max(axis=0)
     return np.asarray(top + np.log(np.exp(total - top).sum(axis=0)))
 
@@ -88,15 +80,15 @@ def at_once(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) 
 
     Where several runs hide one another no single one of them is worth turning.
     """
-    start = verdicts(prior, history, outlying, nodes)
-    sets, verdict = np.tile(outlying, (nodes.b.shape[0], 1)), start
+    gain, start = verdicts(prior, history, outlying, nodes)
+    sets, log_evidence = np.tile(outlying, (nodes.b.shape[0], 1)), start
     for _ in range(4):
-        if not (verdict.gain > 0.0).any():
+        if not (gain > 0.0).any():
             break
-        sets = np.where(verdict.gain > 0.0, 1.0 - sets, sets)
-        verdict = verdicts(prior, history, sets, nodes)
+        sets = np.where(gain > 0.0, 1.0 - sets, sets)
+        gain, log_evidence = verdicts(prior, history, sets, nodes)
     change = log_outlying(prior, sets.T) - log_outlying(prior, outlying)
-    return sets, nodes.log_weight + verdict.log_evidence - start.log_evidence + change
+    return sets, nodes.log_weight + log_evidence - start + change
 
 
 @dataclass(slots=True)
@@ -133,16 +125,12 @@ class Search:
         estimates = np.concatenate([gains(self.prior, self.history, outlying, nodes), leap])
         for neighbour, gain in zip(np.concatenate([turned, sets]), estimates, strict=True):
             if neighbour.tobytes() not in self.expanded:
-                self.log_probability[neighbour.tobytes()] = max(
-                    total + float(gain), self.log_probability.get(neighbour.tobytes(), -math.inf)
-                )
+                known = self.log_probability.get(neighbour.tobytes(), -math.inf)
+                self.log_probability[neighbour.tobytes()] = max(total + float(gain), known)
 
     def kept(self) -> FloatArray:
         """The sets that hold nearly all of the mass, [c, t]."""
         best = max(self.log_probability.values())
-        keys = sorted(
-            (k for k, v in self.log_probability.items() if v > best - 4.5),
-            key=self.log_probability.__getitem__,
-            reverse=True,
-        )
-        return np.stack([np.frombuffer(key) for key in keys[:MOST]])
+        within = [key for key, value in self.log_probability.items() if value > best - 4.5]
+        within.sort(key=self.log_probability.__getitem__, reverse=True)
+        return np.stack([np.frombuffer(key) for key in within[:MOST]])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.degradation.general_order import Degradation
-from models.tracking.courses import basis, coordinates_of, course_of, form_of, unit_of_change
+from models.tracking.courses import UNIT_OF_CHANGE, basis, coordinates_of, course_of, form_of
 from models.tracking.discrepancy import BY_DRAW, Discrepancy
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
@@ -109,7 +109,7 @@ class Posterior:
 
     def _share(self, progress: FloatArray) -> FloatArray:
         """b at progress [k, n] or [k, 1]; [k, n]."""
-        return np.asarray(basis(progress, self.log_scale, self.log_exponent, self.course) * unit_of_change(self.course))
+        return np.asarray(basis(progress, self.log_scale, self.log_exponent, self.course) * UNIT_OF_CHANGE[self.course])
 
     @property
     def course_end(self) -> FloatArray:

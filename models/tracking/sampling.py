@@ -12,15 +12,12 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.courses import FORM_PROPORTIONAL, coefficients_at, unit_of_change
+from models.tracking.courses import FORM_PROPORTIONAL, UNIT_OF_CHANGE, coefficients_at
 from models.tracking.discrepancy import PAST, drawn
 from models.tracking.history import History
 from models.tracking.linear_model import Points, Sums, Terms, conditional, drawn_terms
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
-
-#: How many draws must count: fewer are no sample of anything.
-FEWEST = 60
 
 
 def systematic(weight: FloatArray, size: int, offset: float) -> NDArray[np.intp]:
@@ -30,10 +27,17 @@ def systematic(weight: FloatArray, size: int, offset: float) -> NDArray[np.intp]
     return np.asarray(np.minimum(drawn, weight.size - 1), dtype=np.intp)
 
 
-def tempered(weight: FloatArray, log_factor: FloatArray) -> FloatArray:
-    """Weights [n] times a factor [n], normalised, its logarithm shrunk until FEWEST count, or half as many as without it."""
+def normalised(log_weight: FloatArray) -> FloatArray:
+    """Weights [n] that sum to one."""
+    weight = np.exp(log_weight - log_weight.max())
+    return np.asarray(weight / weight.sum())
+
+
+def tempered(weight: FloatArray, log_factor: FloatArray, fewest: float = 60) -> FloatArray:
+    """Weights [n] times a factor [n], normalised, its logarithm shrunk until the `fewest` count that are a sample, or half
+    as many as without it."""
     whole = weight / weight.sum()
-    fewest = min(FEWEST, 0.5 / float(whole @ whole))
+    fewest = min(fewest, 0.5 / float(whole @ whole))
     off = log_factor - log_factor[weight > 0.0].max()
     while True:
         counted = whole * np.exp(off)
@@ -103,7 +107,7 @@ def with_linear_terms(
     return Posterior(
         weight=weight,
         initial=initial,
-        change=change / unit_of_change(points.course),
+        change=change / UNIT_OF_CHANGE[points.course],
         scale=scale,
         exponent=exponent,
         scatter=np.exp(points.log_scatter),

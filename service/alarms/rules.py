@@ -10,8 +10,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from models.clutch import Geometry
-from models.friction.slope import slope_gradient
-from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, slope
+from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, slope, slope_gradient
 from models.prognosis.first_passage import PassageStatus
 from service.columns import RADIANS_PER_SECOND_PER_RPM, bar
 from service.lives.condition import (
@@ -98,7 +97,8 @@ def slope_quantile(rule: AlarmIn, fit: FitRow, geometry: Geometry) -> float | No
     """dμ/dv [s/m] of a fitted curve at the rule's speed, at the quantile of its standard error; None of one without
     friction.
 
-    dμ/dv = (dS/dv) / (torque of a unit COF), sd = √(gᵀ Σ g) / (torque of a unit COF), as `models.friction.slope` has them.
+    dμ/dv = (dS/dv) / (torque of a unit COF), sd = √(gᵀ Σ g) / (torque of a unit COF), as
+    `models.friction.identification.cof_slope` has them.
     """
     parameters = StribeckParameters(**{name: getattr(fit, name) for name in PARAMETER_NAMES})
     velocity = geometry.sliding_velocity(np.array(rule.speed_rpm * RADIANS_PER_SECOND_PER_RPM))

@@ -14,7 +14,7 @@ from service.run_files import manifest
 if TYPE_CHECKING:
     from models.rig.programme import Programme
     from models.rig.simulated_runs import SimulatedRun
-    from models.rig.surface import Surface
+    from models.rig.truth import Surface
     from service.run_files.record_writer import RecordFormat
 
 #: The campaign ends at this share of the mean COF when new. Chosen: a little below the end of life at 0.5.
@@ -83,7 +83,7 @@ def simulate(
 
     Run-in and duty blocks are always JSON. Tests in another format are listed in runs.json, which push reads.
     """
-    from models.rig import campaign, hidden, stationary, surface, temperatures  # start-up time
+    from models.rig import campaign, hidden, stationary, temperatures, truth  # start-up time
     from models.rig.simulated_runs import RunKind  # start-up time
     from service.run_files import record_writer, simulated  # start-up time
 
@@ -118,13 +118,13 @@ def simulate(
                     record = temperatures.with_plate(record, clutch.geometry, plate_rise)
                 listed += _write(out_folder, record, record_format)
                 if run.kind is RunKind.STATIONARY_STRIBECK:
-                    _inspect(out_folder, surface.surface(clutch, run.wear), run.cycles)
+                    _inspect(out_folder, truth.surface(clutch, run.wear), run.cycles)
                     inspections += 1
                 wear_and_cycles.append((run.wear, run.cycles))
         if listed:
             manifest.write(out_folder / manifest.MANIFEST, listed)
         end = campaign.end_of_life(wear_and_cycles, clutch)
-        truth = "does not halve in this campaign" if end is None else f"halves after {end:.0f} cycles"
+        halving = "does not halve in this campaign" if end is None else f"halves after {end:.0f} cycles"
         wear, last = wear_and_cycles[-1]
         answer = {
             "seed": seed,
@@ -140,7 +140,7 @@ def simulate(
         manifest.write(out_folder / manifest.ANSWER, answer)
         made_so_far = f"{len(wear_and_cycles)} simulated runs and {inspections} inspections"
         out.print(f"{made_so_far} of {clutch_id} in {out_folder}", soft_wrap=True)
-        out.print(f"the true mean COF {truth}")
+        out.print(f"the true mean COF {halving}")
 
 
 def _run_plan(folder: Path, plan: Path, alternative: int) -> None:

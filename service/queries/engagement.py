@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from models.clutch import Geometry
-from models.engagements.capacity import Capacity, capacity_of
 from models.engagements.comparison import bin_means
 from models.engagements.discrepancy import Discrepancy, discrepancy
 from models.engagements.measured import MeasuredEngagement, trace_times
-from models.engagements.simulation import Drive, Engagement, PressureProfile, engage
+from models.engagements.simulation import Capacity, Drive, Engagement, PressureProfile, capacity_of, engage
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 from models.prognosis.first_passage import weighted_quantiles
 from service import records, stored_runs

@@ -13,8 +13,16 @@ from scipy.special import ndtri
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.degradation.programme import Programme, uncertain_work
-from models.degradation.severity import Block, Severity, SeverityBasis, SeverityMap, counted, severity_map
+from models.degradation.severity import (
+    Block,
+    Programme,
+    Severity,
+    SeverityBasis,
+    SeverityMap,
+    counted,
+    severity_map,
+    uncertain_work,
+)
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import PassageStatus, horizon_at, weighted_quantiles
 from models.prognosis.stated_end import StatedEnd

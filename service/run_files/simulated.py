@@ -7,7 +7,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.records.runs import Plateaus, Record
 from models.rig.simulated_runs import DutyBlock, SimulatedRun
-from models.rig.surface import Surface
+from models.rig.truth import Surface
 from service.columns import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 
 #: Significant digits of a value. Chosen: more than a rig's recorder writes.

@@ -7,9 +7,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.friction.stribeck import torque
-from models.loops.attractor import attractor_torque
+from models.loops.lag_laws import attractor_torque, film_time_at, squeeze_film_torque
 from models.loops.loops import Loop, evaluate_loops
-from models.loops.squeeze_film import film_time_at, squeeze_film_torque
 from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.stationary import Sensor
 from models.rig.truth import SimulatedClutch

@@ -15,9 +15,8 @@ from scipy.optimize import least_squares
 
 from models.arrays import FloatArray
 from models.friction.stribeck import StribeckParameters
-from models.loops.attractor import attractor_torque
-from models.loops.loop_area import measured_area
-from models.loops.squeeze_film import film_time_at, squeeze_film_torque
+from models.loops.lag_laws import attractor_torque, film_time_at, squeeze_film_torque
+from models.loops.loop_area import area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 from tests import measuring
@@ -78,7 +77,7 @@ def micro_loops() -> list[Row]:
     rows = []
     for name, t, x, f in _tens():
         place = _position(t, x)
-        work, lag = measured_area(place, t, f), measured_area(_speed_of(place), t, f)
+        work, lag = (area_of(cycle, clean_samples(cycle, t, f)) for cycle in (place, _speed_of(place)))
         whole = (t >= place.start) & (t < place.stop)
         v = np.gradient(x, t)[whole]
         rows.append(

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import Bounds, least_squares, minimize
 
 from models.arrays import FloatArray
-from models.friction.identification import FitStatus, StribeckFit, fit_curves, mean_torque
+from models.friction.identification import FitStatus, StribeckFit, fit_curves, mean_torques
 from models.friction.stribeck import PARAMETER_NAMES
 from models.records.runs import Curve
 from tests.models.friction.stribeck_curves import VELOCITY, clutch, curve, eq3, hard_curve
@@ -117,7 +117,7 @@ def _coverage(fits: Sequence[StribeckFit], truth: FloatArray, shrink: float = 1.
     """[5]: the share of intervals, estimate ± 1.645 standard errors, that hold each parameter and the mean torque."""
     estimate = np.array([fit.parameters.as_array() for fit in fits])
     width = 1.645 * shrink * np.array([fit.standard_errors for fit in fits])
-    means = np.array([mean_torque(fit, VELOCITY) for fit in fits])
+    means = mean_torques(fits, VELOCITY)
     miss = np.abs(means[:, 0] - eq3(truth, VELOCITY).mean(axis=1))
     held = np.column_stack([np.abs(estimate - truth) <= width, miss <= 1.645 * shrink * means[:, 1]])
     share = held.mean(axis=0)

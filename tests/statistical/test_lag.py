@@ -8,10 +8,9 @@ import pytest
 from models.friction.criteria import Z90
 from models.friction.identification import fit_curves
 from models.friction.stribeck import torque as curve_torque
-from models.loops.attractor import attractor_torque
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, Law, StationaryCurve, fit_lag
+from models.loops.lag_laws import attractor_torque, squeeze_film_torque
 from models.loops.loop_area import area_of, clean_samples
-from models.loops.squeeze_film import squeeze_film_torque
 from models.records.periods import fit_cycle
 from models.records.runs import Curve
 from tests.models.loops.dynamic_records import FALLING, GEOMETRY, RISING, SWING, velocity

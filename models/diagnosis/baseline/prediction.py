@@ -5,7 +5,7 @@
 
 with derivatives in closed form. `pooled_fit.gauss_newton` fits it. The attractor law is linear in each loop,
 
-    dM/dt = C (1 - M/S) = (S - M)/τ,   τ = S/C                               (models.loops.attractor)
+    dM/dt = C (1 - M/S) = (S - M)/τ,   τ = S/C                               (models.loops.lag_laws)
 
 Given τ at evenly spaced phases, M is the periodic solution R[S] of a linear relaxation (exact where S is linear in the
 relaxation's own time between phases), and so are its sensitivities: a change δS of the stationary curve gives δM = R[(M/S)

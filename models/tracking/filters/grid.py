@@ -9,6 +9,7 @@ show the grid.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,14 +69,10 @@ class Grid:
     all sums over the history change with every test. The grid is computed when draws are requested.
     """
 
+    name: ClassVar[str] = "grid"
     nodes: int = 21
     rows: int = 21
     levels: int = 11
-
-    @property
-    def name(self) -> str:
-        """`grid`."""
-        return "grid"
 
     def start(self, prior: Prior) -> GridState:
         """Nothing measured."""

@@ -11,14 +11,10 @@ the posterior shrinks a hundredfold over a life the lattice closes in on it: a c
 where the mass is, the next is laid there, until nothing shrinks any more. A coarse row could step over a narrow peak,
 so every measurement is blurred on it by about what the model changes from node to node.
 
-Sets of outlying runs that the first search overlooked.
-
-The first lattice is blurred, and a run that is three deviations off is less far off a blurred course. Once the lattices
-have closed in nothing is blurred any more: the gain of turning a run is computed again at nodes of the leading kinds, and
-the sets with a sufficient gain get lattices where those kinds have theirs.
-
-A set that is overlooked would not only lack its share of the posterior: it would also bias the scatter, which then has
-to explain the run.
+The first search may overlook sets of outlying runs: a run that is three deviations off is less far off a blurred course.
+Once the lattices have closed in nothing is blurred any more: the gain of turning a run is computed again at nodes of the
+leading kinds, and the sets with a sufficient gain get lattices where those kinds have theirs. A set that is overlooked would
+not only lack its share of the posterior: it would also bias the scatter, which then has to explain the run.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -44,11 +40,8 @@ from models.tracking.linear_model import evidence, log_outlying, tabulated
 from models.tracking.outlying_runs import NODES, TEMPER, Nodes, Search, gains
 from models.tracking.prior import Prior
 
-#: Nodes along log τ (the first time, and then), log ε and log s while closing in; how often; what shrinking is worth
-#: it.
+#: Nodes along log τ (the first time, and then), log ε and log s while closing in.
 _FIRST, COARSE = 65, (11, 8, 7)
-
-
 #: Of each form the one that stands for it on the first lattice, which is so blurred that the law of the scatter and smaller
 #: differences of q hardly matter there: a larger q's mass lies no less wide.
 _FIRST_SIZES = np.where(
@@ -253,16 +246,9 @@ def _first(prior: Prior, history: History, frame: Frame, table: FloatArray, blur
 def _chosen(
     prior: Prior, history: History, frame: Frame, table: FloatArray, log_mass: FloatArray, blur: float
 ) -> tuple[Nodes, Nodes]:
-    """NODES nodes of each level of s, drawn evenly by a power of their mass so that what an outlying run hides is among
-    them; and the best one of each level."""
+    """NODES nodes of each level of s, drawn evenly by a power of their mass; and the best one of each level."""
     _, levels, rows, nodes = log_mass.shape
     by_level = np.moveaxis(log_mass, 1, 0).reshape(levels, -1)
-    chance = np.exp(TEMPER * (by_level - by_level.max(axis=1, keepdims=True)))
-    edges = np.cumsum(chance, axis=1)
-    places = (np.arange(NODES) + 0.5) / NODES
-    drawn = np.stack([np.searchsorted(row, places * row[-1]) for row in edges])
-    log_share = np.log(NODES * np.take_along_axis(chance, drawn, axis=1) / edges[:, -1:])
-    best = by_level.argmax(axis=1)[:, None]
 
     def at(cells: NDArray[np.intp], log_share: FloatArray | float) -> Nodes:
         level = np.repeat(np.arange(levels), cells.shape[1])
@@ -277,7 +263,7 @@ def _chosen(
             log_weight=(np.take_along_axis(by_level, cells, axis=1) - log_share).ravel(),
         )
 
-    return at(drawn, log_share), at(best, 0.0)
+    return at(*_tempered(by_level, NODES)), at(by_level.argmax(axis=1)[:, None], 0.0)
 
 
 def log_masses(density: FloatArray, cells: FloatArray) -> FloatArray:
@@ -341,10 +327,6 @@ def _spaced(low: FloatArray, high: FloatArray, count: int) -> FloatArray:
     return np.asarray(low[..., None] + (high - low)[..., None] * (np.arange(count) / (count - 1)))
 
 
-#: Nodes of each leading kind.
-_NODES = 32
-
-
 def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame, log_mass: FloatArray) -> tuple[Kinds, Frame]:
     """The kinds and their lattices, with those of the sets that were overlooked; `log_mass` [k] says which kinds lead."""
     if prior.outlying_share == 0.0 or history.value.size < 2:
@@ -377,20 +359,25 @@ def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame, log_ma
 
 
 def _nodes(kinds: Kinds, frame: Frame, table: FloatArray, mass: FloatArray, kind: int, relative: FloatArray) -> Nodes:
-    """NODES nodes of one kind, drawn evenly by a power of their log mass so that what an
-    outlying run hides is among them."""
-    cells = mass.shape[2] * mass.shape[3]
-    flat = mass[kind].ravel()
-    edges = np.cumsum(np.exp(TEMPER * (flat - flat.max())))
-    drawn = np.searchsorted(edges, (np.arange(_NODES) + 0.5) / _NODES * edges[-1])
-    log_share = np.log(_NODES) + TEMPER * (flat[drawn] - flat.max()) - np.log(edges[-1])
-    level, cell = np.divmod(drawn, cells)
+    """32 nodes of one kind, drawn evenly by a power of their mass."""
+    drawn, log_share = _tempered(mass[kind].reshape(1, -1), 32)
+    level, cell = np.divmod(drawn[0], mass.shape[2] * mass.shape[3])
     return Nodes(
         b=table[kind][:, cell].T,
         noise=np.exp(2.0 * frame.log_scatter[kind, level])[:, None] * scatter_growth(kinds.form[[kind]], relative),
-        size=np.full(_NODES, kinds.size[kind]),
-        log_weight=flat[drawn] - log_share,
+        size=np.full(drawn.size, kinds.size[kind]),
+        log_weight=mass[kind].ravel()[drawn[0]] - log_share[0],
     )
+
+
+def _tempered(log_mass: FloatArray, count: int) -> tuple[NDArray[np.intp], FloatArray]:
+    """`count` nodes of each row [r, n], drawn evenly by a power of their mass so that what an outlying run hides is among
+    them; and the logarithm of how often each is drawn; [r, count]."""
+    chance = np.exp(TEMPER * (log_mass - log_mass.max(axis=1, keepdims=True)))
+    edges = np.cumsum(chance, axis=1)
+    places = (np.arange(count) + 0.5) / count
+    drawn = np.stack([np.searchsorted(row, places * row[-1]) for row in edges])
+    return drawn, np.log(count * np.take_along_axis(chance, drawn, axis=1) / edges[:, -1:])
 
 
 def _name(form: int, outlying: FloatArray) -> bytes:

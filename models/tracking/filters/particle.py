@@ -15,6 +15,7 @@ Source: N. Chopin, "A sequential particle filter method for static models", Biom
 
 import math
 from dataclasses import dataclass, fields, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +23,13 @@ from scipy.special import ndtri
 
 from models.arrays import FloatArray
 from models.tracking.courses import FORM_COURSE, SCALE_SIGN, Course, basis, log_form_weight, log_scale_at, place_of
-from models.tracking.criteria import KEPT, MOVED, MOVES
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.history import History
 from models.tracking.linear_model import Points, evidence, last_outlying, log_outlying, pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
-from models.tracking.sampling import spread_normals, spread_points, systematic, with_linear_terms
-
-#: The log probability of measurements of a course that had ended before.
-_NEVER = -1e6
+from models.tracking.sampling import normalised, spread_normals, spread_points, systematic, with_linear_terms
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +105,7 @@ def _log_prior(prior: Prior, cloud: Cloud) -> FloatArray:
 def _log_alive(history: History, cloud: Cloud) -> FloatArray:
     """Of every particle whose course ended before the last measurement that it was never taken."""
     ended = (SCALE_SIGN[cloud.course] < 0.0) & (cloud.points[:, 0] <= math.log(history.span))
-    return np.where(ended, _NEVER, 0.0)
+    return np.where(ended, -1e6, 0.0)
 
 
 def merged(old: Cloud, new: Cloud, accepted: NDArray[np.bool_]) -> Cloud:
@@ -120,19 +117,11 @@ def merged(old: Cloud, new: Cloud, accepted: NDArray[np.bool_]) -> Cloud:
     return Cloud(**columns)
 
 
-def weights(log_weight: FloatArray) -> FloatArray:
-    """Weights [n] that sum to one."""
-    weight = np.exp(log_weight - log_weight.max())
-    return np.asarray(weight / weight.sum())
-
-
 def effective(log_weight: FloatArray) -> float:
     """Effective number of particles, (Σw)²/Σw²."""
-    return float(1.0 / np.square(weights(log_weight)).sum())
+    return float(1.0 / np.square(normalised(log_weight)).sum())
 
 
-#: In a step, how often another size is tried, and how often the flag of one run, or the law of the scatter, is turned.
-_RESIZED, _TURNED = 0.25, 0.1
 _GRID = Grid()
 
 
@@ -161,15 +150,17 @@ class ParticleState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Particle:
-    """The filter. `moves` = 0 leaves a plain resampling filter, which starves: it serves for comparison."""
+    """The filter. Steps of a move end after `moves`, or when a share `moved` of the particles has moved; without any it is
+    a plain resampling filter, which starves: it serves for comparison.
 
+    Chosen: on 60 lives, and on 60 with an outlying run in ten, shares of 0.9, 0.8 and 0.7 have a CRPS of the end's logarithm
+    of 1.03, 0.97 and 0.98, and 0.93, 0.92 and 0.90 times the exact filter's, and take 15, 12 and 10 ms a test.
+    """
+
+    name: ClassVar[str] = "particle"
     particles: int = 2_000
-    moves: int = MOVES
-
-    @property
-    def name(self) -> str:
-        """`particle`."""
-        return "particle"
+    moves: int = 8
+    moved: float = 0.7
 
     def start(self, prior: Prior) -> ParticleState:
         """Particles spread evenly over the prior, the same every time."""
@@ -193,7 +184,7 @@ class Particle:
         prior, history = state.prior, state.history.append(measurement, state.prior)
         cloud = entered(prior, history, state.cloud, rng)
         enough = effective(cloud.log_weight)
-        if enough < 0.25 * self.particles or weights(cloud.log_weight) @ cloud.outlying[:, -1] > 0.5:
+        if enough < 0.25 * self.particles or normalised(cloud.log_weight) @ cloud.outlying[:, -1] > 0.5:
             cloud = self._from_grid(prior, history, rng)
         elif enough < 0.5 * self.particles:
             cloud = self._renewed(prior, history, cloud, rng)
@@ -215,7 +206,7 @@ class Particle:
 
     def _renewed(self, prior: Prior, history: History, cloud: Cloud, rng: np.random.Generator) -> Cloud:
         """Resampled, and moved by steps of a random walk shaped like the cloud."""
-        weight, span = weights(cloud.log_weight), history.span
+        weight, span = normalised(cloud.log_weight), history.span
         shapes = _shapes(cloud, weight, span)
         chance, log_weight = _kept(cloud.course, weight)
         index = systematic(chance, weight.size, float(rng.random()))
@@ -228,14 +219,14 @@ class Particle:
             cloud = merged(cloud, replace(proposed, log_target=offered), accepted)
             moved |= accepted
             reach *= 0.5 if accepted.mean() < 0.2 else 1.0  # where few are accepted
-            if moved.mean() >= MOVED:
+            if moved.mean() >= self.moved:
                 break
         return cloud
 
     def posterior(self, state: ParticleState, size: int, rng: np.random.Generator) -> Posterior:
         """`size` draws of equal weight: systematic over the particles, with evenly spread draws of (ξ0, Δ)."""
         cloud, offset = state.cloud, rng.random(3)
-        points = cloud.taken(systematic(weights(cloud.log_weight), size, float(offset[2]))).placed()
+        points = cloud.taken(systematic(normalised(cloud.log_weight), size, float(offset[2]))).placed()
         solved, weight = pointwise(state.history, state.prior, points), np.full(size, 1.0 / size)
         normals = spread_normals(size, offset[:2])
         return with_linear_terms(state.history, state.prior, points, solved, weight, normals, rng)
@@ -257,20 +248,21 @@ def _shapes(cloud: Cloud, weight: FloatArray, span: float) -> FloatArray:
     return shapes
 
 
-def _kept(course: NDArray[np.intp], weight: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How often to take each particle, so that every course keeps a share of KEPT, and the log weight that makes up for it
-    [n]: what the data do not speak for today they may speak for later."""
+def _kept(course: NDArray[np.intp], weight: FloatArray, least: float = 0.05) -> tuple[FloatArray, FloatArray]:
+    """How often to take each particle, so that every course keeps at `least` a share, and the log weight that makes up for
+    it [n]: what the data do not speak for today they may speak for later."""
     share = np.bincount(course, weights=weight, minlength=len(Course))
     alive = share > 1e-100  # what makes up for it must not overflow
-    kept = np.where(alive, np.maximum(share, KEPT), share)
+    kept = np.where(alive, np.maximum(share, least), share)
     kept /= kept.sum()
     more = np.divide(kept, share, out=np.ones(len(Course)), where=alive)[course]
     return weight * more, -np.log(more)
 
 
 def _proposed(cloud: Cloud, shapes: FloatArray, span: float, rng: np.random.Generator) -> tuple[Cloud, FloatArray]:
-    """A step of every particle, as likely as the step back but for a log factor [n]: always in its points, at times in its
-    form and its flags."""
+    """A step of every particle, as likely as the step back but for a log factor [n]: always in its points; at times another
+    size is tried, and the flag of one run, or the law of the scatter, turned."""
+    resized, turning = 0.25, 0.1
     (count, runs), course = cloud.outlying.shape, cloud.course
     stride = rng.uniform(0.2, 1.6, size=(count, 1))
     places = _places(cloud, span)
@@ -279,11 +271,11 @@ def _proposed(cloud: Cloud, shapes: FloatArray, span: float, rng: np.random.Gene
     stretch -= places[:, 0] - cloud.points[:, 0]
     points = np.column_stack([log_scale, moved[:, 1:]])
     chance = rng.random((3, count))
-    step = np.where(chance[0] < _RESIZED, np.where(chance[0] < 0.5 * _RESIZED, -1.0, 1.0), 0.0)
+    step = np.where(chance[0] < resized, np.where(chance[0] < 0.5 * resized, -1.0, 1.0), 0.0)
     form = np.clip(cloud.form + step, 0, FORM_COURSE.size - 1)
     form = np.where(FORM_COURSE[form.astype(np.intp)] == course, form, cloud.form)
-    form = np.where(chance[1] < _TURNED, (form + FORM_COURSE.size / 2) % FORM_COURSE.size, form)
-    outlying, turned = cloud.outlying.copy(), np.flatnonzero(chance[2] < _TURNED)
+    form = np.where(chance[1] < turning, (form + FORM_COURSE.size / 2) % FORM_COURSE.size, form)
+    outlying, turned = cloud.outlying.copy(), np.flatnonzero(chance[2] < turning)
     run = rng.integers(runs, size=turned.size)
     outlying[turned, run] = 1.0 - outlying[turned, run]
     return replace(cloud, points=points, form=form, outlying=outlying), stretch

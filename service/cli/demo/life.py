@@ -14,8 +14,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
-from models.engagements.capacity import Capacity
-from models.engagements.simulation import Drive, PressureProfile, engage
+from models.engagements.simulation import Capacity, Drive, PressureProfile, engage
 from models.friction.stribeck import torque
 from models.records.runs import Record
 from models.rig import campaign
@@ -23,9 +22,8 @@ from models.rig.hysteresis import FrictionLag
 from models.rig.sampled import DynamicTest, Recorder, sampled_test
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor
-from models.rig.surface import Surface, surface
 from models.rig.temperatures import warmed
-from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
+from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, Surface, surface
 
 #: The demo ends at this share of the mean COF when new. Chosen: a little after the end of life at 0.5.
 _STOP = 0.49

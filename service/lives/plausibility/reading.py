@@ -18,7 +18,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.plausibility import criteria as odds
-from models.plausibility.slips import Reading, Run, Slip, none
+from models.plausibility.slips import Reading, Run, Slip
 from models.records.criteria import UNLOADED
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 from service.errors import Notice
@@ -294,7 +294,7 @@ def runs_of(events: Sequence[Event], geometry: Geometry, *, corrected: bool) -> 
                     name=event.run_id,
                     kind=event.kind,
                     sent=sent,
-                    slips=none if event.shown is None else partial(comparison.slips, event, shown),
+                    slips=tuple if event.shown is None else partial(comparison.slips, event, shown),
                     tests=bool(event.cofs) and sent.log_cof is not None and not comparison.in_other_oil(event),
                     block=None if event.duty is None or event.kind == RUN_IN else event.duty.cycles,
                     moment=event.moment if event.dated else None,

@@ -14,7 +14,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.friction.slope import cof_slope
+from models.friction.identification import cof_slope
 from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.back_cast import BackCast
 from models.prognosis.criteria import FEWEST_TESTS

@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 from models.degradation.general_order import (
     Degradation,
     first_passage,
-    kinetics,
     progress_fraction,
     reaches,
     sensitivities,
@@ -96,7 +95,7 @@ def test_small_progress_keeps_its_digits() -> None:
 def test_general_order_kinetics_integrate_to_eq_6(exponent: float) -> None:
     """dD/dζ = -k Dⁿ with n = 1 + 1/ε and k = ε/φ; the integrator's tolerance is 1e-10."""
     d = Degradation(initial=0.0, change=1.0, scale=5_000.0, exponent=exponent)
-    rate, order = kinetics(d)
+    rate, order = d.exponent / d.scale, 1.0 + 1.0 / d.exponent
     zeta = np.linspace(0.0, 40_000.0, 9)
     solved = solve_ivp(
         lambda _, left: -rate * left**order, (0.0, 40_000.0), [1.0], "DOP853", zeta, rtol=1e-10, atol=1e-12

@@ -10,8 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models.degradation.general_order import Degradation, first_passage, value
-from models.degradation.programme import Programme, uncertain_work
-from models.degradation.severity import IDENTITY, Block, Severity, SeverityBasis, severity_map
+from models.degradation.severity import (
+    IDENTITY,
+    Block,
+    Programme,
+    Severity,
+    SeverityBasis,
+    severity_map,
+    uncertain_work,
+)
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
 from models.prognosis.scoring import crps_of_sample
 from tests.models.tracking.tracked_series import on_grid, sent

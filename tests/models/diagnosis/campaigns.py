@@ -24,7 +24,7 @@ from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.report.report import Report
 from models.friction.stribeck import StribeckParameters, torque
-from models.loops.attractor import attractor_torque
+from models.loops.lag_laws import attractor_torque
 from models.records.runs import Plateaus, Record
 from models.rig import campaign as rig
 from models.rig.hidden import clutch_for, hidden_in

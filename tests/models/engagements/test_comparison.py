@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from models.clutch import Geometry
-from models.engagements.capacity import Capacity
 from models.engagements.comparison import SpeedCourse, compared, reference_of, same_duty
 from models.engagements.discrepancy import Discrepancy, discrepancy
 from models.engagements.measured import MeasuredEngagement, measured_engagement
-from models.engagements.simulation import engage
+from models.engagements.simulation import Capacity, engage
 from models.engagements.slip import Estimate
 from models.records.runs import Record
 from models.rig.campaign import simulated_clutch

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from models.engagements.capacity import capacity_of
-from models.engagements.simulation import Drive, PressureProfile, engage
+from models.engagements.simulation import Drive, PressureProfile, capacity_of, engage
 from models.friction.stribeck import StribeckParameters, torque
 from models.rig.campaign import simulated_clutch
 from models.rig.truth import PROTOCOL_PRESSURES

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from models.friction.identification import FitStatus, fit_curves, mean_torque
+from models.friction.identification import FitStatus, fit_curves, mean_torques
 from models.friction.stribeck import PARAMETER_NAMES, torque
 from models.friction.variable_projection import jacobian, make_problem, minimise, profile
 from tests.models.friction.stribeck_curves import PRESSURES, VELOCITY, clutch, curve, eq3, hard_curve
@@ -70,16 +70,16 @@ def test_the_order_of_rows_does_not_matter(order, seed):
 def test_a_repeated_point_shifts_the_mean_torque_within_noise(row, seed):
     """A point's weight is at most 1, so its doubling moves the curve's mean by less than the point's own residual."""
     measured = noisy(seed)
-    mean, sd = mean_torque(one(VELOCITY, measured), VELOCITY)
+    mean, sd = mean_torques([one(VELOCITY, measured)], VELOCITY)[0]
     after = one(np.append(VELOCITY, VELOCITY[row]), np.append(measured, measured[row]))
-    assert abs(mean_torque(after, VELOCITY)[0] - mean) < 3 * sd
+    assert abs(mean_torques([after], VELOCITY)[0, 0] - mean) < 3 * sd
 
 
 def test_both_directions_are_one_curve():
     measured = noisy(3)
     forward, backward = one(VELOCITY, measured), one(-VELOCITY, -measured)
     np.testing.assert_array_equal(forward.parameters.as_array(), backward.parameters.as_array())
-    assert mean_torque(forward, -VELOCITY)[0] == -mean_torque(forward, VELOCITY)[0]
+    assert mean_torques([forward], -VELOCITY)[0, 0] == -mean_torques([forward], VELOCITY)[0, 0]
 
 
 def test_points_at_rest_give_the_static_torque():
@@ -93,8 +93,8 @@ def test_weights_follow_the_given_deviations():
     measured, sd = noisy(4), np.full(VELOCITY.size, 0.25)
     measured[[3, 17, 30]], sd[[3, 17, 30]] = 90.0, 1e4
     fit = one(VELOCITY, measured, sd)
-    assert mean_torque(fit, VELOCITY)[0] == pytest.approx(eq3(FRESH, VELOCITY).mean(), abs=0.3)
-    assert mean_torque(one(VELOCITY, measured), VELOCITY)[0] > eq3(FRESH, VELOCITY).mean() + 2
+    assert mean_torques([fit], VELOCITY)[0, 0] == pytest.approx(eq3(FRESH, VELOCITY).mean(), abs=0.3)
+    assert mean_torques([one(VELOCITY, measured)], VELOCITY)[0, 0] > eq3(FRESH, VELOCITY).mean() + 2
 
 
 def test_deviations_that_the_residuals_contradict_are_not_believed():
@@ -130,7 +130,7 @@ def test_a_torque_that_only_rises_has_no_coulomb_ratio():
     assert fit.status is FitStatus.UNDETERMINED
     assert "coulomb_ratio" in fit.undetermined
     assert fit.parameters.stribeck_velocity == pytest.approx(4.0, rel=1e-3)
-    assert mean_torque(fit, VELOCITY)[1] < 0.01
+    assert mean_torques([fit], VELOCITY)[0, 1] < 0.01
 
 
 def test_a_viscous_coefficient_at_zero_is_at_bound():
@@ -147,14 +147,14 @@ def test_fewer_than_four_speeds_determine_nothing(speeds):
     fit = one(velocity, eq3(FRESH, velocity) + np.random.default_rng(7).normal(0, 0.2, velocity.size))
     assert fit.undetermined == PARAMETER_NAMES
     assert f"({speeds}) to determine" in fit.message
-    mean, sd = mean_torque(fit, velocity)
+    mean, sd = mean_torques([fit], velocity)[0]
     assert mean == pytest.approx(eq3(FRESH, velocity).mean(), abs=0.5)
     assert sd < 0.5
 
 
 def test_a_single_point_is_answered():
     fit = one([3.0], [20.0])
-    mean, sd = mean_torque(fit, VELOCITY)
+    mean, sd = mean_torques([fit], VELOCITY)[0]
     assert mean == pytest.approx(20.0)
     assert 5 < sd < 100
     assert "5% of the torque is assumed" in fit.message
@@ -193,7 +193,7 @@ def _check_finite(fit):
     assert (fit.parameters.as_array() >= 0).all()
     assert np.isfinite(fit.covariance).all()
     assert np.isfinite(fit.standard_errors).all()
-    assert np.isfinite([*mean_torque(fit, VELOCITY), fit.noise, fit.rmse]).all()
+    assert np.isfinite([*mean_torques([fit], VELOCITY)[0], fit.noise, fit.rmse]).all()
     assert (fit.status is FitStatus.UNDETERMINED) == bool(fit.undetermined)
     assert fit.message.endswith(".")
 

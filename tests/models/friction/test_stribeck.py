@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from models.friction.identification import fit_curves
-from models.friction.slope import cof_slope, slope_gradient
-from models.friction.stribeck import GAMMA, PARAMETER_NAMES, StribeckParameters, gradient, slope, torque
+from models.friction.identification import cof_slope, fit_curves
+from models.friction.stribeck import GAMMA, PARAMETER_NAMES, StribeckParameters, gradient, slope, slope_gradient, torque
 from models.records.runs import curves_by_pressure
 from models.rig.stationary import NOISELESS, stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch

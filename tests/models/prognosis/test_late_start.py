@@ -10,8 +10,7 @@ from models.arrays import FloatArray
 from models.degradation.general_order import Degradation, first_passage, value
 from models.prognosis.criteria import COUNTED_ELSEWHERE
 from models.prognosis.first_passage import weighted_quantiles
-from models.prognosis.late_start import late_start
-from models.prognosis.stated_end import StatedEnd, stated_end
+from models.prognosis.stated_end import StatedEnd, late_start, stated_end
 from models.tracking.courses import FORM_COURSE, FORM_SIZE, SCALE_SIGN, log_form_weight
 from models.tracking.linear_model import Points
 from models.tracking.measurement import Measurement

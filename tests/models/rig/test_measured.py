@@ -11,8 +11,8 @@ from models.friction.identification import fit_curves
 from models.friction.pressure_laws import LinearLaw
 from models.friction.speed_protocol import REFERENCE_SPEEDS, RPM
 from models.friction.stribeck import torque
-from models.loops.attractor import attractor_torque
 from models.loops.lag_fit import StationaryCurve
+from models.loops.lag_laws import attractor_torque
 from models.loops.loops import evaluate_loops
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, curves_by_pressure

@@ -14,8 +14,7 @@ from models.friction.stribeck import torque
 from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulated_clutch
 from models.rig.stationary import NOISELESS, stationary_test
-from models.rig.surface import surface
-from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, draw
+from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, draw, surface
 
 SPEEDS = np.arange(20, 1971, 50) * RPM
 BAR = 1e5

@@ -15,6 +15,7 @@ from models.tracking.courses import (
     FORM_COURSE,
     FORM_PROPORTIONAL,
     FORM_SIZE,
+    UNIT_OF_CHANGE,
     WITHOUT_EXPONENT,
     Course,
     basis,
@@ -25,7 +26,6 @@ from models.tracking.courses import (
     log_form_weight,
     log_scale_at,
     place_of,
-    unit_of_change,
 )
 from models.tracking.criteria import KNEE_HAZARD
 from models.tracking.discrepancy import PAST, Discrepancy, drawn, smooth
@@ -72,7 +72,7 @@ def test_basis_is_the_share_of_the_change_and_coordinates_lead_back(course: Cour
     scale, exponent = coefficients_at(log_scale, log_exponent, kind)
     zeta = np.array([[0.0], [100.0], [9_000.0]])
     expected = progress_fraction(zeta, scale, exponent)
-    found = basis(zeta, log_scale, log_exponent, kind) * unit_of_change(kind)
+    found = basis(zeta, log_scale, log_exponent, kind) * UNIT_OF_CHANGE[kind]
     np.testing.assert_allclose(found, expected, atol=1e-9)
     assert course_of(scale, exponent) == [course]
     back = coordinates_of(scale, exponent, kind)

@@ -1,4 +1,4 @@
-"""The baseline: its derivatives against differences, its curve and loops against `stribeck` and `loops.attractor`."""
+"""The baseline: its derivatives against differences, its curve and loops against `stribeck` and `loops.lag_laws`."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ from models.diagnosis.noise.estimate import first_noise
 from models.diagnosis.pooled_fit.gauss_newton import fit
 from models.diagnosis.pooled_fit.problem import FitProblem, priors_of
 from models.friction.stribeck import StribeckParameters
-from models.loops.attractor import attractor_torque
+from models.loops.lag_laws import attractor_torque
 from tests.models.diagnosis.campaigns import campaign, start_of, with_theta
 
 

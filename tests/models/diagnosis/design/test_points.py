@@ -13,7 +13,7 @@ from models.diagnosis.campaign import Campaign, DynamicRun
 from models.diagnosis.design.design import Design, Points, build_design
 from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
 from models.friction.stribeck import GAMMA, StribeckParameters, torque
-from models.loops.attractor import attractor_torque
+from models.loops.lag_laws import attractor_torque
 from models.records.runs import Record
 
 GEOMETRY = Geometry()

@@ -307,7 +307,7 @@ def test_a_step_of_all_filters_at_once_is_filterpys_step_of_each() -> None:
     state = followed(Ukf(), PRIOR, CAMPAIGN[:9])
     of = np.flatnonzero(np.isin(state.form, state.form[:2]))
     normals = replace(
-        state.normals, form=np.array([0, 2]), **{n: getattr(state, n)[of] for n in ("mean", "covariance", "scatter")}
+        state, form=np.array([0, 2]), **{n: getattr(state, n)[of] for n in ("mean", "covariance", "scatter")}
     )
     assert normals.mean.shape == (2, 6)
     last, reference, unit = CAMPAIGN[8].progress, state.reference, PRIOR.initial_sd
@@ -330,10 +330,10 @@ def test_a_step_of_all_filters_at_once_is_filterpys_step_of_each() -> None:
         share, whole = progress_fraction(np.array([way.progress, reference]), np.exp(log_scale), np.exp(log_exponent))
         return np.array([(initial + (at_reference - initial) * share / whole + beside) / unit])
 
-    mean, covariance = ukf.predicted(PRIOR, normals, way)
-    noise = covariance - ukf.predicted(PRIOR, replace(normals, form=np.zeros(2, dtype=np.intp)), way)[1]
+    mean, covariance = ukf.predicted(normals, way)
+    noise = covariance - ukf.predicted(replace(normals, form=np.zeros(2, dtype=np.intp)), way)[1]
     assert noise[0].max() == 0.0 < noise[1].max()
-    expected, variance, across = ukf.measured(PRIOR, normals.form, mean, covariance, way)
+    expected, variance, across = ukf.measured(PRIOR, normals.kinds, mean, covariance, way)
     for one in range(2):
         theirs = UnscentedKalmanFilter(
             dim_x=6,

@@ -1,8 +1,16 @@
-"""A squeezed film of oil, after eq. 7: friction lags because the film takes time to follow the speed.
+"""The two laws by which friction lags its speed, given the stationary curve S of eq. 3: an attractor, or a squeezed film.
 
-A film h that carries the load W has h_s ∝ (v/W)^n at rest with itself, so that away from it the film carries
-W (h_s/h)^{1/n}; eq. 7 adds -η_e l (2a/h)³ ḣ, and the sum must be W. In terms of the speed w whose stationary film is the
-present one, h = h_s(w), that is exactly a first-order lag, slower in thin films,
+The attractor law is that of the generalised Maxwell slip (GMS) model, in its sliding regime. Torque runs after S, the faster
+the higher C [Nm/s]:
+
+    dM/dt = C (sign v - M/|S(v)|)                                                 time constant |S|/C
+
+To first order in 1/C its loop area, eq. 8, is -(1/C) ∮ S S' v̇² dt: *negative* wherever S rises with v. It needs S > 0.
+
+The squeezed film of oil, after eq. 7, takes time to follow the speed. A film h that carries the load W has h_s ∝ (v/W)^n at
+rest with itself, so that away from it the film carries W (h_s/h)^{1/n}; eq. 7 adds -η_e l (2a/h)³ ḣ, and the sum must be W.
+In terms of the speed w whose stationary film is the present one, h = h_s(w), that is exactly a first-order lag, slower in
+thin films,
 
     dw/dt = (v - w)/τ(w),    τ(w) = n η_e l (2a)³/(W h²) = τ_1 (w/1 m/s)^{-2n}
 
@@ -14,12 +22,14 @@ elastohydrodynamic films have 0.67 to 0.7) the two terms of eq. 3 are just these
 is S(v) where w = v. Accelerating, w < v: more contact *and* a thinner film, so torque is higher also where S rises
 (M̄_c <= 1). At one lining τ_1 ∝ η_e^{1-2n} W^{2n-1}: it grows with pressure^0.4, see `film_time_at`.
 
-The law needs sliding; sticking and presliding are not in it. Velocities that swing through zero are followed with |v| in
-the film and sign v in the torque.
+Both need sliding; sticking and presliding are not in them. Velocities that swing through zero are followed with |v| in the
+film and sign v in the torque.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.4, eqs. 7-8 and its references 5, 6 and 16.
 The step from eq. 7 to τ(w), and the split of eq. 3, are this project's.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,6 +42,30 @@ FILM_EXPONENT = 1 - GAMMA
 #: The pressure [Pa] at which film times are compared.
 FILM_PRESSURE = 5e5
 _POWER = 2 * FILM_EXPONENT - 1  # z = w^-0.4 makes the film's equation convex
+
+
+def attractor_torque(
+    time: FloatArray,
+    velocity: FloatArray,
+    parameters: StribeckParameters,
+    attractor: float | FloatArray,
+    start: float | FloatArray | None = None,
+) -> FloatArray:
+    """M [n] Nm by the attractor law at time [n] s (ascending) and velocity [n] m/s; attractor C > 0 [Nm/s].
+
+    An array of attractors [k, 1] gives [k, n]. `start` is M at time[0], S(v) if not given. Between samples S is taken
+    as linear in ∫ C/|S| dt: stable however stiff, exact for constant S, and of second order in the time step.
+    Raises ValueError on C <= 0 or times that fall.
+
+    >>> p = StribeckParameters(static_torque=20.0, coulomb_ratio=1.0, stribeck_velocity=1.0, viscous_coefficient=0.0)
+    >>> attractor_torque(np.array([0.0, 0.2]), np.array([1.0, 1.0]), p, 100.0, start=10.0).round(4).tolist()
+    [10.0, 16.3212]
+    """
+    if not (np.asarray(attractor) > 0).all():
+        raise ValueError(f"attractor must be positive, got {attractor}")
+    curve = torque(velocity, parameters)
+    strength = np.maximum(np.abs(curve), 1e-9)
+    return relax(time, np.asarray(attractor) / strength, curve, curve[..., :1] if start is None else start)
 
 
 def squeeze_film_torque(
@@ -47,17 +81,7 @@ def squeeze_film_torque(
     Raises ValueError on τ_1 <= 0 or times that fall.
     """
     film = film_speed(time, velocity, film_time, start)
-    return film_torque(velocity, film, parameters)
-
-
-def film_torque(velocity: FloatArray, film: FloatArray, parameters: StribeckParameters) -> FloatArray:
-    """M [n] Nm at velocity [n] m/s over the film that is stationary at `film` w [n] m/s > 0."""
-    dry = StribeckParameters(
-        static_torque=parameters.static_torque,
-        coulomb_ratio=parameters.coulomb_ratio,
-        stribeck_velocity=parameters.stribeck_velocity,
-        viscous_coefficient=0.0,
-    )
+    dry = replace(parameters, viscous_coefficient=0.0)
     sheared = parameters.viscous_coefficient * np.abs(velocity) / film**FILM_EXPONENT
     return np.asarray(np.copysign(1.0, velocity) * (torque(film, dry) + sheared), dtype=np.float64)
 
