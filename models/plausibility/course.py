@@ -193,7 +193,7 @@ class Predicted:
         """log density [m] of log COF [m] whose own deviation is `spread` [m], at the cycles of the prediction; with
         probability `new_level` [m] COF has a new level there."""
         off, variance, weight = log_cof - self.mean, self.variance + spread**2, self.log_weight[:, None]
-        same = np.log1p(-new_level) + log_outlying(off, variance, weight)
+        same = np.log1p(-new_level) + log_unless_outlying(off, variance, weight)
         stepped = np.logaddexp.reduce(weight + log_normal(off, variance + criteria.LEVEL_SD**2), axis=0)
         return np.asarray(np.logaddexp(same, np.log(np.maximum(new_level, 1e-300)) + stepped))
 
@@ -205,7 +205,7 @@ class Predicted:
         return math.exp(mean - 2 * math.sqrt(square)), math.exp(mean + 2 * math.sqrt(square))
 
 
-def log_outlying(off: FloatArray, variance: FloatArray, log_weight: FloatArray) -> FloatArray:
+def log_unless_outlying(off: FloatArray, variance: FloatArray, log_weight: FloatArray) -> FloatArray:
     """log density [m] of what is `off` its mean [g, m] under nodes of weight [g, m], where a share of tests is outlying."""
     plain = math.log1p(-criteria.OUTLYING_SHARE) + log_normal(off, variance)
     further = math.log(criteria.OUTLYING_SHARE) + log_normal(off, variance + criteria.OUTLYING_SD**2)
@@ -214,7 +214,9 @@ def log_outlying(off: FloatArray, variance: FloatArray, log_weight: FloatArray) 
 
 def missed(off: FloatArray, variance: FloatArray, log_weight: FloatArray) -> FloatArray:
     """log density [m] that is lost by being `off` the mean [g, m]."""
-    return np.asarray(log_outlying(0.0 * off, variance, log_weight) - log_outlying(off, variance, log_weight))
+    return np.asarray(
+        log_unless_outlying(0.0 * off, variance, log_weight) - log_unless_outlying(off, variance, log_weight)
+    )
 
 
 def log_physics(log_cof: FloatArray) -> FloatArray:

@@ -5,8 +5,12 @@ hence its own threshold. Eq. 6 alone passes it in closed form, and saturates: a 
 threshold never gets there. With a discrepancy beside eq. 6, or a known further course of the quantity, the first
 passage is computed along the draw's path. The probability of getting there is part of the result; a quantile that lies
 beyond the horizon is None, never an infinity.
+
+A life may have several limits, each a share of a quantity's value at ζ = 0, or a value that it falls below or rises above:
+the first to be reached counts.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -20,6 +24,7 @@ from models.degradation import general_order
 from models.prognosis.criteria import BAND, HORIZON, HORIZON_AGES, QUANTILES
 from models.tracking.discrepancy import Discrepancy
 from models.tracking.posterior import Posterior
+from models.tracking.sampling import systematic
 
 #: Of these every so many'th is looked at first. A dip below the threshold and back between two of them is not seen: the
 #: course beside eq. 6 bends some twenty times, and steps are looked at by themselves.
@@ -221,3 +226,62 @@ def _status(end_of_life: dict[float, float | None], passed: float) -> PassageSta
     if passed >= 0.5:
         return PassageStatus.REACHED
     return PassageStatus.MAY_NEVER_REACH if None in end_of_life.values() else PassageStatus.PREDICTED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """Exactly one of: `fraction` of the initial value, a value `below` or `above` which the quantity may not get.
+
+    Raises ValueError where none or several are given, or one is not finite, or fraction lies outside (0, 1).
+    """
+
+    fraction: float | None = None
+    below: float | None = None
+    above: float | None = None
+
+    def __post_init__(self) -> None:
+        given = [number for number in (self.fraction, self.below, self.above) if number is not None]
+        if len(given) != 1 or not math.isfinite(given[0]):
+            raise ValueError("exactly one of fraction, below and above must be given, and be finite")
+        if self.fraction is not None and not 0.0 < self.fraction < 1.0:
+            raise ValueError(f"fraction must lie between 0 and 1, got {self.fraction}")
+
+    def level(self, initial: FloatArray | float) -> FloatArray:
+        """The value at which the limit is reached, for an initial value of any shape."""
+        if self.fraction is not None:
+            return np.asarray(self.fraction * np.asarray(initial))
+        fixed = self.below if self.below is not None else self.above
+        return np.full(np.shape(initial), fixed)
+
+    def passages(self, paths: FloatArray, progress: FloatArray) -> FloatArray:
+        """The ζ [n] at which each path [k, n] over ascending progress [k] first comes to the limit; inf where it never does.
+
+        A path that begins past its limit counts only after it has come back to the good side. One that never comes back is
+        at the limit from the first ζ.
+        """
+        sign = -1.0 if self.above is not None else 1.0
+        from_above, level = sign * paths, sign * self.level(paths[0])
+        was_good = np.logical_or.accumulate(from_above > level, axis=0)
+        return first_below(np.where(was_good | ~was_good[-1], from_above, np.inf), progress, level)
+
+
+def places(now: float, horizon: float, behind: int = 40, ahead: int = 200) -> FloatArray:
+    """ζ [k] at which paths are computed: evenly up to `now` >= 0, where a life stands, and in equal ratios to `horizon`."""
+    start = max(now, 1.0)
+    return path_places(start, max(horizon, 2.0 * start), behind, ahead)
+
+
+def first_reached(
+    ends: Sequence[tuple[FloatArray, FloatArray]], size: int, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """The first of several ends, `size` draws of equal weight, and the probability [c] of each to be that first.
+
+    `ends` are weighted samples, each of ends [n] (inf: never) with weights [n] that sum to one. A draw in which none is
+    ever reached counts for none. At least one is needed. Given its own tests the error of one quantity's end is taken to be
+    independent of the others', for each limit looks at another quantity or another pressure.
+    """
+    drawn = np.stack([rng.permutation(sample[systematic(weight, size, rng.random())]) for sample, weight in ends])
+    first = drawn.min(axis=0)
+    reached = np.isfinite(first)
+    which = np.bincount(drawn.argmin(axis=0)[reached], minlength=len(ends))
+    return first, which / size

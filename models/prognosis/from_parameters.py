@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.friction.stribeck import StribeckParameters, slope, torque
 from models.prognosis.criteria import BAND, FAR_APART, FEWEST_TESTS, HORIZON
-from models.prognosis.first_passage import first_below, path_places, weighted_quantiles
+from models.prognosis.first_passage import first_below, places, weighted_quantiles
 from models.tracking.courses import Course, basis
 from models.tracking.posterior import Posterior
 from models.tracking.sampling import systematic, tempered
@@ -212,8 +212,7 @@ def mean_cof_paths(
     velocities [v] m/s are the protocol's, `reference_cofs` the reference test's mean COF at every pressure. Levels with
     fewer than FEWEST_TESTS tests at different progress take no part.
     """
-    start = max(now, 1.0)
-    progress = path_places(start, max(horizon, 2.0 * start), _BEHIND, 49)
+    progress = places(now, horizon, _BEHIND, 49)
     parts, at_levels = [], []
     for level in levels:
         if np.unique(level.progress).size >= FEWEST_TESTS:

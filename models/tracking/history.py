@@ -54,11 +54,6 @@ class History:
         """The deviations of these steps, as shares of the size of the quantity [e]."""
         return step_sizes(self.epoch, self.new_levels, prior.step_size)
 
-    def relative_squared(self, prior: Prior) -> FloatArray:
-        """(value / size)² of every run [t]: the factor on the scatter's variance where scatter is a share of the value. The
-        measured value stands in for the true one, which on average makes the factor too large by the scatter squared."""
-        return np.asarray(prior.relative_squared(self.value))
-
     def to_arrays(self) -> dict[str, FloatArray]:
         """The columns by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}

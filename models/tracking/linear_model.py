@@ -156,7 +156,7 @@ def pointwise(history: History, prior: Prior, points: Points, table: FloatArray 
     np.multiply(scatter[1], FORM_PROPORTIONAL[points.form], out=scatter[2])
     scatter[1] -= scatter[2]
     d = np.multiply(points.outlying, (prior.outlying_size * prior.size) ** 2, out=np.empty(b.shape))
-    d += np.array([history.variance, np.ones(b.shape[0]), history.relative_squared(prior)]).T @ scatter
+    d += np.array([history.variance, np.ones(b.shape[0]), prior.relative_squared(history.value)]).T @ scatter
     log_r = -_log_product(d) - b.shape[0] * math.log(2.0 * math.pi)
     r = np.divide(1.0, d, out=d)
     y = history.value - prior.initial_mean
@@ -180,7 +180,7 @@ def last_outlying(history: History, prior: Prior, points: Points, sums: Sums, te
     It gets a further term of its own with the deviation W, which is eliminated after the others.
     """
     y, sd = float(history.value[-1]) - prior.initial_mean, prior.outlying_size * prior.size
-    growth = scatter_growth(points.form, history.relative_squared(prior)[-1:])[:, 0]
+    growth = scatter_growth(points.form, prior.relative_squared(history.value)[-1:])[:, 0]
     r = 1.0 / (history.variance[-1] + growth * np.exp(2.0 * points.log_scatter))
     pivot = 1.0 + sd**2 * r
     own = sd * r * np.stack([np.ones_like(last), np.full_like(last, y), last])
@@ -218,7 +218,10 @@ def tabulated(
     `table` holds b, [t, g] or [k, t, g]; a kind has its own levels log_scatter [k, l], a form [k] and outlying runs
     [t, k]. `blur` is a further deviation of every measurement, one or [k].
     """
-    further, growth = (prior.outlying_size * prior.size) ** 2, scatter_growth(form, history.relative_squared(prior))
+    further, growth = (
+        (prior.outlying_size * prior.size) ** 2,
+        scatter_growth(form, prior.relative_squared(history.value)),
+    )
     fixed = history.variance + further * outlying.T + (np.zeros(form.size) + blur)[:, None] ** 2
     r = 1.0 / (fixed[:, None, :] + growth[:, None, :] * np.exp(2.0 * log_scatter)[:, :, None])
     y, levels = history.value - prior.initial_mean, r.shape[1]

@@ -68,7 +68,8 @@ class Prior:
         return max(abs(self.initial_mean), self.initial_sd)
 
     def relative_squared(self, value: FloatArray | float) -> FloatArray:
-        """(value / size)² of any shape, at least 0.01: the factor on the variance of scatter that is a share of it."""
+        """(value / size)² of any shape, at least 0.01: the factor on the variance of scatter that is a share of it. Where a
+        measured value stands in for the true one, it is too large by the scatter squared on average."""
         return np.maximum(np.square(np.asarray(value) / self.size), 0.01)  # values may cross zero
 
     def to_array(self) -> FloatArray:

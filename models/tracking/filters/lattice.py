@@ -256,7 +256,7 @@ def _chosen(
         form = LAID_FIRST[np.isfinite(log_form_weight(prior)[LAID_FIRST])][kind]
         return Nodes(
             b=table[FORM_COURSE[form], :, cell],
-            noise=scatter_growth(form, history.relative_squared(prior))
+            noise=scatter_growth(form, prior.relative_squared(history.value))
             * np.exp(2.0 * frame.log_scatter[0, level])[:, None]
             + blur**2,
             size=FORM_SIZE[form],
@@ -338,7 +338,7 @@ def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame, log_ma
     mass = density + np.log(where.cells(COARSE[0]))[:, None, :, None]
     mass -= log_masses(density, where.cells(COARSE[0])).max()
     laid = {_name(form, outlying) for form, outlying in zip(kinds.form, kinds.outlying, strict=True)}
-    relative = history.relative_squared(prior)
+    relative = prior.relative_squared(history.value)
     overlooked: dict[bytes, tuple[float, int, FloatArray]] = {}
     for leader in range(leaders.size):
         gain = gains(prior, history, leading.outlying[leader], _nodes(leading, where, table, mass, leader, relative))

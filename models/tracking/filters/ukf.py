@@ -318,7 +318,7 @@ class Ukf:
             progress=measurement.progress,
             value=measurement.value,
             variance=float(history.variance[-1]),
-            relative=float(history.relative_squared(prior)[-1]),
+            relative=float(prior.relative_squared(history.value)[-1]),
         )
         updated = stepped(replace(state, history=history), way)
         # where courses that end before what is measured have much of the weight: lives that fall at once (ad hoc) are

@@ -10,9 +10,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.prognosis.criteria import FEWEST_TESTS, QUANTILES
-from models.prognosis.first_passage import PassageStatus, horizon_at, weighted_quantiles
+from models.prognosis.first_passage import Limit, PassageStatus, first_reached, horizon_at, places, weighted_quantiles
 from models.prognosis.first_passage import paths as track_paths
-from models.prognosis.limits import Limit, first_reached, places
 from service.columns import PASCALS_PER_BAR
 from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF

@@ -12,15 +12,17 @@ from models.prognosis import first_passage
 from models.prognosis.first_passage import (
     QUANTILES,
     FirstPassage,
+    Limit,
     PassageStatus,
     bands,
     ends_of_life,
     first_below,
+    first_reached,
+    places,
     predict_first_passage,
     weighted_quantiles,
     widened,
 )
-from models.prognosis.limits import Limit, first_reached, places
 from models.tracking.discrepancy import FUTURE, PAST, Discrepancy
 from models.tracking.posterior import Posterior
 
