@@ -30,22 +30,8 @@ COURSE_POINTS = 65
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedCourse:
-    """The speed of one slip [65] rad/s at equal steps from contact to its end; `duration` [s] of that, `noise` [rad/s] the
-    deviation of a point."""
-
-    duration: Estimate
-    speed: FloatArray
-    noise: float
-
-    def at(self, time: FloatArray) -> FloatArray:
-        """Speed [m] rad/s at time [m] s since contact; zero once the shaft stands."""
-        steps = np.linspace(0.0, self.duration.value, self.speed.size)
-        return np.asarray(np.interp(time, steps, self.speed, right=0.0), dtype=np.float64)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reference:
-    """The first engagements together: mean duration [s], and mean speed [50] rad/s at equal steps of it with its noise."""
+    """The speed of one slip [65] rad/s at equal steps from contact to its end, or the mean of several [50]; `duration` [s]
+    of that, `noise` [rad/s] the deviation of a point."""
 
     duration: Estimate
     speed: FloatArray
@@ -53,8 +39,12 @@ class Reference:
 
     @property
     def time(self) -> FloatArray:
-        """[50] s since contact."""
+        """The steps [s since contact]."""
         return np.linspace(0.0, self.duration.value, self.speed.size)
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Speed [m] rad/s at time [m] s since contact; zero once the shaft stands."""
+        return np.asarray(np.interp(time, self.time, self.speed, right=0.0), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +56,7 @@ class Comparison:
     spectral_angle: Estimate
 
 
-def reference_of(courses: Sequence[SpeedCourse]) -> Reference:
+def reference_of(courses: Sequence[SpeedCourse]) -> SpeedCourse:
     """The reference that courses make. Raises ValueError where there is none."""
     if not courses:
         raise ValueError("a reference needs at least one engagement, got none")
@@ -76,14 +66,14 @@ def reference_of(courses: Sequence[SpeedCourse]) -> Reference:
         sd=math.hypot(*(course.duration.sd for course in courses)) / count,
     )
     time = np.linspace(0.0, mean.value, 50)
-    return Reference(
+    return SpeedCourse(
         duration=mean,
         speed=np.mean([course.at(time) for course in courses], axis=0),
         noise=math.hypot(*(course.noise for course in courses)) / count,
     )
 
 
-def compared(course: SpeedCourse, reference: Reference) -> Comparison:
+def compared(course: SpeedCourse, reference: SpeedCourse) -> Comparison:
     """A course against the reference. Standard errors are of the speed's noise and of the moments of contact and end."""
     x, r = course.at(reference.time), reference.speed
     size, whole = float(np.linalg.norm(x)), float(np.linalg.norm(r))

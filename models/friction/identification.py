@@ -422,13 +422,11 @@ def _undetermined(folded: _Folded, too_wide: NDArray[np.bool_]) -> tuple[str, ..
 
 def _message(folded: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str, ...], noise: Noise, row: int) -> str:
     """A sentence or two for a person."""
-    parts = []
+    parts, names = [], ", ".join(undetermined)
     if undetermined and folded.distinct < len(PARAMETER_NAMES):
-        parts.append(
-            f"Too few different speeds ({folded.distinct}) to determine {', '.join(undetermined)}: test more speeds."
-        )
+        parts.append(f"Too few different speeds ({folded.distinct}) to determine {names}: test more speeds.")
     elif undetermined:
-        parts.append(f"The measured speeds and torques do not determine {', '.join(undetermined)}.")
+        parts.append(f"The measured speeds and torques do not determine {names}.")
     if at_zero:
         parts.append(f"The best fit has {', '.join(at_zero)} at zero.")
     if not parts:

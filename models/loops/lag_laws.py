@@ -69,26 +69,19 @@ def attractor_torque(
 
 
 def squeeze_film_torque(
-    time: FloatArray,
-    velocity: FloatArray,
-    parameters: StribeckParameters,
-    film_time: float | FloatArray,
-    start: float | None = None,
+    time: FloatArray, velocity: FloatArray, parameters: StribeckParameters, film_time: float | FloatArray
 ) -> FloatArray:
     """M [n] Nm by the squeezed film at time [n] s (ascending) and velocity [n] m/s; film_time τ_1 > 0 [s] at w = 1 m/s.
 
-    An array of film times [k, 1] gives [k, n]. `start` is w at time[0] [m/s], |v| if not given.
-    Raises ValueError on τ_1 <= 0 or times that fall.
+    An array of film times [k, 1] gives [k, n]; w at time[0] is |v|. Raises ValueError on τ_1 <= 0 or times that fall.
     """
-    film = film_speed(time, velocity, film_time, start)
+    film = film_speed(time, velocity, film_time)
     dry = replace(parameters, viscous_coefficient=0.0)
     sheared = parameters.viscous_coefficient * np.abs(velocity) / film**FILM_EXPONENT
     return np.asarray(np.copysign(1.0, velocity) * (torque(film, dry) + sheared), dtype=np.float64)
 
 
-def film_speed(
-    time: FloatArray, velocity: FloatArray, film_time: float | FloatArray, start: float | None = None
-) -> FloatArray:
+def film_speed(time: FloatArray, velocity: FloatArray, film_time: float | FloatArray) -> FloatArray:
     """w [n] m/s, the speed whose stationary film is the present one, at time [n] s and velocity [n] m/s.
 
     In z = w^-0.4 the film's equation is ż = (0.4/τ_1)(z^-2.5 - |v|), convex in z: Newton's iteration on whole courses
@@ -97,9 +90,9 @@ def film_speed(
     if not (np.asarray(film_time) > 0).all():
         raise ValueError(f"film_time must be positive, got {film_time}")
     speed = np.abs(velocity)
-    fastest = max(float(speed.max()), 0.0 if start is None else abs(start), 1e-12)
+    fastest = max(float(speed.max()), 1e-12)
     rate = _POWER / np.asarray(film_time, dtype=np.float64)
-    first = max(abs(float(speed[0]) if start is None else start), 1e-6 * fastest) ** -_POWER
+    first = max(float(speed[0]), 1e-6 * fastest) ** -_POWER
     least = fastest**-_POWER
     course = np.maximum(speed, 0.2 * fastest) ** -_POWER * np.ones_like(rate)
     for _ in range(60):

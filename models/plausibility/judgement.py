@@ -90,7 +90,8 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> Judgement:
 def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> dict[int, Verdict]:
     """Verdicts on the runs that probably slipped, by the beliefs that were met."""
     weighed |= {other: _Weighed(clutch=clutch, belief=other).log_probability for other in best.instead()}
-    if not (best.belief.slipped or best.doubts or len(weighed) > 1):
+    doubts = any(log_odds >= math.log(criteria.HELD) for log_odds in best.log_odds.values())
+    if not (best.belief.slipped or doubts or len(weighed) > 1):
         return {}
     for index, log_odds in best.log_odds.items():
         if index not in best.belief.outlying | best.belief.levels:  # else other tests lean on it
@@ -113,11 +114,9 @@ def _searched(clutch: "_Clutch") -> tuple["_Weighed", dict[Belief, float]]:
     now = _Weighed(clutch=clutch, belief=Belief())
     met = {now.belief: now.log_probability}
     for _ in range(16):  # changes at most
-        moves = sorted(
-            ((gain, moved) for moved, gain in now.moves() if gain > _WORTH and moved not in met),
-            key=lambda move: -move[0],
-        )
-        then = [_Weighed(clutch=clutch, belief=moved) for _, moved in moves[:3]]
+        moves = [(moved, gain) for moved, gain in now.moves() if gain > _WORTH and moved not in met]
+        moves.sort(key=lambda move: -move[1])
+        then = [_Weighed(clutch=clutch, belief=moved) for moved, _ in moves[:3]]
         met |= {weighed.belief: weighed.log_probability for weighed in then}
         best = max(then, key=lambda weighed: weighed.log_probability, default=now)
         if best.log_probability <= now.log_probability + _WORTH:
@@ -246,8 +245,7 @@ class _Weighed:
     @cached_property
     def origins(self) -> list[float]:
         """The cycles at which lives begin."""
-        rebuilds = [self.clutch.runs[i].sent.cycles for i in self.kept if self.clutch.runs[i].rebuild]
-        return [0.0, *rebuilds]
+        return [0.0, *(self.clutch.runs[i].sent.cycles for i in self.kept if self.clutch.runs[i].rebuild)]
 
     @cached_property
     def life_of(self) -> dict[int, int]:
@@ -373,9 +371,7 @@ class _Weighed:
             spread = np.array([reading.spread for reading in of_life])
             new_level = np.array([self._new_level(index, at, value) for value in cycles.tolist()])[of]
             density = predicted.log_density(log_cof, spread, new_level) + log_physics(log_cof)
-            values |= {
-                id(reading): value for reading, value in zip(of_life, np.maximum(density, _LEAST).tolist(), strict=True)
-            }
+            values |= zip(map(id, of_life), np.maximum(density, _LEAST).tolist(), strict=True)
         return [values.get(id(reading), 0.0) for reading in readings]
 
     def _predicted(self, index: int, life: int, cycles: FloatArray) -> Predicted:
@@ -467,11 +463,6 @@ class _Weighed:
         spread = np.array([reading.spread for reading in sent])
         off = np.array([reading.log_cof for reading in sent], dtype=np.float64) - predicted.mean
         return missed(off, predicted.variance + spread**2, predicted.log_weight[:, None])
-
-    @property
-    def doubts(self) -> bool:
-        """Whether any run may have slipped, all else as the belief has it."""
-        return any(log_odds >= math.log(criteria.HELD) for log_odds in self.log_odds.values())
 
     @cached_property
     def log_odds(self) -> dict[int, float]:

@@ -45,16 +45,14 @@ class PassageStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirstPassage:
-    """End of life [cycles since new] and remaining life [cycles from `as_of`] by quantile, None beyond the horizon.
+    """End of life [cycles since new] by quantile, None beyond the horizon.
 
     `probability_of_reaching` is that of reaching the threshold within the horizon. `initial` is the mean of the value
-    at ζ = 0, `threshold` fraction · initial, `current` the mean and deviation of the value at `as_of`, where friction is
+    at ζ = 0, `threshold` fraction · initial, `current` the mean and deviation of the value now, where friction is
     not negative.
     """
 
-    as_of: float
     end_of_life: dict[float, float | None]
-    remaining: dict[float, float | None]
     probability_of_reaching: float
     status: PassageStatus
     initial: float
@@ -99,9 +97,7 @@ def predict_first_passage(
     fresh, now = paths(posterior, np.array([0.0, as_of]), offset)
     initial = float(posterior.weight @ fresh) if initial is None else initial
     return FirstPassage(
-        as_of=as_of,
         end_of_life=end,
-        remaining={q: None if x is None else max(0.0, x - as_of) for q, x in end.items()},
         probability_of_reaching=_probability(passages <= horizon, weight),
         status=_status(end, _probability(passages <= as_of, weight)),
         initial=initial,

@@ -173,13 +173,12 @@ def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
         slopes.append(slope)
         squares.append(square)
     correlation = pooled_correlation(residuals, removed=2)
-    rows = [_moments(residual, correlation) for residual in residuals]
-    variance, factor, ratio, freedom = np.array(rows).T
+    variance, factor, ratio, freedom = np.array([_moments(residual, correlation) for residual in residuals]).T
+    count = np.array([residual.size for residual in residuals])
     if not correlation.resolved and variance.any():  # few independent values hardly determine a variance
-        independent = np.maximum(np.array([residual.size for residual in residuals]) / factor - 2, 1.0)
+        independent = np.maximum(count / factor - 2, 1.0)
         variance = variance.mean() * _moderated(variance / variance.mean(), independent)
     long_run = variance * factor * _moderated(ratio, freedom)
-    count = np.array([residual.size for residual in residuals])
     return MeanDeviations(
         mean=np.sqrt(long_run / count),
         drift=np.array(slopes),

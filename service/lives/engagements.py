@@ -12,7 +12,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.engagements.comparison import Comparison, Reference, SpeedCourse, compared, reference_of, same_duty
+from models.engagements.comparison import Comparison, SpeedCourse, compared, reference_of, same_duty
 from models.engagements.measured import MeasuredEngagement, measured_engagement
 from models.engagements.slip import Estimate, Refusal
 from service.columns import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
@@ -189,7 +189,7 @@ def engagements_over_life(stored: Sequence[StoredEngagement], lives: Sequence[Co
     return rows
 
 
-def _row(engagement: StoredEngagement, reference: Reference | None) -> dict[str, Any]:
+def _row(engagement: StoredEngagement, reference: SpeedCourse | None) -> dict[str, Any]:
     head = {name: engagement.receipt[name] for name in ("run_id", "cycles", "kind")}
     item = {name: engagement.item[name] for name in ("initial_speed_rpm", "maximum_pressure_bar")}
     time = {"time": engagement.receipt["started_at"] or engagement.receipt["received_at"]}

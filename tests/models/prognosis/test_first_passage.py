@@ -53,7 +53,6 @@ def test_a_certain_life_by_hand() -> None:
     passage = predict_first_passage(sample([-1.0]), fraction=0.5, as_of=250.0)
     assert list(passage.end_of_life) == list(QUANTILES)
     assert all(x == pytest.approx(1_000.0) for x in passage.end_of_life.values())
-    assert all(x == pytest.approx(750.0) for x in passage.remaining.values())
     assert passage.status == "predicted"
     assert passage.probability_of_reaching == 1.0
     assert (passage.initial, passage.threshold) == (1.0, 0.5)
@@ -61,9 +60,8 @@ def test_a_certain_life_by_hand() -> None:
 
 
 @pytest.mark.parametrize("horizon", [1e6, 500.0])
-def test_remaining_life_is_never_negative_and_a_horizon_before_now_is_now(horizon: float) -> None:
+def test_a_horizon_before_now_is_now(horizon: float) -> None:
     passage = predict_first_passage(sample([-1.0]), fraction=0.5, as_of=2_000.0, horizon=horizon)
-    assert set(passage.remaining.values()) == {0.0}
     assert passage.status is PassageStatus.REACHED
     assert passage.probability_of_reaching == 1.0
     assert passage.end_of_life[0.5] == pytest.approx(1_000.0)
@@ -83,7 +81,7 @@ def test_a_quantile_beyond_the_horizon_is_none() -> None:
     assert passage.probability_of_reaching == pytest.approx(0.6)
     assert passage.end_of_life[0.5] == pytest.approx(1_000.0)
     assert passage.end_of_life[0.75] is None
-    assert passage.remaining[0.95] is None
+    assert passage.end_of_life[0.95] is None
 
 
 def test_beyond_the_horizon_counts_as_not_reached() -> None:
@@ -265,7 +263,7 @@ def passage_of(draws: Posterior, as_of: float, power: float) -> FirstPassage:
 
 def test_what_becomes_wider_than_the_horizon_may_never_end() -> None:
     wide = passage_of(sample([-1.0, -0.9, -0.505]), 10.0, 20.0)
-    assert (wide.remaining[0.95], wide.status) == (None, PassageStatus.MAY_NEVER_REACH)
+    assert (wide.end_of_life[0.95], wide.status) == (None, PassageStatus.MAY_NEVER_REACH)
 
 
 # --- Limits: where a path is at one, and which of several is the first.
