@@ -4,7 +4,7 @@
 // and in a dialog).
 
 import { Problem, read, readAll, sendJson } from "../shared/api.js";
-import { h, scrolling, table } from "../shared/dom.js";
+import { button, h, quiet, scrolling, table } from "../shared/dom.js";
 import { rowFiles } from "../shared/files.js";
 import { moment } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
@@ -63,7 +63,7 @@ export class Alarms {
     this.events.replaceChildren(
       h("h2", {}, "Alarms"),
       rows.length === 0
-        ? h("p", { class: "quiet" }, "No alarm has been raised.")
+        ? quiet("No alarm has been raised.")
         : h("div", { class: "panel" }, scrolling("Alarms", table("Alarms, the newest first", COLUMNS, rows))),
       rowFiles("alarms", [
         ["raised at", "clutch", "message", "state", "acknowledged by", "value", "limit"],
@@ -88,9 +88,9 @@ export class Alarms {
     this.rules.replaceChildren(
       h("h2", {}, "Rules"),
       rows.length === 0
-        ? h("p", { class: "quiet" }, "No rule yet: nothing raises an alarm.")
+        ? quiet("No rule yet: nothing raises an alarm.")
         : h("div", { class: "panel" }, scrolling("Rules", table("Rules", ["An alarm when", "Of", "Action"], rows))),
-      h("button", { type: "button", class: "main", onclick: () => this.change(null) }, "New rule …"),
+      button("New rule …", () => this.change(null), { class: "main" }),
     );
   }
 
@@ -109,13 +109,13 @@ export class Alarms {
     this.receivers.replaceChildren(
       h("h2", {}, "Receivers"),
       rows.length === 0
-        ? h("p", { class: "quiet" }, "No receiver yet: alarms appear on this page only.")
+        ? quiet("No receiver yet: alarms appear on this page only.")
         : h(
             "div",
             { class: "panel" },
             scrolling("Receivers", table("Receivers", ["Name", "Address", "Of", "Action"], rows)),
           ),
-      h("button", { type: "button", onclick: add }, "New receiver …"),
+      button("New receiver …", add),
     );
   }
 
@@ -125,7 +125,7 @@ export class Alarms {
    * @param {string} of what it is done to, for a screen reader
    */
   button(label, onclick, of) {
-    return h("button", { type: "button", class: "small", onclick, "aria-label": `${label}: ${of}` }, label);
+    return button(label, onclick, { class: "small", "aria-label": `${label}: ${of}` });
   }
 
   /** @param {EventOut} event */

@@ -3,7 +3,7 @@
 // chart; until someone points at it, and where the plotting library does not load, its drawing is a light one), then life.js:
 // like fan.js, loops.js, parameters.js and stribeck.js it says what its charts show; the others say how a chart is drawn.
 
-import { h, save, scrolling, symbol, table } from "../shared/dom.js";
+import { button, h, quiet, save, scrolling, symbol, table } from "../shared/dom.js";
 import { saveTable } from "../shared/files.js";
 import { settled } from "./frame.js";
 import { base, config } from "./layout.js";
@@ -58,11 +58,7 @@ export class Chart {
     this.turn = 0;
     this.note = h("p", { class: "note" }, "Being computed …");
     this.controls = h("div", { class: "controls" });
-    this.ask = h(
-      "button",
-      { type: "button", class: "small", hidden: true, onclick: want },
-      "Draw it (loads 1.4 MB once)",
-    );
+    this.ask = button("Draw it (loads 1.4 MB once)", want, { class: "small", hidden: true });
     const style = { "min-height": `${height}px` };
     const watched = { onpointerenter: pointed, onclick: want };
     this.plot = h("div", { class: "plot", role: "img", "aria-label": title, style, ...watched });
@@ -93,7 +89,7 @@ export class Chart {
 
   /** @type {(text: string, action: string, onclick: () => unknown) => HTMLButtonElement} */
   button(text, action, onclick) {
-    return h("button", { type: "button", class: "small", onclick, "aria-label": `${this.title}: ${action}` }, text);
+    return button(text, onclick, { class: "small", "aria-label": `${this.title}: ${action}` });
   }
 
   /** @param {Spec} spec what to show from now on */
@@ -195,10 +191,7 @@ export class Chart {
     const names = columns.map(({ name }) => name);
     const cells = rows.slice(0, MOST_ROWS).map((row) => row.map((value, index) => cellText(value, columns[index])));
     const cut = `The first ${cells.length} of ${rows.length} rows; the CSV holds all.`;
-    this.table.replaceChildren(
-      table(this.title, names, cells),
-      rows.length > cells.length ? h("p", { class: "quiet" }, cut) : "",
-    );
+    this.table.replaceChildren(table(this.title, names, cells), rows.length > cells.length ? quiet(cut) : "");
   }
 
   /**

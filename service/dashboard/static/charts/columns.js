@@ -19,6 +19,10 @@ export const column = (name, decimals = 0) => ({ name, text: (value) => fixed(va
 /** @type {(name: string, digits: number) => Column} a column with that many significant digits */
 export const digitsColumn = (name, digits) => ({ name, text: (value) => significant(value, digits) });
 
+/** @type {(name: string, digits: number) => Column[]} a quantity and its 90 % interval, with that many significant digits */
+export const intervalColumns = (name, digits) =>
+  [name, "lower, 5 %", "upper, 95 %"].map((each) => digitsColumn(each, digits));
+
 /** The torque or the coefficient that is shown, in its unit. */
 export const torqueColumn = () => column(named(units().torque), units().torque.decimals);
 

@@ -5,7 +5,7 @@ import { cycles, estimate, fixed, interval, probability } from "../shared/format
 import { column, CYCLES, KIND, measuredAndLaw } from "./columns.js";
 import { eventMarks } from "./layout.js";
 import { faint } from "./palette.js";
-import { band, errorBars, titled } from "./traces.js";
+import { band, lineOf, measuredPoints, titled } from "./traces.js";
 
 /** @import { DegradationItem, Measured, Receipt, RemainingLife, SeriesItem, Trajectory } from "../shared/types.js" */
 /** @import { Annotation, Cell, Colours, PlainTrace, Shape, Spec } from "./types.js" */
@@ -123,15 +123,10 @@ function safeBound({ at_least: left, as_of_cycles: now, status }, last, c) {
 }
 
 /** @type {(measured: Measured, c: Colours) => PlainTrace} */
-const points = (measured, c) => ({
-  name: "measured",
-  mode: "markers",
-  x: measured.cycles,
-  y: measured.value,
-  marker: { color: c.ink, size: 7 },
-  error_y: errorBars(measured.sd, c.ink, { thickness: 1.2, width: 3 }),
-  hovertemplate: "%{x:,.0f} cycles<br>mean COF %{y:.4f}<extra></extra>",
-});
+const points = (measured, c) => {
+  const text = "%{x:,.0f} cycles<br>mean COF %{y:.4f}";
+  return measuredPoints("measured", measured, { color: c.ink, text, size: 7, thickness: 1.2 });
+};
 
 /**
  * Each earlier prediction as a line from mean COF when it was made to the predicted end of life.
@@ -177,13 +172,12 @@ function law(trajectory, life, c) {
   };
   return [
     ...band("its 90 % band", joined(trajectory.lower, end["0.05"]), joined(trajectory.upper, end["0.95"]), c),
-    {
-      name: "ageing as tracked",
-      mode: "lines",
-      ...joined(trajectory.median, median),
-      line: { color: c.accent, width: 2.2 },
-      hovertemplate: "%{x:,.0f} cycles<br>law %{y:.4f}<extra></extra>",
-    },
+    lineOf(
+      "ageing as tracked",
+      joined(trajectory.median, median),
+      { color: c.accent, width: 2.2 },
+      "%{x:,.0f} cycles<br>law %{y:.4f}",
+    ),
   ];
 }
 

@@ -2,7 +2,7 @@
 // How every chart looks: axes, margins, type, what the plotting library may do.
 
 /** @import { Receipt } from "../shared/types.js" */
-/** @import { Annotation, Axis, Colours, Layout, Scene, Shape, WholeLayout } from "./types.js" */
+/** @import { Annotation, Axis, Colours, Layout, Shape, WholeLayout } from "./types.js" */
 
 const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif';
 const COARSE = matchMedia("(pointer: coarse)");
@@ -96,7 +96,7 @@ function commonOf(c, height, compact) {
 
 /**
  * @param {Colours} c
- * @param {Scene} own
+ * @param {NonNullable<Layout["scene"]>} own
  * @param {boolean} compact
  */
 function scene(c, own, compact) {

@@ -6,17 +6,15 @@ import { fixed } from "../shared/format.js";
 import { named, pressureText, units } from "../shared/units.js";
 import { column, CYCLES, distinct, KIND, PRESSURE, torqueColumn } from "./columns.js";
 import { pressureRampOf, rampOf } from "./palette.js";
-import { curveOf } from "./stribeck_law.js";
+import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
 import { titled } from "./traces.js";
 
 /** @import { Channels, ClutchOut, LoopItem, StribeckItem } from "../shared/types.js" */
 /** @import { CurvePoint } from "./stribeck_law.js" */
 /** @import { PlainTrace, Spec } from "./types.js" */
 
-/** Most points of a loop that are drawn. */
-const MOST = 1500;
-/** Bar about a level that still belong to it: on the way to the next one torque is of neither. */
-const NEAR = 0.1;
+/** Most points of a loop that are drawn, and bar about a level that still belong to it: between two levels torque is of neither. */
+const LOOP = { most: 1500, gap: 0.1 };
 
 const NO_LOOPS =
   "No dynamic Stribeck test yet. Send one as kind dynamic_stribeck: speed swept to and fro at constant pressure, sampled.";
@@ -25,35 +23,18 @@ const NO_LOOPS =
 export const loopPressures = (loops) => distinct(loops.map((loop) => loop.pressure_bar));
 
 /**
- * The record near a pressure, in its order, thinned evenly: speed and torque.
- * @type {(channels: Channels, pressure: number, clutch: ClutchOut) => [number, number][]}
- */
-function traceOf({ pressure_bar: p, speed_rpm: n, torque_nm: m }, pressure, clutch) {
-  const { of } = units().torque;
-  /** @type {[number, number][]} */
-  const points = [];
-  for (let index = 0; index < n.length; index += 1) {
-    if (Math.abs(p[index] - pressure) <= NEAR) points.push([n[index], of(m[index], pressure, clutch)]);
-  }
-  const step = Math.ceil(points.length / MOST);
-  return step > 1 ? points.filter((_, index) => index % step === 0) : points;
-}
-
-/**
  * The stationary curve of the state that a loop is of: of the test at the same cycles and pressure; empty where there is none.
  * @param {LoopItem} loop
- * @param {[number, number][]} trace
+ * @param {CurvePoint[]} trace
  * @param {StribeckItem[]} tests
  * @param {ClutchOut} clutch
  * @returns {CurvePoint[]}
  */
 function stationaryOf({ cycles, pressure_bar: pressure }, trace, tests, clutch) {
   const fits = tests.filter((test) => test.cycles === cycles).flatMap((test) => test.fits);
-  const fit = fits.find(({ pressure_bar: level }) => Math.abs(level - pressure) <= NEAR);
-  const fastest = trace.reduce((most, [speed]) => Math.max(most, speed), 0);
-  const { of } = units().torque;
-  const curve = fit ? curveOf(fit, clutch, 0, fastest) : [];
-  return curve.map(({ speed, torque }) => ({ speed, torque: of(torque, pressure, clutch) }));
+  const fit = fits.find(({ pressure_bar: level }) => Math.abs(level - pressure) <= LOOP.gap);
+  const fastest = trace.reduce((most, { speed }) => Math.max(most, speed), 0);
+  return inUnit(fit ? curveOf(fit, clutch, 0, fastest) : [], pressure, clutch);
 }
 
 /** @type {Record<string, string>} */
@@ -96,9 +77,11 @@ function lagNote(loops, label) {
  */
 export function loopCurves({ loops, tests, clutch, channels, over, pressure, run }) {
   const byState = over === "state";
+  /** @param {LoopItem} loop */
+  const traceOf = ({ run_id: id, pressure_bar: level }) => inUnit(measuredOf(channels[id], level, LOOP), level, clutch);
   const drawn = loops
     .filter((loop) => channels[loop.run_id] && (byState ? loop.pressure_bar === pressure : loop.run_id === run))
-    .map((loop) => ({ loop, trace: traceOf(channels[loop.run_id], loop.pressure_bar, clutch) }))
+    .map((loop) => ({ loop, trace: traceOf(loop) }))
     .filter(({ trace }) => trace.length > 2)
     .map(({ loop, trace }) => ({ loop, trace, stationary: stationaryOf(loop, trace, tests, clutch) }));
   if (drawn.length === 0) return { empty: NO_LOOPS };
@@ -114,7 +97,7 @@ export function loopCurves({ loops, tests, clutch, channels, over, pressure, run
     )}`,
     columns: [KIND, CYCLES, PRESSURE, column("speed, rpm", 1), torqueColumn()],
     rows: drawn.flatMap(({ loop: { cycles, pressure_bar: level }, trace, stationary }) => [
-      ...trace.map(([speed, torque]) => ["loop", cycles, level, speed, torque]),
+      ...trace.map(({ speed, torque }) => ["loop", cycles, level, speed, torque]),
       ...stationary.map(({ speed, torque }) => ["stationary curve", cycles, level, speed, torque]),
     ]),
     figure: (c) => {
@@ -125,8 +108,7 @@ export function loopCurves({ loops, tests, clutch, channels, over, pressure, run
           ...drawn.map(({ loop, trace }, index) => ({
             name: label(loop),
             mode: "lines",
-            x: trace.map(([speed]) => speed),
-            y: trace.map(([, torque]) => torque),
+            ...xyOf(trace),
             line: { color: colors[index], width: 1.3 },
             hovertemplate: `${label(loop)}<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}<br>${lagText(loop)}<extra></extra>`,
           })),
@@ -149,8 +131,7 @@ function stationaryTraces(drawn, colors) {
       name: "stationary curve",
       showlegend: index === 0,
       mode: "lines",
-      x: stationary.map(({ speed }) => speed),
-      y: stationary.map(({ torque }) => torque),
+      ...xyOf(stationary),
       line: { color, width: 2, dash: "dash" },
       hovertemplate: `stationary curve<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}<extra></extra>`,
     }));

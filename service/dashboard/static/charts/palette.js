@@ -1,10 +1,9 @@
 // @ts-check
 // The charts' colours, taken from the style sheet, so that light and dark are defined in one place.
 
-/** @import { ColourName, Colours, Scheme } from "./types.js" */
+/** @import { Colours, Scheme } from "./types.js" */
 
-/** @type {ColourName[]} */
-const NAMES = [
+export const NAMES = /** @type {const} */ ([
   "ink",
   "quiet",
   "line",
@@ -21,7 +20,7 @@ const NAMES = [
   "worn",
   "low",
   "high",
-];
+]);
 
 /** @type {(scheme?: Scheme) => Colours} the colours as they are now, or as they are in `scheme` */
 export function colours(scheme = null) {
@@ -35,7 +34,7 @@ export function colours(scheme = null) {
     return [name, computed.color];
   });
   probe.remove();
-  /** @type {Record<ColourName, string>} */
+  /** @type {Record<(typeof NAMES)[number], string>} */
   const named = Object.fromEntries(entries);
   return {
     ...named,

@@ -2,10 +2,10 @@
 // The four Stribeck parameters over cycles: eq. 6 with its band at one pressure (fig. 10), and over all of them (fig. 11).
 
 import { estimate } from "../shared/format.js";
-import { CYCLES, digitsColumn, KIND, measuredAndLaw, PRESSURE } from "./columns.js";
+import { CYCLES, intervalColumns, KIND, measuredAndLaw, PRESSURE } from "./columns.js";
 import { eventMarks } from "./layout.js";
 import { scaleOf } from "./palette.js";
-import { band, errorBars, titled } from "./traces.js";
+import { measuredPoints, titled, tracked } from "./traces.js";
 
 /** @import { DegradationItem, Receipt, Trajectory } from "../shared/types.js" */
 /** @import { Range, Spec } from "./types.js" */
@@ -28,14 +28,7 @@ export function axisOf(name) {
   return `${symbol[0]}<sub>${symbol[1]}</sub>${unit && `, ${unit.replace(/\^([\d.]+)/, "<sup>$1</sup>")}`}`;
 }
 
-const COLUMNS = [
-  KIND,
-  PRESSURE,
-  CYCLES,
-  digitsColumn("value", 4),
-  digitsColumn("lower, 5 %", 4),
-  digitsColumn("upper, 95 %", 4),
-];
+const COLUMNS = [KIND, PRESSURE, CYCLES, ...intervalColumns("value", 4)];
 
 /** @param {DegradationItem} item */
 const rowsOf = (item) => measuredAndLaw(item, { measured: "identified", law: "law", before: [item.pressure_bar] });
@@ -64,31 +57,15 @@ export function parameter({ items, name, pressure, events }) {
   const inUnit = unit && ` ${unit.replace("^0.3", "⁰·³")}`;
   const [initial, change] = [k.initial, k.change].map(({ value, sd }) => inWords(value, sd, inUnit));
   const scale = inWords(k.scale_cycles.value, k.scale_cycles.sd, " cycles");
-  const x = trajectory.cycles;
+  const law = "%{x:,.0f} cycles<br>tracked: %{y:.4g}";
   return {
     note: `Value when new ${initial}, total change ${change}, scale ${scale}.`,
     columns: COLUMNS,
     rows: rowsOf(item),
     figure: (c) => ({
       data: [
-        ...band("90 % band", { x, y: trajectory.lower }, { x, y: trajectory.upper }, c),
-        {
-          name: "tracked",
-          mode: "lines",
-          x,
-          y: trajectory.median,
-          line: { color: c.accent, width: 2 },
-          hovertemplate: "%{x:,.0f} cycles<br>tracked: %{y:.4g}<extra></extra>",
-        },
-        {
-          name: "identified",
-          mode: "markers",
-          x: measured.cycles,
-          y: measured.value,
-          marker: { color: c.ink, size: 6 },
-          error_y: errorBars(measured.sd, c.ink, { thickness: 1.1, width: 3 }),
-          hovertemplate: "%{x:,.0f} cycles<br>%{y:.4g}<extra></extra>",
-        },
+        ...tracked(trajectory, { name: "tracked", line: { color: c.accent, width: 2 }, text: law }, c),
+        measuredPoints("identified", measured, { color: c.ink, text: "%{x:,.0f} cycles<br>%{y:.4g}" }),
       ],
       layout: {
         xaxis: titled("duty cycles"),

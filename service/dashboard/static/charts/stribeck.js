@@ -6,7 +6,7 @@ import { fixed } from "../shared/format.js";
 import { named, pressureText, units } from "../shared/units.js";
 import { column, CYCLES, distinct, KIND, torqueColumn } from "./columns.js";
 import { faint, pressureRampOf, rampOf, scaleOf } from "./palette.js";
-import { curveOf, measuredOf } from "./stribeck_law.js";
+import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
 import { titled } from "./traces.js";
 
 /** @import { Channels, ClutchOut, StribeckItem } from "../shared/types.js" */
@@ -46,17 +46,6 @@ const fastest = (channels) =>
   Object.values(channels).reduce((most, { speed_rpm: speeds }) => speeds.reduce((a, b) => Math.max(a, b), most), 100);
 
 /**
- * Points in the chosen unit of torque.
- * @param {CurvePoint[]} points
- * @param {number} pressure bar
- * @param {ClutchOut} clutch
- */
-function shown(points, pressure, clutch) {
-  const { of } = units().torque;
-  return points.map(({ speed, torque }) => ({ speed, torque: of(torque, pressure, clutch) }));
-}
-
-/**
  * Some tests at some pressures: measured points where the channels have been read, the fit in any case.
  * @type {(answers: Answers, tests: StribeckItem[], wanted: (pressure: number) => boolean) => Drawn[]}
  */
@@ -68,12 +57,12 @@ function drawnOf({ channels, clutch }, tests, wanted) {
       .map((fit) => ({
         cycles: test.cycles,
         pressure: fit.pressure_bar,
-        measured: shown(
+        measured: inUnit(
           channels[test.run_id] ? measuredOf(channels[test.run_id], fit.pressure_bar) : [],
           fit.pressure_bar,
           clutch,
         ),
-        fitted: shown(curveOf(fit, clutch, 0, end), fit.pressure_bar, clutch),
+        fitted: inUnit(curveOf(fit, clutch, 0, end), fit.pressure_bar, clutch),
       })),
   );
 }
@@ -84,11 +73,6 @@ const rowsOf = (drawn) =>
     ...measured.map((point) => ["measured", cycles, pressure, point.speed, point.torque]),
     ...fitted.map((point) => ["fit", cycles, pressure, point.speed, point.torque]),
   ]);
-
-/** @param {CurvePoint[]} points */
-const speeds = (points) => points.map(({ speed }) => speed);
-/** @param {CurvePoint[]} points */
-const torques = (points) => points.map(({ torque }) => torque);
 
 /**
  * Torque over speed: at one pressure, a colour a state, or of one state, a colour a pressure.
@@ -134,8 +118,8 @@ function flatTraces({ measured, fitted }, name, color, c) {
   const shared = { legendgroup: name, name, hovertemplate };
   const marker = { color: faint(c.panel, 1), size: 5, line: { color, width: 1.4 } };
   return [
-    { ...shared, mode: "lines", x: speeds(fitted), y: torques(fitted), line: { color, width: 2 } },
-    { ...shared, showlegend: false, mode: "markers", x: speeds(measured), y: torques(measured), marker },
+    { ...shared, mode: "lines", ...xyOf(fitted), line: { color, width: 2 } },
+    { ...shared, showlegend: false, mode: "markers", ...xyOf(measured), marker },
   ];
 }
 
@@ -199,9 +183,9 @@ function stateSurface(drawn, cycles, color) {
   const own = drawn.filter((curve) => curve.cycles === cycles);
   return {
     type: "surface",
-    x: speeds(own[0].fitted),
+    x: xyOf(own[0].fitted).x,
     y: own.map(({ pressure }) => pressure),
-    z: own.map(({ fitted }) => torques(fitted)),
+    z: own.map(({ fitted }) => xyOf(fitted).y),
     colorscale: [
       [0, color],
       [1, color],
@@ -220,9 +204,9 @@ function surfaceTraces(drawn, byPressure, c) {
   return [
     {
       type: "surface",
-      x: speeds(drawn[0].fitted),
+      x: xyOf(drawn[0].fitted).x,
       y: drawn.map(depth),
-      z: drawn.map(({ fitted }) => torques(fitted)),
+      z: drawn.map(({ fitted }) => xyOf(fitted).y),
       colorscale: scale.map(([at], index) => [at, scale[scale.length - 1 - index][1]]),
       opacity: 0.86,
       showscale: false,
@@ -231,9 +215,9 @@ function surfaceTraces(drawn, byPressure, c) {
     {
       type: "scatter3d",
       mode: "markers",
-      x: drawn.flatMap(({ measured }) => speeds(measured)),
+      x: drawn.flatMap(({ measured }) => xyOf(measured).x),
       y: drawn.flatMap((curve) => curve.measured.map(() => depth(curve))),
-      z: drawn.flatMap(({ measured }) => torques(measured)),
+      z: drawn.flatMap(({ measured }) => xyOf(measured).y),
       marker: { size: 2.2, color: c.ink },
       hovertemplate: `%{x:.0f} rpm<br>measured %{z:.4~g} ${units().torque.unit}<extra></extra>`,
     },

@@ -1,20 +1,13 @@
 // @ts-check
 // Eq. 1 and 3 once more, for drawing: torque over speed from fitted parameters, and the measured points beside it.
 
+import { meanRadius, units } from "../shared/units.js";
+
 /** @import { Channels, ClutchOut, Fit, Parameters } from "../shared/types.js" */
 
 /** @typedef {{ speed: number, torque: number }} CurvePoint rpm, Nm */
 
 const GAMMA = 0.3;
-
-/**
- * The mean radius, m: (d_i + d_o)/4, or the one in the clutch's record.
- * @param {Pick<ClutchOut, "geometry">} clutch
- */
-function meanRadius({ geometry }) {
-  const mm = geometry.mean_radius_mm ?? (geometry.inner_diameter_mm + geometry.outer_diameter_mm) / 4;
-  return mm / 1000;
-}
 
 /**
  * Eq. 3: M_s (1 + (M̄_c − 1) exp(−V_S/v)) + C_v v^0.3, Nm at v ≥ 0 m/s.
@@ -46,20 +39,27 @@ export function curveOf(fit, clutch, from, to, count = 80) {
   });
 }
 
-const MOST = 400;
-
 /**
  * The measured points near a pressure; a long raw record is thinned evenly.
  * @param {Channels} channels
  * @param {number} pressure bar
- * @param {number} [gap] bar
+ * @param {{ gap?: number, most?: number }} [options] how near, bar, and how many points
  * @returns {CurvePoint[]}
  */
-export function measuredOf({ pressure_bar: p, speed_rpm: n, torque_nm: m }, pressure, gap = 0.25) {
+export function measuredOf({ pressure_bar: p, speed_rpm: n, torque_nm: m }, pressure, { gap = 0.25, most = 400 } = {}) {
   const near = [];
   for (let index = 0; index < n.length; index += 1) {
     if (Math.abs(p[index] - pressure) <= gap) near.push({ speed: n[index], torque: m[index] });
   }
-  const step = Math.ceil(near.length / MOST);
+  const step = Math.ceil(near.length / most);
   return step > 1 ? near.filter((_, index) => index % step === 0) : near;
 }
+
+/** @type {(points: CurvePoint[], pressure: number, clutch: ClutchOut) => CurvePoint[]} points in the chosen unit of torque */
+export function inUnit(points, pressure, clutch) {
+  const { of } = units().torque;
+  return points.map(({ speed, torque }) => ({ speed, torque: of(torque, pressure, clutch) }));
+}
+
+/** @type {(points: CurvePoint[]) => { x: number[], y: number[] }} speeds and torques */
+export const xyOf = (points) => ({ x: points.map(({ speed }) => speed), y: points.map(({ torque }) => torque) });

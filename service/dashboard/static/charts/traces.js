@@ -5,21 +5,18 @@ import { pressureText } from "../shared/units.js";
 import { HALF_OF_90 } from "./columns.js";
 import { faint, pressureRampOf } from "./palette.js";
 
-/** @import { Colours, ErrorBars, PlainTrace } from "./types.js" */
+/** @import { Measured } from "../shared/types.js" */
+/** @import { Colours, ErrorBars, Line, PlainTrace } from "./types.js" */
 
-/** @typedef {(number | null)[]} Values */
+/** @typedef {{ x: (number | null)[], y: (number | null)[] }} Places */
 
-/** @type {(text: string) => { title: { text: string }; }} the title of an axis */
+/** @type {(text: string) => { title: { text: string } }} the title of an axis */
 export const titled = (text) => ({ title: { text } });
 
 /**
  * A band between two edges, each with its own abscissae.
  * @param {string} name
- * @param {{ x: Values, y: Values }} lower
- * @param {{ x: Values, y: Values }} upper
- * @param {Colours} c
- * @param {string} [color]
- * @returns {PlainTrace[]}
+ * @type {(name: string, lower: Places, upper: Places, c: Colours, color?: string) => PlainTrace[]}
  */
 export function band(name, lower, upper, c, color = c.accent) {
   /** @type {Omit<PlainTrace, "x" | "y">} */
@@ -27,7 +24,7 @@ export function band(name, lower, upper, c, color = c.accent) {
   const fillcolor = faint(color, 0.2);
   return [
     { ...edge, ...lower },
-    { ...edge, ...upper, fill: "tonexty", fillcolor, name, showlegend: true },
+    { ...edge, ...upper, fill: "tonexty", fillcolor, name, showlegend: name !== "" },
   ];
 }
 
@@ -43,6 +40,49 @@ export const errorBars = (sds, color, look) => ({
   array: sds.map((sd) => HALF_OF_90 * (sd ?? 0)),
   color,
   ...look,
+});
+
+/**
+ * A line; `text` is shown under the pointer.
+ * @type {(name: string, at: Places, line: Line, text: string, more?: Partial<PlainTrace>) => PlainTrace}
+ */
+export const lineOf = (name, at, line, text, more = {}) => ({
+  name,
+  mode: "lines",
+  ...at,
+  line,
+  hovertemplate: `${text}<extra></extra>`,
+  ...more,
+});
+
+/**
+ * A course and its 90 % band; `text` is shown under the pointer.
+ * @param {{ cycles: number[], lower: number[], median: number[], upper: number[] }} course
+ * @param {{ name: string, band?: string, line: Line, text: string }} look
+ * @param {Colours} c
+ */
+export function tracked({ cycles: x, lower, median, upper }, { name, band: edges = "90 % band", line, text }, c) {
+  return [
+    ...band(edges, { x, y: lower }, { x, y: upper }, c, line.color),
+    lineOf(name, { x, y: median }, line, text, { showlegend: x.length > 0 }),
+  ];
+}
+
+/**
+ * Points with error bars, over cycles or what stands in their place.
+ * @param {string} name
+ * @param {Measured} measured
+ * @param {{ color: string, text: string, size?: number, thickness?: number }} look `text` is shown under the pointer
+ * @returns {PlainTrace}
+ */
+export const measuredPoints = (name, { cycles: x, value: y, sd }, { color, text, size = 6, thickness = 1.1 }) => ({
+  name,
+  mode: "markers",
+  x,
+  y,
+  marker: { color, size },
+  error_y: errorBars(sd, color, { thickness, width: 3 }),
+  hovertemplate: `${text}<extra></extra>`,
 });
 
 /**

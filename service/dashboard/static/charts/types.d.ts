@@ -1,6 +1,8 @@
 // What charts are made of, as far as these pages use it: what a chart shows, the plotting library's data and layout, and the
 // little of the library itself that is called. For the checks alone; browsers never load this file.
 
+import type { NAMES } from "./palette.js";
+
 export type Cell = string | number | null | undefined;
 
 /** A column of a chart's table; `text` writes a number for a reader, the CSV has it raw. */
@@ -15,24 +17,8 @@ export type Spec =
   | { empty?: undefined; note: string; columns: Column[]; rows: Cell[][]; figure: (colours: Colours) => Figure };
 
 /** Colours as CSS; `ramp` gives one between fresh (0) and worn (1), `pressureRamp` between the lowest and the highest pressure. */
-export type Colours = Record<ColourName, string> & Record<"ramp" | "pressureRamp", (share: number) => string>;
-export type ColourName =
-  | "ink"
-  | "quiet"
-  | "line"
-  | "edge"
-  | "panel"
-  | "accent"
-  | "failure"
-  | "out"
-  | "check"
-  | "normal"
-  | "maintenance"
-  | "fresh"
-  | "midlife"
-  | "worn"
-  | "low"
-  | "high";
+export type Colours = Record<(typeof NAMES)[number], string> &
+  Record<"ramp" | "pressureRamp", (share: number) => string>;
 export type Scheme = "light" | "dark" | null;
 
 export interface Figure {
@@ -122,48 +108,24 @@ export interface Annotation {
   font?: { size: number; color: string };
 }
 
-export interface Margin {
-  l: number;
-  r: number;
-  t: number;
-  b: number;
-}
-
-export interface Scene {
-  xaxis: Axis;
-  yaxis: Axis;
-  zaxis: Axis;
-}
-
 /** A chart's own layout. */
 export interface Layout {
   xaxis?: Axis;
   yaxis?: Axis;
-  scene?: Scene;
+  scene?: Record<"xaxis" | "yaxis" | "zaxis", Axis>;
   shapes?: Shape[];
   annotations?: Annotation[];
-  margin?: Partial<Margin>;
+  margin?: Partial<WholeLayout["margin"]>;
   legend?: object;
   [name: string]: unknown;
 }
 
-export interface Font {
-  family: string;
-  size: number;
-  color: string;
-}
-
 /** A layout with all that the house adds. */
 export interface WholeLayout extends Layout {
-  font: Font;
-  margin: Margin;
+  font: { family: string; size: number; color: string };
+  margin: Record<"l" | "r" | "t" | "b", number>;
   legend: { font: { size: number }; [name: string]: unknown };
   paper_bgcolor: string;
-}
-
-export interface FlatLayout extends WholeLayout {
-  xaxis: Axis;
-  yaxis: Axis;
 }
 
 export interface WholeFigure {
@@ -186,8 +148,8 @@ export interface LegendEntry {
 /** A figure whose axes, ticks and legend have their places before anything is drawn. */
 export interface SettledFigure {
   data: PlainTrace[];
-  layout: FlatLayout & { xaxis: { range: Range }; yaxis: { range: Range } };
-  ticks: { x: Tick[]; y: Tick[] };
+  layout: WholeLayout & Record<"xaxis" | "yaxis", Axis & { range: Range }>;
+  ticks: Record<"x" | "y", Tick[]>;
   legend: { entries: LegendEntry[]; top: number };
 }
 

@@ -2,7 +2,7 @@
 // The audit trail: who changed what, when and why; the newest first, page by page.
 
 import { clutchPath, read } from "../shared/api.js";
-import { h, scrolling, table } from "../shared/dom.js";
+import { button, h, quiet, scrolling, table } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import { fixed, moment, words } from "../shared/format.js";
 import { runLink } from "./warnings.js";
@@ -80,15 +80,13 @@ export class AuditTrail {
     };
     this.place.replaceChildren(
       changes.length === 0
-        ? h("p", { class: "quiet" }, "Nothing was held, corrected, withdrawn, edited or adopted.")
-        : h(
-            "p",
-            { class: "quiet" },
+        ? quiet("Nothing was held, corrected, withdrawn, edited or adopted.")
+        : quiet(
             "Who changed what and why, the newest first. ",
             files(`${this.clutchId}-changes`, `${clutchPath(this.clutchId)}/changes.csv`),
           ),
       rows.length > 0 ? h("div", { class: "panel" }, scrolling("Changes", table("Changes", COLUMNS, rows))) : "",
-      more ? h("button", { type: "button", onclick: next }, "Show earlier changes") : "",
+      more ? button("Show earlier changes", next) : "",
     );
   }
 }

@@ -1,17 +1,21 @@
 // @ts-check
 // Changes to what is stored: a run is confirmed, corrected, withdrawn or restored, a clutch archived or brought back. Each is
-// a question that says what will happen; nothing is ever deleted, and most of it can be undone at once.
+// asked about, made, said at the foot of the window with the way back (the next change takes its place), and read again.
+// Nothing is ever deleted.
 
 import { doubtList } from "../sending/receipt.js";
 import { clutchPath, Problem, readAll, sendJson } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
-import { field, h } from "../shared/dom.js";
+import { button, field, h } from "../shared/dom.js";
 import { fixed, kindName } from "../shared/format.js";
+import { problemView } from "../shared/problem_view.js";
 
 /** @import { DeclaredEnd, InspectionOut, Receipt } from "../shared/types.js" */
 
 /** @typedef {"confirm" | "correct" | "reread" | "withdraw" | "restore"} RunAction */
 /** @typedef {{ text: string, undo: (() => Promise<Done>) | null }} Done what was done, in a sentence, and how it is undone */
+
+/** @typedef {Promise<Done | null>} Asked null where the reader leaves the question */
 
 /**
  * @typedef {object} Question
@@ -63,42 +67,47 @@ const named = (run) => `${kindName(run.kind)} at ${fixed(run.cycles)} cycles`;
 /** @param {Receipt} run */
 const pathOf = (run) => `${clutchPath(run.clutch_id)}/runs/${encodeURIComponent(run.run_id)}`;
 
-/** @type {(run: Receipt, action: "confirm" | "withdraw" | "restore", reason: string) => Promise<Receipt>} */
-async function post(run, action, reason) {
+/** @type {(address: string, value: object, method?: "POST" | "PATCH") => Promise<Receipt>} the answer, where it is a run's */
+async function post(address, value, method = "POST") {
   /** @type {{ body: Receipt }} */
-  const { body } = await sendJson("POST", `${pathOf(run)}/${action}`, { reason });
+  const { body } = await sendJson(method, address, value);
   return body;
 }
 
-/** @type {(run: Receipt, cycles: number, reason: string) => Promise<Receipt>} */
-async function patch(run, cycles, reason) {
-  /** @type {{ body: Receipt }} */
-  const { body } = await sendJson("PATCH", pathOf(run), { cycles, reason });
-  return body;
-}
-
-/** @param {Receipt} run */
+/** @param {{ state: string }} run */
 const held = (run) => (run.state === "held" ? " It is held: see its doubts." : "");
 
 /** @type {(run: Receipt, cycles: number, reason: string) => Promise<Done>} */
 async function correct(run, cycles, reason) {
-  const after = await patch(run, cycles, reason);
+  const after = await post(pathOf(run), { cycles, reason }, "PATCH");
   const text = `Corrected from ${fixed(run.cycles)} to ${fixed(after.cycles)} cycles.${held(after)}`;
   return { text, undo: () => correct(after, run.cycles, "the correction is undone") };
 }
 
 /** @type {(run: Receipt, reason: string) => Promise<Done>} */
-async function withdraw(run, reason) {
-  const after = await post(run, "withdraw", reason);
-  return { text: `${named(run)} is withdrawn.`, undo: () => restore(after, "the withdrawal is undone") };
+async function confirm(run, reason) {
+  await post(`${pathOf(run)}/confirm`, { reason });
+  return { text: `${named(run)} is confirmed.`, undo: null };
 }
 
-/** @type {(run: Receipt, reason: string) => Promise<Done>} */
-async function restore(run, reason) {
-  const after = await post(run, "restore", reason);
-  const text = `${named(run)} is restored.${held(after)}`;
-  return { text, undo: () => withdraw(after, "the restoration is undone") };
+const TURNS = /** @type {const} */ ({
+  withdraw: { past: "withdrawn", noun: "withdrawal", back: "restore" },
+  restore: { past: "restored", noun: "restoration", back: "withdraw" },
+});
+
+/**
+ * Withdraw a run or an inspection, or restore it: each is undone by the other.
+ * @type {(action: keyof typeof TURNS, address: string, name: string, reason: string) => Promise<Done>}
+ */
+async function turn(action, address, name, reason) {
+  const after = await post(`${address}/${action}`, { reason });
+  const { past, noun, back } = TURNS[action];
+  const text = `${name} is ${past}.${held(after)}`;
+  return { text, undo: () => turn(back, address, name, `the ${noun} is undone`) };
 }
+
+/** @type {(action: keyof typeof TURNS, run: Receipt, reason: string) => Promise<Done>} */
+const turnRun = (action, run, reason) => turn(action, pathOf(run), named(run), reason);
 
 /** @type {(run: Receipt) => number | undefined} the cycles that a doubt about a run asks about */
 export const likelyCycles = ({ doubts }) => doubts.find((doubt) => doubt.likely_cycles)?.likely_cycles ?? undefined;
@@ -127,7 +136,7 @@ export async function answerDoubts(answer, runs) {
   try {
     if (answer === "right" && only && runs.length > 1) {
       const run_ids = runs.map((run) => run.run_id);
-      await sendJson("POST", `${clutchPath(only.clutch_id)}/runs/confirm`, { run_ids, reason: "" });
+      await post(`${clutchPath(only.clutch_id)}/runs/confirm`, { run_ids, reason: "" });
       return { text: `${runs.length} runs are confirmed.`, undo: null };
     }
     for (const run of runs) all.push(await answerDoubt(answer, run));
@@ -141,11 +150,10 @@ export async function answerDoubts(answer, runs) {
 
 /** @type {(answer: Answer, run: Receipt) => Promise<Done>} */
 async function answerDoubt(answer, run) {
-  if (answer === "other") return withdraw(run, "another clutch's run");
+  if (answer === "other") return turnRun("withdraw", run, "another clutch's run");
   const likely = likelyCycles(run);
   if (answer === "likely" && likely !== undefined) return correct(run, likely, "wrong cycles, as the doubt suggests");
-  await post(run, "confirm", "");
-  return { text: `${named(run)} is confirmed.`, undo: null };
+  return confirm(run, "");
 }
 
 /** @type {(run: Receipt) => Promise<Question>} */
@@ -161,7 +169,7 @@ async function rereading(run) {
     action: "Read again",
     choice: { label: "Rig profile", options: rigs.map(({ name }) => [name, name]) },
     send: async (reason, _, rig) => {
-      await sendJson("PATCH", pathOf(run), { rig, reason });
+      await post(pathOf(run), { rig, reason }, "PATCH");
       return { text: `${named(run)} is read by the rig profile ${rig}.`, undo: null };
     },
   };
@@ -174,10 +182,7 @@ const QUESTIONS = {
     lines: [doubtList(run), "The run is right. From now on it counts like every other run."],
     action: "Confirm",
     optional: true,
-    send: async (reason) => {
-      await post(run, "confirm", reason);
-      return { text: `${named(run)} is confirmed.`, undo: null };
-    },
+    send: (reason) => confirm(run, reason),
   }),
   correct: (run) => ({
     title: "Correct the cycles",
@@ -196,13 +201,13 @@ const QUESTIONS = {
       "The run no longer counts, and all results are recomputed without it. Nothing is deleted: you can restore the run.",
     ],
     action: "Withdraw",
-    send: (reason) => withdraw(run, reason),
+    send: (reason) => turnRun("withdraw", run, reason),
   }),
   restore: (run) => ({
     title: "Restore this run",
     lines: ["The run returns to the state before its withdrawal, and all results are recomputed."],
     action: "Restore",
-    send: (reason) => restore(run, reason),
+    send: (reason) => turnRun("restore", run, reason),
   }),
 };
 
@@ -210,7 +215,7 @@ const QUESTIONS = {
  * Ask about a run.
  * @param {RunAction} action
  * @param {Receipt} run
- * @returns {Promise<Done | null>} null where the reader leaves it
+ * @returns {Asked} null where the reader leaves it
  */
 export async function askRun(action, run) {
   const question = await QUESTIONS[action](run);
@@ -218,7 +223,7 @@ export async function askRun(action, run) {
   return ask({ ...question, lines: [name, ...question.lines] });
 }
 
-/** @type {(run: Receipt) => Promise<Done | null>} back to the cycles as they were sent */
+/** @type {(run: Receipt) => Asked} back to the cycles as they were sent */
 export const askUndo = (run) =>
   ask({
     title: "Undo the correction",
@@ -227,51 +232,30 @@ export const askUndo = (run) =>
     send: (reason) => correct(run, run.sent_cycles, reason),
   });
 
-/**
- * Withdraw an inspection, or restore it where it was withdrawn.
- * @type {(inspection: InspectionOut) => Promise<Done | null>}
- */
-export function askInspection(inspection) {
-  const [action, title] =
-    inspection.state === "withdrawn"
-      ? ["restore", "Restore this inspection"]
-      : ["withdraw", "Withdraw this inspection"];
+/** @type {(inspection: InspectionOut) => Asked} withdraw an inspection, or restore it where it was withdrawn */
+export function askInspection({ clutch_id: clutch, inspection_id: id, cycles, state }) {
+  const action = state === "withdrawn" ? "restore" : "withdraw";
+  const place = `at ${fixed(cycles)} cycles`;
+  const address = `${clutchPath(clutch)}/inspections/${id}`;
+  const word = action === "withdraw" ? "Withdraw" : "Restore";
   return ask({
-    title,
+    title: `${word} this inspection`,
     lines: [
-      h("p", {}, h("b", {}, `Inspection at ${fixed(inspection.cycles)} cycles`)),
+      h("p", {}, h("b", {}, `Inspection ${place}`)),
       action === "withdraw"
         ? "It disappears from the charts and stays in the table. Nothing is deleted: you can restore it."
         : "It appears in the charts again, with its photographs.",
     ],
-    action: action === "withdraw" ? "Withdraw" : "Restore",
-    send: (reason) => changeInspection(inspection, action, reason),
+    action: word,
+    send: (reason) => turn(action, address, `The inspection ${place}`, reason),
   });
-}
-
-/**
- * @param {InspectionOut} inspection
- * @param {string} action `withdraw` or `restore`
- * @param {string} reason
- * @returns {Promise<Done>}
- */
-async function changeInspection(inspection, action, reason) {
-  const address = `${clutchPath(inspection.clutch_id)}/inspections/${inspection.inspection_id}/${action}`;
-  /** @type {{ body: InspectionOut }} */
-  const { body } = await sendJson("POST", address, { reason });
-  const [past, back] = action === "withdraw" ? ["withdrawn", "restore"] : ["restored", "withdraw"];
-  const text = `The inspection at ${fixed(body.cycles)} cycles is ${past}.`;
-  return {
-    text,
-    undo: () => changeInspection(body, back, `the ${action === "withdraw" ? "withdrawal" : "restoration"} is undone`),
-  };
 }
 
 /**
  * Archive a clutch, or bring it back.
  * @param {string} id
  * @param {boolean} archived what it becomes
- * @returns {Promise<Done | null>}
+ * @returns {Asked}
  */
 export const askArchive = (id, archived) =>
   ask({
@@ -288,7 +272,7 @@ export const askArchive = (id, archived) =>
 
 /** @type {(id: string, archived: boolean, reason: string) => Promise<Done>} */
 async function archive(id, archived, reason) {
-  await sendJson("PATCH", clutchPath(id), { archived, reason });
+  await post(clutchPath(id), { archived, reason }, "PATCH");
   const text = archived ? `${id} is archived.` : `${id} is back in the list of clutches.`;
   return { text, undo: () => archive(id, !archived, `${archived ? "archiving" : "bringing it back"} is undone`) };
 }
@@ -297,7 +281,7 @@ async function archive(id, archived, reason) {
  * Declare that a clutch's life has ended.
  * @param {string} id
  * @param {number} cycles of its last run
- * @returns {Promise<Done | null>}
+ * @returns {Asked}
  */
 export const askEnd = (id, cycles) =>
   ask({
@@ -318,28 +302,25 @@ export const askEnd = (id, cycles) =>
     note: "Note (optional)",
     send: async (note, at, reason) => {
       const end = { kind: "maintenance", event: "end_of_life", cycles: at, reason, note };
-      /** @type {{ body: Receipt }} */
-      const { body } = await sendJson("POST", `${clutchPath(id)}/runs`, end);
-      const text = `${id} is declared ended at ${fixed(body.cycles)} cycles.${held(body)}`;
-      return { text, undo: () => withdraw(body, "the declaration is undone") };
+      const run = await post(`${clutchPath(id)}/runs`, end);
+      const text = `${id} is declared ended at ${fixed(run.cycles)} cycles.${held(run)}`;
+      return { text, undo: () => turnRun("withdraw", run, "the declaration is undone") };
     },
   });
 
-/** @type {(id: string, end: DeclaredEnd) => Promise<Done | null>} take a declared end back */
+/** @type {(id: string, end: DeclaredEnd) => Asked} take a declared end back */
 export const askTakeBack = (id, end) =>
   ask({
     title: "Take the end back",
     lines: [`The life continues after ${fixed(end.cycles)} cycles, and all results are recomputed.`],
     action: "Take it back",
     send: async (reason) => {
-      const address = `${clutchPath(id)}/runs/${encodeURIComponent(end.run_id)}/withdraw`;
-      /** @type {{ body: Receipt }} */
-      const { body } = await sendJson("POST", address, { reason });
-      return { text: "The declared end is taken back.", undo: () => restore(body, "the end holds again") };
+      const run = await post(`${clutchPath(id)}/runs/${encodeURIComponent(end.run_id)}/withdraw`, { reason });
+      return { text: "The declared end is taken back.", undo: () => turnRun("restore", run, "the end holds again") };
     },
   });
 
-/** @type {(question: Question) => Promise<Done | null>} the question in a dialog */
+/** @type {(question: Question) => Asked} the question in a dialog */
 function ask({ title, lines, action, optional = false, cycles, choice, note, send }) {
   const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
   const number = h("input", { id: "changed-cycles", value: cycles, ...numeric });
@@ -359,4 +340,32 @@ function ask({ title, lines, action, optional = false, cycles, choice, note, sen
   });
   if (cycles !== undefined) number.select();
   return closed;
+}
+
+/** @type {HTMLElement | null} */
+let shown = null;
+
+/**
+ * Say what was done, with the way back.
+ * @param {Done | null} done
+ * @param {() => Promise<unknown>} refresh reads the clutch again
+ */
+export async function showDone(done, refresh) {
+  if (done === null) return;
+  shown?.remove();
+  const { text, undo } = done;
+  const place = h("div", { class: "done", role: "status", tabindex: "-1" });
+  const close = button("Close", () => place.remove());
+  const goBack = async () => {
+    try {
+      await showDone(undo && (await undo()), refresh);
+    } catch (problem) {
+      place.replaceChildren(problemView(problem, "Not undone. "), close);
+    }
+  };
+  document.body.append(place);
+  place.append(h("p", {}, text), undo ? button("Undo", goBack) : "", close);
+  shown = place;
+  place.focus({ preventScroll: true });
+  await refresh();
 }

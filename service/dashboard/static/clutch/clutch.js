@@ -1,7 +1,7 @@
 // @ts-check
 // The page of one clutch: what is known and what to do stand first, then tabs that read their answers when they are opened.
 // Open this file first, then head.js (the first lines), reader.js (what is read) and a tab: overview.js, curves.js, loops.js,
-// runs.js, history.js; stored.js and changes.js say what may be changed, report.js makes the printed page.
+// runs.js, history.js; changes.js says what may be changed, report.js makes the printed page.
 
 import { Diagnosis } from "../diagnosis/diagnosis.js";
 import { Alarms } from "../alarms/alarms.js";
@@ -9,11 +9,10 @@ import { painted } from "../charts/plotting.js";
 import { Engagements } from "../engagements/engagements.js";
 import { sender } from "../sending/sending.js";
 import { Problem, read } from "../shared/api.js";
-import { byId, h, within } from "../shared/dom.js";
-import { withKey } from "../shared/key.js";
+import { button, byId, h, showTab, within } from "../shared/dom.js";
 import { Live } from "../shared/live.js";
-import { liveBar } from "../shared/live_bar.js";
 import { placeUnits } from "../shared/units.js";
+import { askArchive, askEnd, askTakeBack, showDone } from "./changes.js";
 import { Curves } from "./curves.js";
 import { head } from "./head.js";
 import { History } from "./history.js";
@@ -22,11 +21,11 @@ import { Overview } from "./overview.js";
 import { Reader } from "./reader.js";
 import { makeReport } from "./report.js";
 import { Runs } from "./runs.js";
-import { Stored } from "./stored.js";
 
 /** @import { ClutchOut } from "../shared/types.js" */
+/** @import { Asked } from "./changes.js" */
 
-/** @typedef {{ reader: Reader, store: Stored, refresh: () => Promise<void> }} Page what every tab is given */
+/** @typedef {{ reader: Reader, done: (asked: Asked) => Promise<void> }} Page what every tab is given; `done`: changes something */
 
 /**
  * @typedef {object} Tab
@@ -39,9 +38,10 @@ const ID = decodeURIComponent(location.pathname.split("/").at(-1) ?? "");
 document.title = `${ID} · Clutchlife`;
 const reader = new Reader(ID);
 const refresh = () => live.now();
-const store = new Stored(ID, refresh);
+/** @param {Asked} asked */
+const done = async (asked) => showDone(await asked, refresh);
 /** @type {Page} */
-const page = { reader, store, refresh };
+const page = { reader, done };
 
 /** @type {Record<string, (place: HTMLElement) => Tab>} */
 const TABS = {
@@ -98,14 +98,7 @@ function tab(name) {
 }
 
 /** The tab of the address in sight; its answers follow. */
-function turn() {
-  const { name } = wanted();
-  for (const key of Object.keys(TABS)) byId(`tab-${key}`).hidden = key !== name;
-  for (const link of byId("tabs").querySelectorAll("a")) {
-    if (link.hash === `#/${name}`) link.setAttribute("aria-current", "page");
-    else link.removeAttribute("aria-current");
-  }
-}
+const turn = () => showTab(Object.keys(TABS), wanted().name);
 
 async function poll() {
   /** @type {{ body: ClutchOut }} */
@@ -134,15 +127,17 @@ async function poll() {
 
 /** @param {ClutchOut} clutch */
 function drawHead(clutch) {
-  byId("head").replaceChildren(...head(clutch, { archive: () => store.archive(true), end: endOrTakeBack }));
+  byId("head").replaceChildren(...head(clutch, { archive: () => done(askArchive(ID, true)), end: endOrTakeBack }));
   painted().then(() => performance.mark("head-shown"));
-  store.showArchived(clutch);
+  const back = button("Bring it back …", () => done(askArchive(ID, false)));
+  const text = "This clutch is archived: it is not in the list of clutches and accepts no new runs.";
+  byId("archived").replaceChildren(clutch.archived ? h("div", { class: "notice" }, h("p", {}, text), back) : "");
   makeReport(byId("report"), { clutch });
 }
 
 async function endOrTakeBack() {
   const { ended, as_of_cycles: cycles } = await reader.life();
-  await store.end(ended, cycles ?? 0);
+  await done(ended === null ? askEnd(ID, cycles ?? 0) : askTakeBack(ID, ended));
 }
 
 /** The printed page, made beside the overview whenever that is drawn. */
@@ -177,8 +172,8 @@ document.addEventListener("unitschange", () => {
   shown.clear();
   live.now();
 });
-const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
+const live = new Live(poll, INTERVAL);
 sender(byId("send"), { clutch: ID, sent: () => live.now() });
 placeUnits(byId("units"));
 turn();
-live.start();
+live.now();

@@ -6,6 +6,7 @@ import { remainingCycles } from "../charts/life.js";
 import { Inspections } from "../inspections/inspections.js";
 import { within } from "../shared/dom.js";
 import { AuditTrail } from "./audit.js";
+import { askInspection } from "./changes.js";
 
 /** @import { Page } from "./clutch.js" */
 
@@ -14,12 +15,14 @@ export class History {
    * @param {HTMLElement} _place
    * @param {Page} page
    */
-  constructor(_place, { reader, store }) {
+  constructor(_place, { reader, done }) {
     this.reader = reader;
     const { name } = reader;
     this.predicted = new Chart({ name, id: "predicted", title: "Remaining cycles, as predicted", wide: true });
     within("predictions", ".charts").append(this.predicted.element);
-    this.inspections = new Inspections(within("inspections", ".body"), reader.id, name, store.change);
+    this.inspections = new Inspections(within("inspections", ".body"), reader.id, name, (inspection) =>
+      done(askInspection(inspection)),
+    );
     this.audit = new AuditTrail(within("changes", ".body"), reader.id);
   }
 

@@ -2,7 +2,7 @@
 // Planned duty: a form of blocks and a pace, and the remaining life under them. Nothing of it is stored.
 
 import { clutchPath, Problem, sendJson } from "../shared/api.js";
-import { field, h, scrolling, table } from "../shared/dom.js";
+import { button, field, h, quiet, scrolling, table } from "../shared/dom.js";
 import { fixed, NOT_A_NUMBER, numberOf, significant, sentence } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 
@@ -34,19 +34,11 @@ export class PlannedDuty {
     this.pace = h("div", { class: "fields" }, number(`/${PACE.name}`, PACE));
     this.answer = h("div", { class: "answer", "aria-live": "polite" });
     this.go = h("button", { class: "main" }, "Predict");
-    const more = h("button", { type: "button", onclick: () => this.add() }, "Add a block");
+    const more = button("Add a block", () => this.add());
     const buttons = h("div", { class: "buttons" }, more, this.go);
     this.form = h("form", { novalidate: true, onsubmit: this.submit }, this.blocks, this.pace, buttons, this.answer);
     const about = "The blocks run one after the other and repeat until the end of life. Fields may stay empty.";
-    place.append(
-      h(
-        "details",
-        { class: "planned" },
-        h("summary", {}, "Planned duty"),
-        h("p", { class: "quiet" }, about),
-        this.form,
-      ),
-    );
+    place.append(h("details", { class: "planned" }, h("summary", {}, "Planned duty"), quiet(about), this.form));
     this.append();
   }
 
@@ -71,7 +63,7 @@ export class PlannedDuty {
         OF_BLOCK.map((entry) => number("", entry)),
       ),
       h("p", { class: "wrong", hidden: true }),
-      h("button", { type: "button", class: "remove", onclick: remove }, "Remove"),
+      button("Remove", remove, { class: "remove" }),
     );
     this.blocks.append(block);
     this.renumber();
@@ -112,7 +104,7 @@ export class PlannedDuty {
       return;
     }
     this.go.disabled = true;
-    this.answer.replaceChildren(h("p", { class: "quiet" }, "Computing …"));
+    this.answer.replaceChildren(quiet("Computing …"));
     try {
       /** @type {{ body: PlannedLife }} */
       const { body } = await sendJson("POST", this.address, this.programme());
@@ -142,7 +134,7 @@ export class PlannedDuty {
       this.countedBy = next;
       this.ask();
     };
-    return h("button", { type: "button", onclick: ask }, label);
+    return button(label, ask);
   }
 
   programme() {
@@ -232,7 +224,7 @@ function shown(life) {
       ...SHOWN.map((quantile) => dates[quantile]?.slice(0, 10) ?? "–"),
     ]);
   const columns = ["Probability", ...SHOWN.map((quantile) => `${significant(100 * Number(quantile))} %`)];
-  const notes = life.warnings.map(({ message }) => h("p", { class: "quiet" }, message));
+  const notes = life.warnings.map(({ message }) => quiet(message));
   return [
     scrolling("Planned duty", table("Remaining life under planned duty, by probability", columns, rows)),
     ...notes,

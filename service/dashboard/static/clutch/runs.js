@@ -3,10 +3,10 @@
 // by page. `#/runs/RUN` opens one.
 
 import { doubtList, fitTable, loopTable, warnings } from "../sending/receipt.js";
-import { h } from "../shared/dom.js";
+import { button, h, quiet } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import { fixed, kindName, moment, words } from "../shared/format.js";
-import { isCorrected, stateMark } from "./changes.js";
+import { askUndo, isCorrected, stateMark } from "./changes.js";
 import { buttons } from "./held.js";
 import { runCharts } from "./run_view.js";
 
@@ -21,10 +21,10 @@ export class Runs {
    * @param {HTMLElement} place
    * @param {Page} page
    */
-  constructor(place, { reader, store }) {
+  constructor(place, { reader, done }) {
     this.place = place;
     this.reader = reader;
-    this.store = store;
+    this.done = done;
     this.first = 0;
     /** @type {Receipt[]} the latest first */
     this.runs = [];
@@ -72,12 +72,7 @@ export class Runs {
     if (this.first >= length) this.first = 0;
     const listed = this.runs.slice(this.first, this.first + PAGE);
     this.place.replaceChildren(
-      h(
-        "p",
-        { class: "quiet" },
-        `${this.summary()} `,
-        files(`${this.reader.name()}-runs`, `${this.reader.path}/runs.csv`),
-      ),
+      quiet(`${this.summary()} `, files(`${this.reader.name()}-runs`, `${this.reader.path}/runs.csv`)),
       h(
         "div",
         { class: "runs" },
@@ -107,7 +102,7 @@ export class Runs {
         this.place.scrollIntoView({ block: "start" });
         this.place.querySelector("summary")?.focus({ preventScroll: true });
       };
-      return h("button", { type: "button", disabled: first < 0 || first >= this.runs.length, onclick: go }, label);
+      return button(label, go, { disabled: first < 0 || first >= this.runs.length });
     };
     return h(
       "nav",
@@ -156,10 +151,9 @@ export class Runs {
 
   /** @param {Receipt} run */
   inside(run) {
-    const { act, undo } = this.store;
-    const changes = buttons(run, act);
+    const changes = buttons(run, this.done);
     if (isCorrected(run) && run.state !== "withdrawn") {
-      changes.append(h("button", { type: "button", onclick: () => undo(run) }, "Undo the correction …"));
+      changes.append(button("Undo the correction …", () => this.done(askUndo(run))));
     }
     return [
       run.state === "held" ? h("p", {}, "Held: it does not count until it is confirmed or corrected.") : "",

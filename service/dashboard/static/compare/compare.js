@@ -11,11 +11,9 @@ import { titled } from "../charts/traces.js";
 import { usual } from "../quantities/choices.js";
 import { QUANTITIES } from "../quantities/names.js";
 import { clutchPath, read, readAll } from "../shared/api.js";
-import { byId, h } from "../shared/dom.js";
+import { button, byId, h } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
-import { withKey } from "../shared/key.js";
 import { Live } from "../shared/live.js";
-import { liveBar } from "../shared/live_bar.js";
 import { heldText } from "../shared/state.js";
 import { named, placeUnits, pressureText, units } from "../shared/units.js";
 
@@ -203,11 +201,7 @@ function drawForm(lives) {
       " ",
       life.clutch.held > 0 && h("span", { class: "mark-held" }, heldText(life.clutch.held)),
       numbers.length > 1 && choice("Life", numbers, `${id}:${life.answer.life.number}`, replace),
-      h(
-        "button",
-        { type: "button", class: "small", "aria-label": `Remove ${life.label}`, onclick: () => replace(null) },
-        "Leave out",
-      ),
+      button("Leave out", () => replace(null), { class: "small", "aria-label": `Remove ${life.label}` }),
     );
   });
   const input = h("input", { id: "add", placeholder: "clutch", autocomplete: "off", required: true });
@@ -258,6 +252,6 @@ document.addEventListener("unitschange", () => {
   shown = "";
   live.now();
 });
-const live = new Live(withKey(poll), liveBar(byId("live")), 5000);
+const live = new Live(poll, 5000);
 placeUnits(byId("units"));
-live.start();
+live.now();

@@ -5,7 +5,7 @@
 
 import { clutchPath, Problem, read, sendJson } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
-import { h } from "../shared/dom.js";
+import { button, h, quiet } from "../shared/dom.js";
 import { words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { charts } from "./charts.js";
@@ -37,7 +37,7 @@ export class Diagnosis {
     /** @type {ModelName | null} */
     this.model = null;
     this.due = true;
-    this.run = h("button", { type: "button", class: "main", onclick: () => this.start() }, "Run the diagnosis");
+    this.run = button("Run the diagnosis", () => this.start(), { class: "main" });
     this.status = h("span", { class: "quiet", role: "status" });
     this.wrong = h("div");
     this.content = h("div");
@@ -107,7 +107,7 @@ export class Diagnosis {
     return h(
       "div",
       { class: "buttons adopt" },
-      adopted && h("p", { class: "quiet" }, note),
+      adopted && quiet(note),
       !adopted && adoptable && h("button", adopt, "Adopt the extended model"),
       (extended || adopted) && h("button", goBack, "Go back to the baseline"),
     );

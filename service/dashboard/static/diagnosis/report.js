@@ -2,7 +2,7 @@
 // A finished report in words and tables.
 
 import { clutchPath } from "../shared/api.js";
-import { h, scrolling, svg, table } from "../shared/dom.js";
+import { h, quiet, scrolling, svg, table } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import { cycles, fixed, moment, percent, probability, quantity, significant, withSd, words } from "../shared/format.js";
 import { VERDICTS } from "../shared/state.js";
@@ -43,7 +43,7 @@ export function report(diagnosis) {
       { class: `notice ${NOTICES[verdict] ?? ""}` },
       h("p", { class: "verdict" }, h("b", {}, `${heading(diagnosis)}. `), sentence(diagnosis)),
       diagnosis.summary ? h("p", {}, diagnosis.summary) : null,
-      h("p", { class: "quiet" }, date, outdated(diagnosis)),
+      quiet(date, outdated(diagnosis)),
     ),
     h(
       "div",
@@ -214,12 +214,7 @@ function advice({ advice: tests = [], clutch_id: clutch, diagnosis_id: name }) {
   });
   const choice = tests.length > 1 ? h("p", {}, "One of these is enough; the best comes first.") : null;
   const plan = files(`${clutch}-plan`, `${clutchPath(clutch)}/diagnoses/${name}/plan.csv`);
-  return part(
-    "What to test next",
-    choice,
-    h("ol", {}, items),
-    h("p", { class: "quiet" }, "As a protocol for the rig: ", plan),
-  );
+  return part("What to test next", choice, h("ol", {}, items), quiet("As a protocol for the rig: ", plan));
 }
 
 /** @param {DiagnosisOut} diagnosis */
@@ -246,7 +241,7 @@ function visible({ visible: all = [] }) {
     "details",
     { class: "part" },
     h("summary", {}, "What these runs can show"),
-    h("p", { class: "quiet" }, VISIBLE),
+    quiet(VISIBLE),
     scrolling(label, table(label, ["Effect", "For every shape", "For the most visible", "Unit"], rows)),
   );
 }

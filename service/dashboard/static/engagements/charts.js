@@ -3,7 +3,7 @@
 
 import { column, CYCLES, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
 import { eventMarks } from "../charts/layout.js";
-import { errorBars, titled } from "../charts/traces.js";
+import { lineOf, measuredLine, titled } from "../charts/traces.js";
 import { INDICATORS } from "../quantities/names.js";
 import { fixed, percent, significant } from "../shared/format.js";
 
@@ -36,7 +36,7 @@ const titleOf = ([title, unit]) => (unit === "" ? title : `${title}, ${unit}`);
 const valuesOf = (measured, name) =>
   measured.flatMap(({ cycles, indicators }) => {
     const estimate = indicators[name];
-    return estimate === null ? [] : [{ cycles, value: estimate.value, sd: estimate.sd }];
+    return estimate === null ? [] : [{ x: cycles, value: estimate.value, sd: estimate.sd }];
   });
 
 /**
@@ -51,23 +51,10 @@ export function indicatorOverLife({ measured, events, name }) {
   return {
     note: `From ${fixed(values.length)} measured engagements. The 90 % error bars come from the noise of the records.`,
     columns: [CYCLES, digitsColumn(title, 4), digitsColumn("standard error", 2)],
-    rows: values.map(({ cycles, value, sd }) => [cycles, value, sd]),
+    rows: values.map(({ x, value, sd }) => [x, value, sd]),
     figure: (c) => ({
       data: [
-        {
-          name: title,
-          mode: "lines+markers",
-          x: values.map(({ cycles }) => cycles),
-          y: values.map(({ value }) => value),
-          line: { color: c.accent, width: 1.4 },
-          marker: { color: c.accent, size: 7 },
-          error_y: errorBars(
-            values.map(({ sd }) => sd),
-            c.accent,
-            { thickness: 1, width: 3 },
-          ),
-          hovertemplate: `%{x:,.0f} cycles<br>${title} %{y:.4g}<extra></extra>`,
-        },
+        measuredLine(title, values, { size: 7, bars: 3, text: `%{x:,.0f} cycles<br>${title} %{y:.4g}` }, c.accent),
       ],
       layout: { xaxis: titled("duty cycles"), yaxis: titled(title), ...eventMarks(events, c) },
     }),
@@ -88,23 +75,18 @@ export function engagementTrace({ compared, name }) {
     columns: [KIND, column("time since contact, s", 3), digitsColumn(title, 4)],
     rows: kinds.flatMap(({ kind, trace }) => trace.time_s.map((time, index) => [kind, time, trace[name][index]])),
     figure: (c) => ({
-      data: kinds.map(({ kind, trace }) => lineOf(kind, trace, name, c)),
+      data: kinds.map(({ kind, trace }) => traceOf(kind, trace, name, c)),
       layout: { xaxis: titled("time since contact, s"), yaxis: titled(title) },
     }),
   };
 }
 
 /** @type {(kind: string, trace: EngagementTrace, name: Channel, c: Colours) => PlainTrace} */
-function lineOf(kind, trace, name, c) {
+function traceOf(kind, trace, name, c) {
   const measured = kind === "measured";
-  return {
-    name: measured ? "measured" : "tracked model",
-    mode: "lines",
-    x: trace.time_s,
-    y: trace[name],
-    line: measured ? { color: c.accent, width: 1.6 } : { color: c.worn, width: 1.6, dash: "dash" },
-    hovertemplate: `${kind}<br>%{x:.2f} s, %{y:.4g} ${CHANNELS[name][1]}<extra></extra>`,
-  };
+  const line = measured ? { color: c.accent, width: 1.6 } : { color: c.worn, width: 1.6, dash: "dash" };
+  const text = `${kind}<br>%{x:.2f} s, %{y:.4g} ${CHANNELS[name][1]}`;
+  return lineOf(measured ? "measured" : "tracked model", { x: trace.time_s, y: trace[name] }, line, text);
 }
 
 /** @type {(compared: ComparedEngagement) => string} where measurement and model part, in a sentence */

@@ -9,11 +9,9 @@ import { sender } from "../sending/sending.js";
 import { at } from "../shared/address.js";
 import { clutchPath, read, sendJson } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
-import { byId, h } from "../shared/dom.js";
+import { button, byId, h, showTab } from "../shared/dom.js";
 import { age } from "../shared/format.js";
-import { withKey } from "../shared/key.js";
 import { Live } from "../shared/live.js";
-import { liveBar } from "../shared/live_bar.js";
 import { problemView } from "../shared/problem_view.js";
 import { welcome } from "../shared/welcome.js";
 import { countOf, drawChips } from "./chips.js";
@@ -63,11 +61,7 @@ function chosen() {
 /** The tab of the address in sight: the clutches, or the alarms of all of them. */
 function turn() {
   const name = location.hash === "#/alarms" ? "alarms" : "clutches";
-  for (const key of ["clutches", "alarms"]) byId(`tab-${key}`).hidden = key !== name;
-  for (const link of byId("tabs").querySelectorAll("a")) {
-    if (link.hash === `#/${name}`) link.setAttribute("aria-current", "page");
-    else link.removeAttribute("aria-current");
-  }
+  showTab(["clutches", "alarms"], name);
   return name;
 }
 
@@ -132,8 +126,8 @@ function drawPicked() {
   byId("picked").replaceChildren(
     h("b", {}, `${ids.length} chosen`),
     h("a", { href: `/compare?${query}`, class: "button" }, "Compare"),
-    h("button", { type: "button", onclick: () => archive(ids) }, ARCHIVED.checked ? "Bring back …" : "Archive …"),
-    h("button", { type: "button", onclick: clear }, "Choose none"),
+    button(ARCHIVED.checked ? "Bring back …" : "Archive …", () => archive(ids)),
+    button("Choose none", clear),
   );
 }
 
@@ -193,10 +187,10 @@ ARCHIVED.addEventListener("change", () => {
 });
 addEventListener("hashchange", () => live.now());
 setInterval(updateAges, 15_000);
-const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
+const live = new Live(poll, INTERVAL);
 sender(byId("send"), { sent: () => live.now() });
 byId("register").addEventListener("click", async () => {
   const id = await register("");
   if (id !== null) location.assign(at(`/clutches/${encodeURIComponent(id)}`));
 });
-live.start();
+live.now();

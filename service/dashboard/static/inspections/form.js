@@ -3,7 +3,7 @@
 // that a form whose photographs were refused in part is mended and sent once more.
 
 import { clutchPath, Problem, send, sendJson } from "../shared/api.js";
-import { field, h, symbol } from "../shared/dom.js";
+import { field, h, quiet, symbol } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 
@@ -70,7 +70,7 @@ export class InspectionForm {
   submit = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
     this.go.disabled = true;
-    this.answer.replaceChildren(h("p", { class: "quiet" }, "Sending …"));
+    this.answer.replaceChildren(quiet("Sending …"));
     try {
       /** @type {{ body: InspectionOut }} */
       const { body } = await sendJson("POST", this.base, this.inspection());

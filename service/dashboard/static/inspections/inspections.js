@@ -5,7 +5,7 @@
 
 import { Chart } from "../charts/chart.js";
 import { clutchPath, readAll } from "../shared/api.js";
-import { h, scrolling, symbol, table } from "../shared/dom.js";
+import { button, h, quiet, scrolling, symbol, table } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import { fixed, moment, significant } from "../shared/format.js";
 import { surfaceOverLife } from "./charts.js";
@@ -33,7 +33,7 @@ export class Inspections {
     this.list = h("div", { class: "inspections" });
     this.photographs = new Photographs(clutchId);
     const form = new InspectionForm(clutchId, () => this.poll(this.events));
-    place.replaceChildren(h("p", { class: "quiet" }, ABOUT), this.charts, this.list, this.photographs.element);
+    place.replaceChildren(quiet(ABOUT), this.charts, this.list, this.photographs.element);
     place.append(form.element);
     /** @type {Receipt[]} */
     this.events = [];
@@ -75,7 +75,7 @@ export class Inspections {
     const measured = [roughness, symbol("R", "sk")];
     const columns = ["Duty cycles", "Inspected", "Lining", ...measured, "Note", "Photographs", "Change"];
     return [
-      h("p", { class: "quiet" }, files(`${this.clutchId}-inspections`, `${clutchPath(this.clutchId)}/inspections.csv`)),
+      quiet(files(`${this.clutchId}-inspections`, `${clutchPath(this.clutchId)}/inspections.csv`)),
       h("div", { class: "panel" }, scrolling("Inspections", table("Inspections, by duty cycles", columns, rows))),
     ];
   }
@@ -95,11 +95,7 @@ export class Inspections {
       significant(item.skewness),
       item.note || "–",
       String(item.photographs.length),
-      h(
-        "button",
-        { type: "button", class: "small", "aria-label": label, onclick },
-        withdrawn ? "Restore …" : "Withdraw …",
-      ),
+      button(withdrawn ? "Restore …" : "Withdraw …", onclick, { class: "small", "aria-label": label }),
     ];
   }
 }

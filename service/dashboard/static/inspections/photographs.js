@@ -4,7 +4,7 @@
 // keeps a drawing as small as its thumbnail, and the whole of one while it is open.
 
 import { clutchPath, readFile } from "../shared/api.js";
-import { answered, h } from "../shared/dom.js";
+import { answered, button, h } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 
 /** @import { InspectionOut } from "../shared/types.js" */
@@ -104,7 +104,7 @@ export class Photographs {
   /** @param {Shown} photograph */
   async open({ path, text }) {
     const dialog = h("dialog", { class: "photograph", "aria-labelledby": "photograph-title" });
-    const close = h("button", { type: "button", class: "main", onclick: () => dialog.close() }, "Close");
+    const close = button("Close", () => dialog.close(), { class: "main" });
     const image = h("img", { alt: text });
     let address = "";
     dialog.append(h("h2", { id: "photograph-title" }, text), image, h("div", { class: "buttons" }, close));

@@ -1,11 +1,20 @@
 // @ts-check
 // The lag of friction behind its stationary curve over life: over cycles (figs. 15 to 17), and over pressure (figs. 13, 14).
 
-import { CYCLES, digitsColumn, distinct, HALF_OF_90, KIND, measuredAndLaw, PRESSURE } from "../charts/columns.js";
+import {
+  CYCLES,
+  digitsColumn,
+  distinct,
+  HALF_OF_90,
+  intervalColumns,
+  KIND,
+  measuredAndLaw,
+  PRESSURE,
+} from "../charts/columns.js";
 import { eventMarks } from "../charts/layout.js";
 import { rampOf } from "../charts/palette.js";
 import { spread } from "../charts/stribeck.js";
-import { band, linesByPressure, measuredLine, titled } from "../charts/traces.js";
+import { linesByPressure, measuredLine, titled, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
 import { levelsOf } from "./choices.js";
@@ -15,23 +24,20 @@ import { levelsOf } from "./choices.js";
 
 /** @typedef {"loop_area" | "attractor" | "film_time"} LagName */
 
-/** @type {Record<LagName, { title: string, axis: string, unit: string, meaning: string }>} */
+/** @type {Record<LagName, { title: string, unit: string, meaning: string }>} */
 export const LAG = {
   loop_area: {
     title: "Loop area",
-    axis: "loop area, Nm·m/s",
     unit: "Nm·m/s",
     meaning: "Area of the loop over whole periods; positive where torque is higher while the speed rises",
   },
   attractor: {
     title: "Attractor C",
-    axis: "attractor C, Nm/s",
     unit: "Nm/s",
     meaning: "How fast friction follows its stationary curve; a lower value means a longer lag",
   },
   film_time: {
     title: "Film time",
-    axis: "film time, s",
     unit: "s",
     meaning: "The time constant of the squeezed film",
   },
@@ -39,15 +45,16 @@ export const LAG = {
 
 export const LAG_NAMES = /** @type {LagName[]} */ (Object.keys(LAG));
 
+/** @param {LagName} name */
+const axisOf = (name) => `${LAG[name].title.charAt(0).toLowerCase()}${LAG[name].title.slice(1)}, ${LAG[name].unit}`;
+
 /** @type {(name: LagName) => Column[]} */
 const columnsOf = (name) => [
   KIND,
   PRESSURE,
   digitsColumn("frequency, Hz", 3),
   CYCLES,
-  digitsColumn(LAG[name].axis, 3),
-  digitsColumn("lower, 5 %", 3),
-  digitsColumn("upper, 95 %", 3),
+  ...intervalColumns(axisOf(name), 3),
 ];
 
 /** @param {LagName} name */
@@ -72,10 +79,10 @@ const measuredAt = (items, level) =>
  */
 export function lagOverCycles({ items, name, pressure, events }) {
   if (items.length === 0) return { empty: missing(name) };
-  const { axis, unit, meaning } = LAG[name];
+  const { unit, meaning } = LAG[name];
   const chosen = items.find((item) => item.pressure_bar === pressure);
-  const tracked = chosen && chosen.trajectory.cycles.length > 0 ? chosen : undefined;
-  const more = tracked
+  const course = chosen && chosen.trajectory.cycles.length > 0 ? chosen : undefined;
+  const more = course
     ? `Tracked with its 90 % band at ${fixed(pressure, 1)} bar.`
     : "From the third dynamic test on it is tracked.";
   return {
@@ -86,7 +93,7 @@ export function lagOverCycles({ items, name, pressure, events }) {
     ),
     figure: (c) => ({
       data: [
-        ...(tracked ? track(tracked, unit, c) : []),
+        ...(course ? track(course, unit, c) : []),
         ...linesByPressure(
           levelsOf(items),
           (level) => measuredAt(items, level),
@@ -94,7 +101,7 @@ export function lagOverCycles({ items, name, pressure, events }) {
           c,
         ),
       ],
-      layout: { xaxis: titled("duty cycles"), yaxis: titled(axis), ...eventMarks(events, c) },
+      layout: { xaxis: titled("duty cycles"), yaxis: titled(axisOf(name)), ...eventMarks(events, c) },
     }),
   };
 }
@@ -102,18 +109,8 @@ export function lagOverCycles({ items, name, pressure, events }) {
 /** @type {(item: DegradationItem, unit: string, c: Colours) => PlainTrace[]} */
 function track({ pressure_bar: level, trajectory }, unit, c) {
   const name = `tracked, ${pressureText(level)}`;
-  const x = trajectory.cycles;
-  return [
-    ...band("90 % band", { x, y: trajectory.lower }, { x, y: trajectory.upper }, c),
-    {
-      name,
-      mode: "lines",
-      x,
-      y: trajectory.median,
-      line: { color: c.accent, width: 2.2, dash: "dash" },
-      hovertemplate: `%{x:,.0f} cycles, ${name}<br>%{y:.3g} ${unit}<extra></extra>`,
-    },
-  ];
+  const text = `%{x:,.0f} cycles, ${name}<br>%{y:.3g} ${unit}`;
+  return tracked(trajectory, { name, line: { color: c.accent, width: 2.2, dash: "dash" }, text }, c);
 }
 
 /**
@@ -123,7 +120,7 @@ function track({ pressure_bar: level, trajectory }, unit, c) {
 export function lagOverPressure({ items, name }) {
   const values = levelsOf(items).flatMap((level) => measuredAt(items, level));
   if (values.length === 0) return { empty: missing(name) };
-  const { title, axis, unit } = LAG[name];
+  const { title, unit } = LAG[name];
   const states = distinct(values.map(({ cycles }) => cycles));
   const drawn = spread(states);
   return {
@@ -141,7 +138,7 @@ export function lagOverPressure({ items, name }) {
         const text = `%{x:.1f} bar, ${label}<br>%{y:.3g} ${unit}`;
         return measuredLine(label, points, { size: 7, bars: 3, text }, rampOf(c, index, drawn.length));
       }),
-      layout: { xaxis: titled("pressure, bar"), yaxis: titled(axis) },
+      layout: { xaxis: titled("pressure, bar"), yaxis: titled(axisOf(name)) },
     }),
   };
 }

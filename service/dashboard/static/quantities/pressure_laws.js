@@ -1,9 +1,9 @@
 // @ts-check
 // A Stribeck parameter of one test over pressure, its law (fig. 9) and how far the test determines it.
 
-import { column, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
+import { column, HALF_OF_90, intervalColumns, KIND } from "../charts/columns.js";
 import { axisOf, PARAMETERS } from "../charts/parameters.js";
-import { band, errorBars, titled } from "../charts/traces.js";
+import { measuredPoints, titled, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 
 /** @import { ParameterName } from "../charts/parameters.js" */
@@ -12,13 +12,7 @@ import { fixed } from "../shared/format.js";
 
 const POINTS = 60;
 
-const COLUMNS = [
-  KIND,
-  column("pressure, bar", 2),
-  digitsColumn("value", 4),
-  digitsColumn("lower, 5 %", 4),
-  digitsColumn("upper, 95 %", 4),
-];
+const COLUMNS = [KIND, column("pressure, bar", 2), ...intervalColumns("value", 4)];
 
 /**
  * A law's value at a pressure, bar, and its standard deviation: gᵀ Σ g with the derivatives g by its coefficients.
@@ -62,36 +56,28 @@ export function pressureLaw({ test, name }) {
     ...points.map((point) => ["identified", ...interval(point)]),
     ...curve.map((point) => ["law", ...interval(point)]),
   ];
-  const x = curve.map(({ pressure }) => pressure);
-  const edge = (/** @type {number} */ sign) => ({ x, y: curve.map(({ value, sd }) => value + sign * HALF_OF_90 * sd) });
+  const edge = (/** @type {number} */ sign) => curve.map(({ value, sd }) => value + sign * HALF_OF_90 * sd);
+  const course = { cycles: curve.map(({ pressure }) => pressure), lower: edge(-1), median: edge(0), upper: edge(1) };
+  const identified = {
+    cycles: points.map(({ pressure }) => pressure),
+    value: points.map(({ value }) => value),
+    sd: points.map(({ sd }) => sd),
+  };
   return {
     note: `After ${fixed(test.cycles)} cycles. Points: identified at each pressure, with 90 % error bars. The law ${shape}; the band around it holds 90 %.`,
     columns: COLUMNS,
     rows,
     figure: (c) => ({
       data: [
-        ...band("90 % band", edge(-1), edge(1), c),
-        {
-          name: "law",
-          mode: "lines",
-          x,
-          y: curve.map(({ value }) => value),
-          line: { color: c.accent, width: 2 },
-          hovertemplate: "%{x:.2f} bar<br>law %{y:.4g}<extra></extra>",
-        },
-        {
-          name: "identified",
-          mode: "markers",
-          x: points.map(({ pressure }) => pressure),
-          y: points.map(({ value }) => value),
-          marker: { color: c.ink, size: 6 },
-          error_y: errorBars(
-            points.map(({ sd }) => sd),
-            c.ink,
-            { thickness: 1.1, width: 3 },
-          ),
-          hovertemplate: `%{x:.2f} bar<br>${PARAMETERS[name].title} %{y:.4g}<extra></extra>`,
-        },
+        ...tracked(
+          course,
+          { name: "law", line: { color: c.accent, width: 2 }, text: "%{x:.2f} bar<br>law %{y:.4g}" },
+          c,
+        ),
+        measuredPoints("identified", identified, {
+          color: c.ink,
+          text: `%{x:.2f} bar<br>${PARAMETERS[name].title} %{y:.4g}`,
+        }),
       ],
       layout: { xaxis: titled("pressure, bar"), yaxis: titled(axisOf(name)) },
     }),

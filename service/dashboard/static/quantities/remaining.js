@@ -4,7 +4,7 @@
 import { choice } from "../charts/chart.js";
 import { distinct } from "../charts/columns.js";
 import { clutchPath, Problem, read } from "../shared/api.js";
-import { h, scrolling, table } from "../shared/dom.js";
+import { h, quiet, scrolling, table } from "../shared/dom.js";
 import { cycles, interval } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { levelOptions, usual } from "./choices.js";
@@ -59,7 +59,7 @@ export class RemainingBy {
       "details",
       { class: "planned", ontoggle: () => this.ask() },
       h("summary", {}, "Remaining life by another quantity"),
-      h("p", { class: "quiet" }, ABOUT),
+      quiet(ABOUT),
       this.controls,
       this.answer,
     );
@@ -125,7 +125,7 @@ export class RemainingBy {
     const wanted = `${this.revision} ${query}`;
     if (!this.details.open || wanted === this.request) return;
     this.request = wanted;
-    this.answer.replaceChildren(h("p", { class: "quiet" }, "Being computed …"));
+    this.answer.replaceChildren(quiet("Being computed …"));
     try {
       /** @type {{ body: RemainingLife }} */
       const { body } = await read(`${this.address}?${query}`);

@@ -1,9 +1,9 @@
 // @ts-check
 // The shudder margin: the slope dμ/dv of the fitted curves over cycles. Below zero friction falls with speed.
 
-import { CYCLES, column, digitsColumn, KIND, measuredAndLaw, PRESSURE } from "../charts/columns.js";
+import { CYCLES, column, intervalColumns, KIND, measuredAndLaw, PRESSURE } from "../charts/columns.js";
 import { eventMarks } from "../charts/layout.js";
-import { band, errorBars, titled } from "../charts/traces.js";
+import { measuredPoints, titled, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
 import { reachedText } from "./criteria.js";
@@ -11,15 +11,7 @@ import { reachedText } from "./criteria.js";
 /** @import { CriterionOutcome, DegradationItem, Receipt } from "../shared/types.js" */
 /** @import { Colours, PlainTrace, Spec } from "../charts/types.js" */
 
-const COLUMNS = [
-  KIND,
-  PRESSURE,
-  column("speed, rpm"),
-  CYCLES,
-  digitsColumn("dμ/dv, s/m", 3),
-  digitsColumn("lower, 5 %", 3),
-  digitsColumn("upper, 95 %", 3),
-];
+const COLUMNS = [KIND, PRESSURE, column("speed, rpm"), CYCLES, ...intervalColumns("dμ/dv, s/m", 3)];
 
 const NO_SLOPES = "The slope needs a stationary test whose curves determine all four parameters.";
 
@@ -56,29 +48,11 @@ const limitText = (limit) => `At ${fixed(limit.speed_rpm)} rpm ${reachedText(lim
 /** @type {(item: DegradationItem, color: string, c: Colours) => PlainTrace[]} */
 function slopeTraces({ speed_rpm: speed, measured, trajectory }, color, c) {
   const name = `${fixed(speed)} rpm`;
-  const x = trajectory.cycles;
-  const edges = band("", { x, y: trajectory.lower }, { x, y: trajectory.upper }, c, color);
+  const at = `%{x:,.0f} cycles, ${name}<br>`;
+  const points = measuredPoints(name, measured, { color, text: `${at}measured %{y:.3g} s/m` });
   return [
-    ...edges.map((edge) => ({ ...edge, showlegend: false })),
-    {
-      name,
-      showlegend: x.length > 0,
-      mode: "lines",
-      x,
-      y: trajectory.median,
-      line: { color, width: 2 },
-      hovertemplate: `%{x:,.0f} cycles, ${name}<br>tracked %{y:.3g} s/m<extra></extra>`,
-    },
-    {
-      name,
-      showlegend: x.length === 0,
-      mode: "markers",
-      x: measured.cycles,
-      y: measured.value,
-      marker: { color, size: 6 },
-      error_y: errorBars(measured.sd, color, { thickness: 1.1, width: 3 }),
-      hovertemplate: `%{x:,.0f} cycles, ${name}<br>measured %{y:.3g} s/m<extra></extra>`,
-    },
+    ...tracked(trajectory, { name, band: "", line: { color, width: 2 }, text: `${at}tracked %{y:.3g} s/m` }, c),
+    { ...points, showlegend: trajectory.cycles.length === 0 },
   ];
 }
 

@@ -3,7 +3,7 @@
 // fitted, drawn before anything is sent; and the rig profile that the choices are kept in.
 
 import { send, sendJson } from "../shared/api.js";
-import { field, h, scrolling, svg } from "../shared/dom.js";
+import { button, field, h, quiet, scrolling, svg } from "../shared/dom.js";
 import { quantity, words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { warnings } from "./receipt.js";
@@ -267,7 +267,7 @@ export class Importer {
 
   /** @param {Preview} shown */
   saving({ profile, missing, problem }) {
-    if (this.rig !== null) return h("p", { class: "quiet" }, "The next file with these columns is read the same way.");
+    if (this.rig !== null) return quiet("The next file with these columns is read the same way.");
     const { name, pattern } = this;
     pattern.value ||= profile.file_name ?? "";
     const answer = h("div", { role: "status" });
@@ -293,7 +293,7 @@ export class Importer {
         field(name, "Name of the rig"),
         field(pattern, "File names", h("small", {}, "{cycles} stands for the duty cycles, * for any other text")),
       ),
-      h("button", { type: "button", onclick: save, disabled: !ready }, "Save as rig profile"),
+      button("Save as rig profile", save, { disabled: !ready }),
       answer,
     );
   }

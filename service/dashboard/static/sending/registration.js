@@ -2,7 +2,7 @@
 // A clutch is registered by a form that is submitted, never by a name that was typed: all its values are shown first.
 
 import { sendJson } from "../shared/api.js";
-import { answered, field, h } from "../shared/dom.js";
+import { answered, button, field, h, quiet } from "../shared/dom.js";
 import { problemView } from "../shared/problem_view.js";
 
 /**
@@ -95,18 +95,12 @@ export function register(id, options = {}) {
     result = chosen;
     dialog.close();
   };
-  const others = (options.similar ?? []).map((name) =>
-    h("button", { type: "button", onclick: () => end(name) }, `Send to ${name} instead`),
-  );
+  const others = (options.similar ?? []).map((name) => button(`Send to ${name} instead`, () => end(name)));
   dialog.append(
     h("h2", { id: "registration-title" }, "Register a clutch"),
     options.lead ? h("p", { class: "notice" }, options.lead) : "",
     others.length > 0 ? h("p", { class: "buttons start" }, others) : "",
-    h(
-      "p",
-      { class: "quiet" },
-      "These are the values of the reference clutch. Change the values that differ on your clutch.",
-    ),
+    quiet("These are the values of the reference clutch. Change the values that differ on your clutch."),
     form(id, options.record ?? null, end, () => dialog.close()),
   );
   return answered(dialog, () => result);
@@ -159,12 +153,7 @@ function form(id, record, registered, cancel) {
     h("div", { class: "fields" }, field(name, "Clutch id")),
     sections,
     answer,
-    h(
-      "div",
-      { class: "buttons" },
-      h("button", { type: "button", onclick: cancel }, "Cancel"),
-      h("button", { class: "main" }, "Register this clutch"),
-    ),
+    h("div", { class: "buttons" }, button("Cancel", cancel), h("button", { class: "main" }, "Register this clutch")),
   );
 }
 

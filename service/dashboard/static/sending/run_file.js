@@ -2,7 +2,7 @@
 // One file that is to be sent: what it is, as far as it or its name says so; and what the service made of it.
 
 import { clutchPath, Problem, send, sendJson } from "../shared/api.js";
-import { field, h } from "../shared/dom.js";
+import { field, h, quiet } from "../shared/dom.js";
 import { fixed, kindName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { guess } from "./file_name.js";
@@ -115,7 +115,7 @@ export class RunFile {
   async send(id, alone) {
     this.progress = "sending";
     this.fields.disabled = true;
-    this.outcome.replaceChildren(h("p", { class: "quiet" }, "Sending …"));
+    this.outcome.replaceChildren(quiet("Sending …"));
     try {
       const receipt = await this.tried(id);
       this.progress = "stored";

@@ -4,7 +4,7 @@
 // name says), importer.js (how it is read), registration.js (a clutch that is not known yet) and receipt.js (what the service made of a run).
 
 import { clutchPath, Problem, read } from "../shared/api.js";
-import { field, h } from "../shared/dom.js";
+import { button, field, h } from "../shared/dom.js";
 import { problemView } from "../shared/problem_view.js";
 import { batchOf } from "./batch.js";
 import { takeFiles } from "./dropping.js";
@@ -64,7 +64,7 @@ class Sending {
       event.preventDefault();
       this.send();
     };
-    const close = h("button", { type: "button", onclick: () => this.dialog.close() }, "Close");
+    const close = button("Close", () => this.dialog.close());
     const compare = () => runs.forEach((run) => run.compare(this.clutch.value.trim()));
     this.clutch.addEventListener("input", compare);
     this.clutch.addEventListener("input", () => this.suggest(suggestions));

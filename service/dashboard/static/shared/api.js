@@ -43,10 +43,6 @@ export class Problem extends Error {
     this.total = total;
     this.retryAfter = retryAfter;
   }
-
-  get needsKey() {
-    return this.status === 401;
-  }
 }
 
 /** @type {(path: string, options?: RequestInit) => Promise<Response>} */

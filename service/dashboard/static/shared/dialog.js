@@ -1,7 +1,7 @@
 // @ts-check
 // Questions in a dialog: each has a form that is sent, or is left.
 
-import { answered, h } from "./dom.js";
+import { answered, button, h, quiet } from "./dom.js";
 import { problemView } from "./problem_view.js";
 
 /** @import { Content } from "./dom.js" */
@@ -32,7 +32,7 @@ export function asked({ title, lines = [], fields = [], action, leave = "Cancel"
   const submit = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
     go.disabled = true;
-    answer.replaceChildren(h("p", { class: "quiet" }, "Computing …"));
+    answer.replaceChildren(quiet("Computing …"));
     try {
       result = await send();
       dialog.close();
@@ -42,7 +42,7 @@ export function asked({ title, lines = [], fields = [], action, leave = "Cancel"
       go.disabled = false;
     }
   };
-  const cancel = h("button", { type: "button", onclick: () => dialog.close() }, leave);
+  const cancel = button(leave, () => dialog.close());
   const form = h("div", { class: "fields" }, fields);
   const buttons = h("div", { class: "buttons" }, cancel, go);
   dialog.append(h("h2", { id: "question-title" }, title), h("div", {}, ...lines));

@@ -70,6 +70,22 @@ export function within(id, selector) {
   return element;
 }
 
+/** @type {(names: string[], name: string) => void} of the page's tabs the one of that name in sight, its link marked */
+export function showTab(names, name) {
+  for (const key of names) byId(`tab-${key}`).hidden = key !== name;
+  for (const link of byId("tabs").querySelectorAll("a")) {
+    if (link.hash === `#/${name}`) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+}
+
+/** @type {(label: Content, onclick: (() => unknown) | null, attributes?: Attributes) => HTMLButtonElement} */
+export const button = (label, onclick, attributes = {}) =>
+  h("button", { type: "button", ...attributes, onclick }, label);
+
+/** @type {(...content: Content[]) => HTMLElement} a paragraph beside the matter */
+export const quiet = (...content) => h("p", { class: "quiet" }, ...content);
+
 /**
  * A field below its label.
  * @param {HTMLInputElement | HTMLSelectElement | HTMLTextAreaElement} input

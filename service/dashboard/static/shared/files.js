@@ -2,7 +2,7 @@
 // Tables that the reader takes along: CSV after RFC 4180, and XLSX, a zip of four small XML files, numbers as numbers.
 
 import { readText } from "./api.js";
-import { h, saveBlob } from "./dom.js";
+import { button, h, saveBlob } from "./dom.js";
 
 /** @typedef {string | number | null | undefined} Cell */
 
@@ -22,7 +22,7 @@ export function files(name, address) {
     { class: "files" },
     h("a", { href: address, onclick: csv }, "CSV"),
     " ",
-    h("button", { type: "button", class: "link", onclick: xlsx }, "XLSX"),
+    button("XLSX", xlsx, { class: "link" }),
   );
 }
 
@@ -36,11 +36,7 @@ export const rowFiles = (name, rows) =>
     "span",
     { class: "files" },
     ["csv", "xlsx"].map((format) =>
-      h(
-        "button",
-        { type: "button", class: "link", onclick: () => saveTable(`${name}.${format}`, rows) },
-        format.toUpperCase(),
-      ),
+      button(format.toUpperCase(), () => saveTable(`${name}.${format}`, rows), { class: "link" }),
     ),
   );
 

@@ -1,43 +1,55 @@
 // @ts-check
-// Polls the service: less often while errors last, not at all in a hidden tab, at once when someone looks again.
+// Polls the service: less often while errors last, not at all in a hidden tab, at once when someone looks again. How old the
+// answers are is always in sight, with words for a screen reader only when the state changes.
 
 import { Problem } from "./api.js";
+import { button, byId, h } from "./dom.js";
+import { clock, seconds } from "./format.js";
+import { askForKey } from "./key.js";
 
-const MOST_WAIT = 60_000; // ms
+const MAX_WAIT = 60_000; // ms
+
+/** @type {Record<string, string>} */
+const CHANGES = {
+  down: "The service does not answer; the values shown may be out of date.",
+  live: "Live again.",
+  paused: "",
+};
 
 export class Live {
+  failures = 0;
+  running = false;
+  again = false;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  timer;
+  /** @type {Date | null} */
+  asOf = null;
+  /** @type {Problem | null} */
+  problem = null;
+  /** @type {number | null} when the next poll is due, ms since 1970 */
+  nextAt = null;
+  text = h("span", { class: "asof" });
+  change = h("span", { class: "hidden", role: "status" });
+  retry = button("Try now", () => this.now(), { hidden: true });
+
   /**
    * @param {() => Promise<void>} poll asks once and throws a Problem
-   * @param {(live: Live) => void} changed hears after each step
-   * @param {number} [interval] ms between two polls
+   * @param {number} interval ms between two polls
    */
-  constructor(poll, changed, interval = 2000) {
+  constructor(poll, interval) {
     this.poll = poll;
-    this.changed = changed;
     this.interval = interval;
-    this.failures = 0;
-    /** @type {ReturnType<typeof setTimeout> | undefined} */
-    this.timer = undefined;
-    /** @type {Date | null} */
-    this.asOf = null;
-    /** @type {Problem | null} */
-    this.problem = null;
-    /** @type {number | null} */
-    this.nextAt = null;
-    this.running = false;
-    this.again = false;
+    this.bar = byId("live");
+    this.bar.append(h("span", { class: "dot", "aria-hidden": "true" }), this.text, this.retry, this.change);
     document.addEventListener("visibilitychange", () => (document.hidden ? this.pause() : this.now()));
     addEventListener("online", () => this.now());
-  }
-
-  start() {
-    return this.now();
+    setInterval(() => this.problem && this.draw(), 1000);
   }
 
   pause() {
     clearTimeout(this.timer);
     this.nextAt = null;
-    this.changed(this);
+    this.draw();
   }
 
   /** @type {() => Promise<void>} poll at once; a second call while one is under way polls once more after it */
@@ -49,17 +61,20 @@ export class Live {
     clearTimeout(this.timer);
     this.running = true;
     try {
-      await this.poll();
+      await this.polled();
       this.failures = 0;
       this.problem = null;
       this.asOf = new Date();
     } catch (error) {
+      this.failures += 1;
       if (!(error instanceof Problem)) {
+        // the page's own mistake, not the service's: shown on the page, and tried again as after any error
+        const message = error instanceof Error ? error.message : String(error);
+        this.problem = new Problem(-1, { title: `The page could not show the answer: ${message}` });
         this.running = false;
-        this.fault(error);
+        this.plan();
         throw error;
       }
-      this.failures += 1;
       this.problem = error;
     }
     this.running = false;
@@ -70,26 +85,41 @@ export class Live {
     this.plan();
   }
 
-  /**
-   * The page's own mistake, not the service's: shown on the page, and tried again as after any error.
-   * @param {unknown} error
-   */
-  fault(error) {
-    const message = error instanceof Error ? error.message : String(error);
-    this.failures += 1;
-    this.problem = new Problem(-1, { title: `The page could not show the answer: ${message}` });
-    this.plan();
+  /** Poll, asking for a key and polling again where one is needed. */
+  async polled() {
+    for (;;) {
+      try {
+        return await this.poll();
+      } catch (error) {
+        if (!(error instanceof Problem && error.status === 401)) throw error;
+        await askForKey(error.detail);
+      }
+    }
   }
 
   plan() {
-    if (document.hidden || this.problem?.needsKey) {
-      this.pause();
-      return;
-    }
-    const backedOff = this.failures ? Math.min(MOST_WAIT, this.interval * 2 ** (this.failures - 1)) : this.interval;
+    if (document.hidden) return this.pause();
+    const backedOff = this.failures ? Math.min(MAX_WAIT, this.interval * 2 ** (this.failures - 1)) : this.interval;
     const wait = Math.max(backedOff, (this.problem?.retryAfter ?? 0) * 1000);
     this.nextAt = Date.now() + wait;
     this.timer = setTimeout(() => this.now(), wait);
-    this.changed(this);
+    this.draw();
   }
+
+  draw() {
+    const before = this.bar.dataset.state;
+    const state = this.problem ? "down" : document.hidden ? "paused" : "live";
+    const asOf = this.asOf ? `as of ${clock(this.asOf)}` : "nothing read yet";
+    const next = this.nextAt ? `; next try in ${seconds(this.nextAt - Date.now())}` : "";
+    this.bar.dataset.state = state;
+    if (this.problem) this.text.textContent = `${reason(this.problem)}; ${asOf}${next}`;
+    else this.text.textContent = `${document.hidden ? "Paused" : "Live"}, ${asOf}`;
+    this.retry.hidden = state !== "down";
+    if (before && state !== before) this.change.textContent = CHANGES[state];
+  }
+}
+
+/** @param {Problem} problem */
+function reason({ status, detail, title }) {
+  return status === 0 ? "No answer from the service" : detail || title || `Status ${status}`;
 }

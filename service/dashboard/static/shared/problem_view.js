@@ -2,7 +2,7 @@
 // A problem as the reader sees it, with every place that is wrong in what was sent.
 
 import { Problem } from "./api.js";
-import { h, scrolling, table } from "./dom.js";
+import { h, quiet, scrolling, table } from "./dom.js";
 
 /**
  * The problem's sentence and its errors, row by row; anything else than a Problem is the page's own mistake and thrown on.
@@ -25,6 +25,6 @@ export function problemView(problem, lead) {
     {},
     h("p", { class: "notice bad", role: "alert" }, h("b", {}, start), title, problem.detail),
     rows.length > 0 && scrolling("What is wrong", table("What is wrong, by place", columns, rows)),
-    problem.total > rows.length && h("p", { class: "quiet" }, `${rows.length} of ${problem.total} errors are shown.`),
+    problem.total > rows.length && quiet(`${rows.length} of ${problem.total} errors are shown.`),
   );
 }

@@ -28,10 +28,20 @@ function chosen() {
  */
 function cofOf(nm, bar, clutch) {
   if (bar === undefined || clutch === undefined) return NaN;
-  const { inner_diameter_mm: inner, outer_diameter_mm: outer, friction_faces: faces } = clutch.geometry;
-  const { mean_radius_mm: radius, pressure_factor: factor } = clutch.geometry;
+  const {
+    inner_diameter_mm: inner,
+    outer_diameter_mm: outer,
+    friction_faces: faces,
+    pressure_factor: factor,
+  } = clutch.geometry;
   const area = (Math.PI / 4) * (outer ** 2 - inner ** 2) * 1e-6; // m²
-  return nm / (faces * 1e5 * bar * factor * area * ((radius ?? (inner + outer) / 4) / 1000));
+  return nm / (faces * 1e5 * bar * factor * area * meanRadius(clutch));
+}
+
+/** @type {(clutch: Pick<ClutchOut, "geometry">) => number} (d_i + d_o)/4, or the one in the clutch's record, m */
+export function meanRadius({ geometry }) {
+  const mm = geometry.mean_radius_mm ?? (geometry.inner_diameter_mm + geometry.outer_diameter_mm) / 4;
+  return mm / 1000;
 }
 
 /** @returns {{ torque: Unit, pressure: Unit, velocity: Unit, plainTorque: Unit }} how values are shown now */
@@ -63,8 +73,7 @@ export function pressureText(bar) {
   return `${fixed(bar === null || bar === undefined ? bar : of(bar), decimals)} ${unit}`;
 }
 
-/** The choice of units, for the bar at the top. */
-export function unitsMenu() {
+function unitsMenu() {
   const now = chosen();
   /** @type {(label: string, part: Partial<typeof now>) => { label: string, checked: boolean, onclick: () => void }} */
   const entry = (label, part) => ({
