@@ -3,7 +3,7 @@
 // the API go in; lists, a form and tests come out, of all clutches or of one. Open this file first, then form.js (a rule as a sentence
 // and in a dialog).
 
-import { Problem, read, readAll, sendJson } from "../shared/api.js";
+import { read, readAll, sendJson } from "../shared/api.js";
 import { button, h, quiet, scrolling, table } from "../shared/dom.js";
 import { rowFiles } from "../shared/files.js";
 import { moment } from "../shared/format.js";
@@ -159,7 +159,6 @@ export class Alarms {
       await this.show();
       return answer;
     } catch (problem) {
-      if (!(problem instanceof Problem)) throw problem;
       this.wrong.replaceChildren(problemView(problem, "Nothing was changed. "));
       return null;
     }

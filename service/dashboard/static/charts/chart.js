@@ -3,7 +3,7 @@
 // chart; until someone points at it, and where the plotting library does not load, its drawing is a light one), then life.js:
 // like fan.js, loops.js, parameters.js and stribeck.js it says what its charts show; the others say how a chart is drawn.
 
-import { button, h, quiet, save, scrolling, symbol, table } from "../shared/dom.js";
+import { button, h, quiet, save, scrolling, select, symbol, table } from "../shared/dom.js";
 import { saveTable } from "../shared/files.js";
 import { settled } from "./frame.js";
 import { base, config } from "./layout.js";
@@ -11,7 +11,6 @@ import { colours } from "./palette.js";
 import { has3d, painted, plotly, want, wanted } from "./plotting.js";
 import { sketch } from "./sketch.js";
 
-/** @import { Content } from "../shared/dom.js" */
 /** @import { Cell, Column, Scheme, SettledFigure, Size, Spec, WholeFigure } from "./types.js" */
 
 /**
@@ -239,18 +238,13 @@ function cellText(value, { text }) {
  * @param {(value: string) => unknown} changed
  */
 export function choice(label, options, value, changed) {
-  /** @type {Content} */
-  const children = options.map(([key, text]) =>
-    h("option", { value: key, selected: String(key) === String(value) }, text),
-  );
-  const select = h("select", {}, children);
-  select.addEventListener("change", () => changed(select.value));
-  return h("label", {}, `${label} `, select);
+  const list = select({ onchange: () => changed(list.value) }, options, value);
+  return h("label", {}, `${label} `, list);
 }
 
 /**
  * Replace a chart's controls, keeping the focus on the one that was used.
- * @type {(chart: Chart, controls: HTMLElement[]) => void}
+ * @type {(chart: { controls: HTMLElement }, controls: HTMLElement[]) => void}
  */
 export function setControls(chart, controls) {
   const focused = [...chart.controls.querySelectorAll("select")].findIndex(

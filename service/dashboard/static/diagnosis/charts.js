@@ -6,48 +6,21 @@ import { column } from "../charts/columns.js";
 import { titled } from "../charts/traces.js";
 import { fixed, significant } from "../shared/format.js";
 
-/** @import { Annotation, Axis, Colours, PlainTrace, Spec, Trace } from "../charts/types.js" */
+/** @import { Axis, Colours, Layout, PlainTrace, Spec, Trace } from "../charts/types.js" */
 /** @import { DiagnosisOut, LoopTraceOut, MapsOut, Table } from "../shared/types.js" */
 
 /** @typedef {"before" | "after"} Side */
 
-/**
- * @typedef {object} ResidualsMap
- * @property {string} id
- * @property {string} title
- * @property {"speed_pressure" | "pressure_cycles"} key
- * @property {boolean} columnwise whether the table comes with a row an x; all are drawn with a row a y
- * @property {"speed_rpm" | "cycles"} x
- * @property {"pressure_bar"} y
- * @property {string} xName
- * @property {string} yName
- */
+/** @typedef {{ id: string, key: "speed_pressure" | "pressure_cycles", x: "speed_rpm" | "cycles", xName: string }} ResidualsMap */
 
 const NARROW = matchMedia("(max-width: 600px)");
 
 /** @type {ResidualsMap[]} */
 const MAPS = [
-  {
-    id: "map-speed",
-    title: "Residuals over speed and pressure",
-    key: "speed_pressure",
-    columnwise: false,
-    x: "speed_rpm",
-    y: "pressure_bar",
-    xName: "speed, rpm",
-    yName: "pressure, bar",
-  },
-  {
-    id: "map-cycles",
-    title: "Residuals over cycles and pressure",
-    key: "pressure_cycles",
-    columnwise: true,
-    x: "cycles",
-    y: "pressure_bar",
-    xName: "duty cycles",
-    yName: "pressure, bar",
-  },
+  { id: "map-speed", key: "speed_pressure", x: "speed_rpm", xName: "speed, rpm" },
+  { id: "map-cycles", key: "pressure_cycles", x: "cycles", xName: "duty cycles" },
 ];
+const PRESSURE = "pressure, bar";
 
 /**
  * The diagnosis' charts, each with what it shows of a report (null: nothing).
@@ -58,7 +31,7 @@ export function charts(name) {
   const loops = new Chart({ id: "diagnosis-loops", title: "Loops under both models", name, wide: true, height: 380 });
   return [
     ...MAPS.map((map) => ({
-      chart: new Chart({ id: map.id, title: map.title, name, height: 330 }),
+      chart: new Chart({ id: map.id, title: `Residuals over ${map.id.slice(4)} and pressure`, name, height: 330 }),
       spec: (/** @type {DiagnosisOut} */ report) => mapSpec(report.maps, map),
     })),
     { chart: loops, spec: (report) => loopSpec(report.loops ?? []) },
@@ -67,33 +40,30 @@ export function charts(name) {
 
 /** @type {(maps: MapsOut | null | undefined, map: ResidualsMap) => Spec | null} */
 function mapSpec(maps, map) {
-  const { key, columnwise, x, y, xName, yName } = map;
-  if (!maps?.before?.[key] || !maps.axes?.[x] || !maps.axes?.[y]) return null;
-  const [xs, ys] = [maps.axes[x], maps.axes[y]];
+  const { key, x, xName } = map;
+  if (!maps?.before?.[key] || !maps.axes?.[x] || !maps.axes?.pressure_bar) return null;
+  const [xs, ys] = [maps.axes[x], maps.axes.pressure_bar];
   const sides = /** @type {Side[]} */ (["before", "after"])
     .filter((side) => maps[side]?.[key])
-    .map((side) => ({ side, z: columnwise ? turned(maps[side][key], ys) : maps[side][key] }));
+    .map((side) => ({ side, z: key === "pressure_cycles" ? turned(maps[side][key], ys) : maps[side][key] }));
   return {
     note: "Mean of measured minus predicted torque, in standard deviations of the noise (σ). Pure noise stays pale. Both pictures use the same scale.",
-    columns: [{ name: "model" }, column(xName), column(yName, 2), column("residual, sigma", 2)],
+    columns: [{ name: "model" }, column(xName), column(PRESSURE, 2), column("residual, sigma", 2)],
     rows: sides.flatMap(({ side, z }) => z.flatMap((row, j) => row.map((value, i) => [side, xs[i], ys[j], value]))),
     figure: (c) => ({
-      data: heatmaps(sides, { xs, ys, xName, yName }, c),
-      layout: mapLayout(
-        sides.map(({ side }) => side),
-        { xName, yName },
-      ),
+      data: heatmaps(sides, { xs, ys, xName }, c),
+      layout: mapLayout(sides, xName),
     }),
   };
 }
 
 /**
  * @param {{ side: Side, z: Table }[]} sides
- * @param {{ xs: number[], ys: number[], xName: string, yName: string }} axes
+ * @param {{ xs: number[], ys: number[], xName: string }} axes
  * @param {Colours} c
  * @returns {Trace[]}
  */
-function heatmaps(sides, { xs, ys, xName, yName }, c) {
+function heatmaps(sides, { xs, ys, xName }, c) {
   const magnitudes = sides.flatMap(({ z }) => z.flat().flatMap((value) => (value === null ? [] : [Math.abs(value)])));
   const most = Math.max(1, ...magnitudes);
   return sides.map(({ side, z }, index) => ({
@@ -114,16 +84,12 @@ function heatmaps(sides, { xs, ys, xName, yName }, c) {
     ],
     showscale: index === sides.length - 1,
     colorbar: { ...titled("σ"), thickness: 12, outlinewidth: 0 },
-    hovertemplate: `${side}<br>${xName} %{x}<br>${yName} %{y}<br>%{z:.2f} σ<extra></extra>`,
+    hovertemplate: `${side}<br>${xName} %{x}<br>${PRESSURE} %{y}<br>%{z:.2f} σ<extra></extra>`,
   }));
 }
 
-/**
- * One or two maps beside each other, each under its name.
- * @param {Side[]} sides
- * @param {{ xName: string, yName: string }} names
- */
-function mapLayout(sides, { xName, yName }) {
+/** @type {(sides: { side: Side }[], xName: string) => Layout} one or two maps beside each other, each under its name */
+function mapLayout(sides, xName) {
   const two = sides.length > 1;
   /** @type {(domain: [number, number]) => Axis} */
   const abscissa = (domain) => ({
@@ -135,44 +101,35 @@ function mapLayout(sides, { xName, yName }) {
     showgrid: false,
   });
   const middles = two ? [0.24, 0.76] : [0.5];
-  /** @type {Annotation[]} */
-  const annotations = sides.map((side, index) => {
-    const place = {
-      x: middles[index],
-      xref: /** @type {const} */ ("paper"),
-      y: 1,
-      yref: /** @type {const} */ ("paper"),
-    };
-    return { text: `<b>${side}</b>`, ...place, yanchor: "bottom", showarrow: false };
-  });
   return {
     grid: { rows: 1, columns: sides.length },
     hovermode: "closest",
     xaxis: abscissa(two ? [0, 0.48] : [0, 1]),
     ...(two ? { xaxis2: abscissa([0.52, 1]) } : {}),
-    yaxis: { ...titled(yName), type: "category", showgrid: false },
+    yaxis: { ...titled(PRESSURE), type: "category", showgrid: false },
     margin: { t: 30 },
-    annotations,
+    annotations: sides.map(({ side }, index) => ({
+      text: `<b>${side}</b>`,
+      x: middles[index],
+      xref: "paper",
+      y: 1,
+      yref: "paper",
+      yanchor: "bottom",
+      showarrow: false,
+    })),
   };
 }
 
 /** @type {(z: Table, ys: number[]) => Table} rows and columns exchanged */
 const turned = (z, ys) => ys.map((_, j) => z.map((row) => row[j] ?? null));
 
-/** @typedef {"measured" | "baseline" | "extended"} Kind */
-/** @typedef {"measured_nm" | "baseline_nm" | "extended_nm"} TorqueKey */
-
-/** @type {[Kind, TorqueKey][]} */
-const KINDS = [
-  ["measured", "measured_nm"],
-  ["baseline", "baseline_nm"],
-  ["extended", "extended_nm"],
-];
+const KINDS = /** @type {const} */ (["measured", "baseline", "extended"]);
+/** @typedef {(typeof KINDS)[number]} Kind */
 
 /** @type {(loops: LoopTraceOut[]) => Spec | null} */
 function loopSpec(loops) {
   if (loops.length === 0) return null;
-  const kinds = KINDS.filter(([, key]) => loops.every((loop) => loop[key]));
+  const kinds = KINDS.filter((kind) => loops.every((loop) => loop[`${kind}_nm`]));
   const shown = loops.slice(0, NARROW.matches ? 1 : 3);
   const axes = shown.flatMap((_, place) => [
     [`xaxis${suffix(place)}`, titled("speed, rpm")],
@@ -182,12 +139,12 @@ function loopSpec(loops) {
     note: shown.map(loopName).join(" · "),
     columns: [{ name: "loop" }, { name: "model" }, column("speed, rpm", 1), column("torque, Nm", 2)],
     rows: loops.flatMap((loop) =>
-      kinds.flatMap(([kind, key]) =>
-        loop.speed_rpm.map((speed, index) => [loopName(loop), kind, speed, loop[key][index]]),
+      kinds.flatMap((kind) =>
+        loop.speed_rpm.map((speed, index) => [loopName(loop), kind, speed, loop[`${kind}_nm`][index]]),
       ),
     ),
     figure: (c) => ({
-      data: shown.flatMap((loop, place) => kinds.map(([kind, key]) => loopTrace(loop, { place, kind, key }, c))),
+      data: shown.flatMap((loop, place) => kinds.map((kind) => loopTrace(loop, place, kind, c))),
       layout: {
         grid: { rows: 1, columns: shown.length, pattern: "independent", xgap: 0.12 },
         ...Object.fromEntries(axes),
@@ -205,15 +162,15 @@ function loopName({ cycles, pressure_bar: pressure, frequency_hz: frequency }) {
   return `${fixed(cycles)} cycles, ${fixed(pressure, 1)} bar${rate}`;
 }
 
-/** @type {(loop: LoopTraceOut, options: { place: number, kind: Kind, key: TorqueKey }, c: Colours) => PlainTrace} */
-function loopTrace(loop, { place, kind, key }, c) {
+/** @type {(loop: LoopTraceOut, place: number, kind: Kind, c: Colours) => PlainTrace} */
+function loopTrace(loop, place, kind, c) {
   const baseline = kind === "baseline";
   return {
     name: kind,
     showlegend: place === 0,
     legendgroup: kind,
     x: loop.speed_rpm,
-    y: loop[key],
+    y: loop[`${kind}_nm`],
     xaxis: `x${suffix(place)}`,
     yaxis: `y${suffix(place)}`,
     mode: kind === "measured" ? "markers" : "lines",

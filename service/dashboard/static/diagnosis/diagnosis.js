@@ -3,7 +3,7 @@
 // Open this file first, then report.js (a report in words and tables) and charts.js (residuals and loops, before and after);
 // before the model changes, lifebars.js shows what the change means.
 
-import { clutchPath, Problem, read, sendJson } from "../shared/api.js";
+import { clutchPath, read, sendJson } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
 import { button, h, quiet } from "../shared/dom.js";
 import { words } from "../shared/format.js";
@@ -191,7 +191,6 @@ export class Diagnosis {
       await work();
       return true;
     } catch (problem) {
-      if (!(problem instanceof Problem)) throw problem;
       this.wrong.replaceChildren(problemView(problem, "Nothing was changed. "));
       return false;
     } finally {

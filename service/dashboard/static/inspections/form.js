@@ -2,7 +2,7 @@
 // The form that sends an inspection: its measurements first, then each photograph. What is sent again is known already, so
 // that a form whose photographs were refused in part is mended and sent once more.
 
-import { clutchPath, Problem, send, sendJson } from "../shared/api.js";
+import { clutchPath, send, sendJson } from "../shared/api.js";
 import { field, h, quiet, symbol } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
@@ -79,7 +79,6 @@ export class InspectionForm {
       this.answer.replaceChildren(outcomeOf(body), ...refused);
       await this.sent();
     } catch (problem) {
-      if (!(problem instanceof Problem)) throw problem;
       this.answer.replaceChildren(problemView(problem));
     } finally {
       this.go.disabled = false;

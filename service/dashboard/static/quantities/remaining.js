@@ -1,7 +1,7 @@
 // @ts-check
 // Remaining life by any tracked quantity: a choice of quantity and pressure, answered when it is made. Nothing is stored.
 
-import { choice } from "../charts/chart.js";
+import { choice, setControls } from "../charts/chart.js";
 import { distinct } from "../charts/columns.js";
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { h, quiet, scrolling, table } from "../shared/dom.js";
@@ -96,11 +96,7 @@ export class RemainingBy {
     const pressure = choice("Pressure", options, this.level ?? ALL, (level) =>
       this.choose(this.name, level === ALL ? undefined : Number(level)),
     );
-    const focused = [...this.controls.querySelectorAll("select")].findIndex(
-      (select) => select === document.activeElement,
-    );
-    this.controls.replaceChildren(...(options.length > 0 ? [quantity, pressure] : [quantity]));
-    this.controls.querySelectorAll("select")[focused]?.focus();
+    setControls(this, options.length > 0 ? [quantity, pressure] : [quantity]);
   }
 
   /**

@@ -3,11 +3,12 @@
 // fitted, drawn before anything is sent; and the rig profile that the choices are kept in.
 
 import { send, sendJson } from "../shared/api.js";
-import { button, field, h, quiet, scrolling, svg } from "../shared/dom.js";
+import { button, field, h, quiet, scrolling, select, svg } from "../shared/dom.js";
 import { quantity, words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { warnings } from "./receipt.js";
 
+/** @import { Content } from "../shared/dom.js" */
 /** @import { Preview, PreviewColumn, RigColumn, RigProfile } from "../shared/types.js" */
 
 /** Rows that are shown. */
@@ -111,55 +112,44 @@ export class Importer {
 
   /** @param {Preview} shown */
   columns({ columns, first_rows: rows, units }) {
-    const head = (/** @type {string} */ name) => h("th", { scope: "row" }, name);
-    const cells = (/** @type {(column: PreviewColumn, index: number) => Node} */ cell) =>
-      columns.map((column, index) => h("td", {}, cell(column, index)));
+    const names = Object.keys(units);
+    /** @type {(name: string, cells: Content[]) => HTMLElement} */
+    const line = (name, cells) =>
+      h(
+        "tr",
+        {},
+        h("th", { scope: "row" }, name),
+        cells.map((cell) => h("td", {}, cell)),
+      );
+    const titles = columns.map(({ title }) => h("th", { scope: "col" }, title));
+    const choices = [
+      line(
+        "Channel",
+        columns.map((column, index) => this.channel(column, index, names)),
+      ),
+      line(
+        "Unit",
+        columns.map((column, index) => this.unit(column, index, units[column.channel ?? ""] ?? [])),
+      ),
+      .../** @type {const} */ (["scale", "offset"]).map((name) =>
+        line(
+          words(name),
+          columns.map((column, index) => this.number_(column, index, name)),
+        ),
+      ),
+    ];
+    const shown = rows.slice(0, ROWS).map((row, index) =>
+      line(
+        `Row ${index + 1}`,
+        columns.map((_, at) => row[at] ?? ""),
+      ),
+    );
     const grid = h(
       "table",
       { class: "columns" },
       h("caption", { class: "hidden" }, `First rows of ${this.file.name}`),
-      h(
-        "thead",
-        {},
-        h(
-          "tr",
-          {},
-          head("Column"),
-          columns.map(({ title }) => h("th", { scope: "col" }, title)),
-        ),
-      ),
-      h(
-        "tbody",
-        {},
-        h(
-          "tr",
-          {},
-          head("Channel"),
-          cells((column, index) => this.channel(column, index, Object.keys(units))),
-        ),
-        h(
-          "tr",
-          {},
-          head("Unit"),
-          cells((column, index) => this.unit(column, index, units[column.channel ?? ""] ?? [])),
-        ),
-        h(
-          "tr",
-          {},
-          head("Scale"),
-          cells((column, index) => this.number_(column, index, "scale")),
-        ),
-        h(
-          "tr",
-          {},
-          head("Offset"),
-          cells((column, index) => this.number_(column, index, "offset")),
-        ),
-        rows.slice(0, ROWS).map((row, line) => {
-          const values = columns.map((_, index) => h("td", {}, row[index] ?? ""));
-          return h("tr", {}, head(`Row ${line + 1}`), values);
-        }),
-      ),
+      h("thead", {}, h("tr", {}, h("th", { scope: "row" }, "Column"), titles)),
+      h("tbody", {}, choices, shown),
     );
     return scrolling("First rows", grid);
   }
@@ -179,25 +169,21 @@ export class Importer {
     return h("div", {}, select, inPart ? h("p", {}, "Check: its title was recognised only in part.") : null);
   }
 
-  /** @type {(column: PreviewColumn, index: number, units: string[]) => HTMLSelectElement | Text} */
+  /** @type {(column: PreviewColumn, index: number, units: string[]) => HTMLSelectElement | string} */
   unit({ title, channel, unit, stated_unit: stated }, index, units) {
-    if (channel === null) return document.createTextNode(stated ?? "");
+    if (channel === null) return stated ?? "";
     const names = unit !== null && !units.includes(unit) ? [unit, ...units] : units;
-    const options = names.map((name) => h("option", { value: name, selected: name === unit }, name));
+    const options = names.map((name) => /** @type {[string, string]} */ ([name, name]));
     const label = { id: this.id(index, "unit"), "aria-label": `Unit of ${title}` };
     const choose = (/** @type {any} */ event) =>
       this.choose((columns) => Object.assign(columns[index], { unit: event.target.value || null, stated }));
-    return h(
-      "select",
-      { ...label, onchange: choose },
-      unit === null && h("option", { value: "" }, "choose …"),
-      options,
-    );
+    if (unit === null) options.unshift(["", "choose …"]);
+    return select({ ...label, onchange: choose }, options, unit);
   }
 
-  /** @type {(column: PreviewColumn, index: number, name: "scale" | "offset") => HTMLInputElement | Text} */
+  /** @type {(column: PreviewColumn, index: number, name: "scale" | "offset") => HTMLInputElement | string} */
   number_(column, index, name) {
-    if (column.channel === null) return document.createTextNode("");
+    if (column.channel === null) return "";
     const label = { id: this.id(index, name), "aria-label": `${words(name)} of ${column.title}` };
     const choose = (/** @type {any} */ event) =>
       this.choose((columns) => Object.assign(columns[index], { [name]: Number(event.target.value) }));
@@ -214,21 +200,10 @@ export class Importer {
     const { number } = this;
     const choose = (/** @type {"decimal" | "table"} */ name) => (/** @type {any} */ event) =>
       this.edit((edited) => Object.assign(edited, { [name]: event.target.value || null }));
-    const marks = { "": "found", ",": "comma: 1.234,5", ".": "point: 1,234.5" };
-    const decimal = h(
-      "select",
-      { id: `decimal-${number}`, onchange: choose("decimal") },
-      Object.entries(marks).map(([value, name]) =>
-        h("option", { value, selected: value === (profile.decimal ?? "") }, name),
-      ),
-    );
-    const table = h(
-      "select",
-      { id: `table-${number}`, onchange: choose("table") },
-      ["", ...tables].map((name) =>
-        h("option", { value: name, selected: name === profile.table }, name || "the only one"),
-      ),
-    );
+    const marks = Object.entries({ "": "found", ",": "comma: 1.234,5", ".": "point: 1,234.5" });
+    const mark = { id: `decimal-${number}`, onchange: choose("decimal") };
+    const sheets = ["", ...tables].map((name) => /** @type {[string, string]} */ ([name, name || "the only one"]));
+    const sheet = { id: `table-${number}`, onchange: choose("table") };
     const missing = h("input", {
       id: `missing-${number}`,
       value: profile.missing ?? "",
@@ -239,13 +214,13 @@ export class Importer {
     return h(
       "div",
       { class: "fields" },
-      field(decimal, "Decimal mark"),
+      field(select(mark, marks, profile.decimal ?? ""), "Decimal mark"),
       field(
         missing,
         "Missing values",
         h("small", {}, "for example -9999, n/a; “none” if every number is a measurement"),
       ),
-      tables.length > 1 && field(table, "Sheet or test"),
+      tables.length > 1 && field(select(sheet, sheets, profile.table), "Sheet or test"),
     );
   }
 

@@ -2,7 +2,7 @@
 // One file that is to be sent: what it is, as far as it or its name says so; and what the service made of it.
 
 import { clutchPath, Problem, send, sendJson } from "../shared/api.js";
-import { field, h, quiet } from "../shared/dom.js";
+import { field, h, quiet, select } from "../shared/dom.js";
 import { fixed, kindName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { guess } from "./file_name.js";
@@ -15,7 +15,12 @@ import { outcomeOf, receiptView } from "./receipt.js";
 /** @typedef {Record<string, string>} Listed what a list of runs (`runs.json`) says of a file */
 /** @typedef {"waiting" | "sending" | "stored" | "not stored"} Progress */
 
-const KINDS = ["stationary_stribeck", "dynamic_stribeck"];
+/** @type {[string, string][]} */
+const KINDS = [
+  ["", "choose …"],
+  ["stationary_stribeck", kindName("stationary_stribeck")],
+  ["dynamic_stribeck", kindName("dynamic_stribeck")],
+];
 /** Larger JSON is not read here; the service would not take it either. */
 export const MOST_JSON_BYTES = 64 * 2 ** 20;
 /** Tries while the service is busy, and the wait before each, seconds. Chosen: a busy minute. */
@@ -43,12 +48,7 @@ export class RunFile {
     const kind = listed?.kind ?? byName.kind;
     const cycles = listed?.cycles ?? byName.cycles;
     this.guessed = { kind: !listed && byName.kind !== null, cycles: !listed && byName.cycles !== null };
-    this.kind = h(
-      "select",
-      { id: `kind-${number}`, required: true },
-      h("option", { value: "", selected: kind === null }, "choose …"),
-      KINDS.map((value) => h("option", { value, selected: value === kind }, kindName(value))),
-    );
+    this.kind = select({ id: `kind-${number}`, required: true }, KINDS, kind ?? "");
     const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
     this.cycles = h("input", { id: `cycles-${number}`, value: cycles, ...numeric });
     /** @type {Importer | null} how a file that says nothing of its run itself is read */

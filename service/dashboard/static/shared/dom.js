@@ -83,6 +83,17 @@ export function showTab(names, name) {
 export const button = (label, onclick, attributes = {}) =>
   h("button", { type: "button", ...attributes, onclick }, label);
 
+/**
+ * A list to choose from: values and their texts.
+ * @type {(attributes: Attributes, options: [string | number, string][], chosen: unknown) => HTMLSelectElement}
+ */
+export function select(attributes, options, chosen) {
+  const children = options.map(([value, text]) =>
+    h("option", { value, selected: String(value) === String(chosen) }, text),
+  );
+  return h("select", attributes, children);
+}
+
 /** @type {(...content: Content[]) => HTMLElement} a paragraph beside the matter */
 export const quiet = (...content) => h("p", { class: "quiet" }, ...content);
 

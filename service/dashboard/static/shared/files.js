@@ -130,42 +130,26 @@ function zipped(parts) {
   for (const [path, text] of parts) {
     const [name, data] = [encoder.encode(path), encoder.encode(HEAD + text)];
     // version, flags, method, time, date; checksum, sizes; lengths of the name and of nothing more
-    const shared = [
-      [20, 2],
-      [0, 2],
-      [0, 2],
-      [0, 2],
-      [33, 2],
-      [crc32(data), 4],
-      [data.length, 4],
-      [data.length, 4],
-      [name.length, 2],
-      [0, 2],
-    ];
-    const head = bytes([[0x04034b50, 4], ...shared]);
-    central.push(bytes([[0x02014b50, 4], [20, 2], ...shared, [0, 2], [0, 2], [0, 2], [0, 4], [offset, 4]]), name);
+    const shared = [20, 0, 0, 0, 33, crc32(data), data.length, data.length, name.length, 0];
+    const head = bytes([4, ...SHARED], [0x04034b50, ...shared]);
+    const listed = bytes([4, 2, ...SHARED, 2, 2, 2, 4, 4], [0x02014b50, 20, ...shared, 0, 0, 0, 0, offset]);
+    central.push(listed, name);
     local.push(head, name, data);
     offset += head.length + name.length + data.length;
   }
   const size = central.reduce((sum, part) => sum + part.length, 0);
   const count = parts.length;
-  const end = bytes([
-    [0x06054b50, 4],
-    [0, 2],
-    [0, 2],
-    [count, 2],
-    [count, 2],
-    [size, 4],
-    [offset, 4],
-    [0, 2],
-  ]);
+  const end = bytes([4, 2, 2, 2, 2, 4, 4, 2], [0x06054b50, 0, 0, count, count, size, offset, 0]);
   return [...local, ...central, end];
 }
 
-/** @type {(fields: number[][]) => Uint8Array<ArrayBuffer>} numbers in as many bytes as each says, the least first */
-function bytes(fields) {
+/** Bytes of the numbers that both of a file's headers hold. */
+const SHARED = [2, 2, 2, 2, 2, 4, 4, 4, 2, 2];
+
+/** @type {(sizes: number[], values: number[]) => Uint8Array<ArrayBuffer>} numbers in as many bytes as each takes, the least first */
+function bytes(sizes, values) {
   return new Uint8Array(
-    fields.flatMap(([value, size]) => Array.from({ length: size }, (_, n) => (value >>> (8 * n)) & 255)),
+    values.flatMap((value, index) => Array.from({ length: sizes[index] }, (_, n) => (value >>> (8 * n)) & 255)),
   );
 }
 
