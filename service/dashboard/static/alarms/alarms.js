@@ -120,9 +120,8 @@ export class Alarms {
   }
 
   /**
-   * @param {string} label
-   * @param {() => unknown} onclick
-   * @param {string} of what it is done to, for a screen reader
+   * `of`: what it is done to, for a screen reader.
+   * @type {(label: string, onclick: () => unknown, of: string) => HTMLButtonElement}
    */
   button(label, onclick, of) {
     return button(label, onclick, { class: "small", "aria-label": `${label}: ${of}` });

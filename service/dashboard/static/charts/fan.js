@@ -103,11 +103,8 @@ function thresholdMarks(y, c) {
 }
 
 /**
- * Up to where the life lasts with 95 %: a line, where it is on the paper.
- * @param {RemainingLife} life
- * @param {number} last cycles on the paper
- * @param {Colours} c
- * @returns {{ shapes: Shape[], annotations: Annotation[] }}
+ * Up to where the life lasts with 95 %: a line, where it is on the paper; `last`: cycles on the paper.
+ * @type {(life: RemainingLife, last: number, c: Colours) => { shapes: Shape[], annotations: Annotation[] }}
  */
 function safeBound({ at_least: left, as_of_cycles: now, status }, last, c) {
   const x = (now ?? 0) + (left ?? 0);

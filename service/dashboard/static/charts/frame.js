@@ -141,11 +141,8 @@ export function settled({ data, layout }, { width, height }) {
 }
 
 /**
- * How far the last value of the abscissa reaches past the axes, px.
- * @param {{ at: number, text: string } | undefined} last
- * @param {Range} range
- * @param {number} inside width of the axes, px
- * @param {TextFont} font
+ * How far the last value of the abscissa reaches past the axes, px; `inside`: width of the axes, px.
+ * @type {(last: { at: number, text: string } | undefined, range: Range, inside: number, font: TextFont) => number}
  */
 function overhang(last, [from, to], inside, font) {
   return last ? Math.ceil(0.5 * widthOf(last.text, font) - (inside * (to - last.at)) / (to - from)) + 3 : 0;

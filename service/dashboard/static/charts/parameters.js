@@ -143,9 +143,8 @@ export function landscape({ items, name }) {
 }
 
 /**
- * The law's median between its points; null past its end.
- * @param {Trajectory} law
- * @param {number} at cycles
+ * The law's median between its points; null past its end. `at`: cycles.
+ * @type {(law: Trajectory, at: number) => number | null}
  */
 function medianAt({ cycles, median }, at) {
   const index = cycles.findIndex((cycle) => cycle >= at);

@@ -251,12 +251,7 @@ export function askInspection({ clutch_id: clutch, inspection_id: id, cycles, st
   });
 }
 
-/**
- * Archive a clutch, or bring it back.
- * @param {string} id
- * @param {boolean} archived what it becomes
- * @returns {Asked}
- */
+/** @type {(id: string, archived: boolean) => Asked} archive a clutch, or bring it back; `archived`: what it becomes */
 export const askArchive = (id, archived) =>
   ask({
     title: archived ? `Archive ${id}` : `Bring ${id} back`,
@@ -277,12 +272,7 @@ async function archive(id, archived, reason) {
   return { text, undo: () => archive(id, !archived, `${archived ? "archiving" : "bringing it back"} is undone`) };
 }
 
-/**
- * Declare that a clutch's life has ended.
- * @param {string} id
- * @param {number} cycles of its last run
- * @returns {Asked}
- */
+/** @type {(id: string, cycles: number) => Asked} declare that a clutch's life has ended; `cycles`: of its last run */
 export const askEnd = (id, cycles) =>
   ask({
     title: `End of life of ${id}`,
@@ -346,9 +336,8 @@ function ask({ title, lines, action, optional = false, cycles, choice, note, sen
 let shown = null;
 
 /**
- * Say what was done, with the way back.
- * @param {Done | null} done
- * @param {() => Promise<unknown>} refresh reads the clutch again
+ * Say what was done, with the way back; `refresh`: reads the clutch again.
+ * @type {(done: Done | null, refresh: () => Promise<unknown>) => Promise<void>}
  */
 export async function showDone(done, refresh) {
   if (done === null) return;

@@ -15,7 +15,7 @@ import { h } from "../shared/dom.js";
 import { atLeast, estimate, fixed, likely, percent, probability, roundedDown } from "../shared/format.js";
 import { healthBar } from "../shared/sparkline.js";
 import { firstRun } from "../shared/welcome.js";
-import { heldView } from "./held.js";
+import { heldView } from "./warnings.js";
 import { PlannedDuty } from "./planned_duty.js";
 import { lifeWarnings, warningsView } from "./warnings.js";
 

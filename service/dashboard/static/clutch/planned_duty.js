@@ -182,10 +182,7 @@ function focus(place, selector) {
 /** @param {string} pointer */
 const idOf = (pointer) => `planned${pointer.replaceAll("/", "-")}`;
 
-/**
- * @param {string} pointer "" until the block has its number
- * @param {Entry} entry
- */
+/** @type {(pointer: string, entry: Entry) => HTMLElement} `pointer`: "" until the block has its number */
 function number(pointer, { name, label, value = "" }) {
   const attributes = { inputmode: "decimal", autocomplete: "off" };
   const input = h("input", { id: idOf(pointer), name, value, "data-pointer": pointer, ...attributes });

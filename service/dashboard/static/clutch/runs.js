@@ -7,7 +7,7 @@ import { button, h, quiet } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import { fixed, kindName, moment, words } from "../shared/format.js";
 import { askUndo, isCorrected, stateMark } from "./changes.js";
-import { buttons } from "./held.js";
+import { buttons } from "./warnings.js";
 import { runCharts } from "./run_view.js";
 
 /** @import { Receipt } from "../shared/types.js" */

@@ -23,9 +23,8 @@ const MAPS = [
 const PRESSURE = "pressure, bar";
 
 /**
- * The diagnosis' charts, each with what it shows of a report (null: nothing).
- * @param {() => string} name the start of saved files' names
- * @returns {{ chart: Chart, spec: (report: DiagnosisOut) => Spec | null }[]}
+ * The diagnosis' charts, each with what it shows of a report (null: nothing); `name`: the start of saved files' names.
+ * @type {(name: () => string) => { chart: Chart, spec: (report: DiagnosisOut) => Spec | null }[]}
  */
 export function charts(name) {
   const loops = new Chart({ id: "diagnosis-loops", title: "Loops under both models", name, wide: true, height: 380 });

@@ -1,16 +1,106 @@
 // @ts-check
-// The section of the measured engagements: their answer of the API goes in, two charts and the choices above them come out.
-// Open this file first, then charts.js, which says what the charts show: an indicator over the life, and one engagement
-// beside what the tracked model gives for the same pressure and drive.
+// The section of the measured engagements: their answer of the API goes in, two charts and the choices above them come out:
+// an indicator over the life, and one engagement beside what the tracked model gives for the same pressure and drive.
 
 import { Chart, choice, setControls } from "../charts/chart.js";
-import { clutchPath, Problem, read } from "../shared/api.js";
-import { fixed } from "../shared/format.js";
+import { column, CYCLES, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
+import { eventMarks } from "../charts/layout.js";
+import { lineOf, measuredLine, titled } from "../charts/traces.js";
 import { INDICATORS } from "../quantities/names.js";
-import { CHANNELS, engagementTrace, indicatorOverLife } from "./charts.js";
+import { clutchPath, Problem, read } from "../shared/api.js";
+import { fixed, percent, significant } from "../shared/format.js";
 
-/** @import { EngagementOut, Receipt } from "../shared/types.js" */
-/** @import { Channel, Indicator } from "./charts.js" */
+/** @import { Colours, PlainTrace, Spec } from "../charts/types.js" */
+/** @import { ComparedEngagement, EngagementOut, EngagementTrace, MeasuredEngagement, Receipt } from "../shared/types.js" */
+
+/** The channels of a trace: what it is, and its unit. */
+const CHANNELS = {
+  torque_nm: ["Friction torque", "Nm"],
+  speed_rpm: ["Sliding speed", "rpm"],
+  pressure_bar: ["Line pressure", "bar"],
+};
+
+/** @typedef {keyof typeof INDICATORS} Indicator */
+/** @typedef {keyof typeof CHANNELS} Channel */
+
+const NO_ENGAGEMENT =
+  "No measured engagement yet. Send one with a block of duty: time_s, pressure_bar, speed_rpm and torque_nm of one engagement.";
+const NO_VALUE = "None of the engagements determines this indicator.";
+const NO_COMPARISON = "To simulate an engagement, the present life needs a stationary test and a measured engagement.";
+
+/** @param {[string, string] | string[]} named */
+const titleOf = ([title, unit]) => (unit === "" ? title : `${title}, ${unit}`);
+
+/**
+ * The values of an indicator; engagements that do not determine it are left out.
+ * @type {(measured: MeasuredEngagement[], name: Indicator) => { x: number, value: number, sd: number }[]}
+ */
+const valuesOf = (measured, name) =>
+  measured.flatMap(({ cycles, indicators }) => {
+    const estimate = indicators[name];
+    return estimate === null ? [] : [{ x: cycles, value: estimate.value, sd: estimate.sd }];
+  });
+
+/**
+ * An indicator over cycles.
+ * @type {(answers: { measured: MeasuredEngagement[], events: Receipt[], name: Indicator }) => Spec}
+ */
+function indicatorOverLife({ measured, events, name }) {
+  if (measured.length === 0) return { empty: NO_ENGAGEMENT };
+  const values = valuesOf(measured, name);
+  if (values.length === 0) return { empty: NO_VALUE };
+  const title = titleOf(INDICATORS[name]);
+  return {
+    note: `From ${fixed(values.length)} measured engagements. The 90 % error bars come from the noise of the records.`,
+    columns: [CYCLES, digitsColumn(title, 4), digitsColumn("standard error", 2)],
+    rows: values.map(({ x, value, sd }) => [x, value, sd]),
+    figure: (c) => ({
+      data: [
+        measuredLine(title, values, { size: 7, bars: 3, text: `%{x:,.0f} cycles<br>${title} %{y:.4g}` }, c.accent),
+      ],
+      layout: { xaxis: titled("duty cycles"), yaxis: titled(title), ...eventMarks(events, c) },
+    }),
+  };
+}
+
+/**
+ * A measured engagement beside the model's.
+ * @type {(answers: { compared: ComparedEngagement | null, name: Channel }) => Spec}
+ */
+function engagementTrace({ compared, name }) {
+  if (compared === null) return { empty: NO_COMPARISON };
+  const { channels, model, cycles } = compared;
+  const title = titleOf(CHANNELS[name]);
+  const kinds = [{ kind: "measured", trace: channels }, ...(model ? [{ kind: "model", trace: model.channels }] : [])];
+  return {
+    note: `After ${fixed(cycles)} cycles. ${discrepancyOf(compared)}`,
+    columns: [KIND, column("time since contact, s", 3), digitsColumn(title, 4)],
+    rows: kinds.flatMap(({ kind, trace }) => trace.time_s.map((time, index) => [kind, time, trace[name][index]])),
+    figure: (c) => ({
+      data: kinds.map(({ kind, trace }) => traceOf(kind, trace, name, c)),
+      layout: { xaxis: titled("time since contact, s"), yaxis: titled(title) },
+    }),
+  };
+}
+
+/** @type {(kind: string, trace: EngagementTrace, name: Channel, c: Colours) => PlainTrace} */
+function traceOf(kind, trace, name, c) {
+  const measured = kind === "measured";
+  const line = measured ? { color: c.accent, width: 1.6 } : { color: c.worn, width: 1.6, dash: "dash" };
+  const text = `${kind}<br>%{x:.2f} s, %{y:.4g} ${CHANNELS[name][1]}`;
+  return lineOf(measured ? "measured" : "tracked model", { x: trace.time_s, y: trace[name] }, line, text);
+}
+
+/** @type {(compared: ComparedEngagement) => string} where measurement and model part, in a sentence */
+function discrepancyOf({ model }) {
+  if (model === null)
+    return "The record does not show what drove the shaft, so no simulated engagement is drawn beside it.";
+  const torque = `Model discrepancy: ${percent(model.torque_discrepancy, 1)} of torque (RMS, while both slip)`;
+  const { stop_time_difference_s: difference, stop_time_difference_sd_s: sd } = model;
+  if (difference === null) return `${torque}; in the model, the clutch does not stop the shaft.`;
+  const half = sd === null ? "" : ` ± ${significant(HALF_OF_90 * sd, 2)}`;
+  return `${torque}; stops ${significant(Math.abs(difference), 3)}${half} s ${difference > 0 ? "later" : "earlier"} than the model.`;
+}
 
 /** @type {Pick<EngagementOut, "measured" | "compared">} */
 const NOTHING = { measured: [], compared: null };

@@ -1,7 +1,7 @@
 // @ts-check
 // The page of all clutches: of the list of the API the part in sight goes in, and how many clutches there are; rows, worst
 // first, come out. Searching, filtering and sorting are the service's.
-// Open this file first (what is asked for and shown), then rows.js (which rows are drawn), row.js (one of them), chips.js.
+// Open this file first (what is asked for and shown), then rows.js (which rows are drawn) and row.js (one of them).
 
 import { Alarms } from "../alarms/alarms.js";
 import { register } from "../sending/registration.js";
@@ -13,12 +13,12 @@ import { button, byId, h, showTab } from "../shared/dom.js";
 import { age } from "../shared/format.js";
 import { Live } from "../shared/live.js";
 import { problemView } from "../shared/problem_view.js";
+import { stateIcon, STATES } from "../shared/state.js";
 import { welcome } from "../shared/welcome.js";
-import { countOf, drawChips } from "./chips.js";
 import { Rows } from "./rows.js";
 
+/** @import { StateName } from "../shared/state.js" */
 /** @import { ClutchOut, FleetTotals, ListPage } from "../shared/types.js" */
-/** @import { Choice } from "./chips.js" */
 /** @import { Part } from "./rows.js" */
 
 const INTERVAL = 3000; // ms
@@ -82,11 +82,7 @@ async function poll() {
   shown = list;
 }
 
-/**
- * @param {FleetTotals} counted
- * @param {ClutchOut[]} items
- * @param {Part} part of the list that they are
- */
+/** @type {(counted: FleetTotals, items: ClutchOut[], part: Part) => void} `part`: of the list that they are */
 function show(counted, items, part) {
   totals = counted;
   document.getElementById("nothing")?.remove();
@@ -194,3 +190,36 @@ byId("register").addEventListener("click", async () => {
   if (id !== null) location.assign(at(`/clutches/${encodeURIComponent(id)}`));
 });
 live.now();
+
+/** @typedef {StateName | "held" | null} Choice a state, clutches with runs that are held, or all */
+
+/** @type {(totals: FleetTotals, only: Choice) => number} how many clutches a choice shows */
+function countOf({ all, held, states }, only) {
+  return only === null ? all : only === "held" ? held : states[only];
+}
+
+/** @param {string | undefined} name of a choice */
+const chipOf = (name) => byId("chips").querySelector(`[data-state="${name}"]`);
+
+/** @type {(totals: FleetTotals, only: Choice, choose: (chosen: Choice) => void) => void} `only`: what is shown */
+function drawChips(totals, only, choose) {
+  /** @type {(name: Choice, label: string) => HTMLElement | null} */
+  const chip = (name, label) => {
+    const count = countOf(totals, name);
+    if (count === 0 && name !== null && name !== only) return null;
+    const pressed = String(only === name);
+    const attributes = { type: "button", class: "chip", "data-state": name ?? "all", "aria-pressed": pressed };
+    const icon = name && name !== "held" && stateIcon(name);
+    return h("button", { ...attributes, onclick: () => choose(name) }, icon, h("b", {}, String(count)), ` ${label}`);
+  };
+  const focused = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.state : undefined;
+  const names = /** @type {StateName[]} */ (Object.keys(STATES));
+  const chips = [
+    chip(null, totals.all === 1 ? "clutch" : "clutches"),
+    ...names.map((name) => chip(name, STATES[name].word.toLowerCase())),
+    chip("held", "with held runs"),
+  ];
+  byId("chips").replaceChildren(...chips.filter((element) => element !== null));
+  const again = focused && chipOf(focused);
+  if (again instanceof HTMLElement) again.focus();
+}

@@ -99,10 +99,7 @@ export class RemainingBy {
     setControls(this, options.length > 0 ? [quantity, pressure] : [quantity]);
   }
 
-  /**
-   * @param {string} name
-   * @param {number | undefined} level bar
-   */
+  /** @type {(name: string, level: number | undefined) => void} `level`: bar */
   choose(name, level) {
     this.name = name;
     this.level = level;

@@ -7,7 +7,6 @@ import { clutchPath, Problem, read } from "../shared/api.js";
 import { button, field, h } from "../shared/dom.js";
 import { problemView } from "../shared/problem_view.js";
 import { batchOf } from "./batch.js";
-import { takeFiles } from "./dropping.js";
 import { IDENTIFIER, register } from "./registration.js";
 import { registeredLike, similarRegistered } from "./similar_names.js";
 
@@ -199,14 +198,56 @@ function notRuns(wrong) {
 }
 
 /**
- * @param {number} stored
- * @param {number} failed
- * @param {number} held of those that are stored
- * @param {string} id
+ * `held`: of those that are stored.
+ * @type {(stored: number, failed: number, held: number, id: string) => HTMLElement}
  */
 function summary(stored, failed, held, id) {
   const text = failed > 0 ? `${stored} stored, ${failed} not stored: see each file.` : `All ${stored} stored.`;
   const doubted = held > 0 && ` ${held} of them ${held === 1 ? "is" : "are"} held, and must be confirmed or corrected.`;
   const link = h("a", { href: `/clutches/${encodeURIComponent(id)}` }, `Open ${id}`);
   return h("p", { class: `notice ${failed > 0 ? "bad" : "good"}` }, text, doubted, " ", stored > 0 && link);
+}
+
+/**
+ * Make a button and the whole page take files, several at once.
+ * @type {(button: HTMLElement, take: (files: File[]) => unknown) => void}
+ */
+function takeFiles(button, take) {
+  const chooser = h("input", { type: "file", multiple: true, hidden: true, "aria-label": "Run files" });
+  chooser.addEventListener("change", () => {
+    if (chooser.files?.length) take([...chooser.files]);
+  });
+  document.body.append(chooser);
+  button.addEventListener("click", () => {
+    chooser.value = "";
+    chooser.click();
+  });
+  takeDropped(take);
+}
+
+/** @param {(files: File[]) => unknown} take */
+function takeDropped(take) {
+  let depth = 0;
+  /** @param {number} level elements entered and not yet left */
+  const setDepth = (level) => {
+    depth = level;
+    document.body.classList.toggle("dropping", depth > 0);
+  };
+  /** @param {DragEvent} event */
+  const hasFiles = (event) => event.dataTransfer?.types.includes("Files") ?? false;
+  addEventListener("dragenter", (event) => {
+    if (hasFiles(event)) setDepth(depth + 1);
+  });
+  addEventListener("dragleave", () => setDepth(Math.max(0, depth - 1)));
+  addEventListener("dragover", (event) => {
+    if (hasFiles(event)) event.preventDefault();
+  });
+  addEventListener("drop", (event) => {
+    if (!hasFiles(event)) return;
+    event.preventDefault();
+    setDepth(0);
+    if (document.querySelector("dialog[open]")) return; // one question at a time
+    const files = [...(event.dataTransfer?.files ?? [])];
+    if (files.length > 0) take(files);
+  });
 }

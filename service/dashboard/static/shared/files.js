@@ -27,9 +27,8 @@ export function files(name, address) {
 }
 
 /**
- * Rows that the page has, the first of them the header, as buttons that save them.
- * @param {string} name of the file
- * @param {Cell[][]} rows
+ * Rows that the page has, the first of them the header, as buttons that save them; `name`: of the file.
+ * @type {(name: string, rows: Cell[][]) => HTMLElement}
  */
 export const rowFiles = (name, rows) =>
   h(

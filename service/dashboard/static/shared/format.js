@@ -137,10 +137,7 @@ export function age(moment, now = Date.now()) {
   return NONE;
 }
 
-/**
- * A moment on the reader's clock.
- * @param {string | null | undefined} text ISO 8601
- */
+/** @type {(text: string | null | undefined) => string} a moment on the reader's clock; `text`: ISO 8601 */
 export function moment(text) {
   if (!text) return NONE;
   return new Date(text).toLocaleString("en-GB", {
@@ -174,9 +171,8 @@ export function words(name) {
 }
 
 /**
- * A message of the service as a sentence.
- * @param {string} text
- * @param {boolean} [starts] whether it starts with a capital letter
+ * A message of the service as a sentence; `starts`: whether it starts with a capital letter.
+ * @type {(text: string, starts?: boolean) => string}
  */
 export function sentence(text, starts = true) {
   const first = starts ? text.charAt(0).toUpperCase() : text.charAt(0);
