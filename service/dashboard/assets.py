@@ -20,10 +20,11 @@ from importlib.util import find_spec
 from pathlib import Path
 
 STATIC = Path(__file__).parent / "static"
-_TYPES = {
+TYPES = {
     ".css": "text/css; charset=utf-8",
     ".html": "text/html; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
+    ".png": "image/png",
     ".svg": "image/svg+xml",
 }
 #: A page's module, and what a module imports.
@@ -99,15 +100,15 @@ class Assets:
 
 def load(folder: Path = STATIC) -> Assets:
     """Read every file of the tree, and the plotting library."""
-    paths = sorted(path for path in folder.rglob("*") if path.suffix in _TYPES and path.is_file())
-    assets = [_read(path, path.relative_to(folder).as_posix()) for path in paths]
+    paths = sorted(path for path in folder.rglob("*") if path.suffix in TYPES and path.is_file())
+    assets = [read(path, path.relative_to(folder).as_posix()) for path in paths]
     library = plotting_library()
-    assets.append(_read(library, library.name))
+    assets.append(read(library, library.name))
     return Assets(by_name={asset.name: asset for asset in assets}, digest=_digest(assets))
 
 
-def _read(path: Path, name: str) -> Asset:
-    return Asset(name=name, media_type=_TYPES[path.suffix], body=path.read_bytes())
+def read(path: Path, name: str) -> Asset:
+    return Asset(name=name, media_type=TYPES[path.suffix], body=path.read_bytes())
 
 
 def _digest(assets: Iterable[Asset]) -> str:

@@ -10,24 +10,17 @@ from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 from starlette.exceptions import HTTPException
 
-from service.dashboard.assets import Asset
+from service.dashboard.assets import TYPES, Asset, read
 from service.dashboard.pages import REVALIDATE, answer
 
 SITE = Path(__file__).parent / "help"
 NOT_BUILT = "The help is not built here: run `make docs` in the checkout and start the service again.\n"
-_TYPES = {
-    ".css": "text/css; charset=utf-8",
-    ".html": "text/html; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".png": "image/png",
-    ".svg": "image/svg+xml",
-}
 
 
 def router(folder: Path = SITE) -> APIRouter:
     """`/help/...` from a built site; names are looked up among the files that were there at the start."""
-    paths = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.suffix in _TYPES}
-    read: dict[str, Asset] = {}
+    paths = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.suffix in TYPES}
+    kept: dict[str, Asset] = {}
     routes = APIRouter(include_in_schema=False)
 
     @routes.get("/help")
@@ -44,9 +37,8 @@ def router(folder: Path = SITE) -> APIRouter:
             name = posixpath.join(name, "index.html")
         if name not in paths:
             raise HTTPException(404, f"no such page: {name[:80]}")
-        if name not in read:
-            path = paths[name]
-            read[name] = Asset(name=name, media_type=_TYPES[path.suffix], body=path.read_bytes())
-        return answer(request, read[name], REVALIDATE)
+        if name not in kept:
+            kept[name] = read(paths[name], name)
+        return answer(request, kept[name], REVALIDATE)
 
     return routes

@@ -6,8 +6,9 @@ import { distinct } from "../charts/columns.js";
 import { loopCurves, loopPressures } from "../charts/loops.js";
 import { spread } from "../charts/stribeck.js";
 import { levelOptions, levelsOf, stateOptions, usual } from "../quantities/choices.js";
-import { LAG, LAG_NAMES, lagOverCycles, lagOverPressure } from "../quantities/lag.js";
+import { LAG_NAMES, lagOverCycles, lagOverPressure } from "../quantities/lag.js";
 import { Lazy } from "../quantities/lazy.js";
+import { QUANTITIES } from "../quantities/names.js";
 import { read } from "../shared/api.js";
 import { byId, within } from "../shared/dom.js";
 import { BY } from "./curves.js";
@@ -96,7 +97,7 @@ export class Loops {
     if (lag === null) return;
     const quantity = choice(
       "Quantity",
-      LAG_NAMES.map((key) => [key, LAG[key].title]),
+      LAG_NAMES.map((key) => [key, QUANTITIES[key].title]),
       name,
       (value) => {
         this.chosen.lag = LAG_NAMES.find((key) => key === value) ?? name;

@@ -5,10 +5,11 @@
 
 import { Chart, choice } from "../charts/chart.js";
 import { column, CYCLES, KIND } from "../charts/columns.js";
+import { PARAMETER_NAMES } from "../charts/parameters.js";
 import { spread } from "../charts/stribeck.js";
-import { curveOf } from "../charts/stribeck_law.js";
+import { curveOf, xyOf } from "../charts/stribeck_law.js";
 import { titled } from "../charts/traces.js";
-import { usual } from "../quantities/choices.js";
+import { levelsOf, usual } from "../quantities/choices.js";
 import { QUANTITIES } from "../quantities/names.js";
 import { clutchPath, read, readAll } from "../shared/api.js";
 import { button, byId, h } from "../shared/dom.js";
@@ -29,18 +30,13 @@ import { named, placeUnits, pressureText, units } from "../shared/units.js";
  */
 
 /** Quantities that every stationary test gives, and how many states of a life are drawn. */
-const CHOICES = ["mean_cof", "static_torque_nm", "coulomb_ratio", "stribeck_velocity_m_s", "viscous_coefficient"];
+const CHOICES = ["mean_cof", ...PARAMETER_NAMES];
 const STATES = 3;
 const DASHES = ["solid", "dash", "dot"];
 const name = () => "comparison";
 const overLife = new Chart({ name, id: "over-life", title: "Over the cycles of each life", wide: true, height: 400 });
-const curves = new Chart({
-  name,
-  id: "curves",
-  title: "Stribeck curves, first, middle and last test",
-  wide: true,
-  height: 400,
-});
+const title = "Stribeck curves, first, middle and last test";
+const curves = new Chart({ name, id: "curves", title, wide: true, height: 400 });
 
 /** What is compared: the address. `clutch=a` is its present life, `clutch=a:1` its first. */
 function question() {
@@ -80,16 +76,10 @@ async function lifeOf(entry, quantity) {
 }
 
 /** @param {DegradationItem[]} items */
-const pooled = (items) =>
-  items.find((item) => item.pressure_bar === null) ??
-  items.find(
-    (item) =>
-      item.pressure_bar ===
-      usual(
-        items.map(({ pressure_bar: level }) => level ?? 0),
-        undefined,
-      ),
-  );
+function pooled(items) {
+  const level = usual(levelsOf(items));
+  return items.find((item) => item.pressure_bar === null) ?? items.find((item) => item.pressure_bar === level);
+}
 
 /** @param {Colours} c */
 const palette = (c) => [c.accent, c.worn, c.high, c.midlife, c.low, c.ink];
@@ -141,10 +131,7 @@ function overLifeOf(lives, quantity, share) {
 function curvesOf(lives, share) {
   const { torque } = units();
   const drawn = lives.flatMap(({ label, clutch, tests, answer }, index) => {
-    const level = usual(
-      (tests[0]?.fits ?? []).map((fit) => fit.pressure_bar),
-      undefined,
-    );
+    const level = usual((tests[0]?.fits ?? []).map((fit) => fit.pressure_bar));
     const fits = spread(tests, STATES).flatMap(({ cycles, fits: all }) => {
       const fit = all.find(({ pressure_bar: bar }) => bar === level);
       return fit ? [{ fit, cycles: cycles - (answer.life.from_cycles ?? 0) }] : [];
@@ -156,7 +143,7 @@ function curvesOf(lives, share) {
       state,
       points: curveOf(fit, clutch, 0, 2000).map(({ speed, torque: nm }) => ({
         speed,
-        value: share ? nm / unit : torque.of(nm, fit.pressure_bar, clutch),
+        torque: share ? nm / unit : torque.of(nm, fit.pressure_bar, clutch),
       })),
     }));
   });
@@ -165,13 +152,12 @@ function curvesOf(lives, share) {
   return {
     note: "Fitted curves, one colour per life: solid for the first test, dashed for the middle one, dotted for the last.",
     columns: [{ name: "curve" }, column("speed, rpm"), column(axis, 4)],
-    rows: drawn.flatMap((curve) => curve.points.map(({ speed, value }) => [curve.name, speed, value])),
+    rows: drawn.flatMap((curve) => curve.points.map((point) => [curve.name, point.speed, point.torque])),
     figure: (c) => ({
       data: drawn.map(({ name: curve, index, state, points }) => ({
         name: curve,
         mode: "lines",
-        x: points.map(({ speed }) => speed),
-        y: points.map(({ value }) => value),
+        ...xyOf(points),
         line: { color: palette(c)[index % 6], width: 2, ...(state > 0 ? { dash: DASHES[state] } : {}) },
       })),
       layout: { xaxis: { ...titled("sliding speed, rpm"), rangemode: "tozero" }, yaxis: titled(axis) },

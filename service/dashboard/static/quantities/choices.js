@@ -13,7 +13,7 @@ const USUAL_PRESSURE = 5;
 /**
  * The chosen level, or the one closest to the usual; undefined where there are none.
  * @param {number[]} levels bar
- * @param {number | undefined} chosen bar
+ * @param {number} [chosen] bar
  */
 export function usual(levels, chosen) {
   if (chosen !== undefined && levels.includes(chosen)) return chosen;

@@ -18,35 +18,27 @@ import { linesByPressure, measuredLine, titled, tracked } from "../charts/traces
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
 import { levelsOf } from "./choices.js";
+import { QUANTITIES } from "./names.js";
 
 /** @import { DegradationItem, Receipt } from "../shared/types.js" */
 /** @import { Colours, Column, PlainTrace, Spec } from "../charts/types.js" */
 
 /** @typedef {"loop_area" | "attractor" | "film_time"} LagName */
 
-/** @type {Record<LagName, { title: string, unit: string, meaning: string }>} */
-export const LAG = {
-  loop_area: {
-    title: "Loop area",
-    unit: "Nm·m/s",
-    meaning: "Area of the loop over whole periods; positive where torque is higher while the speed rises",
-  },
-  attractor: {
-    title: "Attractor C",
-    unit: "Nm/s",
-    meaning: "How fast friction follows its stationary curve; a lower value means a longer lag",
-  },
-  film_time: {
-    title: "Film time",
-    unit: "s",
-    meaning: "The time constant of the squeezed film",
-  },
+/** @type {Record<LagName, string>} */
+const MEANINGS = {
+  loop_area: "Area of the loop over whole periods; positive where torque is higher while the speed rises",
+  attractor: "How fast friction follows its stationary curve; a lower value means a longer lag",
+  film_time: "The time constant of the squeezed film",
 };
 
-export const LAG_NAMES = /** @type {LagName[]} */ (Object.keys(LAG));
+export const LAG_NAMES = /** @type {LagName[]} */ (Object.keys(MEANINGS));
 
 /** @param {LagName} name */
-const axisOf = (name) => `${LAG[name].title.charAt(0).toLowerCase()}${LAG[name].title.slice(1)}, ${LAG[name].unit}`;
+function axisOf(name) {
+  const { title, unit } = QUANTITIES[name];
+  return `${title.charAt(0).toLowerCase()}${title.slice(1)}, ${unit}`;
+}
 
 /** @type {(name: LagName) => Column[]} */
 const columnsOf = (name) => [
@@ -58,7 +50,7 @@ const columnsOf = (name) => [
 ];
 
 /** @param {LagName} name */
-const missing = (name) => `${LAG[name].title}: no dynamic Stribeck test determines it yet. ${LAG[name].meaning}.`;
+const missing = (name) => `${QUANTITIES[name].title}: no dynamic Stribeck test determines it yet. ${MEANINGS[name]}.`;
 
 /**
  * The values that were measured at a pressure.
@@ -79,14 +71,14 @@ const measuredAt = (items, level) =>
  */
 export function lagOverCycles({ items, name, pressure, events }) {
   if (items.length === 0) return { empty: missing(name) };
-  const { unit, meaning } = LAG[name];
+  const { unit } = QUANTITIES[name];
   const chosen = items.find((item) => item.pressure_bar === pressure);
   const course = chosen && chosen.trajectory.cycles.length > 0 ? chosen : undefined;
   const more = course
     ? `Tracked with its 90 % band at ${fixed(pressure, 1)} bar.`
     : "From the third dynamic test on it is tracked.";
   return {
-    note: `${meaning}; at ${items[0].frequency_hz} Hz, with 90 % error bars. ${more}`,
+    note: `${MEANINGS[name]}; at ${items[0].frequency_hz} Hz, with 90 % error bars. ${more}`,
     columns: columnsOf(name),
     rows: items.flatMap((item) =>
       measuredAndLaw(item, { measured: "measured", law: "tracked", before: [item.pressure_bar, item.frequency_hz] }),
@@ -120,7 +112,7 @@ function track({ pressure_bar: level, trajectory }, unit, c) {
 export function lagOverPressure({ items, name }) {
   const values = levelsOf(items).flatMap((level) => measuredAt(items, level));
   if (values.length === 0) return { empty: missing(name) };
-  const { title, unit } = LAG[name];
+  const { title, unit } = QUANTITIES[name];
   const states = distinct(values.map(({ cycles }) => cycles));
   const drawn = spread(states);
   return {

@@ -1,6 +1,8 @@
 // @ts-check
 // The quantities that are tracked along a life and may end it: title and unit by public name.
 
+import { PARAMETERS } from "../charts/parameters.js";
+
 /** The indicators of an engagement by name: what it is, and its unit. */
 export const INDICATORS = {
   stop_time_s: ["Stop time", "s"],
@@ -22,9 +24,7 @@ export const INDICATORS = {
 /** @type {Record<string, { title: string, unit: string }>} */
 export const QUANTITIES = {
   mean_cof: { title: "Mean COF", unit: "" },
-  static_torque_nm: { title: "Static torque", unit: "Nm" },
-  coulomb_ratio: { title: "Coulomb ratio", unit: "" },
-  stribeck_velocity_m_s: { title: "Stribeck velocity", unit: "m/s" },
+  ...PARAMETERS,
   viscous_coefficient: { title: "Viscous coefficient", unit: "Nm/(m/s)⁰·³" },
   slope: { title: "Slope dμ/dv", unit: "s/m" },
   attractor: { title: "Attractor C", unit: "Nm/s" },

@@ -3,18 +3,22 @@
 
 import { choice, setControls } from "../charts/chart.js";
 import { distinct } from "../charts/columns.js";
+import { PARAMETER_NAMES } from "../charts/parameters.js";
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { h, quiet, scrolling, table } from "../shared/dom.js";
 import { cycles, interval } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { levelOptions, usual } from "./choices.js";
 import { criterionRow, OWN_COLUMNS } from "./criteria.js";
+import { LAG_NAMES } from "./lag.js";
 import { QUANTITIES } from "./names.js";
 
 /** @import { CriterionOutcome, LoopItem, RemainingLife, StribeckItem } from "../shared/types.js" */
 
-const OF_CURVES = ["static_torque_nm", "coulomb_ratio", "stribeck_velocity_m_s", "viscous_coefficient", "slope"];
-const OF_LOOPS = ["attractor", "film_time", "loop_area"];
+/** @type {string[]} */
+const OF_CURVES = ["mean_cof", ...PARAMETER_NAMES, "slope"];
+/** @type {string[]} */
+const OF_LOOPS = LAG_NAMES;
 const ABOUT =
   "When another quantity reaches its limit. The limit is the clutch's own criterion for this quantity. If there is none, the " +
   "limit is the same share of the initial value as for mean COF; for a slope, the limit is 0 at 100 rpm.";
@@ -26,7 +30,7 @@ const ALL = "all";
  */
 export function levelsAt(name, { tests, loops }) {
   const first = tests.find(({ fits }) => fits.length > 0);
-  if (name === "mean_cof" || OF_CURVES.includes(name)) {
+  if (OF_CURVES.includes(name)) {
     return distinct((first?.fits ?? []).map(({ pressure_bar: level }) => level));
   }
   return OF_LOOPS.includes(name) ? distinct(loops.map(({ pressure_bar: level }) => level)) : [];
@@ -87,7 +91,7 @@ export class RemainingBy {
     const levels = levelsAt(this.name, this.answers);
     const whole = this.name === "mean_cof";
     const chosen = this.level !== undefined && levels.includes(this.level);
-    if (!chosen) this.level = whole ? undefined : usual(levels, undefined);
+    if (!chosen) this.level = whole ? undefined : usual(levels);
     /** @type {[string, string][]} */
     const names = Object.entries(QUANTITIES).map(([name, { title }]) => [name, title]);
     const quantity = choice("Quantity", names, this.name, (name) => this.choose(name, this.level));
