@@ -119,10 +119,7 @@ export class Alarms {
     );
   }
 
-  /**
-   * `of`: what it is done to, for a screen reader.
-   * @type {(label: string, onclick: () => unknown, of: string) => HTMLButtonElement}
-   */
+  /** @type {(label: string, onclick: () => unknown, of: string) => HTMLButtonElement} `of`: what it is done to */
   button(label, onclick, of) {
     return button(label, onclick, { class: "small", "aria-label": `${label}: ${of}` });
   }
@@ -147,10 +144,7 @@ export class Alarms {
     else await this.send("PUT", `/v1/alarms/${rule.alarm_id}`, wanted);
   }
 
-  /**
-   * Change something and show what is so now; null where it was refused, which is said.
-   * @type {(method: string, path: string, body?: object) => Promise<any>}
-   */
+  /** @type {(method: string, path: string, body?: object) => Promise<any>} null where it was refused, which is said */
   async send(method, path, body) {
     this.wrong.replaceChildren();
     try {

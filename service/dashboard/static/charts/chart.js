@@ -242,10 +242,7 @@ export function choice(label, options, value, changed) {
   return h("label", {}, `${label} `, list);
 }
 
-/**
- * Replace a chart's controls, keeping the focus on the one that was used.
- * @type {(chart: { controls: HTMLElement }, controls: HTMLElement[]) => void}
- */
+/** @type {(chart: { controls: HTMLElement }, controls: HTMLElement[]) => void} the focus stays where it was */
 export function setControls(chart, controls) {
   const focused = [...chart.controls.querySelectorAll("select")].findIndex(
     (select) => select === document.activeElement,

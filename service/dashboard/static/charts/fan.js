@@ -88,10 +88,7 @@ function endRows({ criterion: { threshold_mean_cof: threshold }, end_of_life_cyc
   return Object.entries(end).map(([quantile, at]) => [name(quantile), at, threshold, null, null]);
 }
 
-/**
- * The threshold as a dashed line with its value.
- * @type {(y: number, c: Colours) => { shapes: Shape[], annotations: Annotation[] }}
- */
+/** @type {(y: number, c: Colours) => { shapes: Shape[], annotations: Annotation[] }} a dashed line with its value */
 function thresholdMarks(y, c) {
   const line = { color: c.failure, width: 1.6, dash: "dash" };
   const font = { color: c.failure, size: 12 };
@@ -178,10 +175,7 @@ function law(trajectory, life, c) {
   ];
 }
 
-/**
- * The predicted end of life on the threshold: its 90 % and 50 % intervals and its median.
- * @type {(life: RemainingLife, threshold: number | null, c: Colours) => PlainTrace[]}
- */
+/** @type {(life: RemainingLife, threshold: number | null, c: Colours) => PlainTrace[]} */
 function endOfLife(life, threshold, c) {
   const q = life.end_of_life_cycles;
   const median = q["0.5"];

@@ -10,10 +10,7 @@ import { fixed } from "../shared/format.js";
 
 const ruler = /** @type {CanvasRenderingContext2D} */ (document.createElement("canvas").getContext("2d"));
 
-/**
- * The width of a text, px; its index and exponent marks are not part of it.
- * @type {(text: string, font: TextFont) => number}
- */
+/** @type {(text: string, font: TextFont) => number} px, without the markup of an index or an exponent */
 export function widthOf(text, { size, family }) {
   ruler.font = `${size}px ${family}`;
   return ruler.measureText(text.replaceAll(/<[^>]+>/g, "")).width;

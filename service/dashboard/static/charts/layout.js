@@ -151,10 +151,7 @@ export const config = (spatial) => ({
 const nameOf = (event, note) =>
   event === "other" && note ? note.replaceAll("<", "‹").replaceAll(">", "›").slice(0, 40) : event.replaceAll("_", " ");
 
-/**
- * Maintenance events as vertical lines with their name at the top.
- * @type {(events: Receipt[], c: Colours) => { shapes: Shape[], annotations: Annotation[] }}
- */
+/** @type {(events: Receipt[], c: Colours) => { shapes: Shape[], annotations: Annotation[] }} lines with names */
 export function eventMarks(events, c) {
   return {
     shapes: events.map(({ cycles }) => ({

@@ -50,10 +50,7 @@ function lagText({ direction, better_law: law }) {
   return `torque is ${DIRECTIONS[direction] ?? direction}, ${better}`;
 }
 
-/**
- * The lag of several loops, those of one kind named together.
- * @type {(loops: LoopItem[], label: (loop: LoopItem) => string) => string}
- */
+/** @type {(loops: LoopItem[], label: (loop: LoopItem) => string) => string} loops of one kind named together */
 function lagNote(loops, label) {
   const kinds = [...new Set(loops.map(lagText))];
   if (kinds.length === 1) return `In each loop ${kinds[0]}.`;
@@ -119,10 +116,7 @@ export function loopCurves({ loops, tests, clutch, channels, over, pressure, run
   };
 }
 
-/**
- * The stationary curves, named once.
- * @type {(drawn: { stationary: CurvePoint[] }[], colors: string[]) => PlainTrace[]}
- */
+/** @type {(drawn: { stationary: CurvePoint[] }[], colors: string[]) => PlainTrace[]} named once */
 function stationaryTraces(drawn, colors) {
   const curves = drawn.map(({ stationary }, index) => ({ stationary, color: colors[index] }));
   return curves

@@ -54,16 +54,10 @@ function between(stops, share) {
   return `rgb(${from.map((value, channel) => Math.round(value + (to[channel] - value) * (place - index))).join(", ")})`;
 }
 
-/**
- * The colour of the n-th of several things, from fresh to worn.
- * @type {(c: Colours, index: number, count: number) => string}
- */
+/** @type {(c: Colours, index: number, count: number) => string} of the n-th of several, from fresh to worn */
 export const rampOf = (c, index, count) => c.ramp(count > 1 ? index / (count - 1) : 0);
 
-/**
- * The colour of the n-th of several pressures, from the lowest to the highest.
- * @type {(c: Colours, index: number, count: number) => string}
- */
+/** @type {(c: Colours, index: number, count: number) => string} from the lowest pressure to the highest */
 export const pressureRampOf = (c, index, count) => c.pressureRamp(count > 1 ? index / (count - 1) : 0);
 
 /** @type {(rgb: string, opacity: number) => string} the colour, partly transparent */

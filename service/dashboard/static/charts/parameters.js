@@ -142,10 +142,7 @@ export function landscape({ items, name }) {
   };
 }
 
-/**
- * The law's median between its points; null past its end. `at`: cycles.
- * @type {(law: Trajectory, at: number) => number | null}
- */
+/** @type {(law: Trajectory, at: number) => number | null} between the law's points, null past its end; `at`: cycles */
 function medianAt({ cycles, median }, at) {
   const index = cycles.findIndex((cycle) => cycle >= at);
   if (index < 0) return null;

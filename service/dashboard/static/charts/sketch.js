@@ -62,10 +62,7 @@ export function sketch({ data, layout, ticks, legend }, { width, height }) {
   );
 }
 
-/**
- * Grid lines with their values.
- * @type {(figure: Pick<SettledFigure, "layout" | "ticks">, frame: Frame) => SVGElement[]}
- */
+/** @type {(figure: Pick<SettledFigure, "layout" | "ticks">, frame: Frame) => SVGElement[]} lines with their values */
 function grid({ layout, ticks }, { x, y, l, t, inside }) {
   const { size } = layout.font;
   const bottom = t + inside.height;
@@ -131,10 +128,7 @@ function pathOf(xs, ys) {
 /** @type {(values: (number | null)[], scale: Scale) => (number | null)[]} */
 const placed = (values, scale) => values.map((value) => (value === null ? null : scale(value)));
 
-/**
- * A trace: its band down to the one before, its error bars, its line, its points.
- * @type {(trace: PlainTrace, before: PlainTrace | undefined, x: Scale, y: Scale) => SVGPathElement[]}
- */
+/** @type {(trace: PlainTrace, before: PlainTrace | undefined, x: Scale, y: Scale) => SVGPathElement[]} */
 function drawn(trace, before, x, y) {
   const [xs, ys] = [placed(trace.x, x), placed(trace.y, y)];
   const { line = {}, marker, error_y: bars } = trace;
@@ -185,10 +179,7 @@ function dot(x, y, marker, line) {
   });
 }
 
-/**
- * A shape, which is a line; `paper` counts from 0 to 1 over the whole chart.
- * @type {(shape: Shape, frame: Frame) => SVGSVGElement}
- */
+/** @type {(shape: Shape, frame: Frame) => SVGSVGElement} `paper` counts from 0 to 1 over the whole chart */
 function ruled({ x0, x1, y0, y1, xref, yref, line }, { x, y, l, t, inside }) {
   /** @type {Scale} */
   const across = xref === "paper" ? (share) => share * inside.width : x;

@@ -103,10 +103,7 @@ export function flat(answers) {
   };
 }
 
-/**
- * That some tests are not drawn, where there are more of them.
- * @type {(tests: StribeckItem[], drawn: number) => string}
- */
+/** @type {(tests: StribeckItem[], drawn: number) => string} that more tests are there than are drawn */
 const leftOut = (tests, drawn) =>
   drawn < tests.length
     ? ` ${drawn} of ${tests.length} tests are drawn; choose “Colour by pressure” to see any of them.`
@@ -175,10 +172,7 @@ export function surface(answers) {
  */
 const fewOf = (tests) => spread(spread(tests), 4);
 
-/**
- * The surface of one of several states, in one colour; points of all of them would hide one another.
- * @type {(drawn: Drawn[], cycles: number, color: string) => Trace}
- */
+/** @type {(drawn: Drawn[], cycles: number, color: string) => Trace} points would hide one another */
 function stateSurface(drawn, cycles, color) {
   const own = drawn.filter((curve) => curve.cycles === cycles);
   return {

@@ -22,10 +22,7 @@ function torqueAt(v, parameters) {
 /** @param {Pick<ClutchOut, "geometry">} clutch */
 const metresPerSecond = (clutch) => (meanRadius(clutch) * 2 * Math.PI) / 60;
 
-/**
- * The fitted torque, Nm, at a speed, rpm.
- * @type {(speed: number, fit: Fit, clutch: Pick<ClutchOut, "geometry">) => number}
- */
+/** @type {(speed: number, fit: Fit, clutch: Pick<ClutchOut, "geometry">) => number} Nm, `speed` in rpm */
 export const torqueAtSpeed = (speed, fit, clutch) => torqueAt(speed * metresPerSecond(clutch), fit.parameters);
 
 /**

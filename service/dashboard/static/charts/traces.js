@@ -42,10 +42,7 @@ export const errorBars = (sds, color, look) => ({
   ...look,
 });
 
-/**
- * A line; `text` is shown under the pointer.
- * @type {(name: string, at: Places, line: Line, text: string, more?: Partial<PlainTrace>) => PlainTrace}
- */
+/** @type {(name: string, at: Places, line: Line, text: string, more?: Partial<PlainTrace>) => PlainTrace} */
 export const lineOf = (name, at, line, text, more = {}) => ({
   name,
   mode: "lines",

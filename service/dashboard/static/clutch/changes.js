@@ -95,10 +95,7 @@ const TURNS = /** @type {const} */ ({
   restore: { past: "restored", noun: "restoration", back: "withdraw" },
 });
 
-/**
- * Withdraw a run or an inspection, or restore it: each is undone by the other.
- * @type {(action: keyof typeof TURNS, address: string, name: string, reason: string) => Promise<Done>}
- */
+/** @type {(action: keyof typeof TURNS, address: string, name: string, reason: string) => Promise<Done>} */
 async function turn(action, address, name, reason) {
   const after = await post(`${address}/${action}`, { reason });
   const { past, noun, back } = TURNS[action];
@@ -335,10 +332,7 @@ function ask({ title, lines, action, optional = false, cycles, choice, note, sen
 /** @type {HTMLElement | null} */
 let shown = null;
 
-/**
- * Say what was done, with the way back; `refresh`: reads the clutch again.
- * @type {(done: Done | null, refresh: () => Promise<unknown>) => Promise<void>}
- */
+/** @type {(done: Done | null, refresh: () => Promise<unknown>) => Promise<void>} `refresh`: reads the clutch again */
 export async function showDone(done, refresh) {
   if (done === null) return;
   shown?.remove();

@@ -54,14 +54,14 @@ const TABS = {
     };
     return { show: () => (reader.present().runs > 0 ? show() : diagnosis.poll()), poll: () => diagnosis.poll() };
   },
-  curves: (place) => new Curves(place, page),
-  loops: (place) => new Loops(place, page),
+  curves: () => new Curves(page),
+  loops: () => new Loops(page),
   engagements: () => {
     const engagements = new Engagements(ID, reader.name, within("engagements", ".charts"));
     return { show: async () => engagements.show(await reader.runs(), await reader.events()) };
   },
   runs: () => new Runs(within("runs", ".body"), page),
-  history: (place) => new History(place, page),
+  history: () => new History(page),
   alarms: (place) => {
     const alarms = new Alarms(place, ID);
     return { show: () => alarms.show(), poll: () => alarms.show() };

@@ -30,11 +30,8 @@ const DEPTHS = [
 const NAMES = PARAMETER_NAMES.map((key) => [key, PARAMETERS[key].title]);
 
 export class Curves {
-  /**
-   * @param {HTMLElement} _place
-   * @param {Page} page
-   */
-  constructor(_place, { reader }) {
+  /** @param {Page} page */
+  constructor({ reader }) {
     this.reader = reader;
     const { name } = reader;
     this.curves = new Chart({ name, id: "stribeck", title: "Stribeck curves", height: 440 });

@@ -118,11 +118,8 @@ function shown(value) {
 }
 
 export class History {
-  /**
-   * @param {HTMLElement} _place
-   * @param {Page} page
-   */
-  constructor(_place, { reader, done }) {
+  /** @param {Page} page */
+  constructor({ reader, done }) {
     this.reader = reader;
     const { name } = reader;
     this.predicted = new Chart({ name, id: "predicted", title: "Remaining cycles, as predicted", wide: true });

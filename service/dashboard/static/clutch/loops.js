@@ -18,11 +18,8 @@ import { BY } from "./curves.js";
 /** @import { Page } from "./clutch.js" */
 
 export class Loops {
-  /**
-   * @param {HTMLElement} _place
-   * @param {Page} page
-   */
-  constructor(_place, { reader }) {
+  /** @param {Page} page */
+  constructor({ reader }) {
     this.reader = reader;
     const { name } = reader;
     this.loops = new Chart({ name, id: "loop-curves", title: "Loops: torque over speed", wide: true, height: 420 });

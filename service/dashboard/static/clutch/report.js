@@ -51,10 +51,7 @@ export function makeReport(place, { clutch, life, tests = [], events = [], chart
   );
 }
 
-/**
- * The release, the settings and the data that a report is of.
- * @type {(clutch: ClutchOut, life: RemainingLife | undefined, tests: StribeckItem[]) => string}
- */
+/** @type {(clutch: ClutchOut, life: RemainingLife | undefined, tests: StribeckItem[]) => string} */
 function basis(clutch, life, tests) {
   const { severity, geometry, revision } = clutch;
   const disc = `${geometry.inner_diameter_mm}/${geometry.outer_diameter_mm} mm, ${geometry.friction_faces} faces, pressure factor ${geometry.pressure_factor}`;

@@ -15,10 +15,7 @@ import { named, pressureText, units } from "../shared/units.js";
 /** @import { Channels, ClutchOut, Receipt } from "../shared/types.js" */
 /** @import { Reader } from "./reader.js" */
 
-/**
- * The charts of a run; empty for one without channels.
- * @type {(run: Receipt, reader: Reader) => Promise<HTMLElement | null>}
- */
+/** @type {(run: Receipt, reader: Reader) => Promise<HTMLElement | null>} null for a run without channels */
 export async function runCharts(run, reader) {
   await reader.records([run.run_id]);
   const channels = reader.channels[run.run_id];

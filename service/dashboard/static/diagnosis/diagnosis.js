@@ -178,10 +178,7 @@ export class Diagnosis {
     if (done) this.status.textContent = id === null ? "The baseline is used again." : "Adopted.";
   }
 
-  /**
-   * Work that the reader waits for; resolves to whether it went well.
-   * @type {(status: string, work: () => Promise<void>) => Promise<boolean>}
-   */
+  /** @type {(status: string, work: () => Promise<void>) => Promise<boolean>} whether it went well */
   async doing(status, work) {
     const buttons = [...this.content.querySelectorAll("button"), this.run];
     for (const button of buttons) button.disabled = true;

@@ -31,10 +31,7 @@ export function lifeBars({ before, after }, names = ["Before", "After"]) {
   return h("dl", { class: "lifebars" }, rows);
 }
 
-/**
- * The quantiles of an answer, the quartiles taken from the 90 % interval where they are missing.
- * @type {(answer: Answer) => Quantiles | null}
- */
+/** @type {(answer: Answer) => Quantiles | null} missing quartiles are taken from the 90 % interval */
 function quantilesOf(answer) {
   const quantiles = /** @type {Quantiles | null | undefined} */ (answer?.remaining_cycles ?? answer);
   if (!quantiles || quantiles["0.5"] === undefined) return null;

@@ -31,20 +31,14 @@ const NO_COMPARISON = "To simulate an engagement, the present life needs a stati
 /** @param {[string, string] | string[]} named */
 const titleOf = ([title, unit]) => (unit === "" ? title : `${title}, ${unit}`);
 
-/**
- * The values of an indicator; engagements that do not determine it are left out.
- * @type {(measured: MeasuredEngagement[], name: Indicator) => { x: number, value: number, sd: number }[]}
- */
+/** @type {(measured: MeasuredEngagement[], name: Indicator) => { x: number, value: number, sd: number }[]} */
 const valuesOf = (measured, name) =>
   measured.flatMap(({ cycles, indicators }) => {
     const estimate = indicators[name];
     return estimate === null ? [] : [{ x: cycles, value: estimate.value, sd: estimate.sd }];
   });
 
-/**
- * An indicator over cycles.
- * @type {(answers: { measured: MeasuredEngagement[], events: Receipt[], name: Indicator }) => Spec}
- */
+/** @type {(answers: { measured: MeasuredEngagement[], events: Receipt[], name: Indicator }) => Spec} */
 function indicatorOverLife({ measured, events, name }) {
   if (measured.length === 0) return { empty: NO_ENGAGEMENT };
   const values = valuesOf(measured, name);
@@ -63,10 +57,7 @@ function indicatorOverLife({ measured, events, name }) {
   };
 }
 
-/**
- * A measured engagement beside the model's.
- * @type {(answers: { compared: ComparedEngagement | null, name: Channel }) => Spec}
- */
+/** @type {(answers: { compared: ComparedEngagement | null, name: Channel }) => Spec} beside the model's */
 function engagementTrace({ compared, name }) {
   if (compared === null) return { empty: NO_COMPARISON };
   const { channels, model, cycles } = compared;

@@ -37,10 +37,7 @@ const QUANTITIES = {
 /** @type {(lining: string) => string} a lining's name as the charts write it; without one, what it is */
 const nameOf = (lining) => lining.replaceAll("<", "‹") || "lining"; // no markup comes from outside
 
-/**
- * A quantity of the surface over cycles.
- * @type {(answers: { inspections: InspectionOut[], events: Receipt[], quantity: SurfaceQuantity }) => Spec}
- */
+/** @type {(answers: { inspections: InspectionOut[], events: Receipt[], quantity: SurfaceQuantity }) => Spec} */
 function surfaceOverLife({ inspections, events, quantity }) {
   const { title, name, meaning } = QUANTITIES[quantity];
   const measured = inspections.filter((item) => item[quantity] !== null);

@@ -105,10 +105,7 @@ function track({ pressure_bar: level, trajectory }, unit, c) {
   return tracked(trajectory, { name, line: { color: c.accent, width: 2.2, dash: "dash" }, text }, c);
 }
 
-/**
- * A quantity of one frequency over pressure, a line a state.
- * @type {(answers: { items: DegradationItem[], name: LagName }) => Spec}
- */
+/** @type {(answers: { items: DegradationItem[], name: LagName }) => Spec} a line a number of cycles */
 export function lagOverPressure({ items, name }) {
   const values = levelsOf(items).flatMap((level) => measuredAt(items, level));
   if (values.length === 0) return { empty: missing(name) };

@@ -15,7 +15,7 @@ const RECORD = "clutch.json";
 /** @type {(files: File[]) => Promise<Batch>} */
 export async function batchOf(files) {
   const listed = await listedRuns(files.find((file) => file.name === LIST));
-  const record = await content(files.find((file) => file.name === RECORD));
+  const record = await object(files.find((file) => file.name === RECORD));
   /** @type {Batch} */
   const batch = { runs: [], record: record && !("kind" in record) ? record : null, wrong: [] };
   for (const file of files) {
@@ -35,34 +35,32 @@ export async function batchOf(files) {
 /** @type {(file: File) => Promise<JsonRun | string>} a JSON run without its channels, or why it is none */
 async function jsonRun(file) {
   if (file.size > MOST_JSON_BYTES) return "too large for JSON; send it as CSV, TDMS, MDF4 or Parquet";
-  const run = await content(file);
+  const run = await object(file);
   if (run === null) return "not a run";
   if (typeof run.kind !== "string") return "not a run: its “kind” is missing";
   const { channels: _, ...rest } = run;
   return rest;
 }
 
-/** @type {(file: File | undefined) => Promise<any>} a JSON object, or null where the file is none */
+/** @type {(file: File | undefined) => Promise<any>} what a JSON file holds, null where it is none */
 async function content(file) {
   if (file === undefined || file.size > MOST_JSON_BYTES) return null;
   try {
-    const value = JSON.parse(await file.text());
-    return value !== null && typeof value === "object" && !Array.isArray(value) ? value : null;
+    return JSON.parse(await file.text());
   } catch {
     return null;
   }
 }
 
-/**
- * What a list of runs says of each file, by its name; null where there is no such list.
- * @type {(file: File | undefined) => Promise<Map<string, Listed> | null>}
- */
+/** @type {(file: File | undefined) => Promise<any>} a JSON object, or null where the file is none */
+async function object(file) {
+  const value = await content(file);
+  return value !== null && typeof value === "object" && !Array.isArray(value) ? value : null;
+}
+
+/** @type {(file: File | undefined) => Promise<Map<string, Listed> | null>} by file name; null without such a list */
 async function listedRuns(file) {
-  if (file === undefined || file.size > MOST_JSON_BYTES) return null;
-  try {
-    const entries = JSON.parse(await file.text());
-    return Array.isArray(entries) ? new Map(entries.map((entry) => [entry.file, entry])) : null;
-  } catch {
-    return null;
-  }
+  const entries = await content(file);
+  const whole = Array.isArray(entries) && entries.every((entry) => entry !== null);
+  return whole ? new Map(entries.map((entry) => [entry.file, entry])) : null;
 }

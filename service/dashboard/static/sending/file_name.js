@@ -44,10 +44,7 @@ function cyclesIn(stem) {
 /** @param {number} value */
 const isCount = (value) => value === 0 || value >= LEAST_UNNAMED;
 
-/**
- * A number of the name, and what word says what it counts.
- * @type {(tokens: Token[], index: number) => { value: number, by: string }}
- */
+/** @type {(tokens: Token[], index: number) => { value: number, by: string }} `by`: the word that says what it counts */
 function numberAt(tokens, index) {
   const token = tokens[index];
   const before = index > 0 ? tokens[index - 1] : undefined;

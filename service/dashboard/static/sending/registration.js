@@ -113,14 +113,8 @@ export function register(id, options = {}) {
  * @param {() => void} cancel
  */
 function form(id, record, registered, cancel) {
-  const name = h("input", {
-    id: "new-id",
-    value: id,
-    required: true,
-    autocomplete: "off",
-    autofocus: true,
-    ...IDENTIFIER,
-  });
+  const attributes = { required: true, autocomplete: "off", autofocus: true, ...IDENTIFIER };
+  const name = h("input", { id: "new-id", value: id, ...attributes });
   const inputs = SECTIONS.flatMap(([, fields]) => fields.map((shown) => inputOf(shown, record)));
   const answer = h("div", { "aria-live": "polite" });
   const submit = async (/** @type {SubmitEvent} */ event) => {
@@ -133,20 +127,11 @@ function form(id, record, registered, cancel) {
       answer.replaceChildren(problemView(problem, "Not registered. "));
     }
   };
-  /** @param {Field[]} fields */
-  const shown = (fields) => inputs.filter((input) => fields.includes(input.field));
-  const sections = SECTIONS.map(([title, fields]) =>
-    h(
-      "fieldset",
-      {},
-      h("legend", {}, title),
-      h(
-        "div",
-        { class: "fields" },
-        shown(fields).map(({ field: { label }, element }) => field(element, label)),
-      ),
-    ),
-  );
+  const sections = SECTIONS.map(([title, fields]) => {
+    const own = inputs.filter((input) => fields.includes(input.field));
+    const labelled = own.map(({ field: { label }, element }) => field(element, label));
+    return h("fieldset", {}, h("legend", {}, title), h("div", { class: "fields" }, labelled));
+  });
   return h(
     "form",
     { onsubmit: submit },

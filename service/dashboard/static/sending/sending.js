@@ -32,15 +32,8 @@ class Sending {
     this.batch = batch;
     this.page = page;
     this.alone = batch.runs.length === 1;
-    this.clutch = h("input", {
-      id: "to",
-      value: page.clutch ?? namedIn(batch),
-      required: true,
-      list: "registered",
-      autocomplete: "off",
-      spellcheck: "false",
-      ...IDENTIFIER,
-    });
+    const typed = { required: true, list: "registered", autocomplete: "off", spellcheck: "false", ...IDENTIFIER };
+    this.clutch = h("input", { id: "to", value: page.clutch ?? namedIn(batch), ...typed });
     this.go = h("button", { class: "main" });
     this.answer = h("div", { class: "answer", role: "status" });
     this.dialog = h("dialog", { "aria-labelledby": "sending-title" });
@@ -64,6 +57,7 @@ class Sending {
       this.send();
     };
     const close = button("Close", () => this.dialog.close());
+    const elements = runs.map((run) => run.element);
     const compare = () => runs.forEach((run) => run.compare(this.clutch.value.trim()));
     this.clutch.addEventListener("input", compare);
     this.clutch.addEventListener("input", () => this.suggest(suggestions));
@@ -75,11 +69,7 @@ class Sending {
         { onsubmit: submit },
         h("div", { class: "fields" }, field(this.clutch, "Clutch", suggestions)),
         wrong.length > 0 ? notRuns(wrong) : "",
-        h(
-          "div",
-          { class: "files" },
-          runs.map((run) => run.element),
-        ),
+        h("div", { class: "files" }, elements),
         this.answer,
         h("div", { class: "buttons" }, close, this.go),
       ),
@@ -175,11 +165,7 @@ class Sending {
       if (!(problem instanceof Problem && problem.status === 404)) throw problem;
     }
     const lead = `No clutch is registered as “${id}”. Nothing has been sent yet.`;
-    const chosen = await register(id, {
-      lead,
-      similar: await similarRegistered(id),
-      record: this.batch.record,
-    });
+    const chosen = await register(id, { lead, similar: await similarRegistered(id), record: this.batch.record });
     if (chosen !== null) this.clutch.value = chosen;
     return chosen;
   }
@@ -197,10 +183,7 @@ function notRuns(wrong) {
   return h("div", { class: "notice bad" }, h("b", {}, "Not sent, because they are not runs:"), h("ul", {}, items));
 }
 
-/**
- * `held`: of those that are stored.
- * @type {(stored: number, failed: number, held: number, id: string) => HTMLElement}
- */
+/** @type {(stored: number, failed: number, held: number, id: string) => HTMLElement} `held`: of those stored */
 function summary(stored, failed, held, id) {
   const text = failed > 0 ? `${stored} stored, ${failed} not stored: see each file.` : `All ${stored} stored.`;
   const doubted = held > 0 && ` ${held} of them ${held === 1 ? "is" : "are"} held, and must be confirmed or corrected.`;
@@ -208,10 +191,7 @@ function summary(stored, failed, held, id) {
   return h("p", { class: `notice ${failed > 0 ? "bad" : "good"}` }, text, doubted, " ", stored > 0 && link);
 }
 
-/**
- * Make a button and the whole page take files, several at once.
- * @type {(button: HTMLElement, take: (files: File[]) => unknown) => void}
- */
+/** @type {(button: HTMLElement, take: (files: File[]) => unknown) => void} from a button and dropped on the page */
 function takeFiles(button, take) {
   const chooser = h("input", { type: "file", multiple: true, hidden: true, "aria-label": "Run files" });
   chooser.addEventListener("change", () => {

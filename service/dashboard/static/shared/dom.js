@@ -83,10 +83,7 @@ export function showTab(names, name) {
 export const button = (label, onclick, attributes = {}) =>
   h("button", { type: "button", ...attributes, onclick }, label);
 
-/**
- * A list to choose from: values and their texts.
- * @type {(attributes: Attributes, options: [string | number, string][], chosen: unknown) => HTMLSelectElement}
- */
+/** @type {(attributes: Attributes, options: [string | number, string][], chosen: unknown) => HTMLSelectElement} */
 export function select(attributes, options, chosen) {
   const children = options.map(([value, text]) =>
     h("option", { value, selected: String(value) === String(chosen) }, text),
@@ -136,10 +133,7 @@ export function table(caption, columns, rows, { shown = false } = {}) {
   );
 }
 
-/**
- * A table that scrolls in its own place, by keyboard too.
- * @type {(label: string, ...content: Content[]) => HTMLElement}
- */
+/** @type {(label: string, ...content: Content[]) => HTMLElement} a place that scrolls, by keyboard too */
 export const scrolling = (label, ...content) =>
   h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": label }, ...content);
 

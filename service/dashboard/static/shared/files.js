@@ -26,10 +26,7 @@ export function files(name, address) {
   );
 }
 
-/**
- * Rows that the page has, the first of them the header, as buttons that save them; `name`: of the file.
- * @type {(name: string, rows: Cell[][]) => HTMLElement}
- */
+/** @type {(name: string, rows: Cell[][]) => HTMLElement} the first row is the header; `name`: of the file */
 export const rowFiles = (name, rows) =>
   h(
     "span",
@@ -39,10 +36,7 @@ export const rowFiles = (name, rows) =>
     ),
   );
 
-/**
- * Save rows, the first of them the header, in the format that the name's ending says.
- * @type {(name: string, rows: Cell[][]) => void}
- */
+/** @type {(name: string, rows: Cell[][]) => void} the first row is the header; the name's ending is the format */
 export function saveTable(name, rows) {
   if (name.endsWith(".xlsx")) return saveBlob(name, xlsxOf(rows));
   const text = rows.map((row) => row.map(quoted).join(",")).join("\r\n");

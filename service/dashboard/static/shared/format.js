@@ -52,10 +52,7 @@ export function withSd(value, sd) {
   return `${fixed(value, decimals)} ± ${fixed(sd, decimals)}`;
 }
 
-/**
- * An estimate and its deviation; one that is less than its deviation is not known.
- * @type {(value: Maybe, sd: Maybe) => string}
- */
+/** @type {(value: Maybe, sd: Maybe) => string} one that is less than its deviation is not known */
 export const estimate = (value, sd) =>
   isNumber(value) && isNumber(sd) && sd > Math.abs(value) ? UNKNOWN : withSd(value, sd);
 
@@ -170,10 +167,7 @@ export function words(name) {
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
-/**
- * A message of the service as a sentence; `starts`: whether it starts with a capital letter.
- * @type {(text: string, starts?: boolean) => string}
- */
+/** @type {(text: string, starts?: boolean) => string} `starts`: whether it starts with a capital letter */
 export function sentence(text, starts = true) {
   const first = starts ? text.charAt(0).toUpperCase() : text.charAt(0);
   return `${first}${text.slice(1)}${/[.?!]$/.test(text) ? "" : "."}`;
