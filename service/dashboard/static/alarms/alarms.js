@@ -60,11 +60,9 @@ export class Alarms {
       event.state === "acknowledged" ? `Acknowledged by ${event.acknowledged_by ?? ""}` : STATES[event.state],
       event.state === "raised" && this.button("Acknowledge", () => this.acknowledge(event), event.message),
     ]);
+    const columns = ["Raised", "Clutch", "What", "State", "Action"];
     this.events.replaceChildren(
-      h("h2", {}, "Alarms"),
-      rows.length === 0
-        ? quiet("No alarm has been raised.")
-        : h("div", { class: "panel" }, scrolling("Alarms", table("Alarms, the newest first", COLUMNS, rows))),
+      ...listed("Alarms", "No alarm has been raised.", table("Alarms, the newest first", columns, rows)),
       rowFiles("alarms", [
         ["raised at", "clutch", "message", "state", "acknowledged by", "value", "limit"],
         ...events.map((e) => [e.raised_at, e.clutch_id, e.message, e.state, e.acknowledged_by, e.value, e.limit]),
@@ -86,10 +84,11 @@ export class Alarms {
       ),
     ]);
     this.rules.replaceChildren(
-      h("h2", {}, "Rules"),
-      rows.length === 0
-        ? quiet("No rule yet: nothing raises an alarm.")
-        : h("div", { class: "panel" }, scrolling("Rules", table("Rules", ["An alarm when", "Of", "Action"], rows))),
+      ...listed(
+        "Rules",
+        "No rule yet: nothing raises an alarm.",
+        table("Rules", ["An alarm when", "Of", "Action"], rows),
+      ),
       button("New rule …", () => this.change(null), { class: "main" }),
     );
   }
@@ -106,15 +105,9 @@ export class Alarms {
       const receiver = await askReceiver(this.clutchId);
       if (receiver !== null) await this.send("POST", "/v1/webhooks", receiver);
     };
+    const columns = ["Name", "Address", "Of", "Action"];
     this.receivers.replaceChildren(
-      h("h2", {}, "Receivers"),
-      rows.length === 0
-        ? quiet("No receiver yet: alarms appear on this page only.")
-        : h(
-            "div",
-            { class: "panel" },
-            scrolling("Receivers", table("Receivers", ["Name", "Address", "Of", "Action"], rows)),
-          ),
+      ...listed("Receivers", "No receiver yet: alarms appear on this page only.", table("Receivers", columns, rows)),
       button("New receiver …", add),
     );
   }
@@ -158,4 +151,8 @@ export class Alarms {
   }
 }
 
-const COLUMNS = ["Raised", "Clutch", "What", "State", "Action"];
+/** @type {(title: string, empty: string, all: HTMLTableElement) => HTMLElement[]} a heading, and the rows or that there are none */
+const listed = (title, empty, all) => [
+  h("h2", {}, title),
+  all.tBodies[0].rows.length === 0 ? quiet(empty) : h("div", { class: "panel" }, scrolling(title, all)),
+];

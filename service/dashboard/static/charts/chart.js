@@ -231,14 +231,15 @@ function cellText(value, { text }) {
 }
 
 /**
- * A labelled choice for a chart's controls.
+ * A labelled choice for a chart's controls: of values, each with its text.
+ * @template {string | number} Value
  * @param {string} label
- * @param {[string | number, string][]} options values and their texts
- * @param {string | number | undefined} value
- * @param {(value: string) => unknown} changed
+ * @param {[Value, string][]} options
+ * @param {Value | undefined} value
+ * @param {(value: Value) => unknown} changed
  */
 export function choice(label, options, value, changed) {
-  const list = select({ onchange: () => changed(list.value) }, options, value);
+  const list = select({ onchange: () => changed(options[list.selectedIndex][0]) }, options, value);
   return h("label", {}, `${label} `, list);
 }
 

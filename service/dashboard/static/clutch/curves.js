@@ -72,7 +72,7 @@ export class Curves {
 
   pressureChoice = () =>
     choice("Pressure", levelOptions(pressuresOf(this.answers.tests)), this.pressure(), (value) => {
-      this.chosen.pressure = Number(value);
+      this.chosen.pressure = value;
       this.drawCurves();
       this.drawParameters();
     });
@@ -90,13 +90,13 @@ export class Curves {
         this.drawCurves();
       });
     const colour = choice("Colour by", BY, by, (value) => {
-      this.chosen.by = value === "pressure" ? "pressure" : "state";
+      this.chosen.by = value;
       this.drawCurves();
     });
     setControls(this.curves, tests.length > 0 ? [colour, by === "state" ? this.pressureChoice() : state()] : []);
     this.curves.show(flat({ ...shared, by }));
     const axis = choice("Torque over speed and", DEPTHS, over, async (value) => {
-      this.chosen.over = DEPTHS.map(([depth]) => depth).find((depth) => depth === value) ?? over;
+      this.chosen.over = value;
       await this.readRecords();
       this.drawCurves();
     });
@@ -113,7 +113,7 @@ export class Curves {
     }
     const which = (/** @type {"parameter" | "law"} */ of) =>
       choice("Parameter", NAMES, this.chosen[of], (value) => {
-        this.chosen[of] = PARAMETER_NAMES.find((key) => key === value) ?? this.chosen[of];
+        this.chosen[of] = value;
         this.drawParameters();
       });
     setControls(this.landscape, [which("parameter")]);

@@ -58,11 +58,11 @@ export class Loops {
     const pressure = chosen !== undefined && levels.includes(chosen) ? chosen : middle;
     const run = runs.some((loop) => loop.run_id === this.chosen.run) ? this.chosen.run : runs[0]?.run_id;
     const axis = choice("Colour by", BY, over, (value) => {
-      this.chosen.over = value === "pressure" ? "pressure" : "state";
+      this.chosen.over = value;
       this.draw();
     });
     const level = choice("Pressure", levelOptions(levels), pressure, (value) => {
-      this.chosen.pressure = Number(value);
+      this.chosen.pressure = value;
       this.draw();
     });
     const state = choice("Cycles", stateOptions(runs), run, async (value) => {
@@ -97,7 +97,7 @@ export class Loops {
       LAG_NAMES.map((key) => [key, QUANTITIES[key].title]),
       name,
       (value) => {
-        this.chosen.lag = LAG_NAMES.find((key) => key === value) ?? name;
+        this.chosen.lag = value;
         this.answers.lag = null;
         this.wantLag();
       },
@@ -111,12 +111,12 @@ export class Loops {
       frequencies.map((hz) => [hz, `${hz} Hz`]),
       frequency,
       (value) => {
-        this.chosen.frequency = Number(value);
+        this.chosen.frequency = value;
         this.drawLag();
       },
     );
     const level = choice("Band at", levelOptions(levelsOf(items)), pressure, (value) => {
-      this.chosen.lagPressure = Number(value);
+      this.chosen.lagPressure = value;
       this.drawLag();
     });
     setControls(this.overCycles, items.length > 0 ? [quantity, hertz, level] : [quantity]);

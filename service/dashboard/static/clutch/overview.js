@@ -119,7 +119,7 @@ export class Overview {
     if (slopes === null) return;
     const pressure = this.slopeLevel();
     const level = choice("Pressure", levelOptions(levelsOf(slopes)), pressure, async (value) => {
-      this.level = Number(value);
+      this.level = value;
       this.tracked.limits = null;
       this.drawShudder();
       this.slopes.want(`${(await this.reader.life()).revision} ${this.level}`);

@@ -98,12 +98,12 @@ const NOTHING = { measured: [], compared: null };
 
 /**
  * @template {string} Name
- * @param {Record<Name, string[]>} names
- * @param {string} value
- * @param {Name} usual
- * @returns {Name}
+ * @param {Record<Name, string[]>} named each with its title
  */
-const among = (names, value, usual) => (value in names ? /** @type {Name} */ (value) : usual);
+function optionsOf(named) {
+  const names = /** @type {Name[]} */ (Object.keys(named));
+  return names.map((name) => /** @type {[Name, string]} */ ([name, named[name][0]]));
+}
 
 export class Engagements {
   /**
@@ -155,9 +155,8 @@ export class Engagements {
 
   drawOverLife() {
     const { measured } = this.answer;
-    const names = Object.entries(INDICATORS).map(([key, [title]]) => /** @type {[string, string]} */ ([key, title]));
-    const which = choice("Indicator", names, this.indicator, (value) => {
-      this.indicator = among(INDICATORS, value, this.indicator);
+    const which = choice("Indicator", optionsOf(INDICATORS), this.indicator, (value) => {
+      this.indicator = value;
       this.drawOverLife();
     });
     setControls(this.overLife, measured.length > 0 ? [which] : []);
@@ -166,9 +165,8 @@ export class Engagements {
 
   drawTrace() {
     const { measured, compared } = this.answer;
-    const names = Object.entries(CHANNELS).map(([key, [title]]) => /** @type {[string, string]} */ ([key, title]));
-    const which = choice("Channel", names, this.channel, (value) => {
-      this.channel = among(CHANNELS, value, this.channel);
+    const which = choice("Channel", optionsOf(CHANNELS), this.channel, (value) => {
+      this.channel = value;
       this.drawTrace();
     });
     /** @type {[string, string][]} */

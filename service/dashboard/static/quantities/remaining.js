@@ -98,7 +98,7 @@ export class RemainingBy {
     /** @type {[string | number, string][]} */
     const options = whole ? [[ALL, "all pressures"], ...levelOptions(levels)] : levelOptions(levels);
     const pressure = choice("Pressure", options, this.level ?? ALL, (level) =>
-      this.choose(this.name, level === ALL ? undefined : Number(level)),
+      this.choose(this.name, typeof level === "number" ? level : undefined),
     );
     setControls(this, options.length > 0 ? [quantity, pressure] : [quantity]);
   }
