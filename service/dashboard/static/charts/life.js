@@ -93,12 +93,7 @@ export function meanCof({ tests, events }) {
     columns: [CYCLES, PRESSURE, column("mean COF", 4), column("standard deviation", 5)],
     rows: values.map(({ cycles, pressure, value, sd }) => [cycles, pressure, value, sd]),
     figure: (c) => ({
-      data: linesByPressure(
-        pressures,
-        (level) => values.filter(({ pressure }) => pressure === level),
-        { size: 5, bars: 2, text: "mean COF %{y:.4f}" },
-        c,
-      ),
+      data: linesByPressure(values, { size: 5, bars: 2, text: "mean COF %{y:.4f}" }, c),
       layout: { xaxis: titled("duty cycles"), yaxis: titled("mean COF"), ...eventMarks(events, c) },
     }),
   };

@@ -25,6 +25,7 @@ export function sketch({ data, layout, ticks, legend }, { width, height }) {
   const x = along(layout.xaxis.range, 0, inside.width);
   const y = along(layout.yaxis.range, inside.height, 0);
   const frame = { x, y, l, t, inside };
+  const axes = `M${l} ${t}V${t + inside.height}H${l + inside.width}`;
   const attributes = {
     class: "sketch",
     viewBox: `0 0 ${width} ${height}`,
@@ -50,11 +51,7 @@ export function sketch({ data, layout, ticks, legend }, { width, height }) {
       data.map((trace, index) => drawn(trace, data[index - 1], x, y)),
     ),
     (layout.shapes ?? []).map((shape) => ruled(shape, frame)),
-    svg("path", {
-      d: `M${l} ${t}V${t + inside.height}H${l + inside.width}`,
-      fill: "none",
-      stroke: layout.xaxis.linecolor,
-    }),
+    svg("path", { d: axes, fill: "none", stroke: layout.xaxis.linecolor }),
     (layout.annotations ?? []).map((annotation) => noted(annotation, frame)),
     label(layout.xaxis.title?.text ?? "", { ...titles.x, "text-anchor": "middle" }),
     label(layout.yaxis.title?.text ?? "", { ...titles.y, "text-anchor": "middle" }),
@@ -102,12 +99,10 @@ function label(text, attributes) {
 const DASHES = { dash: 3, dot: 1 };
 
 /** @param {Line} line */
-const dashes = ({ dash, width = 2 }) =>
-  dash
-    ? Array(2)
-        .fill(DASHES[dash] * Math.max(3, width))
-        .join(" ")
-    : null;
+function dashes({ dash, width = 2 }) {
+  const length = dash && DASHES[dash] * Math.max(3, width);
+  return length ? `${length} ${length}` : null;
+}
 
 /** @type {(xs: (number | null)[], ys: (number | null)[]) => string} the pen lifted where a value is missing */
 function pathOf(xs, ys) {

@@ -2,7 +2,7 @@
 // The traces that several charts draw: bands between two edges, and points or lines with error bars.
 
 import { pressureText } from "../shared/units.js";
-import { HALF_OF_90 } from "./columns.js";
+import { distinct, HALF_OF_90 } from "./columns.js";
 import { faint, pressureRampOf } from "./palette.js";
 
 /** @import { Measured } from "../shared/types.js" */
@@ -82,13 +82,11 @@ export const measuredPoints = (name, { cycles: x, value: y, sd }, { color, text,
   hovertemplate: `${text}<extra></extra>`,
 });
 
+/** @typedef {{ size: number, bars: number, text: string }} Look `text`: under the pointer */
+
 /**
  * A line with points and error bars.
- * @param {string} name
- * @param {{ x: number, value: number, sd: number | null }[]} values
- * @param {{ size: number, bars: number, text: string }} look `text` is shown under the pointer
- * @param {string} color
- * @returns {PlainTrace}
+ * @type {(name: string, values: { x: number, value: number, sd: number | null }[], look: Look, color: string) => PlainTrace}
  */
 export const measuredLine = (name, values, { size, bars, text }, color) => ({
   name,
@@ -107,17 +105,17 @@ export const measuredLine = (name, values, { size, bars, text }, color) => ({
 
 /**
  * A line with points and error bars for each pressure, over cycles.
- * @param {number[]} pressures
- * @param {(pressure: number) => { cycles: number, value: number, sd: number | null }[]} valuesAt
- * @param {{ size: number, bars: number, text: string }} look `text` says a value under the pointer
+ * @param {{ cycles: number, pressure: number, value: number, sd: number | null }[]} values
+ * @param {Look} look
  * @param {Colours} c
- * @returns {PlainTrace[]}
  */
-export function linesByPressure(pressures, valuesAt, { size, bars, text }, c) {
-  return pressures.map((pressure, index) => {
-    const values = valuesAt(pressure).map(({ cycles, value, sd }) => ({ x: cycles, value, sd }));
-    const name = pressureText(pressure);
+export function linesByPressure(values, { size, bars, text }, c) {
+  const pressures = distinct(values.map(({ pressure }) => pressure));
+  return pressures.map((level, index) => {
+    const own = values.filter(({ pressure }) => pressure === level);
+    const points = own.map(({ cycles, value, sd }) => ({ x: cycles, value, sd }));
+    const name = pressureText(level);
     const under = `%{x:,.0f} cycles, ${name}<br>${text}`;
-    return measuredLine(name, values, { size, bars, text: under }, pressureRampOf(c, index, pressures.length));
+    return measuredLine(name, points, { size, bars, text: under }, pressureRampOf(c, index, pressures.length));
   });
 }

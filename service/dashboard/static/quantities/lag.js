@@ -52,17 +52,14 @@ const columnsOf = (name) => [
 /** @param {LagName} name */
 const missing = (name) => `${QUANTITIES[name].title}: no dynamic Stribeck test determines it yet. ${MEANINGS[name]}.`;
 
-/**
- * The values that were measured at a pressure.
- * @param {DegradationItem[]} items
- * @param {number} level bar
- */
-const measuredAt = (items, level) =>
-  items
-    .filter((item) => item.pressure_bar === level)
-    .flatMap(({ measured: { cycles, value, sd } }) =>
+/** @param {DegradationItem[]} items what was measured, by pressure */
+const measuredOf = (items) =>
+  levelsOf(items).flatMap((level) => {
+    const own = items.filter((item) => item.pressure_bar === level);
+    return own.flatMap(({ measured: { cycles, value, sd } }) =>
       cycles.map((at, index) => ({ cycles: at, pressure: level, value: value[index], sd: sd[index] })),
     );
+  });
 
 /**
  * A quantity of one frequency over cycles, a line a pressure; of one pressure its track with the band.
@@ -86,12 +83,7 @@ export function lagOverCycles({ items, name, pressure, events }) {
     figure: (c) => ({
       data: [
         ...(course ? track(course, unit, c) : []),
-        ...linesByPressure(
-          levelsOf(items),
-          (level) => measuredAt(items, level),
-          { size: 7, bars: 3, text: `%{y:.3g} ${unit}` },
-          c,
-        ),
+        ...linesByPressure(measuredOf(items), { size: 7, bars: 3, text: `%{y:.3g} ${unit}` }, c),
       ],
       layout: { xaxis: titled("duty cycles"), yaxis: titled(axisOf(name)), ...eventMarks(events, c) },
     }),
@@ -107,7 +99,7 @@ function track({ pressure_bar: level, trajectory }, unit, c) {
 
 /** @type {(answers: { items: DegradationItem[], name: LagName }) => Spec} a line a number of cycles */
 export function lagOverPressure({ items, name }) {
-  const values = levelsOf(items).flatMap((level) => measuredAt(items, level));
+  const values = measuredOf(items);
   if (values.length === 0) return { empty: missing(name) };
   const { title, unit } = QUANTITIES[name];
   const states = distinct(values.map(({ cycles }) => cycles));
