@@ -5,16 +5,9 @@ import { sendJson } from "../shared/api.js";
 import { answered, button, field, h, quiet } from "../shared/dom.js";
 import { problemView } from "../shared/problem_view.js";
 
-/**
- * @typedef {object} ClutchRecord a clutch as the API takes it
- * @property {Record<string, number | null>} [geometry]
- * @property {Record<string, number>} [oil]
- * @property {Record<string, number>} [end_of_life]
- * @property {string} [friction_material]
- * @property {string} [reaction_plate]
- * @property {string} [fluid]
- * @property {string} [clutch_id]
- */
+/** @import { ClutchIn } from "../shared/types.js" */
+
+/** @typedef {{ [Key in keyof ClutchIn]?: Partial<ClutchIn[Key]> }} ClutchRecord a clutch as the API takes it */
 
 /** The form's values at first: the reference's clutch, as the service fills in what is left out. */
 export const DEFAULTS = {
@@ -73,20 +66,14 @@ const SECTIONS = [
 ];
 
 /**
- * @typedef {object} Options
- * @property {string[]} [similar] registered names, one of which may be meant
- * @property {ClutchRecord | null} [record] other values at first
- * @property {string} [lead] why the form is shown
- */
-
-/**
  * The form in a dialog; resolves to the clutch to go on with: the one that was registered, one of `similar`, or null where
  * the reader leaves it.
  * @param {string} id
- * @param {Options} [options]
+ * @param {{ similar?: string[], record?: ClutchRecord | null, lead?: string }} [options] registered names, one of which may be
+ *   meant; other values at first; why the form is shown
  * @returns {Promise<string | null>}
  */
-export function register(id, options = {}) {
+export function register(id, { similar = [], record = null, lead = "" } = {}) {
   const dialog = h("dialog", { class: "registration", "aria-labelledby": "registration-title" });
   /** @type {string | null} */
   let result = null;
@@ -95,13 +82,13 @@ export function register(id, options = {}) {
     result = chosen;
     dialog.close();
   };
-  const others = (options.similar ?? []).map((name) => button(`Send to ${name} instead`, () => end(name)));
+  const others = similar.map((name) => button(`Send to ${name} instead`, () => end(name)));
   dialog.append(
     h("h2", { id: "registration-title" }, "Register a clutch"),
-    options.lead ? h("p", { class: "notice" }, options.lead) : "",
+    lead && h("p", { class: "notice" }, lead),
     others.length > 0 ? h("p", { class: "buttons start" }, others) : "",
     quiet("These are the values of the reference clutch. Change the values that differ on your clutch."),
-    form(id, options.record ?? null, end, () => dialog.close()),
+    form(id, record, end, () => dialog.close()),
   );
   return answered(dialog, () => result);
 }
