@@ -170,7 +170,7 @@ def _agree(times: FloatArray, others: FloatArray) -> bool:
     if times.size != others.size:
         return False
     steps = [step[step > 0].min(initial=np.inf) for step in (np.diff(times), np.diff(others))]
-    max_difference = np.abs(times - times[0] - others + others[0]).max()
+    max_difference = np.abs(times - times[:1] - others + others[:1]).max(initial=0.0)
     return bool(max_difference <= max(steps) * (1 + 1e-9))
 
 
