@@ -28,7 +28,7 @@ settings.load_profile("untimed")
 #: Fixtures, and values of fixtures, that start a server or a browser.
 OUTSIDE = {"postgresql", "s3", "on_server", "in_bucket", "browser", "server"}
 #: Tests of the service that run on a server, too, in every run; the others do so in `make slow`. Tests of storage always do.
-ON_BOTH = {"test_compute_then_store.py", "test_raw_run.py"}
+ON_BOTH = {"test_compute_then_store.py"}
 #: Folders, files and tests that take longer than 0.1 s of the processor; `make quick ARGS=--durations=20` shows what belongs
 #: here.
 LONG = frozenset(Path(__file__).with_name("long.txt").read_text(encoding="utf-8").split())

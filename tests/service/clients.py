@@ -19,9 +19,10 @@ from tests.storage.samples import lay_empty
 from tests.support import stationary
 
 
-def clutchlife(*arguments: str | Path, code: int = 0) -> str:
-    """Run a command in this process and return what it printed."""
-    done = CliRunner().invoke(command_line, list(map(str, arguments)), catch_exceptions=False)
+def clutchlife(*arguments: object, code: int = 0, answers: str = "") -> str:
+    """Run a command in this process, with `answers` to its questions, and return what it printed."""
+    called = list(map(str, arguments))
+    done = CliRunner().invoke(command_line, called, input=answers, env={"COLUMNS": "200"}, catch_exceptions=False)
     assert done.exit_code == code, done.output
     return done.output
 
@@ -42,10 +43,16 @@ def client_on(database_url: str, **settings: Any) -> Iterator[TestClient]:
     if database_url.startswith("sqlite:///"):
         lay_empty(Path(database_url.removeprefix("sqlite:///")))
     app = create_app(Settings(workers=0, database=database_url, **({"max_body_mb": 1} | settings)))
-    with TestClient(
-        app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000), raise_server_exceptions=False
-    ) as found:
+    here = {"base_url": "http://127.0.0.1", "client": ("127.0.0.1", 50000)}
+    with TestClient(app, raise_server_exceptions=False, **here) as found:
         yield found
+
+
+def post_run(client: TestClient, run: dict[str, Any], clutch_id: str = "c1") -> dict[str, Any]:
+    """Post a run that is stored; its receipt."""
+    answer = client.post(f"/v1/clutches/{clutch_id}/runs", json=run)
+    assert answer.status_code == 201, answer.text
+    return answer.json()
 
 
 @contextmanager
@@ -64,7 +71,7 @@ def filled(*cycles: float, clutch_id: str = "c1") -> bytes:
             for each in dict.fromkeys(("c1", clutch_id)):
                 assert client.post("/v1/clutches", json={"clutch_id": each}).status_code == 201
             for each in cycles:
-                assert client.post(f"/v1/clutches/{clutch_id}/runs", json=stationary(each)).status_code == 201
+                post_run(client, stationary(each), clutch_id)
         return Path(folder, "a.db").read_bytes()
 
 

@@ -39,12 +39,8 @@ def test_a_record_is_one_line_of_json() -> None:
     assert len(line.splitlines()) == 1
     assert line.isascii()
     read = json.loads(line)
-    assert (read["level"], read["logger"], read["message"], read["key"]) == (
-        "warning",
-        "clutchlife",
-        f"a: {FORGED}",
-        FORGED,
-    )
+    expected = {"level": "warning", "logger": "clutchlife", "message": f"a: {FORGED}", "key": FORGED}
+    assert expected.items() <= read.items()
     assert read["time"].endswith("Z")
     assert "request_id" not in read
 
@@ -85,22 +81,17 @@ def test_ours_are_heard_from_the_level_on_and_others_from_warning_on() -> None:
     assert heard == [*[(name, level) for name in ours for level in ("info", "warning")], ("alembic.runtime", "warning")]
 
 
-def test_auto_is_text_on_a_terminal_and_json_elsewhere() -> None:
-    class Terminal(io.StringIO):
-        def isatty(self) -> bool:
-            return True
-
-    for form, stream, is_json in (
-        ("auto", io.StringIO(), True),
-        ("auto", Terminal(), False),
-        ("text", io.StringIO(), False),
-    ):
-        configure(form, "info", stream)  # type: ignore[arg-type]
-        logging.getLogger("clutchlife").info("x")
-        assert stream.getvalue().startswith("{") is is_json
-    configure("json", "info", stream := Terminal())
+@pytest.mark.parametrize(
+    ("form", "on_a_terminal", "is_json"),
+    [("auto", False, True), ("auto", True, False), ("text", False, False), ("json", True, True)],
+)
+def test_auto_is_text_on_a_terminal_and_json_elsewhere(
+    form: LogFormat, on_a_terminal: bool, is_json: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stream := io.StringIO(), "isatty", lambda: on_a_terminal)
+    configure(form, "info", stream)
     logging.getLogger("clutchlife").info("x")
-    assert stream.getvalue().startswith("{")
+    assert stream.getvalue().startswith("{") is is_json
 
 
 def test_a_request_is_a_line_with_numbers() -> None:

@@ -1,5 +1,6 @@
 """Fits as rows and back."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,8 @@ from service import records
 from service.lives.run_analysis import LevelFit, levels_of
 from storage import clutches, results, runs
 from storage.engine.database import Database
+from storage.results import FitRow
 from tests.storage.samples import clutch_row, new_run
-
-CLUTCH = "bench3-017"
 
 
 def fitted() -> tuple[LevelFit, ...]:
@@ -22,12 +22,18 @@ def fitted() -> tuple[LevelFit, ...]:
     return levels_of(stationary_test(clutch, 0.0, rng), clutch.geometry)
 
 
-def test_fits_come_back_with_both_covariances(database: Database) -> None:
-    levels = fitted()
+def stored(database: Database, rows: Sequence[FitRow]) -> tuple[LevelFit, ...]:
+    """What is read of a run's fits."""
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
-        results.write_fits(connection, runs.insert(connection, new_run()), records.fit_rows(levels, {}))
-        [found] = records.levels(connection, CLUTCH).values()
+        results.write_fits(connection, runs.insert(connection, new_run()), rows)
+        [found] = records.levels(connection, clutch_row().clutch_id).values()
+    return found
+
+
+def test_fits_come_back_with_both_covariances(database: Database) -> None:
+    levels = fitted()
+    found = stored(database, records.fit_rows(levels, {}))
     for sent, back in zip(levels, found, strict=True):
         np.testing.assert_array_equal(back.fit.covariance, sent.fit.covariance)
         np.testing.assert_array_equal(back.fit.unbiased_covariance, sent.fit.unbiased_covariance)
@@ -38,10 +44,6 @@ def test_fits_come_back_with_both_covariances(database: Database) -> None:
 
 def test_the_wide_covariance_stands_for_the_one_that_an_earlier_release_had_not(database: Database) -> None:
     levels = fitted()
-    rows = [replace(row, unbiased_covariance=None) for row in records.fit_rows(levels, {})]
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        results.write_fits(connection, runs.insert(connection, new_run()), rows)
-        [found] = records.levels(connection, CLUTCH).values()
+    found = stored(database, [replace(row, unbiased_covariance=None) for row in records.fit_rows(levels, {})])
     for sent, back in zip(levels, found, strict=True):
         np.testing.assert_array_equal(back.fit.unbiased_covariance, sent.fit.covariance)

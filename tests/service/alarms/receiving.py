@@ -3,14 +3,16 @@
 import hashlib
 import hmac
 import json
+import socketserver
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any
+from typing import Any, TypeVar
 
 SECRET = "a-secret-of-tests"  # noqa: S105
+Found = TypeVar("Found")
 
 
 class Receiver:
@@ -33,11 +35,29 @@ class Receiver:
 
     def await_requests(self, count: int, seconds: float = 20.0) -> list[dict[str, Any]]:
         """The bodies, once there are so many."""
-        deadline = time.monotonic() + seconds
-        while len(self.requests) < count and time.monotonic() < deadline:
-            time.sleep(0.02)
-        assert len(self.requests) >= count, f"{len(self.requests)} of {count} requests arrived"
+        assert once(lambda: len(self.requests) >= count, seconds), f"{len(self.requests)} of {count} requests arrived"
         return self.bodies
+
+
+def once(found: Callable[[], Found], seconds: float = 20.0) -> Found:
+    """What is found as soon as it holds, or after so many seconds."""
+    deadline = time.monotonic() + seconds
+    while not (there := found()) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return there
+
+
+@contextmanager
+def in_thread(server: socketserver.BaseServer) -> Iterator[int]:
+    """A server of this process, and its port."""
+    thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
+    thread.start()
+    try:
+        yield server.server_address[1]
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
 
 
 @contextmanager
@@ -57,17 +77,8 @@ def receiving() -> Iterator[Receiver]:
         def log_message(self, *_: object) -> None:
             pass
 
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    server.daemon_threads = True
-    receiver.port = server.server_address[1]
-    thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
-    thread.start()
-    try:
+    with in_thread(ThreadingHTTPServer(("127.0.0.1", 0), Handler)) as receiver.port:
         yield receiver
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()
 
 
 def signed_rightly(headers: dict[str, str], body: bytes, secret: str = SECRET) -> bool:

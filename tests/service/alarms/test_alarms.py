@@ -1,6 +1,5 @@
 """Rules and events as a script uses them: raised once, acknowledged, cleared by the hysteresis; receivers learn of it."""
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from fastapi.testclient import TestClient
 from service.alarms import outbox
 from service.schemas.alarm import AlarmIn
 from service.workflows import change_alarms
-from tests.service.alarms.receiving import SECRET, Receiver, receiving, signed_rightly
+from tests.service.alarms.receiving import SECRET, Receiver, once, receiving, signed_rightly
 from tests.service.clients import client_of
 from tests.support import stationary
 
@@ -34,20 +33,17 @@ def life(tmp_path: Path) -> Iterator[TestClient]:
 def rule(client: TestClient, **fields: Any) -> dict[str, Any]:
     answer = client.post("/v1/alarms", json={"clutch_id": "e", **fields})
     assert answer.status_code == 201, answer.text
-    made: dict[str, Any] = answer.json()
-    return made
+    return answer.json()
 
 
 def events(client: TestClient, **arguments: str) -> list[dict[str, Any]]:
     answer = client.get("/v1/alarms/events", params=arguments)
     assert answer.status_code == 200, answer.text
-    items: list[dict[str, Any]] = answer.json()["items"]
-    return items
+    return answer.json()["items"]
 
 
 def at_least(client: TestClient) -> float:
-    bound: float = client.get("/v1/clutches/e/remaining-useful-life").json()["at_least"]
-    return bound
+    return client.get("/v1/clutches/e/remaining-useful-life").json()["at_least"]
 
 
 def test_a_posted_run_raises_an_alarm_once(life: TestClient) -> None:
@@ -61,11 +57,6 @@ def test_a_posted_run_raises_an_alarm_once(life: TestClient) -> None:
     assert raised["state"] == "raised"
     assert raised["value"] < limit == raised["limit"]
     assert raised["message"].startswith("e: safe for ")
-
-
-def test_a_rule_looks_at_clutches_as_they_are(life: TestClient) -> None:
-    rule(life, quantity="remaining_cycles", below=1e9)
-    assert [event["clutch_id"] for event in events(life)] == ["e"]
 
 
 def test_the_rule_of_the_contract_is_the_same_made_twice(life: TestClient) -> None:
@@ -87,9 +78,7 @@ def test_a_clutch_has_so_many_rules_and_no_more(life: TestClient, monkeypatch: p
     assert "there are 2 rules of clutch 'e', which is the maximum" in refused.json()["detail"]
     assert life.put(f"/v1/alarms/{made[0]}", json=body).status_code == 200
     assert life.post("/v1/alarms", json=body).status_code == 200  # it is there already
-    several = [
-        life.post("/v1/alarms", json={"quantity": "held_runs", "above": limit}).status_code for limit in range(3)
-    ]
+    several = [life.post("/v1/alarms", json={"quantity": "held_runs", "above": n}).status_code for n in range(3)]
     assert several == [201, 201, 409]
 
 
@@ -115,11 +104,8 @@ def test_an_acknowledged_alarm_is_not_raised_again(life: TestClient) -> None:
     address = f"/v1/alarms/events/{raised['event_id']}"
     seen = life.post(f"{address}/acknowledge", json={"note": "ordered"})
     assert seen.status_code == 200
-    assert (seen.json()["state"], seen.json()["note"], seen.json()["acknowledged_by"]) == (
-        "acknowledged",
-        "ordered",
-        "local",
-    )
+    said = {"state": "acknowledged", "note": "ordered", "acknowledged_by": "local"}
+    assert said.items() <= seen.json().items()
     life.post("/v1/clutches/e/runs", json=stationary(4000.0))
     (still,) = events(life, state="open")
     assert still == seen.json() == life.get(address).json()
@@ -155,13 +141,6 @@ def test_it_is_cleared_by_the_hysteresis_and_raised_again(life: TestClient) -> N
     assert events(life, state="open") == []
     life.put(address, json=body | {"below": value + 1})
     assert [event["state"] for event in events(life)] == ["raised", "cleared"]
-
-
-def test_a_deleted_rule_clears_what_it_raised(life: TestClient) -> None:
-    made = rule(life, quantity="remaining_cycles", below=1e9)
-    assert life.delete(f"/v1/alarms/{made['alarm_id']}").status_code == 204
-    assert [event["state"] for event in events(life)] == ["cleared"]
-    assert life.get(f"/v1/alarms/{made['alarm_id']}").status_code == 404
 
 
 @pytest.mark.parametrize(
@@ -215,10 +194,7 @@ def test_a_new_verdict_is_an_alarm(life: TestClient) -> None:
 def test_a_silent_rig_is_an_alarm_and_a_state(life: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outbox, "CLOCK_SECONDS", 0.1)
     rule(life, quantity="silent_hours", above=0.5 / 3600)
-    deadline = time.monotonic() + 20
-    while not events(life) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    (raised,) = events(life)
+    (raised,) = once(lambda: events(life))
     clutch = life.get("/v1/clutches/e").json()
     assert clutch["state"]["name"] == "check"
     assert "the rig is silent" in clutch["state"]["why"]
@@ -258,24 +234,21 @@ def test_an_archived_clutch_has_no_alarms(life: TestClient) -> None:
         {"quantity": "held_runs", "any_of": ["failure"]},
         {"quantity": "held_runs", "clutch_id": "e", "kind": {}},
         {"quantity": "unheard_of"},
+        {"quantity": "held_runs", "clutch_id": "nobody"},
     ],
     ids=str,
 )
 def test_a_rule_that_says_nothing_is_refused(shared_client: TestClient, body: dict[str, Any]) -> None:
-    assert shared_client.post("/v1/alarms", json=body).status_code == 422
+    status = 404 if body.get("clutch_id") == "nobody" else 422
+    assert shared_client.post("/v1/alarms", json=body).status_code == status
     assert shared_client.get("/v1/alarms").json()["items"] == []
-
-
-def test_an_unknown_clutch_has_no_rules(client: TestClient) -> None:
-    assert client.post("/v1/alarms", json={"clutch_id": "nobody", "quantity": "held_runs"}).status_code == 404
 
 
 def webhook(client: TestClient, receiver: Receiver, **more: Any) -> str:
     answer = client.post("/v1/webhooks", json={"url": receiver.url, "secret": SECRET, **more})
     assert answer.status_code == 201, answer.text
     assert SECRET not in answer.text
-    name: str = answer.json()["webhook_id"]
-    return name
+    return answer.json()["webhook_id"]
 
 
 def test_a_receiver_is_sent_a_signed_request(life: TestClient, receiver: Receiver) -> None:
@@ -296,12 +269,12 @@ def test_a_receiver_is_sent_a_signed_request(life: TestClient, receiver: Receive
 
 def deliveries(client: TestClient, webhook_id: str, state: str = "delivered") -> list[dict[str, Any]]:
     """A receiver's deliveries, once the newest is in that state."""
-    deadline = time.monotonic() + 20
-    while True:
-        items: list[dict[str, Any]] = client.get(f"/v1/webhooks/{webhook_id}/deliveries").json()["items"]
-        if (items and items[0]["state"] == state) or time.monotonic() > deadline:
-            return items
-        time.sleep(0.02)
+
+    def listed() -> list[dict[str, Any]]:
+        return client.get(f"/v1/webhooks/{webhook_id}/deliveries").json()["items"]
+
+    once(lambda: [item["state"] for item in listed()[:1]] == [state])
+    return listed()
 
 
 def test_a_receiver_that_fails_is_tried_again_with_the_same_body(life: TestClient, receiver: Receiver) -> None:
@@ -318,11 +291,13 @@ def test_a_receiver_that_fails_is_tried_again_with_the_same_body(life: TestClien
     assert (item["state"], item["attempts"], item["problem"]) == ("delivered", 2, None)
 
 
-def test_that_an_alarm_is_over_is_sent_where_it_is_wanted(life: TestClient, receiver: Receiver) -> None:
+def test_a_deleted_rule_clears_its_alarm_and_that_is_sent_where_wanted(life: TestClient, receiver: Receiver) -> None:
     webhook(life, receiver, cleared=True)
-    made = rule(life, quantity="remaining_cycles", below=1e9)
+    address = f"/v1/alarms/{rule(life, quantity='remaining_cycles', below=1e9)['alarm_id']}"
     receiver.await_requests(1)
-    life.delete(f"/v1/alarms/{made['alarm_id']}")
+    assert life.delete(address).status_code == 204
+    assert [event["state"] for event in events(life)] == ["cleared"]
+    assert life.get(address).status_code == 404
     bodies = receiver.await_requests(2)
     assert [body["type"] for body in bodies] == ["alarm.raised", "alarm.cleared"]
 

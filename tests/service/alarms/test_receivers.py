@@ -6,7 +6,6 @@ import socket
 import socketserver
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -18,35 +17,33 @@ from fastapi.testclient import TestClient
 
 from service.alarms import notify, receivers
 from service.alarms.receivers import post, shown, why_not
-from tests.service.alarms.receiving import SECRET, receiving
+from tests.service.alarms.receiving import SECRET, in_thread, once, receiving
 from tests.service.web.routes.granting import granted
 
 BODY = b'{"type": "alarm.test"}'
+RAISED = b'{"type": "alarm.raised", "event": {"name": "n", "quantity": "state", "message": "m"}}'
 INSIDE = [
     "127.0.0.1", "10.0.0.1", "172.16.3.4", "192.168.1.1", "100.64.0.1", "169.254.169.254", "0.0.0.0",  # noqa: S104
     "224.0.0.1", "240.0.0.1", "255.255.255.255", "::1", "::", "fe80::1", "fc00::1", "ff02::1", "::ffff:127.0.0.1",
     "::127.0.0.1", "::ffff:169.254.169.254", "2002:7f00:1::", "64:ff9b::7f00:1", "64:ff9b::a9fe:a9fe",
     "2001:0:4136:e378:8000:63bf:80ff:fffe", "fec0::1",
 ]  # fmt: skip
+SECRETS = ["169.254.169.254", "0.0.0.0", "224.0.0.1", "fe80::1", "::ffff:169.254.169.254"]  # noqa: S104
+OUTSIDE = ["93.184.216.34", "2606:2800:220:1:248:1893:25c8:1946", "64:ff9b::5db8:d822"]
 
 
 def send(url: str, *, private: bool = True) -> receivers.Attempt:
     return post(url, BODY, secret=SECRET, delivery_id="d", private=private)
 
 
-@pytest.mark.parametrize("address", INSIDE)
-def test_the_inside_is_not_asked(address: str) -> None:
-    assert why_not(ipaddress.ip_address(address), private=False)
-
-
-@pytest.mark.parametrize("address", ["169.254.169.254", "0.0.0.0", "224.0.0.1", "fe80::1", "::ffff:169.254.169.254"])  # noqa: S104
-def test_where_a_cloud_keeps_its_secrets_is_never_asked(address: str) -> None:
-    assert why_not(ipaddress.ip_address(address), private=True)
-
-
-@pytest.mark.parametrize("address", ["93.184.216.34", "2606:2800:220:1:248:1893:25c8:1946", "64:ff9b::5db8:d822"])
-def test_the_outside_is_asked(address: str) -> None:
-    assert why_not(ipaddress.ip_address(address), private=False) is None
+@pytest.mark.parametrize(
+    ("addresses", "private", "refused"),
+    [(INSIDE, False, True), (SECRETS, True, True), (OUTSIDE, False, False)],
+    ids=["inside", "where a cloud keeps its secrets", "outside"],
+)
+def test_only_the_outside_is_asked(addresses: list[str], private: bool, refused: bool) -> None:
+    for address in addresses:
+        assert bool(why_not(ipaddress.ip_address(address), private=private)) is refused, address
 
 
 @pytest.mark.parametrize(
@@ -88,6 +85,10 @@ def test_a_redirect_is_not_followed() -> None:
     assert "a redirect: give the address that it leads to" in str(ended.problem)
 
 
+class Server(socketserver.ThreadingTCPServer):
+    daemon_threads = True
+
+
 @contextmanager
 def answering(write: Callable[[socket.socket], object]) -> Iterator[str]:
     """A receiver that reads what comes and then writes as a test wants."""
@@ -98,11 +99,8 @@ def answering(write: Callable[[socket.socket], object]) -> Iterator[str]:
             with suppress(OSError):
                 write(self.request)
 
-    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Handler) as server:
-        server.daemon_threads = True
-        threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_address[1]}/"
-        server.shutdown()
+    with in_thread(Server(("127.0.0.1", 0), Handler)) as port:
+        yield f"http://127.0.0.1:{port}/"
 
 
 def drip(connection: socket.socket) -> None:
@@ -122,30 +120,25 @@ def endless_continues(connection: socket.socket) -> None:
         connection.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")
 
 
+def endless_body(connection: socket.socket) -> None:
+    """Nothing that is read: the head is the answer."""
+    connection.sendall(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n")
+    while True:
+        connection.sendall(b"10000\r\n" + b"a" * 65536 + b"\r\n")
+
+
 @pytest.mark.parametrize(
     "write",
-    [drip, endless_headers, endless_continues, lambda _: time.sleep(30)],
-    ids=["drip", "headers", "continues", "silence"],
+    [drip, endless_headers, endless_continues, endless_body, lambda _: time.sleep(30)],
+    ids=["drip", "headers", "continues", "body", "silence"],
 )
 def test_a_receiver_that_never_ends_is_cut_off(write: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(receivers, "ATTEMPT_SECONDS", 1.0)
-    started = time.monotonic()
     with answering(write) as url:
+        started = time.monotonic()
         ended = send(url)
         assert time.monotonic() - started < 10
-    assert ended.problem is not None
-
-
-def test_a_body_without_end_is_not_read() -> None:
-    def endless(connection: socket.socket) -> None:
-        connection.sendall(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n")
-        while True:
-            connection.sendall(b"10000\r\n" + b"a" * 65536 + b"\r\n")
-
-    with answering(endless) as url:
-        started = time.monotonic()
-        assert send(url).problem is None
-        assert time.monotonic() - started < 5
+    assert (ended.problem is None) is (write is endless_body)
 
 
 NO_ADDRESSES = (
@@ -174,9 +167,7 @@ def test_addresses_are_shown_without_what_is_secret(url: str, public: str) -> No
     assert shown(url) == public
 
 
-def test_secrets_are_in_no_answer_log_or_export(
-    client: TestClient, caplog: pytest.LogCaptureFixture, database_url: str
-) -> None:
+def test_no_answer_or_log_has_secrets(client: TestClient, caplog: pytest.LogCaptureFixture, database_url: str) -> None:
     """The database holds them, or nothing could be signed."""
     caplog.set_level(logging.DEBUG)
     secret, password = "signs-everything", "pass-word"
@@ -198,50 +189,38 @@ def test_secrets_are_in_no_answer_log_or_export(
     assert secret.encode() in file.read_bytes() + file.with_name(f"{file.name}-wal").read_bytes()
 
 
-def test_with_keys_the_inside_needs_a_setting(client: TestClient) -> None:
-    headers = granted(client, "admin")
-    with receiving() as receiver:
-        refused = client.post("/v1/webhooks", json={"url": receiver.url}, headers=headers)
-    assert refused.status_code == 422
-    assert "CLUTCHLIFE_PRIVATE_RECEIVERS" in refused.json()["detail"]
-
-
-def test_a_key_made_later_stops_deliveries_to_the_inside(client: TestClient) -> None:
+def test_with_keys_the_inside_needs_a_setting_and_a_key_made_later_stops_deliveries(client: TestClient) -> None:
     with receiving() as receiver:
         name = client.post("/v1/webhooks", json={"url": receiver.url}).json()["webhook_id"]
         headers = granted(client, "admin")
         tested = client.post(f"/v1/webhooks/{name}/test", headers=headers).json()
+        refused = client.post("/v1/webhooks", json={"url": receiver.url}, headers=headers)
     assert receiver.requests == []
     assert "not sent" in tested["deliveries"][0]["problem"]
-
-
-class Mailbox(socketserver.StreamRequestHandler):
-    """As much of an SMTP server as a client needs."""
-
-    def handle(self) -> None:
-        self.wfile.write(b"220 test\r\n")
-        while line := self.rfile.readline():
-            word = line[:4].upper()
-            if word == b"DATA":
-                self.wfile.write(b"354 go\r\n")
-                mail = b""
-                while (line := self.rfile.readline()) not in (b".\r\n", b""):
-                    mail += line
-                self.server.mails.append(mail)  # type: ignore[attr-defined]
-            if word == b"QUIT":
-                self.wfile.write(b"221 bye\r\n")
-                return
-            self.wfile.write(b"250 ok\r\n")
+    assert refused.status_code == 422
+    assert "CLUTCHLIFE_PRIVATE_RECEIVERS" in refused.json()["detail"]
 
 
 @contextmanager
 def mailbox() -> Iterator[tuple[int, list[bytes]]]:
-    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Mailbox) as server:
-        server.daemon_threads = True
-        server.mails = []  # type: ignore[attr-defined]
-        threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
-        yield server.server_address[1], server.mails  # type: ignore[attr-defined]
-        server.shutdown()
+    """As much of an SMTP server as a client needs, and the mails that it was sent."""
+    mails: list[bytes] = []
+
+    class Mailbox(socketserver.StreamRequestHandler):
+        def handle(self) -> None:
+            self.wfile.write(b"220 test\r\n")
+            while line := self.rfile.readline():
+                word = line[:4].upper()
+                if word == b"DATA":
+                    self.wfile.write(b"354 go\r\n")
+                    mails.append(b"".join(iter(self.rfile.readline, b".\r\n")))
+                if word == b"QUIT":
+                    self.wfile.write(b"221 bye\r\n")
+                    return
+                self.wfile.write(b"250 ok\r\n")
+
+    with in_thread(Server(("127.0.0.1", 0), Mailbox)) as port:
+        yield port, mails
 
 
 def test_an_alarm_arrives_as_a_mail(client: TestClient) -> None:
@@ -252,30 +231,25 @@ def test_an_alarm_arrives_as_a_mail(client: TestClient) -> None:
         assert made.status_code == 201, made.text
         assert "example.org" not in made.text
         client.post("/v1/alarms", json={"clutch_id": "c1", "quantity": "state", "name": "look at it"})
-        deadline = time.monotonic() + 40
-        while not mails and time.monotonic() < deadline:
-            time.sleep(0.1)
-        (mail,) = mails
+        (mail,) = once(lambda: mails, 40)
     assert b"look at it" in mail
 
 
 def test_apprise_does_not_lead_inside_either() -> None:
     pytest.importorskip("apprise")
-    body = b'{"type": "alarm.raised", "event": {"name": "n", "quantity": "state", "message": "m"}}'
     with mailbox() as (port, mails), receiving() as receiver:
         for url in (
             f"mailto://127.0.0.1:{port}/?from=rig@example.org&to=engineer@example.org",
             f"json://127.0.0.1:{receiver.port}/hook",
         ):
-            ended = notify.send(url, body, secret=SECRET, delivery_id="d", private=False)
+            ended = notify.send(url, RAISED, secret=SECRET, delivery_id="d", private=False)
             assert ended.problem is not None, url
     assert (mails, receiver.requests) == ([], [])
 
 
 def test_a_sender_that_gives_no_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(notify, "PYTHON", (sys.executable, "-c", "", "--"))
-    body = b'{"type": "alarm.raised", "event": {"name": "n", "quantity": "state", "message": "m"}}'
-    ended = notify.send("mailto://a@example.org", body, secret=SECRET, delivery_id="d", private=False)
+    ended = notify.send("mailto://a@example.org", RAISED, secret=SECRET, delivery_id="d", private=False)
     assert "ended without an answer" in (ended.problem or "")
 
 

@@ -53,11 +53,8 @@ def test_planned_duty_by_block_and_by_file_is_the_same(terminal: Terminal, clien
     # twice the energy of the blocks so far: half the cycles, by the middle of the distribution
     assert answer["block_severity"][0] == pytest.approx(2.0, rel=0.02)
     assert answer["pace_cycles_per_hour"] is None
-    for pace, days in (
-        (120.0, "less than a day"),
-        (answer["at_least"] / 35, "1 day"),
-        (answer["at_least"] / 61, "2 days"),
-    ):
+    bound = answer["at_least"]
+    for pace, days in ((120.0, "less than a day"), (bound / 35, "1 day"), (bound / 61, "2 days")):
         shown = terminal("life", "c1", "--block", "5000:36:2", "--pace", pace)
         assert f"safe for {days} at the planned pace, counted from the last run on 2" in shown
     assert "counted from" not in terminal("life", "c1", "--block", "5000:36:2")
@@ -75,9 +72,7 @@ def test_the_tables_hold_every_item_of_the_answer_on_a_line(terminal: Terminal, 
     assert json.loads(terminal("engagement", "c1", "--json")) == client.get("/v1/clutches/c1/engagement").json()
 
 
-def test_an_end_by_other_criteria_is_shown_with_how_probably_each_is_the_first(
-    terminal: Terminal, client: TestClient
-) -> None:
+def test_an_end_by_other_criteria_shows_how_probably_each_is_first(terminal: Terminal, client: TestClient) -> None:
     slope = {"quantity": "slope", "pressure_bar": 5, "speed_rpm": 100}
     changed = {"end_of_life": {"criteria": [{"quantity": "mean_cof"}, slope]}, "reason": "it shudders"}
     assert client.patch("/v1/clutches/c1", json=changed).status_code == 200

@@ -38,9 +38,8 @@ def test_status_ends_as_monitoring_plugins_do(server: Server, clutch: str, code:
 
 
 def test_status_is_unknown_where_nobody_answers_or_it_is_misused() -> None:
-    assert "unknown" in clutchlife(
-        "status", "fine", "--url", f"http://127.0.0.1:{free_port()}", "--patience", "0", code=3
-    )
+    away = f"http://127.0.0.1:{free_port()}"
+    assert "unknown" in clutchlife("status", "fine", "--url", away, "--patience", "0", code=3)
     for wrong in (("status",), ("status", "fine", "--bogus"), ("status", "fine", "--url", "nonsense")):
         printed = clutchlife(*wrong, code=3)
         assert len(printed.strip().splitlines()) == 1, printed
@@ -50,15 +49,13 @@ def test_clutches_are_registered_and_listed(server: Server, tmp_path: Path) -> N
     record = tmp_path / "record.json"
     record.write_text(json.dumps({"fluid": "other"}), encoding="utf-8")
     at = ("--url", server.url)
-    assert "is registered" in clutchlife(
-        "register", "new", "--record", record, "--set", "geometry.friction_faces=4", *at
-    )
+    given = ("--record", record, "--set", "geometry.friction_faces=4")
+    assert "is registered" in clutchlife("register", "new", *given, *at)
     with Client(server.url, frames="list") as client:
-        made = client.clutch("new")
-        assert (made["fluid"], made["geometry"]["friction_faces"]) == ("other", 4)
-        assert [item["clutch_id"] for item in client.clutches()] == [
-            item["clutch_id"] for item in json.loads(clutchlife("list", "--json", *at))
-        ]
+        made, listed = client.clutch("new"), client.clutches()
+    assert (made["fluid"], made["geometry"]["friction_faces"]) == ("other", 4)
+    shown = json.loads(clutchlife("list", "--json", *at))
+    assert [item["clutch_id"] for item in listed] == [item["clutch_id"] for item in shown]
     assert "failure" in clutchlife("list", *at)
     assert "409" in clutchlife("register", "new", *at, code=65)
 
@@ -84,14 +81,12 @@ def test_the_version_is_that_of_the_release() -> None:
 
 
 def test_a_push_to_a_mistyped_clutch_leaves_nothing_in_the_spool(server: Server, tmp_path: Path) -> None:
-    run = tmp_path / "run.json"
+    run, spool = tmp_path / "run.json", tmp_path / "spool"
     run.write_text(json.dumps(stationary(4000.0)), encoding="utf-8")
-    spool = tmp_path / "spool"
-    printed = clutchlife("push", run, "--clutch", "fien", "--url", server.url, "--spool", spool, code=65)
-    assert "clutchlife register fien" in printed
     (tmp_path / "clutch.json").write_text(json.dumps({"clutch_id": "fine"}), encoding="utf-8")
-    printed = clutchlife("push", tmp_path, "--clutch", "fien", "--url", server.url, "--spool", spool, code=65)
-    assert "clutchlife register fien" in printed
+    for pushed in (run, tmp_path):
+        printed = clutchlife("push", pushed, "--clutch", "fien", "--url", server.url, "--spool", spool, code=65)
+        assert "clutchlife register fien" in printed
     assert not list(spool.rglob("*.body"))
 
 
@@ -102,31 +97,14 @@ def test_a_wrong_call_is_one_plain_line() -> None:
         assert "--help" in lines[0]
 
 
-def test_a_list_says_that_a_life_has_ended() -> None:
-    summary = {
-        "status": "ended",
-        "as_of_cycles": 7200,
-        "at_least": 0,
-        "remaining_cycles": {"0.5": 0},
-        "ended": {"cycles": 7200},
-    }
-    item = {"clutch_id": "c1", "state": {"name": "failure"}, "held": 0, "summary": summary}
-    assert _row(item)[:2] == ["c1", "ended, failure"]
-    assert _row(item | {"summary": summary | {"ended": None}})[1] == "failure"
-
-
 def test_a_list_states_cycles_whole_and_no_remaining_life_after_an_end() -> None:
-    summary = {
-        "as_of_cycles": 1e7,
-        "at_least": 2.9,
-        "status": "predicted",
-        "ended": None,
-        "remaining_cycles": {"0.5": 4.2},
-    }
+    left = {"at_least": 2.9, "status": "predicted", "ended": None, "remaining_cycles": {"0.5": 4.2}}
+    summary = {"as_of_cycles": 1e7} | left
     item = {"clutch_id": "c", "held": 0, "summary": summary, "state": {"name": "normal"}}
     assert _row(item) == ["c", "normal", "10,000,000", "2", "4", ""]
     over = {"at_least": None, "status": "ended", "ended": {"cycles": 1e7}, "remaining_cycles": {"0.5": None}}
     assert _row(item | {"summary": summary | over}) == ["c", "ended, normal", "10,000,000", "-", "-", ""]
+    assert _row(item | {"summary": summary | over | {"ended": None}})[1] == "normal"
 
 
 def test_no_note_or_name_commands_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:

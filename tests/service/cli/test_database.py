@@ -1,23 +1,32 @@
-"""Backup, restore, verify and replay, as an operator sees them; a command that only reads changes nothing."""
+"""Backup, restore, verify, replay and serve, as an operator sees them; a command that only reads changes nothing."""
 
-import sqlite3
-from contextlib import closing
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
+from service.cli.serving import listening
 from service.settings import Settings
 from storage.engine.sqlite.connect import service_lock
 from tests.service.clients import client_on, clutchlife
+from tests.service.queries.test_verification import DAMAGE, execute
 from tests.storage.samples import OLD, integrity, old_database, revision
-from tests.support import stationary
+from tests.support import ONCE, free_port, stationary, wait_until_ready
 
 
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A database with the clutches a, b and c, of which b has tests."""
+    """A database with the clutches a, b and c, each with a test."""
     path = tmp_path_factory.mktemp("stored") / "clutchlife.db"
     with client_on(f"sqlite:///{path}") as client:
         for clutch_id in "abc":
@@ -31,11 +40,6 @@ def path(stored: Path, tmp_path: Path) -> Path:
     """A copy of it that a test may change."""
     clutchlife("backup", tmp_path / "a.db", "--database", f"sqlite:///{stored}")
     return tmp_path / "a.db"
-
-
-def execute(path: Path, statement: str) -> None:
-    with closing(sqlite3.connect(path)) as connection, connection:
-        assert connection.execute(statement).rowcount > 0
 
 
 @pytest.mark.usefixtures("later_step")
@@ -54,16 +58,12 @@ def test_commands_that_read_leave_an_older_file_as_it_is(tmp_path: Path) -> None
     assert (revision(path), kept) == ("s9000_later", ["old.db-before-s9000_later"])
 
 
-def test_a_database_without_keys_says_so(path: Path) -> None:
-    assert clutchlife("key", "list", "--database", f"sqlite:///{path}").strip() == "no key exists"
-
-
 def test_verify_is_clean_on_what_a_service_stored(path: Path) -> None:
     url = ("--database", f"sqlite:///{path}")
-    assert "3 runs of 3 clutches were checked, 3 of the clutches computed again: 0 findings" in clutchlife(
-        "verify", *url
-    )
+    said = clutchlife("verify", *url)
+    assert "3 runs of 3 clutches were checked, 3 of the clutches computed again: 0 findings" in said
     assert "3 clutches were checked, 1 of the clutches computed again" in clutchlife("verify", "--sample", "1", *url)
+    assert clutchlife("key", "list", *url).strip() == "no key exists"
 
 
 def test_verify_names_a_damaged_page(path: Path) -> None:
@@ -87,7 +87,7 @@ def test_what_needs_a_file_names_what_does_it_on_a_server(tmp_path: Path) -> Non
 def test_a_backup_is_restored_unless_a_service_runs(path: Path, tmp_path: Path) -> None:
     url = ("--database", f"sqlite:///{path}")
     clutchlife("backup", tmp_path / "backup.db", *url)
-    execute(path, "DELETE FROM prediction")
+    execute(url[1], "DELETE FROM prediction")
     with service_lock(path):
         assert "a service uses this database already" in clutchlife("restore", tmp_path / "backup.db", *url, code=1)
     output = clutchlife("restore", tmp_path / "backup.db", *url)
@@ -100,12 +100,11 @@ def test_a_backup_is_restored_unless_a_service_runs(path: Path, tmp_path: Path) 
 
 def test_replay_goes_on_after_a_clutch_that_it_refuses_and_names_it_at_the_end(path: Path) -> None:
     url = ("--database", f"sqlite:///{path}")
-    execute(path, "UPDATE channel SET data = zeroblob(9) WHERE run_key = 1 AND position = 0")
-    execute(path, "UPDATE fit SET rmse = 2 * rmse WHERE run_key = 3")
+    execute(url[1], DAMAGE)
+    execute(url[1], "UPDATE fit SET rmse = 2 * rmse WHERE run_key = 3")
     output = clutchlife("replay", *url, code=1)
-    assert "a: not replayed: run s0 is damaged: channel" in output
-    assert "b: 1 runs" in output
-    assert "c: 1 runs" in output
+    for line in ("a: not replayed: run s0 is damaged: channel", "b: 1 runs", "c: 1 runs"):
+        assert line in output
     assert output.strip().endswith("1 clutches keep their previous results: a")
     assert "c: " not in clutchlife("verify", *url, code=1)
 
@@ -114,3 +113,94 @@ def test_a_second_service_on_the_same_database_does_not_start(path: Path) -> Non
     with TestClient(create_app(Settings(workers=0, database=f"sqlite:///{path}"))):
         output = clutchlife("serve", "--port", "0", "--database", f"sqlite:///{path}", code=1)
     assert "a service uses this database already (process " in output
+
+
+# --- `clutchlife serve`: its log, from the settings at the start to the stop.
+
+
+SERVE = [sys.executable, "-m", "service.cli.main", "serve"]
+
+
+def served(folder: Path, environment: Mapping[str, str], *arguments: str) -> tuple[str, dict[str, httpx2.Response]]:
+    """What a service with two workers says on standard error while a run is posted, and the answers."""
+    port = free_port()
+    command = [*SERVE, "--port", str(port), *arguments, "--database", f"sqlite:///{folder / 'a.db'}"]
+    process = subprocess.Popen(command, env=os.environ | environment, stderr=subprocess.PIPE, text=True)
+    try:
+        url = f"http://127.0.0.1:{port}"
+        wait_until_ready(url, lambda: process.poll() is not None)
+        headers = {"X-Request-ID": "rig-7"}
+        answers = {
+            "register": ONCE.post(f"{url}/v1/clutches", json={"clutch_id": "c1"}, headers=headers),
+            "post": ONCE.post(f"{url}/v1/clutches/c1/runs", json=stationary(0.0), headers=headers),
+            "absent": ONCE.get(f"{url}/%0aWARNING%20clutchlife:%20forged", headers=headers),
+        }
+    finally:
+        process.terminate()
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 0
+    return said, answers
+
+
+def test_every_line_of_a_service_is_json_from_its_start_to_its_stop(tmp_path: Path) -> None:
+    said, answers = served(tmp_path, {"CLUTCHLIFE_LOG_FORMAT": "json"})
+    lines: list[dict[str, Any]] = [json.loads(line) for line in said.splitlines()]
+    assert lines[0]["message"] == "settings"
+    assert lines[0]["workers"] == 2
+    assert {"clutchlife.start", "clutchlife.access", "uvicorn.error"} <= {line["logger"] for line in lines}
+    ours = [line for line in lines if line.get("request_id") == "rig-7"]
+    assert [(line["method"], line["status"]) for line in ours] == [("POST", 201), ("POST", 201), ("GET", 404)]
+    assert [answer.headers["X-Request-ID"] for answer in answers.values()] == ["rig-7"] * 3
+    assert not any(line.get("route") == "/readyz" for line in lines), "probes are not logged"
+    assert "forged" not in said
+    assert any("no key exists" in line["message"] for line in lines)
+
+
+def test_an_answers_body_does_not_wait_until_its_head_was_received() -> None:
+    """asyncio sends at once (TCP_NODELAY) on connections whose protocol it knows."""
+    (at,) = listening.bound("127.0.0.1", 0)
+    with at:
+        at.listen()
+        with socket.create_connection(at.getsockname()), at.accept()[0] as accepted:
+            assert accepted.proto == socket.IPPROTO_TCP
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arguments", [("--log-level", "ERROR"), ()])
+def test_the_level_is_that_of_the_option_or_else_of_the_environment_and_a_start_warns_at_any(
+    tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    environment = {"CLUTCHLIFE_LOG_FORMAT": "text", "CLUTCHLIFE_LOG_LEVEL": "info" if arguments else "Error"}
+    environment |= {"CLUTCHLIFE_WORKERS": "0", "CLUTCHLIFE_MAX_BODY": "3", "CLUTCHLIFE_SERVICE_PORT": "8000"}
+    said, _ = served(tmp_path, environment, *arguments)
+    misspelt, open_to_all = said.splitlines()
+    assert " WARNING clutchlife.start: CLUTCHLIFE_MAX_BODY is no setting" in misspelt
+    assert misspelt.endswith("is CLUTCHLIFE_MAX_BODY_MB meant?")
+    assert " WARNING clutchlife.start: no key exists" in open_to_all
+
+
+@pytest.mark.slow
+def test_a_busy_port_is_one_line_before_anything_is_made(tmp_path: Path) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = str(other.getsockname()[1])
+        every = "0.0.0.0"  # noqa: S104  (without keys it listens at this machine only)
+        for host in ("127.0.0.1", "localhost", every):
+            command = [*SERVE, "--port", port, "--host", host, "--database", f"sqlite:///{tmp_path / 'a.db'}"]
+            ended = subprocess.run(command, capture_output=True, text=True, check=False)
+            assert ended.returncode == 64
+            said = (ended.stdout + ended.stderr).splitlines()
+            assert said == [
+                f"clutchlife: port {port} at {'127.0.0.1' if host == every else host} is in use, perhaps by another "
+                "service: stop it, or give another port with --port"
+            ]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_start_says_where_the_page_and_the_database_are(tmp_path: Path) -> None:
+    environment = {"CLUTCHLIFE_LOG_FORMAT": "text", "CLUTCHLIFE_WORKERS": "0", "CLUTCHLIFE_ROOT_PATH": "/clutch"}
+    said, _ = served(tmp_path, environment)
+    found = re.search(r"the page is at (http://127\.0\.0\.1:\d+/clutch/), the database at (.*)", said)
+    assert found is not None
+    assert found[2] == str(tmp_path / "a.db")

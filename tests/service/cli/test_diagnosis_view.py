@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from models.diagnosis.campaign import Campaign
 from service.cli.diagnose import shown
 from service.lives.diagnosis.report import empty, public
-from tests.service.lives.diagnosis.test_campaign import EMPTY
 from tests.service.workflows.stand_in_engine import diagnose
 
 LIFE = {"status": "predicted", "remaining_cycles": {"0.05": 4000.0, "0.5": 12345.6, "0.95": None}}
@@ -26,11 +26,9 @@ def printed(report: dict[str, Any], *, colours: bool = False) -> str:
 
 @pytest.fixture
 def report() -> dict[str, Any]:
-    diagnosed = diagnose(EMPTY, rng=None)  # type: ignore[arg-type]  # none is drawn without tests
-    public_report = public(
-        diagnosed, origin=500.0, before=LIFE, after=LIFE | {"status": "reached"}, notes=("left out",)
-    )
-    return public_report | STATE
+    diagnosed = diagnose(Campaign(), rng=None)  # type: ignore[arg-type]  # none is drawn without tests
+    after = LIFE | {"status": "reached"}
+    return public(diagnosed, origin=500.0, before=LIFE, after=after, notes=("left out",)) | STATE
 
 
 def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
@@ -75,14 +73,9 @@ def test_what_could_be_told_apart_is_shown_where_it_was_asked_for(report: dict[s
         "apart": False,
         "with_test": 0.98,
     }
-    sure = {
-        "effects": ["oil_change", "running_in"],
-        "probability": 0.98,
-        "apart": True,
-        "test": None,
-        "with_test": 0.98,
-    }
-    pairs = [pair | {"key": "open_sweep", "test": "stationary test with the clutch open"}, sure | {"key": None}]
+    pair |= {"key": "open_sweep", "test": "stationary test with the clutch open"}
+    sure = {"effects": ["oil_change", "running_in"], "probability": 0.98, "apart": True, "with_test": 0.98}
+    pairs = [pair, sure | {"key": None, "test": None}]
     assert "better by this test" not in printed(report)
     text = printed(report | {"isolability": {"pairs": pairs, "unseen": ["channel_delay"]}})
     row = next(line for line in text.splitlines() if "hydrodynamic drag and torque zero shift" in line)

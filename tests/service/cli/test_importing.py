@@ -10,9 +10,7 @@ from tests.service.cli.conftest import Terminal
 from tests.service.web.test_import_preview import german
 
 
-def test_a_first_file_is_asked_about_and_the_second_is_not(
-    terminal: Terminal, client: TestClient, tmp_path: Path
-) -> None:
+def test_only_a_first_file_is_asked_about(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     first, second = tmp_path / "Stat_7000.csv", tmp_path / "Stat_8000.csv"
     first.write_bytes(german(7000))
     second.write_bytes(german(8000))
@@ -30,9 +28,7 @@ def test_a_first_file_is_asked_about_and_the_second_is_not(
     ]
 
 
-def test_a_file_that_was_pushed_is_the_same_run_when_it_is_imported(
-    terminal: Terminal, client: TestClient, tmp_path: Path
-) -> None:
+def test_a_pushed_file_is_the_same_run_when_imported(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     file = tmp_path / "Stat_7000.csv"
     file.write_bytes(german(7000, torque="Drehmoment"))
     as_pushed = {"kind": "stationary_stribeck", "cycles": "7000.0", "filename": file.name}
@@ -50,9 +46,7 @@ def test_what_is_not_sent_leaves_no_profile(terminal: Terminal, client: TestClie
     assert client.get("/v1/rigs").json()["items"] == client.get("/v1/clutches/c1/runs").json()["items"] == []
 
 
-def test_options_say_what_no_title_does_and_the_profile_keeps_them(
-    terminal: Terminal, client: TestClient, tmp_path: Path
-) -> None:
+def test_options_say_what_no_title_does_and_are_kept(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     """Titles that name no channel, thousands that may be decimals, and a mark of missing values: no question is left."""
     file = tmp_path / "Prüfung 3.csv"
     rows = [f"{p};{n};{m}" for p in (4, 5) for n, m in zip((20, 520, 800, "1.100"), (21, 22, -9999, 20), strict=True)]
@@ -70,9 +64,7 @@ def test_options_say_what_no_title_does_and_the_profile_keeps_them(
     assert (saved["decimal"], saved["missing"], saved["columns"][1]["unit"]) == (",", "-9999", "1/min")
 
 
-def test_what_is_missing_ends_it_where_nothing_may_be_asked(
-    terminal: Terminal, client: TestClient, tmp_path: Path
-) -> None:
+def test_what_is_missing_ends_an_import_with_yes(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     file = tmp_path / "Stat_7000.csv"
     file.write_bytes(german(7000))
     shown = terminal("import", file, "--clutch", "c1", "--yes", "--cycles", "7000", code=EX_DATAERR)
@@ -80,9 +72,7 @@ def test_what_is_missing_ends_it_where_nothing_may_be_asked(
     assert client.get("/v1/clutches/c1/runs").json()["items"] == []
 
 
-def test_a_run_whose_torque_was_read_by_a_wrong_factor_is_read_again(
-    terminal: Terminal, client: TestClient, tmp_path: Path
-) -> None:
+def test_a_run_read_by_a_wrong_factor_is_read_again(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     (tmp_path / "Stat_7000.csv").write_bytes(german(7000))
     terminal("import", tmp_path / "Stat_7000.csv", "--clutch", "c1", answers="1\n1\n7000\ny\nbench-3\n")
     run = client.get("/v1/clutches/c1/runs").json()["items"][0]["run_id"]

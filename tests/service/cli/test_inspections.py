@@ -20,9 +20,7 @@ from tests.support import clutchlife, serving, stationary
 LIST = "/v1/clutches/c1/inspections"
 
 
-def test_an_inspection_is_sent_with_its_photographs_and_repeated_safely(
-    terminal: Terminal, client: TestClient, tmp_path: Path
-) -> None:
+def test_photographs_are_sent_and_repeated_safely(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(png(1))
     (tmp_path / "b.PNG").write_bytes(png(2))
     inspect = ("inspect", "c1", "--cycles", 11000, "--ra", 1.94, "--rsk", -3.4, "--lining", "side A")
@@ -37,9 +35,7 @@ def test_an_inspection_is_sent_with_its_photographs_and_repeated_safely(
     assert json.loads(terminal("inspections", "c1", "--json")) == [stored]
 
 
-def test_an_inspection_that_was_withdrawn_and_is_sent_again_is_said_to_stay_so(
-    terminal: Terminal, client: TestClient
-) -> None:
+def test_an_inspection_withdrawn_and_sent_again_stays_withdrawn(terminal: Terminal, client: TestClient) -> None:
     inspect = ("inspect", "c1", "--cycles", 11000, "--ra", 1.94)
     assert "withdrawn" not in terminal(*inspect)
     (stored,) = client.get(LIST).json()["items"]
@@ -58,9 +54,7 @@ def test_a_photograph_alone_is_an_inspection_too(terminal: Terminal, client: Tes
     assert (stored["note"], len(stored["photographs"])) == ("photographs", 1)
 
 
-def test_what_is_no_photograph_is_said_before_anything_is_sent(
-    terminal: Terminal, client: TestClient, tmp_path: Path
-) -> None:
+def test_what_is_no_photograph_is_refused_unsent(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     (tmp_path / "a.gif").write_bytes(b"GIF89a")
     inspect = ("inspect", "c1", "--cycles", 0, "--ra", 9.5, "--photo")
     assert "the name of a photograph must end in .png" in terminal(*inspect, tmp_path / "a.gif", code=64)
@@ -69,9 +63,7 @@ def test_what_is_no_photograph_is_said_before_anything_is_sent(
     assert client.get(LIST).json()["items"] == []
 
 
-def test_an_export_holds_inspections_and_each_photograph_as_it_was_sent(
-    terminal: Terminal, client: TestClient, tmp_path: Path
-) -> None:
+def test_an_export_holds_inspections_and_photographs(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(png())
     for cycles in (0, 1000):
         terminal("inspect", "c1", "--cycles", cycles, "--ra", 9.5, "--photo", tmp_path / "a.png")
@@ -107,17 +99,12 @@ def test_a_clutch_is_one_archive_with_its_tables(tmp_path: Path) -> None:
     book = CalamineWorkbook.from_path(str(results / "tables.xlsx"))
     assert book.sheet_names == list(TABLES)
     for name in TABLES:
-        rows = rows_of(results, name)
+        rows = list(csv.reader((results / "tables" / f"{name}.csv").read_text(encoding="utf-8").splitlines()))
         sheet = book.get_sheet_by_name(name).to_python()
         assert len(sheet) == len(rows), name
         assert [str(cell) for cell in sheet[0]] == rows[0], name
-    assert book.get_sheet_by_name("runs").to_python()[2][rows_of(results, "runs")[0].index("cycles")] == 1000.0
-
-
-def rows_of(results: Path, name: str) -> list[list[str]]:
-    """The rows of a table, its header first."""
-    with (results / "tables" / f"{name}.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.reader(file))
+    runs = book.get_sheet_by_name("runs").to_python()
+    assert runs[2][runs[0].index("cycles")] == 1000.0
 
 
 def test_a_workbook_computes_nothing_and_takes_any_text(tmp_path: Path) -> None:
@@ -129,9 +116,7 @@ def test_a_workbook_computes_nothing_and_takes_any_text(tmp_path: Path) -> None:
     assert book.get_sheet_by_index(0).to_python() == [["=1+1", 1000.0, "", "a<b & c", "1_000", "nan"]]
 
 
-def test_the_same_tables_are_the_same_workbook_whenever_they_are_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_same_tables_are_the_same_workbook_at_any_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written = []
     for seconds in (1_700_000_000.0, 1_800_000_000.0):
         monkeypatch.setattr("time.time", lambda at=seconds: at)

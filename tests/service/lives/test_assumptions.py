@@ -12,7 +12,7 @@ from service.lives.assumptions import Assumptions
 from service.lives.criteria import SEVERITY_EXPONENTS
 from service.lives.history import Event, Life
 from service.lives.severity_estimate import severity_estimate
-from tests.service.clients import client_on
+from tests.service.clients import client_on, post_run
 from tests.service.queries.test_scores import mean_torque
 from tests.service.workflows.test_learn_fleet import SPEEDS
 from tests.support import stationary
@@ -26,18 +26,16 @@ def wear(zeta: float) -> float:
 
 def measure(client: TestClient, name: str, cycles: float, share: float) -> None:
     body = stationary(cycles, wear=share, speeds=SPEEDS, pressures=(5.0,), run_id=f"t{cycles:g}", noise=0.003)
-    assert client.post(f"/v1/clutches/{name}/runs", json=body).status_code == 201
+    post_run(client, body, name)
 
 
 def duty(client: TestClient, name: str, cycles: float, energy: float) -> None:
     block = {"cycles": 1000, "energy_per_cycle_kj": energy}
-    body = {"kind": "duty_cycles", "cycles": cycles, "duty": block, "run_id": f"d{cycles:g}"}
-    assert client.post(f"/v1/clutches/{name}/runs", json=body).status_code == 201
+    post_run(client, {"kind": "duty_cycles", "cycles": cycles, "duty": block, "run_id": f"d{cycles:g}"}, name)
 
 
 def said(client: TestClient, name: str, **asked: str | float) -> dict[str, Any]:
-    found: dict[str, Any] = client.get(f"/v1/clutches/{name}/remaining-useful-life", params=asked).json()
-    return found
+    return client.get(f"/v1/clutches/{name}/remaining-useful-life", params=asked).json()
 
 
 @pytest.mark.slow
@@ -75,16 +73,14 @@ def test_energy_as_severity_predicts_the_recent_duty(client: TestClient) -> None
 @pytest.mark.slow
 def test_by_energy_too_the_order_of_arrival_does_not_matter(tmp_path: Path) -> None:
     """The blocks tell what the tests' ζ is: a block that comes after its test moves it."""
-    posts = [(measure, 1000.0 * i, wear(1000.0 * i)) for i in range(5)] + [
-        (duty, 1000.0 * i, LIGHT if i % 2 else HEAVY) for i in range(1, 5)
-    ]
+    posts = [(measure, 1000.0 * i, wear(1000.0 * i)) for i in range(5)]
+    posts += [(duty, 1000.0 * i, LIGHT if i % 2 else HEAVY) for i in range(1, 5)]
     answers = []
     for place, order in enumerate((range(9), (8, 3, 1, 7, 0, 5, 2, 6, 4))):
         with client_on(f"sqlite:///{tmp_path / f'{place}.db'}") as client:
             client.post("/v1/clutches", json={"clutch_id": "c1", "severity": {"basis": "dissipated_energy"}})
-            for index in order:
-                cycles, value = posts[index][1:]
-                posts[index][0](client, "c1", cycles, value)
+            for post, cycles, value in (posts[index] for index in order):
+                post(client, "c1", cycles, value)
             answers.append([said(client, "c1", method=method) for method in ("particle", "ukf", "grid")])
     # at equal cycles runs stand by when they were received, so only what is said at the end is the same
     assert [each["end_of_life_cycles"] for each in answers[0]] == [each["end_of_life_cycles"] for each in answers[1]]
@@ -96,8 +92,7 @@ def test_a_step_after_an_oil_change_does_not_look_like_wear(client: TestClient) 
         client.post("/v1/clutches", json={"clutch_id": name})
         for i in range(10):
             if i == 8 and name == "told":
-                body = {"kind": "maintenance", "cycles": 7500, "event": "oil_change", "run_id": "oil"}
-                assert client.post(f"/v1/clutches/{name}/runs", json=body).status_code == 201
+                post_run(client, {"kind": "maintenance", "cycles": 7500, "event": "oil_change"}, name)
             measure(client, name, 1000 * i, wear(1000.0 * i) + (0.06 if i >= 8 else 0.0))
     warned = {name: [each["code"] for each in said(client, name)["warnings"]] for name in ("told", "untold")}
     assert warned == {"told": [], "untold": ["new_level"]}
@@ -114,8 +109,7 @@ def test_a_severity_that_is_none_is_refused(client: TestClient, severity: dict[s
 
 def test_rebuilt_mean_cof_agrees_with_its_direct_track(client: TestClient) -> None:
     for i in range(8):
-        body = stationary(1000 * i, pressures=(4.0, 5.0, 6.0), run_id=f"t{i}")
-        assert client.post("/v1/clutches/c1/runs", json=body).status_code == 201
+        post_run(client, stationary(1000 * i, pressures=(4.0, 5.0, 6.0)))
     found = client.get("/v1/clutches/c1/degradation").json()
     direct, again = found["items"][0], found["rebuilt"]
     middle = again["trajectory"]["median"][0]
@@ -131,18 +125,13 @@ def test_rebuilt_mean_cof_agrees_with_its_direct_track(client: TestClient) -> No
     assert len(client.get("/v1/clutches/c1/surfaces.csv").text.splitlines()) == 1 + 15 * 13 * 20
 
 
-def test_no_surfaces_before_the_first_test(client: TestClient) -> None:
+def test_answers_before_the_first_test_name_model_and_prior(client: TestClient) -> None:
+    found = said(client, "c1")
+    assert found["model"] == {"name": "baseline", "effects": []}
+    assert found["prior"] == {"name": "weak", "version": None, "clutches": 0}
+    assert found["warnings"] == []
     assert client.get("/v1/clutches/c1/surfaces").status_code == 404
     assert client.get("/v1/clutches/c1/degradation").json()["rebuilt"] is None
-
-
-def test_answers_name_model_prior_and_severity(database_url: str) -> None:
-    with client_on(database_url) as client:
-        client.post("/v1/clutches", json={"clutch_id": "c1"})
-        found = said(client, "c1")
-        assert found["model"] == {"name": "baseline", "effects": []}
-        assert found["prior"] == {"name": "weak", "version": None, "clutches": 0}
-        assert found["warnings"] == []
 
 
 # --- The exponent of severity that the tests of one life speak for, where the energy of its duty steps.
@@ -158,29 +147,12 @@ def life(exponent: float, steps: tuple[float, ...] = (10e3, 20e3, 40e3), seed: i
         if test:
             energy = steps[(test - 1) * len(steps) // (TESTS - 1)]
             zeta += EVERY * (energy / steps[0]) ** exponent
-            block = Block(end=cycles, cycles=EVERY, energy=energy)
-            events.append(
-                Event(
-                    run_id=f"d{test}",
-                    kind="duty_cycles",
-                    cycles=cycles,
-                    moment=2.0 * test,
-                    arrived=2.0 * test,
-                    duty=block,
-                )
-            )
+            at = {"run_id": f"d{test}", "cycles": cycles, "moment": 2.0 * test, "arrived": 2.0 * test}
+            events.append(Event(kind="duty_cycles", duty=Block(end=cycles, cycles=EVERY, energy=energy), **at))
         cof = 0.13 * (1.0 - 0.75 * (1.0 - (1.0 + zeta / 12_000.0) ** -0.8)) * (1.0 + SCATTER * rng.standard_normal())
-        events.append(
-            Event(
-                run_id=f"t{test}",
-                kind="stationary_stribeck",
-                cycles=cycles,
-                moment=2.0 * test + 1.0,
-                arrived=2.0 * test + 1.0,
-                speed_range=(1.0, 200.0),
-                cofs={PRESSURE: (cof, 0.001 * cof)},
-            )
-        )
+        at = {"run_id": f"t{test}", "cycles": cycles, "moment": 2.0 * test + 1.0, "arrived": 2.0 * test + 1.0}
+        measured = {"speed_range": (1.0, 200.0), "cofs": {PRESSURE: (cof, 0.001 * cof)}}
+        events.append(Event(kind="stationary_stribeck", **at, **measured))
     return Life(origin=0.0, events=tuple(events))
 
 

@@ -14,6 +14,7 @@ from fastapi.testclient import TestClient
 from models.diagnosis.experiments.candidates import TRIALS
 from models.prognosis.criteria import QUANTILES
 from service.lives.condition import (
+    STATE_WORDS,
     bound_in_words,
     lower_bound,
     rank_of,
@@ -34,7 +35,6 @@ from tests.support import one_quick, stationary
 #: The present, as the answers state it.
 PRESENT = ("mean_cof", "mean_cof_sd", "measured_at_cycles", "fraction_of_initial", "health")
 METHODS = ("particle", "ukf", "grid")
-SLOPE = {"quantity": "slope", "speed_rpm": 100, "pressure_bar": 4.0, "below": -1.0}
 
 
 @pytest.fixture
@@ -98,9 +98,8 @@ def test_tests_at_the_same_cycles_or_at_other_pressures_are_not_asked_for_again(
     for place, pressures in enumerate([(4.0, 5.0), (4.0, 5.0), (4.0, 5.0), (4.0, 5.0), (2.0,)]):
         bench.send(stationary(500.0 * (place == 4), run_id=f"n{place}", wear=0.01 * place, pressures=pressures))
     shown = item(bench)
-    assert shown["state"]["why"].startswith(
-        "tests at 1 of the 3 different cycles that a prediction needs (1 more cannot"
-    )
+    why = "tests at 1 of the 3 different cycles that a prediction needs (1 more cannot"
+    assert shown["state"]["why"].startswith(why)
     assert shown["action"].startswith("Run 2 more stationary tests, at different cycles, with the pressures and oil")
     for answer in (now(bench, method) for method in METHODS):
         (warning,) = answer["warnings"]
@@ -156,32 +155,6 @@ def test_page_and_answer_say_the_same_of_held_runs_before_a_prediction() -> None
     assert "no further cycle is safe if the held run counts" in top_line(known, disputed=False)["headline"]
 
 
-@pytest.mark.parametrize(
-    ("known", "disputed", "name", "words"),
-    [
-        (summary(0.0, status="reached"), True, "failure", "slope, 100 rpm, 5 bar below 0"),
-        (summary(2000.0, held=2), True, "maintenance", "less than 20 % of its life may be left"),
-        (summary(9000.0, current={"health": 0.05}), True, "maintenance", "near its limit, slope, 100 rpm, 5 bar below 0"),
-        (summary(9000.0, held=1, with_held={"particle": {"at_least": 3149.0}}), True, "check", "1 run is held"),
-        (summary(800.0, status="insufficient_data", runs_used=2), True, "check", "2 of the 3 tests"),
-        (summary(9000.0), True, "out_of_specification", "data and model disagree"),
-        (summary(9000.0, status="may_never_reach", current={"health": 0.27}), False, "normal", "probability of 94 %"),
-        (
-            summary(9000.0, status="may_never_reach"), False, "normal",
-            "safe for 9,000 more cycles (95 %); the tests do not yet show how many more (the end",
-        ),
-        ({}, False, "check", "no run counts yet"),
-    ],
-    ids=str,
-)  # fmt: skip
-def test_the_first_state_that_holds_is_the_state(known: dict[str, Any], disputed: bool, name: str, words: str) -> None:
-    state = state_of(known, disputed=disputed)
-    assert state["name"] == name
-    assert words in state["why"]
-    assert name == "normal" or "safe for" not in state["why"]  # which the remaining cycles say
-    assert "may never" not in state["why"]
-
-
 PACE = {"cycles_per_second": 1000 / 86_400, "moment": 1_796_083_200.0}  # 1,000 cycles a day from 1 December 2026
 HELD = {"held": 1, "with_held": {"particle": {"status": "predicted", "at_least": 3149.0, "remaining_cycles": {}}}}
 
@@ -208,7 +181,11 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
             "2 days at the pace so far, counted from the last run on 1 Dec 2026; 50 % chance of 2,000 or more",
             "Replace within 2 days at the pace so far, counted from the last run on 1 Dec 2026.",
         ),
-        (summary(2000.0), None, "Maintenance required: ", "Replace soon."),
+        (summary(2000.0, held=2), None, "Maintenance required: less than 20 % of its life may be left", "Replace soon."),
+        (
+            summary(9000.0, current={"health": 0.05}), None,
+            "Maintenance required: near its limit, slope, 100 rpm, 5 bar below 0", "Replace soon.",
+        ),
         (summary(900.0, pace=PACE), None, "Maintenance required: ", "Replace within less than a day at the pace so far"),
         (summary(0.4, pace=PACE), None, "Maintenance required: ", "Replace now."),
         (
@@ -255,7 +232,10 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
             "Run 2 more stationary tests, at different cycles, with the pressures and oil of this life's first test: then",
         ),
         ({}, None, "Function check: no run counts yet", "Run 3 more stationary tests, at different cycles: then "),
-        (summary(9000.0), found(["oil_temperature"], adoptable=True), "Out of specification: ", "Adopt the model with oil"),
+        (
+            summary(9000.0), found(["oil_temperature"], adoptable=True),
+            "Out of specification: data and model disagree", "Adopt the model with oil",
+        ),
         (
             summary(9000.0), found(["inertia_torque", "squeeze_film"], ["inertia_torque", "squeeze_film"]),
             "Out of specification: ",
@@ -290,11 +270,16 @@ def test_the_top_line_answers_and_says_what_to_do(
     line = top_line(known, disputed=diagnosis is not None, diagnosis=diagnosis)
     assert line["headline"].startswith(headline)
     assert line["action"].startswith(action)
+    state = state_of(known, disputed=diagnosis is not None)
+    assert headline.startswith(f"{STATE_WORDS[state['name']]}: ")
+    assert state["name"] == "normal" or "safe for" not in state["why"]  # which the remaining cycles say
+    assert "may never" not in state["why"]
+    assert ("probability of 94 %" in state["why"]) is (known.get("status") == "may_never_reach")
 
 
 def test_a_clutch_that_shudders_is_no_longer_normal(tmp_path: Path) -> None:
     """Its record ends the life where the slope rises above a value that it has long passed; mean COF has hardly changed."""
-    criteria = [{"quantity": "mean_cof"}, SLOPE | {"below": None, "above": -1e-9}]
+    criteria = [{"quantity": "mean_cof"}, {"quantity": "slope", "speed_rpm": 100, "pressure_bar": 4.0, "above": -1e-9}]
     states = []
     for number, record in enumerate(({}, {"end_of_life": {"criteria": criteria}})):
         bench = Bench(tmp_path / f"{number}.db", record)
@@ -334,9 +319,7 @@ def test_lists_sort_by_the_bound_that_they_show_first() -> None:
     ("other", "warns"),
     [((5000, 9000, 30000), False), ((9000, 20000, None), True), ((4000, None, None), True), ((1, 4999, 20000), True)],
 )
-def test_two_filters_of_which_one_median_is_outside_the_other_interval_warn(
-    other: tuple[float | None, ...], warns: bool
-) -> None:
+def test_a_median_outside_the_interval_of_another_filter_warns(other: tuple[float | None, ...], warns: bool) -> None:
     answers = {
         method: {"status": "predicted", "remaining_cycles": dict(zip(("0.05", "0.5", "0.95"), ends, strict=True))}
         for method, ends in (("particle", (5000, 8000, 12000)), ("ukf", other))
@@ -363,19 +346,14 @@ def test_a_clutch_says_its_last_run_and_its_mean_cof(client: TestClient) -> None
     assert one["diagnosis"] is None
 
 
-@pytest.mark.parametrize("count", [1, MAX_LINE_POINTS, MAX_LINE_POINTS + 1, 1000])
+@pytest.mark.parametrize("count", [0, 1, MAX_LINE_POINTS, MAX_LINE_POINTS + 1, 1000])
 def test_a_line_is_short_and_ends_with_the_last_value(count: int) -> None:
     series = SimpleNamespace(measurements=[SimpleNamespace(value=float(index)) for index in range(count)])
     events = [Event(run_id="a", kind="maintenance", cycles=5.0, moment=10.0)]
     said = recent(events, series)["mean_cof"]  # type: ignore[arg-type]
     assert len(said) <= MAX_LINE_POINTS
-    assert said[-1] == count - 1
+    assert said[-1:] == [count - 1] * (count > 0)
     assert len({after - before for before, after in itertools.pairwise(said)}) <= 1
-
-
-def test_without_a_measurement_there_is_no_line() -> None:
-    events = [Event(run_id="a", kind="run_in", cycles=0.0, moment=0.0)]
-    assert recent(events, SimpleNamespace(measurements=[]))["mean_cof"] == []  # type: ignore[arg-type]
 
 
 def test_a_list_is_made_anew_only_after_a_commit(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""What a filter is given to work with where a fleet has taught, and where none has; and what its draws depend on."""
+"""What a filter is given to work with, what its draws depend on, and what is said of a quantity that is tracked."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,14 +7,32 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from models.loops.lag_fit import StationaryCurve
 from models.prognosis.fleet import FleetPrior
+from models.rig.truth import draw
+from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
-from service.lives.assumptions import FLEET, WEAK, Assumptions, LearnedPrior, ModelInForce
+from models.tracking.prior import weak
+from service.lives.assumptions import (
+    ALL_PRESSURES,
+    FLEET,
+    MEAN_COF,
+    WEAK,
+    Assumptions,
+    LearnedPrior,
+    ModelInForce,
+    Scale,
+)
 from service.lives.criteria import PREDICTION_DRAWS
-from service.lives.history import Event, Life, lives_of
+from service.lives.history import Event, Life, Series, lives_of
+from service.lives.quantities.items import track_item
+from service.lives.quantities.measured import QUANTITIES, parameter_tracks, posterior_of, pressure_level
 from service.lives.tracks import CARRIED, METHODS, advance, drawn, end_of_life, predict
+from tests.models.prognosis.test_course_shares import accelerating
+from tests.models.tracking.tracked_series import CAMPAIGN
 from tests.plausibility.bench import Bench
-from tests.service.clients import client_on
+from tests.score.measured_lives import PLACE, measured_life
+from tests.service.clients import client_on, post_run
 from tests.support import stationary
 
 LIFE = "/v1/clutches/{}/remaining-useful-life"
@@ -34,9 +52,8 @@ def test_two_priors_share_particles_and_draws(method: str) -> None:
         tracked = advance(method, series, assumptions, None, 3)
         assert tracked.states.keys() == ({WEAK} if name == "alone" else {WEAK, FLEET})
         assert drawn(method, series, assumptions, tracked).weight.size == PREDICTION_DRAWS
-        sizes[name] = {
-            key: state.cloud.log_weight.size for key, state in tracked.states.items() if hasattr(state, "cloud")
-        }
+        clouds = {key: state.cloud for key, state in tracked.states.items() if hasattr(state, "cloud")}
+        sizes[name] = {key: cloud.log_weight.size for key, cloud in clouds.items()}
     if method == "particle":
         assert sizes["taught"] == dict.fromkeys((WEAK, FLEET), sizes["alone"][WEAK] // 2)
 
@@ -47,8 +64,7 @@ def test_the_same_runs_under_another_clutch_name_give_the_same_remaining_life(tm
         for name in ("press-4", "another"):
             assert client.post("/v1/clutches", json={"clutch_id": name}).status_code == 201
             for cycles in range(0, 4_001, 1_000):
-                body = stationary(cycles, run_id=f"{cycles}", pressures=(5.0,))
-                assert client.post(f"/v1/clutches/{name}/runs", json=body).status_code == 201
+                post_run(client, stationary(cycles, run_id=f"{cycles}", pressures=(5.0,)), name)
             said.append([client.get(LIFE.format(name), params={"method": method}).json() for method in METHODS])
     for one, other in zip(*said, strict=True):
         assert one["remaining_cycles"] == other["remaining_cycles"]
@@ -69,17 +85,9 @@ def life(*taken: float) -> Life:
         mean = 0.13 * (1 - 0.5 * (1 - (1 + cycles / 6000.0) ** -0.8)) * (1 + 0.001 * (-1) ** index)
         under = {p: tuple(mean - off * cycles / CYCLES[-1] for off in taken) for p in LEVELS}
         means = {p: (float(np.dot(WEIGHTS, draws)) if len(draws) > 1 else draws[0], 2e-4) for p, draws in under.items()}
-        events.append(
-            Event(
-                run_id=str(index),
-                kind="stationary_stribeck",
-                cycles=cycles,
-                moment=float(index),
-                speed_range=(2.0, 200.0),
-                cofs=means,
-                under=under if len(taken) > 1 else {},
-            )
-        )
+        stated = {"run_id": str(index), "cycles": cycles, "moment": float(index), "speed_range": (2.0, 200.0)}
+        under = under if len(taken) > 1 else {}
+        events.append(Event(kind="stationary_stribeck", cofs=means, under=under, **stated))
     return Life(origin=0.0, events=tuple(events))
 
 
@@ -143,18 +151,58 @@ def test_a_test_is_odd_only_where_it_is_under_every_draw() -> None:
     assert warned == [False, False, True]
 
 
-def test_a_clutch_whose_counter_began_elsewhere_is_predicted_and_told_where_it_may_have_begun(
+def test_a_clutch_whose_counter_began_elsewhere_is_predicted_and_told_where(
     client: TestClient,
 ) -> None:
     for share in range(8):
-        body = stationary(50_000.0 + 1_000.0 * share, wear=0.08 * share)
-        assert client.post("/v1/clutches/c1/runs", json=body).status_code == 201
-    before = client.get("/v1/clutches/c1/remaining-useful-life").json()
+        post_run(client, stationary(50_000.0 + 1_000.0 * share, wear=0.08 * share))
+    before = client.get(LIFE.format("c1")).json()
     said = {warning["code"]: warning["message"] for warning in before["warnings"]}
     assert "the event rebuild at 50,000 cycles" in said["new_extrapolated"]
-    declared = {"kind": "maintenance", "cycles": 50_000.0, "event": "rebuild"}
-    assert client.post("/v1/clutches/c1/runs", json=declared).status_code == 201
-    answer = client.get("/v1/clutches/c1/remaining-useful-life").json()
+    post_run(client, {"kind": "maintenance", "cycles": 50_000.0, "event": "rebuild"})
+    answer = client.get(LIFE.format("c1")).json()
     assert "new_extrapolated" not in {warning["code"] for warning in answer["warnings"]}
     assert before["status"] == answer["status"] == "predicted"
     assert before["at_least"] == pytest.approx(answer["at_least"], rel=0.3)
+
+
+# --- What follows from the fits of a life is weighed by their unbiased covariance; coefficients are those of eq. 6.
+
+
+def test_a_level_and_the_curve_of_a_loop_have_the_unbiased_covariance() -> None:
+    rng = np.random.default_rng(5)
+    measured = measured_life(draw(rng), [0.0, 2_000.0, 4_000.0, 6_000.0], rng)
+    pressure, cof = list(measured.mean_cofs().items())[PLACE]
+    tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, pressures={pressure})
+    direct = cof, posterior_of(cof, measured.assumptions)
+    level = pressure_level(measured, tracks, direct, pressure)
+    fits = [levels[PLACE].fit for levels in measured.tests]
+    np.testing.assert_array_equal(level.covariance, [fit.unbiased_covariance for fit in fits])
+    for fit in fits:
+        np.testing.assert_array_equal(StationaryCurve.of(fit).covariance, fit.unbiased_covariance)
+        assert (fit.unbiased_covariance.diagonal() < fit.covariance.diagonal()).all()
+
+
+@pytest.mark.parametrize(("follows", "measurements"), [(True, CAMPAIGN), (False, accelerating(0.8))])
+def test_coefficients_are_those_of_eq_6_and_say_how_probable_it_is(follows: bool, measurements: list) -> None:
+    """Means over courses of other signs of φ and ε would be of nothing."""
+    posterior = Grid().posterior(
+        Grid().from_history(weak(measurements[0], falling=True), measurements), 1_000, np.random.default_rng(1)
+    )
+    series = Series(
+        quantity=MEAN_COF,
+        pressure=ALL_PRESSURES,
+        measurements=tuple(measurements),
+        events=tuple(range(len(measurements))),
+        scale=Scale(origin=0.0),
+    )
+    item = track_item(QUANTITIES[MEAN_COF], series, posterior, Assumptions())
+    assert (item["eq6_probability"] > 0.5) is follows
+    if item["coefficients"] is None:
+        assert item["eq6_probability"] == 0.0
+    else:
+        size = measurements[0].value
+        assert 0.0 < item["coefficients"]["initial"]["value"] < 2.0 * size
+        assert -2.0 * size < item["coefficients"]["change"]["value"] < 0.0
+        assert item["coefficients"]["scale_cycles"]["value"] > 0.0
+        assert 0.0 < item["coefficients"]["exponent"]["value"] < 20.0

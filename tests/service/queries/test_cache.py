@@ -1,10 +1,10 @@
 """The cache of computed answers: bounded by bytes, least lately asked for first, each answer made once."""
 
 import threading
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -13,7 +13,7 @@ from service.queries.cache import AnswerCache, build_of, revision_and_json, shar
 from service.settings import CODE_VERSION
 from service.web.limits import MAX_CACHED_BYTES
 from storage import clutches
-from storage.engine.database import Database, SharedAnswer, SharedAnswers
+from storage.engine.database import Database
 from storage.engine.errors import StorageUnavailable
 from storage.engine.opening import open_database
 from tests.storage.samples import clutch_row
@@ -62,23 +62,29 @@ def test_answers_without_a_body_take_room_too(monkeypatch: pytest.MonkeyPatch) -
     assert sum(cache.held(str(number), 1) is not None for number in range(50)) == 10
 
 
+class Slow:
+    """An answer that is made only when it is let go."""
+
+    def __init__(self) -> None:
+        self.calls, self.started, self.release = 0, threading.Event(), threading.Event()
+
+    def __call__(self) -> bytes:
+        self.calls += 1
+        self.started.set()
+        assert self.release.wait(30)
+        return b"slow"
+
+
 def test_of_several_that_ask_at_once_one_computes() -> None:
-    cache, started, release, calls = AnswerCache(100), threading.Event(), threading.Event(), []
-
-    def make() -> bytes:
-        calls.append(1)
-        started.set()
-        assert release.wait(30)
-        return b"once"
-
+    cache, slow = AnswerCache(100), Slow()
     with ThreadPoolExecutor(4) as pool:
-        first = pool.submit(cache.answer, "a", 1, make)
-        assert started.wait(30)
-        others = [pool.submit(cache.answer, "a", 1, make) for _ in range(3)]
+        first = pool.submit(cache.answer, "a", 1, slow)
+        assert slow.started.wait(30)
+        others = [pool.submit(cache.answer, "a", 1, slow) for _ in range(3)]
         assert cache.answer("b", 1, lambda: b"not held up").body == b"not held up"
-        release.set()
-        assert {answer.result(30).body for answer in (first, *others)} == {b"once"}
-    assert len(calls) == 1
+        slow.release.set()
+        assert {answer.result(30).body for answer in (first, *others)} == {b"slow"}
+    assert slow.calls == 1
 
 
 def test_of_a_key_one_version_is_held_and_counted() -> None:
@@ -93,19 +99,13 @@ def test_of_a_key_one_version_is_held_and_counted() -> None:
 
 
 def test_a_slow_old_version_does_not_replace_a_newer_one() -> None:
-    cache, started, release = AnswerCache(100), threading.Event(), threading.Event()
-
-    def make_slowly() -> bytes:
-        started.set()
-        assert release.wait(30)
-        return b"old"
-
+    cache, old = AnswerCache(100), Slow()
     with ThreadPoolExecutor(1) as pool:
-        slow = pool.submit(cache.answer, "a", 1, make_slowly)
-        assert started.wait(30)
+        slow = pool.submit(cache.answer, "a", 1, old)
+        assert old.started.wait(30)
         new = cache.answer("a", 2, lambda: b"new")
-        release.set()
-        assert slow.result(30).body == b"old"
+        old.release.set()
+        assert slow.result(30).body == b"slow"
     assert cache.held("a", 2) == new
     assert cache.answer("a", 3, lambda: b"newer") == cache.held("a", 3)
 
@@ -116,10 +116,9 @@ def test_what_fails_fails_for_all_and_is_tried_again() -> None:
     def failing() -> bytes:
         raise LookupError("not there")
 
-    attempts: list[Callable[[], bytes]] = [failing, failing]
-    for make in attempts:
+    for _ in range(2):
         with pytest.raises(LookupError, match="not there"):
-            cache.answer("a", 1, make)
+            cache.answer("a", 1, failing)
     assert cache.answer("a", 1, lambda: b"there").body == b"there"
 
 
@@ -169,28 +168,16 @@ def test_another_build_of_the_release_computes_for_itself(on_server: Database, m
 
 
 def test_a_build_is_told_by_its_code_and_by_the_names_of_its_files(tmp_path: Path) -> None:
-    folder = tmp_path / "models"
-    folder.mkdir()
-    code = folder / "law.py"
+    code = tmp_path / "law.py"
     builds = []
     for text in ("EXPONENT = 1.3", "EXPONENT = 1.4", "EXPONENT = 1.3"):
         code.write_text(text)
-        builds.append(build_of([folder]))
-    code.rename(folder / "laws.py")
-    builds.append(build_of([folder]))
+        builds.append(build_of([tmp_path]))
+    code.rename(tmp_path / "laws.py")
+    builds.append(build_of([tmp_path]))
     assert builds[0] == builds[2]
     assert len(set(builds)) == 3
     assert all(each.startswith(f"{CODE_VERSION}+") for each in builds)
-
-
-class Unreachable(SharedAnswers):
-    """Those of a server that has just been restarted."""
-
-    def newest(self, clutch_id: str, name: str, release: str) -> SharedAnswer | None:  # noqa: ARG002
-        raise StorageUnavailable("the connection is gone")
-
-    def keep(self, answer: SharedAnswer) -> None:  # noqa: ARG002
-        raise StorageUnavailable("the connection is gone")
 
 
 def test_an_answer_that_cannot_be_shared_is_an_answer_all_the_same(
@@ -199,7 +186,11 @@ def test_an_answer_that_cannot_be_shared_is_an_answer_all_the_same(
     def query(database: Database, clutch_id: str) -> dict[str, str]:  # noqa: ARG001
         return {"clutch_id": clutch_id}
 
-    monkeypatch.setattr(in_file, "answers", Unreachable())
+    def gone(*_: object) -> None:
+        raise StorageUnavailable("the connection is gone")
+
+    # as of a server that has just been restarted
+    monkeypatch.setattr(in_file, "answers", SimpleNamespace(newest=gone, keep=gone))
     assert shared_answer(in_file, query, "c1") is None
     assert revision_and_json(in_file, query, "c1", ()) == (0, b'{"clutch_id":"c1"}')
     assert [record.levelname for record in caplog.records] == ["WARNING"] * 3

@@ -41,17 +41,14 @@ def test_a_life_that_ended_is_scored(client: TestClient) -> None:
     item = client.get(f"{BASE}/scores").json()["items"][0]
     assert item["end_of_life_cycles"] == pytest.approx(true_end, rel=0.02)
     tests = item["predictions"]
-    assert [test["cycles"] for test in tests] == [
-        c for c in range(2000, 22_001, 1000) if c < item["end_of_life_cycles"]
-    ]
+    end = item["end_of_life_cycles"]
+    assert [test["cycles"] for test in tests] == [cycles for cycles in range(2000, 22_001, 1000) if cycles < end]
     for test in tests:
-        assert test["true_remaining_cycles"] == pytest.approx(item["end_of_life_cycles"] - test["cycles"])
+        assert test["true_remaining_cycles"] == pytest.approx(end - test["cycles"])
         then = client.get(f"{BASE}/remaining-useful-life", params={"at_cycles": test["cycles"]}).json()
         assert then["remaining_cycles"] == test["remaining_cycles"]
         low, high = (then["end_of_life_cycles"][q] for q in ("0.05", "0.95"))
-        assert test["covered"] is (
-            low <= item["end_of_life_cycles"] and (high is None or item["end_of_life_cycles"] <= high)
-        )
+        assert test["covered"] is (low <= end and (high is None or end <= high))
         assert 0 < test["pit"] < 1
     assert tests[-1]["crps_share"] < 0.02 < tests[0]["crps_share"]
     assert tests[-1]["crps_cycles"] == pytest.approx(tests[-1]["crps_share"] * item["end_of_life_cycles"])

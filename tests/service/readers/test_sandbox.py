@@ -41,9 +41,7 @@ ANSWER = (
         ("import os, sys; os.write(int(sys.argv[1]), bytes(9000000)); os._exit(0)", r"broke off \(no answer\)"),
     ],
 )
-def test_a_reader_that_misbehaves_ends_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, message: str
-) -> None:
+def test_a_bad_reader_ends_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, message: str) -> None:
     with pytest.raises(InvalidError, match=message):
         read_with(tmp_path, monkeypatch, body, replace(LIMITS, seconds=1, most_values=1_000_000))
 

@@ -97,12 +97,6 @@ def test_what_rigs_write(tmp_path: Path, text: str) -> None:
     np.testing.assert_allclose(list(got.values()), expected, rtol=4e-16)  # one rounding in the conversion
 
 
-def test_a_map_names_columns_and_leaves_the_others_out(tmp_path: Path) -> None:
-    text = "Mz;Strom [A];Druck 1 [bar];when\n20;1,5;5;8:00\n21;1,6;5;8:01\n"
-    got = read(tmp_path, text, mapping="torque_nm:Mz,pressure_bar:Druck 1")
-    assert {name: column.tolist() for name, column in got.items()} == {"torque_nm": [20, 21], "pressure_bar": [5, 5]}
-
-
 WRONG = [
     ("", "must not be empty"),
     ("\n\n", "send a file with a header"),

@@ -58,9 +58,8 @@ def test_a_map_may_name_what_holds_commas_and_colons() -> None:
 
 def test_a_map_wins_over_names_and_states_the_unit() -> None:
     headers = [Column("torque_nm"), Column("Mz"), Column("other")]
-    assert [(column.channel, column.index) for column in choose(headers, reading_of("torque_nm:Mz"))] == [
-        ("torque_nm", 1)
-    ]
+    (column,) = choose(headers, reading_of("torque_nm:Mz"))
+    assert (column.channel, column.index) == ("torque_nm", 1)
 
 
 def test_equal_names_are_distinguished_by_their_group() -> None:

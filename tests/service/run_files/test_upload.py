@@ -1,4 +1,4 @@
-"""Raw records, dynamic tests and files through the service."""
+"""Raw records, dynamic tests and files through the service; the plate's temperature among their channels."""
 
 import json
 from typing import Any
@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from service.lives.incoming_run import SampledChannels, sampled_record, stationary_plateaus
+from tests.service.clients import post_run
 from tests.support import stationary, torque_nm
 
 RUNS = "/v1/clutches/c1/runs"
+PRESSURES, SPEEDS = (4.0, 5.0, 6.0), (20, 270, 520, 770, 1020, 1320, 1620, 1970)
 
 
 def raw_record(rate: float = 50.0, dwell: float = 5.0, tau: float = 0.1) -> dict[str, list[float]]:
     """A stationary test as its recorder saw it: three pressures, eight speeds, an exponential approach to each torque."""
     rng = np.random.default_rng(3)
-    steps = [(p, n) for p in (4.0, 5.0, 6.0) for n in (20, 270, 520, 770, 1020, 1320, 1620, 1970)]
+    steps = [(p, n) for p in PRESSURES for n in SPEEDS]
     per = int(rate * dwell)
     clock = np.arange(per) / rate
     torque, before = [], 0.0
@@ -34,8 +37,7 @@ def raw_record(rate: float = 50.0, dwell: float = 5.0, tau: float = 0.1) -> dict
 
 def plateaus() -> dict[str, Any]:
     """The same test as exact plateaus."""
-    speeds = (20, 270, 520, 770, 1020, 1320, 1620, 1970)
-    return stationary(0, noise=0.0, pressures=(4.0, 5.0, 6.0), speeds=speeds)
+    return stationary(0, noise=0.0, pressures=PRESSURES, speeds=SPEEDS)
 
 
 def dynamic_record(rate: float = 100.0) -> dict[str, list[float]]:
@@ -54,40 +56,34 @@ def dynamic_record(rate: float = 100.0) -> dict[str, list[float]]:
 
 
 def test_a_raw_record_gives_the_fits_of_its_plateaus(client: TestClient) -> None:
-    raw = client.post(RUNS, json={"kind": "stationary_stribeck", "cycles": 0, "channels": raw_record()})
-    assert raw.status_code == 201, raw.text
+    raw = post_run(client, {"kind": "stationary_stribeck", "cycles": 0, "channels": raw_record()})
     client.post("/v1/clutches", json={"clutch_id": "exact"})
-    exact = client.post("/v1/clutches/exact/runs", json=plateaus())
-    assert [fit["pressure_bar"] for fit in raw.json()["fits"]] == [4.0, 5.0, 6.0]
-    for fitted, true in zip(raw.json()["fits"], exact.json()["fits"], strict=True):
+    exact = post_run(client, plateaus(), "exact")
+    assert [fit["pressure_bar"] for fit in raw["fits"]] == [4.0, 5.0, 6.0]
+    for fitted, true in zip(raw["fits"], exact["fits"], strict=True):
         assert fitted["points"] == 8
         assert abs(fitted["mean_cof"] - true["mean_cof"]) < 4 * fitted["mean_cof_sd"]
-    sent = client.get(f"{RUNS}/{raw.json()['run_id']}").json()["channels"]
-    assert sent == raw_record()
+    assert client.get(f"{RUNS}/{raw['run_id']}").json()["channels"] == raw_record()
 
 
-def test_a_record_without_a_plateau_is_refused(client: TestClient) -> None:
-    record = raw_record()
-    record["torque_nm"] = list(np.linspace(0, 20, len(record["torque_nm"])))
-    record["speed_rpm"] = list(np.linspace(0, 2000, len(record["torque_nm"])))
-    answer = client.post(RUNS, json={"kind": "stationary_stribeck", "cycles": 0, "channels": record})
-    assert (answer.status_code, answer.json()["errors"][0]["code"]) == (422, "no_plateau")
+def test_a_sweep_without_a_plateau_and_a_clock_in_whole_seconds_are_refused(client: TestClient) -> None:
+    raw, dynamic = raw_record(), dynamic_record()
+    ramp = np.linspace(0, 20, len(raw["time_s"]))
+    steady = {"torque_nm": ramp.tolist(), "speed_rpm": (100 * ramp).tolist()}
+    coarse = {"time_s": np.floor(dynamic["time_s"]).tolist()}
+    for kind, channels, code in (
+        ("stationary", raw | steady, "no_plateau"),
+        ("dynamic", dynamic | coarse, "time_stands"),
+    ):
+        answer = client.post(RUNS, json={"kind": f"{kind}_stribeck", "cycles": 0, "channels": channels})
+        assert (answer.status_code, answer.json()["errors"][0]["code"]) == (422, code)
     assert client.get(RUNS).json()["items"] == []
-
-
-def test_a_dynamic_test_by_a_clock_in_whole_seconds_is_refused(client: TestClient) -> None:
-    record = dynamic_record()
-    record["time_s"] = np.floor(record["time_s"]).tolist()
-    answer = client.post(RUNS, json={"kind": "dynamic_stribeck", "cycles": 0, "channels": record})
-    assert (answer.status_code, answer.json()["errors"][0]["code"]) == (422, "time_stands")
 
 
 def test_a_dynamic_test_gets_its_loop(client: TestClient) -> None:
     """Whole periods only: 15 s at 0.1 Hz are one; the area is that of the ellipse, π · 1 Nm · the velocity's amplitude."""
     client.post(RUNS, json=plateaus())
-    answer = client.post(RUNS, json={"kind": "dynamic_stribeck", "cycles": 0, "channels": dynamic_record()})
-    assert answer.status_code == 201, answer.text
-    (loop,) = answer.json()["loops"]
+    (loop,) = post_run(client, {"kind": "dynamic_stribeck", "cycles": 0, "channels": dynamic_record()})["loops"]
     amplitude = 1000 * 2 * np.pi / 60 * 0.058
     assert loop["periods"] == 1
     assert loop["pressure_bar"] == 5.0
@@ -136,17 +132,10 @@ def test_a_wrong_file_is_refused_and_nothing_is_stored(client: TestClient) -> No
     address = f"{RUNS}/file?kind=stationary_stribeck&cycles=0"
     columns = plateaus()["channels"]
     bad = csv_of({**columns, "torque_nm": [*columns["torque_nm"][:-1], float("nan")]})
-    for content, status in (
-        (b"", 422),
-        (b"\x89PNG\r\n\x1a\n" + bytes(100), 422),
-        (b"a,b\n1,2\n", 422),
-        (csv_of({"speed_rpm": [1.0, 2.0], "torque_nm": [1.0, 2.0]}), 422),
-        (bad, 422),
-    ):
+    short = csv_of({"speed_rpm": [1.0, 2.0], "torque_nm": [1.0, 2.0]})
+    for content in (b"", b"\x89PNG\r\n\x1a\n" + bytes(100), b"a,b\n1,2\n", short, bad):
         answer = client.post(address, content=content)
-        assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json"), content[
-            :20
-        ]
+        assert (answer.status_code, answer.headers["content-type"]) == (422, "application/problem+json"), content[:20]
     assert client.post(f"{RUNS}/file?kind=maintenance&cycles=0", content=b"x").status_code == 422
     assert client.post(f"{RUNS}/file?kind=stationary_stribeck&cycles=-1", content=b"x").status_code == 422
     assert client.get(RUNS).json()["items"] == []
@@ -158,3 +147,67 @@ def test_a_page_of_another_site_may_not_post(client: TestClient) -> None:
     assert client.post("/v1/clutches", content=body, headers=headers).status_code == 403
     headers["Origin"] = "http://127.0.0.1"
     assert client.post("/v1/clutches", content=body, headers=headers).status_code == 201
+
+
+# --- The plate's temperature, front and rear: sent as JSON or as a file, checked, kept, given back, and read as one mean.
+
+
+FRONT, REAR = "plate_temperature_front_c", "plate_temperature_rear_c"
+
+
+def with_plate(channels: dict[str, list[float]], *names: str) -> dict[str, list[float]]:
+    """The channels, and each of the plate's thermometers a little warmer than the one before."""
+    rows = np.arange(len(channels["torque_nm"]))
+    return channels | {name: (90.0 + 2.0 * place + 0.01 * rows).tolist() for place, name in enumerate(names)}
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        {"kind": "stationary_stribeck", "channels": stationary(0)["channels"]},
+        {"kind": "stationary_stribeck", "channels": raw_record()},
+        {"kind": "dynamic_stribeck", "channels": dynamic_record()},
+        {"kind": "duty_cycles", "duty": {"cycles": 10}, "channels": dynamic_record()},
+    ],
+    ids=["plateaus", "raw", "dynamic", "engagement"],
+)
+def test_what_was_sent_is_given_back(client: TestClient, run: dict[str, Any]) -> None:
+    channels = with_plate(run["channels"], FRONT, REAR)
+    post_run(client, run | {"run_id": "r", "cycles": 10, "channels": channels})
+    assert client.get(f"{RUNS}/r").json()["channels"] == channels
+
+
+def test_a_file_brings_it_by_its_titles(client: TestClient) -> None:
+    channels = with_plate(stationary(0)["channels"], FRONT, REAR)
+    titles = {FRONT: "T_plate front [K]", REAR: "Lamellentemperatur hinten [°C]"}
+    columns = channels | {FRONT: [value + 273.15 for value in channels[FRONT]]}
+    lines = [",".join(titles.get(name, name) for name in columns)]
+    lines += [",".join(map(repr, row)) for row in zip(*columns.values(), strict=True)]
+    for kind in ("stationary_stribeck", "dynamic_stribeck"):
+        if kind == "dynamic_stribeck":
+            lines = [f"time_s,{lines[0]}", *(f"{0.01 * row},{line}" for row, line in enumerate(lines[1:]))]
+        sent = client.post(f"{RUNS}/file?kind={kind}&cycles=0&run_id={kind}", content="\n".join(lines).encode())
+        assert sent.status_code == 201, sent.text
+        kept = client.get(f"{RUNS}/{kind}").json()["channels"]
+        np.testing.assert_allclose(kept[FRONT], channels[FRONT])
+        assert kept[REAR] == channels[REAR]
+
+
+def test_it_is_refused_below_absolute_zero(client: TestClient) -> None:
+    body = stationary(0)
+    body["channels"] = with_plate(body["channels"], FRONT, REAR)
+    body["channels"][REAR][3] = -300.0
+    answer = client.post(RUNS, json=body)
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["pointer"] == f"/channels/{REAR}/3"
+
+
+@pytest.mark.parametrize(
+    ("names", "mean"), [((FRONT,), 363.15), ((REAR,), 363.15), ((FRONT, REAR), 364.15), ((), None)]
+)
+def test_the_plate_is_as_warm_as_the_mean_of_its_thermometers(names: tuple[str, ...], mean: float | None) -> None:
+    channels = {name: np.array(values) for name, values in with_plate(dynamic_record(), *names).items()}
+    rows = {name: values for name, values in channels.items() if name != "time_s"}
+    for read in (sampled_record(channels), SampledChannels(channels), stationary_plateaus(rows)):
+        plate = read.plate_temperature
+        assert plate is None if mean is None else plate[0] == pytest.approx(mean)

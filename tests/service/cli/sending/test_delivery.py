@@ -14,7 +14,7 @@ from service.client.clutchlife.answers import RefusedError, ServiceAwayError
 from service.client.clutchlife.transport import Service
 from tests.service.cli.sending.stand_in_service import URL, Answer, StandInService, body, problem
 from tests.service.cli.sending.test_spool import contents, set_aside, written
-from tests.service.client.clutchlife.test_transport import Clock
+from tests.service.client.clutchlife.test_client import Clock
 
 
 class Sender:
@@ -77,9 +77,7 @@ def test_a_run_that_the_service_refuses_is_set_aside_with_the_reason(sender: Sen
     "status", [400, 405, 406, 409, 410, 411, 413, 414, 415, 421, 422, 426, 428, 431, 451, 499, 500]
 )
 @pytest.mark.parametrize("body_of", [{"html": "<h1>no</h1>"}, {"json": {"detail": "no"}}], ids=["html", "json"])
-def test_a_run_that_somebody_else_objects_to_stays_and_the_next_is_sent(
-    sender: Sender, status: int, body_of: dict[str, Any]
-) -> None:
+def test_a_run_a_proxy_refuses_stays_and_the_next_is_sent(sender: Sender, status: int, body_of: dict[str, Any]) -> None:
     """An nginx with a bound of its own answers 413 in HTML: the run is not bad, and others may pass."""
     sender.service.instead = of_run(b'"bad"', lambda: httpx2.Response(status, **body_of))
     sender.push(body(1, "bad"), "1.json")
@@ -183,9 +181,7 @@ def test_an_inspection_waits_while_the_service_is_away_and_is_sent_to_its_own_ad
     sender.service.states[name] = {"state": "withdrawn"}
     sender.spool.add([(sender.folder / "i.json", None)], INSPECTIONS)
     assert sender.send().duplicates == 1
-    assert sender.lines[-1:] == [
-        f"{name} was stored earlier and then withdrawn: it stays withdrawn and is not sent again"
-    ]
+    assert sender.lines[-1] == f"{name} was stored earlier and then withdrawn: it stays withdrawn and is not sent again"
 
 
 def test_a_run_known_with_other_content_waits_no_more(sender: Sender) -> None:

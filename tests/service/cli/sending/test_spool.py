@@ -82,9 +82,8 @@ def test_a_file_that_is_used_for_every_run_replaces_none(spool: Spool, tmp_path:
     run = tmp_path / "latest.json"
     for cycles in (1, 2, 3):
         spool.add([(written(run, body(cycles, f"r{cycles}")), None)])
-        spool.add(
-            [(written(tmp_path / "other.json", body(cycles, started_at=f"2026-01-0{cycles}", note=str(cycles))), None)]
-        )
+        dated = body(cycles, started_at=f"2026-01-0{cycles}", note=str(cycles))
+        spool.add([(written(tmp_path / "other.json", dated), None)])
     assert len(contents(spool)) == 6
     assert set_aside(spool) == []
 
@@ -97,9 +96,7 @@ def test_files_of_one_call_do_not_replace_each_other(spool: Spool, tmp_path: Pat
         assert contents(spool) == [body(1, "r1"), body(2, "r1")]
 
 
-def test_a_clock_that_is_set_back_changes_no_order(
-    spool: Spool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_clock_set_back_changes_no_order(spool: Spool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = tmp_path / "run.json"
     for cycles, year in ((70000, 2030), (7000, 2026)):
         monkeypatch.setattr(entries, "stamp", lambda year=year: f"{year}-01-01T00:00:00+00:00")

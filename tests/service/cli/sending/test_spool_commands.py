@@ -1,24 +1,17 @@
 """`clutchlife spool` and what `push` says of the spool, as an engineer types them."""
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import threading
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 import httpx2
 import pytest
-from typer.testing import CliRunner
 
-from service.cli.main import app
 from service.cli.sending import delivery
 from service.cli.sending.spool import Spool
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body, problem
 from tests.service.cli.sending.test_spool import written
+from tests.service.clients import clutchlife
 
 
 class Terminal:
@@ -37,11 +30,8 @@ class Terminal:
         client.base_url = httpx2.URL(url)
         return client
 
-    def __call__(self, *arguments: str | Path, code: int = 0, answer: str = "") -> str:
-        called = [*map(str, arguments), "--spool", str(self.folder / "spool")]
-        done = CliRunner().invoke(app, called, input=answer)
-        assert done.exit_code == code, done.output
-        return done.output
+    def __call__(self, *arguments: str | Path, code: int = 0, answers: str = "") -> str:
+        return clutchlife(*arguments, "--spool", self.folder / "spool", code=code, answers=answers)
 
     def push(self, content: bytes, name: str = "run.json", *, code: int = 0, clutch: str = "c1", url: str = URL) -> str:
         """Push one run without waiting."""
@@ -52,8 +42,7 @@ class Terminal:
 
     def listed(self) -> list[dict[str, Any]]:
         """What `spool list --json` prints."""
-        items: list[dict[str, Any]] = json.loads(self("spool", "list", "--json"))["items"]
-        return items
+        return json.loads(self("spool", "list", "--json"))["items"]
 
 
 @pytest.fixture
@@ -133,11 +122,11 @@ def test_the_spool_is_emptied_after_a_question(terminal: Terminal) -> None:
     terminal.service.instead = away
     terminal.push(body(1), "1.json", code=75)
     terminal.push(body(2), "2.json", code=75, clutch="c2")
-    for answer in ("n\n", ""):
-        output = terminal("spool", "empty", answer=answer, code=1)
+    for answers in ("n\n", ""):
+        output = terminal("spool", "empty", answers=answers, code=1)
         assert "Delete these 3 for good? 2 of them were never stored by the service." in output
         assert len(terminal.listed()) == 3
-    assert "1 deleted; the service never stored 0 of them" in terminal("spool", "empty", "--refused", answer="y\n")
+    assert "1 deleted; the service never stored 0 of them" in terminal("spool", "empty", "--refused", answers="y\n")
     assert [item["state"] for item in terminal.listed()] == ["waiting", "waiting"]
     output = terminal("spool", "empty", "--clutch", "c2", "--yes")
     assert "2.json" in output
@@ -179,59 +168,6 @@ def test_refusals_end_the_command_as_data_errors_and_absence_as_a_failure_for_no
     terminal.service.instead = lambda _request: httpx2.Response(200, html="<p>log in</p>")
     assert "a login page or a proxy?" in terminal.push(body(1), code=75)
     assert len(terminal.listed()) == 1
-
-
-class Killing(BaseHTTPRequestHandler):
-    """Kills the client while it waits for the answer to its first run; answers every other request."""
-
-    client: subprocess.Popen[str] | None = None
-    started = threading.Event()
-
-    def do_GET(self) -> None:
-        self._answer(b'{"clutch_id": "c1"}')
-
-    def do_POST(self) -> None:
-        self.rfile.read(int(self.headers["Content-Length"]))
-        self.started.wait(60)
-        if self.client is not None:
-            os.kill(self.client.pid, signal.SIGKILL)
-            self.client.wait()
-            Killing.client = None
-            return
-        self._answer(b'{"run_id": "r1", "duplicate": true}')
-
-    def _answer(self, content: bytes) -> None:
-        self.send_response(200)
-        self.send_header("Content-Length", str(len(content)))
-        self.end_headers()
-        self.wfile.write(content)
-
-    def log_message(self, *_arguments: object) -> None:
-        """Say nothing."""
-
-
-def test_a_push_that_is_killed_while_the_service_answers_is_known_to_have_been_sent(tmp_path: Path) -> None:
-    file = written(tmp_path / "run.json", body(1, "r1"))
-    with ThreadingHTTPServer(("127.0.0.1", 0), Killing) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        try:
-            arguments = ["push", str(file), "--clutch", "c1", "--url", f"http://127.0.0.1:{server.server_port}"]
-            arguments += ["--spool", str(tmp_path / "spool")]
-            Killing.client = killed = subprocess.Popen(
-                [sys.executable, "-m", "service.cli.main", *arguments], text=True
-            )
-            Killing.started.set()
-            assert killed.wait(120) == -signal.SIGKILL
-            (spool,) = Spool.every(tmp_path / "spool")
-            (entry,) = spool.waiting()
-            assert (entry.tries, entry.perhaps_stored) == (1, True)
-            done = CliRunner().invoke(app, arguments)
-            assert "0 stored now, 1 stored before, 0 refused" in done.output
-            assert spool.waiting() == []
-        finally:
-            server.shutdown()
-            thread.join()
 
 
 def test_a_rigs_files_are_sent_with_its_name_and_what_else_is_given(terminal: Terminal) -> None:

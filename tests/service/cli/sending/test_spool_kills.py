@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import httpx2
 import pytest
 
 from service.cli.sending import spool
@@ -114,9 +115,8 @@ def test_a_killed_push_loses_nothing_and_keeps_no_half(tmp_path: Path) -> None:
     first, second = (partial(Sender.push, content=body(n), name=f"{n}.json") for n in (1, 2))
     for bench in benches(tmp_path, first, second):
         bench.spool.begin()
-        assert {path.name for path in bench.spool.folder.iterdir()} - {"spool.sqlite"} == {
-            entry.body for entry in bench.spool.waiting()
-        }
+        bodies = {entry.body for entry in bench.spool.waiting()}
+        assert {path.name for path in bench.spool.folder.iterdir()} == {"spool.sqlite", *bodies}
         assert contents(bench.spool) in ([body(1)], [body(1), body(2)])
         bench.push(body(2), "2.json")
         assert contents(bench.spool) == [body(1), body(2)]
@@ -163,3 +163,22 @@ def test_a_kill_while_sending_loses_and_doubles_nothing(tmp_path: Path) -> None:
         assert bench.spool.body(refused).read_bytes() == body(-1)
         assert refused.problem["detail"] == "cycles: must not be negative"
         assert set_aside(bench.spool) == [OLDER]
+
+
+def test_a_kill_while_the_service_answers_leaves_the_run_known_as_sent(tmp_path: Path) -> None:
+    bench = Sender(tmp_path)
+    bench.push(body(1, "r1"))
+
+    def kill(request: httpx2.Request) -> None:
+        if request.method == "POST":
+            _killer.left = 0  # nothing is written any more, either
+            raise KilledError
+
+    bench.service.instead = kill
+    with pytest.raises(KilledError), killed_before(10**6, bench.spool.folder):
+        bench.send()
+    (entry,) = bench.spool.waiting()
+    assert (entry.tries, entry.perhaps_stored) == (1, True)
+    bench.service.instead = lambda _request: None
+    assert bench.send().stored == 1
+    assert contents(bench.spool) == []

@@ -1,19 +1,25 @@
-"""The client as scripts use it, against a running service: values, tables, exceptions with the service's problem."""
+"""The client as scripts use it: values, tables, problems as exceptions; it waits while the service is away."""
 
+import email.utils
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import httpx2
 import numpy as np
 import pandas as pd
 import pytest
 
-from service.client.clutchlife import Client, ClutchlifeError, RefusedError, ServiceAwayError
-from service.client.clutchlife.tables import Frames, columns, table
-from tests.support import Server, free_port, serving, stationary
+from service.client.clutchlife import Client, ClutchlifeError, transport
+from service.client.clutchlife.answers import RefusedError, ServiceAwayError, retry_after
+from service.client.clutchlife.tables import Frames, table
+from service.client.clutchlife.transport import NoLongerWantedError, Service
+from tests.service.cli.sending.stand_in_service import URL
+from tests.support import Server, serving, stationary
 
 ROOT = Path(__file__).parents[4]
 
@@ -52,7 +58,7 @@ def test_remaining_life_is_the_answer_of_the_api(client: Client) -> None:
 def test_held_runs_are_confirmed_together(client: Client) -> None:
     client.register("held")
     for cycles in (0.0, 1000.0, 2000.0):
-        client.post_run("held", stationary(cycles, run_id=f"s{cycles:g}"))
+        client.post_run("held", stationary(cycles))
     for cycles in (3000.0, 4000.0):
         body = stationary(cycles, run_id=f"odd-{cycles:g}")
         body["channels"]["torque_nm"] = [60 * torque for torque in body["channels"]["torque_nm"]]
@@ -88,55 +94,38 @@ def test_a_refusal_carries_the_problem(client: Client) -> None:
     assert unknown.value.problem["type"] == "urn:clutchlife:problem:not-found"
 
 
-def test_a_service_that_is_not_there_is_said_so() -> None:
-    with pytest.raises(ServiceAwayError), Client(f"http://127.0.0.1:{free_port()}", patience=0.0) as away:
-        away.clutches()
-
-
 def test_a_diagnosis_is_waited_for(client: Client) -> None:
     report = client.diagnose("e")
     assert report["status"] == "finished"
     assert client.diagnoses("e").loc[0, "diagnosis_id"] == report["diagnosis_id"]
 
 
-ITEMS: list[dict[str, Any]] = [{"a": 1, "b": {"c": None, "d": [1]}}, {"a": 2.5, "b": {"c": "x", "d": []}}]
-
-
-def test_tables_have_a_column_for_each_part_of_an_item() -> None:
-    frame = table(ITEMS, "pandas")
-    assert list(frame.columns) == ["a", "b.c", "b.d"]
-    assert table(ITEMS, "list") == ITEMS
-    polars = pytest.importorskip("polars")
-    assert isinstance(table(ITEMS, "polars"), polars.DataFrame)
-
-
 @pytest.mark.parametrize("library", ["pandas", "polars"])
-def test_an_object_that_only_some_items_have_is_no_empty_column_beside_its_own(library: Frames) -> None:
-    pytest.importorskip(library)
-    frame = table([{"a": 1, "b": None}, {"a": 2, "b": {"c": 3}}, {"a": 4, "b": {}}], library)
-    assert list(frame.columns) == ["a", "b.c"]
+@pytest.mark.parametrize(
+    ("items", "columns"),
+    [
+        ([{"a": 1, "b": {"c": None, "d": [1]}}, {"a": 2.5, "b": {"c": "x", "d": []}}], ["a", "b.c", "b.d"]),
+        # an object that only some items have is no empty column beside its own
+        ([{"a": 1, "b": None}, {"a": 2, "b": {"c": 3}}, {"a": 4, "b": {}}], ["a", "b.c"]),
+    ],
+)
+def test_tables_have_a_column_for_each_part(library: Frames, items: list[dict[str, Any]], columns: list[str]) -> None:
+    frame = table(items, library)
+    assert isinstance(frame, pytest.importorskip(library).DataFrame)
+    assert list(frame.columns) == columns
+    assert table(items, "list") == items
 
 
 def test_a_frame_has_a_row_for_each_measurement() -> None:
-    items = [
-        {
-            "run_id": "a",
-            "fits": [{"pressure_bar": 4, "mean_cof": 0.1}, {"pressure_bar": 5, "mean_cof": 0.2}],
-            "doubts": [],
-        },
-        {"run_id": "b", "fits": [], "doubts": [{"code": "unit", "message": "?"}, {"code": "dead", "message": "?"}]},
-    ]
+    fits = [{"pressure_bar": 4, "mean_cof": 0.1}, {"pressure_bar": 5, "mean_cof": 0.2}]
+    doubts = [{"code": "unit", "message": "?"}, {"code": "dead", "message": "?"}]
+    items = [{"run_id": "a", "fits": fits, "doubts": []}, {"run_id": "b", "fits": [], "doubts": doubts}]
     rows = table(items, "pandas", row_of="fits")
     assert rows["run_id"].tolist() == ["a", "a", "b"]
     assert rows["pressure_bar"].tolist()[:2] == [4, 5]
     assert rows["doubts"].tolist() == ["", "", "unit, dead"]
     assert table(items, "pandas", without=["fits"]).columns.tolist() == ["run_id", "doubts"]
     assert table(items, "list", row_of="fits") == items
-
-
-def test_channels_of_any_kind_are_lists() -> None:
-    assert columns(pd.DataFrame({"torque_nm": [1.0, 2.0]})) == {"torque_nm": [1.0, 2.0]}
-    assert columns({"torque_nm": (1, 2)}) == {"torque_nm": [1, 2]}
 
 
 @pytest.mark.usefixtures("client")
@@ -148,7 +137,147 @@ def test_without_pandas_and_polars_tables_are_lists(server: Server) -> None:
         "u.find_spec = lambda name, *more: None if name in ('pandas', 'polars') else real(name, *more);"
         f"from clutchlife import Client; print([run['cycles'] for run in Client({server.url!r}).runs('e')])"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT / "service" / "client", capture_output=True, text=True, check=False
-    )
+    here, command = ROOT / "service" / "client", [sys.executable, "-c", script]
+    done = subprocess.run(command, cwd=here, capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "[0, 1000, 2000, 3000]", done.stderr
+
+
+# --- It waits while the service is away, on a clock of the test's.
+
+
+RECEIPT = httpx2.Response(200, json={"run_id": "r1"})
+
+
+class Clock:
+    """Time that passes in `sleep` alone."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.waits: list[float] = []
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+        self.waits.append(seconds)
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    fake = Clock()
+    monkeypatch.setattr(transport, "time", fake)
+    return fake
+
+
+Served = httpx2.Response | Exception
+
+
+def service(*answers: Served, patience: float = 60.0) -> Service:
+    """A service that gives these answers in turn, the last one for ever."""
+    left = list(answers)
+
+    def handle(_request: httpx2.Request) -> httpx2.Response:
+        answer = left.pop(0) if len(left) > 1 else left[0]
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    return Service(http=httpx2.Client(base_url=URL, transport=httpx2.MockTransport(handle)), patience=patience)
+
+
+def test_it_waits_for_a_service_that_comes_back(clock: Clock) -> None:
+    away: list[Served] = [
+        httpx2.ConnectError("refused"),
+        httpx2.Response(502),
+        httpx2.Response(429),
+        httpx2.Response(308, headers={"Location": "https://login.test"}),
+        httpx2.Response(200, html="<p>log in</p>"),
+    ]
+    assert service(*away, RECEIPT).get("/x") == {"run_id": "r1"}
+    assert clock.waits == [0.25, 0.5, 1.0, 2.0, 4.0]
+
+
+def test_it_waits_as_long_as_it_is_told(clock: Clock) -> None:
+    later = {"Date": "Sun, 01 Mar 2026 12:00:00 GMT", "Retry-After": "Sun, 01 Mar 2026 12:00:20 GMT"}
+    assert service(httpx2.Response(503, headers=later), RECEIPT).get("/x")
+    assert service(httpx2.Response(429, headers={"Retry-After": "9"}), RECEIPT).get("/x")
+    assert clock.waits == [20.0, 9.0]
+
+
+@pytest.mark.parametrize(
+    ("answer", "patience", "words"),
+    [
+        (httpx2.Response(503, headers={"Retry-After": "86400"}), 60.0, "503"),
+        (httpx2.Response(200, html="<html>Please log in</html>"), 0.0, "login page"),
+        (httpx2.Response(308, headers={"Location": "https://new.test/"}), 0.0, "https://new.test/"),
+    ],
+)
+def test_no_wait_goes_beyond_its_patience(clock: Clock, answer: httpx2.Response, patience: float, words: str) -> None:
+    with pytest.raises(ServiceAwayError, match=words):
+        service(answer, patience=patience).get("/x")
+    assert clock.waits == []
+
+
+@pytest.mark.parametrize(
+    ("answer", "perhaps"),
+    [
+        (httpx2.ConnectError("refused"), False),
+        (httpx2.Response(503), False),
+        (httpx2.Response(429), False),
+        (httpx2.Response(302), False),
+        (httpx2.ReadTimeout("slow"), True),
+        (httpx2.RemoteProtocolError("cut"), True),
+        (httpx2.Response(504), True),
+        (httpx2.DecodingError("not gzip"), True),
+    ],
+    ids=str,
+)
+@pytest.mark.usefixtures("clock")
+def test_it_tells_whether_a_lost_request_may_have_been_carried_out(answer: Served, perhaps: bool) -> None:
+    with pytest.raises(ServiceAwayError) as raised:
+        service(answer, patience=5).post("/x", {})
+    assert raised.value.perhaps_stored is perhaps
+
+
+def test_what_is_refused_is_not_tried_again(clock: Clock) -> None:
+    for status in (400, 401, 404, 409, 413, 422, 500):
+        with pytest.raises(RefusedError, match=str(status)):
+            service(httpx2.Response(status, text="no")).get("/x")
+    with pytest.raises(RefusedError):
+        Service(http=httpx2.Client(base_url="nowhere")).get("/x")
+    assert clock.waits == []
+
+
+def test_what_is_wanted_no_more_is_not_tried_again(clock: Clock, tmp_path: Path) -> None:
+    (tmp_path / "run").write_bytes(b"{}")
+    wanted: Callable[[], bool] = lambda: not clock.waits  # noqa: E731  (until the first wait)
+    with pytest.raises(NoLongerWantedError):
+        service(httpx2.Response(503)).post_file("/x", tmp_path / "run", None, wanted)
+    assert len(clock.waits) == 1
+
+
+NOW = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
+NEXT_YEAR = NOW + timedelta(days=365)
+
+
+def http_date(moment: datetime) -> str:
+    return email.utils.format_datetime(moment, usegmt=True)
+
+
+@pytest.mark.parametrize(
+    ("headers", "seconds"),
+    [
+        ({}, 0),
+        ({"Retry-After": "7"}, 7),
+        ({"Retry-After": http_date(NOW + timedelta(seconds=90))}, 90),
+        ({"Retry-After": http_date(NOW - timedelta(days=1))}, 0),
+        ({"Retry-After": "Sunday, 01-Mar-26 12:00:30 GMT"}, 30),
+        *(({"Retry-After": text}, 0) for text in ("-3", "nan", "inf", "1e9", "soon", "", "Mon, 99 Foo 2026")),
+        # this machine's clock is a year behind: the service's own says how long it is
+        ({"Date": http_date(NEXT_YEAR), "Retry-After": http_date(NEXT_YEAR + timedelta(seconds=5))}, 5),
+    ],
+    ids=str,
+)
+def test_retry_after_is_a_number_or_a_date(headers: dict[str, str], seconds: float) -> None:
+    assert retry_after(httpx2.Headers(headers), now=NOW) == seconds

@@ -1,7 +1,9 @@
-"""Stored runs as the diagnosis sees them: SI units, the present life, records within bounds."""
+"""Stored runs as the diagnosis sees them: SI units, the present life, records within bounds; its public report."""
 
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -9,31 +11,36 @@ from fastapi.testclient import TestClient
 
 from models.diagnosis.campaign import Campaign, EventKind
 from models.diagnosis.design.design import build_design
+from models.diagnosis.explanations.verdict import Verdict
 from models.records.runs import Record
 from service.lives.diagnosis import campaign as campaign_module
 from service.lives.diagnosis.campaign import DiagnosedLife, thinned
+from service.lives.diagnosis.report import public
 from service.work.diagnosis import read_life
 from storage.engine.opening import open_database
+from tests.models.diagnosis.report.test_summary import findings
+from tests.service.clients import post_run
 from tests.service.run_files.test_upload import dynamic_record, raw_record
 from tests.support import PRESSURES_BAR, SPEEDS_RPM, stationary
 
 RUNS = "/v1/clutches/c1/runs"
 ALL = 10**9
-EMPTY = Campaign()
 
 
 def post(client: TestClient, *bodies: dict[str, Any]) -> None:
     for body in bodies:
-        answer = client.post(RUNS, json=body)
-        assert answer.status_code == 201, answer.text
+        post_run(client, body)
 
 
 def campaign(database_url: str, last_run_key: int = ALL) -> DiagnosedLife:
-    database = open_database(database_url)
-    try:
+    with closing(open_database(database_url)) as database:
         return read_life(database, "c1", last_run_key=last_run_key)
-    finally:
-        database.close()
+
+
+def idle_record() -> dict[str, list[float]]:
+    """A dynamic test with the clutch open."""
+    record = dynamic_record()
+    return record | {"pressure_bar": [0.0] * len(record["time_s"]), "torque_nm": [0.1 * t for t in record["torque_nm"]]}
 
 
 def test_each_kind_of_run_arrives_in_si_units(client: TestClient, database_url: str) -> None:
@@ -67,9 +74,7 @@ def test_readings_without_pressure_are_evidence_and_no_curve(client: TestClient,
     open_speeds = [20.0, 500.0, 1000.0, 1970.0]
     added = {"pressure_bar": [0.0, 0.0, 0.02, 0.01], "speed_rpm": open_speeds, "torque_nm": [0.01, 0.05, 0.1, 0.2]}
     told["channels"] = {name: [*values, *added[name]] for name, values in told["channels"].items()}
-    loops = dynamic_record()
-    nothing = {"pressure_bar": [0.0] * len(loops["pressure_bar"]), "torque_nm": [0.1 * t for t in loops["torque_nm"]]}
-    post(client, told, {"kind": "dynamic_stribeck", "cycles": 0, "run_id": "idle", "channels": loops | nothing})
+    post(client, told, {"kind": "dynamic_stribeck", "cycles": 0, "run_id": "idle", "channels": idle_record()})
     found = campaign(database_url).campaign
     assert found.stationary[0].plateaus.pressure.size == len(PRESSURES_BAR) * len(SPEEDS_RPM) + len(open_speeds)
     design = build_design(found)
@@ -91,12 +96,10 @@ def test_only_the_present_life_counts_from_its_rebuild_on(client: TestClient, da
     earlier = campaign(database_url, last_run_key=1)
     assert [run.run_id for run in earlier.campaign.stationary] == ["old"]
     assert campaign(database_url, last_run_key=0).life is None
-    assert campaign(database_url, last_run_key=0).campaign == EMPTY
+    assert campaign(database_url, last_run_key=0).campaign == Campaign()
 
 
-def test_a_raw_record_gives_plateaus_and_stays(
-    client: TestClient, database_url: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_raw_record_gives_plateaus(client: TestClient, database_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     raw = {"kind": "stationary_stribeck", "cycles": 0, "run_id": "raw", "channels": raw_record()}
     post(client, raw, raw | {"cycles": 1000, "run_id": "later"})
     client.post("/v1/clutches/c1/runs/later/confirm", json={"reason": "a bench of two tests"})
@@ -134,13 +137,11 @@ def test_nothing_of_it_is_written(client: TestClient, database_url: str) -> None
 
 
 def test_the_plate_and_a_declared_filter_reach_the_diagnosis(client: TestClient, database_url: str) -> None:
-    def with_plate(channels: dict[str, Any]) -> dict[str, Any]:
-        return channels | {"plate_temperature_rear_c": [95.0] * len(channels["torque_nm"])}
-
-    raw = {"kind": "stationary_stribeck", "cycles": 0, "run_id": "raw", "channels": with_plate(raw_record())}
-    loops = {"kind": "dynamic_stribeck", "cycles": 0, "run_id": "loops", "channels": with_plate(dynamic_record())}
-    rows = stationary(500, run_id="rows")
-    post(client, raw, loops, rows | {"channels": with_plate(rows["channels"])})
+    raw = {"kind": "stationary_stribeck", "cycles": 0, "run_id": "raw", "channels": raw_record()}
+    loops = {"kind": "dynamic_stribeck", "cycles": 0, "run_id": "loops", "channels": dynamic_record()}
+    for run in (raw, loops, stationary(500, run_id="rows")):
+        run["channels"]["plate_temperature_rear_c"] = [95.0] * len(run["channels"]["torque_nm"])
+        post_run(client, run)
     plain = campaign(database_url).campaign
     tables = [*(run.plateaus for run in plain.stationary), *(run.record for run in plain.dynamic)]
     assert all(table.plate_temperature == pytest.approx(368.15) for table in tables)
@@ -155,3 +156,19 @@ def test_the_plate_and_a_declared_filter_reach_the_diagnosis(client: TestClient,
     assert declared.stationary[0].time != plain.stationary[0].time
     assert declared.stationary[0].plateaus.torque == pytest.approx(plain.stationary[0].plateaus.torque, rel=0.01)
     np.testing.assert_array_equal(declared.stationary[1].plateaus.torque, plain.stationary[1].plateaus.torque)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        (0.0, 880.0, "If you adopt it, the end is not reached any more: a median of about 880 cycles remains."),
+        (880.0, 0.0, "If you adopt it, the end is reached; without it, a median of about 880 cycles remains."),
+        (9000.0, 5700.0, "from about 9,000 to about 5,700 cycles."),
+    ],
+)
+def test_an_end_that_adoption_takes_back_is_said_so(before: float, after: float, said: str) -> None:
+    """From about 0 to about 880 cycles was all that was said."""
+    found = replace(findings(Verdict.CAUSE_NAMED, "pressure_offset"), extension=cast("Any", object()))
+    lives = [{"remaining_cycles": {"0.5": median}} for median in (before, after)]
+    answer = public(found, origin=0.0, before=lives[0], after=lives[1], notes=())
+    assert answer["summary"].endswith(said)

@@ -24,25 +24,23 @@ def bench_after(cycles: Iterable[int] = CYCLES) -> Bench:
     return bench
 
 
-def next_test(**changed: Any) -> Body:
+def next_test(*, torque: float = 1.0, oil: float = 85.0, **changed: Any) -> Body:
+    """The test that follows, its torque so many times what it would be."""
     body = stationary(7000, run_id="next")
-    body["channels"]["oil_temperature_c"] = [85.0] * len(body["channels"]["torque_nm"])
+    body["channels"]["torque_nm"] = [torque * value for value in body["channels"]["torque_nm"]]
+    body["channels"]["oil_temperature_c"] = [oil] * len(body["channels"]["torque_nm"])
     return body | changed
 
 
 def made(at: float, level: float, *, new_level: bool = False) -> Event:
     """A test of a clutch whose COF hardly changes, at a level of it."""
     cof = level * (1.0 + 0.002 * np.random.default_rng(int(at)).standard_normal())
-    return Event(
-        run_id=f"t{at:g}",
-        kind="stationary_stribeck",
-        cycles=at,
-        moment=at,
-        speed_range=(1.0, 50.0),
-        cofs={5e5: (cof, 1e-4)},
-        shown=Shown(cof=cof, pressure=5e5, speed=50.0),
-        new_level=new_level,
-    )
+    measured = {
+        "cofs": {5e5: (cof, 1e-4)},
+        "shown": Shown(cof=cof, pressure=5e5, speed=50.0),
+        "speed_range": (1.0, 50.0),
+    }
+    return Event(run_id=f"t{at:g}", kind="stationary_stribeck", cycles=at, moment=at, new_level=new_level, **measured)
 
 
 @pytest.mark.parametrize(
@@ -52,9 +50,7 @@ def made(at: float, level: float, *, new_level: bool = False) -> Event:
         (70, 10, 10_500.0), (70, 25, 500.0), (70, 60, 500.0),  # at 25 between those that are nearest to either
     ],
 )  # fmt: skip
-def test_a_level_stays_where_the_tests_before_it_are_no_longer_looked_at(
-    tests: int, begins: int, incoming: float | None
-) -> None:
+def test_a_level_stays_when_earlier_tests_are_out_of_sight(tests: int, begins: int, incoming: float | None) -> None:
     """And none begins a second time with the first test that is looked at after it."""
     begun = 1000.0 * begins
     known = [made(1000.0 * k, 0.1 if k < begins else 0.08, new_level=k == begins) for k in range(tests)]
@@ -70,30 +66,47 @@ def test_a_level_passes_to_the_next_test_however_long_ago_its_first_was_made() -
     assert judged == Judged(levels={"t11000": True})
 
 
-def test_a_test_that_follows_is_not_doubted() -> None:
-    assert bench_after().answer(next_test()).codes == ()
+OFF_PACE = ("cycles_off_pace",)
+BLOCK: Body = {"kind": "duty_cycles", "run_id": "d", "duty": {"cycles": 1000, "initial_speed_rpm": 2000}}
 
 
-def test_a_zero_too_many_is_asked_about() -> None:
-    answer = bench_after().answer(next_test(cycles=70_000))
-    assert answer.codes == ("cycles_off_pace",)
-    for part in (
-        "70000 cycles",
-        "64000 after the previous run",
-        "1000 cycles apart",
-        "Is it 7000?",
-        "Confirm or correct it.",
-    ):
-        assert part in answer.message
-
-
-def test_swapped_digits_among_earlier_runs_are_seen_by_the_cof() -> None:
-    """700 cycles would be an honest late run; its COF is that of 7000."""
-    bench = bench_after()
-    answer = bench.answer(next_test(cycles=700))
-    assert answer.codes == ("cycles_off_pace",)
-    assert "is expected at these cycles" in answer.message
-    assert bench.answer(stationary(700, run_id="late")).codes == ()
+@pytest.mark.parametrize(
+    ("before", "run", "codes", "words"),
+    [
+        pytest.param(CYCLES, next_test(), (), [], id="a test that follows"),
+        pytest.param((), next_test(), (), [], id="a first test"),
+        pytest.param(
+            CYCLES, next_test(cycles=70_000), OFF_PACE,
+            ["70000 cycles", "64000 after the previous run", "1000 cycles apart", "Is it 7000?", "Confirm or correct it."],
+            id="a zero too many",
+        ),
+        # 700 cycles would be an honest late run; the COF is that of 7000
+        pytest.param(CYCLES, next_test(cycles=700), OFF_PACE, ["is expected at these cycles"], id="swapped digits by COF"),
+        pytest.param(CYCLES, stationary(700, run_id="late"), (), [], id="a late run"),
+        pytest.param((), next_test(cycles=3e9), OFF_PACE, [], id="cycles beyond any clutch of a first run"),
+        # 8.9 times too large by pounds and inches, and still 6.8 times too large then
+        pytest.param(
+            (0, 1000, 2000), next_test(cycles=3000, torque=60.0), ("cof_beyond_physics",), ["mean COF is 2."],
+            id="a unit that does not explain all",
+        ),
+        pytest.param(
+            CYCLES, next_test(oil=358.1, torque=1.1), ("unit",), ["was it sent in K?"],
+            id="oil in kelvin whatever COF is",
+        ),
+        pytest.param((5500,), BLOCK | {"cycles": 10_000}, (), [], id="any of equal blocks first"),
+        pytest.param(CYCLES, BLOCK | {"cycles": 70_000}, OFF_PACE, [], id="a zero too many in a block"),
+        pytest.param(
+            CYCLES, next_test(channels=stationary(0)["channels"]), ("cof_off_course",), ["another clutch"],
+            id="the test of a new clutch",
+        ),
+    ],
+)  # fmt: skip
+def test_slips_are_asked_about_and_honest_runs_are_not(
+    before: tuple[int, ...], run: Body, codes: tuple[str, ...], words: list[str]
+) -> None:
+    answer = bench_after(before).answer(run)
+    assert answer.codes == codes
+    assert [part for part in words if part not in answer.message] == []
 
 
 @pytest.mark.parametrize("event", ["rebuild", "oil_change"])
@@ -115,38 +128,10 @@ def test_a_far_jump_that_a_duty_block_declares_is_honest() -> None:
     assert bench_after().answer(shorter).codes == ("cycles_off_pace",)
 
 
-def test_cycles_beyond_any_clutch_are_doubted_of_a_first_run() -> None:
-    assert Bench({}).answer(next_test(cycles=3e9)).codes == ("cycles_off_pace",)
-    assert Bench({}).answer(next_test()).codes == ()
-
-
 def test_a_cof_beyond_physics_is_doubted_of_a_first_run() -> None:
-    body = next_test()
-    body["channels"]["torque_nm"] = [61.0 * torque for torque in body["channels"]["torque_nm"]]
-    answer = Bench({}).answer(body)
-    assert len(answer.codes) == 1
-    assert answer.codes[0] in {"unit", "cof_beyond_physics"}
-    body["channels"]["torque_nm"] = [-torque / 61.0 for torque in body["channels"]["torque_nm"]]
-    assert "sign" in Bench({}).answer(body).message
-
-
-def test_a_unit_is_asked_about_only_where_it_explains_all() -> None:
-    """Sixty times the torque is 8.9 times too large by pounds and inches, and still 6.8 times too large then."""
-    body = next_test()
-    body["channels"]["torque_nm"] = [60.0 * torque for torque in body["channels"]["torque_nm"]]
-    answer = bench_after((0, 1000, 2000)).answer(body | {"cycles": 3000})
-    assert answer.codes == ("cof_beyond_physics",)
-    assert "mean COF is 2." in answer.message
-
-
-def test_a_unit_that_does_not_touch_cof_is_asked_about_whatever_cof_is() -> None:
-    """Oil in kelvin, and a COF that is a tenth off besides."""
-    body = next_test()
-    body["channels"]["oil_temperature_c"] = [358.1] * len(body["channels"]["torque_nm"])
-    body["channels"]["torque_nm"] = [1.1 * torque for torque in body["channels"]["torque_nm"]]
-    answer = bench_after().answer(body)
-    assert answer.codes == ("unit",)
-    assert "was it sent in K?" in answer.message
+    (code,) = Bench({}).answer(next_test(torque=61.0)).codes
+    assert code in {"unit", "cof_beyond_physics"}
+    assert "sign" in Bench({}).answer(next_test(torque=-1.0)).message
 
 
 def test_order_in_time_counts_where_runs_are_dated() -> None:
@@ -183,13 +168,6 @@ def test_a_second_life_may_go_as_the_first_did() -> None:
     assert bench.answer(late).codes == ()
 
 
-def test_any_of_equal_blocks_may_come_first() -> None:
-    """Of blocks of 1000 cycles each, sent in any order; a zero too many in a block is seen all the same."""
-    block: Body = {"kind": "duty_cycles", "run_id": "d", "duty": {"cycles": 1000, "initial_speed_rpm": 2000}}
-    assert bench_after((5500,)).answer(block | {"cycles": 10_000}).codes == ()
-    assert bench_after().answer(block | {"cycles": 70_000}).codes == ("cycles_off_pace",)
-
-
 @pytest.mark.parametrize("name", [*slips.UNITS, *slips.UNPLUGGED])
 def test_wrong_units_and_dead_channels_are_held(name: str) -> None:
     wrong = slips.UNITS.get(name) or slips.UNPLUGGED[name]
@@ -201,14 +179,6 @@ def test_wrong_units_and_dead_channels_are_held(name: str) -> None:
         assert answer.codes == ("unit",)
         assert name.split()[-1] in answer.message
     assert answer.codes == (REFUSED,) or answer.message.endswith(("confirm it.", "connected?"))
-
-
-def test_another_clutch_is_held_once_there_is_a_course() -> None:
-    """The test of a clutch at 0 cycles, sent as that of one at 7000."""
-    other = next_test(channels=stationary(0)["channels"])
-    answer = bench_after().answer(other)
-    assert answer.codes == ("cof_off_course",)
-    assert "another clutch" in answer.message
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,8 @@
-"""Tests with the clutch open: taken in, said to be such, evidence for the diagnosis and nothing for any track."""
+"""Tests that no track follows: with the clutch open, evidence for the diagnosis alone, and in much colder oil."""
 
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -7,32 +10,26 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from service.lives.assumptions import Assumptions, ModelInForce
+from service.lives.history import Event, Life
 from service.lives.model_correction import corrected_cofs
 from service.workflows.replay import replay_clutch
 from storage.engine.opening import open_database
-from tests.service.lives.diagnosis.test_campaign import campaign, post
+from tests.service.clients import client_on, post_run
+from tests.service.lives.diagnosis.test_campaign import campaign, idle_record, post
 from tests.service.run_files.test_upload import dynamic_record
+from tests.service.workflows.benches import without_revision
 from tests.support import stationary
 
 CLUTCH = "/v1/clutches/c1"
 RUNS = f"{CLUTCH}/runs"
 SPEEDS = [20.0, 520.0, 1020.0, 1520.0, 1970.0]
 #: What is said of a clutch, and what of it has a CSV twin; questions to which no open test changes an answer.
-TOLD = (
-    "remaining-useful-life",
-    "degradation",
-    "stribeck",
-    "loops",
-    "runs",
-    "series",
-    "surfaces",
-    "scores",
-    "engagement",
-)
-TWINS = ("degradation", "stribeck", "loops", "runs", "series", "surfaces", "scores")
+TWINS = ("degradation", "stribeck", "loops", "series", "surfaces", "scores")
+TOLD = ("remaining-useful-life", "engagement", *TWINS)
 QUESTIONS = (
-    *(name for name in TOLD if name != "runs"),
-    *(f"{name}.csv" for name in TWINS if name != "runs"),
+    *TOLD,
+    *(f"{name}.csv" for name in TWINS),
     "engagement?at_cycles=1000",
     *(f"remaining-useful-life?{each}" for each in ("method=ukf", "method=grid", "pressure_bar=5", "at_cycles=2500")),
 )
@@ -60,28 +57,19 @@ def raw_sweep(noise: float) -> dict[str, list[float]]:
 
 def idle_loops(cycles: float) -> dict[str, Any]:
     """The advised dynamic test."""
-    record = dynamic_record()
-    nothing = {"pressure_bar": [0.0] * len(record["time_s"]), "torque_nm": [0.1 * t for t in record["torque_nm"]]}
-    return {"kind": "dynamic_stribeck", "cycles": cycles, "run_id": f"idle-{cycles:g}", "channels": record | nothing}
+    return {"kind": "dynamic_stribeck", "cycles": cycles, "run_id": f"idle-{cycles:g}", "channels": idle_record()}
 
 
 def told(client: TestClient) -> dict[str, Any]:
     """All that is said of a clutch beside the list of its runs."""
-    found = {question: client.get(f"{CLUTCH}/{question}") for question in QUESTIONS}
-    assert {answer.status_code for answer in found.values()} == {200}
+    said: dict[str, Any] = {}
+    for question in QUESTIONS:
+        answer = client.get(f"{CLUTCH}/{question}")
+        assert answer.status_code == 200
+        said[question] = without_revision(answer.text if ".csv" in question else answer.json())
     summary = client.get("/v1/clutches").json()["items"][0]
-    line = summary["recent"]["mean_cof"]
-    said = {name: _plain(each) for name, each in found.items()}
-    return said | {
-        "line": line,
-        "summary": {n: v for n, v in summary.items() if n not in ("runs", "recent", "revision")},
-    }
-
-
-def _plain(answer: Any) -> Any:
-    """Without the revision, which every run moves on."""
-    said = answer.json() if answer.headers["content-type"] == "application/json" else answer.text
-    return {name: each for name, each in said.items() if name != "revision"} if isinstance(said, dict) else said
+    said["line"] = summary["recent"]["mean_cof"]
+    return said | {"summary": {n: v for n, v in summary.items() if n not in ("runs", "recent", "revision")}}
 
 
 def life() -> list[dict[str, Any]]:
@@ -89,9 +77,7 @@ def life() -> list[dict[str, Any]]:
 
 
 def test_an_open_sweep_is_taken_in_and_said_to_be_one(client: TestClient, database_url: str) -> None:
-    answer = client.post(RUNS, json=sweep(0, "open"))
-    assert answer.status_code == 201, answer.text
-    receipt = answer.json()
+    receipt = post_run(client, sweep(0, "open"))
     assert (receipt["fits"], receipt["loops"]) == ([], [])
     assert [each["code"] for each in receipt["warnings"]] == ["open_clutch"]
     assert "(all pressures below 0.05 bar): no curve is fitted" in receipt["warnings"][0]["message"]
@@ -115,16 +101,14 @@ def test_so_is_its_raw_record(client: TestClient, database_url: str, noise: floa
 
 def test_a_single_plateau_and_a_deviation_do(client: TestClient) -> None:
     one = {"pressure_bar": [0.0], "speed_rpm": [500.0], "torque_nm": [-0.1], "torque_sd_nm": [0.01]}
-    assert client.post(RUNS, json=sweep(0, "one", **one)).status_code == 201
+    post_run(client, sweep(0, "one", **one))
 
 
 @pytest.mark.slow
 def test_while_there_is_nothing_else_all_is_answered_as_without_tests(client: TestClient) -> None:
-    bare = {name: client.get(f"{CLUTCH}/{name}").status_code for name in TOLD}
-    csv = {name: client.get(f"{CLUTCH}/{name}.csv").status_code for name in TWINS}
+    bare = {name: client.get(f"{CLUTCH}/{name}").status_code for name in QUESTIONS}
     post(client, sweep(500, "open"), idle_loops(500))
-    assert {name: client.get(f"{CLUTCH}/{name}").status_code for name in TOLD} == bare
-    assert {name: client.get(f"{CLUTCH}/{name}.csv").status_code for name in TWINS} == csv
+    assert {name: client.get(f"{CLUTCH}/{name}").status_code for name in QUESTIONS} == bare
     said = client.get(f"{CLUTCH}/remaining-useful-life").json()
     assert (said["status"], said["runs_used"], said["as_of_cycles"]) == ("insufficient_data", 0, 500)
     assert said["criterion"]["initial_mean_cof"] is None
@@ -152,11 +136,8 @@ def test_no_track_sees_an_open_test_at_a_state(client: TestClient, database_url:
     post(client, raw)
     assert told(client) == before
     etag = client.get(CLUTCH).headers["etag"]
-    database = open_database(database_url)
-    try:
+    with closing(open_database(database_url)) as database:
         assert replay_clutch(database, "c1") == 8
-    finally:
-        database.close()
     assert told(client) == before
     assert client.get(CLUTCH).headers["etag"] == etag
 
@@ -167,7 +148,7 @@ def test_an_open_test_that_came_first_leaves_the_reference_to_the_first_with_loa
     before = told(client)
     assert client.post("/v1/clutches", json={"clutch_id": "c2"}).status_code == 201
     for body in (sweep(0, "open") | {"started_at": "2020-01-01T00:00:00Z"}, *life()):
-        assert client.post("/v1/clutches/c2/runs", json=body).status_code == 201
+        post_run(client, body, "c2")
     for name in ("stribeck", "stribeck.csv"):
         assert client.get(f"/v1/clutches/c2/{name}").text == client.get(f"{CLUTCH}/{name}").text
     tracks, earlier = client.get("/v1/clutches/c2/degradation").json()["items"], before["degradation"]["items"]
@@ -184,24 +165,12 @@ def test_curves_are_paged_past_open_tests(client: TestClient) -> None:
 
 
 def test_loops_are_told_against_the_state_s_test_with_load(client: TestClient) -> None:
-    post(
-        client,
-        stationary(0, run_id="s0"),
-        {"kind": "dynamic_stribeck", "cycles": 500, "run_id": "d", "channels": dynamic_record()},
-    )
+    loops = {"kind": "dynamic_stribeck", "cycles": 500, "run_id": "d", "channels": dynamic_record()}
+    post(client, stationary(0, run_id="s0"), loops)
     before = client.get(f"{CLUTCH}/loops").json()
     post(client, sweep(400, "open"))
     assert client.get(f"{CLUTCH}/loops").json() == before
     assert before["items"][0]["attractor_nm_s"] is not None
-
-
-def test_a_file_of_one_is_taken_in(client: TestClient) -> None:
-    channels = sweep(0, "open")["channels"]
-    rows = zip(channels["pressure_bar"], channels["speed_rpm"], channels["torque_nm"], strict=True)
-    text = "pressure_bar,speed_rpm,torque_nm\n" + "".join(f"{p},{n},{t}\n" for p, n, t in rows)
-    answer = client.post(f"{RUNS}/file?kind=stationary_stribeck&cycles=0&filename=open.csv", content=text.encode())
-    assert answer.status_code == 201, answer.text
-    assert answer.json()["warnings"][0]["code"] == "open_clutch"
 
 
 def test_an_adopted_model_corrects_no_open_test(client: TestClient, database_url: str) -> None:
@@ -211,3 +180,84 @@ def test_an_adopted_model_corrects_no_open_test(client: TestClient, database_url
     shifted = SimpleNamespace(weights=np.ones(1), artefact=lambda run, _: np.ones((1, run.plateaus.torque.size)))
     found = corrected_cofs(shifted, known.record, known.life, known.runs, known.campaign.stationary)  # type: ignore[arg-type]
     assert found.keys() == {"s0"}
+
+
+# --- A test whose oil is much colder than the first test's is said so, and no track follows it, whenever it arrives.
+
+
+def in_oil(cycles: float, oil_c: float | None, gain: float = 1.0) -> dict[str, Any]:
+    """A stationary test with its oil at some temperature, and torque so many times what it would be."""
+    run = stationary(cycles, run_id=f"at-{cycles:g}", pressures=(5.0, 6.0))
+    channels = run["channels"]
+    channels["torque_nm"] = (gain * np.array(channels["torque_nm"])).tolist()
+    if oil_c is not None:
+        channels["oil_temperature_c"] = [oil_c] * len(channels["torque_nm"])
+    return run
+
+
+def codes(client: TestClient, run_id: str) -> list[str]:
+    return [warning["code"] for warning in client.get(f"{CLUTCH}/runs/{run_id}").json()["warnings"]]
+
+
+def remaining(client: TestClient) -> dict[str, Any]:
+    return client.get(f"{CLUTCH}/remaining-useful-life", params={"method": "grid"}).json()
+
+
+USUAL = [in_oil(1000.0 * place, 80.0 + 2.5 * place) for place in range(4)]
+COLD = in_oil(2500.0, 40.0, gain=1.08)
+
+
+def test_a_test_in_cold_oil_is_said_so_and_not_tracked(client: TestClient) -> None:
+    for run in USUAL:
+        assert post_run(client, run)["warnings"] == []
+    before = remaining(client)
+    receipt = post_run(client, COLD)
+    warned = {warning["code"]: warning["message"] for warning in receipt["warnings"]}
+    assert receipt["state"] == "accepted"
+    assert warned.keys() == {"late_arrival", "other_oil_temperature"}
+    assert "was 40 °C in this test" in warned["other_oil_temperature"]
+    assert "80 °C" in warned["other_oil_temperature"]
+    after = remaining(client)
+    assert after["runs_used"] == 4
+    for part in ("current", "end_of_life_cycles"):
+        assert after[part] == before[part]
+    parameters = client.get(f"{CLUTCH}/degradation").json()["items"]
+    assert {len(item["measured"]["cycles"]) for item in parameters} == {4}
+
+
+def test_the_same_torque_in_usual_oil_is_tracked(client: TestClient) -> None:
+    """The control: what keeps the cold test out is its oil; one without a measured temperature counts too."""
+    for run in [*USUAL, in_oil(4000.0, 90.0), in_oil(5000.0, None)]:
+        assert "other_oil_temperature" not in [warning["code"] for warning in post_run(client, run)["warnings"]]
+    assert remaining(client)["runs_used"] == 6
+
+
+def test_whatever_the_order_the_first_test_by_cycles_is_the_reference(client: TestClient, tmp_path: Path) -> None:
+    """The cold test comes first and is the reference until those before it by cycles arrive."""
+    for run in (COLD, *reversed(USUAL)):
+        post_run(client, run)
+    names = [run["run_id"] for run in (*USUAL, COLD)]
+    assert [name for name in names if "other_oil_temperature" in codes(client, name)] == [COLD["run_id"]]
+    answers = [remaining(client)]
+    with client_on(f"sqlite:///{tmp_path / 'in_order.db'}") as other:
+        assert other.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
+        for run in sorted((*USUAL, COLD), key=lambda run: float(run["cycles"])):
+            post_run(other, run)
+        answers.append(remaining(other))
+    assert answers[0]["end_of_life_cycles"] == answers[1]["end_of_life_cycles"]
+    assert [answer["runs_used"] for answer in answers] == [4, 4]
+
+
+@pytest.mark.parametrize(
+    ("effects", "measured"), [([], 1), (["torque_zero_shift"], 1), (["interface_heating", "oil_temperature"], 2)]
+)
+def test_a_model_that_corrects_for_the_oil_has_its_mean_cof_tracked(effects: list[str], measured: int) -> None:
+    measured = {"oil_temperature": 358.0, "cofs": {5e5: (0.1, 0.001)}}
+    warm = Event(run_id="warm", kind="stationary_stribeck", cycles=0.0, moment=0.0, **measured)
+    cold = replace(warm, run_id="cold", cycles=1000.0, oil_temperature=313.0)
+    tested_life = Life(origin=0.0, events=(warm, cold))
+    under = Assumptions(model=ModelInForce(name={"name": "extended", "effects": effects}))
+    assert len(tested_life.pooled(under).measurements) == measured
+    # Stribeck parameters are those of the baseline's fits: nothing corrects them
+    parameter = tested_life.series(under, "static_torque_nm", 5e5, [(20.0, 0.1), (22.0, 0.1)])
+    assert len(parameter.measurements) == 1

@@ -1,0 +1,528 @@
+"""Functions of the pages' modules, loaded into a browser from a running service and called from Python."""
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+
+from models.friction.pressure_laws import AsymptoticLaw, LinearLaw
+from service.schemas.clutch import ClutchIn
+from service.schemas.life import QuantityName
+from tests.browser.driving import FLAT, chromium
+from tests.browser.modules import Module, load, open_page
+from tests.support import Server, serving
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A service without clutches, which serves the files."""
+    with serving(tmp_path_factory.mktemp("modules") / "clutchlife.db", loaded=True) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def loaded(server: Server) -> Iterator[Callable[[str], Module]]:
+    """A module by its name in the tree, in an empty page of the service."""
+    with chromium(more=FLAT) as browser:
+        page = open_page(browser, server)
+        yield lambda name: load(page, server, name)
+
+
+# --- Where a light chart has its axes, ticks and legend.
+FONT = {"family": "monospace", "size": 12, "color": "#000"}
+
+
+@pytest.fixture(scope="module")
+def frame(loaded: Callable[[str], Module]) -> Module:
+    return loaded("charts/frame.js")
+
+
+def trace(x: list[Any], y: list[Any], mode: str = "lines", **more: Any) -> dict[str, Any]:
+    return {"mode": mode, "x": x, "y": y} | more
+
+
+def settled(frame: Module, *data: dict[str, Any], **layout: Any) -> dict[str, Any]:
+    own = {"font": FONT, "margin": {"l": 56, "r": 16, "t": 12, "b": 48}, "legend": {"font": {"size": 11}}}
+    figure = {"data": list(data), "layout": own | {"xaxis": {}, "yaxis": {}} | layout}
+    return frame("settled", figure, {"width": 600, "height": 400})
+
+
+@pytest.mark.parametrize(
+    ("span", "length", "least", "texts"),
+    [
+        ((0, 100), 400, 80, ["0", "20", "40", "60", "80", "100"]),
+        ((0, 9), 800, 80, list("0123456789")),
+        ((0, 100), 8000, 80, ["0", "20", "40", "60", "80", "100"]),  # never more than about nine
+        ((0, 1), 160, 40, ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]),
+        ((0.12, 0.14), 160, 40, ["0.120", "0.125", "0.130", "0.135", "0.140"]),
+        ((-10, 10), 160, 40, ["−10", "−5", "0", "5", "10"]),
+        ((3, 17), 160, 40, ["5", "10", "15"]),
+        ((0, 12_000), 400, 80, ["0", "2,000", "4,000", "6,000", "8,000", "10,000", "12,000"]),
+    ],
+)
+def test_ticks_are_one_two_or_five_times_a_power_of_ten(
+    frame: Module, span: tuple[float, float], length: float, least: float, texts: list[str]
+) -> None:
+    ticks = frame("ticksOf", list(span), length, least)
+    assert [tick["text"] for tick in ticks] == texts
+    for tick in ticks:
+        assert float(tick["text"].replace(",", "").replace("−", "-")) == pytest.approx(tick["at"])
+        assert span[0] - 1e-9 <= tick["at"] <= span[1] + 1e-9
+
+
+def test_a_range_leaves_room_about_what_is_drawn(frame: Module) -> None:
+    layout = settled(frame, trace([0, 10], [1, 3]))["layout"]
+    assert layout["xaxis"]["range"] == pytest.approx([-0.2, 10.2])
+    assert layout["yaxis"]["range"] == pytest.approx([0.9, 3.1])
+    marked = settled(frame, trace([0, 10], [1, 3], "lines+markers"))["layout"]
+    assert marked["xaxis"]["range"] == pytest.approx([-0.5, 10.5])  # points would be cut at the edge
+
+
+@pytest.mark.parametrize(
+    ("values", "mode", "expected"),
+    [
+        ([0, 10], "tozero", [0, 10.2]),
+        ([4, 10], "tozero", [0, 10.2]),
+        ([-5, 5], "tozero", [-5.2, 5.2]),  # below zero it starts where the values start
+        ([None, 2, 4, None], None, [1.96, 4.04]),
+        ([None, None], None, [0, 1]),
+        ([], None, [0, 1]),
+        ([5, 5], None, [4.5, 5.5]),
+        ([0, 0], None, [-1, 1]),
+        ([float("nan"), 1, 2], None, [0.98, 2.02]),
+    ],
+)
+def test_ranges_at_their_edges(frame: Module, values: list[Any], mode: str | None, expected: list[float]) -> None:
+    axis = {} if mode is None else {"rangemode": mode}
+    layout = settled(frame, trace(values, [1] * len(values)), xaxis=axis)["layout"]
+    assert layout["xaxis"]["range"] == pytest.approx(expected)
+
+
+def test_error_bars_are_in_the_range(frame: Module) -> None:
+    bars = {"array": [1, 2, 5], "color": "#000", "thickness": 1, "width": 3}
+    layout = settled(frame, trace([0, 1, 2], [10, 20, None], error_y=bars))["layout"]
+    assert layout["yaxis"]["range"] == pytest.approx([9 - 0.65, 22 + 0.65])
+
+
+def test_a_legend_fits_beside_itself_or_breaks_into_rows(frame: Module) -> None:
+    named = [trace([0, 1], [0, 1], name=name) for name in ("a", "bb", "ccc")]
+    short = settled(frame, *named, trace([0], [0]), trace([0], [0], name="hidden", showlegend=False))
+    entries = short["legend"]["entries"]
+    assert [entry["trace"]["name"] for entry in entries] == ["a", "bb", "ccc"]
+    assert entries[0]["x"] == 0
+    for before, entry in pairwise(entries):
+        assert entry["x"] == pytest.approx(before["x"] + before["width"] + 5)
+        assert entry["y"] == before["y"]
+    long = settled(frame, *(trace([0, 1], [0, 1], name="n" * 40) for _ in range(3)))
+    rows = [entry["y"] for entry in long["legend"]["entries"]]
+    assert rows == sorted(set(rows))
+    assert {entry["x"] for entry in long["legend"]["entries"]} == {0}
+    assert long["layout"]["margin"]["b"] > short["layout"]["margin"]["b"]
+
+
+def test_margins_hold_labels_titles_and_legend(frame: Module) -> None:
+    small = settled(frame, trace([0, 1], [0, 1]), yaxis={"range": [0, 9]})["layout"]
+    assert small["margin"] == {"l": 56, "r": 16, "t": 12, "b": 49}  # b: two lines of 1.3 x 12 px and 18 px between
+    big = settled(frame, trace([0, 1], [0, 12_345_678]))
+    widest = max(frame("widthOf", tick["text"], FONT) for tick in big["ticks"]["y"])
+    assert big["layout"]["margin"]["l"] == round(max(56, widest + 1.3 * 12 + 24)) > 56
+
+
+# --- The heading of a diagnosis, and remaining life before and after on one scale.
+
+
+@pytest.mark.parametrize(
+    ("probability", "heading", "said"),
+    [
+        (0.95, "Cause certain, others possible", "and oil change accounts for it."),
+        (0.6, "Cause ambiguous", "The cause may be oil change or inertia torque"),
+    ],
+)
+def test_the_heading_says_which_cause_is_certain(
+    loaded: Callable[[str], Module], probability: float, heading: str, said: str
+) -> None:
+    report = loaded("diagnosis/report.js")
+    probabilities = {"oil_change": probability, "inertia_torque": 0.4}
+    candidates = [{"effect": effect, "probability": each} for effect, each in probabilities.items()]
+    diagnosis = {"verdict": "cause_ambiguous", "causes": [*probabilities], "candidates": candidates}
+    assert report("heading", diagnosis) == heading
+    assert said in report("sentence", diagnosis)
+
+
+BEFORE = {"0.05": 1000, "0.25": 1500, "0.5": 2000, "0.75": 2500, "0.95": 3000}
+AFTER = {"0.05": 3000, "0.25": 3500, "0.5": 4000, "0.75": 4500, "0.95": 5000}
+#: Width of a bar's drawing, and where its right end is in cycles for AFTER: 5 % past the larger 95 % quantile.
+WIDTH, SCALE = 120, 1.05 * 5000
+
+
+@pytest.fixture(scope="module")
+def bars(loaded: Callable[[str], Module]) -> Module:
+    return loaded("diagnosis/lifebars.js")
+
+
+def show(bars: Module, before: Any, after: Any, *names: Any) -> dict[str, str]:
+    return bars("lifeBars", {"before": before, "after": after}, *names)
+
+
+def medians(html: str) -> list[float]:
+    """Where the medians are, px."""
+    return [float(x) for x in re.findall(r'class="median" x="([^"]+)"', html)]
+
+
+def boxes(html: str, name: str) -> list[tuple[float, float]]:
+    """Both ends of the bars of a kind, px."""
+    found = re.findall(rf'class="{name}"[^>]*? x="([^"]+)" width="([^"]+)"', html)
+    return [(float(x), float(x) + float(width)) for x, width in found]
+
+
+def test_they_share_one_scale(bars: Module) -> None:
+    html = show(bars, BEFORE, AFTER)["html"]
+    assert medians(html) == pytest.approx([WIDTH * 2000 / SCALE, WIDTH * 4000 / SCALE], abs=0.06)
+    wide, half = boxes(html, "wide"), boxes(html, "half")
+    assert wide[0] == pytest.approx((WIDTH * 1000 / SCALE, WIDTH * 3000 / SCALE), abs=0.11)
+    assert wide[1] == pytest.approx((WIDTH * 3000 / SCALE, WIDTH * 5000 / SCALE), abs=0.11)
+    assert half[1] == pytest.approx((WIDTH * 3500 / SCALE, WIDTH * 4500 / SCALE), abs=0.11)
+    assert 'class="beyond"' not in html
+
+
+def test_an_end_that_is_not_in_sight_is_marked(bars: Module) -> None:
+    result = show(bars, BEFORE, AFTER | {"0.75": None, "0.95": None})
+    assert "(90 %: 3,000 to over 1,000,000)" in result["text"]
+    assert result["html"].count('class="beyond"') == 1
+    # the scale then goes 1.6 times as far as the median
+    assert medians(result["html"])[1] == pytest.approx(WIDTH * 4000 / (1.05 * 1.6 * 4000), abs=0.06)
+    never = show(bars, BEFORE, dict.fromkeys(AFTER))
+    assert "After– (90 %: –)" in never["text"]
+    assert len(medians(never["html"])) == 1
+
+
+def test_quartiles_that_are_missing_are_taken_from_the_interval(bars: Module) -> None:
+    ends = {name: AFTER[name] for name in ("0.05", "0.5", "0.95")}
+    html = show(bars, BEFORE, ends)["html"]
+    assert boxes(html, "half")[1] == boxes(html, "wide")[1]
+    alone = show(bars, BEFORE, {"0.5": 4000})
+    assert "After4,000 (90 %: –)" in alone["text"]
+
+
+@pytest.mark.parametrize("nothing", [None, {}, {"remaining_cycles": {}}, {"status": "insufficient_data"}])
+def test_without_quantiles_on_both_sides_there_is_nothing_to_compare(bars: Module, nothing: Any) -> None:
+    assert show(bars, nothing, AFTER) is None
+    assert show(bars, BEFORE, nothing) is None
+
+
+# --- Criteria in words, the remaining life that charts of mean COF show, and the band of a pressure law.
+NONE = {"0.05": None, "0.5": None, "0.95": None}
+PLACE = {"fraction": None, "below": None, "above": None, "pressure_bar": None, "speed_rpm": None, "frequency_hz": None}
+SLOPE = PLACE | {"quantity": "slope", "below": 0.0, "pressure_bar": 5.0, "speed_rpm": 100.0}
+MEAN_COF = PLACE | {"quantity": "mean_cof", "fraction": 0.5}
+STOP = PLACE | {"quantity": "stop_time_s", "above": 1.2}
+FILM = PLACE | {"quantity": "film_time", "above": 0.02, "pressure_bar": 4.0, "frequency_hz": 0.1}
+
+
+@pytest.fixture(scope="module")
+def criteria(loaded: Callable[[str], Module]) -> Module:
+    return loaded("quantities/criteria.js")
+
+
+def outcome(criterion: dict[str, Any], end: tuple[Any, Any, Any], now: float, **more: Any) -> dict[str, Any]:
+    ends = dict(zip(NONE, end, strict=True))
+    left = {level: None if at is None else max(0.0, at - now) for level, at in ends.items()}
+    known = {"current": {"value": 0.1, "sd": 0.01}, "probability_of_reaching": 0.9, "probability_first": 0.5}
+    return criterion | {"limit": 0.0, "end_of_life_cycles": ends, "remaining_cycles": left} | known | more
+
+
+@pytest.mark.parametrize(
+    ("criterion", "place", "limit"),
+    [
+        (SLOPE, "Slope dμ/dv, 100 rpm, 5.0 bar", "below 0 s/m"),
+        (MEAN_COF, "Mean COF", "50 % of new"),
+        (STOP, "Stop time", "above 1.20 s"),
+        (FILM, "Film time, 0.10 Hz, 4.0 bar", "above 0.0200 s"),
+    ],
+)
+def test_a_criterion_names_its_quantity_its_place_and_its_limit(
+    criteria: Module, criterion: dict[str, Any], place: str, limit: str
+) -> None:
+    assert criteria("placeText", criterion) == place
+    assert criteria("limitText", criterion) == limit
+
+
+@pytest.mark.parametrize(
+    ("end", "more", "text"),
+    [
+        (
+            (8000, 9000, 10_000), {},
+            "the limit 0 is reached at about 9,000 cycles (90 %: 8,000 to 10,000), 4,000 cycles from now",
+        ),
+        ((2000, 3000, 4000), {}, "the limit 0 has been reached at about 3,000 cycles (90 %: 2,000 to 4,000)"),
+        (
+            (9000, None, None), {"probability_of_reaching": 0.3},
+            "the limit 0 may never be reached: it is reached with a probability of 30 %",
+        ),
+        ((None, None, None), {"probability_of_reaching": None}, "too few tests to predict when it is reached"),
+    ],
+)  # fmt: skip
+def test_when_a_limit_is_reached_is_said_in_words(
+    criteria: Module, end: tuple[Any, Any, Any], more: dict[str, Any], text: str
+) -> None:
+    assert criteria("reachedText", outcome(SLOPE, end, 5000, **more)) == text
+
+
+def life(*ends: dict[str, Any]) -> dict[str, Any]:
+    first = {name: ends[0][name] for name in ("end_of_life_cycles", "remaining_cycles")}
+    criterion = ends[0] | {"threshold_mean_cof": None}
+    return {"status": "predicted", "criterion": criterion, "criteria": list(ends)} | first
+
+
+def test_charts_of_mean_cof_show_its_own_end_where_another_criterion_is_the_first(criteria: Module) -> None:
+    slope = outcome(SLOPE, (5500, 6000, 6500), 5000)
+    cof = outcome(MEAN_COF, (8000, 9000, 10_000), 5000, limit=0.07)
+    answer = criteria("byMeanCof", life(slope, cof))
+    assert answer["end_of_life_cycles"] == cof["end_of_life_cycles"]
+    assert (answer["criterion"]["threshold_mean_cof"], answer["criterion"]["fraction"]) == (0.07, 0.5)
+    assert answer["status"] == "predicted"
+    passed = life(outcome(SLOPE, (1000, 2000, 3000), 5000), cof) | {"status": "reached"}
+    assert criteria("byMeanCof", passed)["status"] == "predicted"  # its slope has ended it, not its mean COF
+    without = criteria("byMeanCof", life(slope))
+    assert without["end_of_life_cycles"] == NONE
+    assert without["criterion"]["threshold_mean_cof"] is None
+
+
+def test_what_limits_first_is_always_said(criteria: Module) -> None:
+    slope, cof = outcome(SLOPE, (5500, 6000, 6500), 5000), outcome(MEAN_COF, (8000, 9000, 10_000), 5000)
+    for ends in ((cof,), (slope,), (cof, slope)):
+        assert len(criteria("criteriaTable", life(*ends))) == 1
+
+
+@pytest.mark.parametrize("quantity", get_args(QuantityName))
+def test_every_quantity_that_may_end_a_life_has_a_title(criteria: Module, quantity: str) -> None:
+    given = outcome(PLACE | {"quantity": quantity, "above": 1.0}, (5500, 6000, 6500), 5000)
+    assert criteria("placeText", given) not in ("", quantity)
+    assert criteria("criterionRow", given)[3] == "6,000"
+
+
+LINEAR = {"intercept": 2.0, "slope_per_bar": 3.0, "covariance": [[0.04, -0.006], [-0.006, 0.0016]]}
+FALLING = {
+    "asymptote": 0.6, "excess": 4.0, "decay_bar": 1.6,
+    "covariance": [[0.01, -0.02, 0.003], [-0.02, 0.09, -0.01], [0.003, -0.01, 0.005]],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("drawn", "law"),
+    [(LINEAR, LinearLaw(intercept=2.0, slope=3.0)), (FALLING, AsymptoticLaw(asymptote=0.6, excess=4.0, decay=1.6))],
+    ids=["linear", "falling"],
+)
+def test_a_law_is_drawn_with_the_band_of_its_covariance(
+    loaded: Callable[[str], Module], drawn: dict[str, Any], law: LinearLaw | AsymptoticLaw
+) -> None:
+    laws = loaded("quantities/pressure_laws.js")
+    for pressure in (4.0, 5.5, 7.0):
+        at = np.array([pressure])
+        (gradient,) = law.gradient(at)
+        point, covariance = laws("lawAt", drawn, pressure), np.array(drawn["covariance"])
+        assert point["value"] == pytest.approx(law(at)[0])
+        assert point["sd"] == pytest.approx(np.sqrt(gradient @ covariance @ gradient))
+        assert point["sd"] != pytest.approx(np.sqrt(covariance.diagonal() @ gradient**2))
+
+
+# --- What a file's name says of its run, the form that registers a clutch, and names that are spelt almost alike.
+
+
+@pytest.fixture(scope="module")
+def file_name(loaded: Callable[[str], Module]) -> Module:
+    return loaded("sending/file_name.js")
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "cycles"),
+    [
+        ("stationary-7000.csv", "stationary_stribeck", 7000),
+        ("2026-11-02-stationary-7000.tdms", "stationary_stribeck", 7000),
+        ("20261102_081500_dyn_4000_5bar.mf4", "dynamic_stribeck", 4000),
+        ("bench3-017_stationary_007000.csv", "stationary_stribeck", 7000),
+        ("0012000-loops.parquet", "dynamic_stribeck", 12000),
+        ("stribeck 7.5k.csv.gz", "stationary_stribeck", 7500),
+        ("run-0012 after 250 cycles.csv", None, 250),
+        ("cycles=3_sweep.csv", "stationary_stribeck", 3),
+        ("7000.csv", None, 7000),
+        ("stationary-0.csv", "stationary_stribeck", 0),
+    ],
+)
+def test_a_name_that_says_it(file_name: Module, name: str, kind: str | None, cycles: float) -> None:
+    assert file_name("guess", name) == {"kind": kind, "cycles": cycles}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "run-0012.csv",  # a number of the file
+        "0012.csv",
+        "12.csv",
+        "stationary-2.csv",  # the second one, or two cycles
+        "bench3.csv",
+        "stationary_7000_dyn_8000.csv",  # two numbers of cycles
+        "after 100 cycles to 200 cycles.csv",
+        "stationary_5bar.csv",
+        "stationary_2026-11-02.csv",
+        "2026-11-02-1200.csv",  # a time of day, it may be
+        "clutch 7000.csv",
+        "measurement.csv",
+    ],
+)
+def test_a_name_that_leaves_a_doubt_about_cycles(file_name: Module, name: str) -> None:
+    assert file_name("guess", name)["cycles"] is None
+
+
+@pytest.mark.parametrize("name", ["a.csv", "stationary_and_dynamic.csv", "7000.tdms"])
+def test_a_name_that_leaves_a_doubt_about_the_kind(file_name: Module, name: str) -> None:
+    assert file_name("guess", name)["kind"] is None
+
+
+def test_the_form_s_first_values_are_the_service_s_defaults(loaded: Callable[[str], Module]) -> None:
+    shown = loaded("sending/registration.js").evaluate("m => m.DEFAULTS")
+    filled_in = ClutchIn(clutch_id="any").model_dump()
+    filled_in["end_of_life"].pop("criteria")  # the form has mean COF's fraction alone
+    assert shown == {name: filled_in[name] for name in shown}
+    assert {"geometry", "oil", "end_of_life"} <= shown.keys()
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [
+        ("bench3-17", ["bench3-017"]),
+        ("Bench3_017", ["bench3-017"]),
+        ("bench3-071", ["bench3-017"]),
+        ("left", []),
+        ("c2", []),  # of two letters, two may not differ
+    ],
+)
+def test_names_that_are_spelt_almost_alike(loaded: Callable[[str], Module], typed: str, meant: list[str]) -> None:
+    assert loaded("sending/similar_names.js")("similarTo", typed, ["bench3-017", "c1", "right"]) == meant
+
+
+# --- Numbers as a person reads them: ordinary values, none at all, and the edges of each rule.
+#: What is no number to show.
+NOTHING = (None, math.nan, math.inf, -math.inf)
+#: A function, its arguments as JSON, its text. Eight decimals at most; two digits stay however wide an interval is; no minus
+#: before nothing but zeros; a first digit of 1 is followed by a second one; a clock may be ahead.
+TABLE = """
+quantity ["oil_temperature_c"]                 = Oil temperature, °C
+quantity ["torque_nm"]                         = Torque, Nm
+quantity ["cycles"]                            = Cycles
+quantity ["mean_cof"]                          = Mean cof
+quantity ["_c"]                                = , °C
+quantity [""]                                  =
+fixed [1234.5678, 2]                           = 1,234.57
+fixed [0.5, 0]                                 = 1
+fixed [-0.0004, 2]                             = 0.00
+fixed [-0.006, 2]                              = −0.01
+fixed [-0.0, 1]                                = 0.0
+fixed [2.4]                                    = 2
+significant [0, 3]                             = 0
+significant [3.14159, 3]                       = 3.14
+significant [31415.9, 3]                       = 31,400
+significant [999.6, 3]                         = 1,000
+significant [0.0012345, 3]                     = 0.00123
+significant [0.0001, 1]                        = 0.0001
+significant [9.9e-05, 2]                       = 9.9e−5
+significant [-2e-05, 2]                        = −2.0e−5
+significant [999999, 2]                        = 1,000,000
+significant [1000000.0, 3]                     = 1.00e+6
+significant [0.6666666666666666]               = 0.667
+withSd [21.23456, 0.34]                        = 21.2 ± 0.3
+withSd [21.23456, 0.14]                        = 21.23 ± 0.14
+withSd [21.23456, 0.19999]                     = 21.23 ± 0.20
+withSd [0.13412, 0.00112]                      = 0.1341 ± 0.0011
+withSd [1234.5, 25]                            = 1,235 ± 25
+withSd [-0.2, 0.05]                            = −0.20 ± 0.05
+withSd [5, 0]                                  = 5.000
+withSd [5, null]                               = 5.000
+withSd [5, NaN]                                = 5.000
+withSd [5, Infinity]                           = 5.000
+withSd [1, 3e-12]                              = 1.00000000 ± 0.00000000
+cycles [0]                                     = 0
+cycles [7]                                     = 7
+cycles [7000.4]                                = 7,000
+cycles [12345, 10000, 15000]                   = 12,300
+cycles [12345, 12000, 12150]                   = 12,350
+cycles [12345, 0, 20]                          = 12,345
+cycles [12345, 0, 1000000000.0]                = 12,000
+cycles [123456]                                = 123,500
+cycles [3, 0, 1000000.0]                       = 3
+cycles [12345, 10000, null]                    = 12,350
+cycles [-4321, 0, 1000000.0]                   = −4,300
+interval [{"0.05": 1234, "0.5": 3, "0.95": 5678}] = 1,200 to 5,700
+interval [{"0.05": 0, "0.5": 3, "0.95": 400}]  = 0 to 400
+interval [{"0.05": 1234, "0.5": 3, "0.95": null}] = 1,200 to over 1,000,000
+interval [{"0.05": 0.4, "0.5": 3, "0.95": null}] = 0 to over 1,000,000
+interval [{"0.05": null, "0.5": 3, "0.95": null}] = –
+interval [{"0.05": null, "0.5": 3, "0.95": 5678}] = – to 5,680
+percent [0.123, 0]                             = 12 %
+percent [0.123, 1]                             = 12.3 %
+probability [0]                                = < 1 %
+probability [0.00499]                          = < 1 %
+probability [0.005]                            = 1 %
+probability [0.5]                              = 50 %
+probability [0.995]                            = > 99 %
+probability [1]                                = > 99 %
+age [-4999, 0]                                 = just now
+age [3600000, 0]                               = just now
+age [-5000, 0]                                 = 5 s ago
+age [-59999, 0]                                = 59 s ago
+age [-60000, 0]                                = 1 min ago
+age [-3540000, 0]                              = 59 min ago
+age [-3600000, 0]                              = 1 h ago
+age [-82800000, 0]                             = 23 h ago
+age [-86400000, 0]                             = 1 day ago
+age [-172800000, 0]                            = 2 days ago
+age [-31449600000, 0]                          = 364 days ago
+age [-31536000000, 0]                          = 1 year ago
+moment ["2026-11-02T08:00:00+01:00"]           = 2 Nov 2026, 08:00
+moment ["2026-07-02T22:30:00Z"]                = 3 Jul 2026, 00:30
+moment [""]                                    = –
+moment [null]                                  = –
+kindName ["stationary_stribeck"]               = Stationary Stribeck test
+kindName ["another_kind"]                      = Another kind
+words ["oil_change"]                           = Oil change
+words [""]                                     =
+words [7]                                      = 7
+seconds [400]                                  = 1 s
+seconds [1499]                                 = 1 s
+seconds [1500]                                 = 2 s
+seconds [59999]                                = 60 s
+seconds [60000]                                = 1 min
+"""
+ROWS = [row.split(" =", 1) for row in TABLE.strip("\n").splitlines()]
+CASES = [(called.split(" ", 1), text.strip()) for called, text in ROWS]
+
+
+@pytest.fixture(scope="module")
+def shown(loaded: Callable[[str], Module]) -> Module:
+    return loaded("shared/format.js")
+
+
+@pytest.mark.parametrize("name", sorted({name for (name, _), _ in CASES}))
+def test_numbers_are_shown_as_the_table_has_them(shown: Module, name: str) -> None:
+    for (function, arguments), text in CASES:
+        if function == name:
+            assert shown(name, *json.loads(arguments)) == text, (name, arguments)
+
+
+def test_the_clock_of_the_reader(shown: Module) -> None:
+    assert shown.evaluate("m => m.age(Date.now() - 3 * 60_000)") == "3 min ago"
+    assert shown.evaluate("m => m.clock(new Date('2026-11-02T08:05:09+01:00'))") == "08:05:09"
+
+
+@pytest.mark.parametrize("name", ["fixed", "significant", "withSd", "cycles", "percent", "probability"])
+def test_what_is_no_number_is_a_dash(shown: Module, name: str) -> None:
+    arguments: list[Any] = [1] if name == "withSd" else []
+    assert [shown(name, value, *arguments) for value in NOTHING] == ["–"] * len(NOTHING)
+    assert shown.evaluate(f"m => m.{name}(undefined)") == "–"
