@@ -3,7 +3,6 @@
 import io
 import json
 import logging
-import sys
 from typing import Any
 
 import pytest
@@ -102,10 +101,3 @@ def test_a_request_is_a_line_with_numbers() -> None:
     expected = {"method": "GET", "route": "/v1/clutches", "status": 200, "duration_ms": 12.35, "bytes": 2048}
     assert expected.items() <= line.items()
     assert line["key"] == "key:1a2b bench 3"
-
-
-def test_standard_error_is_where_lines_go(capsys: pytest.CaptureFixture[str]) -> None:
-    configure("json", "info")
-    assert logging.getLogger().handlers[0].stream is sys.stderr  # type: ignore[attr-defined]
-    logging.getLogger("clutchlife").info("x")
-    assert json.loads(capsys.readouterr().err)["message"] == "x"

@@ -35,13 +35,20 @@ def loaded(server: Server) -> Iterator[Callable[[str], Module]]:
         yield lambda name: load(page, server, name)
 
 
+def module(name: str) -> Any:
+    """A fixture of a module."""
+    return pytest.fixture(lambda loaded: loaded(name), scope="module")
+
+
+frame = module("charts/frame.js")
+bars = module("diagnosis/lifebars.js")
+criteria = module("quantities/criteria.js")
+file_name = module("sending/file_name.js")
+shown = module("shared/format.js")
+
+
 # --- Where a light chart has its axes, ticks and legend.
 FONT = {"family": "monospace", "size": 12, "color": "#000"}
-
-
-@pytest.fixture(scope="module")
-def frame(loaded: Callable[[str], Module]) -> Module:
-    return loaded("charts/frame.js")
 
 
 def trace(x: list[Any], y: list[Any], mode: str = "lines", **more: Any) -> dict[str, Any]:
@@ -162,11 +169,6 @@ AFTER = {"0.05": 3000, "0.25": 3500, "0.5": 4000, "0.75": 4500, "0.95": 5000}
 WIDTH, SCALE = 120, 1.05 * 5000
 
 
-@pytest.fixture(scope="module")
-def bars(loaded: Callable[[str], Module]) -> Module:
-    return loaded("diagnosis/lifebars.js")
-
-
 def show(bars: Module, before: Any, after: Any, *names: Any) -> dict[str, str]:
     return bars("lifeBars", {"before": before, "after": after}, *names)
 
@@ -224,11 +226,6 @@ SLOPE = PLACE | {"quantity": "slope", "below": 0.0, "pressure_bar": 5.0, "speed_
 MEAN_COF = PLACE | {"quantity": "mean_cof", "fraction": 0.5}
 STOP = PLACE | {"quantity": "stop_time_s", "above": 1.2}
 FILM = PLACE | {"quantity": "film_time", "above": 0.02, "pressure_bar": 4.0, "frequency_hz": 0.1}
-
-
-@pytest.fixture(scope="module")
-def criteria(loaded: Callable[[str], Module]) -> Module:
-    return loaded("quantities/criteria.js")
 
 
 def outcome(criterion: dict[str, Any], end: tuple[Any, Any, Any], now: float, **more: Any) -> dict[str, Any]:
@@ -334,11 +331,6 @@ def test_a_law_is_drawn_with_the_band_of_its_covariance(
 
 
 # --- What a file's name says of its run, the form that registers a clutch, and names that are spelt almost alike.
-
-
-@pytest.fixture(scope="module")
-def file_name(loaded: Callable[[str], Module]) -> Module:
-    return loaded("sending/file_name.js")
 
 
 @pytest.mark.parametrize(
@@ -502,11 +494,6 @@ seconds [60000]                                = 1 min
 """
 ROWS = [row.split(" =", 1) for row in TABLE.strip("\n").splitlines()]
 CASES = [(called.split(" ", 1), text.strip()) for called, text in ROWS]
-
-
-@pytest.fixture(scope="module")
-def shown(loaded: Callable[[str], Module]) -> Module:
-    return loaded("shared/format.js")
 
 
 @pytest.mark.parametrize("name", sorted({name for (name, _), _ in CASES}))

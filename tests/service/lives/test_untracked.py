@@ -252,8 +252,9 @@ def test_whatever_the_order_the_first_test_by_cycles_is_the_reference(client: Te
     ("effects", "measured"), [([], 1), (["torque_zero_shift"], 1), (["interface_heating", "oil_temperature"], 2)]
 )
 def test_a_model_that_corrects_for_the_oil_has_its_mean_cof_tracked(effects: list[str], measured: int) -> None:
-    measured = {"oil_temperature": 358.0, "cofs": {5e5: (0.1, 0.001)}}
-    warm = Event(run_id="warm", kind="stationary_stribeck", cycles=0.0, moment=0.0, **measured)
+    level = {5e5: (0.1, 0.001)}
+    at_first = {"cycles": 0.0, "moment": 0.0, "oil_temperature": 358.0}
+    warm = Event(run_id="warm", kind="stationary_stribeck", cofs=level, **at_first)
     cold = replace(warm, run_id="cold", cycles=1000.0, oil_temperature=313.0)
     tested_life = Life(origin=0.0, events=(warm, cold))
     under = Assumptions(model=ModelInForce(name={"name": "extended", "effects": effects}))

@@ -348,103 +348,90 @@ def test_a_shorter_channel_has_the_times_beside_it(tmp_path: Path) -> None:
     np.testing.assert_allclose(columns["pressure_bar"][:-1], RECORD["pressure_bar"][:-1], rtol=1e-9)
 
 
-REFUSED: dict[str, tuple[str, ...]] = {
-    "units-in-cells-that-differ": (
-        "t [s];M\n0;21 Nm\n1;22 mNm\n",
-        "torque_nm[1] (line 3) must be a number in Nm, as in the first row, got '22 mNm'",
-    ),
-    "a-unit-in-one-cell": ("t [s];M [Nm]\n0;21\n1;22 Nm\n", "torque_nm[1] (line 3) must be a number, got '22 Nm'"),
-    "a-unit-in-all-cells-but-one": (
-        "t [s];M\n0;21 Nm\n1;22\n",
-        "torque_nm[1] (line 3) must be a number in Nm, as in the first row, got '22'",
-    ),
-    "an-unknown-unit": ("t [s];M [10 Nm]\n0;1\n1;2\n", "got '10 Nm'; state it with map=torque_nm:M [UNIT]"),
-    "two-zones": (
-        "time;M [Nm]\n2026-10-25 02:59:59 CEST;1\n2026-10-25 02:00:00 CET;2\n",
-        "in one zone, or each with its offset",
-    ),
-    "a-factor-in-a-title": (
-        "t [s];Torque x10 [Nm]\n0;210\n",
-        "[x0.1 Nm], [x10 Nm] or [x1 Nm]",
-        "torque_nm:Torque x10 [Nm]",
-    ),
-    "a-factor-in-a-title-without-a-map": ("t [s];Drehzahl x100 [1/min]\n0;12\n", "[x0.01 1/min], [x100 1/min]"),
-    "a-row-of-factors": ("t;M\ns;Nm\nFaktor;1;0,1\n0;210\n1;211\n", "are the values already multiplied?"),
-    "a-factor-behind-a-unit": ("t;M\ns;Nm*10\n0;2.1\n", "'Nm*10'"),
-    "two-torques": ("t [s];Torque A1 [Nm];Torque A2 [Nm]\n0;1;2\n", "torque_nm must be one column"),
-    "speeds-of-both-sides": (
+UNKNOWN_UNIT = "t [s];M [10 Nm]\n0;1\n1;2\n"
+THOUSANDS = "pressure_bar;speed_rpm;torque_nm\n5;800;21\n5;1.100;21\n"
+TWO_TABLES = "p [bar],M [Nm]\n5,1\n\nTest 2\np [bar],M [Nm]\n5,2\n"
+REFUSED: list[tuple[str, ...]] = [
+    ("t [s];M\n0;21 Nm\n1;22 mNm\n", "torque_nm[1] (line 3) must be a number in Nm, as in the first row, got '22 mNm'"),
+    ("t [s];M [Nm]\n0;21\n1;22 Nm\n", "torque_nm[1] (line 3) must be a number, got '22 Nm'"),
+    ("t [s];M\n0;21 Nm\n1;22\n", "torque_nm[1] (line 3) must be a number in Nm, as in the first row, got '22'"),
+    (UNKNOWN_UNIT, "got '10 Nm'; state it with map=torque_nm:M [UNIT]"),
+    ("time;M [Nm]\n2026-10-25 02:59:59 CEST;1\n2026-10-25 02:00:00 CET;2\n", "in one zone, or each with its offset"),
+    ("t [s];Torque x10 [Nm]\n0;210\n", "[x0.1 Nm], [x10 Nm] or [x1 Nm]", "torque_nm:Torque x10 [Nm]"),
+    ("t [s];Drehzahl x100 [1/min]\n0;12\n", "[x0.01 1/min], [x100 1/min]"),
+    ("t;M\ns;Nm\nFaktor;1;0,1\n0;210\n1;211\n", "are the values already multiplied?"),
+    ("t;M\ns;Nm*10\n0;2.1\n", "'Nm*10'"),
+    ("t [s];Torque A1 [Nm];Torque A2 [Nm]\n0;1;2\n", "torque_nm must be one column"),
+    (
         "t [s];p [bar];n inner [rpm];n outer [rpm];M [Nm]\n0;5;520;500;20\n",
         "if the columns hold the speeds of both sides, send the difference",
     ),
-    "two-torques-understood-in-part": (
+    (
         "t [s];p [bar];n [rpm];Torque FZG [Nm];Torque HBM [Nm]\n0;5;100;1;2\n",
         "torque_nm must be one column, got Torque FZG and Torque HBM; choose one with map=torque_nm:NAME",
     ),
-    "a-clock-in-whole-seconds": (
+    (
         "Time,p [bar],n [rpm],M [Nm]\n" + "".join(f"08:00:0{k // 10},5,{k},20\n" for k in range(40)),
         "time_s does not advance in 36 of 39 steps: the clock is coarser than the rows",
     ),
-    "a-rate-of-more-samples-than-rows": (
+    (
         "Sampling rate,1000 Hz\nThinning,1/20\n\n" + ",".join(PLATEAUS) + "\n" + rows(names=PLATEAUS),
         "one every 0.001 s, thinning = 1/20. Add a column of times",
     ),
-    "a-counter-of-samples": (
+    (
         "fs = 250 Hz\nIndex,"
         + ",".join(PLATEAUS)
         + "\n"
         + "".join(f"{5 * k},{line}\n" for k, line in enumerate(rows(names=PLATEAUS).splitlines())),
         "Index rises by 5 a row",
     ),
-    "a-duration-that-contradicts-the-rate": (
+    (
         "Sample rate,1000 Hz\nDuration,8 s\nSamples,12\n\n" + ",".join(PLATEAUS) + "\n" + rows(names=PLATEAUS),
         "one every 0.001 s, 8 s for 12 samples",
     ),
-    "gains-above-a-table": (
+    (
         "Channel,Gain,Offset\nPressure,0.001,0\nTorque,0.01,0\n\np [bar],M [Nm]\n3995,1731\n",
         "the line 'Gain' holds factors",
     ),
-    "two-times-that-differ": (
+    (
         "Timestamp;Time (s);M [Nm]\n" + "".join(f"2026-11-02 08:00:0{s};{2 * s};1\n" for s in range(5)),
         "got Timestamp and Time (s); choose one with time=NAME",
     ),
-    "two-times-without-rows": ("time_s,time_s,i\n", "time_s must be one column, got time_s and time_s"),
-    "german-thousands": ("pressure_bar;speed_rpm;torque_nm\n5;800;21\n5;1.100;21\n", "may be 1.1 or 1100"),
-    "american-thousands": ('pressure_bar,speed_rpm,torque_nm\n5,800,21\n5,"1,100",21\n', "may be 1.1 or 1100"),
-    "foreign-unit": ("t [s],M [V]\n0,1\n", "'V'"),
-    "mapped-foreign-unit": ("t [s],Mz V\n0,1\n", "but the file has only", "torque_nm:Mz, V"),
-    "mapped-unit-of-another": ("t [s];Kraft, kN\n0;1\n", "'kN'", "torque_nm:Kraft, kN"),
-    "turns-or-radians": ("t [s];n [1/s]\n0;1\n", "'1/s'"),
-    "decimal-commas-between-commas": (HEAD + "\n0,0,5,0,100,0,20,0\n0,1,5,0,100,0,20,0\n", "must have 4 cells"),
-    "ambiguous-dates": ("timestamp,M [Nm]\n01/02/2026 07:00:00,1\n02/02/2026 07:00:00,2\n", "day/month"),
-    "hours-or-minutes": ("Zeit,M [Nm]\n07:30,1\n07:31,2\n", "must be a number"),
-    "no-titles": ("1,2,3\n4,5,6\n", "line 1 must be a header"),
-    "words-in-a-column-of-times": (
-        "timestamp,M [Nm]\nMon 2 Nov,1\nTue 3 Nov,2\n",
-        "a time such as 2026-11-02 07:00:00.5",
-    ),
-    "absolute-pressure": ("t [s];p [bar(a)]\n0;1\n", "'bar(a)'"),
-    "a-sensor's-range-or-a-factor": ("t [s];p [10 bar]\n0;1\n", "'10 bar'"),
-    "days-of-a-spreadsheet": (
+    ("time_s,time_s,i\n", "time_s must be one column, got time_s and time_s"),
+    (THOUSANDS, "may be 1.1 or 1100"),
+    ('pressure_bar,speed_rpm,torque_nm\n5,800,21\n5,"1,100",21\n', "may be 1.1 or 1100"),
+    ("t [s],M [V]\n0,1\n", "'V'"),
+    ("t [s],Mz V\n0,1\n", "but the file has only", "torque_nm:Mz, V"),
+    ("t [s];Kraft, kN\n0;1\n", "'kN'", "torque_nm:Kraft, kN"),
+    ("t [s];n [1/s]\n0;1\n", "'1/s'"),
+    (HEAD + "\n0,0,5,0,100,0,20,0\n0,1,5,0,100,0,20,0\n", "must have 4 cells"),
+    ("timestamp,M [Nm]\n01/02/2026 07:00:00,1\n02/02/2026 07:00:00,2\n", "day/month"),
+    ("Zeit,M [Nm]\n07:30,1\n07:31,2\n", "must be a number"),
+    ("1,2,3\n4,5,6\n", "line 1 must be a header"),
+    ("timestamp,M [Nm]\nMon 2 Nov,1\nTue 3 Nov,2\n", "a time such as 2026-11-02 07:00:00.5"),
+    ("t [s];p [bar(a)]\n0;1\n", "'bar(a)'"),
+    ("t [s];p [10 bar]\n0;1\n", "'10 bar'"),
+    (
         "Datum;M [Nm]\n46000.25000012;1\n46000.25000023;2\n",
         "State the unit with map=time_s:Datum [s], or [d]",
         "time_s:Datum",
     ),
-    "two-tables": ("p [bar],M [Nm]\n5,1\n\nTest 2\np [bar],M [Nm]\n5,2\n", "holds 2 tables"),
-    "two-records": (HEAD + "\n" + rows() + "\nTest 2\n" + HEAD + "\n" + rows(), "holds 2 tables"),
-    "an-empty-cell": (HEAD + "\n0,5,,20\n", "(line 2) must be a number, got '': fill the cell, or add missing=empty"),
-    "a-long-table-of-two-values": (
+    (TWO_TABLES, "holds 2 tables"),
+    (HEAD + "\n" + rows() + "\nTest 2\n" + HEAD + "\n" + rows(), "holds 2 tables"),
+    (HEAD + "\n0,5,,20\n", "(line 2) must be a number, got '': fill the cell, or add missing=empty"),
+    (
         long("time_s,channel,a,b", "{t},{channel},{value},1"),
         "column of values is not clear, got a, b: name one column 'value'",
     ),
-    "a-word-for-no-value": (HEAD + "\n0,5,n/a,20\n", "got 'n/a': add missing=n/a to leave out such rows"),
-    "not-a-number": (HEAD + "\n0,5,NaN,20\n", "got nan: add missing=nan to leave such rows out"),
-    "words-among-rows": (HEAD + "\n" + rows() + "Mittelwert\n" + rows(), "line 14 must have 4 cells"),
-}
+    (HEAD + "\n0,5,n/a,20\n", "got 'n/a': add missing=n/a to leave out such rows"),
+    (HEAD + "\n0,5,NaN,20\n", "got nan: add missing=nan to leave such rows out"),
+    (HEAD + "\n" + rows() + "Mittelwert\n" + rows(), "line 14 must have 4 cells"),
+]
 
 
-@pytest.mark.parametrize("name", REFUSED)
-def test_a_text_is_refused_with_words_that_help(tmp_path: Path, name: str) -> None:
-    content, words, *mapping = REFUSED[name]
+@pytest.mark.parametrize("case", REFUSED, ids=[words for _, words, *_ in REFUSED])
+def test_a_text_is_refused_with_words_that_help(tmp_path: Path, case: tuple[str, ...]) -> None:
+    content, words, *mapping = case
     with pytest.raises(InvalidError) as caught:
         read_content(tmp_path, content, *mapping)
     assert words in caught.value.detail
@@ -559,13 +546,13 @@ def test_a_unit_in_the_map_is_used_and_must_not_contradict_the_file(tmp_path: Pa
     assert read_content(tmp_path, text, "torque_nm:Mz [kNm]").columns["torque_nm"].tolist() == [1000, 2000]
     with pytest.raises(InvalidError, match="must be kNm, as the rig profile or map says, got 'Nm'"):
         read_content(tmp_path, text, "torque_nm:Mx [kNm]")
-    columns = read_content(tmp_path, REFUSED["an-unknown-unit"][0], "torque_nm:M [x10 Nm]").columns
+    columns = read_content(tmp_path, UNKNOWN_UNIT, "torque_nm:M [x10 Nm]").columns
     assert columns["torque_nm"].tolist() == [10, 20]
 
 
 @pytest.mark.parametrize("number", [1, 2])
 def test_one_of_tables_below_each_other_is_read_by_its_number(tmp_path: Path, number: int) -> None:
-    channels = read_content(tmp_path, REFUSED["two-tables"][0], table=str(number))
+    channels = read_content(tmp_path, TWO_TABLES, table=str(number))
     assert channels.columns["torque_nm"].tolist() == [number]
     assert channels.line_of is not None
     assert channels.line_of(0) == (2, 6)[number - 1]
@@ -573,7 +560,7 @@ def test_one_of_tables_below_each_other_is_read_by_its_number(tmp_path: Path, nu
 
 @pytest.mark.parametrize(("decimal", "speed"), [(",", 1100.0), (".", 1.1)])
 def test_an_option_settles_the_thousands(tmp_path: Path, decimal: str, speed: float) -> None:
-    columns = read_content(tmp_path, REFUSED["german-thousands"][0], decimal=decimal).columns
+    columns = read_content(tmp_path, THOUSANDS, decimal=decimal).columns
     assert columns["speed_rpm"].tolist() == [800.0, speed]
 
 

@@ -11,24 +11,21 @@ from service.readers.unit_table import conversion
 
 
 @pytest.mark.parametrize(
-    ("name", "channel"),
+    ("channel", "names"),
     [
-        ("Torque", "torque_nm"), ("M", "torque_nm"), ("Drehmoment", "torque_nm"), ("TORQUE_NM", "torque_nm"),
-        ("n", "speed_rpm"), ("Drehzahl", "speed_rpm"), ("Speed", "speed_rpm"),
-        ("p", "pressure_bar"), ("Druck", "pressure_bar"),
-        ("T_oil", "oil_temperature_c"), ("Öltemperatur", "oil_temperature_c"), ("Oeltemperatur", "oil_temperature_c"),
-        ("O\u0308ltemperatur", "oil_temperature_c"), ("oil temperature", "oil_temperature_c"),
-        ("T_plate", "plate_temperature_front_c"), ("Plate temperature front", "plate_temperature_front_c"),
-        ("Lamellentemperatur vorne", "plate_temperature_front_c"), ("T_plate_rear", "plate_temperature_rear_c"),
-        ("Lamellentemperatur hinten", "plate_temperature_rear_c"), ("plate", None),
-        ("t", "time_s"), ("Zeit", "time_s"),
-        ("N", None), ("P", None), ("T", None), ("m", None), ("Mz", None), ("", None), ("Temperatur", None),
-        ("-Torque", None), ("Torque/2", None), ("Torque^2", None), ("Motordrehzahl", None),
-        ("Pressure abs", None), ("Absolutdruck", None), ("Torque abs", "torque_nm"), ("Absolute Time", "time_s"),
+        ("torque_nm", ["Torque", "M", "Drehmoment", "TORQUE_NM", "Torque abs"]),
+        ("speed_rpm", ["n", "Drehzahl", "Speed"]),
+        ("pressure_bar", ["p", "Druck"]),
+        ("oil_temperature_c", ["T_oil", "Öltemperatur", "Oeltemperatur", "O\u0308ltemperatur", "oil temperature"]),
+        ("plate_temperature_front_c", ["T_plate", "Plate temperature front", "Lamellentemperatur vorne"]),
+        ("plate_temperature_rear_c", ["T_plate_rear", "Lamellentemperatur hinten"]),
+        ("time_s", ["t", "Zeit", "Absolute Time"]),
+        (None, ["plate", "N", "P", "T", "m", "Mz", "", "Temperatur", "-Torque", "Torque/2", "Torque^2"]),
+        (None, ["Motordrehzahl", "Pressure abs", "Absolutdruck"]),
     ],
-)  # fmt: skip
-def test_names_are_known(name: str, channel: str | None) -> None:
-    assert known_channel(name) == channel
+)
+def test_names_are_known(channel: str | None, names: list[str]) -> None:
+    assert {name: known_channel(name) for name in names} == dict.fromkeys(names, channel)
 
 
 def test_an_absolute_pressure_is_another_one() -> None:
@@ -72,35 +69,22 @@ def test_equal_names_are_distinguished_by_their_group() -> None:
 
 
 @pytest.mark.parametrize(
-    ("channel", "unit", "value", "expected"),
+    ("channel", "shown", "expected"),
     [
-        ("speed_rpm", "rad/s", 2 * np.pi, 60.0),
-        ("speed_rpm", "1/min", 60.0, 60.0),
-        ("speed_rpm", "min⁻¹", 60.0, 60.0),
-        ("torque_nm", "kNm", 0.02, 20.0),
-        ("torque_nm", "N·m", 20.0, 20.0),
-        ("torque_nm", "N m", 20.0, 20.0),
-        ("torque_nm", "mNm", 20.0, 0.02),
-        ("torque_nm", "lbf·ft", 1.0, 1.3558179483314004),
-        ("pressure_bar", "mbar", 5000.0, 5.0),
-        ("pressure_bar", "MPa", 0.5, 5.0),
-        ("pressure_bar", "kPa", 500.0, 5.0),
-        ("pressure_bar", "Pa", 5e5, 5.0),
-        ("pressure_bar", "psi", 14.503773773020923, 1.0),
-        ("oil_temperature_c", "degC", 85.0, 85.0),
-        ("oil_temperature_c", "K", 358.15, 85.0),
-        ("oil_temperature_c", "°F", 185.0, 85.0),
-        ("oil_temperature_c", "℃", 85.0, 85.0),
-        ("time_s", "ms", 1500.0, 1.5),
-        ("time_s", "min", 2.0, 120.0),
+        ("speed_rpm", {"rad/s": 2 * np.pi, "1/min": 60.0, "min⁻¹": 60.0}, 60.0),
+        ("torque_nm", {"kNm": 0.02, "N·m": 20.0, "N m": 20.0, "mNm": 2e4, "lbf·ft": 20.0 / 1.3558179483314004}, 20.0),
+        ("pressure_bar", {"mbar": 1000.0, "MPa": 0.1, "kPa": 100.0, "Pa": 1e5, "psi": 14.503773773020923}, 1.0),
+        ("oil_temperature_c", {"degC": 85.0, "K": 358.15, "°F": 185.0, "℃": 85.0}, 85.0),
+        ("time_s", {"ms": 90_000.0, "min": 1.5}, 90.0),
     ],
 )
-def test_units_are_converted(channel: str, unit: str, value: float, expected: float) -> None:
-    converted = conversion(channel, unit)
-    assert converted is not None
-    values = np.array([value])
-    converted.apply(values)
-    np.testing.assert_allclose(values, expected, rtol=1e-15, atol=1e-13)
+def test_units_are_converted(channel: str, shown: dict[str, float], expected: float) -> None:
+    for unit, value in shown.items():
+        converted = conversion(channel, unit)
+        assert converted is not None, unit
+        values = np.array([value])
+        converted.apply(values)
+        np.testing.assert_allclose(values, expected, rtol=1e-15, atol=1e-13, err_msg=unit)
 
 
 @pytest.mark.parametrize(

@@ -102,11 +102,8 @@ def test_each_number_that_is_a_text_is_an_error_with_its_row(count: int) -> None
     body["channels"] = {name: [1.5, 2, *["7,5"] * count, 3] for name in body["channels"]}
     found = refused(json.dumps(body, indent=count % 3).encode())
     require_total(found, 3 * count)
-    assert (found.errors[0].pointer, found.errors[0].row, found.errors[0].code) == (
-        "/channels/pressure_bar/2",
-        3,
-        "not_a_number",
-    )
+    first = found.errors[0]
+    assert (first.pointer, first.row, first.code) == ("/channels/pressure_bar/2", 3, "not_a_number")
     assert [error.row for error in found.errors] == list(range(3, 53))
 
 
@@ -140,9 +137,9 @@ def test_other_bodies_know_their_own_fields() -> None:
 
 def test_what_is_no_json_is_named() -> None:
     for body in (b"", b"{", b'{"a":}', b'{"kind":"maintenance",}'):
-        found = refused(body)
-        assert found.errors[0].code == "json_invalid"
-        assert found.errors[0].message.startswith("the body must be valid JSON: ")
+        error = refused(body).errors[0]
+        assert error.code == "json_invalid"
+        assert error.message.startswith("the body must be valid JSON: ")
 
 
 @pytest.mark.parametrize("kept", [r"\\u0000", r"a\\\\u0000", r"\u0001"])

@@ -110,8 +110,9 @@ def test_a_diagnosis_is_waited_for(client: Client) -> None:
     ],
 )
 def test_tables_have_a_column_for_each_part(library: Frames, items: list[dict[str, Any]], columns: list[str]) -> None:
+    frames = pytest.importorskip(library)
     frame = table(items, library)
-    assert isinstance(frame, pytest.importorskip(library).DataFrame)
+    assert isinstance(frame, frames.DataFrame)
     assert list(frame.columns) == columns
     assert table(items, "list") == items
 
