@@ -1,7 +1,6 @@
 """What the tests of the workers have called; each takes the database first."""
 
 import os
-import signal
 import time
 from pathlib import Path
 from typing import NoReturn
@@ -10,6 +9,7 @@ from service.errors import FieldError, InvalidError
 from service.logging import request_id
 from storage import clutches
 from storage.engine.database import Database
+from tests.service.work.waiting import until
 
 
 def ids(database: Database) -> list[str]:
@@ -18,8 +18,9 @@ def ids(database: Database) -> list[str]:
         return clutches.all_ids(connection)
 
 
-def pid(_: Database) -> int:
-    """The process that works."""
+def pid(_: object) -> int:
+    """The process that works, after a while: others have a call by then."""
+    time.sleep(0.05)
     return os.getpid()
 
 
@@ -27,11 +28,7 @@ def logged(_: Database, log: Path, name: str, gate: Path) -> str:
     """Write begin and end into a log, and wait between them until the gate is there."""
     with log.open("a") as file:
         file.write(f"+{name} ")
-    deadline = time.monotonic() + 60
-    while not gate.exists():
-        if time.monotonic() > deadline:
-            raise TimeoutError(f"{gate} was not made")
-        time.sleep(0.005)
+    until(gate.exists)
     with log.open("a") as file:
         file.write(f"-{name} ")
     return name
@@ -47,21 +44,12 @@ def refused(_: Database) -> NoReturn:
     raise InvalidError("wrong", errors=[FieldError(pointer="/a", code="c", message="m", row=3, value="v")], total=7)
 
 
-def dies(_: Database, mark: Path, times: int) -> str:
-    """End the process at once, as often as said; then answer."""
+def signalled(_: Database, mark: Path, times: int, number: int) -> str:
+    """Have the process end or stand still by a signal, as often as said; then answer."""
     with mark.open("a") as file:
         file.write("x")
     if len(mark.read_text()) <= times:
-        os._exit(9)
-    return "alive"
-
-
-def stops(_: Database, mark: Path, times: int) -> str:
-    """Have the process stand still, as often as said; then answer."""
-    with mark.open("a") as file:
-        file.write("x")
-    if len(mark.read_text()) <= times:
-        os.kill(os.getpid(), signal.SIGSTOP)
+        os.kill(os.getpid(), number)
     return "alive"
 
 

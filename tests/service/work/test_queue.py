@@ -1,6 +1,5 @@
 """How the process of a job is started, and which jobs wait for which."""
 
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,10 +13,12 @@ from service.work.queue import JobQueue, Kind
 from storage import jobs
 from storage.engine.database import Database
 from storage.jobs import JobRow, NewJob
+from tests.service.work.waiting import until
 
 ADDRESS = "postgresql+psycopg://u:s3cr3t@host/db"
 AT = "2026-11-02T10:00:00+00:00"
-WORK = Work(modules=("tests.service.work.sleeping",), task={"clutch_id": "c1"}, longest=60.0)
+JOB = ("tests.service.work.job_process",)
+SLEEPS = Work(modules=JOB, task={"how": "sleeps"}, longest=60.0)
 
 
 class StartedError(Exception):
@@ -34,16 +35,15 @@ def test_no_argument_shows_the_address_of_the_database(monkeypatch: pytest.Monke
         raise StartedError
 
     monkeypatch.setattr(process.subprocess, "Popen", start)
-    with pytest.raises(StartedError), process.running(WORK, ADDRESS):
+    with pytest.raises(StartedError), process.running(SLEEPS, ADDRESS):
         pytest.fail("it was not started")
     assert "s3cr3t" not in " ".join(started["command"])
     assert started["env"][DATABASE_VARIABLE] == ADDRESS
 
 
 def ask(database: Database, job_id: str, kind: str) -> None:
-    new = NewJob(
-        job_id=job_id, kind=kind, clutch_id=None, asked_at=AT, asked_by="local", arguments={"request": ""}
-    )  # fmt: skip
+    arguments = {"request": ""}
+    new = NewJob(job_id=job_id, kind=kind, clutch_id=None, asked_at=AT, asked_by="local", arguments=arguments)
     with database.writing() as connection:
         jobs.insert(connection, new)
 
@@ -65,7 +65,7 @@ def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
             problem = ended.get("problem")
             jobs.end(connection, job.job_id, jobs.FAILED, AT, problem=problem, claimer=job.claimed_by)
 
-    endless = Kind(lambda _job, _settings: WORK, finish)
+    endless = Kind(lambda _job, _settings: SLEEPS, finish)
     quick = Kind(lambda _job, _settings: Work(modules=("this",), task={}, longest=0.0), finish)
     groups = [{jobs.DIAGNOSIS: quick}, {jobs.REPLAY: endless, jobs.FLEET_REFRESH: endless}]
     for job_id, kind in (("r", jobs.REPLAY), ("f", jobs.FLEET_REFRESH), ("d", jobs.DIAGNOSIS), ("other", "unheard of")):
@@ -73,33 +73,21 @@ def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
     queue = JobQueue(in_file, Settings(job_lease_seconds=1), groups)
     queue.start()
     try:
-        deadline = time.monotonic() + 60
-        while states(in_file) != {"r": "running", "f": "waiting", "d": "failed", "other": "waiting"}:
-            assert time.monotonic() < deadline, states(in_file)
-            time.sleep(0.05)
+        until(lambda: states(in_file) == {"r": "running", "f": "waiting", "d": "failed", "other": "waiting"})
         assert queue.is_working()
         with in_file.writing() as connection:
             assert jobs.end(connection, "r", jobs.CANCELLED, AT)
-        while states(in_file) != {"r": "cancelled", "f": "running", "d": "failed", "other": "waiting"}:
-            assert time.monotonic() < deadline, states(in_file)
-            time.sleep(0.05)
+        until(lambda: states(in_file) == {"r": "cancelled", "f": "running", "d": "failed", "other": "waiting"})
     finally:
         queue.close()
     assert not queue.is_working()
     assert states(in_file) == {"r": "cancelled", "f": "waiting", "d": "failed", "other": "waiting"}, "given back"
 
 
-@pytest.mark.parametrize(
-    "how",
-    [
-        "dies",
-        "writes a list",
-        *(pytest.param(how, marks=pytest.mark.slow) for how in ("raises", "writes garbage", "says nothing")),
-        "cannot start",
-        "cannot be stored",
-        "cannot end",
-    ],
-)
+RARE = [pytest.param(how, marks=pytest.mark.slow) for how in ("raises", "writes garbage", "says nothing")]
+
+
+@pytest.mark.parametrize("how", ["dies", "writes a list", "cannot start", "cannot be stored", "cannot end", *RARE])
 def test_a_job_that_fails_in_any_way_is_marked_failed_and_the_next_one_runs(
     in_file: Database, caplog: pytest.LogCaptureFixture, how: str
 ) -> None:
@@ -115,17 +103,14 @@ def test_a_job_that_fails_in_any_way_is_marked_failed_and_the_next_one_runs(
         if job.job_id == "bad" and how == "cannot start":
             raise OSError("no process can be started")
         task = {"how": how if job.job_id == "bad" else "ends well"}
-        return Work(modules=("tests.service.work.failing",), task=task, longest=60.0)
+        return Work(modules=JOB, task=task, longest=60.0)
 
     ask(in_file, "bad", jobs.REPLAY)
     ask(in_file, "next", jobs.REPLAY)
     queue = JobQueue(in_file, Settings(job_lease_seconds=1), [{jobs.REPLAY: Kind(work, finish)}])
     queue.start()
     try:
-        deadline = time.monotonic() + 60
-        while states(in_file) != {"bad": "failed", "next": "finished"}:
-            assert time.monotonic() < deadline, states(in_file)
-            time.sleep(0.05)
+        until(lambda: states(in_file) == {"bad": "failed", "next": "finished"})
         assert queue.is_working()
     finally:
         queue.close()
@@ -135,5 +120,5 @@ def test_a_job_that_fails_in_any_way_is_marked_failed_and_the_next_one_runs(
     assert row.problem
     if how == "dies":
         assert "stopped (SIGKILL)" in row.problem, "it wrote nothing: the log has nothing of it"
-    if how not in ("dies",):
+    else:
         assert any(record.levelname == "ERROR" for record in caplog.records), "it is logged"

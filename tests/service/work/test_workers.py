@@ -4,11 +4,10 @@ import multiprocessing
 import multiprocessing.connection
 import os
 import pickle
-import signal
-import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from signal import SIGKILL, SIGSTOP, pause
 
 import pytest
 
@@ -24,6 +23,7 @@ from service.workflows.ingest_run import ingest_posted
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.service.work import calls
+from tests.service.work.waiting import until
 from tests.support import stationary
 
 AT = "2026-11-02T10:00:00+00:00"
@@ -86,16 +86,6 @@ def test_calls_of_one_turn_run_one_after_the_other_and_hold_up_no_other(workers:
     assert [mark for mark in log.read_text().split() if "other" not in mark] == ["+a", "-a", "+b", "-b", "+c", "-c"]
 
 
-def test_they_are_idle_until_one_works(workers: Workers, tmp_path: Path) -> None:
-    gate = tmp_path / "gate"
-    assert workers.are_idle()
-    held = workers.submit(Lane.ANSWERS, calls.logged, tmp_path / "log", "a", gate)
-    assert not workers.are_idle()
-    gate.touch()
-    held.result(IN_TIME)
-    assert workers.are_idle()
-
-
 def test_more_than_may_wait_are_refused(workers: Workers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_MAX_WAITING_LONG", 2)
     gate = tmp_path / "gate"
@@ -127,9 +117,9 @@ def test_both_kinds_take_in_the_same_runs_alike(tmp_path: Path) -> None:
 
 
 def test_a_process_that_ends_is_replaced_and_its_call_made_once_more(processes: Workers, tmp_path: Path) -> None:
-    assert processes.submit(Lane.RUNS, calls.dies, tmp_path / "once", 1).result(IN_TIME) == "alive"
+    assert processes.submit(Lane.RUNS, calls.signalled, tmp_path / "once", 1, SIGKILL).result(IN_TIME) == "alive"
     with pytest.raises(BusyError, match="ended unexpectedly"):
-        processes.submit(Lane.RUNS, calls.dies, tmp_path / "twice", 2).result(IN_TIME)
+        processes.submit(Lane.RUNS, calls.signalled, tmp_path / "twice", 2, SIGKILL).result(IN_TIME)
     assert processes.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
 
 
@@ -137,13 +127,10 @@ def test_a_lane_whose_processes_end_at_a_call_again_and_again_is_told_until_one_
     processes: Workers, tmp_path: Path
 ) -> None:
     with pytest.raises(BusyError, match="ended unexpectedly"):
-        processes.submit(Lane.RUNS, calls.dies, tmp_path / "mark", 99).result(IN_TIME)
+        processes.submit(Lane.RUNS, calls.signalled, tmp_path / "mark", 99, SIGKILL).result(IN_TIME)
     assert processes.ended() == [Lane.RUNS]
-    deadline = time.monotonic() + IN_TIME
-    while processes.ended():
-        assert time.monotonic() < deadline, "no other process came up"
-        time.sleep(0.05)
-    assert isinstance(processes.submit(Lane.RUNS, calls.pid).result(IN_TIME), int)
+    until(lambda: not processes.ended(), within=IN_TIME)
+    assert processes.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
 
 
 @pytest.mark.slow
@@ -152,25 +139,20 @@ def test_a_process_that_stops_is_replaced_and_its_call_made_once_more(
 ) -> None:
     monkeypatch.setattr(module, "_SILENCE", 3.0)
     stopped = processes.submit(Lane.RUNS, calls.pid).result(IN_TIME)
-    os.kill(stopped, signal.SIGSTOP)
+    os.kill(stopped, SIGSTOP)
     assert processes.submit(Lane.RUNS, calls.pid).result(IN_TIME) != stopped
-    assert processes.submit(Lane.RUNS, calls.stops, tmp_path / "once", 1).result(IN_TIME) == "alive"
+    assert processes.submit(Lane.RUNS, calls.signalled, tmp_path / "once", 1, SIGSTOP).result(IN_TIME) == "alive"
     with pytest.raises(BusyError, match="ended unexpectedly"):
-        processes.submit(Lane.RUNS, calls.stops, tmp_path / "twice", 2).result(IN_TIME)
+        processes.submit(Lane.RUNS, calls.signalled, tmp_path / "twice", 2, SIGSTOP).result(IN_TIME)
     assert processes.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
 
 
 def test_an_idle_process_that_stops_is_told_and_replaced(processes: Workers, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_SILENCE", 3.0)
     stopped = processes.submit(Lane.RUNS, calls.pid).result(IN_TIME)
-    os.kill(stopped, signal.SIGSTOP)
-    deadline = time.monotonic() + IN_TIME
-    while processes.ended() != [Lane.RUNS]:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    while processes.ended():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    os.kill(stopped, SIGSTOP)
+    until(lambda: processes.ended() == [Lane.RUNS], within=IN_TIME)
+    until(lambda: not processes.ended(), within=IN_TIME)
     assert processes.submit(Lane.RUNS, calls.pid).result(IN_TIME) != stopped
 
 
@@ -180,10 +162,10 @@ def test_what_starts_processes_is_replaced_where_it_stops(processes: Workers, mo
     stopped = processes.submit(Lane.RUNS, calls.pid).result(IN_TIME)
     starter = int(Path(f"/proc/{stopped}/stat").read_text().rpartition(")")[2].split()[1])
     for pid in (starter, stopped):
-        os.kill(pid, signal.SIGSTOP)
+        os.kill(pid, SIGSTOP)
     assert processes.submit(Lane.RUNS, calls.ids, patience=IN_TIME).result(IN_TIME) == ["c1"]
     assert processes.submit(Lane.ANSWERS, calls.ids, patience=IN_TIME).result(IN_TIME) == ["c1"]
-    assert not Path(f"/proc/{starter}").exists() or "Z" in _state(starter)
+    assert _state(starter) == "Z"
 
 
 def test_a_call_that_takes_too_long_is_ended_with_its_process(processes: Workers, tmp_path: Path) -> None:
@@ -198,7 +180,9 @@ def test_a_call_that_takes_too_long_is_ended_with_its_process(processes: Workers
 
 def test_a_call_that_waits_too_long_is_refused_and_never_begun(workers: Workers, tmp_path: Path) -> None:
     gate, log = tmp_path / "gate", tmp_path / "log"
+    assert workers.are_idle()
     held = workers.submit(Lane.ANSWERS, calls.logged, log, "a", gate, turn="c1")
+    assert not workers.are_idle()
     late = [
         workers.submit(Lane.ANSWERS, calls.logged, log, "b", gate, turn=turn, patience=0.5) for turn in ("c1", "c2")
     ]
@@ -239,7 +223,7 @@ def _serve(path: str, answer: "multiprocessing.connection.Connection") -> None:
     """A service with workers that waits to be killed."""
     made = in_processes(open_database(f"sqlite:///{path}"), 1)
     answer.send([made.submit(lane, calls.pid).result(IN_TIME) for lane in Lane])
-    signal.pause()
+    pause()
 
 
 @pytest.mark.slow
@@ -251,15 +235,13 @@ def test_workers_end_with_a_service_that_is_killed(database: Database) -> None:
     pids = ours.recv()
     assert len(set(pids)) == len(Lane)
     assert service.pid is not None
-    os.kill(service.pid, signal.SIGKILL)
+    os.kill(service.pid, SIGKILL)
     service.join(IN_TIME)
-    deadline = time.monotonic() + IN_TIME
-    while any(Path(f"/proc/{pid}").exists() and "Z" not in _state(pid) for pid in pids):
-        assert time.monotonic() < deadline, "a worker outlives its service"
-        time.sleep(0.02)
+    until(lambda: all(_state(pid) == "Z" for pid in pids), within=IN_TIME)
 
 
 def _state(pid: int) -> str:
+    """Its letter; that of a zombie, too, where it has gone."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     except FileNotFoundError:

@@ -36,6 +36,7 @@ CLUTCH = "c1"
 AT = "2026-11-02T10:00:00+00:00"
 WHO = {"by": "local", "at": AT}
 PRESSURES, OTHER_PRESSURES, SPEEDS = (4.0, 6.0), (5.0, 7.0), tuple(range(20, 1971, 150))
+REPORT = {"verdict": "cause_named", "causes": []}
 EXTENSION = Extension(effects=("torque_zero_shift",), content={"shift_nm": 0.5, "course_nm": -0.2}).to_dict()
 #: What only the audit knows of a run.
 OF_THE_AUDIT = ("state", "doubts", "sent_cycles", "content_sha256")
@@ -59,8 +60,7 @@ def doubts_alone(*_: Any) -> tuple[Shown, tuple[Notice, ...]]:
 def stood_in(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Doubts, and what an adopted extension does, are stood in for."""
     with monkeypatch.context() as patched:
-        for name, method in stand_in_engine.METHODS.items():
-            patched.setattr(Extension, name, method)
+        stand_in_engine.apply(patched.setattr)
         for workflow in (ingest_run, change_run):
             patched.setattr(workflow, "doubts_alone", doubts_alone)
             patched.setattr(workflow, "doubts_together", doubts_together)
@@ -69,22 +69,12 @@ def stood_in(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 def body(kind: str, run_id: str, cycles: float, *, wear: float | None = None, odd: bool = False) -> dict[str, Any]:
     """A run as it is sent: `test`, `other` (pressures), `few` (speeds), `loop`, `duty`, `rebuild`, `oil_change`."""
-    head = {
-        "run_id": run_id,
-        "cycles": cycles,
-        "started_at": f"2026-01-01T00:00{f':{ODD}+00:00' if odd else ':00+00:00'}",
-    }
+    started_at = f"2026-01-01T00:00:{ODD if odd else '00'}+00:00"
+    head = {"run_id": run_id, "cycles": cycles, "started_at": started_at}
     if kind in ("test", "other", "few"):
-        return (
-            stationary(
-                cycles,
-                wear=wear,
-                noise=0.02,
-                pressures=OTHER_PRESSURES if kind == "other" else PRESSURES,
-                speeds=SPEEDS[1:-1] if kind == "few" else SPEEDS,
-            )
-            | head
-        )
+        pressures = OTHER_PRESSURES if kind == "other" else PRESSURES
+        speeds = SPEEDS[1:-1] if kind == "few" else SPEEDS
+        return stationary(cycles, wear=wear, noise=0.02, pressures=pressures, speeds=speeds) | head
     if kind == "loop":
         return {"kind": "dynamic_stribeck", "channels": loop_channels()} | head
     if kind == "duty":
@@ -115,8 +105,12 @@ class Bench:
         edit_clutch.register(self.database, ClutchIn.model_validate(record), created_at=AT)
 
     def send(self, run: Mapping[str, Any]) -> dict[str, Any]:
-        """Post a run; its receipt."""
         return send_to(self.database, run)
+
+    def send_tests(self, *cycles: float) -> None:
+        """Tests that are named after their cycles: `a0`, `a1000`."""
+        for each in cycles:
+            self.send(body("test", f"a{each:g}", each))
 
     def diagnose(self, diagnosis_id: str, life: str, revision: int = 10**6) -> None:
         """Store a finished diagnosis of a life, whose extension the stand-in applies."""
@@ -126,30 +120,25 @@ class Bench:
         )  # fmt: skip
         with self.database.writing() as connection:
             diagnoses.insert(connection, row)
-            diagnoses.finish(connection, diagnosis_id, AT, {"verdict": "cause_named", "causes": []}, EXTENSION)
+            diagnoses.finish(connection, diagnosis_id, AT, REPORT, EXTENSION)
 
     def adopt(self, diagnosis_id: str | None) -> None:
         """Adopt a diagnosis, or return to the baseline."""
         adopt(self.database, CLUTCH, diagnosis_id, adopted_at=AT)
 
     def withdraw(self, run_id: str) -> dict[str, Any]:
-        """Withdraw a run."""
         return change_run.withdraw(self.database, CLUTCH, run_id, reason="a slip", **WHO)
 
     def restore(self, run_id: str) -> dict[str, Any]:
-        """Restore a run."""
         return change_run.restore(self.database, CLUTCH, run_id, reason="no slip", **WHO)
 
     def confirm(self, run_id: str) -> dict[str, Any]:
-        """Confirm a run."""
         return change_run.confirm(self.database, CLUTCH, run_id, reason="", **WHO)
 
     def correct(self, run_id: str, cycles: float) -> dict[str, Any]:
-        """Correct a run."""
         return change_run.correct(self.database, CLUTCH, run_id, cycles=cycles, reason="a slip", **WHO)
 
     def receipts(self) -> dict[str, dict[str, Any]]:
-        """All receipts by run_id."""
         page = json.loads(runs.page_as_json(self.database, CLUTCH, WHOLE))
         return {item["run_id"]: item for item in page["items"]}
 
@@ -158,14 +147,9 @@ class Bench:
 
         `/degradation` is most of the work: it may be left out where it was looked at already.
         """
-        database = self.database
-        named: dict[str, Any] = {
-            method: remaining_life.remaining_life(database, CLUTCH, method=method, pressure_bar=None, at_cycles=None)
-            for method in ("particle", "ukf", "grid")
-        }
-        named["earlier"] = remaining_life.remaining_life(
-            database, CLUTCH, method="particle", pressure_bar=None, at_cycles=2500.0
-        )
+        database, life = self.database, remaining_life.remaining_life
+        named: dict[str, Any] = {name: life(database, CLUTCH, name, None, None) for name in ("particle", "ukf", "grid")}
+        named["earlier"] = life(database, CLUTCH, "particle", None, 2500.0)
         if degradation_too:
             named["degradation"] = degradation.degradation(database, CLUTCH)
         named["stribeck"] = stribeck.curves(database, CLUTCH, WHOLE)
@@ -185,7 +169,6 @@ class Bench:
         return {name: without_revision(answer) for name, answer in named.items()}
 
     def close(self) -> None:
-        """Close the database."""
         self.database.close()
 
 

@@ -1,8 +1,7 @@
 """The stored state of a clutch is that which follows from all its rows, whatever was written in which order."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import Any, TypeVar
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from service.workflows.edit_clutch import edit
 from storage import clutches, diagnoses, jobs
 from storage.clutches import Choice
 from storage.diagnoses import FINISHED
-from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, WHO, Bench, body, stood_in
+from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, WHO, Bench, body
 from tests.support import one_quick
 
 #: Sequences, the tests that each begins with, and its writes: with them all states are met, and each kind of write.
@@ -82,24 +81,22 @@ class Written:
     def baseline(self) -> None:
         self.bench.adopt(None)
 
-    def confirm(self) -> None:
-        if runs := self.runs("held"):
-            self.bench.confirm(self.one_of(runs))
+    def change(self, state: str, change: Callable[[str], object]) -> None:
+        """A change of one of the runs in that state, if there is any."""
+        if runs := [run_id for run_id, receipt in self.bench.receipts().items() if receipt["state"] == state]:
+            change(self.one_of(runs))
 
-    def runs(self, state: str) -> list[str]:
-        return [run_id for run_id, receipt in self.bench.receipts().items() if receipt["state"] == state]
+    def confirm(self) -> None:
+        self.change("held", self.bench.confirm)
 
     def withdraw(self) -> None:
-        if runs := self.runs("accepted"):
-            self.bench.withdraw(self.one_of(runs))
+        self.change("accepted", self.bench.withdraw)
 
     def restore(self) -> None:
-        if runs := self.runs("withdrawn"):
-            self.bench.restore(self.one_of(runs))
+        self.change("withdrawn", self.bench.restore)
 
     def correct(self) -> None:
-        if runs := self.runs("accepted"):
-            self.bench.correct(self.one_of(runs), float(self.rng.integers(40) * 500))
+        self.change("accepted", lambda run_id: self.bench.correct(run_id, float(self.rng.integers(40) * 500)))
 
     def replay(self) -> None:
         replay.replay_clutch(self.bench.database, CLUTCH)
@@ -120,7 +117,8 @@ def stated_anew(bench: Bench) -> str:
     if life["status"] == "reached":
         return "failure"
     if life["status"] != "insufficient_data":
-        rebuilds = [run["cycles"] for run in bench.receipts().values() if run["event"] == "rebuild" and counts(run)]
+        accepted = [run for run in bench.receipts().values() if run["state"] == "accepted"]
+        rebuilds = [run["cycles"] for run in accepted if run["event"] == "rebuild"]
         left, age = life["remaining_cycles"]["0.05"], life["as_of_cycles"] - max(rebuilds, default=0)
         if (left is not None and left < 0.2 * (age + left)) or life["current"]["health"] < 0.1:
             return "maintenance"
@@ -130,18 +128,6 @@ def stated_anew(bench: Bench) -> str:
     if found and not found["adopted"] and not found["earlier_life"] and found["verdict"] in DISAGREE:
         return "out_of_specification"
     return "normal"
-
-
-def counts(run: Mapping[str, Any]) -> bool:
-    return bool(run["state"] == "accepted")
-
-
-@pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    with stood_in(monkeypatch):
-        made = Bench(tmp_path / "a.db")
-        yield made
-        made.close()
 
 
 @pytest.mark.parametrize("seed", one_quick(SEEDS))
@@ -154,9 +140,8 @@ def test_the_stored_state_follows_from_all_rows(bench: Bench, seed: int) -> None
         expected = stated_anew(bench)
         (row,) = written.rows()
         met.add(row.state)
-        assert (row.state, clutch_list.look_up(bench.database, CLUTCH)["state"]["name"]) == (expected, expected), (
-            written.did
-        )
+        shown = clutch_list.look_up(bench.database, CLUTCH)["state"]["name"]
+        assert row.state == shown == expected, written.did
         totals = clutch_list.totals(bench.database, Choice())
         assert totals["states"] == {name: int(name == expected) for name in totals["states"]}
     print(seed, met, written.did)

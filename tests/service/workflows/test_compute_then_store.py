@@ -3,7 +3,9 @@
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,6 @@ import pytest
 from sqlalchemy import text
 from typer.testing import CliRunner
 
-from models.diagnosis.extension import Extension
 from service import stored_runs
 from service.cli.main import app
 from service.lives import model_correction, recomputation, run_analysis, tracks
@@ -25,34 +26,24 @@ from service.workflows import adopt_model, edit_clutch, ingest_run, learn_fleet
 from service.workflows.adopt_model import adopt, finish_and_adopt
 from service.workflows.ingest_run import ingest
 from service.workflows.replay import replay_clutch
+from service.workflows.run_diagnosis import ask
 from storage import assumptions, clutches, diagnoses, jobs, results, runs
-from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import FileDatabase
-from storage.jobs import NewJob
 from tests.service.workflows import stand_in_engine
-from tests.service.workflows.benches import overtaken
+from tests.service.workflows.benches import EXTENSION, REPORT, overtaken
 from tests.support import stationary
 
 AT = "2026-11-02T10:00:00+00:00"
-REPORT = {"verdict": "cause_named", "causes": []}
-EXTENSION = Extension(effects=("torque_zero_shift",), content={"shift_nm": 0.5, "course_nm": -0.2}).to_dict()
-CYCLES = (0.0, 1000.0, 2000.0, 3000.0)
 
 
 @pytest.fixture
-def url(tmp_path: Path) -> str:
-    return f"sqlite:///{tmp_path / 'a.db'}"
-
-
-@pytest.fixture
-def database(url: str) -> Iterator[Database]:
-    opened = open_database(url)
-    edit_clutch.register(opened, ClutchIn(clutch_id="c1"), created_at=AT)
-    yield opened
-    opened.close()
+def database(in_file: Database) -> Database:
+    """On a file alone: a database whose write lock the tests watch."""
+    edit_clutch.register(in_file, ClutchIn(clutch_id="c1"), created_at=AT)
+    return in_file
 
 
 def post(database: Database, cycles: float, run_id: str | None = None) -> dict[str, Any]:
@@ -67,31 +58,22 @@ def stored(database: Database) -> list[Any]:
         return [receipts, [results.predictions_of(connection, "c1", name, 0.0) for name in tracks.CARRIED]]
 
 
-def diagnosed(database: Database, diagnosis_id: str) -> None:
-    """A finished diagnosis with an extension that the stand-in applies."""
-    begun(database, diagnosis_id)
+def asked_for(database: Database) -> str:
+    """A diagnosis that is to be made; its id."""
+    return ask(database, "c1", by="local", adopt=False, request="", most=1, created_at=AT)[0]
+
+
+def diagnosed(database: Database) -> str:
+    """A finished diagnosis with an extension that the stand-in applies; its id."""
+    diagnosis_id = asked_for(database)
     with database.writing() as connection:
         diagnoses.finish(connection, diagnosis_id, AT, REPORT, EXTENSION)
-
-
-def begun(database: Database, diagnosis_id: str) -> None:
-    """A running diagnosis."""
-    with database.writing() as connection:
-        row = NewDiagnosis(
-            clutch_id="c1", diagnosis_id=diagnosis_id, created_at=AT, revision=0, last_run_key=0, life="",
-            as_of_cycles=None, code_version="0",
-        )  # fmt: skip
-        diagnoses.insert(connection, row)
-        job = NewJob(
-            job_id=diagnosis_id, kind=jobs.DIAGNOSIS, clutch_id="c1", asked_at=AT, asked_by="local", arguments={}
-        )
-        jobs.insert(connection, job)
+    return diagnosis_id
 
 
 @pytest.fixture
 def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, method in stand_in_engine.METHODS.items():
-        monkeypatch.setattr(Extension, name, method)
+    stand_in_engine.apply(monkeypatch.setattr)
 
 
 @pytest.fixture
@@ -133,11 +115,11 @@ def numerics(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
 
 @pytest.mark.usefixtures("stand_in")
 def test_nothing_is_computed_while_the_write_lock_is_held(database: Database, numerics: Callable[[], int]) -> None:
-    diagnosed(database, "d1")
+    diagnosis_id = diagnosed(database)
     errands: list[Callable[[], Any]] = [
-        *(lambda cycles=cycles: post(database, cycles) for cycles in (*CYCLES, 4000.0, 5000.0)),
+        *(partial(post, database, 1000.0 * number) for number in range(6)),
         lambda: post(database, 500.0),  # late: everything again
-        lambda: adopt(database, "c1", "d1", adopted_at=AT),
+        lambda: adopt(database, "c1", diagnosis_id, adopted_at=AT),
         lambda: post(database, 6000.0),
         lambda: adopt(database, "c1", None, adopted_at=AT),
         lambda: replay_clutch(database, "c1"),
@@ -157,19 +139,17 @@ def test_a_run_that_comes_while_another_is_computed_counts_for_it(
     calls = overtaken(monkeypatch, ingest_run, "_computed", database, lambda other: post(other, 1000.0))
     post(database, 2000.0)
     assert len(calls) == 3  # its own twice, the other's once
-    monkeypatch.undo()
-    calm = open_database(f"sqlite:///{tmp_path / 'b.db'}")
-    edit_clutch.register(calm, ClutchIn(clutch_id="c1"), created_at=AT)
-    for cycles in (0.0, 1000.0, 2000.0):
-        post(calm, cycles)
-    assert stored(database) == stored(calm)
+    with closing(open_database(f"sqlite:///{tmp_path / 'calm.db'}")) as calm:
+        edit_clutch.register(calm, ClutchIn(clutch_id="c1"), created_at=AT)
+        for cycles in (0.0, 1000.0, 2000.0):
+            post(calm, cycles)
+        assert stored(database) == stored(calm)
     with database.reading() as connection:
         assert clutches.revision(connection, "c1") == 3
-    calm.close()
 
 
 def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
-    database: Database, url: str, monkeypatch: pytest.MonkeyPatch
+    database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A run comes whenever the clutch is computed again: it is left as it was, the others are replayed all the same."""
     edit_clutch.register(database, ClutchIn(clutch_id="c2"), created_at=AT)
@@ -186,7 +166,7 @@ def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
 
     with monkeypatch.context() as busy:
         busy.setattr(stored_runs, "recomputed", recomputed_late)
-        replayed = CliRunner().invoke(app, ["replay", "--database", url])
+        replayed = CliRunner().invoke(app, ["replay", "--database", database.url])
     assert len(attempts) == MAX_ATTEMPTS
     assert replayed.exit_code == 1
     assert "runs arrived during each of 3 attempts" in replayed.stderr
@@ -199,16 +179,16 @@ def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
 def test_a_diagnosis_that_is_no_longer_the_claimer_s_is_not_adopted(database: Database, meanwhile: str) -> None:
     """It was cancelled, or a service that was taken for dead comes to its end after all; nothing of it comes into force."""
     post(database, 0.0)
-    begun(database, "d1")
+    diagnosis_id = asked_for(database)
     before = stored(database)
     with database.writing() as connection:
         assert jobs.claim(connection, "one", [jobs.DIAGNOSIS], lease=-1.0, at=AT) is not None
         if meanwhile == "cancelled":
-            assert jobs.end(connection, "d1", jobs.CANCELLED, AT)
+            assert jobs.end(connection, diagnosis_id, jobs.CANCELLED, AT)
         else:
             assert jobs.claim(connection, "two", [jobs.DIAGNOSIS], lease=60.0, at=AT) is not None
     ended = {"report": REPORT, "extension": EXTENSION}
-    assert not finish_and_adopt(database, "c1", "d1", ended, at=AT, claimer="one")
+    assert not finish_and_adopt(database, "c1", diagnosis_id, ended, at=AT, claimer="one")
     with database.reading() as connection:
         assert assumptions.current_adoption(connection, "c1") is None
         assert clutches.revision(connection, "c1") == 1
@@ -223,13 +203,13 @@ def test_an_adoption_that_is_asked_for_twice_at_once_makes_one_version(
 
     def computed_late(*arguments: Any) -> Any:
         monkeypatch.setattr(adopt_model, "_computed", computed)
-        adopt(database, "c1", "d1", adopted_at=AT)
+        adopt(database, "c1", diagnosis_id, adopted_at=AT)
         return computed(*arguments)
 
     post(database, 0.0)
-    diagnosed(database, "d1")
+    diagnosis_id = diagnosed(database)
     monkeypatch.setattr(adopt_model, "_computed", computed_late)
-    adopt(database, "c1", "d1", adopted_at=AT)
+    adopt(database, "c1", diagnosis_id, adopted_at=AT)
     with database.reading() as connection:
         row = assumptions.current_adoption(connection, "c1")
         assert row is not None
@@ -260,32 +240,21 @@ def oil_change() -> IncomingRun:
 
 
 def test_the_same_run_of_two_threads_is_stored_once(database: Database) -> None:
-    answers: list[bool] = []
-
-    def send() -> None:
-        answers.append(ingest(database, "c1", oil_change(), received_at=AT)[1])
-
-    senders = [threading.Thread(target=send) for _ in range(4)]
-    for thread in senders:
-        thread.start()
-    for thread in senders:
-        thread.join(120)
-    assert sorted(answers) == [False, False, False, True]
+    with ThreadPoolExecutor(4) as pool:
+        sent = pool.map(lambda _: ingest(database, "c1", oil_change(), received_at=AT), range(4))
+    assert sorted(new for _, new in sent) == [False, False, False, True]
 
 
 def test_a_run_that_another_process_stores_after_it_was_not_found_is_a_repeat(
     database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is looked for twice, before and after its curves are fitted; it comes when it has just not been found again."""
-    new_to_other: list[bool] = []
 
     def store(other: Database) -> None:
-        new_to_other.append(ingest(other, "c1", oil_change(), received_at=AT)[1])
+        assert ingest(other, "c1", oil_change(), received_at=AT)[1], "it is not new to the other"
 
     calls = overtaken(monkeypatch, runs, "get", database, store, at=2)
     receipt, new = ingest(database, "c1", oil_change(), received_at=AT)
-    assert receipt["duplicate"]
-    assert not new
-    assert (calls[:2], new_to_other) == ([None, None], [True])
+    assert (receipt["duplicate"], new, calls[:2]) == (True, False, [None, None])
     with database.reading() as connection:
         assert clutches.revision(connection, "c1") == 1

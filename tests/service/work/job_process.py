@@ -1,4 +1,4 @@
-"""A job's process that fails, or ends well; `python -m tests.service.work.failing`."""
+"""A job's process that ends in the way that its task says; `python -m tests.service.work.job_process`."""
 
 import json
 import os
@@ -9,7 +9,10 @@ from service.work import process
 
 if __name__ == "__main__":
     how = json.loads(sys.argv[1])["how"]
-    if how == "dies":
+    if how == "sleeps":
+        process.say({"step": how})
+        sys.stdin.buffer.read()  # until the service ends
+    elif how == "dies":
         os.kill(os.getpid(), signal.SIGKILL)
     elif how == "raises":
         raise RuntimeError(how)
