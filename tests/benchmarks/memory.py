@@ -25,11 +25,7 @@ def family(pid: int) -> list[int]:
 
 def held(pid: int) -> int:
     """Bytes of a process and its children: what they share with each other is counted once (`Pss` of /proc)."""
-    total = 0
-    for number in family(pid):
-        with suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
-            total += held_alone(number)
-    return total
+    return int(_total(pid, held_alone))
 
 
 def resident(pid: int) -> int:
@@ -54,10 +50,14 @@ def processor_seconds(pid: int) -> float:
 
 def family_seconds(pid: int) -> float:
     """Time of the processor that a process and all that it has started have taken, the ended that it waited for too."""
+    return _total(pid, processor_seconds)
+
+
+def _total(pid: int, of: Callable[[int], float]) -> float:
     total = 0.0
     for number in family(pid):
         with suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
-            total += processor_seconds(number)
+            total += of(number)
     return total
 
 

@@ -18,7 +18,6 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from service import errors
 from service.cli import main as command_line
-from service.cli import options
 from service.settings import PREFIX, Settings
 from service.web.metrics import Metrics
 from storage.engine.opening import open_database
@@ -88,14 +87,10 @@ def table(titles: str, rows: Iterable[Sequence[str]]) -> str:
 
 
 def settings() -> str:
-    fields_of_settings = (
-        (name, field, str(field.default).lower() if isinstance(field.default, bool | None) else str(field.default))
-        for name, field in Settings.model_fields.items()
-    )
-    rows = [
-        [f"`{PREFIX}{name.upper()}`", f"`{default or 'none'}`", field.description or ""]
-        for name, field, default in fields_of_settings
-    ]
+    rows = []
+    for name, field in Settings.model_fields.items():
+        shown = str(field.default).lower() if isinstance(field.default, bool | None) else str(field.default)
+        rows.append([f"`{PREFIX}{name.upper()}`", f"`{shown or 'none'}`", field.description or ""])
     parts = [
         "## The service",
         "A wrong value ends the start with a line that names it. A misspelt name causes a warning.",
@@ -111,10 +106,8 @@ def _command_variables() -> dict[str, str]:
     found: dict[str, str] = {}
     for _, command in walk():
         for option in command.params:
-            for name in [option.envvar] if isinstance(option.envvar, str) else option.envvar or []:
-                found.setdefault(name, getattr(option, "help", None) or option.name or "")
-    for name in re.findall(rf'"({PREFIX}\w+)"', Path(options.__file__).read_text(encoding="utf-8")):
-        found.setdefault(name, "read by the commands")
+            if option.envvar:
+                found.setdefault(option.envvar, option.help)
     return {
         name: text for name, text in found.items() if name.removeprefix(PREFIX).lower() not in Settings.model_fields
     }
@@ -155,7 +148,7 @@ def _meaning(option: click.Parameter) -> str:
 
 
 def _names(option: click.Parameter) -> list[str]:
-    if isinstance(option, click.Argument) or option.param_type_name == "argument":
+    if option.param_type_name == "argument":
         return [(option.name or "").upper()]
     return [*option.opts, *option.secondary_opts]
 
@@ -205,7 +198,7 @@ def kind(schema: Json) -> str:
     if "$ref" in schema:
         name = schema["$ref"].rpartition("/")[2]
         return f"[{name}](fields.md#{name.lower()})"
-    for joint in ("anyOf", "oneOf", "allOf"):
+    for joint in ("anyOf", "oneOf"):
         if joint in schema:
             return " or ".join(dict.fromkeys(kind(each) for each in schema[joint]))
     if "enum" in schema:
@@ -214,10 +207,8 @@ def kind(schema: Json) -> str:
         return f"`{schema['const']}`"
     if schema.get("type") == "array":
         return f"list of {kind(schema.get('items', {}))}"
-    if schema.get("type") == "object" and isinstance(schema.get("additionalProperties"), Mapping):
+    if isinstance(schema.get("additionalProperties"), Mapping):
         return f"object of {kind(schema['additionalProperties'])}"
-    if schema.get("title") == "Problem":
-        return "[Problem](fields.md#problem)"
     return str(schema.get("type", "any"))
 
 
@@ -231,9 +222,7 @@ def fields(description: Json) -> str:
             for field, each in schema.get("properties", {}).items()
         ]
         parts.append(table("field | type | meaning", rows) if rows else f"One of {kind(schema)}.")
-    return page(
-        "Fields", "What goes over the wire. A unit is in the name of its field.", [part for part in parts if part]
-    )
+    return page("Fields", "What goes over the wire. A unit is in the name of its field.", parts)
 
 
 def _text(docstring: str) -> str:
@@ -329,8 +318,6 @@ def _said(node: ast.expr | None, assigned: Sequence[ast.Assign | ast.Return], li
             return "".join(str(part.value) if isinstance(part, ast.Constant) else "…" for part in values)
         case ast.BinOp(left=left, right=right):
             return _said(left, assigned, line) + _said(right, assigned, line)
-        case ast.IfExp(body=body):
-            return _said(body, assigned, line)
         case ast.Name(id=name):
             before = [each for each in assigned if each.lineno < line and name in _targets(each)]
             return _said(max(before, key=lambda each: each.lineno).value, [], line) if before else "…"

@@ -44,16 +44,7 @@ def wrong_gain(rng: np.random.Generator, run: Body) -> Body | None:
     return _scaled("torque_nm", factor)(rng, run)
 
 
-def _scaled(channel: str, factor: float, offset: float = 0.0) -> Slip:
-    def slip(_: np.random.Generator, run: Body) -> Body | None:
-        if channel not in run.get("channels", {}):
-            return None
-        return with_values(run, channel, np.array(run["channels"][channel]) * factor + offset)
-
-    return slip
-
-
-def _dead(channel: str, reading: Callable[[np.random.Generator, np.ndarray], np.ndarray]) -> Slip:
+def _changed(channel: str, reading: Callable[[np.random.Generator, np.ndarray], np.ndarray]) -> Slip:
     def slip(rng: np.random.Generator, run: Body) -> Body | None:
         if channel not in run.get("channels", {}):
             return None
@@ -63,6 +54,10 @@ def _dead(channel: str, reading: Callable[[np.random.Generator, np.ndarray], np.
         return with_values(run, channel, values)
 
     return slip
+
+
+def _scaled(channel: str, factor: float, offset: float = 0.0) -> Slip:
+    return _changed(channel, lambda _, values: values * factor + offset)
 
 
 def _about(level: float, noise: float) -> Callable[[np.random.Generator, np.ndarray], np.ndarray]:
@@ -87,18 +82,18 @@ UNITS: dict[str, Slip] = {
     "temperature in °F": _scaled("oil_temperature_c", 1.8, 32.0),
 }
 UNPLUGGED: dict[str, Slip] = {
-    "torque zero": _dead("torque_nm", lambda _, values: 0.0 * values),
-    "torque about zero": _dead("torque_nm", _about(0.02, 0.05)),
-    "torque railed": _dead("torque_nm", _about(200.0, 0.02)),
-    "torque frozen": _dead("torque_nm", _frozen),
-    "pressure about zero": _dead("pressure_bar", _about(0.0, 0.004)),
-    "pressure railed": _dead("pressure_bar", _about(10.0, 0.002)),
-    "pressure frozen": _dead("pressure_bar", _frozen),
-    "speed about zero": _dead("speed_rpm", _about(0.0, 0.3)),
-    "speed frozen": _dead("speed_rpm", _frozen),
-    "temperature zero": _dead("oil_temperature_c", lambda _, values: 0.0 * values),
-    "temperature at -273": _dead("oil_temperature_c", lambda _, values: 0.0 * values - 273.0),
-    "temperature railed": _dead("oil_temperature_c", _about(850.0, 0.1)),
+    "torque zero": _changed("torque_nm", lambda _, values: 0.0 * values),
+    "torque about zero": _changed("torque_nm", _about(0.02, 0.05)),
+    "torque railed": _changed("torque_nm", _about(200.0, 0.02)),
+    "torque frozen": _changed("torque_nm", _frozen),
+    "pressure about zero": _changed("pressure_bar", _about(0.0, 0.004)),
+    "pressure railed": _changed("pressure_bar", _about(10.0, 0.002)),
+    "pressure frozen": _changed("pressure_bar", _frozen),
+    "speed about zero": _changed("speed_rpm", _about(0.0, 0.3)),
+    "speed frozen": _changed("speed_rpm", _frozen),
+    "temperature zero": _changed("oil_temperature_c", lambda _, values: 0.0 * values),
+    "temperature at -273": _changed("oil_temperature_c", lambda _, values: 0.0 * values - 273.0),
+    "temperature railed": _changed("oil_temperature_c", _about(850.0, 0.1)),
 }
 CYCLES: dict[str, Slip] = {"cycles x 10": zero_too_many, "swapped digits": swapped_digits}
 #: Slips that nobody demanded.

@@ -82,16 +82,13 @@ def _after_tests(made: Campaign, count: int) -> int:
 
 
 def _slip_of(rng: np.random.Generator, group: str, made: Campaign, draw: Draw) -> tuple[str, slips.Slip]:
-    kinds = {"wrong unit": slips.UNITS, "sensor unplugged": slips.UNPLUGGED}.get(group, slips.CYCLES | slips.OTHERS)
-    if group in kinds:
-        return group, kinds[group]
-    swaps = slips.CLUTCHES if group == "wrong clutch" else slips.ALIKE if group in slips.ALIKE else {}
-    if swaps:
-        name = group if group in swaps else str(rng.choice(list(swaps)))
-        swap, other = swaps[name], draw(rng)
-        return name, lambda rng, run: swap(rng, run, made, other)
-    name = str(rng.choice(list(kinds)))
-    return name, kinds[name]
+    groups = {"wrong unit": slips.UNITS, "sensor unplugged": slips.UNPLUGGED, "wrong clutch": slips.CLUTCHES}
+    name = str(rng.choice(list(groups[group]))) if group in groups else group
+    swaps = slips.CLUTCHES | slips.ALIKE
+    if name in swaps:
+        other = draw(rng)
+        return name, lambda rng, run: swaps[name](rng, run, made, other)
+    return name, (slips.CYCLES | slips.UNITS | slips.UNPLUGGED | slips.OTHERS)[name]
 
 
 def _sent(made: Campaign, k: int, wrong: Body, source: str, name: str, *, ablated: bool) -> Outcome:

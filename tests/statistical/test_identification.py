@@ -24,11 +24,6 @@ GIVEN_AWAY = 3e-8
 CURVES, COVERAGE, WITHIN = 1000, 0.90, 0.03
 
 
-@pytest.fixture(autouse=True)
-def _print_seed() -> None:
-    print(f"seed {SEED}")
-
-
 def _residuals(x: FloatArray, speed: FloatArray, torque: FloatArray) -> FloatArray:
     return eq3(x, speed) - torque
 

@@ -26,11 +26,6 @@ FINE = np.linspace(-10.0, 15.1, 25_101)
 PERIOD = slice(15_000, 25_001)
 
 
-@pytest.fixture(autouse=True)
-def _print_seed() -> None:
-    print(f"seed {SEED}")
-
-
 def _dirty(torque: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """15 s at 100 Hz: 1 % noise of torque, 0.1 % of speed, 1 % of samples lost, jitter, a spike; velocity in m/s."""
     time = np.sort((np.arange(1500) + 0.3 * rng.uniform(-0.5, 0.5, 1500)) / 100)

@@ -20,11 +20,6 @@ CHI_SQUARED = (0.86, 1.24)
 RECORDS = 8
 
 
-@pytest.fixture(autouse=True)
-def _print_seed() -> None:
-    print(f"seed {SEED}")
-
-
 def _misses(record: Record, made: Made) -> FloatArray:
     cut = cut_plateaus(record)
     of = np.searchsorted(made.start, 0.5 * (cut.start + cut.stop)) - 1
