@@ -11,7 +11,7 @@ from service.alarms import outbox
 from service.schemas.alarm import AlarmIn
 from service.workflows import change_alarms
 from tests.service.alarms.receiving import SECRET, Receiver, once, receiving, signed_rightly
-from tests.service.clients import client_of
+from tests.service.clients import client_of, post_run
 from tests.support import stationary
 
 CYCLES = (0.0, 1000.0, 2000.0, 3000.0)
@@ -51,8 +51,7 @@ def test_a_posted_run_raises_an_alarm_once(life: TestClient) -> None:
     rule(life, quantity="remaining_cycles", probability=0.05, below=limit)
     assert events(life) == []
     for cycles in (3500, 4000):
-        duty = {"kind": "duty_cycles", "cycles": cycles, "duty": {"cycles": 500}}
-        assert life.post("/v1/clutches/e/runs", json=duty).status_code == 201
+        post_run(life, {"kind": "duty_cycles", "cycles": cycles, "duty": {"cycles": 500}}, "e")
     (raised,) = events(life)
     assert raised["state"] == "raised"
     assert raised["value"] < limit == raised["limit"]

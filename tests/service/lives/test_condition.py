@@ -29,6 +29,7 @@ from service.lives.history import Event
 from service.lives.payloads import filters_disagree
 from service.queries import clutch_list, degradation, series
 from service.queries.remaining_life import remaining_life
+from tests.service.clients import post_run
 from tests.service.workflows.benches import CLUTCH, Bench, body, stood_in
 from tests.support import one_quick, stationary
 
@@ -335,8 +336,8 @@ def test_a_median_outside_the_interval_of_another_filter_warns(other: tuple[floa
 def test_a_clutch_says_its_last_run_and_its_mean_cof(client: TestClient) -> None:
     assert client.get("/v1/clutches/c1").json()["recent"] is None
     for cycles, day in ((0, 1), (2000, 3), (1000, 2)):
-        body = stationary(cycles, run_id=f"s{cycles}") | {"started_at": f"2026-11-0{day}T08:00:00+01:00"}
-        assert client.post("/v1/clutches/c1/runs", json=body).status_code == 201
+        started = {"started_at": f"2026-11-0{day}T08:00:00+01:00"}
+        post_run(client, stationary(cycles, run_id=f"s{cycles}") | started)
     one = client.get("/v1/clutches/c1").json()
     assert one == client.get("/v1/clutches").json()["items"][0]
     last = {"run_id": "s2000", "kind": "stationary_stribeck", "cycles": 2000, "at": "2026-11-03T07:00:00+00:00"}

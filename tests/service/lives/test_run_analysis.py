@@ -34,10 +34,9 @@ def posted(client: TestClient, torque: FloatArray, seed: int) -> tuple[dict[str,
     body = stationary(pressures=(5.0,), run_id="t")
     noise = np.random.default_rng(seed).standard_normal(torque.size)
     body["channels"]["torque_nm"] = (torque * (1 + 0.01 * noise)).tolist()
-    answer = client.post("/v1/clutches/c1/runs", json=body)
-    assert answer.status_code == 201
-    (fit,) = client.get("/v1/clutches/c1/runs/t").json()["fits"]
-    return fit, [each["code"] for each in answer.json()["warnings"]]
+    receipt = post_run(client, body)
+    (fit,) = receipt["fits"]
+    return fit, [each["code"] for each in receipt["warnings"]]
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -82,12 +81,12 @@ def swing(*, late: bool, spiked: bool = False) -> dict[str, Any]:
 
 def area(client: TestClient, clutch: str) -> float:
     (loop,) = client.get(f"/v1/clutches/{clutch}/runs/loops").json()["loops"]
-    return float(loop["loop_area_nm_m_s"])
+    return loop["loop_area_nm_m_s"]
 
 
 def area_of(client: TestClient, clutch: str, *, late: bool, spiked: bool = False, **fields: Any) -> float:
     assert client.post("/v1/clutches", json={"clutch_id": clutch} | fields).status_code == 201
-    assert client.post(f"/v1/clutches/{clutch}/runs", json=swing(late=late, spiked=spiked)).status_code == 201
+    post_run(client, swing(late=late, spiked=spiked), clutch)
     return area(client, clutch)
 
 

@@ -5,6 +5,7 @@ import math
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.service.clients import post_run
 from tests.service.workflows.test_learn_fleet import SPEEDS
 from tests.support import stationary, torque_nm
 
@@ -20,8 +21,7 @@ def mean_torque(wear: float) -> float:
 
 def post_life(client: TestClient, last: int = 22_000) -> None:
     for cycles in range(0, last + 1, 1000):
-        body = stationary(cycles, speeds=SPEEDS, pressures=(5.0,), run_id=f"t{cycles}", noise=0.004)
-        assert client.post(f"{BASE}/runs", json=body).status_code == 201
+        post_run(client, stationary(cycles, speeds=SPEEDS, pressures=(5.0,), noise=0.004))
 
 
 def test_a_life_that_has_not_ended_has_no_scores(client: TestClient) -> None:
