@@ -31,7 +31,7 @@ from service.lives.tracks import CARRIED, METHODS, advance, drawn, end_of_life, 
 from tests.models.prognosis.test_course_shares import accelerating
 from tests.models.tracking.tracked_series import CAMPAIGN
 from tests.plausibility.bench import Bench
-from tests.score.measured_lives import PLACE, measured_life
+from tests.score.paper import PLACE, measured_life
 from tests.service.clients import client_on, post_run
 from tests.support import stationary
 
