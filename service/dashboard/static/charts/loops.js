@@ -9,7 +9,8 @@ import { pressureRampOf, rampOf } from "./palette.js";
 import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
 import { titled } from "./traces.js";
 
-/** @import { Channels, ClutchOut, LoopItem, StribeckItem } from "../shared/types.js" */
+/** @import { ClutchOut, LoopItem, StribeckItem } from "../shared/types.js" */
+/** @import { Answers } from "./stribeck.js" */
 /** @import { CurvePoint } from "./stribeck_law.js" */
 /** @import { PlainTrace, Spec } from "./types.js" */
 
@@ -62,14 +63,8 @@ function lagNote(loops, label) {
 /**
  * Torque over speed of some loops, and behind each the stationary curve; `over` says whether the colour is the state or the
  * pressure.
- * @param {object} choices
- * @param {LoopItem[]} choices.loops
- * @param {StribeckItem[]} choices.tests
- * @param {ClutchOut} choices.clutch
- * @param {Record<string, Channels>} choices.channels by run
- * @param {"state" | "pressure"} choices.over
- * @param {number} choices.pressure where the colour is the state
- * @param {string | undefined} choices.run where the colour is the pressure
+ * @param {Answers & { loops: LoopItem[], over: "state" | "pressure", run: string | undefined }} choices `pressure` where the
+ *   colour is the state, `run` where it is the pressure
  * @returns {Spec}
  */
 export function loopCurves({ loops, tests, clutch, channels, over, pressure, run }) {

@@ -13,13 +13,7 @@ import { titled } from "./traces.js";
 /** @import { CurvePoint } from "./stribeck_law.js" */
 /** @import { Cell, Colours, PlainTrace, Spec, Trace } from "./types.js" */
 
-/**
- * @typedef {object} Answers
- * @property {StribeckItem[]} tests
- * @property {Record<string, Channels>} channels by run; of the tests that are drawn
- * @property {ClutchOut} clutch
- * @property {number | undefined} pressure bar
- */
+/** @typedef {{ tests: StribeckItem[], channels: Record<string, Channels>, clutch: ClutchOut, pressure?: number }} Answers channels by run */
 /** @typedef {{ cycles: number, pressure: number, measured: CurvePoint[], fitted: CurvePoint[] }} Drawn */
 
 const columnsOf = () => [KIND, CYCLES, column("pressure, bar", 2), column("speed, rpm"), torqueColumn()];

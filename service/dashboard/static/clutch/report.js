@@ -17,15 +17,10 @@ const LAST_EVENTS = 6;
 const COLUMNS = ["Cycles", "Test", "Mean COF, mean of pressures", "Fits acceptable"];
 
 /**
- * @typedef {object} Answers what is known of the clutch; before its overview was read, itself alone
- * @property {ClutchOut} clutch
- * @property {RemainingLife} [life]
- * @property {StribeckItem[]} [tests]
- * @property {Receipt[]} [events]
- * @property {Chart[]} [charts]
+ * What is known of the clutch; before its overview was read, itself alone.
+ * @param {HTMLElement} place
+ * @param {{ clutch: ClutchOut, life?: RemainingLife, tests?: StribeckItem[], events?: Receipt[], charts?: Chart[] }} answers
  */
-
-/** @type {(place: HTMLElement, answers: Answers) => void} */
 export function makeReport(place, { clutch, life, tests = [], events = [], charts = [] }) {
   const drawings = charts.map((chart) => chart.light({ width: 760, height: 255, scheme: "light" }));
   const { state, headline, action } = clutch;

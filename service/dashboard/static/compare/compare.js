@@ -21,13 +21,7 @@ import { named, placeUnits, pressureText, units } from "../shared/units.js";
 /** @import { Colours, PlainTrace, Spec } from "../charts/types.js" */
 /** @import { ClutchOut, Degradation, DegradationItem, StribeckItem } from "../shared/types.js" */
 
-/**
- * @typedef {object} Life a life of a clutch, as it is compared
- * @property {string} label
- * @property {ClutchOut} clutch
- * @property {Degradation} answer
- * @property {StribeckItem[]} tests of this life
- */
+/** @typedef {Awaited<ReturnType<typeof lifeOf>>} Life a life of a clutch, as it is compared, with its own tests */
 
 /** Quantities that every stationary test gives, and how many states of a life are drawn. */
 const CHOICES = ["mean_cof", ...PARAMETER_NAMES];
@@ -57,7 +51,10 @@ function go(change) {
   live.now();
 }
 
-/** @type {(entry: string, quantity: string) => Promise<Life>} */
+/**
+ * @param {string} entry
+ * @param {string} quantity
+ */
 async function lifeOf(entry, quantity) {
   const [, id, life] = /^(.*?)(?::(\d+))?$/.exec(entry) ?? ["", entry, undefined];
   const path = clutchPath(id);

@@ -17,10 +17,8 @@ const NO_SLOPES = "The slope needs a stationary test whose curves determine all 
 
 /**
  * The slopes at one pressure, a colour a speed.
- * @param {object} answers
- * @param {DegradationItem[]} answers.items the slopes at that pressure
- * @param {CriterionOutcome[] | null} answers.limits when slopes there reach their limit; null while it is computed
- * @param {Receipt[]} answers.events
+ * @param {{ items: DegradationItem[], limits: CriterionOutcome[] | null, events: Receipt[] }} answers `limits`: when slopes
+ *   there reach their limit; null while it is computed
  * @returns {Spec}
  */
 export function shudderMargin({ items, limits, events }) {

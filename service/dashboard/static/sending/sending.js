@@ -12,11 +12,7 @@ import { registeredLike, similarRegistered } from "./similar_names.js";
 
 /** @import { Batch } from "./batch.js" */
 
-/**
- * @typedef {object} Page
- * @property {string} [clutch] the clutch that the page shows; without one the reader names it
- * @property {() => unknown} sent hears of stored runs
- */
+/** @typedef {{ clutch?: string, sent: () => unknown }} Page without a clutch the reader names it; `sent`: hears of stored runs */
 
 /** @type {(button: HTMLElement, page: Page) => void} make a button and the whole page take files */
 export function sender(button, page) {

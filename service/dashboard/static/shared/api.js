@@ -7,25 +7,28 @@ import { at, own } from "./address.js";
 
 /** @import { ListPage, ProblemError, RunOut } from "./types.js" */
 
-const KEY = "clutchlife-key";
-
-export const key = {
+/**
+ * What the browser keeps under a name; one that keeps nothing forgets it.
+ * @type {(storage: () => Storage, name: string) => { get: () => string | null, set: (text: string) => void }}
+ */
+export const kept = (storage, name) => ({
   get: () => {
     try {
-      return sessionStorage.getItem(KEY);
+      return storage().getItem(name);
     } catch {
       return null;
     }
   },
-  /** @param {string} text */
   set: (text) => {
     try {
-      sessionStorage.setItem(KEY, text);
+      storage().setItem(name, text);
     } catch {
-      /* the key holds for this request only */
+      /* it holds for this page only */
     }
   },
-};
+});
+
+export const key = kept(() => sessionStorage, "clutchlife-key");
 
 /** An answer that is no success; `status` 0 means that there was no answer at all. */
 export class Problem extends Error {

@@ -1,6 +1,7 @@
 // @ts-check
 // Units that the reader chooses, kept by the browser: friction as torque or as coefficient, SI or US. Files name the unit that they hold.
 
+import { kept } from "./api.js";
 import { menu } from "./dom.js";
 import { fixed } from "./format.js";
 
@@ -8,7 +9,7 @@ import { fixed } from "./format.js";
 
 /** @typedef {{ name: string, unit: string, decimals: number, of: (value: number, bar?: number, clutch?: Pick<ClutchOut, "geometry">) => number }} Unit */
 
-const KEY = "clutchlife-units";
+const CHOICE = kept(() => localStorage, "clutchlife-units");
 const PSI_PER_BAR = 14.5038;
 const LBF_FT_PER_NM = 0.737562;
 const FT_PER_M = 3.28084;
@@ -16,9 +17,9 @@ const FT_PER_M = 3.28084;
 /** @returns {{ system: "si" | "us", friction: "torque" | "cof" }} */
 function chosen() {
   try {
-    return { system: "si", friction: "torque", ...JSON.parse(localStorage.getItem(KEY) ?? "{}") };
+    return { system: "si", friction: "torque", ...JSON.parse(CHOICE.get() ?? "{}") };
   } catch {
-    return { system: "si", friction: "torque" }; // a browser that stores nothing
+    return { system: "si", friction: "torque" }; // not as this page wrote it
   }
 }
 
@@ -80,11 +81,7 @@ function unitsMenu() {
     label,
     checked: Object.entries(part).every(([name, value]) => now[/** @type {keyof typeof now} */ (name)] === value),
     onclick: () => {
-      try {
-        localStorage.setItem(KEY, JSON.stringify({ ...now, ...part }));
-      } catch {
-        /* a browser that stores nothing keeps the usual units */
-      }
+      CHOICE.set(JSON.stringify({ ...now, ...part }));
       document.dispatchEvent(new Event("unitschange"));
     },
   });
