@@ -3,7 +3,7 @@
 
 import { cycles, estimate, fixed, interval, probability } from "../shared/format.js";
 import { column, CYCLES, KIND, measuredAndLaw } from "./columns.js";
-import { eventMarks } from "./layout.js";
+import { eventMarks, vertical } from "./layout.js";
 import { faint } from "./palette.js";
 import { band, lineOf, measuredPoints, titled } from "./traces.js";
 
@@ -109,9 +109,7 @@ function safeBound({ at_least: left, as_of_cycles: now, status }, last, c) {
   const font = { color: c.normal, size: 12 };
   const text = `safe until ${cycles(x, 0, 1000)} (95 %)`;
   return {
-    shapes: [
-      { type: "line", x0: x, x1: x, y0: 0, y1: 1, yref: "paper", line: { color: c.normal, width: 2, dash: "dot" } },
-    ],
+    shapes: [vertical(x, { color: c.normal, width: 2, dash: "dot" })],
     annotations: [{ x, y: 1, yref: "paper", yanchor: "top", xanchor: "right", text, showarrow: false, font }],
   };
 }

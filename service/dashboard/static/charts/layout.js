@@ -2,7 +2,7 @@
 // How every chart looks: axes, margins, type, what the plotting library may do.
 
 /** @import { Receipt } from "../shared/types.js" */
-/** @import { Annotation, Axis, Colours, Layout, Shape, WholeLayout } from "./types.js" */
+/** @import { Annotation, Axis, Colours, Layout, Line, Shape, WholeLayout } from "./types.js" */
 
 const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif';
 const COARSE = matchMedia("(pointer: coarse)");
@@ -151,18 +151,13 @@ export const config = (spatial) => ({
 const nameOf = (event, note) =>
   event === "other" && note ? note.replaceAll("<", "‹").replaceAll(">", "›").slice(0, 40) : event.replaceAll("_", " ");
 
+/** @type {(x: number, line: Required<Line>) => Shape} a line over the whole height */
+export const vertical = (x, line) => ({ type: "line", x0: x, x1: x, y0: 0, y1: 1, yref: "paper", line });
+
 /** @type {(events: Receipt[], c: Colours) => { shapes: Shape[], annotations: Annotation[] }} lines with names */
 export function eventMarks(events, c) {
   return {
-    shapes: events.map(({ cycles }) => ({
-      type: "line",
-      x0: cycles,
-      x1: cycles,
-      y0: 0,
-      y1: 1,
-      yref: "paper",
-      line: { color: c.maintenance, width: 1.5, dash: "dot" },
-    })),
+    shapes: events.map(({ cycles }) => vertical(cycles, { color: c.maintenance, width: 1.5, dash: "dot" })),
     annotations: events.map(({ cycles, event, note }) => ({
       x: cycles,
       y: 1,

@@ -5,7 +5,7 @@ import { estimate } from "../shared/format.js";
 import { CYCLES, intervalColumns, KIND, measuredAndLaw, PRESSURE } from "./columns.js";
 import { eventMarks } from "./layout.js";
 import { scaleOf } from "./palette.js";
-import { measuredPoints, titled, tracked } from "./traces.js";
+import { measuredPoints, spatialPoints, surfaceOf, titled, tracked } from "./traces.js";
 
 /** @import { DegradationItem, Receipt, Trajectory } from "../shared/types.js" */
 /** @import { Range, Spec } from "./types.js" */
@@ -102,33 +102,23 @@ export function landscape({ items, name }) {
     .filter(({ value }) => value >= low && value <= high);
   // every pressure's law on the same cycles, those of the longest
   const laws = own.map(({ item }) => item.trajectory);
-  const end = (/** @type {Trajectory} */ law) => law.cycles.at(-1) ?? 0;
+  const end = (/** @type {Trajectory} */ each) => each.cycles.at(-1) ?? 0;
   const longest = laws.reduce((a, b) => (end(b) > end(a) ? b : a)).cycles;
+  const pressures = own.map(({ pressure }) => pressure);
+  const law = { x: longest, y: pressures, z: laws.map((each) => longest.map((at) => medianAt(each, at))) };
+  const identified = {
+    x: points.map(({ at }) => at),
+    y: points.map(({ pressure }) => pressure),
+    z: points.map(({ value }) => value),
+  };
   return {
     note: `${PARAMETERS[name].title} at every pressure. Points: identified from one test each. Surface: tracked over life. Drag to turn.`,
     columns: COLUMNS,
     rows: own.flatMap(({ item }) => rowsOf(item)),
     figure: (c) => ({
       data: [
-        {
-          type: "surface",
-          x: longest,
-          y: own.map(({ pressure }) => pressure),
-          z: laws.map((law) => longest.map((at) => medianAt(law, at))),
-          colorscale: scaleOf(c),
-          opacity: 0.86,
-          showscale: false,
-          hovertemplate: "%{x:,.0f} cycles, %{y} bar<br>tracked: %{z:.4g}<extra></extra>",
-        },
-        {
-          type: "scatter3d",
-          mode: "markers",
-          x: points.map(({ at }) => at),
-          y: points.map(({ pressure }) => pressure),
-          z: points.map(({ value }) => value),
-          marker: { size: 2.6, color: c.ink },
-          hovertemplate: "%{x:,.0f} cycles, %{y} bar<br>%{z:.4g}<extra></extra>",
-        },
+        surfaceOf(law, scaleOf(c), "%{x:,.0f} cycles, %{y} bar<br>tracked: %{z:.4g}"),
+        spatialPoints(identified, 2.6, c.ink, "%{x:,.0f} cycles, %{y} bar<br>%{z:.4g}"),
       ],
       layout: {
         showlegend: false,

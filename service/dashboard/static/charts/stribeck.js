@@ -7,7 +7,7 @@ import { named, pressureText, units } from "../shared/units.js";
 import { column, CYCLES, distinct, KIND, torqueColumn } from "./columns.js";
 import { faint, pressureRampOf, rampOf, scaleOf } from "./palette.js";
 import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
-import { titled } from "./traces.js";
+import { spatialPoints, surfaceOf, titled } from "./traces.js";
 
 /** @import { Channels, ClutchOut, StribeckItem } from "../shared/types.js" */
 /** @import { CurvePoint } from "./stribeck_law.js" */
@@ -169,45 +169,35 @@ const fewOf = (tests) => spread(spread(tests), 4);
 /** @type {(drawn: Drawn[], cycles: number, color: string) => Trace} points would hide one another */
 function stateSurface(drawn, cycles, color) {
   const own = drawn.filter((curve) => curve.cycles === cycles);
-  return {
-    type: "surface",
+  const at = {
     x: xyOf(own[0].fitted).x,
     y: own.map(({ pressure }) => pressure),
     z: own.map(({ fitted }) => xyOf(fitted).y),
-    colorscale: [
-      [0, color],
-      [1, color],
-    ],
-    opacity: 0.8,
-    showscale: false,
-    hovertemplate: `${fixed(cycles)} cycles<br>%{x:.0f} rpm, %{y} bar<br>fit %{z:.4~g} ${units().torque.unit}<extra></extra>`,
   };
+  const text = `${fixed(cycles)} cycles<br>%{x:.0f} rpm, %{y} bar<br>fit %{z:.4~g} ${units().torque.unit}`;
+  const colorscale = /** @type {[number, string][]} */ ([0, 1].map((share) => [share, color]));
+  return surfaceOf(at, colorscale, text, 0.8);
 }
 
 /** @type {(drawn: Drawn[], byPressure: boolean, c: Colours) => Trace[]} */
 function surfaceTraces(drawn, byPressure, c) {
   /** @param {Drawn} curve */
   const depth = (curve) => (byPressure ? curve.pressure : curve.cycles);
+  const fitted = {
+    x: xyOf(drawn[0].fitted).x,
+    y: drawn.map(depth),
+    z: drawn.map((curve) => xyOf(curve.fitted).y),
+  };
+  const measured = {
+    x: drawn.flatMap((curve) => xyOf(curve.measured).x),
+    y: drawn.flatMap((curve) => curve.measured.map(() => depth(curve))),
+    z: drawn.flatMap((curve) => xyOf(curve.measured).y),
+  };
   const scale = scaleOf(c);
+  const turned = /** @type {typeof scale} */ (scale.map(([at], index) => [at, scale[scale.length - 1 - index][1]]));
+  const { unit } = units().torque;
   return [
-    {
-      type: "surface",
-      x: xyOf(drawn[0].fitted).x,
-      y: drawn.map(depth),
-      z: drawn.map(({ fitted }) => xyOf(fitted).y),
-      colorscale: scale.map(([at], index) => [at, scale[scale.length - 1 - index][1]]),
-      opacity: 0.86,
-      showscale: false,
-      hovertemplate: `%{x:.0f} rpm, %{y}<br>fit %{z:.4~g} ${units().torque.unit}<extra></extra>`,
-    },
-    {
-      type: "scatter3d",
-      mode: "markers",
-      x: drawn.flatMap(({ measured }) => xyOf(measured).x),
-      y: drawn.flatMap((curve) => curve.measured.map(() => depth(curve))),
-      z: drawn.flatMap(({ measured }) => xyOf(measured).y),
-      marker: { size: 2.2, color: c.ink },
-      hovertemplate: `%{x:.0f} rpm<br>measured %{z:.4~g} ${units().torque.unit}<extra></extra>`,
-    },
+    surfaceOf(fitted, turned, `%{x:.0f} rpm, %{y}<br>fit %{z:.4~g} ${unit}`),
+    spatialPoints(measured, 2.2, c.ink, `%{x:.0f} rpm<br>measured %{z:.4~g} ${unit}`),
   ];
 }

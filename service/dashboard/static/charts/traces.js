@@ -6,9 +6,10 @@ import { distinct, HALF_OF_90 } from "./columns.js";
 import { faint, pressureRampOf } from "./palette.js";
 
 /** @import { Measured } from "../shared/types.js" */
-/** @import { Colours, ErrorBars, Line, PlainTrace } from "./types.js" */
+/** @import { Colours, ErrorBars, Line, PlainTrace, Trace } from "./types.js" */
 
-/** @typedef {{ x: (number | null)[], y: (number | null)[] }} Places */
+/** @typedef {(number | null)[]} Values */
+/** @typedef {{ x: Values, y: Values }} Places */
 
 /** @type {(text: string) => { title: { text: string } }} the title of an axis */
 export const titled = (text) => ({ title: { text } });
@@ -79,6 +80,27 @@ export const measuredPoints = (name, { cycles: x, value: y, sd }, { color, text,
   y,
   marker: { color, size },
   error_y: errorBars(sd, color, { thickness, width: 3 }),
+  hovertemplate: `${text}<extra></extra>`,
+});
+
+/** @typedef {{ x: Values, y: Values, z: Values | Values[] }} Spatial */
+
+/** @type {(at: Spatial, colorscale: [number, string][], text: string, opacity?: number) => Trace} a surface in 3D */
+export const surfaceOf = (at, colorscale, text, opacity = 0.86) => ({
+  type: "surface",
+  ...at,
+  colorscale,
+  opacity,
+  showscale: false,
+  hovertemplate: `${text}<extra></extra>`,
+});
+
+/** @type {(at: Spatial, size: number, color: string, text: string) => Trace} points in 3D */
+export const spatialPoints = (at, size, color, text) => ({
+  type: "scatter3d",
+  mode: "markers",
+  ...at,
+  marker: { size, color },
   hovertemplate: `${text}<extra></extra>`,
 });
 
