@@ -114,7 +114,6 @@ def test_a_life_of_light_and_heavy_blocks_is_predicted_better_by_energy() -> Non
             ends = mapped.cycles_at(np.minimum(ends_of_life(drawn, 0.5), 1e6))
             scores[name].append(crps_of_sample(ends, drawn.weight, end) / end)
             assert weighted_quantiles(ends, drawn.weight, (0.5,))[0] > at[-1] * 0.5
-    print({name: np.mean(column) for name, column in scores.items()})
     assert np.mean(scores["energy"]) < 0.75 * np.mean(scores["cycles"])
 
 

@@ -1,10 +1,11 @@
-"""Small simulated campaigns for the diagnosis, with something planted where a test asks for it.
+"""Campaigns for the tests of the diagnosis, and what was fitted to them.
 
-The clutch is the simulated rig's; loops follow the attractor law in time, from rest, so that neither the periodic solution
-nor the phase bins of the diagnosis are used to make what it is tested on.
+Small ones have something planted where a test asks for it. Their clutch is the simulated rig's; loops follow the
+attractor law in time, from rest, so that neither the periodic solution nor the phase bins of the diagnosis are used to
+make what it is tested on.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -30,6 +31,7 @@ from models.rig import campaign as rig
 from models.rig.hidden import clutch_for, hidden_in
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
+from models.rig.simulated_runs import SimulatedRun
 from models.rig.stationary import SHARP
 from models.rig.truth import SimulatedClutch, draw
 
@@ -164,8 +166,12 @@ def rehearsal(
     sensor = SHARP if noise is None else replace(SHARP, noise=noise)
     programme = Programme(dynamic=DynamicTest() if dynamic else None, engagements=True)
     runs = rig.simulate(seed, clutch=clutch, sensor=sensor, programme=programme, most_tests=tests)
+    return campaign_of(hidden_in(run, clutch, sizes) for run in runs)
+
+
+def campaign_of(runs: Iterable[SimulatedRun]) -> Campaign:
     stationary, moving, duty = [], [], []
-    for run in (hidden_in(run, clutch, sizes) for run in runs):
+    for run in runs:
         head = {"run_id": run.run_id, "cycles": float(run.cycles)}
         if run.plateaus is not None:
             stationary.append(StationaryRun(**head, plateaus=run.plateaus))

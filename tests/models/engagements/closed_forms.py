@@ -86,26 +86,22 @@ def ramp(cof: float = 0.12, stop: float = 2.0) -> Engagement:
 def exponential(cof: float = 0.12, tau: float = 0.2) -> Engagement:
     torque = cof * PER_PASCAL * PRESSURE
 
-    def lost(t: float) -> float:
-        return torque / INERTIA * (t - tau * (1 - math.exp(-t / tau)))
+    def risen(t: FloatArray | float) -> FloatArray:
+        return np.asarray(1 - np.exp(-np.asarray(t) / tau))
 
-    stop = float(brentq(lambda t: lost(t) - SPEED, 0.0, 20.0))
-    # P' = 0:  e^{-t/τ}/τ ω = (T/J) (1 - e^{-t/τ})²
-    peak = float(
-        brentq(
-            lambda t: math.exp(-t / tau) / tau * (SPEED - lost(t)) - torque / INERTIA * (1 - math.exp(-t / tau)) ** 2,
-            1e-9,
-            stop,
-        )
-    )
+    def speed(t: FloatArray | float) -> FloatArray:
+        return np.asarray(SPEED - torque / INERTIA * (t - tau * risen(t)))
+
+    stop = float(brentq(speed, 0.0, 20.0))
+    fine = np.linspace(0.0, stop, 200_001)
     return Engagement(
         stop=stop,
-        pressure=lambda t: PRESSURE * (1 - np.exp(-t / tau)),
-        speed=lambda t: SPEED - torque / INERTIA * (t - tau * (1 - np.exp(-t / tau))),
-        torque=lambda t: torque * (1 - np.exp(-t / tau)),
+        pressure=lambda t: PRESSURE * risen(t),
+        speed=speed,
+        torque=lambda t: torque * risen(t),
         cof=lambda _t: cof,
-        start=-tau * math.log(1 - 0.1 * (1 - math.exp(-stop / tau))),
-        peak_power=torque * (1 - math.exp(-peak / tau)) * (SPEED - lost(peak)),
+        start=-tau * math.log(1 - 0.1 * float(risen(stop))),
+        peak_power=float((torque * risen(fine) * speed(fine)).max()),
     )
 
 

@@ -15,8 +15,11 @@ CASES = [FRESH, np.array([12.0, 0.4, 2.7, 3.2]), np.array([3.0, 4.0, 0.3, 0.0]),
 
 
 @pytest.mark.parametrize("values", CASES)
-def test_torque_is_eq_3_as_printed(values):
-    np.testing.assert_allclose(torque(VELOCITY, parameters(values)), eq3(values, VELOCITY), rtol=1e-14)
+def test_torque_is_eq_3_as_printed_and_odd(values):
+    p = parameters(values)
+    np.testing.assert_allclose(torque(VELOCITY, p), eq3(values, VELOCITY), rtol=1e-14)
+    np.testing.assert_array_equal(torque(-VELOCITY, p), -torque(VELOCITY, p))
+    np.testing.assert_array_equal(gradient(-VELOCITY, p), -gradient(VELOCITY, p))
 
 
 @pytest.mark.parametrize("values", CASES)
@@ -39,13 +42,6 @@ def test_slope_by_central_differences(values):
     witness = (torque(VELOCITY + h, p) - torque(VELOCITY - h, p)) / (2 * h)
     np.testing.assert_allclose(slope(VELOCITY, p), witness, rtol=1e-6, atol=1e-6)
     np.testing.assert_array_equal(slope(-VELOCITY, p), slope(VELOCITY, p))
-
-
-@pytest.mark.parametrize("values", CASES)
-def test_both_directions_are_odd(values):
-    p = parameters(values)
-    np.testing.assert_array_equal(torque(-VELOCITY, p), -torque(VELOCITY, p))
-    np.testing.assert_array_equal(gradient(-VELOCITY, p), -gradient(VELOCITY, p))
 
 
 def test_at_rest_the_sign_bit_names_the_limit():
@@ -119,11 +115,8 @@ def test_a_noiseless_test_shows_the_true_slope_and_its_sign(cycles: float, falls
 
 
 def test_it_is_that_of_a_cof_at_a_speed() -> None:
-    fit = fit_curves(
-        curves_by_pressure(
-            stationary_test(SimulatedClutch(), 0.0, np.random.default_rng(1)), SimulatedClutch().geometry
-        )
-    )[0]
+    plateaus = stationary_test(SimulatedClutch(), 0.0, np.random.default_rng(1))
+    fit = fit_curves(curves_by_pressure(plateaus, SimulatedClutch().geometry))[0]
     one, half = cof_slope(fit, 0.6, 100.0), cof_slope(fit, 0.6, 200.0)
     assert half.value == pytest.approx(one.value / 2)
     assert half.sd == pytest.approx(one.sd / 2)

@@ -15,14 +15,7 @@ from models.degradation import general_order
 from models.degradation.general_order import Degradation, first_passage
 from models.prognosis import ended_lives
 from models.prognosis.criteria import COURSE_DISCREPANCIES, COURSE_SCATTERS, COURSE_SIZE_SD, OTHER_KIND, VAGUE
-from models.prognosis.ended_lives import (
-    EndedLife,
-    Kin,
-    as_its_kind,
-    declared_end,
-    ended_life,
-    representative,
-)
+from models.prognosis.ended_lives import EndedLife, Kin, as_its_kind, declared_end, ended_life, representative
 from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.scoring import crps_of_sample
 from models.prognosis.stated_end import stated_end

@@ -9,38 +9,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models.prognosis import first_passage
-from models.prognosis.first_passage import (
-    QUANTILES,
-    FirstPassage,
-    Limit,
-    PassageStatus,
-    bands,
-    ends_of_life,
-    first_below,
-    first_reached,
-    places,
-    predict_first_passage,
-    weighted_quantiles,
-    widened,
-)
-from models.tracking.discrepancy import FUTURE, PAST, Discrepancy
+from models.prognosis.first_passage import Limit, ends_of_life, predict_first_passage, weighted_quantiles, widened
+from models.tracking.discrepancy import FUTURE, PAST
 from models.tracking.posterior import Posterior
+from tests.models.tracking.tracked_series import beside, draws_of
 
 
 def sample(change: list[float], weight: list[float] | None = None, scale: float = 1_000.0) -> Posterior:
     """Draws with ξ0 = 1 and ε = 1: the end of life at half is φ (1/(1 - 0.5/-Δ) - 1)."""
-    n = len(change)
-    return Posterior(
-        weight=np.full(n, 1.0 / n) if weight is None else np.array(weight),
-        initial=np.ones(n),
-        change=np.array(change),
-        scale=np.full(n, scale),
-        exponent=np.ones(n),
-        scatter=np.full(n, 0.003),
-    )
+    draws = draws_of(len(change), initial=1.0, change=change, scale=scale, exponent=1.0)
+    return draws if weight is None else replace(draws, weight=np.array(weight))
 
 
-def numbers(passage: FirstPassage) -> list[float]:
+def numbers(passage: first_passage.FirstPassage) -> list[float]:
     found: list[float] = []
     for entry in asdict(passage).values():
         entries = entry.values() if isinstance(entry, dict) else entry if isinstance(entry, tuple) else [entry]
@@ -51,7 +32,7 @@ def numbers(passage: FirstPassage) -> list[float]:
 def test_a_certain_life_by_hand() -> None:
     """Δ = -1, ε = 1: 1/(1 + ζ/φ) = 1/2 at ζ = φ."""
     passage = predict_first_passage(sample([-1.0]), fraction=0.5, as_of=250.0)
-    assert list(passage.end_of_life) == list(QUANTILES)
+    assert list(passage.end_of_life) == list(first_passage.QUANTILES)
     assert all(x == pytest.approx(1_000.0) for x in passage.end_of_life.values())
     assert passage.status == "predicted"
     assert passage.probability_of_reaching == 1.0
@@ -62,7 +43,7 @@ def test_a_certain_life_by_hand() -> None:
 @pytest.mark.parametrize("horizon", [1e6, 500.0])
 def test_a_horizon_before_now_is_now(horizon: float) -> None:
     passage = predict_first_passage(sample([-1.0]), fraction=0.5, as_of=2_000.0, horizon=horizon)
-    assert passage.status is PassageStatus.REACHED
+    assert passage.status is first_passage.PassageStatus.REACHED
     assert passage.probability_of_reaching == 1.0
     assert passage.end_of_life[0.5] == pytest.approx(1_000.0)
 
@@ -133,27 +114,19 @@ def test_arguments_out_of_range(arguments: dict[str, float], message: str) -> No
         predict_first_passage(sample([-1.0]), **arguments)
 
 
-def beside(draws: Posterior, size: float, curvature: list[float], step: float = 0.0, at: float = 0.0) -> Posterior:
-    """The same draws with a discrepancy whose curvature on the first stretches is as given; span 1,000."""
+def bent(draws: Posterior, size: float, curvature: float = 0.0, step: float = 0.0, at: float = 0.0) -> Posterior:
+    """The same draws with a discrepancy whose curvature on the first stretch is as given; span 1,000."""
     n = draws.weight.size
     bends = np.zeros((n, PAST + FUTURE))
-    bends[:, : len(curvature)] = curvature
-    course = Discrepancy(
-        span=1_000.0,
-        size=np.full(n, size),
-        curvature=bends,
-        at=np.array([at]),
-        height=np.full((n, 1), step),
-        knee=np.full(n, np.inf),
-        steepening=np.ones(n),
-    )
+    bends[:, 0] = curvature
+    course = beside(n, size=np.full(n, size), curvature=bends, at=np.array([at]), height=np.full((n, 1), step))
     return replace(draws, discrepancy=course)
 
 
 def test_a_discrepancy_that_is_nothing_changes_nothing_but_the_way_it_is_found() -> None:
     """Along the path, linear between places 6 % apart, the closed form's end is found to 0.1 %."""
     draws = sample([-1.0, -0.7, -0.4])
-    found = ends_of_life(beside(draws, 0.03, [0.0]), 0.5)
+    found = ends_of_life(bent(draws, 0.03), 0.5)
     np.testing.assert_allclose(found, ends_of_life(draws, 0.5), rtol=1e-3)
     assert math.isinf(found[2])
 
@@ -161,7 +134,7 @@ def test_a_discrepancy_that_is_nothing_changes_nothing_but_the_way_it_is_found()
 @pytest.mark.parametrize(("step", "end", "rel"), [(-0.1, 666.7, 2e-3), (-0.2, 500.0, 0.02), (0.1, 1_500.0, 2e-3)])
 def test_a_step_of_the_level_is_a_crossing_where_it_is(step: float, end: float, rel: float) -> None:
     """1/(1 + ζ/φ) is 0.55 at ζ = 818: a step of -0.1 at 500, where it is 0.667, brings the end to 1/0.6 - 1."""
-    assert ends_of_life(beside(sample([-1.0]), 0.0, [0.0], step, at=500.0), 0.5) == pytest.approx(end, rel=rel)
+    assert ends_of_life(bent(sample([-1.0]), 0.0, 0.0, step, at=500.0), 0.5) == pytest.approx(end, rel=rel)
 
 
 def test_a_bend_by_hand() -> None:
@@ -169,7 +142,7 @@ def test_a_bend_by_hand() -> None:
     draws = replace(sample([-1.0]), change=np.zeros(1))
     w = -0.5
     slope = w * math.sqrt(18.0) / 6.0
-    found = ends_of_life(beside(draws, 0.1, [w]), 0.5)[0]
+    found = ends_of_life(bent(draws, 0.1, w), 0.5)[0]
     assert found == pytest.approx(1_000.0 * (-0.5 / slope + 1.0 / 12.0), rel=1e-3)
 
 
@@ -177,8 +150,8 @@ def test_looking_at_every_sixth_place_first_is_looking_at_all(monkeypatch: pytes
     """Of 4,000 courses that bend and step as the prior has it, at most a few in a thousand dip and come back between."""
     rng, count = np.random.default_rng(5), 4_000
     draws = replace(sample(rng.uniform(-1.0, -0.45, count).tolist()), scale=np.exp(rng.normal(7.0, 1.0, count)))
-    course = Discrepancy(
-        span=1_000.0,
+    course = beside(
+        count,
         size=np.full(count, 0.1),
         curvature=0.1 * rng.standard_normal((count, PAST + FUTURE)),
         at=np.array([300.0, 700.0]),
@@ -217,7 +190,7 @@ def test_an_offset_is_part_of_the_criterion() -> None:
 def test_bands_are_those_of_the_paths() -> None:
     draws = sample([-1.0, -0.5, -0.8], [0.25, 0.5, 0.25])
     zeta = np.array([0.0, 1_000.0])
-    mean, quantiles = bands(draws, zeta)
+    mean, quantiles = first_passage.bands(draws, zeta)
     np.testing.assert_allclose(mean, [1.0, 0.25 * 0.5 + 0.5 * 0.75 + 0.25 * 0.6])
     assert quantiles.shape == (2, 3)
     assert quantiles[1].tolist() == sorted(quantiles[1].tolist())
@@ -232,7 +205,7 @@ def test_a_value_that_is_not_positive_at_first_is_at_its_threshold_from_the_star
 
 def test_first_below_is_straight_between_places_and_inf_where_never() -> None:
     paths = np.array([[1.0, 0.4, 1.0], [0.6, 0.3, 0.9], [0.2, 0.1, 0.8]])
-    found = first_below(paths, np.array([0.0, 10.0, 30.0]), np.full(3, 0.5))
+    found = first_passage.first_below(paths, np.array([0.0, 10.0, 30.0]), np.full(3, 0.5))
     assert found[:2] == pytest.approx([15.0, 0.0])
     assert np.isinf(found[2])
 
@@ -256,14 +229,11 @@ def test_remaining_life_is_wider_about_its_median(passages: list[float], power: 
     assert found.tolist() == pytest.approx(stated)
 
 
-def passage_of(draws: Posterior, as_of: float, power: float) -> FirstPassage:
-    ends = widened(ends_of_life(draws, 0.5), draws.weight, as_of=as_of, horizon=1e6, power=power)
-    return predict_first_passage(draws, fraction=0.5, as_of=as_of, stated=(ends, draws.weight))
-
-
 def test_what_becomes_wider_than_the_horizon_may_never_end() -> None:
-    wide = passage_of(sample([-1.0, -0.9, -0.505]), 10.0, 20.0)
-    assert (wide.end_of_life[0.95], wide.status) == (None, PassageStatus.MAY_NEVER_REACH)
+    draws = sample([-1.0, -0.9, -0.505])
+    ends = widened(ends_of_life(draws, 0.5), draws.weight, as_of=10.0, horizon=1e6, power=20.0)
+    wide = predict_first_passage(draws, fraction=0.5, as_of=10.0, stated=(ends, draws.weight))
+    assert (wide.end_of_life[0.95], wide.status) == (None, first_passage.PassageStatus.MAY_NEVER_REACH)
 
 
 # --- Limits: where a path is at one, and which of several is the first.
@@ -309,7 +279,7 @@ def test_the_first_of_two_counts_and_says_which() -> None:
     rng = np.random.default_rng(4)
     weight = np.full(40_000, 1.0 / 40_000)
     fast, slow = (rng.exponential(mean, 40_000) for mean in (1.0, 3.0))
-    first, shares = first_reached([(fast, weight), (slow, weight)], 40_000, rng)
+    first, shares = first_passage.first_reached([(fast, weight), (slow, weight)], 40_000, rng)
     assert shares == pytest.approx([0.75, 0.25], abs=0.01)
     assert first.mean() == pytest.approx(0.75, abs=0.015)
 
@@ -317,13 +287,13 @@ def test_the_first_of_two_counts_and_says_which() -> None:
 def test_what_is_never_reached_is_nobodys_first() -> None:
     weight = np.array([0.5, 0.5])
     ends = [(np.array([10.0, np.inf]), weight), (np.array([np.inf, np.inf]), weight)]
-    first, shares = first_reached(ends, 1_000, np.random.default_rng(1))
+    first, shares = first_passage.first_reached(ends, 1_000, np.random.default_rng(1))
     assert shares.tolist() == [pytest.approx(0.5), 0.0]
     assert np.isfinite(first).mean() == pytest.approx(0.5)
 
 
 def test_places_go_from_the_beginning_to_the_horizon() -> None:
-    at = places(5_000.0, 1e6)
+    at = first_passage.places(5_000.0, 1e6)
     assert (at[0], at[-1]) == (0.0, pytest.approx(1e6))
     assert (np.diff(at) > 0.0).all()
     assert 5_000.0 in at

@@ -17,7 +17,7 @@ from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
-from tests.models.tracking.tracked_series import followed, on_grid, sent
+from tests.models.tracking.tracked_series import draws_of, followed, on_grid, sent
 
 UKF = Ukf()
 
@@ -114,7 +114,6 @@ def scored(prior: FleetPrior, seed: int, count: int) -> float:
 
 def test_a_fleet_of_the_same_kind_helps_and_another_kind_does_little_harm() -> None:
     ratio = {scale: scored(fleet(8, 5, scale), 6, 12) for scale in (5000.0, 40_000.0)}
-    print(ratio)
     assert ratio[5000.0] < 0.75
     assert ratio[40_000.0] < 1.25
 
@@ -131,7 +130,6 @@ def test_the_mixture_is_that_of_importance_sampling() -> None:
     mixed = prior.together(under[0], under[1], seen[0])
     reference = _brute(prior, seen, rng)
     misfits = [_misfit(each, reference) for each in (mixed, *under)]
-    print("misfit of the mixture, the weak and the fleet's sample", misfits)
     assert misfits[0] < 0.1
     # the negative control: neither sample alone is that distribution
     assert min(misfits[1:]) > 0.15
@@ -181,14 +179,8 @@ def _brute(prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator)
         log_weight += -0.5 * (np.log(variance) + (each.value - initial - change * b) ** 2 / variance)
     weight = np.exp(log_weight - log_weight.max())
     assert weight.sum() ** 2 / np.square(weight).sum() > 500
-    return Posterior(
-        weight=weight / weight.sum(),
-        initial=initial,
-        change=change,
-        scale=np.exp(scale),
-        exponent=np.exp(exponent),
-        scatter=np.exp(scatter),
-    )
+    law = {"initial": initial, "change": change, "scale": np.exp(scale), "exponent": np.exp(exponent)}
+    return draws_of(count, **law, weight=weight / weight.sum(), scatter=np.exp(scatter))
 
 
 def test_pooled_draws_have_half_of_the_weight_each() -> None:

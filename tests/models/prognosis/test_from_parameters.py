@@ -20,7 +20,7 @@ from models.prognosis.from_parameters import (
 )
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
-from tests.models.tracking.tracked_series import on_grid, sent
+from tests.models.tracking.tracked_series import draws_of, on_grid, sent
 
 AT = np.linspace(0.0, 12_000.0, 13)
 VELOCITIES = np.linspace(0.2, 12.0, 40)
@@ -36,15 +36,8 @@ PER_COF = 150.0
 
 def track(truth: Degradation, size: int = 40) -> Posterior:
     """A sample that is sure of its coefficients."""
-    ones = np.ones(size)
-    return Posterior(
-        weight=ones / size,
-        initial=truth.initial * ones,
-        change=truth.change * ones,
-        scale=truth.scale * ones,
-        exponent=truth.exponent * ones,
-        scatter=1e-6 * ones,
-    )
+    law = {"initial": truth.initial, "change": truth.change, "scale": truth.scale, "exponent": truth.exponent}
+    return draws_of(size, **law, scatter=1e-6)
 
 
 def mean_cofs(progress: np.ndarray, strength: float = 1.0) -> np.ndarray:
@@ -162,13 +155,7 @@ def test_no_disagreement_is_stated_beyond_the_horizon_or_without_uncertainty() -
     assert disagreement(same, never, same, ends, weight, 0.0).end_of_life is None
     found = disagreement(same, np.full(4, 1e4), same, np.full(4, 1e4), weight, 0.0)
     assert (found.now, found.end_of_life) == (None, None)
-
-
-@pytest.mark.parametrize(
-    ("deviations", "far"), [(None, False), (FAR_APART, False), (1.01 * FAR_APART, True), (-4.0, True)]
-)
-def test_far_apart(deviations: float | None, far: bool) -> None:
-    assert far_apart(deviations) is far
+    assert [far_apart(deviations) for deviations in (None, FAR_APART, -4.0)] == [False, False, True]
 
 
 # --- Quantities whose measurements err together: what only their sum knows is not lost.

@@ -22,7 +22,7 @@ from models.prognosis.scoring import (
 )
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
-from tests.models.tracking.tracked_series import PRIOR
+from tests.models.tracking.tracked_series import PRIOR, draws_of
 
 # --- Scores against closed forms and hand-worked cases.
 
@@ -117,11 +117,8 @@ def test_the_prognostic_horizon_counts_from_where_all_that_follow_are_right() ->
 #: ξ is 1 for ever, with a deviation of 0.1 in the level of the draws.
 SPREAD_LEVELS = 1.0 + 0.1 * np.linspace(-3.0, 3.0, 4_001)
 WEIGHT = np.exp(-0.5 * np.square(np.linspace(-3.0, 3.0, 4_001)))
-FLAT = Posterior(
-    weight=WEIGHT / WEIGHT.sum(),
-    initial=SPREAD_LEVELS,
-    **dict.fromkeys(("change", "scatter"), np.zeros(SPREAD_LEVELS.size)),
-    **dict.fromkeys(("scale", "exponent"), np.ones(SPREAD_LEVELS.size)),
+FLAT = draws_of(
+    WEIGHT.size, weight=WEIGHT / WEIGHT.sum(), initial=SPREAD_LEVELS, change=0.0, scale=1.0, exponent=1.0, scatter=0.0
 )
 
 

@@ -90,14 +90,7 @@ def make(
         torque=_counted(torque + sensors.torque * coloured, sensors.torque_count),
         oil_temperature=358.15 + 0.3 * np.sin(time / 200) + 0.05 * rng.standard_normal(n),
     )
-    return Made(
-        record=record,
-        start=ends[:-1],
-        stop=ends[1:],
-        pressure=p,
-        speed=w,
-        torque=true_torque(p, w),
-    )
+    return Made(record=record, start=ends[:-1], stop=ends[1:], pressure=p, speed=w, torque=true_torque(p, w))
 
 
 def _counted(values: FloatArray, count: float) -> FloatArray:

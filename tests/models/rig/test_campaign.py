@@ -43,7 +43,7 @@ def test_runs_come_in_rig_order():
     assert runs[2].duty.maximum_pressure == 8 * BAR
 
 
-def test_ends_with_the_first_test_below_the_stop():
+def test_a_campaign_ends_with_the_first_test_below_the_stop():
     for seed in range(5):
         clutch = simulated_clutch(seed)
         tests = [run.cycles for run in simulate(seed) if run.kind is RunKind.STATIONARY_STRIBECK]

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
 from models.diagnosis.effects.catalogue import CATALOGUE
-from models.diagnosis.report.report import Report
 from models.rig.campaign import simulate, simulated_clutch
 from models.rig.hidden import EFFECTS, clutch_for, effect_of, hidden_in
 from models.rig.programme import Programme
@@ -15,7 +13,7 @@ from models.rig.sampled import DynamicTest
 from models.rig.simulated_runs import RunKind, SimulatedRun
 from models.rig.stationary import SHARP
 from models.rig.temperatures import with_plate
-from tests.models.diagnosis.campaigns import look
+from tests.models.diagnosis.campaigns import campaign_of, look
 
 LEVELS = (4.0e5, 5.5e5, 7.0e5)
 PROGRAMME = Programme(dynamic=DynamicTest(rate=50.0, pressures=LEVELS), pressures=LEVELS)
@@ -67,20 +65,6 @@ def test_every_hidden_effect_is_of_the_catalogue_and_an_unknown_one_lists_them()
         effect_of("warm_oil")
 
 
-def diagnosed(found: list[SimulatedRun]) -> Report:
-    tests = [
-        StationaryRun(run_id=run.run_id, cycles=run.cycles, plateaus=run.plateaus)
-        for run in found
-        if run.plateaus is not None
-    ]
-    loops = [
-        DynamicRun(run_id=run.run_id, cycles=run.cycles, record=run.record)
-        for run in found
-        if run.kind is RunKind.DYNAMIC_STRIBECK and run.record is not None
-    ]
-    return look(Campaign(stationary=tuple(tests), dynamic=tuple(loops)), 1)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("slug", "rise", "named"),
@@ -88,5 +72,6 @@ def diagnosed(found: list[SimulatedRun]) -> Report:
 )
 def test_heating_is_named_by_a_warm_plate_only(slug: str, rise: float, named: bool) -> None:
     geometry = simulated_clutch(7).geometry
-    report = diagnosed([with_plate(run, geometry, rise) for run in runs({slug: effect_of(slug).size}, 9)])
+    given = campaign_of(with_plate(run, geometry, rise) for run in runs({slug: effect_of(slug).size}, 9))
+    report = look(replace(given, duty=()), 1)
     assert ("interface_heating" in report.causes) is named, (report.verdict, report.causes, report.summary)

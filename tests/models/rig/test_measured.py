@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from models.arrays import FloatArray
-from models.friction.identification import fit_curves
+from models.friction.identification import StribeckFit, fit_curves
 from models.friction.pressure_laws import LinearLaw
 from models.friction.speed_protocol import REFERENCE_SPEEDS, RPM
 from models.friction.stribeck import torque
@@ -15,7 +15,7 @@ from models.loops.lag_fit import StationaryCurve
 from models.loops.lag_laws import attractor_torque
 from models.loops.loops import evaluate_loops
 from models.records.plateaus import cut_plateaus
-from models.records.runs import Plateaus, curves_by_pressure
+from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulated_clutch
 from models.rig.hysteresis import ATTRACTOR, NO_LAG, FrictionLag
 from models.rig.sampled import EXACT, DynamicTest, RawTest, Recorder, sampled_test
@@ -29,6 +29,10 @@ CLUTCH = SimulatedClutch()
 GEOMETRY = CLUTCH.geometry
 
 
+def rng(seed: int = 2) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
 def test_rows_stand_in_the_references_order():
     plateaus = stationary_test(CLUTCH, 0, np.random.default_rng(0))
     assert plateaus.pressure.reshape(7, 40)[:, 0] / BAR == pytest.approx([4, 4.5, 5, 5.5, 6, 6.5, 7])
@@ -37,43 +41,34 @@ def test_rows_stand_in_the_references_order():
     assert len(curves_by_pressure(plateaus, GEOMETRY)) == 7
 
 
-def test_noise_is_what_was_asked_for():
-    exact = stationary_test(CLUTCH, 0, np.random.default_rng(0), NOISELESS).torque
+def torque_by(sensor: Sensor, seed: int = 0) -> FloatArray:
+    return stationary_test(CLUTCH, 0, rng(seed), sensor).torque
+
+
+def test_noise_floor_and_counts_are_what_was_asked_for():
+    exact = torque_by(NOISELESS)
     sensor = Sensor(noise=0.01, floor=0.0, gain_scatter=0.05, torque_counts=0.0)
-    ratios = np.array([stationary_test(CLUTCH, 0, np.random.default_rng(s), sensor).torque / exact for s in range(300)])
+    ratios = np.array([torque_by(sensor, seed) / exact for seed in range(300)])
     # 300 runs know a deviation to 4 % (one sigma), 84,000 plateaus to 0.25 %; four sigma each.
     assert ratios.mean(axis=1).std() == pytest.approx(0.05, rel=0.16)
     assert (ratios / ratios.mean(axis=1, keepdims=True)).std() == pytest.approx(0.01, rel=0.01)
-
-
-def test_the_floor_is_all_that_is_left_without_noise():
-    exact = stationary_test(CLUTCH, 0, np.random.default_rng(0), NOISELESS).torque
-    sensor = Sensor(noise=0.0, floor=0.02, gain_scatter=0.0)
-    left = np.concatenate(
-        [stationary_test(CLUTCH, 0, np.random.default_rng(s), sensor).torque - exact for s in range(20)]
-    )
-    assert left.std() == pytest.approx(0.02, rel=0.04)  # 5600 values, four sigma
-
-
-def test_torque_is_recorded_in_counts():
-    recorded = stationary_test(CLUTCH, 0, np.random.default_rng(0), Sensor(torque_counts=100.0)).torque
+    still = Sensor(noise=0.0, floor=0.02, gain_scatter=0.0)
+    left = [torque_by(still, seed) - exact for seed in range(20)]
+    assert np.std(left) == pytest.approx(0.02, rel=0.04)  # 5600 values, four sigma
+    recorded = torque_by(Sensor(torque_counts=100.0))
     assert np.array_equal(recorded, np.round(recorded, 2))
 
 
 def test_oil_temperature_is_recorded_and_does_not_act():
     for seed in range(20):
-        plateaus = stationary_test(CLUTCH, 0, np.random.default_rng(seed), NOISELESS)
+        plateaus = stationary_test(CLUTCH, 0, rng(seed), NOISELESS)
         assert plateaus.oil_temperature.min() >= 273.15 + 80
         assert plateaus.oil_temperature.max() <= 273.15 + 90
         assert np.ptp(plateaus.oil_temperature) > 1
-        assert np.array_equal(plateaus.torque, stationary_test(CLUTCH, 0, np.random.default_rng(99), NOISELESS).torque)
+        assert np.array_equal(plateaus.torque, torque_by(NOISELESS, 99))
 
 
 # --- The simulated recorder: noise, counts, losses and spikes.
-
-
-def rng(seed: int = 2) -> np.random.Generator:
-    return np.random.default_rng(seed)
 
 
 def test_noise_is_what_was_asked_for_and_autocorrelated() -> None:
@@ -88,7 +83,7 @@ def test_noise_is_what_was_asked_for_and_autocorrelated() -> None:
     assert record.speed.std() == pytest.approx(0.2, rel=0.01)
 
 
-def test_counts_losses_and_spikes() -> None:
+def test_a_recorder_counts_loses_and_spikes() -> None:
     count = 60_000
     still = np.full(count, 20.0)
     recorder = Recorder(torque_counts=200.0, lost=0.1, spikes_per_minute=30.0, torque_noise=0.01)
@@ -102,10 +97,9 @@ def test_counts_losses_and_spikes() -> None:
 # --- The simulated sampled records and their lag, against closed forms and an integrator.
 
 SILENT = DynamicTest(recorder=EXACT)
-COARSE_RAW = RawTest(rate=50.0)
 
 
-def test_has_the_references_course() -> None:
+def test_a_dynamic_test_has_the_references_course() -> None:
     record = sampled_test(CLUTCH, 0, SILENT, rng(), NOISELESS)
     for turn, pressure in enumerate(PROTOCOL_PRESSURES):
         rows = (record.time >= 15.1 * turn) & (record.time < 15.1 * turn + 15)
@@ -142,7 +136,7 @@ def test_the_film_time_is_lost_with_use_the_more_the_higher_the_pressure() -> No
     assert found == pytest.approx(0.2 * np.exp([-0.0, -0.25, -0.75]))
 
 
-def test_an_attractor_alone_is_the_attractor_law() -> None:
+def test_a_lag_of_an_attractor_alone_is_the_attractor_law() -> None:
     clutch = replace(CLUTCH, lag=replace(NO_LAG, attractor=150.0))
     record = sampled_test(clutch, 1000, SILENT, rng(), NOISELESS)
     rows = record.time < 15
@@ -157,9 +151,8 @@ def test_without_lag_it_is_the_stationary_curve() -> None:
     assert record.torque == pytest.approx(torque(CLUTCH.geometry.sliding_velocity(record.speed), at), rel=1e-12)
 
 
-def test_settles_after_each_step() -> None:
-    test = replace(COARSE_RAW, recorder=EXACT)
-    record = sampled_test(CLUTCH, 0, test, rng(), NOISELESS)
+def test_torque_settles_after_each_step_of_a_raw_test() -> None:
+    record = sampled_test(CLUTCH, 0, RawTest(rate=50.0, recorder=EXACT), rng(), NOISELESS)
     dwells = record.torque.reshape(280, 250)
     true = stationary_test(CLUTCH, 0, rng(), NOISELESS).torque
     assert np.abs(dwells[1:, 0] - true[1:]).max() > 1.0
@@ -171,19 +164,21 @@ def test_settles_after_each_step() -> None:
 # seen.
 
 
-def mses(plateaus: Plateaus) -> FloatArray:
-    return np.array([fit.mse_percent for fit in fit_curves(curves_by_pressure(plateaus, GEOMETRY))])
+def fits_of(clutch: SimulatedClutch, sensor: Sensor) -> tuple[StribeckFit, ...]:
+    return fit_curves(curves_by_pressure(stationary_test(clutch, 0, rng(7), sensor), GEOMETRY))
 
 
 def test_fresh_curves_are_fitted_as_well_as_the_references() -> None:
     """1.74 % on average and 3.61 % at most there; some drawn clutches' curves at 4 bar are flatter and have more."""
     clutches = [simulated_clutch(seed) for seed in range(12)]
-    sharp = np.array([mses(stationary_test(clutch, 0, np.random.default_rng(7), SHARP)) for clutch in clutches])
+    sharp, usual = (
+        np.array([[fit.mse_percent for fit in fits_of(clutch, sensor)] for clutch in clutches])
+        for sensor in (SHARP, Sensor())
+    )
     assert 1.0 < sharp.mean() < 2.0
     assert np.median(sharp) < sharp.mean()
     assert (sharp < 3.61).mean() > 0.85
     # the control: a sensor of 1 % gives errors ten times as large
-    usual = np.array([mses(stationary_test(clutch, 0, np.random.default_rng(7), Sensor())) for clutch in clutches])
     assert usual.mean() > 10
 
 
@@ -191,16 +186,16 @@ def test_fresh_curves_are_fitted_as_well_as_the_references() -> None:
 def test_plateaus_of_a_raw_record_are_as_exact_as_plateaus(cycles: int) -> None:
     clutch = simulated_clutch(7)
     still = replace(SHARP, gain_scatter=0.0)
-    true = stationary_test(clutch, cycles, np.random.default_rng(7), NOISELESS).torque
-    plateaus = stationary_test(clutch, cycles, np.random.default_rng(7), still).torque
-    record = sampled_test(clutch, cycles, RawTest(rate=100.0), np.random.default_rng(7), still)
-    raw = cut_plateaus(record).plateaus.torque
+    # the control last: plateaus of the usual sensor are four times as noisy
+    true, plateaus, usual = (
+        stationary_test(clutch, cycles, rng(7), sensor).torque
+        for sensor in (NOISELESS, still, replace(Sensor(), gain_scatter=0.0))
+    )
+    raw = cut_plateaus(sampled_test(clutch, cycles, RawTest(rate=100.0), rng(7), still)).plateaus.torque
     assert raw.size == true.size
     errors = [float(np.std(torque / true - 1)) for torque in (plateaus, raw)]
     assert errors[1] == pytest.approx(errors[0], rel=0.4)
     assert max(errors) < 0.004
-    # the control: plateaus of the usual sensor are four times as noisy
-    usual = stationary_test(clutch, cycles, np.random.default_rng(7), replace(Sensor(), gain_scatter=0.0)).torque
     assert np.std(usual / true - 1) > 2.5 * max(errors)
 
 
@@ -210,10 +205,8 @@ def test_a_film_beside_an_attractor_shows_both_laws_when_fresh() -> None:
     both = replace(film_alone, lag=replace(film_alone.lag, attractor=ATTRACTOR))
     determined = []
     for clutch in (film_alone, both):
-        rng = np.random.default_rng(7)
-        fits = fit_curves(curves_by_pressure(stationary_test(clutch, 0, rng, SHARP), GEOMETRY))
-        curves = {fit.pressure: StationaryCurve.of(fit) for fit in fits}
-        loops = evaluate_loops(sampled_test(clutch, 0, DynamicTest(rate=50.0), rng, SHARP), GEOMETRY, curves)
+        curves = {fit.pressure: StationaryCurve.of(fit) for fit in fits_of(clutch, SHARP)}
+        loops = evaluate_loops(sampled_test(clutch, 0, DynamicTest(rate=50.0), rng(7), SHARP), GEOMETRY, curves)
         assert len(loops) == 7
         assert sum(loop.film_time is not None for loop in loops) >= 6
         assert sum(loop.better_law is not None for loop in loops) >= 6

@@ -34,9 +34,8 @@ def by_hand(clutch, pressure, cycles, velocity):
         return 1 + course.change - course.change / (1 + cycles / course.scale) ** course.exponent
 
     m_s = (clutch.static_torque.intercept + clutch.static_torque.slope * pressure) * aged(clutch.static_torque_course)
-    fresh_ratio = clutch.coulomb_ratio.asymptote + clutch.coulomb_ratio.excess / math.exp(
-        pressure / clutch.coulomb_ratio.decay
-    )
+    law = clutch.coulomb_ratio
+    fresh_ratio = law.asymptote + law.excess / math.exp(pressure / law.decay)
     m_c = m_s * fresh_ratio * aged(clutch.coulomb_ratio_course)
     law, course = clutch.stribeck_velocity, clutch.stribeck_velocity_course
     share = math.exp(-(law.intercept + law.slope * pressure) * aged(course) / velocity)
@@ -55,24 +54,18 @@ def test_torque_agrees_with_the_equations_written_out_by_hand(cycles):
 
 def test_mean_cof_is_the_mean_over_all_plateaus():
     # Pressure levels hold equally many rows, so the mean over rows is the mean over pressures of the means over speeds.
-    geometry = Geometry()
-    rows = [
-        geometry.cof(by_hand(CLUTCH, p, 7000, w * geometry.mean_radius), p)
-        for p, w in itertools.product(PROTOCOL_PRESSURES, SPEEDS)
-    ]
+    places = itertools.product(PROTOCOL_PRESSURES, SPEEDS)
+    rows = [Geometry().cof(by_hand(CLUTCH, p, 7000, w * Geometry().mean_radius), p) for p, w in places]
     assert CLUTCH.mean_cof(7000) == pytest.approx(math.fsum(rows) / 280, rel=1e-9)
 
 
-def test_fresh_clutch_gives_about_25_newton_metres_at_5_bar():
+def test_a_fresh_clutch_gives_about_25_newton_metres_at_5_bar_and_half_of_its_cof_after_15_000_cycles():
     at_1000_rpm = np.interp(1000 * RPM, SPEEDS, curves(CLUTCH, 0)[5.0])
     assert at_1000_rpm == pytest.approx(25, abs=1)
-
-
-def test_mean_cof_is_halved_near_15_000_cycles():
     assert CLUTCH.end_of_life() == pytest.approx(15_000, rel=0.02)
 
 
-def test_is_where_mean_cof_crosses_on_a_dense_grid():
+def test_the_end_of_life_is_where_mean_cof_crosses_on_a_dense_grid():
     cycles = np.arange(0.0, 40_000.0, 10.0)
     share = CLUTCH.mean_cofs(cycles) / CLUTCH.mean_cof(0)
     for fraction in (0.9, 0.5, 0.45):
@@ -80,12 +73,12 @@ def test_is_where_mean_cof_crosses_on_a_dense_grid():
         assert crossing - 10 <= CLUTCH.end_of_life(fraction) <= crossing
 
 
-def test_is_none_where_the_loss_saturates_above_the_threshold():
+def test_no_life_ends_where_the_loss_saturates_above_the_threshold():
     assert CLUTCH.mean_cof(1e6) > 0.2 * CLUTCH.mean_cof(0)
     assert CLUTCH.end_of_life(0.2) is None
 
 
-def test_spreads_over_drawn_clutches_around_the_nominal_life():
+def test_lives_of_drawn_clutches_spread_around_the_nominal_one():
     lives = [draw(np.random.default_rng(seed)).end_of_life() for seed in range(50)]
     assert None not in lives
     assert min(lives) > 8_000
@@ -100,11 +93,8 @@ def test_drawn_clutches_differ_by_5_to_15_percent():
         values = np.array([float(getattr(parameters, name)) for parameters in drawn])
         assert 0.03 < values.std() / values.mean() < 0.16, name  # 200 draws know a deviation to 5 %
         assert (values > 0).all()
-
-
-def test_in_no_drawn_clutch_sliding_grips_more_than_rest():
-    for seed in range(200):
-        assert draw(np.random.default_rng(seed)).parameters(4 * BAR, 0).coulomb_ratio < 1
+    # in none of them sliding grips more than rest
+    assert all(draw(np.random.default_rng(seed)).parameters(4 * BAR, 0).coulomb_ratio < 1 for seed in range(200))
 
 
 def test_the_clutch_transfers_what_its_curve_says_and_less_below_its_lowest_pressure() -> None:

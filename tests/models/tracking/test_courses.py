@@ -1,4 +1,4 @@
-"""Courses and their knees, the model's discrepancy, and both as one linear model."""
+"""Courses and their knees, the model's discrepancy, both as one linear model, priors and draws."""
 
 import math
 from dataclasses import asdict, replace
@@ -10,34 +10,29 @@ from scipy.stats import multivariate_normal
 
 from models.degradation.general_order import Degradation, first_passage, progress_fraction, value
 from models.prognosis.first_passage import ends_of_life, predict_first_passage, weighted_quantiles
-from models.tracking import linear_model, sampling
-from models.tracking.courses import (
-    FORM_COURSE,
-    FORM_PROPORTIONAL,
-    FORM_SIZE,
-    UNIT_OF_CHANGE,
-    WITHOUT_EXPONENT,
-    Course,
-    basis,
-    coefficients_at,
-    coordinates_of,
-    course_of,
-    form_of,
-    log_form_weight,
-    log_scale_at,
-    place_of,
-)
+from models.tracking import courses, linear_model, sampling
+from models.tracking.courses import Course
 from models.tracking.criteria import KNEE_HAZARD
-from models.tracking.discrepancy import PAST, Discrepancy, drawn, smooth
+from models.tracking.discrepancy import PAST, drawn, smooth
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import weak
+from models.tracking.prior import Prior, weak
 from tests import dense
-from tests.models.tracking.tracked_series import NAMES, PRIOR, TYPICAL, followed, on_grid, sent, series
+from tests.models.tracking.tracked_series import (
+    CAMPAIGN,
+    NAMES,
+    PRIOR,
+    TYPICAL,
+    beside,
+    draws_of,
+    followed,
+    on_grid,
+    sent,
+    series,
+)
 
 # --- Courses of either sign of φ and ε: the kinetics that they obey, their coordinates, and their prior
 # probabilities.
@@ -69,15 +64,15 @@ def test_the_first_passage_is_where_the_course_has_that_value(scale: float, expo
 @pytest.mark.parametrize("course", list(Course))
 def test_basis_is_the_share_of_the_change_and_coordinates_lead_back(course: Course) -> None:
     log_scale, log_exponent, kind = np.array([9.2]), np.array([-0.4]), np.array([course])
-    scale, exponent = coefficients_at(log_scale, log_exponent, kind)
+    scale, exponent = courses.coefficients_at(log_scale, log_exponent, kind)
     zeta = np.array([[0.0], [100.0], [9_000.0]])
     expected = progress_fraction(zeta, scale, exponent)
-    found = basis(zeta, log_scale, log_exponent, kind) * UNIT_OF_CHANGE[kind]
+    found = courses.basis(zeta, log_scale, log_exponent, kind) * courses.UNIT_OF_CHANGE[kind]
     np.testing.assert_allclose(found, expected, atol=1e-9)
-    assert course_of(scale, exponent) == [course]
-    back = coordinates_of(scale, exponent, kind)
+    assert courses.course_of(scale, exponent) == [course]
+    back = courses.coordinates_of(scale, exponent, kind)
     assert back[0] == pytest.approx(log_scale)
-    assert back[1] == pytest.approx(0.0 if WITHOUT_EXPONENT[course] else log_exponent)
+    assert back[1] == pytest.approx(0.0 if courses.WITHOUT_EXPONENT[course] else log_exponent)
 
 
 @pytest.mark.parametrize(
@@ -87,26 +82,29 @@ def test_basis_is_the_share_of_the_change_and_coordinates_lead_back(course: Cour
 )
 def test_courses_without_an_exponent_are_what_they_are_called(course: Course, expected: Any) -> None:
     zeta = np.linspace(0.0, 30_000.0, 50)
-    found = basis(zeta[:, None], np.array([math.log(5_000.0)]), np.zeros(1), np.array([course]))
+    found = courses.basis(zeta[:, None], np.array([math.log(5_000.0)]), np.zeros(1), np.array([course]))
     np.testing.assert_allclose(found[:, 0], expected(zeta / 5_000.0), atol=1e-3)
 
 
 def test_a_course_that_ends_does_so_beyond_what_was_measured() -> None:
     course, place = np.array([Course.EQ_6, Course.ENDING, Course.HYPERBOLIC]), np.full(3, math.log(100.0))
-    log_scale, stretch = log_scale_at(place, course, 7_000.0)
+    log_scale, stretch = courses.log_scale_at(place, course, 7_000.0)
     np.testing.assert_allclose(np.exp(log_scale), [100.0, 7_100.0, 7_100.0])
-    np.testing.assert_allclose(place_of(log_scale, course, 7_000.0), place)
-    near = log_scale_at(place + 1e-6, course, 7_000.0)[0]
+    np.testing.assert_allclose(courses.place_of(log_scale, course, 7_000.0), place)
+    near = courses.log_scale_at(place + 1e-6, course, 7_000.0)[0]
     np.testing.assert_allclose(stretch, np.log((near - log_scale) / 1e-6), atol=1e-5)
 
 
 def test_forms_are_courses_by_sizes_and_share_the_prior() -> None:
-    weight = np.exp(log_form_weight(PRIOR))
+    weight = np.exp(courses.log_form_weight(PRIOR))
     assert weight.sum() == pytest.approx(1.0)
-    assert weight[FORM_COURSE == Course.EQ_6].sum() == pytest.approx(PRIOR.eq_6_share)
-    np.testing.assert_array_equal(form_of(FORM_COURSE, FORM_SIZE, FORM_PROPORTIONAL), np.arange(FORM_SIZE.size))
-    sure = log_form_weight(replace(PRIOR, eq_6_share=1.0))
-    assert np.isneginf(sure[FORM_COURSE != Course.EQ_6]).all()
+    assert weight[courses.FORM_COURSE == Course.EQ_6].sum() == pytest.approx(PRIOR.eq_6_share)
+    np.testing.assert_array_equal(
+        courses.form_of(courses.FORM_COURSE, courses.FORM_SIZE, courses.FORM_PROPORTIONAL),
+        np.arange(courses.FORM_SIZE.size),
+    )
+    sure = courses.log_form_weight(replace(PRIOR, eq_6_share=1.0))
+    assert np.isneginf(sure[courses.FORM_COURSE != Course.EQ_6]).all()
 
 
 # --- The discrepancy beside eq. 6: its size, lives of another law, and steps at events.
@@ -124,18 +122,17 @@ def test_what_was_measured_bends_as_the_course_beyond_it_does() -> None:
     """Up to T each draw's own time is ζ, and its δ a sum of terms; beyond, it is led on from stretch to stretch. Where both
     hold they are the same, on both sides of a step of the level."""
     rng, progress = np.random.default_rng(1), np.array([0.0, 900.0, 4_000.0, 4_001.0, 7_000.0])
-    beside = Discrepancy(
+    course = beside(
+        50,
         span=7_000.0,
         size=np.full(50, 0.1),
         curvature=rng.standard_normal((50, 22)),
         at=np.array([4_000.5]),
         height=rng.standard_normal((50, 1)),
-        knee=np.full(50, np.inf),
-        steepening=np.ones(50),
     )
     own = np.repeat(progress[:, None], 50, axis=1)
-    np.testing.assert_allclose(beside.measured(progress), beside(own, progress[:, None]), rtol=0, atol=1e-13)
-    assert np.abs(beside.measured(progress) - replace(beside, height=-beside.height).measured(progress)).max() > 1.0
+    np.testing.assert_allclose(course.measured(progress), course(own, progress[:, None]), rtol=0, atol=1e-13)
+    assert np.abs(course.measured(progress) - replace(course, height=-course.height).measured(progress)).max() > 1.0
 
 
 def test_a_straight_line_is_no_eq_6_and_the_data_say_so() -> None:
@@ -178,23 +175,8 @@ def test_after_an_event_the_forecast_widens_and_then_settles(tracker: Any) -> No
 
 def test_a_course_goes_on_along_its_knee_from_there_on() -> None:
     """From ζ = 1,500 on at four times the mean pace until then, which is a line's own; before, nothing changes."""
-    line = Posterior(
-        weight=np.full(2, 0.5),
-        initial=np.full(2, 0.1),
-        change=np.full(2, -0.1),
-        scale=np.full(2, -10_000.0),
-        exponent=np.full(2, -1.0),
-        scatter=np.full(2, 0.001),
-        discrepancy=Discrepancy(
-            span=1_000.0,
-            size=np.full(2, 0.01),
-            curvature=np.zeros((2, 22)),
-            at=np.zeros(0),
-            height=np.zeros((2, 0)),
-            knee=np.array([1_500.0, np.inf]),
-            steepening=np.full(2, 4.0),
-        ),
-    )
+    course = beside(2, size=np.full(2, 0.01), knee=np.array([1_500.0, np.inf]), steepening=np.full(2, 4.0))
+    line = draws_of(2, initial=0.1, change=-0.1, scale=-10_000.0, exponent=-1.0, discrepancy=course)
     at = np.array([0.0, 1_000.0, 1_500.0, 2_000.0])
     np.testing.assert_allclose(line.values(at).T, [[0.1, 0.09, 0.085, 0.06], [0.1, 0.09, 0.085, 0.08]], atol=1e-12)
     assert ends_of_life(line, 0.5) == pytest.approx([2_200.0, 5_000.0], rel=2e-3)
@@ -204,11 +186,11 @@ def test_knees_come_as_their_hazard_has_it_and_eq_6_alone_has_none() -> None:
     prior = weak(Measurement(progress=0.0, value=0.1, variance=0.0), falling=True)
     history = History.of(sent([0.0, 2_000.0], 0.1), prior)
     sizes = np.repeat([0.0, 0.03], 20_000)
-    beside = drawn(history, prior, sizes, np.zeros((sizes.size, PAST)), np.random.default_rng(4))
-    assert np.isinf(beside.knee[:20_000]).all()
+    found = drawn(history, prior, sizes, np.zeros((sizes.size, PAST)), np.random.default_rng(4))
+    assert np.isinf(found.knee[:20_000]).all()
     for ahead in (1.5, 3.0):
-        assert (beside.knee[20_000:] > ahead * 2_000.0).mean() == pytest.approx(ahead**-KNEE_HAZARD, abs=0.015)
-    assert beside.knee.min() >= 2_000.0
+        assert (found.knee[20_000:] > ahead * 2_000.0).mean() == pytest.approx(ahead**-KNEE_HAZARD, abs=0.015)
+    assert found.knee.min() >= 2_000.0
     parameter = weak(Measurement(progress=0.0, value=0.1, variance=0.0), falling=False)
     assert np.isinf(drawn(history, parameter, sizes, np.zeros((sizes.size, PAST)), np.random.default_rng(4)).knee).all()
 
@@ -286,7 +268,7 @@ def test_conditional_is_that_of_the_whole_normal() -> None:
 
 def test_the_table_and_the_points_are_one_sum() -> None:
     history = History.of(EPOCHS, BELIEF)
-    table = basis(history.progress[:, None], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
+    table = courses.basis(history.progress[:, None], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
     levels = np.array([-8.0, -7.0])
     forms, outlying = np.array([0, 2 + 24]), np.eye(13)[:, [0, 5]]
     tabled = linear_model.evidence(
@@ -310,7 +292,7 @@ def test_the_last_run_turned_outlying_is_that_of_all_sums_anew(measurements: lis
     sound = replace(POINTS, outlying=POINTS.outlying * (np.arange(13) < 12)[:, None])
     outlying = replace(sound, outlying=sound.outlying + (np.arange(13) == 12)[:, None])
     sums, terms = linear_model.pointwise(history, BELIEF, sound)
-    last = basis(history.progress[-1], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
+    last = courses.basis(history.progress[-1], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
     turned = linear_model.last_outlying(history, BELIEF, sound, sums, terms, last)
     anew = linear_model.pointwise(history, BELIEF, outlying)[0]
     for name, found in asdict(turned).items():
@@ -343,3 +325,72 @@ def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
     sd = math.sqrt((0.03 * 0.134) ** 2 * dense.integrated(history.progress)[-1, -1] - gain @ cross)
     assert at_the_last.mean() == pytest.approx(gain @ (history.value - mean), abs=4.0 * sd / math.sqrt(count))
     assert at_the_last.std() == pytest.approx(sd, rel=0.03)
+
+
+# --- Priors, measurements and histories check themselves; draws are even and as correlated as they should be.
+
+
+def test_a_prior_survives_its_array_and_checks_itself() -> None:
+    assert Prior.from_array(PRIOR.to_array()) == PRIOR
+    with pytest.raises(ValueError, match="change_sd must be positive"):
+        replace(PRIOR, change_sd=0.0)
+    with pytest.raises(ValueError, match="initial_mean must be finite"):
+        replace(PRIOR, initial_mean=math.nan)
+    with pytest.raises(ValueError, match="outlying_share must lie within"):
+        replace(PRIOR, outlying_share=1.0)
+    with pytest.raises(ValueError, match="law_share must lie within"):
+        replace(PRIOR, law_share=0.0)
+
+
+def test_the_weak_prior_scales_with_the_quantity() -> None:
+    """The same clutch in another unit has the same life."""
+    big = [replace(m, value=1e3 * m.value, variance=1e6 * m.variance) for m in CAMPAIGN]
+    lives = []
+    for measurements in (CAMPAIGN, big):
+        drawn = on_grid(measurements, 500, np.random.default_rng(3))
+        passage = predict_first_passage(drawn, fraction=0.5, as_of=0.0)
+        lives.append(passage.end_of_life[0.5])
+    assert lives[0] == pytest.approx(lives[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("life", [1e2, 1e4, 1e6])
+def test_lives_of_any_length_are_tractable(life: float) -> None:
+    """Measured to 90 % of its life, the end is found within 10 %, whatever the length of the life."""
+    d = replace(TYPICAL, scale=life / 7.4)
+    seen = series(d, np.linspace(0.0, 0.9, 30) * life, 2e-4)
+    drawn = on_grid(seen, 1_000, np.random.default_rng(3), PRIOR)
+    passage = predict_first_passage(drawn, fraction=0.5, as_of=0.9 * life, horizon=1e7)
+    assert passage.end_of_life[0.5] == pytest.approx(float(first_passage(0.067, d)), rel=0.1)
+
+
+@pytest.mark.parametrize("numbers", [(-1.0, 0.1, 0.0), (0.0, math.nan, 0.0), (0.0, 0.1, -1e-9), (math.inf, 0.1, 0.0)])
+def test_measurements_check_themselves(numbers: tuple[float, float, float]) -> None:
+    with pytest.raises(ValueError, match="must"):
+        Measurement(progress=numbers[0], value=numbers[1], variance=numbers[2])
+
+
+def test_systematic_draws_share_out_the_weights() -> None:
+    weight = np.array([0.5, 0.0, 0.3, 0.2])
+    for offset in (0.0, 0.5, 0.999):
+        assert np.bincount(sampling.systematic(weight, 10, offset), minlength=4).tolist() == [5, 0, 3, 2]
+
+
+def test_spread_points_are_more_even_than_chance() -> None:
+    """The share of 200 corners of the cube: these points err by less than half of what independent ones do."""
+    rng = np.random.default_rng(0)
+    edges = rng.random((200, 3))
+    points = sampling.spread_points(1_000, np.full(3, 0.5))
+    assert points.min() > 0.0
+    assert points.max() < 1.0
+
+    def error(sample: np.ndarray) -> float:
+        shares = (sample[None] < edges[:, None]).all(axis=2).mean(axis=1)
+        return float(np.sqrt(np.mean((shares - edges.prod(axis=1)) ** 2)))
+
+    assert error(points) < 0.5 * error(rng.random((1_000, 3)))
+
+
+def test_correlated_pairs_have_their_covariance() -> None:
+    normals = sampling.spread_normals(20_000, np.full(2, 0.5))
+    pair = sampling.correlated_pair(normals, np.full(20_000, 4.0), np.full(20_000, 1.0), np.full(20_000, -1.5))
+    np.testing.assert_allclose(np.cov(pair, rowvar=False), [[4.0, -1.5], [-1.5, 1.0]], atol=0.02)

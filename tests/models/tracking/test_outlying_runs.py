@@ -124,7 +124,6 @@ def test_a_run_a_little_off_may_be_outlying(monkeypatch: pytest.MonkeyPatch) -> 
     expected = float(cloud.outlying[:, 55] @ share / share.sum())
     found = probability()
     monkeypatch.setattr(grid_module, "completed", lambda prior, history, kinds, frame, log_mass: (kinds, frame))  # noqa: ARG005
-    print(f"particles {expected:.3f}, grid {found:.3f}, without a second look {probability():.3f}")
     assert 0.1 < expected < 0.9
     assert found == pytest.approx(expected, abs=0.06)
     assert probability() != pytest.approx(expected, abs=0.1)

@@ -1,4 +1,4 @@
-"""Series of measurements and the filters that follow them, for the tests of tracking."""
+"""Series of measurements, draws, and the filters that follow them, for the tests of tracking and prognosis."""
 
 from dataclasses import replace
 from typing import Any
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from models.degradation.general_order import Degradation, value
+from models.tracking.discrepancy import FUTURE, PAST, Discrepancy
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
@@ -36,6 +37,26 @@ def sent(progress: ArrayLike, values: ArrayLike, variance: float = 0.0, epoch: A
 def on_grid(tests: list[Measurement], count: int, rng: np.random.Generator, prior: Prior | None = None) -> Posterior:
     """Draws of what the grid makes of the tests, by the weak prior of a COF where no other is given."""
     return Grid().posterior(Grid().from_history(prior or weak(tests[0], falling=True), tests), count, rng)
+
+
+def draws_of(count: int, **columns: Any) -> Posterior:
+    """Draws that weigh the same; a number stands for all of them, and scatter is 0.3 % unless given."""
+    given = {"weight": 1.0 / count, "scatter": 0.003} | columns
+    beside = {"discrepancy": given.pop("discrepancy")} if "discrepancy" in given else {}
+    return Posterior(**{name: np.broadcast_to(np.asarray(x, float), count) for name, x in given.items()}, **beside)
+
+
+def beside(count: int, **given: Any) -> Discrepancy:
+    """Over 1,000 cycles, of so many draws: nothing but what is given."""
+    nothing = {
+        "size": np.zeros(count),
+        "curvature": np.zeros((count, PAST + FUTURE)),
+        "at": np.zeros(0),
+        "height": np.zeros((count, 0)),
+        "knee": np.full(count, np.inf),
+        "steepening": np.ones(count),
+    }
+    return Discrepancy(**{"span": 1_000.0} | nothing | given)
 
 
 def followed(tracker: Any, prior: Prior, measurements: list[Measurement], seed: int = 0) -> Any:

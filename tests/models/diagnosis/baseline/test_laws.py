@@ -1,4 +1,4 @@
-"""The baseline: its derivatives against differences, its curve and loops against `stribeck` and `loops.lag_laws`."""
+"""The baseline: its curve and loops against `stribeck` and `loops.lag_laws`, and how its Coulomb ratio falls."""
 
 from dataclasses import replace
 

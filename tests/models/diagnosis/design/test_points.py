@@ -48,12 +48,8 @@ def test_only_the_swing_is_binned(periods: float, held: float, back: float) -> N
     pressures = np.repeat([4e5, 5e5, 6e5], speed.size)
     rpm = np.tile(speed, 3)
     velocity = GEOMETRY.sliding_velocity(rpm * RPM)
-    record = Record(
-        time=np.arange(rpm.size) / RATE,
-        pressure=pressures,
-        speed=rpm * RPM,
-        torque=torque_at(velocity) * pressures / 5e5,
-    )
+    time, torque = np.arange(rpm.size) / RATE, torque_at(velocity) * pressures / 5e5
+    record = Record(time=time, pressure=pressures, speed=rpm * RPM, torque=torque)
     loops, notes = binned_loops(record, GEOMETRY)
     assert [loop.pressure for loop in loops] == [4e5, 5e5, 6e5]
     assert not notes
@@ -186,21 +182,15 @@ def test_a_bin_was_measured_when_its_samples_were(periods: float) -> None:
 def test_dynamic_tests_that_tell_nothing_are_counted() -> None:
     time = np.arange(750) / RATE
     swinging = speed_of(0.1, 1.5, 0.0, 0.0) * RPM
-    tests = [
-        DynamicRun(
-            run_id=f"d{number}",
-            cycles=0.0,
-            record=Record(time=time, pressure=np.full(time.size, 5e5), speed=speed, torque=np.full(time.size, 20.0)),
-        )
-        for number, speed in enumerate((swinging, np.full(time.size, 100.0)))
+    pressure, torque = np.full(time.size, 5e5), np.full(time.size, 20.0)
+    records = [
+        Record(time=time, pressure=pressure, speed=speed, torque=torque) for speed in (swinging, 0.0 * swinging + 100.0)
     ]
-    sentences = [
-        each for each in build_design(Campaign(dynamic=tuple(tests))).notes if each.startswith("Dynamic tests")
-    ]
-    assert len(sentences) == 1
-    assert sentences[0].startswith(
-        "Dynamic tests that could not be evaluated and were left out: 1 of 2 (5 bar: The speed does not "
-    )
-    assert not [
-        each for each in build_design(Campaign(dynamic=tuple(tests[:1]))).notes if each.startswith("Dynamic tests")
-    ]
+    tests = [DynamicRun(run_id=f"d{k}", cycles=0.0, record=each) for k, each in enumerate(records)]
+
+    def said(*some: DynamicRun) -> list[str]:
+        return [note for note in build_design(Campaign(dynamic=some)).notes if note.startswith("Dynamic tests")]
+
+    (sentence,) = said(*tests)
+    assert "could not be evaluated and were left out: 1 of 2 (5 bar: The speed does not " in sentence
+    assert not said(tests[0])

@@ -41,7 +41,9 @@ from models.diagnosis.effects.thermal import HERSEY, log_viscosity_ratio, viscos
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.diagnosis.pooled_fit.projection import gram_of, project
+from tests.measuring import APPENDIX, parts
 from tests.models.diagnosis.campaigns import Study, campaign, of_size, scene_of, study
+from tests.models.diagnosis.tables import TABLES
 
 
 @pytest.fixture(scope="module")
@@ -444,3 +446,9 @@ def test_a_film_of_its_own_strength_relaxes(power: float, thin: float, least: fl
     strength = 0.5 * (points.pressure[one] / 5e5) ** (1.0 + 0.5 * power) * middle / (tau * q * (1 + least) ** (q - 1))
     expected = strength * (height - told.y[0])
     np.testing.assert_allclose(change[one], expected, atol=0.02 * np.abs(expected).max())
+
+
+def test_the_appendix_holds_the_tables_that_the_catalogue_gives() -> None:
+    held = parts((APPENDIX / "diagnosis.md").read_text(encoding="utf-8"))
+    for name, make in TABLES.items():
+        assert held[name] == make(), "run python -m tests.models.diagnosis.tables"

@@ -51,11 +51,6 @@ def test_a_zero_that_settles_is_still_a_zero() -> None:
     assert not [each.title for each in FAULTS if each.title in report.summary]
 
 
-def test_faults_have_slugs_of_their_own() -> None:
-    assert len(FAULT_BY_SLUG) == len(FAULTS)
-    assert not FAULT_BY_SLUG.keys() & BY_SLUG.keys()
-
-
 def curved_pressure(at: Where) -> np.ndarray:
     """M_s is no straight line in pressure."""
     x = (at.pressure - 4e5) / 3e5

@@ -12,13 +12,7 @@ from models.diagnosis.effects.fitted_effect import Estimate
 from models.diagnosis.explanations.decide import decide, explanations_of
 from models.diagnosis.explanations.posterior import Prior, Search, posterior_of
 from models.diagnosis.explanations.shapeless import outlying_run, temperature_evidence
-from models.diagnosis.explanations.verdict import (
-    NOTHING,
-    UNCATALOGUED,
-    Alternative,
-    Explanation,
-    Verdict,
-)
+from models.diagnosis.explanations.verdict import NOTHING, UNCATALOGUED, Alternative, Explanation, Verdict
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
 from models.diagnosis.raw_records.evidence import FIXED_LINE, RawEvidence
 from tests.blind.rig.hide import hide

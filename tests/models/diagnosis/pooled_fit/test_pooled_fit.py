@@ -5,17 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.diagnosis.baseline.laws import Laws
-from models.diagnosis.baseline.prediction import frame_of
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import FROM_THE_START
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.thermal import AT_ONCE
-from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, starting_laws
+from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.diagnosis.pooled_fit.gauss_newton import FitStatus, fit
 from models.diagnosis.pooled_fit.projection import RunScatter, gram_of, projections_of, run_scatter
-from tests.models.diagnosis.campaigns import Study, campaign, rehearsal, study
+from tests.models.diagnosis.campaigns import Study, campaign, rehearsal, start_of, study
 
 # --- A fit says how it ended: converged, without a step that lowers the cost, out of steps, without a finite cost.
 
@@ -25,22 +23,15 @@ def given() -> Study:
     return study(campaign(2, loops=False))
 
 
-def start_of(given: Study) -> Laws:
-    return starting_laws(given.design, frame_of(given.design))
-
-
 def test_enough_steps_converge_and_too_few_do_not(given: Study) -> None:
-    ended = fit(given.problem, start_of(given), steps=60)
+    ended = fit(given.problem, start_of(given.design), steps=60)
     assert ended.status in {FitStatus.CONVERGED, FitStatus.STALLED}
     assert 1 < ended.steps < 60
-    cut = fit(given.problem, start_of(given), steps=1)
+    cut = fit(given.problem, start_of(given.design), steps=1)
     assert (cut.status, cut.steps) == (FitStatus.OUT_OF_STEPS, 1)
     assert cut.cost > ended.cost + 1.0
-    assert fit(given.problem, start_of(given), steps=0).status is FitStatus.OUT_OF_STEPS
-
-
-def test_a_fit_from_its_own_end_makes_no_way(given: Study) -> None:
-    ended = fit(given.problem, start_of(given), steps=60)
+    assert fit(given.problem, start_of(given.design), steps=0).status is FitStatus.OUT_OF_STEPS
+    # from its own end a fit makes no way
     again = fit(given.problem, ended.laws)
     assert again.status in {FitStatus.CONVERGED, FitStatus.STALLED}
     assert ended.cost - 1.0 < again.cost <= ended.cost
@@ -49,7 +40,7 @@ def test_a_fit_from_its_own_end_makes_no_way(given: Study) -> None:
 def test_numbers_that_cannot_be_fitted_are_a_status(given: Study) -> None:
     torque = given.design.torque.copy()
     torque[3] = np.nan
-    broken = fit(replace(given.problem, design=replace(given.design, torque=torque)), start_of(given))
+    broken = fit(replace(given.problem, design=replace(given.design, torque=torque)), start_of(given.design))
     assert broken.status is FitStatus.NOT_FINITE
     assert np.isinf(broken.cost)
 
@@ -89,7 +80,7 @@ def test_one_run_shows_no_scatter_and_it_is_said_to_be_assumed() -> None:
 def test_an_extended_model_is_not_off_all_runs_by_one_share() -> None:
     baseline = fit_baseline(build_design(rehearsal(3, {"oil_temperature": 1.0}, tests=8, noise=0.01)))
     problem = baseline.problem.with_noise(replace(baseline.problem.noise, run_gain=0.02))
-    start = starting_laws(problem.design, frame_of(problem.design))
+    start = start_of(problem.design)
     hersey = FittedEffect(effect=BY_SLUG["oil_temperature"], amplitude=0.1, shape=(-1.0, AT_ONCE, FROM_THE_START))
     found = fit(problem, start, [hersey], steps=40)
     assert abs(np.mean(found.residual / found.torque)) < 0.01

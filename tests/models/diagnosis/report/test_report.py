@@ -16,7 +16,7 @@ from models.diagnosis.pooled_fit.projection import without_likely_gains
 from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.assemble import candidates_of, reason_against, report_of
 from models.diagnosis.report.maps import MOST_BINS, SHOWN, loop_traces, residual_maps
-from models.diagnosis.report.report import Isolability, misfit_of
+from models.diagnosis.report.report import Report, misfit_of
 from models.diagnosis.report.summary import signed
 from models.diagnosis.validation.extended_model import Validation
 from tests.models.diagnosis.campaigns import CYCLES, PRESSURES, SPEEDS, Study, bump, campaign, look, study
@@ -24,6 +24,7 @@ from tests.models.diagnosis.report.test_summary import GAIN
 from tests.models.diagnosis.test_diagnose import late
 
 WORSE = replace(GAIN, log_score_gain=-1.0)
+NOTHING = Validation(extended=None, gain=None)
 LARGER = replace(GAIN, rmse_after=1.1 * GAIN.rmse_before)
 
 
@@ -35,6 +36,16 @@ def given() -> Study:
 @pytest.fixture(scope="module")
 def posterior(given: Study) -> Posterior:
     return posterior_of(given.baseline, ())
+
+
+def reported(
+    given: Study,
+    posterior: Posterior,
+    judgement: Judgement,
+    validation: Validation = NOTHING,
+    sizes: Sizes | None = None,
+) -> Report:
+    return report_of(given.baseline, posterior, judgement, (), validation, sizes or Sizes(by_slug={}), ())
 
 
 @pytest.mark.parametrize(
@@ -51,7 +62,7 @@ def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(give
     assert (judgement.verdict, judgement.causes) == (Verdict.CAUSE_NAMED, ("unsettled_dwell",))
     validation = Validation(extended=judgement.stand[0].fit, gain=gain)
     sizes = sizes_of(posterior.problem, judgement, np.random.default_rng(1))
-    report = report_of(given.baseline, posterior, judgement, (), validation, sizes, ())
+    report = reported(given, posterior, judgement, validation, sizes)
     assert (report.verdict, report.causes) == (judgement.verdict, judgement.causes)
     assert (report.extension is None) == bool(why)
     assert why in report.not_adoptable
@@ -64,20 +75,13 @@ def test_a_fit_that_ran_out_of_steps_is_said_with_what_follows_from_it(given: St
     judgement = judge(posterior)
     (cause,) = judgement.stand
     cut = replace(cause, fit=replace(cause.fit, status=FitStatus.OUT_OF_STEPS))
-    nothing = Validation(extended=None, gain=None)
-
-    def noted(judged: Judgement) -> tuple[str, ...]:
-        return report_of(given.baseline, posterior, judged, (), nothing, Sizes(by_slug={}), ()).notes
-
     expected = "The fit with unsettled dwell ended before its optimum: its probability may be larger than stated."
-    assert expected in noted(replace(judgement, stand=(cut,)))
-    assert expected not in noted(judgement)
+    assert expected in reported(given, posterior, replace(judgement, stand=(cut,))).notes
+    assert expected not in reported(given, posterior, judgement).notes
 
 
 def test_what_no_reading_shows_is_no_candidate(given: Study, posterior: Posterior) -> None:
-    report = report_of(
-        given.baseline, posterior, judge(posterior), (), Validation(extended=None, gain=None), Sizes(by_slug={}), ()
-    )
+    report = reported(given, posterior, judge(posterior))
     loops_only = {"channel_delay", "inertia_torque", "squeeze_film"}
     assert not loops_only & {each.effect for each in report.candidates}
     assert not loops_only & {slug for each in report.explanations for slug in each.effects}
@@ -87,12 +91,9 @@ def test_why_an_extension_is_not_proposed_is_said(given: Study) -> None:
     assert reason_against(LARGER, Sizes(by_slug={})) == ""  # nothing was fitted
     either = Size(value=1e4, sd=2e4, interval=(-2e4, 4e4), other_sign=0.3, courses=True)
     some = Sizes(draws=(Draw(weight=1.0, laws=given.baseline.fit.laws),), by_slug={"pressure_offset": either})
-    assert "size of pressure offset (90 % interval −0.2 to 0.4 bar); it depends on the assumed" in reason_against(
-        GAIN, some
-    )
-    positive = replace(
-        either, interval=(1e3, 4e4), other_sign=0.03, courses=False
-    )  # "not even its sign" was said of it
+    said = reason_against(GAIN, some)
+    assert "size of pressure offset (90 % interval −0.2 to 0.4 bar); it depends on the assumed" in said
+    positive = replace(either, interval=(1e3, 4e4), other_sign=0.03, courses=False)
     said = reason_against(GAIN, replace(some, by_slug={"pressure_offset": positive}))
     assert "(90 % interval 0.01 to 0.4 bar); its sign may be wrong with probability 0.03." in said
     sure = replace(either, interval=(1e4, 4e4), other_sign=0.001)
@@ -102,41 +103,24 @@ def test_why_an_extension_is_not_proposed_is_said(given: Study) -> None:
 # --- Which causes a campaign could tell apart, from its design alone.
 
 
-def isolability(*, loops: bool) -> Isolability:
-    """Of a simulated campaign without an effect and without a thermometer."""
-    tests = campaign(3, loops=loops, temperature=False)
-    return look(tests, 0, isolability=True).isolability
-
-
-@pytest.fixture(scope="module")
-def sweeps() -> Isolability:
-    return isolability(loops=False)
-
-
-def test_a_drag_and_a_shifted_zero_are_parted_by_an_open_clutch(sweeps: Isolability) -> None:
+def test_sweeps_without_a_thermometer_tell_some_causes_apart() -> None:
+    sweeps = look(campaign(3, loops=False, temperature=False), 0, isolability=True).isolability
+    # a drag and a shifted zero are parted by an open clutch
     (pair,) = [pair for pair in sweeps.pairs if set(pair.effects) == {"hydrodynamic_drag", "torque_zero_shift"}]
     assert not pair.apart
     assert "the clutch open" in pair.test
     assert pair.with_trial > 0.9 > pair.probability
-
-
-def test_what_these_tests_cannot_show_is_said(sweeps: Isolability) -> None:
+    # what these tests cannot show is said
     assert {"oil_temperature", "channel_delay", "inertia_torque", "squeeze_film"} <= set(sweeps.unseen)
     shown = {slug for pair in sweeps.pairs for slug in pair.effects}
     assert not shown & set(sweeps.unseen)
     assert not {"shaft_ripple", "stick_slip"} & (shown | set(sweeps.unseen))
-
-
-def test_pairs_come_hardest_first_and_only_those_get_a_test(sweeps: Isolability) -> None:
+    # pairs come hardest first, and only those get a test
     chances = [pair.probability for pair in sweeps.pairs]
     assert chances == sorted(chances)
     for pair in sweeps.pairs:
         assert pair.with_trial >= pair.probability
         assert pair.apart == (pair.probability >= 0.9) == (pair.test == "" and pair.with_trial == pair.probability)
-
-
-def test_it_is_computed_on_request_only() -> None:
-    assert look(campaign(3, loops=False), 0).isolability is None
 
 
 def test_the_size_of_a_swing_has_no_sign(given: Study) -> None:

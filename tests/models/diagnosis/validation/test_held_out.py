@@ -15,17 +15,9 @@ from models.diagnosis.effects.effect import amplitude_precision
 from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns, law_columns
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.validation import held_out
 from models.diagnosis.validation.extended_model import SLUG, smooth_fit
-from models.diagnosis.validation.held_out import (
-    _STEPS,
-    Gain,
-    _ahead,
-    _bridged,
-    _forecast_score,
-    _held,
-    _without,
-    measure_gain,
-)
+from models.diagnosis.validation.held_out import Gain, measure_gain
 from tests.models.diagnosis.campaigns import CYCLES, Study, bump, campaign, study, warmth
 
 TEMPERATURE = ("oil_temperature", 0.3, (0.5, AT_ONCE))
@@ -87,13 +79,13 @@ def test_what_was_learned_of_single_curves_does_not_gain(plain):
     assert found.reduction_percent < 0.25 * inside
     # curves that are held out are unlearned altogether
     out = bumpy.rows.cycles == CYCLES[2]
-    masked = problem.with_noise(_without(problem.noise, out))
+    masked = problem.with_noise(held_out._without(problem.noise, out))
     forgot = fit(masked, memorised.laws, memorised.effects, steps=2)
     sizes_of = [np.array([each.amplitude for each in model.effects]) for model in (memorised, forgot)]
     mine = np.unique(bumpy.curve[out])
     assert np.abs(sizes_of[1][mine]).max() < 0.01 * np.abs(sizes_of[0][mine]).max()
     # the control: every other row held out, the rest of each curve gives its bump away
-    by_row = _held(problem, null, memorised, np.arange(bumpy.torque.size) % 2 == 1)
+    by_row = held_out._held(problem, null, memorised, np.arange(bumpy.torque.size) % 2 == 1)
     assert by_row.score > 0.25 * learned
 
 
@@ -114,10 +106,10 @@ def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
     priors = given.problem.priors
     noise = replace(given.problem.noise, plateaus=Correlation(), loops=Correlation(), run_gain=0.0, curve_gain=0.0)
     extended = given.extended(TEMPERATURE)
-    out = _ahead(given.design)
+    out = held_out._ahead(given.design)
     for model in (given.baseline.fit, extended):
-        masked = given.problem.with_noise(_without(noise, out))
-        found = fit(masked, model.laws, model.effects, steps=_STEPS)
+        masked = given.problem.with_noise(held_out._without(noise, out))
+        found = fit(masked, model.laws, model.effects, steps=held_out._STEPS)
         own = [effect_columns(given.design, found.prediction, each) for each in found.effects]
         laws = law_columns(given.design, found.prediction, found.effects)
         jacobian = np.concatenate([laws[:, priors.free], *own], axis=1)
@@ -134,7 +126,7 @@ def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
         spread = np.linalg.inv(precision * scale[:, None] * scale) * scale[:, None] * scale
         covariance = np.eye(int(out.sum())) + unit[out] @ spread @ unit[out].T
         density = multivariate_normal.logpdf((found.residual / noise.deviation)[out], cov=covariance)
-        score = _forecast_score(given.problem.with_noise(noise), model, out)
+        score = held_out._forecast_score(given.problem.with_noise(noise), model, out)
         assert score == pytest.approx(density + 0.5 * int(out.sum()) * np.log(2 * np.pi), abs=0.05)
         # the control: without the parameters' uncertainty it is another number
         bare = -0.5 * float(np.square(found.residual / noise.deviation)[out].sum())
@@ -147,14 +139,14 @@ def test_loops_at_a_pressure_held_out_take_c_from_its_neighbours():
     out = given.design.level == nodes[2]
     wild = given.baseline.fit.laws.theta.copy()
     wild[ATTRACTOR + 2] += 5.0
-    laws = _bridged(replace(given.baseline.fit.laws, theta=wild), given.design, out)
+    laws = held_out._bridged(replace(given.baseline.fit.laws, theta=wild), given.design, out)
     between = np.interp(nodes[2], nodes[[1, 3]], wild[[ATTRACTOR + 1, ATTRACTOR + 3]])
     assert laws.theta[ATTRACTOR + 2] == pytest.approx(between)
     assert np.array_equal(np.delete(laws.theta, ATTRACTOR + 2), np.delete(wild, ATTRACTOR + 2))
     # held out by state, every pressure has loops left: nothing is touched
     by_state = given.design.rows.cycles == 5000.0
     assert np.array_equal(
-        _bridged(given.baseline.fit.laws, given.design, by_state).theta, given.baseline.fit.laws.theta
+        held_out._bridged(given.baseline.fit.laws, given.design, by_state).theta, given.baseline.fit.laws.theta
     )
 
 

@@ -311,12 +311,13 @@ def test_a_step_of_all_filters_at_once_is_filterpys_step_of_each() -> None:
     )
     assert normals.mean.shape == (2, 6)
     last, reference, unit = CAMPAIGN[8].progress, state.reference, PRIOR.initial_sd
+    after, still = 1.2 * last, np.zeros(0)
     way = Way(
         reference=reference,
         before=last,
-        after=1.2 * last,
-        steps=np.zeros(0),
-        progress=1.2 * last,
+        after=after,
+        steps=still,
+        progress=after,
         value=0.1,
         variance=0.0,
         relative=1.0,
@@ -335,14 +336,8 @@ def test_a_step_of_all_filters_at_once_is_filterpys_step_of_each() -> None:
     assert noise[0].max() == 0.0 < noise[1].max()
     expected, variance, across = ukf.measured(PRIOR, normals.kinds, mean, covariance, way)
     for one in range(2):
-        theirs = UnscentedKalmanFilter(
-            dim_x=6,
-            dim_z=1,
-            dt=1.0,
-            hx=seen,
-            fx=moved,
-            points=MerweScaledSigmaPoints(n=6, alpha=1.0, beta=0.0, kappa=0.0),
-        )
+        points = MerweScaledSigmaPoints(n=6, alpha=1.0, beta=0.0, kappa=0.0)
+        theirs = UnscentedKalmanFilter(dim_x=6, dim_z=1, dt=1.0, hx=seen, fx=moved, points=points)
         theirs.x, theirs.P = normals.mean[one], normals.covariance[one]
         theirs.Q, theirs.R = noise[one] + 1e-9 * np.eye(6), np.array([[0.0]])
         theirs.predict()
@@ -381,17 +376,11 @@ def test_where_every_drawn_course_has_ended_all_are_kept_alike() -> None:
     state = followed(Ukf(), weak(measurements[0], falling=True), measurements[:20])
     growing = SCALE_SIGN[FORM_COURSE[state.form.astype(np.intp)]] < 0.0
     assert growing.any()
-    mean = state.mean[growing]
-    mean[:, 2] = -DOMAIN
-    state = replace(
-        state,
-        form=state.form[growing],
-        log_weight=state.log_weight[growing],
-        mean=mean,
-        covariance=1e-12 * state.covariance[growing],
-        scatter=state.scatter[growing],
-        history=state.history.append(replace(measurements[20], progress=2.0 * state.reference), state.prior),
-    )
+    normals = {name: getattr(state, name)[growing] for name in ("form", "log_weight", "mean", "covariance", "scatter")}
+    normals["mean"][:, 2] = -DOMAIN
+    normals["covariance"] *= 1e-12
+    history = state.history.append(replace(measurements[20], progress=2.0 * state.reference), state.prior)
+    state = replace(state, **normals, history=history)
     drawn = Ukf().posterior(state, 500, np.random.default_rng(0))
     assert (-drawn.scale <= state.history.span).all(), "the case shows nothing: a course has not ended"
     np.testing.assert_array_equal(drawn.weight, 1.0 / 500)
