@@ -43,17 +43,14 @@ class Oil:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StationaryRun:
-    """A stationary test after `cycles` >= 0: its plateaus in the order they were made, and the raw record if one was sent.
-
-    `time` [n] s is the middle of each plateau on the test's own clock where it is known.
-    """
+    """A stationary test after `cycles` >= 0."""
 
     run_id: str
     cycles: float
-    plateaus: Plateaus
+    plateaus: Plateaus  # in the order they were made
     moment: float | None = None
-    time: tuple[float, ...] | None = None
-    record: Record | None = None
+    time: tuple[float, ...] | None = None  # [n] s, the middle of each plateau on the test's own clock where it is known
+    record: Record | None = None  # the raw record if one was sent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,19 +65,16 @@ class DynamicRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DutyRun:
-    """A block of duty that ends at `cycles`: engagements, energy of each [J], initial speed [rad/s], pressure [Pa].
-
-    None stands for a quantity that the rig did not send; `record` is one engagement's trace if it was sent.
-    """
+    """A block of duty that ends at `cycles`; None stands for a quantity that the rig did not send."""
 
     run_id: str
     cycles: float
     engagements: float
-    energy: float | None = None
-    initial_speed: float | None = None
-    maximum_pressure: float | None = None
+    energy: float | None = None  # of each [J]
+    initial_speed: float | None = None  # [rad/s]
+    maximum_pressure: float | None = None  # [Pa]
     moment: float | None = None
-    record: Record | None = None
+    record: Record | None = None  # one engagement's trace if it was sent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

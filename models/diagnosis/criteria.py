@@ -6,11 +6,13 @@ without an origin was chosen, and no record was kept of what else was tried. λ 
 of an effect (`pooled_fit.projection`), for the best hypothesis estimated by the drop of its cost.
 """
 
+from scipy.constants import zero_Celsius
+
 # --- design --------------------------------------------------------------------------------------------------------------
 
 #: Oil temperature [K] to which everything refers where none was measured.
 #: Derived: the middle of the 80 to 90 °C of Ompusunggu et al. 2013, section 2.3.
-REFERENCE_TEMPERATURE = 273.15 + 85.0
+REFERENCE_TEMPERATURE = zero_Celsius + 85.0
 #: Torque [Nm] and pressure [Pa] of the clutch in whose size the effects' priors are given, and the time on one plateau [s]
 #: where none was sent. Derived: Ompusunggu et al. 2013, section 2.3.3.
 USUAL_TORQUE, USUAL_PRESSURE, PLATEAU_DURATION = 25.0, 5e5, 5.0
@@ -69,6 +71,9 @@ DISCREPANCY_SD = 0.25
 
 # --- pooled fit ----------------------------------------------------------------------------------------------------------
 
+#: Gauss-Newton steps from a fit nearby, as of a size under another course or without some rows, and those after which starts
+#: are compared (it bounds the time; nothing of held-out rows is left after so many).
+FEW_STEPS = 12
 #: Fewest plateaus of stationary tests under pressure for a baseline (a Stribeck curve has four parameters and the laws over
 #: pressure and life multiply them), and the fewest distinct speeds among them that determine a curve.
 FEWEST_ROWS, CURVE_SPEEDS = 24, 4
@@ -120,8 +125,6 @@ CHANGES_WITHIN_TESTS = (0.0, *CHANGES_BETWEEN_TESTS)
 
 # --- explanations: sizes -----------------------------------------------------------------------------------------------
 
-#: Gauss-Newton steps of a refit under another course at most, from the fit under its neighbour (it bounds the time).
-COURSE_STEPS = 12
 #: Degrees of freedom of a size's prior once its effect is held to be at work [-]: p ∝ 1/|a| but for the smallest. Chosen:
 #: with the search's 2, eight of eight offsets of 0.7 to 1.5 bar came out small, by 15 % in the mean.
 SIZE_TAILS = 0.1

@@ -36,13 +36,10 @@ class NotFiniteError(ArithmeticError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Extension:
-    """An extended model, ready to be stored as JSON and applied to runs that come later.
+    """An extended model, ready to be stored as JSON and applied to runs that come later."""
 
-    `effects` are slugs; `content` is what `to_dict` stores: plain numbers, strings, lists and dicts, all finite.
-    """
-
-    effects: tuple[str, ...]
-    content: Mapping[str, Any]
+    effects: tuple[str, ...]  # slugs
+    content: Mapping[str, Any]  # what `to_dict` stores: plain numbers, strings, lists and dicts, all finite
 
     @property
     def weights(self) -> FloatArray:
@@ -149,7 +146,7 @@ def build_extension(draws: Sequence[Draw], facts: Facts, ranges: Ranges, *, cour
         content={
             "facts": facts_to(facts),
             "ranges": {along.value: list(range_) for along, range_ in ranges.items()},
-            "laws": [_stored_laws(shared) for shared in laws],
+            "laws": [{"theta": shared.theta.tolist(), "frame": facts_to(shared.frame)} for shared in laws],
             "draws": [
                 {
                     "weight": draw.weight,
@@ -172,38 +169,32 @@ def build_extension(draws: Sequence[Draw], facts: Facts, ranges: Ranges, *, cour
     )
 
 
-def facts_to(facts: Facts) -> dict[str, Any]:
-    """Facts as JSON can carry them: arrays as lists, what is not a number as None."""
-    stored: dict[str, Any] = {}
-    for field in fields(Facts):
-        value = getattr(facts, field.name)
-        if isinstance(value, Geometry | Oil):
-            stored[field.name] = asdict(value)
-        elif isinstance(value, np.ndarray | tuple):
-            stored[field.name] = [None if math.isnan(float(x)) else float(x) for x in value]
-        else:
-            stored[field.name] = value
+def facts_to(facts: Facts | Frame) -> dict[str, Any]:
+    """Facts, or a frame, as JSON can carry them: arrays as lists, what is not a number as None."""
+    stored = asdict(facts)
+    for name, value in stored.items():
+        if isinstance(value, np.ndarray | tuple):
+            stored[name] = [None if math.isnan(float(x)) else float(x) for x in value]
     return stored
 
 
 def facts_from(stored: Mapping[str, Any]) -> Facts:
     """The inverse of `facts_to`."""
-    values: dict[str, Any] = dict(stored) | {"geometry": Geometry(**stored["geometry"]), "oil": Oil(**stored["oil"])}
-    for field in fields(Facts):
-        value = values[field.name]
-        if isinstance(value, list):
+    return Facts(
+        **_arrays_of(Facts, stored) | {"geometry": Geometry(**stored["geometry"]), "oil": Oil(**stored["oil"])}
+    )
+
+
+def _arrays_of(kind: type[Facts | Frame], stored: Mapping[str, Any]) -> dict[str, Any]:
+    """What is stored with its lists as the arrays, or tuples, that they were."""
+    values = dict(stored)
+    for field in fields(kind):
+        if isinstance(value := stored[field.name], list):
             numbers = [math.nan if x is None else x for x in value]
             values[field.name] = np.array(numbers, dtype=np.float64) if field.type is FloatArray else tuple(numbers)
-    return Facts(**values)
-
-
-def _stored_laws(laws: Laws) -> dict[str, Any]:
-    frame = {field.name: getattr(laws.frame, field.name) for field in fields(Frame)}
-    frame["loop_pressures"] = laws.frame.loop_pressures.tolist()
-    return {"theta": laws.theta.tolist(), "frame": frame}
+    return values
 
 
 def _laws(stored: Mapping[str, Any]) -> Laws:
-    frame = stored["frame"]
-    at = Frame(**(frame | {"loop_pressures": np.array(frame["loop_pressures"], dtype=np.float64)}))
-    return Laws(theta=np.array(stored["theta"], dtype=np.float64), frame=at)
+    frame = Frame(**_arrays_of(Frame, stored["frame"]))
+    return Laws(theta=np.array(stored["theta"], dtype=np.float64), frame=frame)

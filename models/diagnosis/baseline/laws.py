@@ -53,14 +53,13 @@ _LEAST_VELOCITY = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """The reference of the laws: the lowest and highest pressure [Pa], the last state [cycles], the pressures of the
-    loops [l] Pa, ascending, and a velocity [m/s] in the middle of what was measured."""
+    """The reference of the laws."""
 
-    lowest: float
+    lowest: float  # pressure [Pa]
     highest: float
-    last: float
-    loop_pressures: FloatArray
-    reference_velocity: float
+    last: float  # state [cycles]
+    loop_pressures: FloatArray  # [l] Pa, ascending
+    reference_velocity: float  # [m/s], in the middle of what was measured
 
     @property
     def span(self) -> float:
@@ -205,17 +204,16 @@ def curve(velocity: FloatArray, parameters: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """The baseline at points [P]: curve S [Nm]; the parameters [P, 4] and the gradient [P, 4] of S by them; decay
-    e = exp(-V_S/v); by_velocity ∂S/∂v [Nm s/m]. With the clutch open there is no friction: all but parameters and e is 0."""
+    """The baseline at points [P]; with the clutch open there is no friction: all but parameters and decay is 0."""
 
     points: Points
     facts: Facts
     laws: Laws
-    parameters: FloatArray
-    curve: FloatArray
-    gradient: FloatArray
-    decay: FloatArray
-    by_velocity: FloatArray
+    parameters: FloatArray  # [P, 4]
+    curve: FloatArray  # S [Nm]
+    gradient: FloatArray  # [P, 4] of S by the parameters
+    decay: FloatArray  # e = exp(-V_S/v)
+    by_velocity: FloatArray  # ∂S/∂v [Nm s/m]
 
     @property
     def by_pressure(self) -> FloatArray:

@@ -41,14 +41,13 @@ _LEAST_SHARE = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lag:
-    """keep e^-x and mean_keep (1 - e^-x)/x of each step [l, k]; torque M [l, k] Nm; ratio M/S [l, k]; by_log_attractor
-    ∂M/∂log C [l, k]."""
+    """The lag of loops [l] at phases [k]."""
 
-    keep: FloatArray
-    mean_keep: FloatArray
-    torque: FloatArray
-    ratio: FloatArray
-    by_log_attractor: FloatArray
+    keep: FloatArray  # e^-x of each step [l, k]
+    mean_keep: FloatArray  # (1 - e^-x)/x
+    torque: FloatArray  # M [l, k] Nm
+    ratio: FloatArray  # M/S
+    by_log_attractor: FloatArray  # ∂M/∂log C
 
     def follow(self, change: FloatArray) -> FloatArray:
         """R[(M/S) δS]: the change of the loops' torque [l, k, m] Nm by a change of the stationary curve [l, k, m] Nm."""

@@ -11,6 +11,7 @@ have public channel names, or a name of our own where no channel is it.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,40 +34,24 @@ IntArray = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
-    """Columns [n].
+    """Columns [n]: plateaus, or phases of loops."""
 
-    run                index into Design.runs
-    cycles
-    pressure           [Pa]; where the clutch is open the campaign's lowest closed pressure, for the laws hold for no other
-                       (no friction acts there, see `engaged`)
-    engaged            1, or 0 where the clutch is open
-    velocity           [m/s] >= 0, folded; sign ±1 says which way the clutch turned
-    acceleration       [m/s²] of the folded velocity
-    temperature        of the oil [K], NaN where not measured
-    plate_rise         of the plate above the oil [K], NaN where not measured
-    clock              [s] since the test began
-    moment             [s] since 1970, NaN where unknown
-    angular_frequency  [rad/s], 0 at plateaus
-    phase              [rad]
-    loop               index, -1 at plateaus
-    previous           index of the plateau before it in the same run, -1 where there is none
-    """
-
-    run: IntArray
+    run: IntArray  # index into Design.runs
     cycles: FloatArray
+    # [Pa]; where the clutch is open the campaign's lowest closed pressure, for the laws hold for no other
     pressure: FloatArray
-    engaged: FloatArray
-    velocity: FloatArray
-    sign: FloatArray
-    acceleration: FloatArray
-    temperature: FloatArray
-    plate_rise: FloatArray
-    clock: FloatArray
-    moment: FloatArray
-    angular_frequency: FloatArray
-    phase: FloatArray
-    loop: IntArray
-    previous: IntArray
+    engaged: FloatArray  # 1, or 0 where the clutch is open: no friction acts there
+    velocity: FloatArray  # [m/s] >= 0, folded
+    sign: FloatArray  # ±1, which way the clutch turned
+    acceleration: FloatArray  # [m/s²] of the folded velocity
+    temperature: FloatArray  # of the oil [K], NaN where not measured
+    plate_rise: FloatArray  # of the plate above the oil [K], NaN where not measured
+    clock: FloatArray  # [s] since the test began
+    moment: FloatArray  # [s] since 1970, NaN where unknown
+    angular_frequency: FloatArray  # [rad/s], 0 at plateaus
+    phase: FloatArray  # [rad]
+    loop: IntArray  # index, -1 at plateaus
+    previous: IntArray  # index of the plateau before it in the same run, -1 where there is none
 
     @property
     def steady(self) -> NDArray[np.bool_]:
@@ -86,27 +71,19 @@ def mark_open(points: Points) -> Points:
     return replace(points, engaged=closed.astype(np.float64), pressure=np.where(closed, points.pressure, lowest))
 
 
-#: Columns of whole numbers, and what stands where nothing is given (0 in all others).
-_INTEGERS: dict[str, int] = {"run": 0, "loop": -1, "previous": -1}
-_USUAL = {"engaged": 1.0, "sign": 1.0, "temperature": np.nan, "plate_rise": np.nan, "moment": np.nan}
+#: What stands where nothing is given (0 in all others).
+_USUAL: dict[str, float] = {"engaged": 1, "sign": 1, "loop": -1, "previous": -1}
+_USUAL |= dict.fromkeys(("temperature", "plate_rise", "moment"), np.nan)
 
 
 def points_of(count: int, **known: FloatArray | IntArray | float | None) -> Points:
     """So many points, plateaus of a closed clutch that turns forwards unless given; what was not measured is None."""
-    given = {name: values for name, values in known.items() if values is not None}
-    integers = {name: np.full(count, given.get(name, usual), dtype=np.intp) for name, usual in _INTEGERS.items()}
-    floats = {
-        field.name: np.full(count, given.get(field.name, _USUAL.get(field.name, 0.0)), dtype=np.float64)
-        for field in fields(Points)
-        if field.name not in integers
-    }
-    return Points(**integers, **floats)  # type: ignore[arg-type] # names are the fields' own
-
-
-def concatenate(blocks: list[Points]) -> Points:
-    """All blocks one after the other; no blocks give no points."""
-    columns = {field.name: [getattr(block, field.name) for block in blocks] for field in fields(Points)}
-    return Points(**{name: np.concatenate(parts) for name, parts in columns.items()}) if blocks else points_of(0)
+    columns: dict[str, Any] = {}
+    for field in fields(Points):
+        given = known.get(field.name)
+        values = _USUAL.get(field.name, 0) if given is None else given
+        columns[field.name] = np.full(count, values, dtype=np.intp if field.type is IntArray else np.float64)
+    return Points(**columns)
 
 
 def thinned(campaign: Campaign, notes: list[str]) -> Campaign:
@@ -148,41 +125,26 @@ class RunInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
-    """What the baseline and the effects are fitted to.
+    """What the baseline and the effects are fitted to."""
 
-    points [P]              plateaus first, then PHASES points a loop
-    rows [N]                plateaus first, then the loops' bins
-    torque [N] Nm           measured, folded
-    samples [N]             how many were averaged in each row
-    level [N] Pa            pressure level, 0 where the clutch is open
-    curve [N]               an index that the rows of one run at one level share
-    bins [N - plateaus]     which bin of the flat (loop, bin) order each loop row is
-    bin_offset [N - plateaus]  how far past that bin's middle (in bins) its samples lie
-    period_differences      rows [n] of a loop, and what a further period of it differs by there [n] Nm, as if each were one
-                            sample (`design.loop_bins`)
-    chains [b, n]           rows that follow each other in a run or loop, those of one length together
-    plateaus, loops         how many
-    bin_autocorrelation     of neighbouring bins, and of those next but one, estimated from the loops' samples; None where
-                            these are too few
-    notes                   what was left out
-    """
-
-    points: Points
-    rows: Points
-    torque: FloatArray
-    samples: FloatArray
-    level: FloatArray
-    curve: IntArray
-    bins: IntArray
-    bin_offset: FloatArray
+    points: Points  # [P] plateaus first, then PHASES points a loop
+    rows: Points  # [N] plateaus first, then the loops' bins
+    torque: FloatArray  # [N] Nm, measured, folded
+    samples: FloatArray  # [N] how many were averaged in each row
+    level: FloatArray  # [N] Pa, pressure level, 0 where the clutch is open
+    curve: IntArray  # [N] an index that the rows of one run at one level share
+    bins: IntArray  # [N - plateaus] which bin of the flat (loop, bin) order each loop row is
+    bin_offset: FloatArray  # [N - plateaus] how far past that bin's middle (in bins) its samples lie
+    # rows [n] of a loop, and what a further period of it differs by there [n] Nm, as if each were one sample (`loop_bins`)
     period_differences: tuple[tuple[IntArray, FloatArray], ...]
-    chains: tuple[IntArray, ...]
-    plateaus: int
+    chains: tuple[IntArray, ...]  # [b, n] rows that follow each other in a run or loop, those of one length together
+    plateaus: int  # how many
     loops: int
+    # of neighbouring bins, and of those next but one, by the loops' samples; None where these are too few
     bin_autocorrelation: tuple[float, float] | None
     runs: tuple[RunInfo, ...]
     facts: Facts
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what was left out
 
     @property
     def closed(self) -> NDArray[np.bool_]:
@@ -218,7 +180,7 @@ def build_design(campaign: Campaign) -> Design:
     notes: list[str] = []
     kept = thinned(campaign, notes)
     runs: list[RunInfo] = []
-    blocks: list[Points] = []
+    blocks = [points_of(0)]
     torques = [np.zeros(0)]
     plateaus = 0
     for run in kept.stationary:
@@ -242,7 +204,8 @@ def build_design(campaign: Campaign) -> Design:
     if reasons:
         count = f"{len(reasons)} of {len(kept.dynamic)} ({reasons[0].rstrip('.')})"
         notes.append(f"Dynamic tests that could not be evaluated and were left out: {count}.")
-    points = mark_open(concatenate(blocks))
+    columns = {field.name: [getattr(block, field.name) for block in blocks] for field in fields(Points)}
+    points = mark_open(Points(**{name: np.concatenate(parts) for name, parts in columns.items()}))
     binned, filled, offsets = (
         np.concatenate([np.zeros(0), *(getattr(loop, name) for loop in loops)])
         for name in ("torque", "samples", "bin_offset")

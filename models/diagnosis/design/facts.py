@@ -20,40 +20,27 @@ REFERENCES = ("reference_temperature", "usual_torque", "usual_pressure")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """What the effects need to know beside the rows. Cycles and moments are as in the campaign.
-
-    states [s]                 distinct cycles at which friction was tested (not those where the clutch was only open),
-                               ascending
-    oil_changes, sensor_zeros  cycles of maintenance
-    rests                      cycles of rests: logged as maintenance, or a long gap in the moments
-    rest_moments               when the rest ended [s], NaN where unknown; rest_lengths [s] likewise
-    duty_ends [d]              cycles at the end of each block whose energy is known, ascending; duty_energies [d] J an
-                               engagement
-    first_moment, last_moment  [s] of the timed tests, None where fewer than two were timed
-    usual_torque, usual_pressure  medians over the closed clutch [Nm], [Pa]
-    plate_warming              the plate's rise above the oil at no heat flux of friction [K], and what it rises by with that
-                               [K m²/W]; None where its temperature was not measured
-    plate_in_all_tests         whether it was measured in every test
-    """
+    """What the effects need to know beside the rows. Cycles and moments are as in the campaign."""
 
     geometry: Geometry
     oil: Oil
-    states: FloatArray
+    states: FloatArray  # distinct cycles [s] at which friction was tested (with the clutch closed), ascending
     temperature_measured: bool
     reference_temperature: float
-    oil_changes: tuple[float, ...]
+    oil_changes: tuple[float, ...]  # cycles of maintenance
     sensor_zeros: tuple[float, ...]
-    rests: tuple[float, ...]
-    rest_moments: tuple[float, ...]
-    rest_lengths: tuple[float, ...]
-    duty_ends: FloatArray
-    duty_energies: FloatArray
-    first_moment: float | None = None
+    rests: tuple[float, ...]  # cycles of rests: logged as maintenance, or a long gap in the moments
+    rest_moments: tuple[float, ...]  # when the rest ended [s], NaN where unknown
+    rest_lengths: tuple[float, ...]  # [s], NaN where unknown
+    duty_ends: FloatArray  # [d] cycles at the end of each block whose energy is known, ascending
+    duty_energies: FloatArray  # [d] J an engagement
+    first_moment: float | None = None  # [s] of the timed tests, None where fewer than two were timed
     last_moment: float | None = None
-    usual_torque: float = criteria.USUAL_TORQUE
+    usual_torque: float = criteria.USUAL_TORQUE  # medians over the closed clutch [Nm], [Pa]
     usual_pressure: float = criteria.USUAL_PRESSURE
+    # the plate's rise above the oil at no heat flux of friction [K], and what it rises by with that [K m²/W], if measured
     plate_warming: tuple[float, float] | None = None
-    plate_in_all_tests: bool = False
+    plate_in_all_tests: bool = False  # whether its temperature was measured in every test
 
     @property
     def life(self) -> float:
@@ -83,11 +70,12 @@ def facts_of(campaign: Campaign) -> Facts:
     ]
     rests = _rests(campaign)
     timed = [run.moment for run in campaign.tests if run.moment is not None]
-    spread = bool(timed) and max(timed) > min(timed)
+    span = (min(timed), max(timed)) if len(set(timed)) > 1 else (None, None)
     torques, pressures = (
         np.concatenate([np.abs(getattr(table, name)[rows]) for _, table, rows in under_load] or [np.zeros(0)])
         for name in ("torque", "pressure")
     )
+    events = {kind: {event.cycles for event in campaign.maintenance if event.event is kind} for kind in EventKind}
     with_energy = [duty for duty in campaign.duty if duty.energy is not None and duty.energy > 0]
     return Facts(
         geometry=campaign.geometry,
@@ -97,17 +85,17 @@ def facts_of(campaign: Campaign) -> Facts:
         reference_temperature=float(np.median(np.concatenate(temperatures)))
         if temperatures
         else criteria.REFERENCE_TEMPERATURE,
-        oil_changes=_events(campaign, EventKind.OIL_CHANGE),
-        sensor_zeros=_events(campaign, EventKind.SENSOR_ZERO),
+        oil_changes=tuple(sorted(events[EventKind.OIL_CHANGE])),
+        sensor_zeros=tuple(sorted(events[EventKind.SENSOR_ZERO])),
         rests=tuple(rests),
         rest_moments=tuple(end for end, _ in rests.values()),
         rest_lengths=tuple(length for _, length in rests.values()),
         duty_ends=np.array([duty.cycles for duty in with_energy], dtype=np.float64),
         duty_energies=np.array([duty.energy for duty in with_energy], dtype=np.float64),
-        first_moment=min(timed) if spread else None,
-        last_moment=max(timed) if spread else None,
-        usual_torque=_median(torques, criteria.USUAL_TORQUE),
-        usual_pressure=_median(pressures, criteria.USUAL_PRESSURE),
+        first_moment=span[0],
+        last_moment=span[1],
+        usual_torque=max(float(np.median(torques)), 1e-9) if torques.size else criteria.USUAL_TORQUE,
+        usual_pressure=max(float(np.median(pressures)), 1e-9) if pressures.size else criteria.USUAL_PRESSURE,
         plate_warming=_plate_warming(campaign),
         plate_in_all_tests=bool(tests) and all(table.plate_temperature is not None for _, table in tests),
     )
@@ -128,14 +116,6 @@ def _plate_warming(campaign: Campaign) -> tuple[float, float] | None:
             slope = max(float(off @ rise) / max(float(off @ off), 1e-300), (1.0 / 0.32e6))
             return float(rise.mean() - slope * flux.mean()), slope
     return None
-
-
-def _median(values: FloatArray, otherwise: float) -> float:
-    return max(float(np.median(values)), 1e-9) if values.size else otherwise
-
-
-def _events(campaign: Campaign, kind: EventKind) -> tuple[float, ...]:
-    return tuple(sorted({event.cycles for event in campaign.maintenance if event.event is kind}))
 
 
 def _rests(campaign: Campaign) -> dict[float, tuple[float, float]]:

@@ -55,44 +55,37 @@ _FINE = 6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BinnedLoop:
-    """One pressure of a dynamic test [Pa].
+    """One pressure of a dynamic test, at PHASES phases and in BINS bins."""
 
-    At PHASES phases: phase [rad], velocity [m/s] >= 0, acceleration [m/s²], clock [s], plate_rise [K] above the oil, NaN
-    where not measured.
-    In BINS bins: torque [Nm] (folded); samples, how many it is the mean of, 0 where the bin is not used; bin_offset, how far
-    past the bin's middle [of a bin] they lie on average (with a rate that is a multiple of the speed's, always as far).
-    period_differences [p, BINS] Nm (`design.loop_bins`).
-    temperature [K], NaN where not measured; angular_frequency [rad/s]; sign ±1; autocorrelation of its samples, or None."""
-
-    pressure: float
+    pressure: float  # [Pa]
     sign: float
-    temperature: float
-    angular_frequency: float
-    phase: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
-    clock: FloatArray
-    plate_rise: FloatArray
-    torque: FloatArray
-    samples: FloatArray
+    temperature: float  # [K], NaN where not measured
+    angular_frequency: float  # [rad/s]
+    phase: FloatArray  # [PHASES] rad
+    velocity: FloatArray  # [PHASES] m/s >= 0
+    acceleration: FloatArray  # [PHASES] m/s²
+    clock: FloatArray  # [PHASES] s
+    plate_rise: FloatArray  # [PHASES] K above the oil, NaN where not measured
+    torque: FloatArray  # [BINS] Nm, folded
+    samples: FloatArray  # [BINS] how many the torque is the mean of, 0 where the bin is not used
+    # [BINS] how far past the bin's middle [of a bin] they lie (with a rate that is a multiple of the speed's, always as far)
     bin_offset: FloatArray
-    period_differences: FloatArray
+    period_differences: FloatArray  # [p, BINS] Nm
     autocorrelation: SampleAutocorrelation | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Stretch:
-    """Samples [n] at one pressure [Pa], folded: time [s], velocity [m/s], torque [Nm]; the sign, the mean oil temperature
-    [K], the plate's rise above the oil [n] K (None where not measured), and the record's first time [s]."""
+    """Samples [n] at one pressure, folded."""
 
-    time: FloatArray
-    velocity: FloatArray
-    torque: FloatArray
-    pressure: float
+    time: FloatArray  # [s]
+    velocity: FloatArray  # [m/s]
+    torque: FloatArray  # [Nm]
+    pressure: float  # [Pa]
     sign: float
-    temperature: float
-    plate_rise: FloatArray | None
-    test_start: float
+    temperature: float  # mean of the oil [K]
+    plate_rise: FloatArray | None  # above the oil [n] K, None where not measured
+    test_start: float  # the record's first time [s]
 
 
 def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], list[str]]:
@@ -121,12 +114,9 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
             test_start=float(time[0]),
         )
         cycle = _speed_cycle(samples.time, samples.velocity, before)
-        if isinstance(cycle, str):
-            if stretch.pressure > 0:
-                notes.append(f"{stretch.pressure / 1e5:.3g} bar: {cycle}")
-            continue
-        before = cycle
-        loop = _binned(samples, cycle)
+        if not isinstance(cycle, str):
+            before = cycle
+        loop = cycle if isinstance(cycle, str) else _binned(samples, cycle)
         if not isinstance(loop, str):
             loops.append(loop)
         elif stretch.pressure > 0:

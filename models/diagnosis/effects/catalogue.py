@@ -49,13 +49,12 @@ def effects_for(facts: Facts, without: frozenset[str] = frozenset()) -> list[Eff
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """One point of an effect's grid: the effect, its shape, its log prior weight (normalised over the effect's grid), and
-    that of all points that differ from it in smooth shapes only."""
+    """One point of an effect's grid."""
 
     effect: Effect
     shape: Shape
-    log_weight: float
-    log_weight_around: float
+    log_weight: float  # its prior weight, normalised over the effect's grid
+    log_weight_around: float  # that of all points that differ from it in smooth shapes only
 
 
 def columns_of(effects: Sequence[Effect], facts: Facts) -> list[Column]:

@@ -30,6 +30,8 @@ from models.diagnosis.design.design import IntArray, Points
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.design.loop_bins import PHASES
 
+#: Powers of life in which an offset, a zero or a gain that creeps is tried first [-].
+CREEPS = (0.5, 1.0, 2.0)
 #: The onset of what is at work in every test [cycles].
 FROM_THE_START = -1.0
 #: Values of an effect's shape parameters, in the order of `Effect.shapes`.
@@ -68,18 +70,15 @@ class Discrepancy(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShapeParameter:
-    """A shape parameter: its name and unit; `smooth` where the change may be differentiated in it (then it is refined
-    between grid values, within its bounds), else it is taken from the grid; `held` where a smooth one stays at the values of
-    `Effect.courses` while a size is averaged over them: the size bends with it; `lags` where it says (1 or 0) whether
-    friction in loops lags behind the change."""
+    """A shape parameter."""
 
     name: str
     unit: str
     lowest: float = -math.inf
     highest: float = math.inf
-    smooth: bool = False
-    held: bool = False
-    lags: bool = False
+    smooth: bool = False  # the change may be differentiated in it: it is refined between grid values, within its bounds
+    held: bool = False  # a smooth one that stays at the values of `Effect.courses` while a size is averaged over them
+    lags: bool = False  # it says (1 or 0) whether friction in loops lags behind the change
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,56 +91,42 @@ class Tried:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """An effect of the catalogue.
+    """An effect of the catalogue, or a rig fault."""
 
-    slug and title are public; physics is a sentence; formula the change of torque; source where it is from.
-    channels: what must have been measured or sent for it to be judged (public names). amplitude, unit: the name and unit
-    of the amplitude; prior_sd: its prior deviation in that unit (zero mean, either sign unless `positive`), for a clutch of
-    the reference's size where it `grows_with` something (`sized`);
-    `scale` turns the SI amplitude into `unit`.
-    grid(facts) gives the shapes to be tried (one, without a parameter), none where the campaign cannot show the effect.
-    change(scene, amplitude, shape) -> [P] Nm at the scene's points (0: averages do not show it). before_lag: whether it
-    changes the stationary curve, which friction in loops then lags behind, or the measured torque itself; None where that
-    is unknown and a shape says.
-    discrepancies: along what its form is uncertain (`effects.fitted_effect`); an exact law has none.
-    courses(facts) gives the shapes between which a size is averaged; None: as it was fitted.
-    several(scene, settings) -> [P, m] Nm is its change for many (amplitude, shape) at once, where that is cheaper.
-    begins: whether its last shape is the cycle from which on it is at work (`begins` below).
-    tails: degrees of freedom of the amplitude's prior (`effects.effect`), infinite for a normal one.
-    counts_in_severity: its amplitude is the exponent by which ζ counts engagements (no torque is added along a life).
-    named: whether it may be named as a cause; where not, what it explains is uncatalogued and lies on `axis`
-    (`design.design`).
-    article: what stands before its name where it is the cause (`a`, `changed`).
-    opposite_physics: a sentence for a negative amplitude, where `physics` holds for a positive one only.
-    """
-
-    slug: str
+    slug: str  # public, as the title is
     title: str
-    physics: str
-    formula: str
+    physics: str  # a sentence
+    formula: str  # the change of torque
     source: str
     kind: Kind
-    channels: tuple[str, ...] = ()
-    amplitude: str
+    channels: tuple[str, ...] = ()  # what must have been measured or sent for it to be judged (public names)
+    amplitude: str  # its name
     unit: str
+    # its prior deviation in SI units (zero mean), for a clutch of the reference's size where it `grows_with` something
     prior_sd: float
-    positive: bool = False
-    scale: float = 1.0
+    positive: bool = False  # else either sign
+    scale: float = 1.0  # turns the SI amplitude into `unit`
     shapes: tuple[ShapeParameter, ...] = ()
+    # the shapes to be tried, none where the campaign cannot show the effect
     grid: Callable[[Facts], tuple[Tried, ...]] = lambda _: (Tried(shape=()),)
+    # (scene, amplitude, shape) -> [P] Nm at the scene's points (0: averages do not show it)
     change: Callable[[Scene, float, Shape], FloatArray] = lambda scene, _, __: np.zeros_like(scene.curve)
+    # whether it changes the stationary curve, which friction in loops then lags behind, or the measured torque itself; None
+    # where that is unknown and a shape says
     before_lag: bool | None
-    discrepancies: tuple[Discrepancy, ...] = ()
-    tails: float = 2.0
+    discrepancies: tuple[Discrepancy, ...] = ()  # along what its form is uncertain; an exact law has none
+    tails: float = 2.0  # degrees of freedom of the amplitude's prior, infinite for a normal one
+    # the shapes between which a size is averaged; None: as it was fitted
     courses: Callable[[Facts], tuple[Tried, ...]] | None = None
+    # (scene, settings) -> [P, m] Nm, the change for many (amplitude, shape) at once, where that is cheaper
     several: Callable[[Scene, Sequence[tuple[float, Shape]]], FloatArray] | None = None
-    begins: bool = False
+    begins: bool = False  # whether its last shape is the cycle from which on it is at work (`begins` below)
     grows_with: Measure | None = None
-    counts_in_severity: bool = False
-    named: bool = True
+    counts_in_severity: bool = False  # its amplitude is the exponent by which ζ counts engagements, no torque
+    named: bool = True  # whether it may be named as a cause; else what it explains is uncatalogued and lies on `axis`
     axis: str = ""
-    article: str = ""
-    opposite_physics: str = ""
+    article: str = ""  # what stands before its name where it is the cause (`a`, `changed`)
+    opposite_physics: str = ""  # a sentence for a negative amplitude, where `physics` holds for a positive one only
 
     def changes(self, scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
         """The changes [P, m] Nm of several (amplitude, shape)."""
@@ -196,9 +181,8 @@ def begins(effect: Effect) -> Effect:
         return (*always, *later)
 
     def several(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
-        onsets = np.array(
-            [max(shape[own:], default=FROM_THE_START) for _, shape in settings]
-        )  # stored ones may have none
+        # an extension that was stored without an onset is at work from the start
+        onsets = np.array([max(shape[own:], default=FROM_THE_START) for _, shape in settings])
         at_work = scene.points.cycles[:, None] > onsets
         return np.where(at_work, effect.changes(scene, [(size, shape[:own]) for size, shape in settings]), 0.0)
 
@@ -214,13 +198,11 @@ def begins(effect: Effect) -> Effect:
 
 def sized(effect: Effect, facts: Facts) -> Effect:
     """The effect with the prior that fits this campaign's clutch."""
-    factor = {
-        Measure.TORQUE: facts.usual_torque / criteria.USUAL_TORQUE,
-        Measure.PRESSURE: facts.usual_pressure / criteria.USUAL_PRESSURE,
-    }
-    return (
-        effect if effect.grows_with is None else replace(effect, prior_sd=effect.prior_sd * factor[effect.grows_with])
-    )
+    if effect.grows_with is None:
+        return effect
+    of_torque = facts.usual_torque / criteria.USUAL_TORQUE
+    factor = of_torque if effect.grows_with is Measure.TORQUE else facts.usual_pressure / criteria.USUAL_PRESSURE
+    return replace(effect, prior_sd=effect.prior_sd * factor)
 
 
 def unit_changes(effect: Effect, scene: Scene, shapes: Sequence[Shape]) -> FloatArray:

@@ -15,11 +15,9 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene, curve
 from models.diagnosis.design.design import CLOCK, CYCLES, PRESSURE, SPEED, IntArray
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Effect, Kind, Shape, ShapeParameter, Tried, begins, life_of
+from models.diagnosis.effects.effect import CREEPS, Effect, Kind, Shape, ShapeParameter, Tried, begins, life_of
 from models.friction.stribeck import PARAMETER_NAMES
 
-#: Powers of the cycles in which a gain creeps [-].
-CREEP_POWERS = (0.5, 1.0, 2.0)
 #: The first shape of a gain over life says whether it steps (at the cycle that follows) or creeps (by the power).
 _STEP, _CREEP = 0.0, 1.0
 
@@ -47,14 +45,18 @@ def _gains_with_life(facts: Facts) -> tuple[Tried, ...]:
         return ()
     weight = -float(np.log(len(facts.onsets)))
     steps = tuple(Tried(shape=(_STEP, onset), log_weight=weight) for _, onset, _ in facts.onsets)
-    weight = -float(np.log(len(CREEP_POWERS)))
-    return steps + tuple(Tried(shape=(_CREEP, power), log_weight=weight) for power in CREEP_POWERS)
+    weight = -float(np.log(len(CREEPS)))
+    return steps + tuple(Tried(shape=(_CREEP, power), log_weight=weight) for power in CREEPS)
 
 
 def _gain_with_life(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     course, value = shape
     share = np.where(scene.points.cycles > value, 1.0, 0.0) if course == _STEP else life_of(scene) ** value
     return np.asarray(amplitude * share * scene.curve, dtype=np.float64)
+
+
+def _gains_with_clock(_: Facts) -> tuple[Tried, ...]:
+    return tuple(Tried(shape=(time, in_loops)) for time in (0.0, 60.0, 150.0, 400.0) for in_loops in (0.0, 1.0))
 
 
 def _gain_with_clock(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
@@ -130,7 +132,7 @@ FAULTS: tuple[Effect, ...] = (
             "a S t/30 min, or a S (1 - e^{-t/τ})",
             CLOCK,
             _gain_with_clock,
-            lambda _: tuple(Tried(shape=(time, loops)) for time in (0.0, 60.0, 150.0, 400.0) for loops in (0.0, 1.0)),
+            _gains_with_clock,
             shapes=2,
         )
     ),

@@ -24,13 +24,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import BLOCKS, RAISED, Laws, Scene
 from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.design.design import Design, Points
-from models.diagnosis.effects.effect import (
-    Discrepancy,
-    Effect,
-    Kind,
-    Shape,
-    amplitude_precision,
-)
+from models.diagnosis.effects.effect import Discrepancy, Effect, Kind, Shape, amplitude_precision
 
 #: Steps of the differences: shares of the prior deviation and of a shape's range; and of a law's largest value.
 _STEP, _RAISE = 1e-3, 1e-6
@@ -38,13 +32,12 @@ _STEP, _RAISE = 1e-3, 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FittedEffect:
-    """An effect in a model: its amplitude, its shape, and in a draw the factors b [m] of its discrepancy and of its
-    template's small errors."""
+    """An effect in a model."""
 
     effect: Effect
     amplitude: float
     shape: Shape
-    factors: tuple[float, ...] = ()
+    factors: tuple[float, ...] = ()  # in a draw: b [m] of its discrepancy and of its template's small errors
 
     @property
     def wrong_sign(self) -> bool:
@@ -204,16 +197,15 @@ HALF_WIDTH = 1.6448536269514722
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """The amplitude of an effect in engineering units: its name, value, standard deviation and unit; `one_sided` where it
-    cannot be negative; its 90 % interval and the probability of its sign where those are not the normal ones."""
+    """The amplitude of an effect in engineering units."""
 
     name: str
     value: float
     sd: float
     unit: str
-    one_sided: bool = False
-    stated_interval: tuple[float, float] | None = None
-    stated_sign: float | None = None
+    one_sided: bool = False  # where it cannot be negative
+    stated_interval: tuple[float, float] | None = None  # of 90 %, where it is not the normal one
+    stated_sign: float | None = None  # its probability likewise
 
     @property
     def interval(self) -> tuple[float, float]:

@@ -206,7 +206,10 @@ def _rest_recovery_change(scene: Scene, amplitude: float, shape: Shape) -> Float
     length, clocked, settling, power, part = shape
     points, seconds = scene.points, math.exp(settling)
     share = np.zeros_like(points.cycles)
-    strengths = _strengths(scene.facts) ** power
+    # what settles grows with the logarithm of the pause; 1 after the longest, and where the length is not known
+    grown = np.log1p(np.maximum(np.array(scene.facts.rest_lengths, dtype=np.float64), 60.0) / 3600.0)
+    timed = np.isfinite(grown)
+    strengths = np.where(timed, grown / max(float(grown[timed].max(initial=0.0)), 1e-9), 1.0) ** power
     for rest, moment, strength in zip(scene.facts.rests, scene.facts.rest_moments, strengths.tolist(), strict=True):
         since = points.cycles - rest
         left = np.where(since >= 0, strength * np.exp(-np.maximum(since, 0.0) / length), 0.0)
@@ -216,13 +219,6 @@ def _rest_recovery_change(scene: Scene, amplitude: float, shape: Shape) -> Float
             left = left * np.exp(-np.clip(waited / seconds, 0.0, 50.0))
         share = np.maximum(share, left)
     return np.asarray(amplitude * _carried(scene, part) * share, dtype=np.float64)
-
-
-def _strengths(facts: Facts) -> FloatArray:
-    """[r] What settles grows with the logarithm of the pause; 1 after the longest, and where the length is not known."""
-    grown = np.log1p(np.maximum(np.array(facts.rest_lengths, dtype=np.float64), 60.0) / 3600.0)
-    timed = np.isfinite(grown)
-    return np.where(timed, grown / max(float(grown[timed].max(initial=0.0)), 1e-9), 1.0)
 
 
 REST_RECOVERY = Effect(

@@ -14,6 +14,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import (
+    CREEPS,
     Discrepancy,
     Effect,
     Kind,
@@ -53,11 +54,7 @@ def _torque_zero_shift_grid(facts: Facts) -> tuple[Tried, ...]:
     if facts.states.size > 2:
         courses = (LIFE,) if facts.first_moment is None else (LIFE, DAYS)
         weight = -0.7 - float(np.log(len(courses)))
-        tried += [
-            Tried(shape=(course, power, *STRAIGHT), log_weight=weight)
-            for course in courses
-            for power in (0.5, 1.0, 2.0)
-        ]
+        tried += [Tried(shape=(course, power, *STRAIGHT), log_weight=weight) for course in courses for power in CREEPS]
     return tuple(tried)
 
 
@@ -137,12 +134,12 @@ TORQUE_ZERO_SHIFT = Effect(
 
 #: Courses of the offset over life x = ζ/ζ_last, 1 at its end: constant, x^q, from a cycle on, or x (1 + s)/(x + s).
 OFFSET_CONSTANT, OFFSET_GROWING, OFFSET_STEP, OFFSET_SETTLING = map(float, range(4))
-#: Powers q from which a fit starts, and those between which a size is averaged (chosen as those of a zero).
-OFFSET_STARTS, OFFSET_POWERS = (0.5, 1.0, 2.0), (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 2.8)
+#: Powers q between which a size is averaged (chosen as those of a zero).
+OFFSET_POWERS = (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 2.8)
 
 
 def _pressure_offset_grid(facts: Facts) -> tuple[Tried, ...]:
-    return _offsets(facts, [(OFFSET_GROWING, 0.0, math.log(power)) for power in OFFSET_STARTS])
+    return _offsets(facts, [(OFFSET_GROWING, 0.0, math.log(power)) for power in CREEPS])
 
 
 def _pressure_offset_courses(facts: Facts) -> tuple[Tried, ...]:
@@ -154,7 +151,7 @@ def _offsets(facts: Facts, growing: Sequence[Shape]) -> tuple[Tried, ...]:
     """Constant; along the life, as probable together as the starts; from a cycle on."""
     tried = [Tried(shape=(OFFSET_CONSTANT, 0.0, 0.0))]
     if facts.states.size > 2:
-        tried += [Tried(shape=shape, log_weight=math.log(len(OFFSET_STARTS) / len(growing))) for shape in growing]
+        tried += [Tried(shape=shape, log_weight=math.log(len(CREEPS) / len(growing))) for shape in growing]
         weight = -math.log(len(facts.onsets))
         tried += [Tried(shape=(OFFSET_STEP, onset, 0.0), log_weight=weight) for _, onset, _ in facts.onsets]
     return tuple(tried)

@@ -16,6 +16,7 @@ stays at the oil's temperature leaves nothing of this effect. The viscous term m
 import math
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
@@ -36,7 +37,7 @@ from models.diagnosis.effects.effect import (
 from models.friction.stribeck import GAMMA
 
 _CST = 1e-6
-_LOW, _HIGH = 273.15 + 40.0, 273.15 + 100.0
+_LOW, _HIGH = zero_Celsius + 40.0, zero_Celsius + 100.0
 
 
 def viscosity(temperature: FloatArray, oil: Oil) -> FloatArray:
@@ -66,9 +67,8 @@ AT_ONCE, STARTS = math.log(0.3), (math.log(1.0), math.log(15.0))
 
 
 def _oil_temperature_grid(facts: Facts) -> tuple[Tried, ...]:
-    if not facts.temperature_measured:
-        return ()
-    return tuple(Tried(shape=(share, late)) for share in (HERSEY, -1.0, 0.0, 0.5, 1.0) for late in STARTS)
+    shares = (HERSEY, -1.0, 0.0, 0.5, 1.0) if facts.temperature_measured else ()
+    return tuple(Tried(shape=(share, late)) for share in shares for late in STARTS)
 
 
 def _oil_temperature_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:

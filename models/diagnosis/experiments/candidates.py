@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
@@ -32,27 +33,21 @@ Run = TypeVar("Run", StationaryRun, DynamicRun)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """What a test would be. `text` is for the engineer, empty where it is only made as a part of others.
+    """What a test would be."""
 
-    loops: a dynamic test at `frequency` [Hz]; else a stationary test, with speeds `falling`. Either with the oil at
-    `temperature` [K] (None: as usual), pressures times `pressure` [-] (of loops at LIGHT times that of the lowest one,
-    where it is not 1; 0: the clutch is open, one sweep of the speeds PASSES times over, or ten periods, as one
-    run); `times` over, each as the first. `later`: how many usual distances between states it lies ahead,
-    with `energy` [-] times the usual energy of an engagement up to there. `rest` [s]: a pause before the first test and
-    every second one after it. `parts`: keys of the trials that it consists of, and nothing else.
-    """
-
-    text: str
-    loops: bool = False
-    frequency: float = 0.3
-    temperature: float | None = None
-    falling: bool = False
+    text: str  # for the engineer, empty where it is only made as a part of others
+    loops: bool = False  # a dynamic test, else a stationary one
+    frequency: float = 0.3  # [Hz] of a dynamic test
+    temperature: float | None = None  # of the oil [K], None: as usual
+    falling: bool = False  # the speeds of a stationary test
+    # times the usual pressures [-] (of loops at LIGHT times that of the lowest one, where it is not 1; 0: the clutch is
+    # open, one sweep of the speeds PASSES times over, or ten periods, as one run)
     pressure: float = 1.0
-    times: int = 1
-    later: int = 0
-    energy: float = 1.0
-    rest: float = 0.0
-    parts: tuple[str, ...] = ()
+    times: int = 1  # each as the first
+    later: int = 0  # how many usual distances between states it lies ahead
+    energy: float = 1.0  # times the usual energy of an engagement up to there [-]
+    rest: float = 0.0  # a pause before the first test and every second one after it [s]
+    parts: tuple[str, ...] = ()  # keys of the trials that it consists of, and nothing else
 
 
 _LOOPS = "dynamic test at 0.3 Hz, ten periods a pressure, 60 samples a second, at the usual speeds"
@@ -62,7 +57,7 @@ _LIGHT_TESTS = f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}"
 _ALL_LOADS = f"{_LIGHT_SWEEP}, and {_LOOPS}, at the usual pressures and then {_LIGHT}"
 _OPEN_SWEEP = "stationary test with the clutch open (no pressure), at the usual speeds, five times over"
 _OPEN_TESTS = f"{_OPEN_SWEEP}, and dynamic test at 0.3 Hz with the clutch open, ten periods"
-_SIXTY, _HUNDRED = 333.15, 373.15
+_SIXTY, _HUNDRED = zero_Celsius + 60.0, zero_Celsius + 100.0
 
 TRIALS: dict[str, Trial] = {
     "loops_0.3hz": Trial(text=f"{_LOOPS}, at the usual pressures", loops=True),
@@ -251,20 +246,18 @@ OIL_SETTLING, DUTY_CYCLE = 60.0, 20.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """One test: its kind, pressures [Pa] and speeds [rad/s] in the order in which they are set (of a dynamic test the lowest
-    and the highest), frequency [Hz] and periods of a dynamic test, oil temperature [K] (None: as usual), repeats; the cycles
-    at which it is made, the pause before it [s], and minutes on the rig, those of the duty cycles up to it included."""
+    """One test of a protocol."""
 
     kind: str
-    pressures: tuple[float, ...]
-    speeds: tuple[float, ...]
-    frequency: float | None = None
+    pressures: tuple[float, ...]  # [Pa] in the order in which they are set
+    speeds: tuple[float, ...]  # [rad/s] likewise; of a dynamic test the lowest and the highest
+    frequency: float | None = None  # [Hz] of a dynamic test
     periods: int | None = None
-    temperature: float | None
+    temperature: float | None  # of the oil [K], None: as usual
     repeats: int = 1
-    cycles: float
-    pause: float = 0.0
-    minutes: float
+    cycles: float  # at which it is made
+    pause: float = 0.0  # before it [s]
+    minutes: float  # on the rig, those of the duty cycles up to it included
 
 
 def steps_of(campaign: Campaign, key: str) -> tuple[Step, ...]:
@@ -278,10 +271,13 @@ def steps_of(campaign: Campaign, key: str) -> tuple[Step, ...]:
     settling = 0.0 if trial.temperature is None else OIL_SETTLING
     steps = list[Step]()
     before = max((run.cycles for run in campaign.tests), default=0.0)
+    timed = sorted({(run.cycles, run.moment) for run in campaign.stationary if run.moment is not None})
+    paces = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(timed) if b[0] > a[0]]
+    pace = float(np.median(paces)) if paces else DUTY_CYCLE  # seconds of a duty cycle, between tests of known moments
     for number, run in enumerate(then.stationary[len(campaign.stationary) :]):
         table, pause = run.plateaus, trial.rest * float(number % 2 == 0)
         minutes = criteria.PLATEAU_DURATION * table.torque.size / 60.0 * trial.times + settling + pause / 60.0
-        minutes += _pace(campaign) * (run.cycles - before) / 60.0
+        minutes += pace * (run.cycles - before) / 60.0
         before = run.cycles
         steps.append(
             Step(
@@ -317,10 +313,3 @@ def _in_order(values: FloatArray) -> tuple[float, ...]:
     """The distinct values in the order in which they first come."""
     _, first = np.unique(values, return_index=True)
     return tuple(float(value) for value in values[np.sort(first)])
-
-
-def _pace(campaign: Campaign) -> float:
-    """Seconds of a duty cycle: the median between tests of known moments."""
-    timed = sorted({(run.cycles, run.moment) for run in campaign.stationary if run.moment is not None})
-    paces = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(timed) if b[0] > a[0]]
-    return float(np.median(paces)) if paces else DUTY_CYCLE

@@ -51,21 +51,16 @@ _WARM = "sweep_60c"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Advice:
-    """A test that would decide between two effects (or between an effect and none, then `other` is BASELINE).
+    """A test that would decide between two effects, or between an effect and none."""
 
-    `key` names the test for machines (`experiments.candidates.TRIALS`), `nats` is what it is expected to bring,
-    `probability` that it leaves one candidate alone; `narrows`: of a cause without a rival, its size's deviation after the
-    test as a share of today's (0 where it was not asked for); `steps` are what the rig is to do.
-    """
-
-    key: str
+    key: str  # for machines (`experiments.candidates.TRIALS`)
     test: str
     effect: str
-    other: str
-    nats: float
-    probability: float = 0.0
-    narrows: float = 0.0
-    steps: tuple[Step, ...] = ()
+    other: str  # BASELINE for none
+    nats: float  # what it is expected to bring
+    probability: float = 0.0  # that it leaves one candidate alone
+    narrows: float = 0.0  # of a cause without a rival: its size's deviation after it, a share of today's; else 0
+    steps: tuple[Step, ...] = ()  # what the rig is to do
 
     @property
     def minutes(self) -> float:

@@ -7,9 +7,8 @@ information and the score of (a, c) at the fit, δ = a - a_f and r = a/a_f:
 
     ln p(a) = s_a δ - I_aa δ²/2 + max_c (r (s_c - I_ca δ)ᵀ c - r² cᵀ I_cc c/2 - Σ c²/(2 sd²))
 
-Were all jointly normal, an effect might vanish, or turn its sign, while its shapes' part explains the data: a film with 15
-nats of evidence was 1.9 ± 1.5 of its unit, and its sign was open. Integrated over the c instead, an effect with many that
-are determined is pulled towards nothing, for c has more room there (docs/appendix/diagnosis.md).
+Were all jointly normal, an effect might vanish, or turn its sign, while its shapes' part explains the data; integrated over
+the c instead, an effect with many that are determined is pulled towards nothing (docs/appendix/diagnosis.md).
 """
 
 from collections.abc import Iterator
@@ -30,13 +29,12 @@ _WIDE, _NEAR, _REACH = 401, 49, 8.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proportional:
-    """info [m, m] and score [m] of all amplitudes, shapes and errors, without their priors; their deviations `sd` [m],
-    infinite for an amplitude and 0 for what is not at work; the place `of` [m] their effect, amplitudes before the rest."""
+    """All amplitudes, shapes and errors [m], amplitudes before the rest."""
 
-    info: FloatArray
-    score: FloatArray
-    sd: FloatArray
-    of: IntArray
+    info: FloatArray  # [m, m], without their priors
+    score: FloatArray  # [m] likewise
+    sd: FloatArray  # [m] their deviations, infinite for an amplitude and 0 for what is not at work
+    of: IntArray  # [m] the place of their effect
     effects: tuple[FittedEffect, ...]
 
     def log_integral(self) -> float:

@@ -7,7 +7,6 @@ the torque, bumps and kinks in speed, waves over a loop's phase, and single stat
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import product
 from typing import TypeAlias
 
@@ -28,16 +27,8 @@ TORQUE_WAVES, SPEED_WAVES = 20, range(4, 17)
 MOST_ORDER = 8
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Contrasts:
-    """columns [N, m] Nm at the rows, and the axis [m] on which each lives."""
-
-    columns: FloatArray
-    axes: tuple[str, ...]
-
-
-def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
-    """Every contrast that the design can show."""
+def contrasts_of(design: Design, prediction: Prediction) -> tuple[FloatArray, list[str]]:
+    """Every contrast that the design can show: columns [N, m] Nm at the rows, and the axis [m] on which each lives."""
     rows = design.rows
     torque = rows.engaged * np.abs(prediction.torque)  # with the clutch open there is no friction to be wrong
     steady, looping = rows.steady.astype(np.float64), 1.0 - rows.steady
@@ -69,7 +60,11 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
     reading = _unit(torque, design.closed)
     for t in range(1, TORQUE_WAVES + 1):
         add(TORQUE, _cosine(t, reading))
-    _add_clock(design, add, steady)
+    clock = rows.clock / max(float(rows.clock[rows.steady & design.closed].max(initial=1.0)), 1e-9)
+    for t in range(1, 7):
+        add(CLOCK, _cosine(t, clock) * steady)
+        if states > 1:
+            add(CLOCK, _cosine(t, clock) * steady * _cosine(1, life))
     if design.loops:
         _add_loops(design, add, np.asarray(looping, dtype=np.float64), lives, presses)
     if np.isfinite(rows.temperature).any():
@@ -80,7 +75,7 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
         add(TEMPERATURE, warm * _cosine(1, pressure))
         if lives:
             add(TEMPERATURE, warm * _cosine(1, life))
-    return Contrasts(columns=np.stack(columns, axis=1), axes=tuple(axes)) if columns else no_contrasts(design)
+    return np.stack(columns, axis=1) if columns else np.zeros((design.torque.size, 0)), axes
 
 
 def _over_the_laws(design: Design, prediction: Prediction) -> tuple[list[FloatArray], list[str]]:
@@ -113,20 +108,6 @@ def _axis(s: int, p: int, z: int) -> str:
         return SPEED
     least = 2 if s == 0 and z > 0 else 1
     return PRESSURE if p >= least else CYCLES
-
-
-def no_contrasts(design: Design) -> Contrasts:
-    """None at all."""
-    return Contrasts(columns=np.zeros((design.torque.size, 0)), axes=())
-
-
-def _add_clock(design: Design, add: Add, steady: FloatArray) -> None:
-    rows = design.rows
-    clock = rows.clock / max(float(rows.clock[rows.steady & design.closed].max(initial=1.0)), 1e-9)
-    for t in range(1, 7):
-        add(CLOCK, _cosine(t, clock) * steady)
-        if design.facts.states.size > 1:
-            add(CLOCK, _cosine(t, clock) * steady * _cosine(1, _rank(rows.cycles)))
 
 
 def _add_loops(design: Design, add: Add, looping: FloatArray, lives: int, presses: int) -> None:

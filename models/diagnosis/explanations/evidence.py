@@ -27,7 +27,7 @@ from models.diagnosis.effects.fitted_effect import (
     ranges_of,
     small_factors_at,
 )
-from models.diagnosis.explanations.contrasts import contrasts_of, no_contrasts
+from models.diagnosis.explanations.contrasts import contrasts_of
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.problem import FitProblem
@@ -37,15 +37,14 @@ from models.gaussian_evidence import independent, log_gain, log_gain_alone, log_
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
-    """About one fit [nats, up to one constant]: `whole` with the templates' errors; `structure` by axis what smooth
-    structure adds to it, and `patterns` its likeliest form [N] Nm; `screened` are the given changes projected off the fit,
-    one for each scatter of the gains; `misfit` is χ²/N, what is left of the residual when the templates' errors and
-    structure on all axes, at its largest size, have taken their part (where it was wanted), near 1 where that is noise."""
+    """About one fit [nats, up to one constant]."""
 
-    whole: float
-    structure: Mapping[str, float]
-    patterns: Mapping[str, FloatArray]
-    screened: tuple[Projected, ...]
+    whole: float  # with the templates' errors
+    structure: Mapping[str, float]  # what smooth structure adds to it, by axis
+    patterns: Mapping[str, FloatArray]  # its likeliest form [N] Nm
+    screened: tuple[Projected, ...]  # the given changes projected off the fit, one for each scatter of the gains
+    # χ²/N that is left when the templates' errors and structure on all axes, at its largest size, have taken their part (if
+    # it was wanted), near 1 where that is noise
     misfit: float
 
 
@@ -53,19 +52,16 @@ def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = No
     """The evidence about a fit, with changes [N, m] Nm `beside` it projected for the screen of one thing more, and smooth
     structure beside it unless not wanted."""
     design = problem.design
-    contrasts = contrasts_of(design, fitted.prediction) if smooth else no_contrasts(design)
+    nothing = np.zeros((design.torque.size, 0))
+    contrasts, lies = contrasts_of(design, fitted.prediction) if smooth else (nothing, [])
     factors, own = template_errors(design, fitted)
-    changes = (
-        np.zeros((design.torque.size, 0)) if beside is None else beside,
-        contrasts.columns,
-        off_by(design, fitted, factors),
-    )
+    changes = (nothing if beside is None else beside, contrasts, off_by(design, fitted, factors))
     gram = gram_of(problem, fitted, np.concatenate(changes, axis=1))
     gram, outward = _held_at_bounds(gram, int(problem.priors.free.sum()), fitted)
     ends = np.cumsum([outward.size, *(change.shape[1] for change in changes)])
     held, catalogue, contrasted, wrong = (slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
-    axes = np.array(contrasts.axes)
-    places = {axis: contrasted.start + np.flatnonzero(axes == axis) for axis in dict.fromkeys(contrasts.axes)}
+    axes = np.array(lies)
+    places = {axis: contrasted.start + np.flatnonzero(axes == axis) for axis in dict.fromkeys(lies)}
     prior = _log_prior(fitted)
     wholes, screened = [], []
     structures: dict[str, list[float]] = {axis: [] for axis in places}
@@ -90,7 +86,7 @@ def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = No
         whole=whole,
         structure={axis: log_sum(logs) - whole for axis, logs in structures.items()},
         patterns={
-            axis: contrasts.columns[:, axes == axis] @ _likeliest(projections[int(np.argmax(structures[axis]))], mine)
+            axis: contrasts[:, axes == axis] @ _likeliest(projections[int(np.argmax(structures[axis]))], mine)
             for axis, mine in places.items()
         },
         screened=tuple(screened),

@@ -49,13 +49,12 @@ from models.gaussian_evidence import log_gain_alone, log_positive, log_sum
 
 
 class Start(NamedTuple):
-    """A kind of an effect's shapes: what it promises [nats, its prior included], its best column, the place of the scatter
-    of the gains that suits that, and the linear fit of it."""
+    """A kind of an effect's shapes."""
 
-    promise: float
-    column: Column
-    gain: int
-    fitted: FittedEffect
+    promise: float  # [nats], its prior included
+    column: Column  # its best
+    gain: int  # the place of the scatter of the gains that suits that
+    fitted: FittedEffect  # the linear fit of it
 
 
 def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str, list[Start]]:
@@ -98,14 +97,13 @@ Key: TypeAlias = tuple[Alternative, Kinds]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Node:
-    """An alternative that was refitted: its fit, its log evidence [nats] with that of its kind of shapes and of raw records,
-    and what it had been promised to be."""
+    """An alternative that was refitted."""
 
     fit: Fit
     evidence: Evidence
-    shape_evidence: tuple[float, ...]
-    log_evidence: float
-    promise: float
+    shape_evidence: tuple[float, ...]  # of its kind of shapes [nats]
+    log_evidence: float  # with that, and that of raw records
+    promise: float  # what it had been promised to be
 
     @property
     def kind(self) -> Kinds:
@@ -115,16 +113,14 @@ class Node:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Posterior:
-    """Log weights [nats] over nothing by alternative, prior included; of those that were refitted the best node; the
-    probability of each vibration, independent of the rest; the problem that all refits share, and the columns that were
-    screened."""
+    """What the search found."""
 
-    weights: Mapping[Alternative, float]
-    nodes: Mapping[Alternative, Node]
-    vibrations: Mapping[str, float]
+    weights: Mapping[Alternative, float]  # log weights [nats] over nothing, prior included
+    nodes: Mapping[Alternative, Node]  # the best one of each alternative that was refitted
+    vibrations: Mapping[str, float]  # the probability of each, independent of the rest
     prior: "Prior"
-    problem: FitProblem
-    columns: tuple[Column, ...]
+    problem: FitProblem  # that all refits share
+    columns: tuple[Column, ...]  # that were screened
     refits: int
 
     @property

@@ -40,7 +40,7 @@ from models.diagnosis.explanations.evidence import projections_beside
 from models.diagnosis.noise.covariance import Noise, whitened
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, refit_beside
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import Projected, gram_of, projections_of, without_likely_gains
+from models.diagnosis.pooled_fit.projection import gram_of, projections_of, without_likely_gains
 from models.gaussian_evidence import log_gain, log_mean, log_sum
 
 #: Steps of half a cycle a test: the first (two and a half cycles), slower ones that it must exceed, and the size of a
@@ -193,16 +193,11 @@ def temperature_evidence(problem: FitProblem, fitted: Fit) -> float:
     columns, between, within = _courses(problem.design, fitted)
     gram = gram_of(problem, fitted, columns)
     projections = list(projections_of(gram, problem.noise))
-    gained = [projected.evidence + _averaged(projected, between, within) for projected in projections]
-    return log_sum(gained) - log_sum([projected.evidence for projected in projections])
-
-
-def _averaged(projected: Projected, between: FloatArray, within: FloatArray) -> float:
-    """Over the strengths."""
     strengths = product(criteria.CHANGES_BETWEEN_TESTS, criteria.CHANGES_WITHIN_TESTS)
     # of ln ν by some 3 K, as ASTM D341 has it near 85 °C
     sds = [0.06 * (b * between + w * within) for b, w in strengths]
-    return log_mean([log_gain(projected.info, projected.score, sd) for sd in sds])
+    gained = [p.evidence + log_mean([log_gain(p.info, p.score, sd) for sd in sds]) for p in projections]
+    return log_sum(gained) - log_sum([projected.evidence for projected in projections])
 
 
 def _courses(design: Design, fitted: Fit) -> tuple[FloatArray, FloatArray, FloatArray]:

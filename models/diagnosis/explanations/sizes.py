@@ -41,15 +41,15 @@ _AMPLITUDES = 200
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Size:
-    """The size of an effect after the last state, given that it is at work: mean and deviation, the 90 % interval; the
-    probability that it is at work without the likelier sign, for nothing of it may be left by then; `courses` whether likely
-    courses ask for different signs."""
+    """The size of an effect after the last state, given that it is at work."""
 
     value: float
     sd: float
-    interval: tuple[float, float]
-    other_sign: float
-    courses: bool
+    interval: tuple[float, float]  # of 90 %
+    other_sign: (
+        float  # the probability that it is at work without the likelier sign, for nothing of it may be left by then
+    )
+    courses: bool  # whether likely courses ask for different signs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,16 +62,14 @@ class Sizes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Component:
-    """A refit with its weight: mean and root of the covariance of (amplitude, smooth shapes) of each effect, then their b;
-    `trend` is what a draw changes between the first state and the last, and its derivatives; `last` φ after the last state
-    by effect."""
+    """A refit with its weight."""
 
     weight: float
     fit: Fit
-    mean: FloatArray
-    root: FloatArray
-    trend: tuple[float, FloatArray]
-    last: tuple[FloatArray, ...]
+    mean: FloatArray  # of (amplitude, smooth shapes) of each effect, then their b
+    root: FloatArray  # of the covariance
+    trend: tuple[float, FloatArray]  # what a draw changes between the first state and the last, and its derivatives
+    last: tuple[FloatArray, ...]  # φ after the last state by effect
 
     def effects(self, off: FloatArray) -> tuple[FittedEffect, ...]:
         """The effects at one sample [m]."""
@@ -170,7 +168,7 @@ def _components(problem: FitProblem, original: Fit, share: float, rng: np.random
     fitted = replace(original, effects=tuple(effects))
     courses = list(_courses(problem, fitted))
     if not courses:
-        courses = [(0.0, fit(problem, fitted.laws, fitted.effects, steps=criteria.COURSE_STEPS))]
+        courses = [(0.0, fit(problem, fitted.laws, fitted.effects, steps=criteria.FEW_STEPS))]
     logs = np.array([log for log, _ in courses])
     weights = np.exp(logs - logs.max())
     for weight, (_, fitted) in zip((share * weights / weights.sum()).tolist(), courses, strict=True):
@@ -199,7 +197,7 @@ def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
                 for index in way:
                     shape = _with_free(kind[index].shape, effect)
                     tried = replace(near[place], effect=held, shape=shape)
-                    refit = fit(problem, laws, (*near[:place], tried, *near[place + 1 :]), steps=criteria.COURSE_STEPS)
+                    refit = fit(problem, laws, (*near[:place], tried, *near[place + 1 :]), steps=criteria.FEW_STEPS)
                     if not np.isfinite(refit.cost) or refit.wrong_sign:
                         break
                     log = evidence_of(problem, refit, smooth=False).whole + kind[index].log_weight

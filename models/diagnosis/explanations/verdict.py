@@ -12,7 +12,7 @@ import numpy as np
 
 from models.diagnosis.design.design import CLOCK, CYCLES, FREQUENCY
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
-from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
+from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.raw_records.evidence import FIXED_LINE
 
 #: A line over the tests' clock; lines, with the axes on which they lie. One run that is not like the others.
@@ -73,12 +73,11 @@ UNCATALOGUED = "uncatalogued"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Explanation:
-    """Slugs of the effects at work (UNCATALOGUED among them, or none), the probability that these and no others are, and
-    the probability that the estimated amplitudes have the right signs (None where nothing was estimated)."""
+    """One of the explanations, which exclude each other."""
 
-    effects: tuple[str, ...]
-    probability: float
-    sign_probability: float | None = None
+    effects: tuple[str, ...]  # slugs of those at work (UNCATALOGUED among them), or none
+    probability: float  # that these and no others are
+    sign_probability: float | None = None  # that the estimated amplitudes have the right signs; None where nothing was
 
 
 def probabilities_by_slug(explanations: Iterable[Explanation]) -> dict[str, float]:
@@ -105,42 +104,29 @@ class Where:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fitted:
-    """Causes that were fitted together: by slug in the order of the fit's effects, their evidence [nats] over nothing, and
-    the probability that they and no others of the catalogue are at work."""
+    """Causes that were fitted together."""
 
-    slugs: tuple[str, ...]
+    slugs: tuple[str, ...]  # in the order of the fit's effects
     fit: Fit
-    evidence: float
-    probability: float
-
-    @property
-    def unfinished(self) -> bool:
-        """Whether the fit ran out of steps: its evidence is a lower bound."""
-        return self.fit.status is FitStatus.OUT_OF_STEPS
+    evidence: float  # [nats] over nothing
+    probability: float  # that they and no others of the catalogue are at work
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
-    """The verdict and its causes, read off the explanations (most probable first); of what was fitted the causes that
-    `stand`, best first, and the `others`; the axes on which structure lies, most evidence first; `likest` the slug of the
-    fault that is the likeliest of all that has no name, if one is; evidence [nats] by slug of effects alone."""
+    """The verdict, and what was fitted behind it."""
 
     verdict: Verdict
     causes: tuple[str, ...] = ()
-    explanations: tuple[Explanation, ...] = ()
-    stand: tuple[Fitted, ...] = ()
+    explanations: tuple[Explanation, ...] = ()  # that it is read off, most probable first
+    stand: tuple[Fitted, ...] = ()  # the causes that stand, best first
     others: tuple[Fitted, ...] = ()
-    where: tuple[Where, ...] = ()
-    left: tuple[Where, ...] = ()
-    likest: str | None = None
-    evidence: Mapping[str, float]
+    where: tuple[Where, ...] = ()  # the axes on which structure lies, most evidence first
+    left: tuple[Where, ...] = ()  # the same beside the best that stands
+    likest: str | None = None  # the slug of the fault that is the likeliest of all that has no name, if one is
+    evidence: Mapping[str, float]  # [nats] by slug of effects alone
 
     @property
     def probabilities(self) -> dict[str, float]:
         """The probability of each effect of the catalogue, largest first."""
         return probabilities_by_slug(self.explanations)
-
-    @property
-    def open(self) -> bool:
-        """Whether something is left to be found out."""
-        return self.verdict in {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}

@@ -20,13 +20,12 @@ from models.diagnosis.design.design import Design, IntArray
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Noise:
-    """deviation [N] Nm of each row; correlation along plateaus and along a loop's bins; relative gain scatter of runs and
-    of curves [-]."""
+    """The covariance of the rows, as its parts."""
 
-    deviation: FloatArray
-    plateaus: Correlation
-    loops: Correlation
-    run_gain: float
+    deviation: FloatArray  # of each row [N] Nm
+    plateaus: Correlation  # along plateaus
+    loops: Correlation  # along a loop's bins
+    run_gain: float  # relative gain scatter of runs, and of curves [-]
     curve_gain: float
 
 
@@ -60,14 +59,13 @@ def _filter(blocks: FloatArray, correlation: Correlation) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gains:
-    """Directions of the gains in whitened rows: torque [N], curve [N] and run_of_curve [c] indices, squares [c] = |m_c|²;
-    directions [c, N] are the m_c themselves."""
+    """Directions m_c of the gains of curves [c] in whitened rows [N]."""
 
-    torque: FloatArray
-    curve: IntArray
-    run_of_curve: IntArray
-    squares: FloatArray
-    directions: csr_array
+    torque: FloatArray  # [N]
+    curve: IntArray  # [N]
+    run_of_curve: IntArray  # [c]
+    squares: FloatArray  # [c] |m_c|²
+    directions: csr_array  # [c, N]
 
     def by_run(self, of_curve: FloatArray) -> FloatArray:
         """Sums [r, ...] over the curves of each run."""

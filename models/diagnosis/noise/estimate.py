@@ -57,11 +57,6 @@ def owners(design: Design) -> IntArray:
     return np.asarray(np.where(design.rows.steady, design.curve, loops), dtype=np.intp)
 
 
-def pieces_of(design: Design, part: NDArray[np.bool_], longest: int = _LONGEST) -> list[Piece]:
-    """Curves and loops among the rows of `part` [N] that have rows enough, cut to `longest` rows."""
-    return _pieces(design, np.flatnonzero(part), owners(design), longest)
-
-
 def pieces_across_curves(design: Design, part: NDArray[np.bool_]) -> list[Piece]:
     """Where curves have too few speeds, the same speed over the pressures of a run, among the rows of `part` [N]; with too
     few pressures as well the same point from state to state, where what scatters from run to run counts for noise."""
@@ -106,7 +101,8 @@ def _pieces(
 def calm_pieces(design: Design, part: NDArray[np.bool_], residual: FloatArray) -> list[Piece]:
     """The pieces of `part` [N] whose remainder of residual [N] Nm is noise: whole curves, unless short pieces typically show
     less than a SHARP-th of their mean square; then those short ones that show less than SHARP times what is typical."""
-    whole, short = pieces_of(design, part), pieces_of(design, part, _SHORT)
+    rows, owner = np.flatnonzero(part), owners(design)
+    whole, short = (_pieces(design, rows, owner, longest) for longest in (_LONGEST, _SHORT))
     if not part[0] or not short:  # a loop's harmonics do not become fewer in a part of it
         return whole
     of_whole, of_short = (np.array([piece.mean_square(residual) for piece in pieces]) for pieces in (whole, short))
@@ -212,7 +208,12 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
             correlations.append(Correlation())
             continue
         from_samples = design.bin_autocorrelation if part[-1] else None  # loops are the last rows
-        differences = _relative_differences(design, variance, part)
+        # what further periods of the loops differ by, in deviations of a sample
+        differences = [
+            series / np.sqrt(variance[rows] * design.samples[rows])
+            for rows, series in design.period_differences
+            if rows.size >= 8 and part[rows[0]]
+        ]
         correlation, scale = estimate_correlation(pieces, residual, np.sqrt(variance), from_samples, differences)
         deviation[part] *= scale
         correlations.append(correlation)
@@ -241,15 +242,6 @@ def _variance(pieces: Sequence[Piece], residual: FloatArray, torque: FloatArray,
         (constant, proportional), _ = nnls(columns / fitted[:, None], cut / fitted)
         fitted = np.maximum(columns @ np.array([constant, proportional]), 1e-4 * usual)
     return np.asarray(np.maximum(constant + proportional * torque**2 / level, 1e-4 * usual) / samples, dtype=np.float64)
-
-
-def _relative_differences(design: Design, variance: FloatArray, part: NDArray[np.bool_]) -> list[FloatArray]:
-    """What further periods of the loops differ by, in deviations [n] of a sample; nothing for plateaus."""
-    return [
-        differences / np.sqrt(variance[rows] * design.samples[rows])
-        for rows, differences in design.period_differences
-        if rows.size >= 8 and part[rows[0]]
-    ]
 
 
 def _isolated(design: Design, residual: FloatArray, deviation: FloatArray) -> NDArray[np.bool_]:

@@ -148,10 +148,6 @@ def _curve_values(design: Design) -> tuple[FloatArray, FloatArray, FloatArray, F
     )
 
 
-#: Gauss-Newton steps after which starts are compared.
-_ROUGH = 12
-
-
 class IndeterminateError(Exception):
     """The data determine no baseline, and the message says what they lack: the one expected end without a report."""
 
@@ -184,10 +180,10 @@ def fit_baseline(design: Design) -> Baseline:
     problem = FitProblem(design=design, noise=first_noise(design), priors=priors_of(design, start.theta, frame))
     # with more every curve is determined and one start is enough
     starts = (start, cautious_laws(design, start)) if design.plateaus < 8000 else (start,)
-    first = _best_of(problem, starts, _ROUGH)
+    first = _best_of(problem, starts, criteria.FEW_STEPS)
     problem = problem.with_noise(estimate_noise(design, first.residual, first.torque, problem.noise)[0])
     # with a noise that was only assumed the first fit may have ended in another valley
-    second = _best_of(problem, starts, _ROUGH)
+    second = _best_of(problem, starts, criteria.FEW_STEPS)
     return _with_its_noise(problem, _best_of(problem, (first.laws, second.laws), STEPS))
 
 

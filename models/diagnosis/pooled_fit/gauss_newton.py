@@ -24,6 +24,7 @@ from models.diagnosis.effects.fitted_effect import (
     effect_precisions,
     effect_rows,
     law_columns,
+    smooth_places,
 )
 from models.diagnosis.noise.covariance import whitening
 from models.diagnosis.pooled_fit.problem import FitProblem, Priors
@@ -47,18 +48,16 @@ class FitStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """A fitted model: laws, prediction of the baseline part, torque [N] of all of it, residual [N] Nm (measured minus
-    torque), the effects in it, cost [nats] (half the whitened squares, priors included); how it ended, after so many
-    steps that lowered the cost."""
+    """A fitted model."""
 
     laws: Laws
-    prediction: Prediction
-    torque: FloatArray
-    residual: FloatArray
+    prediction: Prediction  # of the baseline part
+    torque: FloatArray  # [N] Nm of all of it
+    residual: FloatArray  # [N] Nm, measured minus torque
     effects: tuple[FittedEffect, ...]
-    cost: float
-    status: FitStatus
-    steps: int
+    cost: float  # [nats], half the whitened squares, priors included
+    status: FitStatus  # how it ended
+    steps: int  # that lowered the cost
 
     @property
     def wrong_sign(self) -> bool:
@@ -112,10 +111,9 @@ def _inside(state: Fit, priors: Priors, matrix: FloatArray, gradient: FloatArray
     at, held = int(priors.free.sum()), np.zeros(step.size, dtype=np.bool_)
     for fitted in state.effects:
         at += 1
-        for value, shape in zip(fitted.shape, fitted.effect.shapes, strict=True):
-            if shape.smooth:
-                held[at] = (value <= shape.lowest and step[at] < 0) or (value >= shape.highest and step[at] > 0)
-                at += 1
+        for value, shape in fitted.effect.smooth(fitted.shape):
+            held[at] = (value <= shape.lowest and step[at] < 0) or (value >= shape.highest and step[at] > 0)
+            at += 1
     if held.any():
         step[held] = 0.0
         step[~held] = np.linalg.solve(matrix[np.ix_(~held, ~held)], gradient[~held])
@@ -200,10 +198,10 @@ def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fi
         size = fitted.amplitude + float(step[at])
         at += 1
         shape = list(fitted.shape)
-        for index, parameter in enumerate(fitted.effect.shapes):
-            if parameter.smooth:
-                shape[index] = float(np.clip(shape[index] + step[at], parameter.lowest, parameter.highest))
-                at += 1
+        for index in smooth_places(fitted.effect):
+            parameter = fitted.effect.shapes[index]
+            shape[index] = float(np.clip(shape[index] + step[at], parameter.lowest, parameter.highest))
+            at += 1
         effects.append(FittedEffect(effect=fitted.effect, amplitude=size, shape=tuple(shape)))
     return Laws(theta=theta, frame=state.laws.frame), tuple(effects)
 

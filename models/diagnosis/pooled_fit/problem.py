@@ -12,19 +12,18 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.baseline.laws import ATTRACTOR, BLOCK, DRIFT, FALL, KAPPA, OPEN_DRAG, Frame
+from models.diagnosis.baseline.laws import ATTRACTOR, BLOCK, DRIFT, FALL, KAPPA, LOG_DECAY, OPEN_DRAG, SHARES, Frame
 from models.diagnosis.design.design import Design
 from models.diagnosis.noise.covariance import Noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Priors:
-    """Rows of prior on θ: (combination θ - mean)/sd, `rows` [q, θ.size] already divided by sd, `means` [q] too; `free`
-    [θ.size] which entries are fitted at all."""
+    """Rows of prior on θ: (combination θ - mean)/sd."""
 
-    rows: FloatArray
-    means: FloatArray
-    free: NDArray[np.bool_]
+    rows: FloatArray  # [q, θ.size], divided by sd
+    means: FloatArray  # [q] likewise
+    free: NDArray[np.bool_]  # [θ.size] which entries are fitted at all
 
 
 def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
@@ -33,9 +32,7 @@ def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
     level = design.usual_torque
     fastest = 2.0 * frame.reference_velocity
     sds, means = np.full(size, np.nan), start.copy()
-    spreads = {0: 10 * level, 1: 3.0, 2: 3 * fastest, 3: 10 * level}
-    for k, spread in spreads.items():
-        block = k * BLOCK
+    for block, spread in zip(range(0, LOG_DECAY, BLOCK), (10 * level, 3.0, 3 * fastest, 10 * level), strict=True):
         sds[block : block + BLOCK] = [spread, spread, 1.5, 1.5, 1.5, 0.7]
         means[block + 2 : block + BLOCK] = [0.0, 0.0, np.log(0.5 * design.facts.life), np.log(0.8)]
     sds[FALL], means[FALL] = (0.7, 1.2), (np.log(0.6 * frame.span), np.log(criteria.USUAL_CURVATURE))
@@ -49,7 +46,7 @@ def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
     rows[nodes[1:], nodes[:-1]] = -1.0
     alike = np.zeros((4, size))
     for k in range(4):
-        alike[k, k * BLOCK + 2], alike[k, k * BLOCK + 3] = 1 / criteria.ALIKE_SD, -1 / criteria.ALIKE_SD
+        alike[k, k * BLOCK :][SHARES] = 1 / criteria.ALIKE_SD, -1 / criteria.ALIKE_SD
     return Priors(
         rows=np.concatenate([rows, alike]),
         means=np.concatenate([means / sds, np.zeros(4)]),
@@ -62,8 +59,7 @@ def _free(design: Design, size: int) -> NDArray[np.bool_]:
     states, levels = np.unique(design.rows.cycles[closed]).size, design.levels.size
     loop_states = np.unique(design.rows.cycles[design.plateaus :][closed[design.plateaus :]]).size
     free = np.ones(size, dtype=np.bool_)
-    for k in range(4):
-        block = k * BLOCK
+    for block in range(0, LOG_DECAY, BLOCK):
         free[block + 1] = levels > 1
         free[block + 2 : block + 4] = states > 1, states > 1 and levels > 1
         free[block + 4 : block + 6] = states > 2
@@ -75,13 +71,12 @@ def _free(design: Design, size: int) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitProblem:
-    """A least-squares problem: design (rows and measured torque), noise (their covariance) and priors on θ; `fitted` is the
-    torque [N] Nm of a fit, None before there is one."""
+    """A least-squares problem."""
 
-    design: Design
-    noise: Noise
+    design: Design  # rows and measured torque
+    noise: Noise  # their covariance
     priors: Priors
-    fitted: FloatArray | None = None
+    fitted: FloatArray | None = None  # the torque [N] Nm of a fit, None before there is one
 
     @property
     def gained(self) -> FloatArray:

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.special import logsumexp
+from scipy.special import log_softmax, logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
@@ -34,13 +34,12 @@ from models.diagnosis.pooled_fit.problem import FitProblem
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gram:
-    """matrix [m, m] without gains, directions q [c, m] of the curves, squares [c], run_of_curve [c]; the first `base`
-    columns are the baseline's, the last is the residual."""
+    """Inner products of whitened columns [m], the first `base` of them the baseline's, the last the residual."""
 
-    matrix: FloatArray
-    along: FloatArray
-    squares: FloatArray
-    run_of_curve: IntArray
+    matrix: FloatArray  # [m, m] without gains
+    along: FloatArray  # [c, m] along the directions of the curves
+    squares: FloatArray  # [c]
+    run_of_curve: IntArray  # [c]
     base: int
 
     def with_gains(self, run_gain: float, curve_gain: float) -> tuple[FloatArray, float]:
@@ -92,16 +91,14 @@ GAINS: FloatArray = np.geomspace(criteria.LEAST_GAIN, criteria.MOST_GAIN, 13)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Projected:
-    """info [m, m], score [m] of the changes, and `whole` [m], what info's diagonal would be if the baseline absorbed nothing
-    of them; `miss` rᵀV⁻¹(1 - P)r; `evidence` [nats] of the gains' scatter (`run_gain`, `curve_gain`), and `profile`
-    [nats] the same without the determinant of what is fitted."""
+    """What is left of changes [m] once the baseline is projected off, at one scatter of the gains."""
 
-    info: FloatArray
-    score: FloatArray
-    whole: FloatArray
-    miss: float
-    evidence: float
-    profile: float
+    info: FloatArray  # [m, m]
+    score: FloatArray  # [m]
+    whole: FloatArray  # [m] what info's diagonal would be if the baseline absorbed nothing of them
+    miss: float  # rᵀV⁻¹(1 - P)r
+    evidence: float  # of the gains' scatter [nats]
+    profile: float  # the same without the determinant of what is fitted
     run_gain: float
     curve_gain: float
 
@@ -200,15 +197,11 @@ def run_scatter(projections: Sequence[Projected]) -> RunScatter:
         for gain in gains
     ]
     logs = np.linspace(np.log(gains[0]), np.log(gains[-1]), 601)
-    posterior = _normalised(CubicSpline(np.log(gains), by_gain)(logs))
-    prior = _normalised(np.array([log_gain_prior(gain) for gain in np.exp(logs).tolist()]))
+    posterior = log_softmax(CubicSpline(np.log(gains), by_gain)(logs))
+    prior = log_softmax(np.array([log_gain_prior(gain) for gain in np.exp(logs).tolist()]))
     lower, median, upper = np.exp(np.interp((0.05, 0.5, 0.95), np.cumsum(np.exp(posterior)), logs)).tolist()
     information = float(np.exp(posterior) @ (posterior - prior))
     return RunScatter(median=median, lower=lower, upper=upper, information=information)
-
-
-def _normalised(logs: FloatArray) -> FloatArray:
-    return np.asarray(logs - logsumexp(logs), dtype=np.float64)
 
 
 def without_likely_gains(problem: FitProblem, fitted: Fit) -> FloatArray:

@@ -37,15 +37,13 @@ ComplexArray: TypeAlias = NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """evidence [nats], averaged over everything tried; position, the order [per revolution] or the frequency [Hz];
-    amplitude [Nm]; speed_share, the share of the highest speed below which it acts; peak, the largest log likelihood
-    ratio [nats]. Without arguments: no line."""
+    """A swing at an order of the shaft or at a frequency; without arguments none."""
 
-    evidence: float = 0.0
-    position: float = 0.0
-    amplitude: float = 0.0
-    speed_share: float = 1.0
-    peak: float = 0.0
+    evidence: float = 0.0  # [nats], averaged over everything tried
+    position: float = 0.0  # the order [per revolution] or the frequency [Hz]
+    amplitude: float = 0.0  # [Nm]
+    speed_share: float = 1.0  # of the highest speed, below which it acts
+    peak: float = 0.0  # the largest log likelihood ratio [nats]
 
 
 #: Amplitudes tried, as multiples of the one at which all stretches together show about 4 nats, and their prior weights: a
@@ -247,17 +245,16 @@ _VISIBLE_ABOVE, _COMPARED_ABOVE = 0.8, 0.4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Windows:
-    """D and N [w, f] at multiples of the spacing; where they may give the noise level beside a line, and where a line
-    itself (`visible`) [w, f]; lowest and highest speed [w] rad/s, mean torque [w] Nm, and the usual length [s]."""
+    """Windows [w] of raw records, and frequencies [f] at multiples of the spacing."""
 
-    sums: ComplexArray
-    weight: FloatArray
-    beside: Bools
-    visible: Bools
-    slowest: FloatArray
+    sums: ComplexArray  # D [w, f]
+    weight: FloatArray  # N [w, f]
+    beside: Bools  # [w, f] where they may give the noise level beside a line
+    visible: Bools  # [w, f] where a line itself is seen
+    slowest: FloatArray  # speed [w] rad/s
     fastest: FloatArray
-    torque: FloatArray
-    length: float
+    torque: FloatArray  # mean [w] Nm
+    length: float  # the usual one [s]
 
 
 def windows_of(

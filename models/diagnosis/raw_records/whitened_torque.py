@@ -106,22 +106,17 @@ def _averaged(record: Record, first: int, stop: int, count: int) -> Piece:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WhitenedRecord:
-    """The samples of a record's pieces, one after the other: time [n] s, speed [n] rad/s, torque [n] Nm (the spline's).
+    """The samples [n] of a record's pieces, one after the other."""
 
-    matched [n] is A(1/L) [A(L) x/σ²], weight [n] 1/σ²; `starts` are the pieces' first samples and n. `step` [s] is the
-    sample interval, `lowest` and `highest` [Hz] bound the frequencies that can be seen, `gain` is |A|² evenly from 0 to half
-    the rate.
-    """
-
-    time: FloatArray
-    speed: FloatArray
-    torque: FloatArray
-    matched: FloatArray
-    weight: FloatArray
-    starts: tuple[int, ...]
-    step: float
-    lowest: float
-    gain: FloatArray
+    time: FloatArray  # [s]
+    speed: FloatArray  # [rad/s]
+    torque: FloatArray  # [Nm], the spline's
+    matched: FloatArray  # A(1/L) [A(L) x/σ²]
+    weight: FloatArray  # 1/σ²
+    starts: tuple[int, ...]  # the pieces' first samples, and n
+    step: float  # the sample interval [s]
+    lowest: float  # bounds the frequencies that can be seen [Hz], as `highest` does
+    gain: FloatArray  # |A|² evenly from 0 to half the rate
 
     @property
     def highest(self) -> float:

@@ -18,7 +18,7 @@ from models.diagnosis.explanations.posterior import Posterior
 from models.diagnosis.explanations.shapeless import outlying_run
 from models.diagnosis.explanations.sizes import Size, Sizes
 from models.diagnosis.explanations.verdict import NOTHING, Explanation, Judgement, Verdict
-from models.diagnosis.extension import Extension, build_extension
+from models.diagnosis.extension import build_extension
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
 from models.diagnosis.pooled_fit.gauss_newton import FitStatus
 from models.diagnosis.pooled_fit.problem import FitProblem
@@ -100,15 +100,6 @@ def _finite(value: float) -> float:
     return float(np.clip(value, -1e300, 1e300))
 
 
-def proposed_extension(problem: FitProblem, gain: Gain | None, sizes: Sizes, reason: str) -> Extension | None:
-    """The draws of the causes; None where nothing was fitted, or there is a reason against it. Effects of use are followed
-    beyond the data only where they help to predict the last states from the first ones."""
-    if reason or not any(draw.effects for draw in sizes.draws):
-        return None
-    design, follow = problem.design, gain is not None and gain.forecast_log_score_gain > 0
-    return build_extension(sizes.draws, design.facts, ranges_of(design.rows), courses=follow)
-
-
 def reason_against(gain: Gain | None, sizes: Sizes) -> str:
     """Why an extension is not proposed, or nothing where one is or none was fitted. The verdict stays."""
     if not sizes.draws:
@@ -166,6 +157,12 @@ def report_of(
     candidates = candidates_of(problem, judgement, raw, sizes.by_slug)
     extended = validation.extended
     visible = visible_of(posterior)
+    extension = None
+    if not reason and any(draw.effects for draw in sizes.draws):
+        # effects of use are followed beyond the data only where they help to predict the last states from the first ones
+        follow = validation.gain is not None and validation.gain.forecast_log_score_gain > 0
+        design = problem.design
+        extension = build_extension(sizes.draws, design.facts, ranges_of(design.rows), courses=follow)
     report = Report(
         verdict=judgement.verdict,
         causes=judgement.causes,
@@ -180,7 +177,7 @@ def report_of(
         unseen=unseen_of(posterior, visible, raw),
         maps=residual_maps(problem, fitted, extended),
         loops=loop_traces(problem, fitted, extended),
-        extension=proposed_extension(problem, validation.gain, sizes, reason),
+        extension=extension,
         not_adoptable=reason,
         notes=notes,
         statistics=statistics_of(posterior, judgement, scatter),
@@ -203,14 +200,13 @@ def _notes(
 ) -> tuple[str, ...]:
     """Of the baseline, of raw records, of fits that did not end, and on an outlying run where the case is open."""
     notes = [*baseline.notes, *(f"{record.effect}: {record.note}." for record in raw)]
-    unfinished = [
-        " and ".join(effect_name(slug) for slug in cause.slugs) for cause in judgement.stand if cause.unfinished
-    ]
+    ran_out = [cause for cause in judgement.stand if cause.fit.status is FitStatus.OUT_OF_STEPS]
+    unfinished = [" and ".join(map(effect_name, cause.slugs)) for cause in ran_out]
     if posterior.null.fit.status is FitStatus.OUT_OF_STEPS and posterior.probabilities[NOTHING] > criteria.NEGLIGIBLE:
         unfinished.append("nothing at work")
     ended = "ended before its optimum: its probability may be larger than stated."
     notes += [f"The fit with {name} {ended}" for name in unfinished]
-    if judgement.open:
+    if judgement.verdict in {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}:
         # an effect in one run alone may bend a better baseline's laws until that run fits
         alone = outlying_run(baseline.problem, baseline.fit)
         notes.append(alone or outlying_run(posterior.problem, posterior.null.fit))

@@ -111,7 +111,11 @@ def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
     null = posterior.null.fit
     info = posterior.null.evidence.screened[0].info
     place_of = {id(column): place for place, column in enumerate(posterior.columns)}
-    own = {slug: _likeliest(shapes) for slug, shapes in visible.items()}
+    own = {}  # the most probable shape in which an effect is seen, and the amplitude [SI] that is thought to be at work
+    for slug, shapes in visible.items():
+        seen = [shape for shape in shapes if np.isfinite(shape[1])]
+        column, size = max(seen, key=lambda shape: shape[0].log_weight)
+        own[slug] = column, _TIMES_VISIBLE * size
     pairs = []
     for first, second in combinations(visible, 2):
         ways = []
@@ -128,12 +132,6 @@ def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
         pairs=tuple(sorted(pairs, key=lambda pair: pair.probability)),
         unseen=tuple(slug for slug in slugs if slug not in visible),
     )
-
-
-def _likeliest(shapes: Sequence[tuple[Column, float]]) -> tuple[Column, float]:
-    """The most probable shape in which an effect is seen, and the amplitude [SI] that is thought to be at work."""
-    column, size = max((shape for shape in shapes if np.isfinite(shape[1])), key=lambda shape: shape[0].log_weight)
-    return column, _TIMES_VISIBLE * size
 
 
 def _with(null: Fit, column: Column, amplitude: float) -> Fit:

@@ -19,17 +19,14 @@ SHOWN = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Maps:
-    """Mean whitened residuals [-] before and after the extension; NaN where nothing was measured.
+    """Mean whitened residuals [-] before and after the extension; NaN where nothing was measured."""
 
-    Axes: pressure [p] Pa, speed [s] rad/s, cycles [c]. `speed_pressure` are [p, s], `pressure_cycles` [c, p].
-    """
-
-    pressure: FloatArray
-    speed: FloatArray
-    cycles: FloatArray
-    speed_pressure_before: FloatArray
+    pressure: FloatArray  # axes: [p] Pa
+    speed: FloatArray  # [s] rad/s
+    cycles: FloatArray  # [c]
+    speed_pressure_before: FloatArray  # [p, s]
     speed_pressure_after: FloatArray
-    pressure_cycles_before: FloatArray
+    pressure_cycles_before: FloatArray  # [c, p]
     pressure_cycles_after: FloatArray
 
 
@@ -97,8 +94,8 @@ def loop_traces(problem: FitProblem, baseline: Fit, extended: Fit | None) -> tup
         for loop, state, level in zip(loops, states, levels, strict=True)
         if state in _spread(np.unique(states)) and level in _spread(np.unique(levels))
     ]
-    before = design.torque - without_likely_gains(problem, baseline)
-    after = before if extended is None else design.torque - without_likely_gains(problem, extended)
+    models = (baseline, baseline if extended is None else extended)
+    before, after = (design.torque - without_likely_gains(problem, model) for model in models)
     traces = []
     for loop in chosen:
         rows = np.flatnonzero(number == loop)

@@ -50,39 +50,37 @@ def misfit_of(problem: FitProblem, fitted: Fit, where: Sequence[Where] = ()) -> 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """An effect that competed: its slug, probability [0, 1] and gain in log evidence over the baseline [nats], both in the
-    fit that it was part of: with the effects `beside` it. `fit`: how that fit ended, None where there is none."""
+    """An effect that competed, in the fit that it was part of."""
 
     effect: str
     title: str
     probability: float
-    log_evidence_gain: float
+    log_evidence_gain: float  # over the baseline [nats]
     estimate: Estimate
-    beside: tuple[str, ...] = ()
-    fit: FitStatus | None = None
+    beside: tuple[str, ...] = ()  # the effects beside it
+    fit: FitStatus | None = None  # how that fit ended, None where there is none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Visible:
-    """The smallest amplitude of an effect that these data would have shown with 90 % power: in whatever of its shapes
-    (infinite where one of them would be absorbed whole), `least` in the shape that shows best; and its usual size."""
+    """The smallest amplitude of an effect that these data would have shown with 90 % power."""
 
     effect: str
-    amplitude: float
-    least: float
+    amplitude: float  # in whatever of its shapes (infinite where one of them would be absorbed whole)
+    least: float  # in the shape that shows best
     usual: float
     unit: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """Two effects, the probability [0, 1] that either, if it is at work, is told from the other, and whether that is sure.
-    Where it is not: `trial`, the shortest test that is sure to part them, else the one that helps most (a key of
-    `experiments.candidates.TRIALS`; empty where none helps), the `test` in words, and the probability with it."""
+    """Two effects that the data may tell from each other."""
 
     effects: tuple[str, str]
-    probability: float
-    apart: bool
+    probability: float  # that either, if it is at work, is told from the other
+    apart: bool  # whether that is sure
+    # where it is not, the shortest test that is sure to part them, else the one that helps most (a key of
+    # `experiments.candidates.TRIALS`; empty where none helps), in words, and the probability with it
     trial: str
     test: str
     with_trial: float
@@ -108,13 +106,11 @@ class Report:
     candidates: tuple[Candidate, ...] = ()
     baseline: Misfit | None = None
     extended: Misfit | None = None
-    #: The effects of the extended model.
-    extended_effects: tuple[str, ...] = ()
+    extended_effects: tuple[str, ...] = ()  # the effects of the extended model
     gain: Gain | None = None
     advice: tuple[Advice, ...] = ()
     visible: tuple[Visible, ...] = ()
-    #: Effects of which these data show nothing at any size.
-    unseen: tuple[str, ...] = ()
+    unseen: tuple[str, ...] = ()  # effects of which these data show nothing at any size
     maps: Maps | None = None
     loops: tuple[LoopTrace, ...] = ()
     extension: Extension | None = None
@@ -124,12 +120,8 @@ class Report:
     notes: tuple[str, ...] = ()
     #: Numbers of the engine that a test may want: scatter of runs, evidence, odds, refits.
     statistics: Mapping[str, float] = field(default_factory=dict)
-    #: How many tests at how many states of use were examined.
-    tests: int = 0
+    tests: int = 0  # how many tests at how many states of use were examined
     states: int = 0
-    #: The fault that what has no name most resembles, in words.
-    resembles: str = ""
-    #: The scatter of the runs' gains.
-    scatter: RunScatter | None = None
-    #: Which causes this design could tell apart, where that was asked for.
-    isolability: Isolability | None = None
+    resembles: str = ""  # the fault that what has no name most resembles, in words
+    scatter: RunScatter | None = None  # the scatter of the runs' gains
+    isolability: Isolability | None = None  # which causes this design could tell apart, where that was asked for

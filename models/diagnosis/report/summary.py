@@ -34,11 +34,6 @@ _AXES = {
 }
 
 
-def axis_name(axis: str) -> str:
-    """An axis in words."""
-    return _AXES.get(axis, axis)
-
-
 def effect_name(slug: str) -> str:
     """A slug in words."""
     return slug.replace("_", " ")
@@ -72,30 +67,22 @@ def with_unit(text: str, unit: str) -> str:
     return text if unit in {"-", ""} else f"{text} {unit}"
 
 
-def estimated(estimate: Estimate) -> str:
-    """Value and deviation to the deviation's second digit."""
-    size = number(estimate.value)
-    if estimate.sd > 0:
-        digits = max(0, 1 - math.floor(math.log10(estimate.sd)))
-        size = f"{size} ± {number(estimate.sd)}"
-        if digits <= 5:
-            size = f"{_signed(f'{estimate.value:.{digits}f}')} ± {estimate.sd:.{digits}f}"
-    return with_unit(f"{estimate.name}: {size}", estimate.unit)
-
-
 def signed(estimate: Estimate) -> str:
-    """Value with its 90 % interval where one is stated, else with its deviation, and where the sign is open its
-    probability: said to be open where the interval holds both signs."""
+    """Value with its 90 % interval where one is stated, else with its deviation (to the second digit of that), and where the
+    sign is open its probability: said to be open where the interval holds both signs."""
     sign = None if estimate.one_sided else estimate.sign_probability
-    low, high = estimate.interval
-    size = estimated(estimate)
-    if estimate.stated_interval is not None:
-        size = with_unit(f"{estimate.name}: {number(estimate.value)}", estimate.unit)
-        size += f", 90 % interval {number(low)} to {with_unit(number(high), estimate.unit)}"
-    if sign is None:
+    (low, high), sd, unit = estimate.interval, estimate.sd, estimate.unit
+    size, stated = number(estimate.value), estimate.stated_interval is not None
+    if stated:
+        size = f"{with_unit(size, unit)}, 90 % interval {number(low)} to {number(high)}"
+    elif sd > 0:
+        digits = max(0, 1 - math.floor(math.log10(sd)))
+        rounded = f"{_signed(f'{estimate.value:.{digits}f}')} ± {sd:.{digits}f}"
+        size = rounded if digits <= 5 else f"{size} ± {number(sd)}"
+    size = f"{estimate.name}: {with_unit(size, unit)}"
+    # where it holds one sign the interval says it
+    if sign is None or (stated and not low < 0.0 < high and sign > 0.99):
         return size
-    if estimate.stated_interval is not None and not low < 0.0 < high and sign > 0.99:
-        return size  # the interval says it
     way = f"{'negative' if estimate.value < 0 else 'positive'} with probability {probability(sign)}"
     return f"{size}, the sign is open ({way})" if low < 0.0 < high else f"{size}, {way}"
 
@@ -326,7 +313,7 @@ def _unexplained(report: Report) -> list[Sentence]:
     first += f"so no cause is named.{resembles}"
     again = "Next: repeat the last test at once. If the error is gone, it came from one run; if it stays, look for"
     swings = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{FIXED_LINE}: ")]
-    if swings and _axes(report.baseline).startswith(axis_name(FREQUENCY)):
+    if swings and _axes(report.baseline).startswith(_AXES[FREQUENCY]):
         found = [Sentence(f"In the raw records {swing}") for swing in swings]
         return [Sentence(first), *found, Sentence(f"{again} what turns, or is driven, like that.")]
     where = _axes(report.baseline) or "the rig"
@@ -349,7 +336,7 @@ def _error(report: Report) -> str:
 
 def _axes(misfit: Misfit | None) -> str:
     shown = () if misfit is None else misfit.where[:2]
-    return " and ".join(axis_name(axis.axis) for axis in shown if axis.strength > 0)
+    return " and ".join(_AXES[axis.axis] for axis in shown if axis.strength > 0)
 
 
 def _gained(report: Report) -> list[Sentence]:

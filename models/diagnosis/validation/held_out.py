@@ -23,44 +23,35 @@ from models.diagnosis.noise.covariance import Noise, whitening
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, prior_gram, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
 
-#: Gauss-Newton steps from the fit to all rows: enough that nothing of the held-out rows is left in the fit.
-_STEPS = 12
-
 BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hardest:
-    """Where the extended model's error on held-out rows is largest: `axis` (cycles, or pressure in Pa), the value there, RMS
-    error [Nm], and by how much the value is beyond all that were kept (0: it is among them)."""
+    """Where the extended model's error on held-out rows is largest."""
 
-    axis: str
-    value: float
-    rmse: float
-    beyond: float
+    axis: str  # cycles, or pressure
+    value: float  # there, pressure in Pa
+    rmse: float  # [Nm]
+    beyond: float  # by how much the value is beyond all that were kept (0: it is among them)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gain:
-    """What the extension gains on runs held out by state and by pressure; rmse [Nm], log score [nats].
-
-    `reduction_sd` [%] is the paired uncertainty of `reduction_percent`. `excess` [Nm] is the error beyond noise. MSE is
-    eq. 5's percentage. `forecast_log_score_gain` [nats] is the gain of log score when the last states are predicted from the
-    first ones. `hardest` is where the error after is largest.
-    """
+    """What the extension gains on runs held out by state and by pressure; rmse [Nm], log score [nats]."""
 
     held_out_runs: tuple[str, ...]
     rmse_before: float
     rmse_after: float
     reduction_percent: float
-    reduction_sd: float
-    excess_before: float
+    reduction_sd: float  # its paired uncertainty [%]
+    excess_before: float  # error beyond noise [Nm]
     excess_after: float
-    mse_percent_before: float
+    mse_percent_before: float  # of eq. 5
     mse_percent_after: float
     log_score_gain: float
-    forecast_log_score_gain: float
-    hardest: Hardest | None = None
+    forecast_log_score_gain: float  # when the last states are predicted from the first ones
+    hardest: Hardest | None = None  # where the error after is largest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,22 +75,22 @@ def measure_gain(problem: FitProblem, baseline: Fit, extended: Fit, rng: np.rand
         forecast = scores[1] - scores[0]
     if not held:
         return None
-    rows = np.concatenate([fold.rows for fold in held])
-    before, after = (np.concatenate([getattr(fold, name) for fold in held]) for name in ("before", "after"))
+    rows, before, after = (np.concatenate([getattr(f, name) for f in held]) for name in ("rows", "before", "after"))
     reduction, spread = _reduction(design.curve[rows], before, after, rng)
     scatter = (noise.run_gain**2 + noise.curve_gain**2) * design.torque[rows] ** 2
     floor = float(np.mean(noise.deviation[rows] ** 2 + scatter))
-    total = float(np.var(design.torque[rows]))
+    total = max(float(np.var(design.torque[rows])), 1e-300)
+    square_before, square_after = (float(np.mean(errors**2)) for errors in (before, after))
     return Gain(
         held_out_runs=tuple(design.runs[run].run_id for run in np.unique(design.rows.run[rows])),
         rmse_before=_rms(before),
         rmse_after=_rms(after),
         reduction_percent=reduction,
         reduction_sd=spread,
-        excess_before=_beyond(before, floor),
-        excess_after=_beyond(after, floor),
-        mse_percent_before=100 * float(np.mean(before**2)) / max(total, 1e-300),
-        mse_percent_after=100 * float(np.mean(after**2)) / max(total, 1e-300),
+        excess_before=max(square_before - floor, 0.0) ** 0.5,
+        excess_after=max(square_after - floor, 0.0) ** 0.5,
+        mse_percent_before=100 * square_before / total,
+        mse_percent_after=100 * square_after / total,
         log_score_gain=sum(fold.score for fold in held) * design.torque.size / rows.size,
         forecast_log_score_gain=forecast,
         hardest=max((group for fold in held for group in _groups(design, fold)), key=lambda group: group.rmse),
@@ -152,7 +143,7 @@ def _forecast_score(problem: FitProblem, model: Fit, out: BoolArray) -> float:
     """The log score [nats] of rows that are held out, the uncertainty of what was fitted to the others included."""
     design, noise = problem.design, problem.noise
     before = _without(noise, out)
-    refit = fit(problem.with_noise(before), model.laws, model.effects, steps=_STEPS)
+    refit = fit(problem.with_noise(before), model.laws, model.effects, steps=criteria.FEW_STEPS)
     jacobian = sensitivities(problem, refit)
     fitted = whitening(design, problem.gained, before)(jacobian)
     held = whitening(design, problem.gained, _without(noise, ~out))(np.column_stack([jacobian, refit.residual]))
@@ -171,7 +162,7 @@ def _held(problem: FitProblem, baseline: Fit, extended: Fit, out: BoolArray) -> 
     masked = problem.with_noise(_without(problem.noise, out))
     errors = []
     for model in (baseline, extended):
-        refit = fit(masked, model.laws, model.effects, steps=_STEPS)
+        refit = fit(masked, model.laws, model.effects, steps=criteria.FEW_STEPS)
         bridged = _bridged(refit.laws, problem.design, out)
         if bridged is not refit.laws:
             refit = fit(masked, bridged, refit.effects, steps=0)
@@ -208,7 +199,3 @@ def _reduction(
 
 def _rms(errors: FloatArray) -> float:
     return float(np.sqrt(np.mean(errors**2)))
-
-
-def _beyond(errors: FloatArray, floor: float) -> float:
-    return float(np.sqrt(max(float(np.mean(errors**2)) - floor, 0.0)))

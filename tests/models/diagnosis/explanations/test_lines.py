@@ -198,7 +198,7 @@ def information(given: Study, *columns: FloatArray) -> FloatArray:
 
 def best_shares(given: Study, structures: FloatArray) -> FloatArray:
     """Of λ that is left of each structure, what the best single contrast sees."""
-    info = information(given, structures, contrasts_of(given.design, given.baseline.fit.prediction).columns)
+    info = information(given, structures, contrasts_of(given.design, given.baseline.fit.prediction)[0])
     scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
     count = structures.shape[1]
     return ((info / scale[:, None] / scale)[:count, count:] ** 2).max(axis=1)
@@ -230,9 +230,9 @@ def test_ripples_over_speed_are_seen_through_the_lag_of_loops(plain: Study, wave
 def test_a_curve_of_another_form_is_structure_over_speed(plain, form):
     """That falls within a tenth of the range, with the loops' lag; λ = 50 of it is left beside the baseline."""
     points, prediction = plain.design.points, plain.baseline.fit.prediction
-    contrasts = contrasts_of(plain.design, prediction)
+    shapes, axes = contrasts_of(plain.design, prediction)
     friction = prediction.scene.curve * form(points.velocity / (0.1 * points.velocity.max()))
     structure = prediction.change_at_rows(plain.design, friction[:, None], before_lag=True)
-    info = information(plain, structure, contrasts.columns[:, np.array(contrasts.axes) == SPEED])
+    info = information(plain, structure, shapes[:, np.array(axes) == SPEED])
     score = np.sqrt(2 * 50.0 / info[0, 0]) * info[1:, 0]
     assert structure_gain(info[1:, 1:], score) > 20.0

@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from models.diagnosis.baseline.laws import ATTRACTOR, Scene
+from models.diagnosis.criteria import FEW_STEPS
 from models.diagnosis.design.autocorrelation import Correlation
 from models.diagnosis.design.design import CYCLES as BY_CYCLES
 from models.diagnosis.design.design import PHASE, PRESSURE, SPEED
@@ -109,7 +110,7 @@ def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
     out = held_out._ahead(given.design)
     for model in (given.baseline.fit, extended):
         masked = given.problem.with_noise(held_out._without(noise, out))
-        found = fit(masked, model.laws, model.effects, steps=held_out._STEPS)
+        found = fit(masked, model.laws, model.effects, steps=FEW_STEPS)
         own = [effect_columns(given.design, found.prediction, each) for each in found.effects]
         laws = law_columns(given.design, found.prediction, found.effects)
         jacobian = np.concatenate([laws[:, priors.free], *own], axis=1)
