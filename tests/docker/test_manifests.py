@@ -16,7 +16,7 @@ import yaml
 from service.cli.main import app
 from tests.architecture.source import ROOT
 
-DOCKER = Path(__file__).parents[2] / "docker"
+DOCKER = ROOT / "docker"
 COMPOSE = sorted(DOCKER.glob("compose*.yaml"))
 MANIFESTS = sorted((DOCKER / "kubernetes").glob("*.yaml"))
 CREATED = re.compile(r"create (secret generic|configmap) (\S+)((?:\s+\\?\n?\s*--from-\S+)+)")
@@ -71,18 +71,13 @@ def commands() -> Iterator[list[str]]:
 
 
 def test_the_image_runs_commands_that_there_are() -> None:
-    seen = []
+    seen = set()
     for words in commands():
         if words[:2] == ["sh", "-c"]:
             words = re.findall(r"clutchlife [\w -]+", words[2])[0].split()
         check_command(words)
-        seen.append(words[:2])
-    assert {tuple(words) for words in seen} == {
-        ("clutchlife", "serve"),
-        ("clutchlife", "raw"),
-        ("dask", "scheduler"),
-        ("dask", "worker"),
-    }
+        seen.add(" ".join(words[:2]))
+    assert seen == {"clutchlife serve", "clutchlife raw", "dask scheduler", "dask worker"}
     with pytest.raises(KeyError):
         check_command(["clutchlife", "server"])
     with pytest.raises(AssertionError):
@@ -162,21 +157,17 @@ def test_services_are_told_of_the_database_the_store_and_how_to_reach_it() -> No
     compose = yaml.safe_load((DOCKER / "compose.scale.yaml").read_text(encoding="utf-8"))["services"]
     clutch = next(pod["containers"][0] for name, _, pod in pods() if name == "clutchlife")
     assert {each["name"] for each in clutch["env"]} == set(compose["clutchlife"]["environment"])
-    assert (
-        compose["clutchlife"]["environment"]["CLUTCHLIFE_RAW"].split("/")[2]
-        == (compose["objects"]["environment"]["GARAGE_DEFAULT_BUCKET"])
-    )
-    assert f'"{compose["clutchlife"]["environment"]["AWS_REGION"]}"' in (DOCKER / "scale" / "garage.toml").read_text()
+    told = compose["clutchlife"]["environment"]
+    assert told["CLUTCHLIFE_RAW"].split("/")[2] == compose["objects"]["environment"]["GARAGE_DEFAULT_BUCKET"]
+    assert f'"{told["AWS_REGION"]}"' in (DOCKER / "scale" / "garage.toml").read_text()
 
 
 # --- What filterpy declares for its plots, and no part of the product imports, is installed for the tests alone.
 
 LOCKS = sorted(
-    [
-        *(ROOT / "docker").glob("requirements*.txt"),
-        *(ROOT / "docs").glob("*.txt"),
-        *(ROOT / "tests").glob("requirements-*.txt"),
-    ]
+    path
+    for pattern in ("docker/requirements*.txt", "docs/*.txt", "tests/requirements-*.txt")
+    for path in ROOT.glob(pattern)
 )
 UNUSED = ("matplotlib", "contourpy", "cycler", "fonttools", "kiwisolver", "pillow")
 
@@ -196,7 +187,5 @@ def test_the_oldest_releases_were_tried() -> None:
 
 
 def test_the_unscented_filter_is_imported_without_them() -> None:
-    blocked = (
-        f"import sys; sys.modules.update(dict.fromkeys({UNUSED!r} + ('PIL',))); import models.tracking.filters.ukf"
-    )
+    blocked = f"import sys; sys.modules.update(dict.fromkeys({(*UNUSED, 'PIL')!r})); import models.tracking.filters.ukf"
     subprocess.run([sys.executable, "-c", blocked], cwd=ROOT, check=True)

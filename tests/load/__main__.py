@@ -14,8 +14,8 @@ import platform
 import sqlite3
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -80,10 +80,12 @@ def run(options: Options, folder: Path) -> Loaded:
         pids = [server.pid for server in servers]
         with httpx2.Client(base_url=servers[-1].url, timeout=120) as http:
             post_life(http, DIAGNOSED, options.states, WHOLE)
-        with _all_kept():
-            before = Processor.since_start(pids)
-            field, noted = asyncio.run(_loaded(options, servers, lives))
-            processor = Processor.since_start(pids).minus(before)
+        gc.collect()
+        gc.freeze()  # the prepared bodies are not looked through by the collector: it would delay what is sent meanwhile
+        before = Processor.since_start(pids)
+        field, noted = asyncio.run(_loaded(options, servers, lives))
+        processor = Processor.since_start(pids).minus(before)
+        gc.unfreeze()
         return Loaded(
             seconds=options.seconds,
             raw=options.raw,
@@ -94,17 +96,6 @@ def run(options: Options, folder: Path) -> Loaded:
             services=options.services,
             on_server=bool(options.database),
         )
-
-
-@contextmanager
-def _all_kept() -> Iterator[None]:
-    """The prepared bodies are not looked through by the collector: it would delay what is sent meanwhile."""
-    gc.collect()
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
 
 
 async def _loaded(options: Options, servers: Sequence[Server], lives: Sequence[SentLife]) -> tuple[Field, Beside]:

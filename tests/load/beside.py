@@ -32,11 +32,6 @@ class Beside:
     problems: Counter[str] = field(default_factory=Counter)
 
 
-def fleet_refresh(address: str) -> list[str]:
-    """The command that learns the fleets' priors again."""
-    return [sys.executable, "-m", "service.cli.main", "fleet", "refresh", "--database", address]
-
-
 async def diagnose(port: int, clutch_id: str, end: float, beside: Beside) -> None:
     """Have a clutch diagnosed, again and again, until the end."""
     loop = asyncio.get_running_loop()
@@ -44,7 +39,7 @@ async def diagnose(port: int, clutch_id: str, end: float, beside: Beside) -> Non
         question = posted(f"/v1/clutches/{clutch_id}/diagnoses", b"{}", JSON_TYPE, "Prefer: wait=0")
         while loop.time() < end:
             started = loop.time()
-            answer = await noted(lambda: line.ask(question), "POST diagnoses", beside.problems)
+            answer = await noted(line, question, "POST diagnoses", beside.problems)
             if answer is None or answer.status not in (201, 202):
                 await asyncio.sleep(LOOK_EVERY)
                 continue
@@ -52,7 +47,7 @@ async def diagnose(port: int, clutch_id: str, end: float, beside: Beside) -> Non
             look = asked(f"/v1/clutches/{clutch_id}/diagnoses/{report['diagnosis_id']}")
             while report["status"] == "running" and loop.time() < end:
                 await asyncio.sleep(LOOK_EVERY)
-                answer = await noted(lambda look=look: line.ask(look), "GET diagnoses", beside.problems)  # type: ignore[misc]
+                answer = await noted(line, look, "GET diagnoses", beside.problems)
                 if answer is not None and answer.status == 200:
                     report = json.loads(answer.body)
             if report["status"] == "finished":
@@ -72,11 +67,12 @@ async def refresh_fleets(address: str, begin: float, end: float, beside: Beside)
 
 
 async def refresh_once(address: str, beside: Beside) -> None:
-    """One refresh, waited for."""
+    """The command that learns the fleets' priors again, waited for."""
     loop = asyncio.get_running_loop()
     started = loop.time()
+    command = [sys.executable, "-m", "service.cli.main", "fleet", "refresh", "--database", address]
     pipe = asyncio.subprocess.PIPE
-    process = await asyncio.create_subprocess_exec(*fleet_refresh(address), stdout=pipe, stderr=pipe)
+    process = await asyncio.create_subprocess_exec(*command, stdout=pipe, stderr=pipe)
     _, errors = await process.communicate()
     beside.refreshes.append(loop.time() - started)
     if process.returncode != 0:

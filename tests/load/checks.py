@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +20,15 @@ ANSWERS = ("remaining-useful-life", "degradation", "stribeck", "loops", "series"
 
 def stored_hashes(port: int, clutch_id: str) -> dict[str, str]:
     """run_id -> content hash of all runs of a clutch, read page by page."""
-    line, found, cursor = Blocking(port), dict[str, str](), ""
-    while True:
-        page = _json(line, f"/v1/clutches/{clutch_id}/runs?limit=50{cursor}")
-        found |= {item["run_id"]: item["content_sha256"] for item in page["items"]}
-        if page["next"] is None:
-            line.close()
-            return found
-        cursor = f"&cursor={page['next']}"
+    found, cursor = dict[str, str](), ""
+    with closing(Blocking(port)) as line:
+        while True:
+            answer = _good(line.ask(asked(f"/v1/clutches/{clutch_id}/runs?limit=50{cursor}")))
+            page = json.loads(answer.body)
+            found |= {item["run_id"]: item["content_sha256"] for item in page["items"]}
+            if page["next"] is None:
+                return found
+            cursor = f"&cursor={page['next']}"
 
 
 def losses(port: int, counts: Counts) -> list[str]:
@@ -69,9 +71,11 @@ def calm_differences(
     `sample`: the fluid by clutch_id.
     """
     wrong = []
-    line = Blocking(loaded.port)
-    with serving(folder / "calm.db", loaded=loaded.loaded) as server:
-        calm = Blocking(server.port)
+    with (
+        closing(Blocking(loaded.port)) as line,
+        serving(folder / "calm.db", loaded=loaded.loaded) as server,
+        closing(Blocking(server.port)) as calm,
+    ):
         for clutch_id, fluid in sample.items():
             _good(calm.ask(registration(clutch_id, fluid)))
             for run in acknowledged[clutch_id]:
@@ -83,28 +87,22 @@ def calm_differences(
                 for name in ANSWERS
                 if answered(calm, clutch_id, name) != answered(line, clutch_id, name)
             ]
-        calm.close()
-    line.close()
     return wrong
 
 
 def replay_differences(loaded: Server, clutch_ids: Sequence[str]) -> list[str]:
     """Clutches that a fleet teaches: whose remaining life a replay of the raw runs changes."""
-    line = Blocking(loaded.port)
-    before = {clutch_id: answered(line, clutch_id) for clutch_id in clutch_ids}
-    line.close()
-    command = [sys.executable, "-m", "service.cli.main", "replay", *clutch_ids, "--database", loaded.address]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        return [f"replay ended with {done.returncode}: {done.stderr[-160:]}"]
-    line = Blocking(loaded.port)
-    wrong = [
-        f"{clutch_id}: a replay changes the remaining life"
-        for clutch_id in clutch_ids
-        if answered(line, clutch_id) != before[clutch_id]
-    ]
-    line.close()
-    return wrong
+    with closing(Blocking(loaded.port)) as line:
+        before = {clutch_id: answered(line, clutch_id) for clutch_id in clutch_ids}
+        command = [sys.executable, "-m", "service.cli.main", "replay", *clutch_ids, "--database", loaded.address]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            return [f"replay ended with {done.returncode}: {done.stderr[-160:]}"]
+        return [
+            f"{clutch_id}: a replay changes the remaining life"
+            for clutch_id in clutch_ids
+            if answered(line, clutch_id) != before[clutch_id]
+        ]
 
 
 def answered(line: Blocking, clutch_id: str, name: str = ANSWERS[0]) -> dict[str, Any]:
@@ -113,10 +111,6 @@ def answered(line: Blocking, clutch_id: str, name: str = ANSWERS[0]) -> dict[str
     body = _good(line.ask(request)).body
     answer: dict[str, Any] = json.loads(body, object_hook=lambda found: {k: found[k] for k in found.keys() - _OWN})
     return answer
-
-
-def _json(line: Blocking, address: str) -> Any:
-    return json.loads(_good(line.ask(asked(address))).body)
 
 
 def _good(answer: Answer) -> Answer:

@@ -11,7 +11,7 @@ import itertools
 import json
 import random
 from collections import Counter, defaultdict
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 
@@ -83,16 +83,11 @@ class Field:
     def tasks(self) -> list[Awaitable[None]]:
         """Everything that runs until `end`."""
         rng = random.Random(self.seed)  # noqa: S311  (no secret)
-        return [
-            *(self._rig(number, rng.random()) for number in range(self.rigs)),
-            *(
-                self._client(number, phase, part)
-                for number in range(self.clients)
-                for phase in (rng.random(),)
-                for part in range(len(ROUTES))
-            ),
-            self._livez(),
-        ]
+        tasks: list[Awaitable[None]] = [self._rig(number, rng.random()) for number in range(self.rigs)]
+        for number in range(self.clients):
+            phase = rng.random()
+            tasks += [self._client(number, phase, part) for part in range(len(ROUTES))]
+        return [*tasks, self._livez()]
 
     def _port(self, number: int) -> int:
         return self.ports[number % len(self.ports)]
@@ -130,7 +125,7 @@ class Field:
         loop = asyncio.get_running_loop()
         while loop.time() < self.end:
             started = loop.time()
-            answer = await self._asked(line, request, f"POST {what}")
+            answer = await noted(line, request, f"POST {what}", self.counts.problems)
             self.counts.posts[what].append(loop.time() - started)
             if answer is not None and answer.status in (200, 201):
                 return answer
@@ -192,21 +187,17 @@ class Field:
         return False
 
     async def _timed(self, line: Line, request: bytes, route: str, planned: float) -> Answer | None:
-        answer = await self._asked(line, request, f"GET {route}")
+        answer = await noted(line, request, f"GET {route}", self.counts.problems)
         self.counts.gets[route].append(asyncio.get_running_loop().time() - planned)
         if answer is not None:
             self.counts.statuses[route, answer.status] += 1
         return answer
 
-    async def _asked(self, line: Line, request: bytes, what: str) -> Answer | None:
-        """An answer whose status is noted where it is an error; None where there was none."""
-        return await noted(lambda: line.ask(request), what, self.counts.problems)
 
-
-async def noted(ask: Callable[[], Awaitable[Answer]], what: str, problems: Counter[str]) -> Answer | None:
+async def noted(line: Line, request: bytes, what: str, problems: Counter[str]) -> Answer | None:
     """An answer; counts what was not 2xx or 304, by status and reason. None where no answer came."""
     try:
-        answer = await ask()
+        answer = await line.ask(request)
     except TimeoutError:
         problems[f"{what}: no answer in time"] += 1
     except LostError as error:

@@ -5,6 +5,7 @@ import statistics
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from tests.load.beside import Beside, Processor
 from tests.load.field import LIVEZ, ROUTES, Counts
@@ -44,8 +45,7 @@ class Loaded:
         return sum(map(len, self.counts.acknowledged.values()))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Demand:
+class Demand(NamedTuple):
     """What is demanded, what was found, and whether that will do."""
 
     name: str
@@ -74,38 +74,25 @@ def demands(loaded: Loaded) -> list[Demand]:
     errors = sum(loaded.problems.values())
     alone, together = growth(beside.alone), growth(beside.together)
     found = [
-        Demand(name="no error", found=str(errors), met=errors == 0),
-        Demand(
-            name="nothing lost, and the same as posted calmly", found=str(len(loaded.losses)), met=not loaded.losses
-        ),
+        Demand("no error", str(errors), errors == 0),
+        Demand("nothing lost, and the same as posted calmly", str(len(loaded.losses)), not loaded.losses),
     ]
     if loaded.on_server:  # the others are those of one service on a file
         return found
+    growths = f"{100 * (alone - 1):+.1f} % alone, {100 * (together - 1):+.1f} % with its processes"
+    most = f"{100 * (MOST_GROWTH - 1):.0f} %"
     found += [
+        Demand(f"GET 99 % < {MOST_GET_MS:.0f} ms, every route", f"{get:.0f} ms (`{slowest}`)", get < MOST_GET_MS),
+        Demand(f"POST 99 % < {MOST_POST_MS:.0f} ms, but for sampled records", f"{post:.0f} ms", post < MOST_POST_MS),
         Demand(
-            name=f"GET 99 % < {MOST_GET_MS:.0f} ms, every route",
-            found=f"{get:.0f} ms (`{slowest}`)",
-            met=get < MOST_GET_MS,
-        ),
-        Demand(
-            name=f"POST 99 % < {MOST_POST_MS:.0f} ms, but for sampled records",
-            found=f"{post:.0f} ms",
-            met=post < MOST_POST_MS,
-        ),
-        Demand(
-            name=f"memory flat: the last third at most {100 * (MOST_GROWTH - 1):.0f} % above the middle third",
-            found=f"{100 * (alone - 1):+.1f} % alone, {100 * (together - 1):+.1f} % with its processes",
-            met=max(alone, together) <= MOST_GROWTH,
+            f"memory flat: the last third at most {most} above the middle third",
+            growths,
+            max(alone, together) <= MOST_GROWTH,
         ),
     ]
     if not loaded.raw:
-        found.append(
-            Demand(
-                name=f"at least {LEAST_POSTS_A_SECOND:.0f} posts a second",
-                found=f"{loaded.pace:.1f}",
-                met=loaded.pace >= LEAST_POSTS_A_SECOND,
-            )
-        )
+        least = LEAST_POSTS_A_SECOND
+        found.append(Demand(f"at least {least:.0f} posts a second", f"{loaded.pace:.1f}", loaded.pace >= least))
     return found
 
 

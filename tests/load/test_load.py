@@ -17,9 +17,6 @@ def run_named(name: str) -> Post:
     return Post(run_id=name, kind="maintenance", content=b"{}")
 
 
-# --- what is sent ---
-
-
 def test_a_life_is_whole_and_the_same_for_a_seed(tmp_path: Path) -> None:
     own = life(3, tests=20)
     assert own == life(3, tests=20)
@@ -39,16 +36,12 @@ def test_a_life_is_whole_and_the_same_for_a_seed(tmp_path: Path) -> None:
     assert {Path(str(post.path)).suffix for post in files} == {".gz", ".parquet"}
 
 
-# --- what is made of it ---
-
-
 def test_what_is_lost_changed_or_added_is_noticed() -> None:
     own = [Acknowledged(post=run_named(name), sha256=name * 2) for name in ("a", "b")]
     assert lost_of("c", own, {"a": "aa", "b": "bb"}) == []
     assert lost_of("c", own, {"a": "aa", "b": "bb", "x": "xx"}, {("c", "x")}) == []
-    assert len(lost_of("c", own, {"a": "aa", "b": "bb", "x": "xx"})) == 1
-    assert len(lost_of("c", own, {"a": "aa"})) == 1
-    assert len(lost_of("c", own, {"a": "aa", "b": "bx"})) == 1
+    for wrong in ({"a": "aa", "b": "bb", "x": "xx"}, {"a": "aa"}, {"a": "aa", "b": "bx"}):
+        assert len(lost_of("c", own, wrong)) == 1
 
 
 def found(*, get: float = 0.01, post: float = 0.1, runs: int = 20, memory: int = 100, raw: bool = False) -> Loaded:
@@ -77,9 +70,6 @@ def test_each_demand_can_fail_by_itself() -> None:
     refused = found()
     refused.counts.problems["GET runs: 503 busy"] = 1
     assert unmet(refused) == ["no"]
-
-
-# --- all of it ---
 
 
 @pytest.mark.slow

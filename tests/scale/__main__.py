@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import httpx2
 import sqlalchemy as sa
@@ -55,9 +56,9 @@ def bodies(count: int) -> list[bytes]:
     return [json.dumps(simulated_body(run)).encode() for run in runs if run.plateaus is not None]
 
 
-def timed(times: Times, title: str, work: Callable[[], httpx2.Response]) -> None:
+def timed(times: Times, title: str, ask: Callable[..., httpx2.Response], *arguments: Any) -> None:
     start = time.perf_counter()
-    answer = work()
+    answer = ask(*arguments)
     times[title].append(1e3 * (time.perf_counter() - start))
     answer.raise_for_status()
 
@@ -72,12 +73,12 @@ def asked(http: httpx2.Client, runs: list[bytes], clutches: int, states: int, ti
         http.post("/v1/clutches", json={"clutch_id": clutch}).raise_for_status()
         for number in range(10):
             title = "POST a run to a clutch of 4 to 9" if number > 3 else "POST a run to a clutch of 0 to 3"
-            timed(times, title, lambda c=clutch, n=number: post(c, n))  # type: ignore[misc]
+            timed(times, title, post, clutch, number)
             yield
     for number in range(ROUNDS):
         clutch = name(number % FEW)
         title = f"POST a run to a clutch of {states}"
-        timed(times, title, lambda c=clutch, n=number: post(c, states + n // FEW))  # type: ignore[misc]
+        timed(times, title, post, clutch, states + number // FEW)
         for title, address in (
             ("GET remaining life", f"/v1/clutches/{clutch}/remaining-useful-life"),
             ("GET runs, 10 of them", f"/v1/clutches/{clutch}/runs?limit=10"),
@@ -88,7 +89,7 @@ def asked(http: httpx2.Client, runs: list[bytes], clutches: int, states: int, ti
             ("GET metrics", "/metrics"),
             ("GET readyz", "/readyz"),
         ):
-            timed(times, title, lambda a=address: http.get(a))  # type: ignore[misc]
+            timed(times, title, http.get, address)
             yield
 
 

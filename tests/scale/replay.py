@@ -12,24 +12,13 @@ import shutil
 import signal
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from unittest.mock import patch
 
-import numpy as np
-
-from models.friction.identification import fit_curves
-from models.records.runs import Curve, curves_by_pressure
 from models.rig import campaign
-from models.rig.stationary import stationary_test
-from models.rig.truth import draw
-from models.tracking.filters import ukf
-from models.tracking.filters.grid import Grid
-from models.tracking.filters.particle import Particle
 from service import records, stored_runs
-from service.lives import tracks
 from service.queries.cache import to_json
 from service.run_files.json_run import read_run
 from service.run_files.simulated import simulated_body
@@ -49,7 +38,6 @@ AT = "2026-01-01T00:00:00+00:00"
 #: The tables that hold results.
 RESULTS = (clutch, run, fit, prediction, filter_state, corrected_cof)
 PROFILED = 5
-_REPEATS = 5
 
 Digests = dict[str, tuple[int, str]]
 
@@ -123,41 +111,6 @@ def costs(database: Database) -> dict[str, float]:
     return taken
 
 
-@contextmanager
-def a_tenth() -> Iterator[None]:
-    """The filters with a tenth of their particles and of their draws, and a sixteenth of the lattice that starts the UKF."""
-    fewer = {"particle": Particle(particles=200)}
-    with (
-        patch.object(tracks, "_TRACKERS", {**tracks._TRACKERS, **fewer}),
-        patch.object(tracks, "PREDICTION_DRAWS", 100),
-        patch.multiple(ukf, _STARTER=Grid(nodes=5, rows=5, levels=3), _DRAWS=100),
-    ):
-        yield
-
-
-def fits_at_once(states: int) -> tuple[float, float]:
-    """Milliseconds of the processor for the fits of a life's tests, one test after the other, and all at once: the same."""
-    rng = np.random.default_rng(1)
-    clutch = draw(rng)
-    tests = [
-        curves_by_pressure(stationary_test(clutch, 800.0 * number, rng), clutch.geometry) for number in range(states)
-    ]
-    whole = [curve for test in tests for curve in test]
-
-    def taken(batches: Sequence[Sequence[Curve]]) -> float:
-        begin = time.process_time()
-        for _ in range(_REPEATS):
-            for batch in batches:
-                fit_curves(batch)
-        return 1e3 * (time.process_time() - begin) / _REPEATS
-
-    one_by_one = [fit for test in tests for fit in fit_curves(test)]
-    for own, together in zip(one_by_one, fit_curves(whole), strict=True):  # and what is loaded and compiled once
-        assert own.parameters == together.parameters, (own, together)
-        assert (own.covariance == together.covariance).all(), (own, together)
-    return taken(tests), taken([whole])
-
-
 def main(clutches: int, states: int, workers: int) -> None:
     """The table."""
     with tempfile.TemporaryDirectory() as folder:
@@ -166,8 +119,6 @@ def main(clutches: int, states: int, workers: int) -> None:
         with closing(open_database(f"sqlite:///{path}")) as database:
             costs(database)  # what is loaded and compiled once
             each = costs(database)
-            with a_tenth():
-                small = costs(database)
         before = time.process_time()
         local = replayed(path, "local")
         core = time.process_time() - before
@@ -181,11 +132,6 @@ def main(clutches: int, states: int, workers: int) -> None:
     steps = ", ".join(f"{step} {milliseconds:.1f} ms" for step, milliseconds in each.items())
     print(f"\nA clutch takes of a core: {steps}: {clutches / core:.1f} clutches/s/core in all, `local`.")
     print(f"A worker's part alone: {1e3 / each['compute']:.1f} clutches/s/core.")
-    print(
-        f"With a tenth of particles and draws, and a sixteenth of the nodes: {1e3 / small['compute']:.1f} clutches/s/core."
-    )
-    by_test, at_once = fits_at_once(states)
-    print(f"Its fits take {by_test:.1f} ms test by test, and {at_once:.1f} ms all at once.")
     print(f"Processes beside took {children.ru_utime + children.ru_stime:.0f} s of the processor.")
     same = all(one.stored == local.stored for one in found.values())
     print(f"All three stored {'the same rows' if same else 'DIFFERENT rows'}.")

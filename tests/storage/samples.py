@@ -6,27 +6,29 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 from alembic.config import Config
 from numpy.typing import NDArray
 from sqlalchemy import Connection, text
 
-from storage import channels, clutches, diagnoses, runs
+from storage import channels, clutches, runs
 from storage.clutches import ClutchRow
 from storage.diagnoses import NewDiagnosis
-from storage.engine.database import Database
 from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.results import FitRow
 from storage.runs import NewRun
 
+CLUTCH = "bench3-017"
 
-def clutch_row(clutch_id: str = "bench3-017", *, rank: float = 0.0) -> ClutchRow:
+
+def clutch_row(clutch_id: str = CLUTCH, *, rank: float = 0.0) -> ClutchRow:
     return ClutchRow(
         clutch_id=clutch_id,
         record={"clutch_id": clutch_id, "geometry": {"inner_diameter_mm": 99}, "fluid": "Öl"},
@@ -38,7 +40,7 @@ def clutch_row(clutch_id: str = "bench3-017", *, rank: float = 0.0) -> ClutchRow
     )
 
 
-def new_run(number: int = 0, *, clutch_id: str = "bench3-017", cycles: float | None = None) -> NewRun:
+def new_run(number: int = 0, *, clutch_id: str = CLUTCH, cycles: float | None = None) -> NewRun:
     return NewRun(
         clutch_id=clutch_id,
         run_id=f"run-{number:04d}",
@@ -53,9 +55,9 @@ def new_run(number: int = 0, *, clutch_id: str = "bench3-017", cycles: float | N
     )
 
 
-def new_diagnosis(number: int, *, last_run_key: int = 1) -> NewDiagnosis:
+def new_diagnosis(number: int, clutch_id: str = CLUTCH, *, last_run_key: int = 1) -> NewDiagnosis:
     return NewDiagnosis(
-        clutch_id="bench3-017",
+        clutch_id=clutch_id,
         diagnosis_id=f"d{number}",
         created_at="2026-11-02T10:00:00+00:00",
         revision=3,
@@ -71,8 +73,8 @@ def columns(number: int, length: int = 40) -> dict[str, NDArray[np.float64]]:
     return {name: rng.standard_normal(length) for name in ("torque_nm", "pressure_bar", "speed_rpm")}
 
 
-def fit_row(pressure: float, *, mse_percent: float | None = 1.7) -> FitRow:
-    return FitRow(
+def fit_row(pressure: float, **changed: Any) -> FitRow:
+    row = FitRow(
         pressure=pressure,
         mean_pressure=pressure + 12.5,
         static_torque=25.1,
@@ -84,7 +86,7 @@ def fit_row(pressure: float, *, mse_percent: float | None = 1.7) -> FitRow:
         status="at_bound",
         undetermined=("stribeck_velocity",),
         noise=0.1,
-        mse_percent=mse_percent,
+        mse_percent=1.7,
         rmse=0.11,
         points=40,
         speeds=39,
@@ -93,6 +95,7 @@ def fit_row(pressure: float, *, mse_percent: float | None = 1.7) -> FitRow:
         message="the Stribeck velocity lies at its bound",
         code_version="0.1.0",
     )
+    return replace(row, **changed)
 
 
 @cache
@@ -113,26 +116,8 @@ def store_run(connection: Connection, number: int, *, length: int = 40) -> int:
     """One accepted run as the workflow writes it: the run, its channels and the clutch's revision."""
     run_key = runs.insert(connection, new_run(number))
     channels.write(connection, run_key, channels.encoded(columns(number, length)))
-    clutches.bump_revision(connection, "bench3-017")
+    clutches.bump_revision(connection, CLUTCH)
     return run_key
-
-
-def store_diagnoses(database: Database) -> Database:
-    """A clutch with one run and three running diagnoses, d0 to d2."""
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        store_run(connection, 1)
-        for number in range(3):
-            diagnoses.insert(connection, new_diagnosis(number))
-    return database
-
-
-def store_two_clutches(database: Database) -> Database:
-    """A clutch and another one."""
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        clutches.insert(connection, clutch_row("other"))
-    return database
 
 
 @contextmanager

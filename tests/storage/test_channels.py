@@ -1,10 +1,9 @@
-"""The raw channels of runs: each function against a real database."""
-
-from dataclasses import replace
+"""The raw channels of runs, in either database and in each kind of store beside it."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from sqlalchemy import Connection
 from sqlalchemy.exc import IntegrityError
 
 from service import stored_runs
@@ -18,33 +17,21 @@ from storage.engine.errors import DamagedData
 from tests.storage.samples import clutch_row, columns, new_run
 
 
-def test_channels_keep_their_order_and_their_bits(database: Database) -> None:
+def test_channels_keep_their_order_and_their_bits_and_are_written_once(connection: Connection) -> None:
     sent = {"time_s": np.array([0.0, -0.0, 5e-324, 1e308]), **columns(1, 5000), "empty": np.zeros(0)}
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        key, bare = (runs.insert(connection, new_run(number)) for number in range(2))
+    key, bare = (runs.insert(connection, new_run(number)) for number in range(2))
+    channels.write(connection, key, channels.encoded(sent))
+    channels.write(connection, bare, channels.encoded({}))
+    back = channels.read(connection, key)
+    assert list(back) == list(sent) == list(channels.lengths(connection, key))
+    assert all(back[name].tobytes() == column.tobytes() for name, column in sent.items())
+    assert channels.read(connection, bare) == channels.lengths(connection, bare) == {}
+    with pytest.raises(LookupError, match="has no channel torque_nm"):
+        channels.stored(connection, bare, "torque_nm")
+    with pytest.raises(IntegrityError, match=r"(?i)unique"), connection.begin_nested():
         channels.write(connection, key, channels.encoded(sent))
-        channels.write(connection, bare, channels.encoded({}))
-    with database.reading() as connection:
-        back = channels.read(connection, key)
-        assert list(back) == list(sent)
-        assert all(back[name].tobytes() == column.tobytes() for name, column in sent.items())
-        assert channels.read(connection, bare) == {}
-
-
-def test_long_channels_keep_their_order_and_their_bits(database: Database) -> None:
-    sent = columns(7, 50_000) | {"oil_temperature_c": np.zeros(50_000), "time_s": np.arange(50_000) / 1000}
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        run_key = runs.insert(connection, new_run(0))
-        channels.write(connection, run_key, channels.encoded(sent))
-    with database.reading() as connection:
-        kept = channels.read(connection, run_key)
-        rows = connection.exec_driver_sql("SELECT name, codec FROM channel").fetchall()
-        stored = {name: codec for name, codec in rows}  # noqa: C416  (rows are no pairs to mypy)
-    assert list(kept) == list(sent)
-    assert all(kept[name].tobytes() == column.tobytes() for name, column in sent.items())
-    assert {stored["time_s"], stored["torque_nm"]} == {"decimal-zlib", "shuffle-zlib"}
+    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), connection.begin_nested():
+        channels.write(connection, 99, channels.encoded(sent))
 
 
 def test_short_channels_are_never_stored_as_decimals() -> None:
@@ -53,43 +40,14 @@ def test_short_channels_are_never_stored_as_decimals() -> None:
     assert codecs == ["shuffle-zlib", "decimal-zlib"]
 
 
-def test_channels_belong_to_a_run_and_are_written_once(database: Database) -> None:
-    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), database.writing() as connection:
-        channels.write(connection, 7, channels.encoded(columns(1)))
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        key = runs.insert(connection, new_run())
-        channels.write(connection, key, channels.encoded(columns(1)))
-    with pytest.raises(IntegrityError, match=r"(?i)unique"), database.writing() as connection:
-        channels.write(connection, key, channels.encoded(columns(2)))
-
-
-def test_a_damaged_channel_is_named(database: Database) -> None:
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        key = runs.insert(connection, new_run())
-        channels.write(connection, key, channels.encoded(columns(1)))
-        connection.exec_driver_sql("UPDATE channel SET data = substr(data, 1, 50) WHERE name = 'speed_rpm'")
-    with database.reading() as connection, pytest.raises(DamagedData, match="channel speed_rpm: "):
+def test_a_damaged_channel_is_named(connection: Connection) -> None:
+    key = runs.insert(connection, new_run())
+    channels.write(connection, key, channels.encoded(columns(1)))
+    connection.exec_driver_sql("UPDATE channel SET data = substr(data, 1, 50) WHERE name = 'speed_rpm'")
+    with pytest.raises(DamagedData, match="channel speed_rpm: "):
         channels.read(connection, key)
-
-
-def test_one_channel_is_read_alone_and_decoded_without_a_connection(database: Database) -> None:
-    sent = {"time_s": np.arange(50_000) / 1000, **columns(1, 50_000)}
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        key, bare = (runs.insert(connection, new_run(number)) for number in range(2))
-        channels.write(connection, key, channels.encoded(sent))
-    with database.reading() as connection:
-        stored = [channels.stored(connection, key, name) for name in sent]
-        assert channels.lengths(connection, key) == dict.fromkeys(sent, 50_000)
-        assert list(channels.lengths(connection, key)) == list(sent)
-        assert channels.lengths(connection, bare) == {}
-        with pytest.raises(LookupError, match="has no channel torque_nm"):
-            channels.stored(connection, bare, "torque_nm")
-    assert [each.values().tobytes() for each in stored] == [column.tobytes() for column in sent.values()]
-    with pytest.raises(DamagedData, match="channel time_s: "):
-        replace(stored[0], data=stored[0].data[:50]).values()
+    with pytest.raises(DamagedData, match="channel speed_rpm: "):
+        channels.stored(connection, key, "speed_rpm").values()
 
 
 @pytest.fixture(params=["database", "in_folder", "in_bucket"])
@@ -114,15 +72,16 @@ def test_columns_keep_their_bits_wherever_they_are(database: Database, place: st
     run_key = store_long_run(database, place, sent)
     with database.reading() as connection:
         held = channels.stored_of_run(connection, run_key)
-        rows = connection.exec_driver_sql("SELECT name, length(data) FROM channel")
-        sizes = {name: size for name, size in rows}  # noqa: C416  (rows are no pairs to mypy)
+        rows = connection.exec_driver_sql("SELECT name, codec, length(data) FROM channel").fetchall()
         assert channels.lengths(connection, run_key) == dict.fromkeys(sent, 50_000)
-        one = channels.stored(connection, run_key, "torque_nm")
+        alone = [channels.stored(connection, run_key, name) for name in sent]
         numbers = raw_stores.numbers(connection)
-    assert one.values().tobytes() == sent["torque_nm"].tobytes()
+    assert [each.values().tobytes() for each in alone] == [column.tobytes() for column in sent.values()]
     kept = channels.values_of(held)
     assert list(kept) == list(sent)
     assert all(kept[name].tobytes() == column.tobytes() for name, column in sent.items())
+    codecs, sizes = {name: codec for name, codec, _ in rows}, {name: size for name, _, size in rows}
+    assert (codecs["time_s"], codecs["torque_nm"]) == ("decimal-zlib", "shuffle-zlib")
     assert 0 < sizes["oil_temperature_c"] < channels.MAX_INLINE  # a short one stays in the database
     assert (sizes["torque_nm"] > channels.MAX_INLINE) == (place == DATABASE)
     assert numbers == ({} if place == DATABASE else {place: (3, 3)})

@@ -4,31 +4,22 @@ from dataclasses import replace
 from math import nan
 
 import pytest
+from sqlalchemy import Connection
 from sqlalchemy.exc import IntegrityError
 
 from storage import clutches, runs
 from storage.clutches import Choice, Counts
 from storage.engine.database import Database
-from tests.storage.samples import clutch_row, new_run
+from tests.storage.samples import CLUTCH, clutch_row, new_run
 
-CLUTCH = "bench3-017"
+NAMED = {"life": "", "state": "normal", "if_disputed": "normal"}
 
 
-def test_a_clutch_comes_back_as_it_was_stored(database: Database) -> None:
-    with database.writing() as connection:
+def test_a_clutch_comes_back_as_it_was_stored_and_its_id_is_taken_once(connection: Connection) -> None:
+    assert clutches.get(connection, CLUTCH) == clutch_row()
+    assert clutches.get(connection, "unknown") is None
+    with pytest.raises(IntegrityError), connection.begin_nested():
         clutches.insert(connection, clutch_row())
-    with database.reading() as connection:
-        assert clutches.get(connection, CLUTCH) == clutch_row()
-        assert clutches.get(connection, "unknown") is None
-
-
-def test_a_clutch_id_is_taken_once_and_summaries_are_json(database: Database) -> None:
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-    with pytest.raises(IntegrityError), database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-    with pytest.raises(ValueError, match="not JSON compliant"), database.writing() as connection:
-        clutches.set_summary(connection, CLUTCH, 0.5, {"health": nan}, life="", state="check", if_disputed="check")
 
 
 def test_lists_are_worst_first_and_pages_join_without_gap_or_repeat(database: Database) -> None:
@@ -36,7 +27,6 @@ def test_lists_are_worst_first_and_pages_join_without_gap_or_repeat(database: Da
     with database.writing() as connection:
         for clutch_id, rank in ranks.items():
             clutches.insert(connection, clutch_row(clutch_id, rank=rank))
-    with database.reading() as connection:
         seen: list[str] = []
         after = None
         while page := clutches.page(connection, limit=2, after=after):
@@ -46,38 +36,35 @@ def test_lists_are_worst_first_and_pages_join_without_gap_or_repeat(database: Da
         assert clutches.all_ids(connection) == ["a", "b", "c", "d", "e"]
 
 
-def test_archived_clutches_are_listed_apart(database: Database) -> None:
-    with database.writing() as connection:
-        for clutch_id in ("a", "b"):
-            clutches.insert(connection, clutch_row(clutch_id))
-        content = {"record": {"fluid": "new"}, "content_sha256": "cd", "registered": {"fluid": "old"}}
-        clutches.set_record(connection, "a", **content, archived=True)
+def test_archived_clutches_are_listed_apart(connection: Connection) -> None:
+    content = {"record": {"fluid": "new"}, "content_sha256": "cd", "registered": {"fluid": "old"}}
+    clutches.set_record(connection, CLUTCH, **content, archived=True)
+    assert [row.clutch_id for row in clutches.page(connection, limit=9)] == ["other"]
+    (row,) = clutches.page(connection, Choice(archived=True), limit=9)
+    assert (row.clutch_id, row.record, row.registered) == (CLUTCH, {"fluid": "new"}, {"fluid": "old"})
+    assert clutches.page(connection, Choice(archived=True), limit=9, after=(row.rank, CLUTCH)) == []
+
+
+def test_summary_and_revision(connection: Connection) -> None:
+    clutches.set_summary(connection, CLUTCH, 0.2, {"health": 0.2}, **NAMED)
+    assert [clutches.bump_revision(connection, CLUTCH) for _ in range(3)] == [1, 2, 3]
+    assert clutches.get(connection, CLUTCH) == replace(
+        clutch_row(), rank=0.2, summary={"health": 0.2}, revision=3, state="normal"
+    )
+    assert clutches.get(connection, "other") == clutch_row("other")
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        clutches.set_summary(connection, CLUTCH, 0.5, {"health": nan}, **NAMED)
+
+
+def test_an_unknown_clutch_is_named(connection: Connection) -> None:
+    for change in (
+        lambda: clutches.set_summary(connection, "nobody", 0.0, {}, **NAMED),
+        lambda: clutches.bump_revision(connection, "nobody"),
+        lambda: clutches.set_record(connection, "nobody", record={}, content_sha256="", registered=None, archived=True),
+        lambda: clutches.set_disputed(connection, "nobody", None, state="normal"),
+    ):
         with pytest.raises(LookupError, match="'nobody'"):
-            clutches.set_record(connection, "nobody", **content, archived=True)
-    with database.reading() as connection:
-        assert [row.clutch_id for row in clutches.page(connection, limit=9)] == ["b"]
-        (row,) = clutches.page(connection, Choice(archived=True), limit=9)
-        assert (row.clutch_id, row.record, row.registered) == ("a", {"fluid": "new"}, {"fluid": "old"})
-        assert clutches.page(connection, Choice(archived=True), limit=9, after=(row.rank, "a")) == []
-
-
-def test_summary_and_revision(database: Database) -> None:
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        clutches.insert(connection, clutch_row("other"))
-        clutches.set_summary(connection, CLUTCH, 0.2, {"health": 0.2}, life="", state="check", if_disputed="check")
-        assert [clutches.bump_revision(connection, CLUTCH) for _ in range(3)] == [1, 2, 3]
-    with database.reading() as connection:
-        assert clutches.get(connection, CLUTCH) == replace(clutch_row(), rank=0.2, summary={"health": 0.2}, revision=3)
-        assert clutches.get(connection, "other") == clutch_row("other")
-
-
-def test_an_unknown_clutch_is_named(database: Database) -> None:
-    with database.writing() as connection:
-        with pytest.raises(LookupError, match="'nobody'"):
-            clutches.set_summary(connection, "nobody", 0.0, {}, life="", state="check", if_disputed="check")
-        with pytest.raises(LookupError, match="'nobody'"):
-            clutches.bump_revision(connection, "nobody")
+            change()
 
 
 #: id -> rank, state, material, fluid, archived
@@ -167,10 +154,9 @@ def test_a_walk_by_name_meets_each_clutch_once_while_ranks_change_and_one_worst_
                     break
                 seen.append(page[0].clutch_id)
                 place = page[0].rank, page[0].clutch_id
-                named = {"life": "", "state": "normal", "if_disputed": "normal"}
                 # the clutch that was seen falls behind all others, and the last of the list comes to its front
-                clutches.set_summary(connection, page[0].clutch_id, 20.0 + len(seen), {}, **named)
-                clutches.set_summary(connection, "c-4", -float(len(seen)), {}, **named)
+                clutches.set_summary(connection, page[0].clutch_id, 20.0 + len(seen), {}, **NAMED)
+                clutches.set_summary(connection, "c-4", -float(len(seen)), {}, **NAMED)
         return seen
 
     shown = walked(by_name=False)
@@ -191,39 +177,32 @@ def test_the_clutch_at_a_share_of_the_ranks(fleet: Database) -> None:
         assert at(0.9, Choice(only=())) is None
 
 
-def test_a_dispute_counts_in_its_life(fleet: Database) -> None:
+def test_a_dispute_counts_in_its_life(connection: Connection) -> None:
     def summarised(life: str) -> str:
-        named = {"life": life, "state": "normal", "if_disputed": "out_of_specification"}
-        with fleet.writing() as connection:
-            clutches.set_summary(connection, "A-1", 1.0, {}, **named)
-            row = clutches.get(connection, "A-1")
-            assert row is not None
-            return row.state
+        disputed = "out_of_specification"
+        clutches.set_summary(connection, CLUTCH, 1.0, {}, life=life, state="normal", if_disputed=disputed)
+        row = clutches.get(connection, CLUTCH)
+        assert row is not None
+        return row.state
 
     assert summarised("") == "normal"
-    with fleet.writing() as connection:
-        clutches.set_disputed(connection, "A-1", "rebuilt", state="normal")
-        with pytest.raises(LookupError, match="'nobody'"):
-            clutches.set_disputed(connection, "nobody", None, state="normal")
-    assert [summarised(life) for life in ("", "rebuilt", "rebuilt-again")] == [
-        "normal",
-        "out_of_specification",
-        "normal",
-    ]
+    clutches.set_disputed(connection, CLUTCH, "rebuilt", state="normal")
+    states = [summarised(life) for life in ("", "rebuilt", "rebuilt-again")]
+    assert states == ["normal", "out_of_specification", "normal"]
+
+
+_NAMES = "SELECT clutch_id FROM clutch WHERE archived = 0"
 
 
 @pytest.mark.parametrize(
     ("question", "index"),
     [
-        ("SELECT clutch_id FROM clutch WHERE archived = 0 ORDER BY rank, clutch_id", "clutch_worst_first (archived=?)"),
+        (f"{_NAMES} ORDER BY rank, clutch_id", "clutch_worst_first (archived=?)"),
         (
-            "SELECT clutch_id FROM clutch WHERE archived = 0 AND (rank, clutch_id) > (1.0, 'a') ORDER BY rank, clutch_id",
+            f"{_NAMES} AND (rank, clutch_id) > (1.0, 'a') ORDER BY rank, clutch_id",
             "clutch_worst_first (archived=? AND (rank,clutch_id)>(?,?))",
         ),
-        (
-            "SELECT clutch_id FROM clutch WHERE archived = 0 AND state = 'check' ORDER BY rank, clutch_id",
-            "clutch_by_state (archived=? AND state=?)",
-        ),
+        (f"{_NAMES} AND state = 'check' ORDER BY rank, clutch_id", "clutch_by_state (archived=? AND state=?)"),
         ("SELECT state, count(*) FROM clutch WHERE archived = 0 GROUP BY state", "clutch_by_state (archived=?)"),
     ],
 )

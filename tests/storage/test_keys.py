@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from sqlalchemy import Connection
 from sqlalchemy.exc import IntegrityError
 
 from storage import keys
@@ -51,10 +52,9 @@ def test_a_key_opens_until_it_is_revoked(database: Database) -> None:
 
 
 @pytest.mark.parametrize("second", [key("k1", "bb"), key("k2", "aa")])
-def test_a_key_id_and_a_secret_are_taken_once(database: Database, second: KeyRow) -> None:
-    with database.writing() as connection:
-        keys.insert(connection, key("k1", "aa"))
-    with pytest.raises(IntegrityError, match=r"(?i)unique"), database.writing() as connection:
+def test_a_key_id_and_a_secret_are_taken_once(connection: Connection, second: KeyRow) -> None:
+    keys.insert(connection, key("k1", "aa"))
+    with pytest.raises(IntegrityError, match=r"(?i)unique"), connection.begin_nested():
         keys.insert(connection, second)
 
 

@@ -11,9 +11,7 @@ from storage import channels, clutches, runs
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseBusy, StorageUnavailable
 from storage.engine.opening import open_database
-from tests.storage.samples import clutch_row, store_run
-
-CLUTCH = "bench3-017"
+from tests.storage.samples import CLUTCH, clutch_row, store_run
 
 
 def test_a_failed_statement_rolls_back_what_came_before(database: Database) -> None:

@@ -10,29 +10,21 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
 from models.prognosis.ended_lives import EndedLife
-from storage import assumptions, channels, clutches, diagnoses
+from storage import assumptions, clutches, diagnoses
 from storage.encoding import to_text
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseTooNew, StorageUnavailable
-from storage.engine.integrity import other_schema
 from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.tables import metadata
-from tests.storage.engine.postgresql.server import PostgresServer
-from tests.storage.samples import (
-    OLD,
-    child,
-    clutch_row,
-    columns,
-    integrity,
-    new_diagnosis,
-    old_database,
-    revision,
-    store_run,
-    take_back,
-)
+from tests.storage.samples import CLUTCH, OLD, child, clutch_row, integrity, new_diagnosis, old_database, revision
 
-CLUTCH = "bench3-017"
+
+@pytest.fixture
+def database(in_file: Database) -> Database:
+    """A database on a server starts at the newest revision; tests of its migration are among those of its engine."""
+    return in_file
+
 
 STARTER = """
 import sys
@@ -53,10 +45,7 @@ def test_the_migrated_schema_is_that_of_the_tables(database: Database) -> None:
             connection, opts={"compare_type": True, "compare_server_default": True, "render_as_batch": True}
         )
         assert compare_metadata(context, metadata) == []
-
-
-def test_a_column_that_no_step_makes_would_be_noticed(database: Database) -> None:
-    with database.writing() as connection:
+    with database.writing() as connection:  # the comparison can fail
         connection.exec_driver_sql("ALTER TABLE clutch ADD COLUMN forgotten TEXT")
         connection.exec_driver_sql("DROP INDEX run_in_order")
         assert len(compare_metadata(MigrationContext.configure(connection), metadata)) == 2
@@ -78,23 +67,28 @@ def test_a_second_start_changes_nothing(database: Database) -> None:
         clutches.insert(connection, clutch_row())
     before = database.path.read_bytes()
     with closing(open_database(f"sqlite:///{database.path}")) as again, again.reading() as connection:
-        assert clutches.get(connection, "bench3-017") == clutch_row()
+        assert clutches.get(connection, CLUTCH) == clutch_row()
         assert migrations.current(connection) == migrations.head()
     assert database.path.read_bytes() == before
+    assert list(database.path.parent.glob("*-before-*")) == []
 
 
 @pytest.mark.usefixtures("later_step")
-def test_an_older_file_is_brought_up_and_keeps_what_it_holds(tmp_path: Path) -> None:
+def test_an_older_file_is_brought_up_keeps_what_it_holds_and_is_kept_as_it_was(tmp_path: Path) -> None:
     path = old_database(tmp_path)
-    with closing(sqlite3.connect(path)) as connection:
-        assert "later" not in {row[1] for row in connection.execute("PRAGMA table_info(clutch)")}
     with closing(open_database(f"sqlite:///{path}")) as new, new.writing() as connection:
         assert migrations.current(connection) == migrations.head() == "s9000_later"
         (row,) = connection.exec_driver_sql("SELECT clutch_id, later FROM clutch").fetchall()
         assert tuple(row) == (CLUTCH, None)
         diagnoses.insert(connection, new_diagnosis(0))
         assert diagnoses.running(connection, CLUTCH, 1) == ["d0"]
-    assert integrity(path) == ["ok"]
+    kept = path.with_name(f"old.db-before-{migrations.head()}")
+    assert (revision(kept), integrity(path), integrity(kept)) == (OLD, ["ok"], ["ok"])
+    with closing(sqlite3.connect(kept)) as old:
+        assert old.execute("SELECT clutch_id FROM clutch").fetchall() == [(CLUTCH,)]
+        assert "later" not in {row[1] for row in old.execute("PRAGMA table_info(clutch)")}
+    open_database(f"sqlite:///{path}").close()
+    assert [each.name for each in tmp_path.glob("*-before-*")] == [kept.name]
 
 
 def test_ended_lives_that_were_stored_before_they_had_a_law_can_be_read(tmp_path: Path) -> None:
@@ -117,19 +111,16 @@ def test_a_file_of_the_last_step_is_as_it_is(tmp_path: Path) -> None:
     with closing(sqlite3.connect(path)) as connection, connection:
         connection.execute("UPDATE alembic_version SET version_num = 's0003_laws_of_ended_lives'")
     with closing(open_database(f"sqlite:///{path}")) as database, database.reading() as connection:
-        assert (clutches.get(connection, CLUTCH) is not None, migrations.current(connection)) == (
-            True,
-            migrations.head(),
-        )
+        assert clutches.get(connection, CLUTCH) is not None
+        assert migrations.current(connection) == migrations.head()
 
 
 def test_steps_are_one_line_and_named_after_their_files() -> None:
     steps = list(ScriptDirectory.from_config(migrations._config()).walk_revisions())
     assert [Path(step.path).stem for step in steps] == [step.revision for step in steps]
     assert all(step.doc and len(step.revision) <= 32 for step in steps)
-    assert {path.stem for path in Path(migrations.__file__).parent.glob("versions/s*.py")} == {
-        s.revision for s in steps
-    }
+    files = Path(migrations.__file__).parent.glob("versions/s*.py")
+    assert {path.stem for path in files} == {step.revision for step in steps}
 
 
 def test_a_newer_database_is_refused_and_left_alone(database: Database) -> None:
@@ -178,18 +169,6 @@ def test_processes_that_start_at_once_all_succeed(tmp_path: Path, journal_mode: 
 
 
 @pytest.mark.usefixtures("later_step")
-def test_a_migration_keeps_a_copy_of_the_file_as_it_was(tmp_path: Path) -> None:
-    path = old_database(tmp_path)
-    kept = path.with_name(f"old.db-before-{migrations.head()}")
-    open_database(f"sqlite:///{path}").close()
-    assert (revision(path), revision(kept), integrity(kept)) == (migrations.head(), OLD, ["ok"])
-    with closing(sqlite3.connect(kept)) as connection:
-        assert connection.execute("SELECT clutch_id FROM clutch").fetchall() == [("bench3-017",)]
-    open_database(f"sqlite:///{path}").close()
-    assert [each.name for each in tmp_path.glob("*-before-*")] == [kept.name]
-
-
-@pytest.mark.usefixtures("later_step")
 def test_a_migration_that_is_tried_again_replaces_no_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same content is kept once; a file that was worked on in between is kept beside it."""
     path = old_database(tmp_path)
@@ -206,36 +185,3 @@ def test_a_migration_that_is_tried_again_replaces_no_copy(tmp_path: Path, monkey
     open_database(f"sqlite:///{path}").close()
     assert sorted(each.name for each in tmp_path.glob("*-before-*")) == [name, f"{name}.2"]
     assert (tmp_path / name).read_bytes() == first
-
-
-def test_a_new_file_needs_no_copy(database: Database) -> None:
-    assert list(database.path.parent.glob("*-before-*")) == []
-
-
-@pytest.mark.usefixtures("later_step")
-def test_a_server_of_an_earlier_release_is_brought_up(postgresql: PostgresServer) -> None:
-    url = postgresql.fresh()
-    with closing(open_database(url)) as old, old.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        run_key = store_run(connection, 1)
-        take_back(connection)
-    with closing(open_database(url)) as new, new.reading() as connection:
-        assert migrations.current(connection) == migrations.head()
-        assert connection.exec_driver_sql("SELECT count(later) FROM clutch").scalar_one() == 0
-        kept = channels.read(connection, run_key)
-        assert all(kept[name].tobytes() == column.tobytes() for name, column in columns(1).items())
-    postgresql.drop(url)
-
-
-def test_the_first_tables_of_a_server_are_those_of_the_metadata(postgresql: PostgresServer) -> None:
-    """Made by the same step as a file's; text is ordered by its code points."""
-    url = postgresql.fresh()
-    with closing(open_database(url)) as database, database.reading() as connection:
-        assert other_schema(connection) == []
-        others = connection.exec_driver_sql(
-            "SELECT table_name, column_name FROM information_schema.columns WHERE table_schema = current_schema() "
-            "AND data_type = 'text' AND collation_name IS DISTINCT FROM 'C' "
-            "AND table_name NOT IN ('shared_answer', 'alembic_version')"
-        ).fetchall()
-        assert others == []
-    postgresql.drop(url)

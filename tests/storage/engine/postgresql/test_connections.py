@@ -20,9 +20,6 @@ from storage.engine.postgresql.database import ServerWatch
 from tests.storage.engine.postgresql.server import postgresql_server
 from tests.storage.samples import clutch_row
 
-# --- The connections of a service to a server: what they say of it, and what becomes of them when the server comes
-# back.
-
 ANSWER = SharedAnswer(clutch_id="c1", name="degradation", release="1.0", revision=0, body=b"kept")
 _HELD = text("""
 SELECT count(*) FROM pg_locks JOIN pg_database ON pg_database.oid = pg_locks.database
@@ -223,7 +220,7 @@ def test_a_database_answers_each_what_it_asked(database: Database) -> None:
 
 # --- The last computed answers, which the services on a server share.
 
-FIRST = SharedAnswer(clutch_id="c1", name="degradation", release="1.0", revision=3, body=b"\x00first")
+FIRST = replace(ANSWER, revision=3, body=b"\x00first")
 
 
 @pytest.fixture

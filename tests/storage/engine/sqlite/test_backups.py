@@ -16,11 +16,9 @@ from storage.engine.opening import open_database
 from storage.engine.sqlite.backup import restore
 from storage.engine.sqlite.connect import service_lock
 from storage.engine.sqlite.database import back_up
-from tests.storage.samples import OLD, clutch_row, integrity, old_database, revision, store_run
+from tests.storage.samples import CLUTCH, OLD, clutch_row, integrity, old_database, revision, store_run
 
 # --- A copy taken while others write is one state of the database, and never replaces a file.
-
-CLUTCH = "bench3-017"
 
 
 @pytest.fixture
@@ -70,15 +68,11 @@ def test_a_copy_during_an_open_transaction_is_the_state_before_it(busy: Database
     with busy.writing() as connection:
         store_run(connection, 1)
         back_up(f"sqlite:///{busy.path}", tmp_path / "copy.db")
+    with closing(sqlite3.connect(tmp_path / "copy.db")) as any_sqlite:
+        assert any_sqlite.execute("PRAGMA journal_mode").fetchone() == ("delete",)
+    assert [path.name for path in tmp_path.glob("copy.db*")] == ["copy.db"], "it is one file"
     with closing(open_database(f"sqlite:///{tmp_path}/copy.db")) as restored, restored.reading() as connection:
         assert len(runs.in_order(connection, CLUTCH)) == 1
-
-
-def test_a_copy_is_one_file_for_any_sqlite(busy: Database, tmp_path: Path) -> None:
-    back_up(f"sqlite:///{busy.path}", tmp_path / "copy.db")
-    with closing(sqlite3.connect(tmp_path / "copy.db")) as connection:
-        assert connection.execute("PRAGMA journal_mode").fetchone() == ("delete",)
-    assert [path.name for path in sorted(tmp_path.glob("copy.db*"))] == ["copy.db"]
 
 
 def test_an_existing_file_is_never_replaced(busy: Database, tmp_path: Path) -> None:
@@ -98,15 +92,6 @@ def test_a_copy_that_fails_leaves_nothing(busy: Database, tmp_path: Path) -> Non
     assert not busy.path.exists()
     with pytest.raises(FileNotFoundError):
         back_up(f"sqlite:///{busy.path}", tmp_path / "no such folder" / "copy.db")
-
-
-def test_a_backup_of_an_older_file_is_made_as_it_is(tmp_path: Path) -> None:
-    path = old_database(tmp_path)
-    before = path.read_bytes()
-    back_up(f"sqlite:///{path}", tmp_path / "copy.db")
-    assert path.read_bytes() == before
-    assert [revision(each) for each in (path, tmp_path / "copy.db")] == [OLD, OLD]
-    assert integrity(tmp_path / "copy.db") == ["ok"]
 
 
 # --- A backup is put back whole or not at all, and what it replaces is kept.

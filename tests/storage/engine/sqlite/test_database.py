@@ -1,17 +1,134 @@
-"""What the store reports where the file cannot be used."""
+"""A database in a file: its address and settings, who waits for whom, and what is said where it cannot be used."""
 
+import multiprocessing
+import os
+import sqlite3
+import stat
+import time
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
-from storage import clutches
+from storage import clutches, runs
 from storage.engine.database import Database
-from storage.engine.errors import DatabaseTooOld, StorageUnavailable
-from storage.engine.opening import find_database, open_database
-from tests.storage.samples import OLD, clutch_row, old_database, store_run
+from storage.engine.errors import DatabaseBusy, DatabaseTooOld, StorageUnavailable
+from storage.engine.opening import find_database, open_database, service_lock
+from storage.engine.sqlite import connect
+from storage.engine.sqlite.backup import copy
+from storage.engine.sqlite.database import back_up
+from tests.storage.samples import CLUTCH, OLD, clutch_row, integrity, old_database, store_run
+from tests.support import one_quick
+
+# --- Address, journal mode and the settings of every connection.
+
+
+def journal_mode_of_file(path: Path) -> str:
+    with closing(sqlite3.connect(path)) as connection:
+        return str(connection.execute("PRAGMA journal_mode").fetchone()[0])
+
+
+@pytest.mark.parametrize("earlier", ["delete", "wal"])
+def test_a_file_of_another_sqlite_is_turned_and_keeps_its_rows(
+    tmp_path: Path, journal_mode: str, earlier: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    url = f"sqlite:///{tmp_path}/a.db"
+    with monkeypatch.context() as patch:
+        patch.setattr(connect, "JOURNAL_MODE", earlier)
+        with closing(open_database(url)) as database, database.writing() as connection:
+            clutches.insert(connection, clutch_row())
+    assert journal_mode_of_file(tmp_path / "a.db") == earlier
+    with closing(open_database(url)) as database, database.reading() as connection:
+        assert database.journal_mode == journal_mode
+        assert clutches.get(connection, "bench3-017") == clutch_row()
+    assert journal_mode_of_file(tmp_path / "a.db") == journal_mode
+
+
+@pytest.mark.parametrize(
+    ("url", "says"),
+    [
+        ("postgresql://user:secret@host/db", "'postgresql'"),
+        ("sqlite+aiosqlite:///a.db", r"'sqlite\+aiosqlite'"),
+        ("clutches.db", "sqlite:///path"),
+        ("", "sqlite:///path"),
+        ("sqlite://", "needs a file"),
+        ("sqlite:///", "needs a file"),
+        ("sqlite://host/a.db", "needs a file"),
+        ("sqlite:///:memory:", "needs a file"),
+        ("sqlite:///a.db?mode=ro", "without options"),
+        ("sqlite:///a.db?key=secret", "without options"),
+        ("sqlite:///file:a.db", "without options"),
+    ],
+)
+def test_other_addresses_are_refused(url: str, says: str) -> None:
+    with pytest.raises(ValueError, match=says) as refusal:
+        open_database(url)
+    assert "secret" not in str(refusal.value)
+
+
+def test_relative_paths_and_paths_with_signs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("plain.db", "50 % of # ü.db"):
+        with closing(open_database(f"sqlite:///{name}")) as database:
+            assert not database.faults(least_free=0)
+            back_up(f"sqlite:///{name}", tmp_path / f"copy of {name}")
+        assert {(tmp_path / name).exists(), (tmp_path / f"copy of {name}").exists()} == {True}
+
+
+def test_every_connection_enforces_keys_and_syncs(database: Database) -> None:
+    expected = {"foreign_keys": 1, "synchronous": 2, "cache_spill": 0, "busy_timeout": 10_000}
+    for block in (database.reading, database.writing):
+        with block() as first, database.reading() as second:
+            for connection in (first, second):
+                found = {name: connection.exec_driver_sql(f"PRAGMA {name}").scalar_one() for name in expected}
+                assert found == expected
+                driver = connection.connection.driver_connection
+                assert isinstance(driver, sqlite3.Connection)
+                assert driver.isolation_level is None
+
+
+# --- Transactions: what both kinds of database have is in tests/storage/engine/test_transactions.py.
+
+
+def test_beside_a_rollback_journal_a_commit_waits_for_readers_gives_up_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connect, "JOURNAL_MODE", "delete")
+    with closing(open_database(f"sqlite:///{tmp_path}/a.db", lock_timeout=0.1)) as impatient:
+        with impatient.writing() as connection:
+            clutches.insert(connection, clutch_row())
+        with impatient.reading() as reader:
+            assert runs.in_order(reader, CLUTCH) == []
+            with pytest.raises(DatabaseBusy, match="locked"), impatient.writing() as connection:
+                store_run(connection, 0)
+            assert runs.in_order(reader, CLUTCH) == []
+        with impatient.writing() as connection:
+            assert runs.in_order(connection, CLUTCH) == []
+            store_run(connection, 1)
+        assert integrity(impatient.path) == ["ok"]
+
+
+def test_a_writer_elsewhere_makes_the_database_busy(tmp_path: Path, journal_mode: str) -> None:
+    with (
+        closing(open_database(f"sqlite:///{tmp_path}/a.db", lock_timeout=0.1)) as impatient,
+        closing(sqlite3.connect(tmp_path / "a.db", isolation_level=None)) as other,
+    ):
+        assert impatient.journal_mode == journal_mode
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(DatabaseBusy, match="locked"), impatient.writing():
+            pytest.fail("two writers at once")
+        with impatient.reading() as connection:
+            assert clutches.all_ids(connection) == []
+        other.execute("ROLLBACK")
+        with impatient.writing() as connection:
+            clutches.insert(connection, clutch_row())
+
+
+# --- Where the file cannot be used.
 
 
 def test_an_unreachable_file_is_named(tmp_path: Path) -> None:
@@ -92,3 +209,122 @@ def test_nothing_is_found_where_there_is_no_file(tmp_path: Path) -> None:
     with pytest.raises(StorageUnavailable, match="cannot be opened"):
         find_database(f"sqlite:///{tmp_path}/none.db")
     assert not (tmp_path / "none.db").exists()
+
+
+# --- Ready: the file is there, answers, has room and can be written; the question changes nothing.
+
+#: Bytes that must be free in these tests.
+LEAST_FREE = 16 << 20
+
+
+def test_ready_while_the_file_is_there_readable_and_open(database: Database) -> None:
+    assert not database.faults(least_free=LEAST_FREE)
+    database.path.rename(database.path.with_suffix(".gone"))
+    assert database.faults(least_free=LEAST_FREE)
+    database.path.with_suffix(".gone").rename(database.path)
+    assert not database.faults(least_free=LEAST_FREE)
+    database.path.write_bytes(b"x" * 8192)
+    assert "cannot be read" in database.faults(least_free=LEAST_FREE)["database"]
+    database.close()
+    assert database.faults(least_free=LEAST_FREE)
+
+
+def test_not_ready_on_a_full_disk(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    for free, full in ((LEAST_FREE - 1, True), (LEAST_FREE, False)):
+        disk = SimpleNamespace(free=free)
+        monkeypatch.setattr("storage.engine.sqlite.database.shutil.disk_usage", lambda _, disk=disk: disk)
+        assert bool(database.faults(least_free=LEAST_FREE)) == full
+
+
+def test_not_ready_where_nothing_can_be_written(
+    tmp_path: Path, journal_mode: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a disk that was mounted again for reading only, where the system refuses root too."""
+    access = os.access
+    with closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
+        assert database.journal_mode == journal_mode
+        assert not database.faults(least_free=LEAST_FREE)
+        for unwritable in (database.path, database.path.parent):
+            with monkeypatch.context() as patch:
+                patch.setattr(
+                    "storage.engine.sqlite.database.os.access",
+                    lambda path, how, no=unwritable: path != no and access(path, how),
+                )
+                assert database.faults(least_free=LEAST_FREE) == {
+                    "database": "the file or its folder cannot be written"
+                }
+        assert not database.faults(least_free=LEAST_FREE)
+
+
+def test_ready_writes_nothing_and_waits_for_nobody(database: Database) -> None:
+    def files() -> dict[str, bytes]:  # but for the log's index, which holds the marks of those who read
+        return {path.name: path.read_bytes() for path in database.path.parent.iterdir() if path.suffix != ".db-shm"}
+
+    assert not database.faults(least_free=LEAST_FREE)
+    before = files()
+    for _ in range(20):
+        assert not database.faults(least_free=LEAST_FREE)
+    assert files() == before
+    with database.writing():
+        begun = time.monotonic()
+        assert not database.faults(least_free=LEAST_FREE), "who writes now can write"
+        assert time.monotonic() - begun < 5.0
+
+
+def _hold(path: str, begin: str, say: "multiprocessing.connection.Connection") -> None:
+    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        connection.execute(begin)
+        say.send("held")
+        say.recv()
+
+
+@pytest.mark.parametrize("begin", one_quick(["BEGIN EXCLUSIVE", "BEGIN IMMEDIATE"]))
+def test_ready_at_once_while_another_process_holds_the_lock(tmp_path: Path, journal_mode: str, begin: str) -> None:
+    spawn = multiprocessing.get_context("spawn")
+    with closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
+        assert database.journal_mode == journal_mode
+        ours, theirs = spawn.Pipe()
+        other = spawn.Process(target=_hold, args=(str(database.path), begin, theirs))
+        other.start()
+        assert ours.poll(60)
+        assert ours.recv() == "held"
+        begun = time.monotonic()
+        assert database.faults(least_free=LEAST_FREE) == {}
+        assert time.monotonic() - begun < 5.0
+        ours.send("end")
+        other.join(60)
+
+
+# --- What keys protect is not readable by other users of the machine: the database, its log, its lock and its backups.
+
+
+@pytest.fixture
+def _open_to_all() -> Iterator[None]:
+    """The mask of a careless machine, under which what is made without a mode is open to all."""
+    before = os.umask(0)
+    yield
+    os.umask(before)
+
+
+def modes(folder: Path) -> dict[str, str]:
+    return {path.name: oct(stat.S_IMODE(path.stat().st_mode)) for path in folder.iterdir()}
+
+
+@pytest.mark.usefixtures("_open_to_all")
+def test_other_users_read_no_file_of_a_new_database(tmp_path: Path) -> None:
+    with service_lock(f"sqlite:///{tmp_path}/a.db"), closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
+        with database.writing() as connection:
+            clutches.insert(connection, clutch_row())
+        copy(tmp_path / "a.db", tmp_path / "backup.db", lock_timeout=1.0)
+        found = modes(tmp_path)
+    assert {"a.db", "a.db-wal", "a.db-shm", "a.db-lock", "a.db-service", "backup.db"} <= found.keys()
+    assert set(found.values()) == {"0o600"}
+    (tmp_path / "control").touch()
+    assert modes(tmp_path)["control"] == "0o666", "the mask hides what is to be seen"
+
+
+def test_a_mode_that_an_operator_chose_stays(tmp_path: Path) -> None:
+    open_database(f"sqlite:///{tmp_path}/a.db").close()
+    (tmp_path / "a.db").chmod(0o640)
+    open_database(f"sqlite:///{tmp_path}/a.db").close()
+    assert modes(tmp_path)["a.db"] == "0o640"

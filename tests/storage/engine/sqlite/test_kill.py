@@ -12,9 +12,7 @@ import pytest
 from storage import channels, clutches, runs
 from storage.engine.database import Database
 from storage.engine.opening import open_database
-from tests.storage.samples import child, clutch_row, columns, integrity, store_run
-
-CLUTCH = "bench3-017"
+from tests.storage.samples import CLUTCH, child, clutch_row, columns, integrity, store_run
 
 #: Kills itself at a named moment of the second run's transaction.
 SUICIDE = """

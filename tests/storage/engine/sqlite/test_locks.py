@@ -30,33 +30,28 @@ def _hold(path: str, say: "multiprocessing.connection.Connection") -> None:
         say.recv()
 
 
-def _count(path: str, counter: str, times: int) -> None:
-    """Read, wait a moment and write a number: two at once would lose steps."""
-    lock = WriteLock(Path(path), IN_TIME)
-    for _ in range(times):
+def _count(lock: WriteLock, counter: Path) -> None:
+    """Read, wait a moment and write a number, sixty times: two at once would lose steps."""
+    for _ in range(60):
         with lock.held():
-            number = int(Path(counter).read_text())
+            number = int(counter.read_text())
             time.sleep(0.0005)
-            Path(counter).write_text(str(number + 1))
+            counter.write_text(str(number + 1))
+
+
+def _count_elsewhere(path: Path, counter: Path) -> None:
+    _count(WriteLock(path, IN_TIME), counter)
 
 
 def test_processes_and_threads_take_it_one_at_a_time(tmp_path: Path) -> None:
     path, counter = tmp_path / "a.db", tmp_path / "counter"
     counter.write_text("0")
-    others = [_SPAWN.Process(target=_count, args=(str(path), str(counter), 60)) for _ in range(2)]
+    others = [_SPAWN.Process(target=_count_elsewhere, args=(path, counter)) for _ in range(2)]
     for other in others:
         other.start()
     lock = WriteLock(path, IN_TIME)
-
-    def count() -> None:
-        for _ in range(60):
-            with lock.held():
-                number = int(counter.read_text())
-                time.sleep(0.0005)
-                counter.write_text(str(number + 1))
-
     with ThreadPoolExecutor(2) as pool:
-        for done in [pool.submit(count) for _ in range(2)]:
+        for done in [pool.submit(_count, lock, counter) for _ in range(2)]:
             done.result(IN_TIME)
     for other in others:
         other.join(IN_TIME)
