@@ -17,6 +17,7 @@ from models.diagnosis.baseline.laws import (
     RATIO,
     Frame,
     Laws,
+    curve,
     falling_weight,
 )
 from models.diagnosis.baseline.prediction import predict
@@ -25,9 +26,18 @@ from models.diagnosis.design.design import build_design
 from models.diagnosis.noise.estimate import first_noise
 from models.diagnosis.pooled_fit.gauss_newton import fit
 from models.diagnosis.pooled_fit.problem import FitProblem, priors_of
-from models.friction.stribeck import StribeckParameters
+from models.friction.stribeck import StribeckParameters, torque
 from models.loops.lag_laws import attractor_torque
 from tests.models.diagnosis.campaigns import campaign, start_of, with_theta
+
+
+def test_the_curve_is_that_of_eq_3() -> None:
+    velocity = np.linspace(0.1, 12.0, 30)
+    parameters = StribeckParameters(
+        static_torque=22.0, coulomb_ratio=0.6, stribeck_velocity=4.0, viscous_coefficient=1.5
+    )
+    found = curve(velocity, np.tile(parameters.as_array(), (velocity.size, 1)))
+    np.testing.assert_allclose(found, torque(velocity, parameters), rtol=1e-12)
 
 
 @pytest.mark.parametrize("attractor", [40.0, 250.0, 4000.0])
