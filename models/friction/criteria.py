@@ -8,11 +8,6 @@ ACCEPTABLE_MSE = 5.0
 
 #: Noise where it cannot be estimated, as a share of the root mean square torque. Chosen; no table.
 ASSUMED_NOISE = 0.05
-#: A parameter with a standard error above this share of its scale is undetermined. Chosen; no table.
-UNDETERMINED_SHARE = 0.5
-#: V_S is undetermined where values this far from the optimum in log V_S are as likely as the 90 % interval allows. Chosen: a
-#: factor e.
-STRAY = 1.0
 
 #: A pressure law is fitted through at least this many pressures. Derived: the falling law has three coefficients.
 FEWEST_PRESSURES = 3

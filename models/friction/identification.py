@@ -112,8 +112,11 @@ class Uncertainty:
     undetermined: NDArray[np.bool_]
 
 
-def uncertainty(problem: Problem, optimum: Profile, scan: Profile, noise: Noise, level: FloatArray) -> Uncertainty:
-    """Covariance of the optimum [P, 1] with a > 0, and which parameters the data do not determine."""
+def uncertainty(
+    problem: Problem, optimum: Profile, scan: Profile, noise: Noise, level: FloatArray, share: float = 0.5
+) -> Uncertainty:
+    """Covariance of the optimum [P, 1] with a > 0, and which parameters the data do not determine: those with a standard
+    error above a `share` of their scale, and V_S where values a factor e away are as likely as the 90 % interval allows."""
     columns = jacobian(problem, optimum)
     points = (problem.weight**2).sum(axis=1)
     size = np.sqrt((columns**2).sum(axis=1) / points[:, None])
@@ -130,8 +133,8 @@ def uncertainty(problem: Problem, optimum: Profile, scan: Profile, noise: Noise,
     ratio = transform[:, 1, 1] * optimum.coefficients[:, 0, 1]
     viscous = np.sqrt((problem.viscous**2).sum(axis=1) / points)
     scale = np.stack([level, np.maximum(ratio, 1.0), transform[:, 2, 3], level / np.maximum(viscous, 1e-100)], axis=1)
-    undetermined = deviation > criteria.UNDETERMINED_SHARE * scale
-    undetermined[:, 2] |= stray > criteria.STRAY
+    undetermined = deviation > share * scale
+    undetermined[:, 2] |= stray > 1.0
     return Uncertainty(covariance=covariance, unbiased_covariance=unbiased, undetermined=undetermined)
 
 
@@ -143,7 +146,7 @@ def _covariance(
     inner = _linearised(columns * prior[:, None, :], shape, sd)
     inner *= prior[:, :, None] * prior[:, None, :]
     variance = inner[:, 3, 3]
-    missing = np.where(stray > criteria.STRAY, np.maximum((stray / criteria.Z90) ** 2 - variance, 0.0), 0.0)
+    missing = np.where(stray > 1.0, np.maximum((stray / criteria.Z90) ** 2 - variance, 0.0), 0.0)
     direction = inner[:, :, 3] / variance[:, None]
     inner += missing[:, None, None] * direction[:, :, None] * direction[:, None, :]
     covariance = transform @ inner @ transform.swapaxes(1, 2)

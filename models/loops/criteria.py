@@ -9,10 +9,3 @@ NOT_WHITE = 2.5
 
 #: The gain's prior deviation [-]. Chosen: what a torque sensor's gain differs by from day to day.
 GAIN_SD = 0.05
-#: Fewer sliding samples give no lag. Chosen; no table.
-FEWEST_SLIDING = 20
-#: A lag is against the law where it is this many deviations below none. Chosen; no table.
-AGAINST = 3.0
-
-#: One law is said to describe a loop better where the log likelihoods differ by this much. Chosen; no table.
-TELLING = 5.0

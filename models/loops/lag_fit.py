@@ -34,7 +34,7 @@ from models.arrays import FloatArray
 from models.friction.criteria import Z90
 from models.friction.identification import StribeckFit
 from models.friction.stribeck import StribeckParameters, torque
-from models.loops.criteria import AGAINST, FEWEST_SLIDING, GAIN_SD, NOT_WHITE
+from models.loops.criteria import GAIN_SD, NOT_WHITE
 from models.loops.lag_laws import attractor_torque, squeeze_film_torque
 from models.records.periods import Cycle
 
@@ -137,14 +137,14 @@ class LagProblem:
 
 
 def make_lag_problem(
-    cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters, count: int = 6
+    cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters, count: int = 6, fewest: int = 20
 ) -> LagProblem:
-    """The samples of torque [n] Nm at phase [n] rad that slide, with so many shapes beside the curve."""
+    """The samples of torque [n] Nm at phase [n] rad that slide, `fewest` at least, with so many shapes beside the curve."""
     speed = cycle.value(phase)
     highest = float(speed.max())
     rows = speed > 0.01 * highest  # slower it sticks or is next to it, and no stationary test goes there
-    if rows.sum() < FEWEST_SLIDING:
-        raise ValueError(f"at least {FEWEST_SLIDING} samples must slide, got {int(rows.sum())}")
+    if rows.sum() < fewest:
+        raise ValueError(f"at least {fewest} samples must slide, got {int(rows.sum())}")
     phase, speed, measured = phase[rows], speed[rows], measured[rows]
     span = max(highest - float(speed.min()), 1e-12)
     shapes = np.polynomial.chebyshev.chebvander(2 * (speed - speed.min()) / span - 1, count + 1)
@@ -230,20 +230,22 @@ class LagFit:
     status: LagStatus
 
 
-def fit_lag(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StationaryCurve) -> LagFit:
+def fit_lag(
+    law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StationaryCurve, against: float = 3.0
+) -> LagFit:
     """Fit `law` to torque [n] Nm at phase [n] rad of a cycle of *sliding velocity* in m/s, v >= 0 but for noise.
 
-    Raises ValueError where fewer than 20 samples slide.
+    A lag so many deviations below none is `against` the law. Raises ValueError where fewer than 20 samples slide.
     """
     posed = _Posed(law, cycle, phase, measured, curve.parameters)
     scanned = posed.at(law.lags)
     misfits = [posed.problem.misfit(row) for row in scanned]
     best = int(np.argmin(misfits))
     none, first = posed.near_none(scanned[0])
-    if first < -AGAINST * none or (best == 0 and first <= Z90 * none):
+    if first < -against * none or (best == 0 and first <= Z90 * none):
         slant = _by_curve(lambda moved: _Posed(law, cycle, phase, measured, moved).near_none()[1], curve)
         estimate = _Estimate(first, none, slant)
-        status = LagStatus.AGAINST_THE_LAW if first < -AGAINST * estimate.sd else LagStatus.UNRESOLVED
+        status = LagStatus.AGAINST_THE_LAW if first < -against * estimate.sd else LagStatus.UNRESOLVED
         return _result(posed.problem, torque(posed.problem.speed, curve.parameters), None, estimate, status)
     lag = posed.refined(misfits, best)
     middle, change = posed.about(lag)

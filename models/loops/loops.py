@@ -17,7 +17,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.stribeck import torque as stationary_torque
-from models.loops.criteria import FEWEST_SAMPLES, TELLING
+from models.loops.criteria import FEWEST_SAMPLES
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
 from models.loops.loop_area import Area, Direction, Samples, area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
@@ -158,9 +158,10 @@ def _inverted(fit: LagFit) -> tuple[float, float | None] | None:
     return 1 / high, 1 / low if low > 0 else None
 
 
-def _better(attractor: LagFit, film: LagFit) -> str | None:
+def _better(attractor: LagFit, film: LagFit, telling: float = 5.0) -> str | None:
+    """The law whose log likelihood is higher by so much at least."""
     lead = attractor.log_likelihood - film.log_likelihood
-    if abs(lead) < TELLING:
+    if abs(lead) < telling:
         return None
     return ATTRACTOR.name if lead > 0 else SQUEEZE_FILM.name
 

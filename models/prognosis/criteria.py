@@ -43,21 +43,13 @@ FAR_APART = 3.0
 FEWEST_TESTS_TO_LEARN = 6
 #: Fewer clutches than this are no fleet [-]. Chosen; no table.
 FEWEST_CLUTCHES = 3
-#: The hyperprior: the deviations of (Δ/ξ0, log φ, log ε, log s/ξ0) among clutches of one kind. Chosen; no table.
-HYPER_SD = np.array([0.15, 0.6, 0.4, 0.5])
-#: How many clutches that is worth, and how many the centre of the weak prior is worth as the population's mean. Chosen; no
-#: table.
-HYPER_CLUTCHES, HYPER_CENTRE = 6.0, 0.03
 #: A fleet of n has the share TRUST n/(n + DOUBT) of the mixture: most of it stays weak, for the evidence soon speaks for a
 #: fleet that is right, and slowly against one that is wrong. Chosen: `make score PARTS=fleets` shows what it achieves.
 TRUST, DOUBT = 0.25, 3.0
 
 # What ended lives say of one that has not (`ended_lives`): what it achieves: docs/appendix/prognosis.md, A fleet's prior
 
-#: More ended lives than this say no more: their predictive is within 3 % of the normal's width, and each costs every answer
-#: 0.1 ms. Chosen; no table.
-MOST_ENDED = 40
-#: And fewer lives than this tell no exponent of their work. Derived: two lie on any power.
+#: Fewer lives than this tell no exponent of their work. Derived: two lie on any power.
 FEWEST_SEVERITIES = 3
 #: Of a course that an ended life has taken: the deviation q of δ at the end and that of the scatter, in shares of the way
 #: to the threshold, each as probable; the deviation of a, and for each q that of the logarithm of what remains where all of

@@ -37,6 +37,8 @@ from models.tracking.prior import Prior, weak
 from models.tracking.sampling import normalised
 
 _GRID = Grid()
+#: How many clutches the hyperprior is worth, and how many the centre of the weak prior as the population's mean.
+_HYPER_CLUTCHES, _HYPER_CENTRE = 6.0, 0.03
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,7 +161,7 @@ def population(fleet: Sequence[Taught], rounds: int = 40) -> FleetPrior:
         clutches=len(fleet),
         mean=believed,
         scale=np.diag([centre.change_sd, centre.log_scale_sd, centre.log_exponent_sd, centre.log_scatter_sd]) ** 2,
-        freedom=criteria.HYPER_CLUTCHES,
+        freedom=_HYPER_CLUTCHES,
     )
     for _ in range(rounds):
         learned = _learnt(learned, fleet, believed)
@@ -182,14 +184,16 @@ def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArra
         off = clutch.x - means[index]
         spread += (weight * off.T) @ off
     middle = means.mean(axis=0)
-    centre = criteria.HYPER_CENTRE + n
+    centre = _HYPER_CENTRE + n
     off, pull = means - middle, middle - believed
-    scatter = np.diag(criteria.HYPER_SD**2) * (criteria.HYPER_CLUTCHES - d + 1.0) + spread + off.T @ off
-    scatter += criteria.HYPER_CENTRE * n / centre * np.outer(pull, pull)
-    freedom = criteria.HYPER_CLUTCHES + n - d + 1.0
+    # of (Δ/ξ0, log φ, log ε, log s/ξ0) among clutches of one kind
+    hyper_sd = np.array([0.15, 0.6, 0.4, 0.5])
+    scatter = np.diag(hyper_sd**2) * (_HYPER_CLUTCHES - d + 1.0) + spread + off.T @ off
+    scatter += _HYPER_CENTRE * n / centre * np.outer(pull, pull)
+    freedom = _HYPER_CLUTCHES + n - d + 1.0
     return FleetPrior(
         clutches=n,
-        mean=(criteria.HYPER_CENTRE * believed + n * middle) / centre,
+        mean=(_HYPER_CENTRE * believed + n * middle) / centre,
         scale=scatter * (centre + 1.0) / (centre * freedom),
         freedom=freedom,
     )
