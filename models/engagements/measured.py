@@ -68,6 +68,8 @@ def measured_engagement(record: Record, geometry: Geometry) -> MeasuredEngagemen
         for share in (criteria.INITIAL, criteria.MIDPOINT, criteria.ENDPOINT)
     )
     breakaway = _breakaway(slip, channels, per_pascal)
+    at_midpoint = channels.moment(criteria.MIDPOINT * speed.value)
+    rise = _ratio(*(channels.torque.at(moment, channels.width) for moment in (slip.end.value, at_midpoint)))
     return MeasuredEngagement(
         slip=slip,
         initial_speed=speed,
@@ -82,7 +84,7 @@ def measured_engagement(record: Record, geometry: Geometry) -> MeasuredEngagemen
         initial_ratio=_ratio(initial, midpoint),
         endpoint_ratio=_ratio(endpoint, midpoint),
         breakaway_ratio=_ratio(breakaway, midpoint),
-        torque_rise=channels.torque_rise(channels.moment(criteria.MIDPOINT * speed.value)),
+        torque_rise=None if rise is None else Estimate(value=rise.value - 1, sd=rise.sd),
         course=_course(slip, channels),
     )
 
@@ -125,11 +127,6 @@ class _Channels:
     def cof(self, moment: float) -> Estimate | None:
         """μ at a moment of the slip [s]."""
         return None if self.friction is None else self.friction.at(moment, self.width)
-
-    def torque_rise(self, midpoint: float) -> Estimate | None:
-        """The torque at the end of slip over that at its midpoint, less 1."""
-        ratio = _ratio(self.torque.at(self.slip.end.value, self.width), self.torque.at(midpoint, self.width))
-        return None if ratio is None else Estimate(value=ratio.value - 1, sd=ratio.sd)
 
     def noise(self, channel: Channel) -> float:
         """The deviation of a sample, by differences of second order."""

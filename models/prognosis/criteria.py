@@ -8,9 +8,6 @@ QUANTILES = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95)
 BAND = (0.05, 0.5, 0.95)
 #: Cycles beyond which an end of life is not distinguished from never. Fixed by the public contract.
 HORIZON = 1_000_000.0
-#: And of a life older than a tenth of that, so many times its age: a life counts engagements, or kilometres. Chosen: an end
-#: that is nine ages ahead is no nearer than never, as one at HORIZON is to a clutch that lasts ten thousand cycles.
-HORIZON_AGES = 10.0
 #: Nothing is predicted from fewer tests at different progress. Chosen; no table: eq. 6 has four coefficients.
 FEWEST_TESTS = 3
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.degradation import general_order
-from models.prognosis.criteria import BAND, HORIZON, HORIZON_AGES, QUANTILES
+from models.prognosis.criteria import BAND, HORIZON, QUANTILES
 from models.tracking.discrepancy import Discrepancy
 from models.tracking.posterior import Posterior
 from models.tracking.sampling import systematic
@@ -61,8 +61,9 @@ class FirstPassage:
 
 
 def horizon_at(age: float) -> float:
-    """The cycles since new up to which an end is sought of a life that has so many behind it."""
-    return max(HORIZON, HORIZON_AGES * age)
+    """The cycles since new up to which an end is sought of a life that has so many behind it: a life counts engagements, or
+    kilometres, and an end that is nine ages ahead is no nearer than never."""
+    return max(HORIZON, 10.0 * age)
 
 
 def predict_first_passage(
@@ -146,12 +147,10 @@ def paths(posterior: Posterior, progress: FloatArray, offset: Offset | None = No
     return values if offset is None else np.asarray(values + posterior.beside(offset(progress)))
 
 
-def bands(
-    posterior: Posterior, progress: FloatArray, quantiles: Sequence[float] = BAND
-) -> tuple[FloatArray, FloatArray]:
-    """The mean of ξ at progress [k], and its quantiles [k, q]: what a plot of the course shows."""
+def bands(posterior: Posterior, progress: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The mean of ξ at progress [k], and its quantiles BAND [k, 3]: what a plot of the course shows."""
     values = posterior.values(progress)
-    return values @ posterior.weight, np.array([weighted_quantiles(row, posterior.weight, quantiles) for row in values])
+    return values @ posterior.weight, np.array([weighted_quantiles(row, posterior.weight, BAND) for row in values])
 
 
 def _along_paths(posterior: Posterior, fraction: float, offset: Offset | None, horizon: float) -> FloatArray:

@@ -97,7 +97,8 @@ def plan_cleaning(record: Sampled) -> Cleaning:
     if not removed:
         return Cleaning(rows=order, period=period, notes=tuple(notes))
     times = ordered.of(record.time)[spikes]
-    notes.append(("spikes_removed", f"Spiking samples removed: {', '.join(removed)}, {_at(times, 1.0)}."))
+    apart = times[np.concatenate([[True], np.diff(times) > 1.0])]
+    notes.append(("spikes_removed", f"Spiking samples removed: {', '.join(removed)}, at {listed(apart)} s."))
     rows = np.flatnonzero(~spikes)
     return Cleaning(rows=rows if order is None else order[rows], period=period, notes=tuple(notes))
 
@@ -187,7 +188,6 @@ def _jumps(channel: FloatArray, most: float) -> NDArray[np.intp]:
     return np.concatenate(jumps)
 
 
-def _at(times: FloatArray, apart: float) -> str:
-    """ "at 1.20, 61.4, ... s": the first few of times that lie further apart than `apart` [s]."""
-    first = times[np.concatenate([[True], np.diff(times) > apart])]
-    return f"at {', '.join(f'{time:.2f}' for time in first[:5])}{', ...' if first.size > 5 else ''} s"
+def listed(times: FloatArray) -> str:
+    """The first five of times [s], for a note."""
+    return ", ".join(f"{time:.2f}" for time in times[:5]) + (", ..." if len(times) > 5 else "")

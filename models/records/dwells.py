@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.records import criteria
-from models.records.cleaning import Cleaning, Note, Sampled
+from models.records.cleaning import Cleaning, Note, Sampled, listed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -247,8 +247,3 @@ def _ramps(channel: _Channel, where: slice) -> bool:
     means = part[: part.size // pieces * pieces].reshape(pieces, -1).mean(axis=1)
     noise = criteria.LEAVING_DEVIATIONS * float(np.diff(part).std()) * np.sqrt(pieces / part.size)
     return bool(np.ptp(means) > max(2 * channel.threshold, noise, 0.01 * abs(float(part.mean()))))  # 1 % over a dwell
-
-
-def listed(times: FloatArray) -> str:
-    """The first five of times [s], for a note."""
-    return ", ".join(f"{time:.2f}" for time in times[:5]) + (", ..." if len(times) > 5 else "")

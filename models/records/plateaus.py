@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.records.cleaning import SCALE_SAMPLES, Note, Sampled, UnusableRecordError, plan_cleaning
-from models.records.dwells import Blocks, average, find_dwells, listed
+from models.records.cleaning import SCALE_SAMPLES, Note, Sampled, UnusableRecordError, listed, plan_cleaning
+from models.records.dwells import Blocks, average, find_dwells
 from models.records.mean_deviation import Stretch, deviations
 from models.records.runs import Plateaus
 from models.records.settling import dropped, fit_transients, mean_decay
