@@ -1,10 +1,8 @@
-"""A whole simulated campaign in the rig's order (fig. 2): run-in, then duty blocks with the tests after each.
+"""A whole simulated campaign in the rig's order (section 2.3, fig. 2): run-in, then duty blocks with the tests after each.
 
 Run-in of 200 engagements before cycle 0, tests at 0, then at 500, 1000, 2000, 3000, ... duty cycles, until the true mean
 COF has fallen below `stop_fraction` of its initial value or `most_tests` stationary tests are made. The tests are those of
 a `Programme`. All of it is simulated, and every run id says so. Runs have no time of day: the sender adds it.
-
-Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.
 """
 
 import itertools

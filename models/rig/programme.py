@@ -1,8 +1,6 @@
 """What a simulated campaign consists of: which tests beside the stationary one, and what ages the clutch.
 
 The default is the quick one: plateaus, and duty blocks whose energies are assumed. `WHOLE` is all of fig. 2.
-
-Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3 and fig. 2.
 """
 
 from dataclasses import dataclass, replace

@@ -1,11 +1,9 @@
 """The sampled records of the simulated rig: the dynamic Stribeck test, the raw stationary test, one engagement.
 
 **Dynamic** (section 2.3.4): a sinusoidal speed, 0.1 Hz, offset and amplitude 1000 rpm, for 15 s at each pressure; it swings
-on while the pressure goes to the next. **Raw stationary** (section 2.3.3): 7 x 40 dwells of 5 s,
-speed and pressure approaching each exponentially as their controllers let them. In both, torque comes from the clutch's
-moving torque, so that the transient after a step is that of its lag. The rates and controllers are assumed.
-
-Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, sections 2.3.3 and 2.3.4.
+on while the pressure goes to the next. **Raw stationary** (section 2.3.3): 7 x 40 dwells of 5 s, speed and pressure
+approaching each exponentially as their controllers let them. In both, torque comes from the clutch's moving torque, so that
+the transient after a step is that of its lag. The rates and controllers are assumed.
 
 The recorder adds noise, counts, losses and spikes to a course of pressure, speed and torque. Torque noise is a first-order
 autoregression of `memory` seconds; the gain is one number a run, as for plateaus. It is this project's: the reference says

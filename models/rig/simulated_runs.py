@@ -1,7 +1,4 @@
-"""The runs of a simulated campaign, as values: what kind, after how many cycles, and what was measured.
-
-Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.
-"""
+"""The runs of a simulated campaign, as values: what kind, after how many cycles, and what was measured."""
 
 from dataclasses import dataclass
 from enum import StrEnum

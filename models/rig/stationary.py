@@ -6,8 +6,6 @@ The measured torque of plateau i is simulated as
 
 with sensor noise s, additive floor f and a gain g that is one number a run, rounded to the recorder's counts. Oil
 temperature is recorded and swings about its set point as under a thermostat; it does not act on the torque.
-
-Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.
 """
 
 import math

@@ -117,7 +117,7 @@ def course_item(engagement: Engagement | None) -> dict[str, Any]:
     }
 
 
-def course_of(item: Mapping[str, Any]) -> SpeedCourse:
+def speed_course_of(item: Mapping[str, Any]) -> SpeedCourse:
     """The kept course as the models take it."""
     return SpeedCourse(
         duration=Estimate(value=item["duration_s"], sd=item["duration_sd_s"]),
@@ -171,7 +171,7 @@ def stored_engagement(receipt: Mapping[str, Any], details: Mapping[str, Any]) ->
     """A stored run's engagement; None where it has none, or was evaluated by a release that knew of none."""
     if receipt.get("engagement") is None:
         return None
-    return StoredEngagement(receipt=receipt, course=course_of(details[COURSE]) if COURSE in details else None)
+    return StoredEngagement(receipt=receipt, course=speed_course_of(details[COURSE]) if COURSE in details else None)
 
 
 def engagements_over_life(stored: Sequence[StoredEngagement], lives: Sequence[Collection[str]]) -> list[dict[str, Any]]:
