@@ -288,9 +288,7 @@ def shrunk(frame: Frame, density: FloatArray) -> Frame:
     """The rows, levels and intervals that hold mass, with a node to spare on either side; as many as before."""
     nodes = density.shape[3]
     by_row = density.max(axis=1)
-    held = by_row > by_row.max(axis=2, keepdims=True) - DEPTH
-    first = np.maximum(held.argmax(axis=2) - 1, 0)
-    last = np.minimum(nodes - held[..., ::-1].argmax(axis=2), nodes - 1)
+    first, last = _held(by_row)
     step = (frame.upper - frame.lower) / (nodes - 1)
     lower, upper = frame.lower + first * step, frame.lower + last * step
     row_low, row_high = _held(by_row.max(axis=2))
@@ -309,9 +307,9 @@ def shrunk(frame: Frame, density: FloatArray) -> Frame:
 
 def _held(density: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The first and last index along the last axis that hold mass, with one to spare."""
-    held = density > density.max(axis=1, keepdims=True) - DEPTH
-    last = density.shape[1] - 1
-    return np.maximum(held.argmax(axis=1) - 1, 0), np.minimum(last - held[:, ::-1].argmax(axis=1) + 1, last)
+    held = density > density.max(axis=-1, keepdims=True) - DEPTH
+    last = density.shape[-1] - 1
+    return np.maximum(held.argmax(axis=-1) - 1, 0), np.minimum(last - held[..., ::-1].argmax(axis=-1) + 1, last)
 
 
 def _shrinkage(wide: Frame, closer: Frame) -> FloatArray:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.courses import FORM_COURSE, SCALE_SIGN, Course, basis, log_form_weight, log_scale_at, place_of
+from models.tracking.courses import FORM_COURSE, SCALE_SIGN, Course, log_form_weight, log_scale_at, place_of
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.history import History
 from models.tracking.linear_model import Points, evidence, last_outlying, log_outlying, pointwise
@@ -68,7 +68,8 @@ def entered(prior: Prior, history: History, cloud: Cloud, rng: np.random.Generat
     """The particles of all runs of a history but its last, weighted by that one, each with a flag for it drawn from its
     posterior given the rest of the particle."""
     as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(cloud.form.size)]))
-    points, table = as_sound.placed(), table_of(history, cloud)
+    points = as_sound.placed()
+    table = points.basis(history.progress)
     sums, terms = pointwise(history, prior, points, table)
     turned = last_outlying(history, prior, points, sums, terms, table[-1])
     others = _log_prior(prior, cloud) + _log_alive(history, cloud)
@@ -82,19 +83,14 @@ def entered(prior: Prior, history: History, cloud: Cloud, rng: np.random.Generat
     return replace(as_sound, log_weight=log_weight, log_target=np.where(is_outlying, outlying, sound))
 
 
-def table_of(history: History, cloud: Cloud) -> FloatArray:
-    """b of every run and particle, [t, n]."""
-    return basis(history.progress[:, None], cloud.points[:, 0], cloud.points[:, 1], cloud.course)
-
-
-def log_target_of(history: History, prior: Prior, cloud: Cloud, table: FloatArray) -> FloatArray:
+def log_target_of(history: History, prior: Prior, cloud: Cloud) -> FloatArray:
     """Log posterior density of every particle, up to a constant."""
-    return log_likelihood_of(history, prior, cloud, table) + _log_prior(prior, cloud)
+    return log_likelihood_of(history, prior, cloud) + _log_prior(prior, cloud)
 
 
-def log_likelihood_of(history: History, prior: Prior, cloud: Cloud, table: FloatArray) -> FloatArray:
+def log_likelihood_of(history: History, prior: Prior, cloud: Cloud) -> FloatArray:
     """Log probability of the data given every particle."""
-    return evidence(pointwise(history, prior, cloud.placed(), table)[0], prior) + _log_alive(history, cloud)
+    return evidence(pointwise(history, prior, cloud.placed())[0], prior) + _log_alive(history, cloud)
 
 
 def _log_prior(prior: Prior, cloud: Cloud) -> FloatArray:
@@ -115,11 +111,6 @@ def merged(old: Cloud, new: Cloud, accepted: NDArray[np.bool_]) -> Cloud:
         kept, offered = getattr(old, field.name), getattr(new, field.name)
         columns[field.name] = np.where(accepted if kept.ndim == 1 else accepted[:, None], offered, kept)
     return Cloud(**columns)
-
-
-def effective(log_weight: FloatArray) -> float:
-    """Effective number of particles, (Σw)²/Σw²."""
-    return float(1.0 / np.square(normalised(log_weight)).sum())
 
 
 _GRID = Grid()
@@ -176,17 +167,18 @@ class Particle:
             log_target=np.zeros(self.particles),
         )
         nothing = History.of((), prior)
-        target = log_target_of(nothing, prior, cloud, table_of(nothing, cloud))
+        target = log_target_of(nothing, prior, cloud)
         return ParticleState(prior=prior, history=nothing, cloud=replace(cloud, log_target=target))
 
     def update(self, state: ParticleState, measurement: Measurement, rng: np.random.Generator) -> ParticleState:
         """The posterior with one more measurement."""
         prior, history = state.prior, state.history.append(measurement, state.prior)
         cloud = entered(prior, history, state.cloud, rng)
-        enough = effective(cloud.log_weight)
-        if enough < 0.25 * self.particles or normalised(cloud.log_weight) @ cloud.outlying[:, -1] > 0.5:
+        weight = normalised(cloud.log_weight)
+        effective = float(1.0 / np.square(weight).sum())
+        if effective < 0.25 * self.particles or weight @ cloud.outlying[:, -1] > 0.5:
             cloud = self._from_grid(prior, history, rng)
-        elif enough < 0.5 * self.particles:
+        elif effective < 0.5 * self.particles:
             cloud = self._renewed(prior, history, cloud, rng)
         return ParticleState(prior=prior, history=history, cloud=cloud)
 
@@ -202,7 +194,7 @@ class Particle:
             log_weight=np.log(np.maximum(weight, 1e-300)),
             log_target=np.zeros(self.particles),
         )
-        return replace(cloud, log_target=log_target_of(history, prior, cloud, table_of(history, cloud)))
+        return replace(cloud, log_target=log_target_of(history, prior, cloud))
 
     def _renewed(self, prior: Prior, history: History, cloud: Cloud, rng: np.random.Generator) -> Cloud:
         """Resampled, and moved by steps of a random walk shaped like the cloud."""
@@ -214,7 +206,7 @@ class Particle:
         moved, reach = np.zeros(weight.size, dtype=bool), 1.0
         for _ in range(self.moves):
             proposed, stretch = _proposed(cloud, reach * shapes, span, rng)
-            offered = log_target_of(history, prior, proposed, table_of(history, proposed))
+            offered = log_target_of(history, prior, proposed)
             accepted = np.log(rng.random(weight.size)) < offered - cloud.log_target + stretch
             cloud = merged(cloud, replace(proposed, log_target=offered), accepted)
             moved |= accepted

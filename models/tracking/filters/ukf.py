@@ -49,7 +49,7 @@ from models.tracking.courses import (
 from models.tracking.criteria import DOMAIN, OUTLIER
 from models.tracking.discrepancy import PAST, drawn, value_and_slope_now
 from models.tracking.filters.grid import Grid, GridState
-from models.tracking.filters.particle import Particle, ParticleState, log_likelihood_of, table_of
+from models.tracking.filters.particle import Particle, ParticleState, log_likelihood_of
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -377,7 +377,7 @@ def _before_the_start(prior: Prior, history: History, size: int, rng: np.random.
     cloud = _PRIOR.start(prior).cloud
     outlying = rng.random((_PRIOR.particles, history.value.size)) < prior.outlying_share
     cloud = replace(cloud, outlying=outlying.astype(np.float64))
-    cloud = replace(cloud, log_weight=log_likelihood_of(history, prior, cloud, table_of(history, cloud)))
+    cloud = replace(cloud, log_weight=log_likelihood_of(history, prior, cloud))
     return _PRIOR.posterior(ParticleState(prior=prior, history=history, cloud=cloud), size, rng)
 
 
