@@ -143,14 +143,6 @@ def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
     return Taught(x=_coordinates(drawn)[sound], log_weight=log_weight[sound], initial=initial)
 
 
-def learn(histories: Sequence[Sequence[Measurement]]) -> FleetPrior:
-    """The population behind clutches of one kind, each by its measurements of mean COF in order.
-
-    Those with fewer than FEWEST_TESTS_TO_LEARN measurements are left out. Raises ValueError where none is left.
-    """
-    return population([taught(history) for history in histories if len(history) >= criteria.FEWEST_TESTS_TO_LEARN])
-
-
 def population(fleet: Sequence[Taught], rounds: int = 40) -> FleetPrior:
     """The population behind the samples of clutches, after so many rounds. Raises ValueError where there are none."""
     if not fleet:

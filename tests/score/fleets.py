@@ -7,8 +7,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.degradation.general_order import Degradation, first_passage
+from models.prognosis import fleet as of_fleets
 from models.prognosis.criteria import HORIZON
-from models.prognosis.fleet import learn
 from models.prognosis.stated_end import stated_end
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
@@ -48,7 +48,7 @@ def fleets(count: int, seed: int) -> str:
             if index % 4 == 0:
                 fleet = [kind(rng, 0.75, 5_000.0 * other, 0.7) for _ in range(size)]
                 taught_by = [(each.end, each.measured(1.0, 25, rng)) for each in fleet if math.isfinite(each.end)]
-                learned = learn([history for _, history in taught_by])
+                learned = of_fleets.population([of_fleets.taught(history) for _, history in taught_by])
                 ended = [taught(history, end) for end, history in taught_by]
             life = kind(rng, 0.75, 5_000.0, 0.7)
             if not math.isfinite(life.end):

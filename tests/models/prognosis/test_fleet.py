@@ -10,7 +10,7 @@ import pytest
 from models.degradation.general_order import Degradation, first_passage, value
 from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
 from models.prognosis.first_passage import ends_of_life
-from models.prognosis.fleet import FleetPrior, learn, pooled, population, taught
+from models.prognosis.fleet import FleetPrior, pooled, population, taught
 from models.prognosis.scoring import crps_of_sample
 from models.tracking.courses import Course, basis
 from models.tracking.filters.ukf import Ukf
@@ -41,7 +41,7 @@ def measured(truth: Degradation, last: float, tests: int, rng: np.random.Generat
 
 def fleet(count: int, seed: int, scale: float = 5000.0) -> FleetPrior:
     rng = np.random.default_rng(seed)
-    return learn([measured(life(rng, scale), 3.0 * scale, 14, rng) for _ in range(count)])
+    return population([taught(measured(life(rng, scale), 3.0 * scale, 14, rng)) for _ in range(count)])
 
 
 def test_the_population_is_found() -> None:
@@ -83,8 +83,10 @@ def test_a_population_has_converged() -> None:
 
 def test_too_few_tests_teach_nothing() -> None:
     rng = np.random.default_rng(4)
+    with pytest.raises(ValueError, match=f"{FEWEST_TESTS_TO_LEARN} tests to teach"):
+        taught(measured(life(rng, 5000.0), 9000.0, FEWEST_TESTS_TO_LEARN - 1, rng))
     with pytest.raises(ValueError, match=f"{FEWEST_TESTS_TO_LEARN} tests or more"):
-        learn([measured(life(rng, 5000.0), 9000.0, FEWEST_TESTS_TO_LEARN - 1, rng)])
+        population([])
 
 
 def crps(posterior: Posterior, truth: float) -> float:
