@@ -9,7 +9,7 @@ from models.diagnosis.baseline.laws import OPEN_DRAG, Laws
 from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.criteria import SURE, WORTHWHILE
-from models.diagnosis.design.design import Design, build_design
+from models.diagnosis.design.design import Design, build_design, mark_open, points_of
 from models.diagnosis.effects.catalogue import CATALOGUE
 from models.diagnosis.effects.effect import unit_changes
 from models.diagnosis.experiments.candidates import PASSES, TRIALS, runs_of, with_trial
@@ -20,6 +20,7 @@ from models.diagnosis.explanations.verdict import Fitted, Verdict
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, missing_for_baseline
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.validation.held_out import measure_gain
+from models.records.criteria import UNLOADED
 from tests.models.diagnosis.campaigns import CYCLES, SPEEDS, Study, Where, altered, campaign, look, start_of, study
 
 INERTIA = 0.004
@@ -88,6 +89,12 @@ def test_open_readings_are_rows_of_their_own(swung: Study, given: Study) -> None
     # the control: a light pressure is none
     light = build_design(with_trial(swung.campaign, "light_tests"))
     assert light.closed.all()
+
+
+def test_an_open_clutch_has_the_lowest_closed_pressure() -> None:
+    found = mark_open(points_of(3, pressure=np.array([4 * UNLOADED, 0.5 * UNLOADED, UNLOADED])))
+    assert found.engaged.tolist() == [1.0, 0.0, 1.0]
+    assert found.pressure.tolist() == [4 * UNLOADED, UNLOADED, UNLOADED]
 
 
 def test_there_is_no_friction_with_the_clutch_open(given: Study) -> None:
