@@ -15,16 +15,15 @@ from httpx2 import Client
 
 from service.queries import series
 from service.web import answers, auth
-from service.web.context import Context
 from service.web.middleware import Polls
 from service.workflows.replay import replay_clutch
-from storage import keys
 from storage.engine.errors import DatabaseBusy
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import back_up
 from tests.benchmarks.memory import resident
 from tests.service.clients import client_on
-from tests.support import one_quick, serving, stationary
+from tests.service.web.routes.granting import granted, revoke_all
+from tests.support import serving, stationary
 
 # --- Answers that are kept by the clutch's revision: computed once, and never given when they no longer hold.
 
@@ -49,12 +48,8 @@ def told_by_another(database_url: str) -> dict[str, tuple[str, bytes]]:
     """The same by a service that remembers nothing yet, on a copy: two services never share a database."""
     with tempfile.TemporaryDirectory() as folder:
         back_up(database_url, Path(folder) / "copy.db")
-        return told_on(f"sqlite:///{folder}/copy.db")
-
-
-def told_on(database_url: str) -> dict[str, tuple[str, bytes]]:
-    with client_on(database_url) as client:
-        return told(client)
+        with client_on(f"sqlite:///{folder}/copy.db") as client:
+            return told(client)
 
 
 def post(client: TestClient, cycles: float) -> None:
@@ -160,102 +155,83 @@ POLLED = (
     "/v1/clutches", "/v1/clutches/c1/remaining-useful-life", "/v1/clutches/c1/degradation", "/v1/clutches/c1/runs",
     "/v1/clutches/c1/runs?limit=1", "/v1/clutches/c1/series",
 )  # fmt: skip
-AT = "2026-11-02T10:00:00Z"
 
 
 @pytest.fixture
-def polled(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> TestClient:
-    """A service where a run was posted and everything asked once; from then on nothing is routed unseen."""
-    post_at_5_bar(client, 0.0)
+def polled(client: TestClient) -> TestClient:
+    """A service where a run was posted and everything asked once."""
+    post(client, 0.0)
     for address in POLLED:
         assert client.get(address).status_code == 200
-    routed: list[str] = []
-    unknown_arguments = auth._refuse_unknown_arguments
-
-    def noted(request: Request) -> None:
-        routed.append(request.url.path)
-        unknown_arguments(request)
-
-    monkeypatch.setattr(auth, "_refuse_unknown_arguments", noted)
-    client.app.state.routed = routed  # type: ignore[attr-defined]
     return client
 
 
-def routed(client: TestClient) -> list[str]:
-    """The addresses that were routed since this was asked for last."""
-    found: list[str] = client.app.state.routed  # type: ignore[attr-defined]
-    taken = list(found)
-    found.clear()
-    return taken
+@pytest.fixture
+def routed(polled: TestClient, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The addresses that are routed from then on."""
+    assert polled
+    seen: list[str] = []
+    unknown_arguments = auth._refuse_unknown_arguments
+
+    def noted(request: Request) -> None:
+        seen.append(request.url.path)
+        unknown_arguments(request)
+
+    monkeypatch.setattr(auth, "_refuse_unknown_arguments", noted)
+    return seen
 
 
-def post_at_5_bar(client: TestClient, cycles: float) -> None:
-    run = stationary(cycles, pressures=(5.0,))
-    assert client.post("/v1/clutches/c1/runs", json=run).status_code == 201
-
-
-def test_the_same_again_is_the_same_answer_or_304(polled: TestClient) -> None:
+def test_the_same_again_is_the_same_answer_or_304(polled: TestClient, routed: list[str]) -> None:
     for address in POLLED:
         first = polled.get(address)
-        assert first.status_code == 200
-        assert polled.get(address).content == first.content
+        assert (first.status_code, polled.get(address).content) == (200, first.content)
         seen = polled.get(address, headers={"If-None-Match": first.headers["ETag"]})
         assert (seen.status_code, seen.content, seen.headers["ETag"]) == (304, b"", first.headers["ETag"])
         assert "Content-Security-Policy" in seen.headers
         assert polled.head(address).headers["ETag"] == first.headers["ETag"]
-    assert routed(polled) == []
+    assert routed == []
 
 
-def test_a_changed_clutch_is_looked_at_anew(polled: TestClient) -> None:
+def test_a_changed_clutch_is_looked_at_anew(polled: TestClient, routed: list[str]) -> None:
     before = {address: polled.get(address).headers["ETag"] for address in POLLED}
-    post_at_5_bar(polled, 1000.0)
-    routed(polled)
+    post(polled, 1000.0)
     for address, tag in before.items():
+        routed.clear()
         after = polled.get(address, headers={"If-None-Match": tag})
         assert after.status_code == 200
         assert after.headers["ETag"] != tag
-        assert len(routed(polled)) == 1, address
+        assert len(routed) == 1, address
 
 
 def test_nobody_is_answered_who_may_not_read(polled: TestClient) -> None:
-    context = polled.app.state.context  # type: ignore[attr-defined]
-    assert isinstance(context, Context)
-    text, row = auth.make_key("read", "page", created_at=AT)
-    with context.database.writing() as connection:
-        keys.insert(connection, row)
+    key = granted(polled)
     for address in POLLED:
         assert polled.get(address).status_code == 401
         assert polled.get(address, headers={"Authorization": "Bearer nobody"}).status_code == 401
-        assert polled.get(address, headers={"Authorization": f"Bearer {text}"}).status_code == 200
-    with context.database.writing() as connection:
-        keys.revoke(connection, row.key_id, AT)
-        keys.insert(connection, auth.make_key("read", "another", created_at=AT)[1])
-    for address in POLLED:
-        assert polled.get(address, headers={"Authorization": f"Bearer {text}"}).status_code == 401
+        assert polled.get(address, headers=key).status_code == 200
+    revoke_all(polled)
+    granted(polled)
+    assert [polled.get(address, headers=key).status_code for address in POLLED] == [401] * len(POLLED)
 
 
-def test_a_number_is_one_entry_however_it_is_written(polled: TestClient) -> None:
+def test_a_number_is_one_entry_however_it_is_written(polled: TestClient, routed: list[str]) -> None:
     """3,000 spellings of one number added 142 MiB outside every bound."""
     address = "/v1/clutches/c1/remaining-useful-life"
     assert polled.get(f"{address}?at_cycles=0&method=particle").status_code == 200
     index = polls_of(polled)
     entries = len(index._polls)
-    routed(polled)
+    routed.clear()
     answers = set()
     for spelled in ("0", "0.0", "0e9", "-0", "+0", "00", "0.000000000000000000000000", " 0"):
         for query in (f"at_cycles={quote(spelled)}", f"method=particle&at_cycles={quote(spelled)}"):
             answers.add(polled.get(f"{address}?{query}").content)
     assert len(answers) == 1
-    assert (len(index._polls), routed(polled)) == (entries, [])
+    assert (len(index._polls), routed) == (entries, [])
 
 
 def test_what_cannot_be_a_number_is_refused_by_its_length(client: TestClient) -> None:
-    for argument in (
-        "remaining-useful-life?at_cycles",
-        "remaining-useful-life?pressure_bar",
-        "runs?limit",
-        "scores?limit",
-    ):
+    life = "remaining-useful-life"
+    for argument in (f"{life}?at_cycles", f"{life}?pressure_bar", "runs?limit", "scores?limit"):
         answer = client.get(f"/v1/clutches/c1/{argument}={'0' * 40}1")
         assert answer.status_code == 422
         assert "at most 32 characters" in answer.json()["detail"]
@@ -310,16 +286,3 @@ def test_a_database_that_cannot_be_read_is_said_to_be(polled: TestClient, monkey
     monkeypatch.setattr("storage.engine.sqlite.database.FileWatch.snapshots", unreadable)
     answer = polled.get("/v1/clutches/c1/runs")
     assert (answer.status_code, answer.headers["Retry-After"]) == (503, "1")
-
-
-@pytest.mark.parametrize("table", one_quick(["runs", "changes", "series", "loops", "degradation", "scores"]))
-def test_a_page_that_was_asked_for_is_not_the_answer_for_another(client: TestClient, table: str) -> None:
-    for cycles in (0.0, 1000.0, 2000.0):
-        post_at_5_bar(client, cycles)
-    address = f"/v1/clutches/c1/{table}"
-    assert client.get(address).status_code == 200
-    pages = {limit: client.get(f"{address}?limit={limit}").json()["items"] for limit in (1, 2, 1)}
-    assert all(len(items) <= limit for limit, items in pages.items())
-    if table in ("runs", "series", "degradation"):
-        assert [len(items) for items in pages.values()] == [1, 2]
-    assert client.get(f"{address}?cursor=bad").status_code == 422

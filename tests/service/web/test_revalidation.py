@@ -1,14 +1,17 @@
 """Slow answers: waited for where there is none, given as they were while a newer one is made, made once."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from concurrent.futures import Future
+from typing import Any
 
 import pytest
 
 from service.queries import cache
 from service.queries.cache import Answer, AnswerCache
 from service.web.revalidation import Made, Revalidation
+
+Asked = tuple[int, Answer]
 
 
 @pytest.fixture(autouse=True)
@@ -67,10 +70,16 @@ async def test_the_first_answer_is_waited_for_and_made_once(kept: Revalidation, 
 
 async def _held_at_one(kept: Revalidation, worker: Worker) -> None:
     """An answer of revision 1 is there."""
-    first = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
-    await _settled()
+    first = await _asking(kept.answer("a", 1, worker.compute, wait=0))
     await worker.gives(1, b"one")
     assert (await first)[0] == 1
+
+
+async def _asking(asked: Coroutine[Any, Any, Asked]) -> "asyncio.Task[Asked]":
+    """Somebody who asks, and is as far as may be without the worker."""
+    task = asyncio.create_task(asked)
+    await _settled()
+    return task
 
 
 @scenario
@@ -112,8 +121,7 @@ async def test_who_waits_takes_a_quicker_renewal_and_does_not_hear_of_its_failur
     for revision, error in ((2, None), (3, LookupError("not there"))):
         await kept.answer("a", revision, worker.compute, wait=0)
         renewal = worker.asked[-1]
-        patient = asyncio.create_task(kept.answer("a", revision, worker.compute, wait=20))
-        await _settled()
+        patient = await _asking(kept.answer("a", revision, worker.compute, wait=20))
         if error is None:
             renewal.set_result((revision, b"idle"))
             assert await patient == (revision, Answer.of(b"idle"))
@@ -127,17 +135,12 @@ async def test_who_waits_takes_a_quicker_renewal_and_does_not_hear_of_its_failur
 
 @scenario
 async def test_what_fails_is_told_to_those_who_wait_and_tried_again(kept: Revalidation, worker: Worker) -> None:
-    first = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
-    await _settled()
+    first = await _asking(kept.answer("a", 1, worker.compute, wait=0))
     worker.asked[-1].set_exception(LookupError("not there"))
     with pytest.raises(LookupError, match="not there"):
         await first
-    again = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
-    await _settled()
-    await worker.gives(1, b"one")
-    assert (await again)[0] == 1
-    waiting = asyncio.create_task(kept.answer("a", 2, worker.compute, wait=20))
-    await _settled()
+    await _held_at_one(kept, worker)
+    waiting = await _asking(kept.answer("a", 2, worker.compute, wait=20))
     worker.asked[-1].set_exception(LookupError("not now"))
     with pytest.raises(LookupError, match="not now"):
         await waiting
@@ -145,42 +148,10 @@ async def test_what_fails_is_told_to_those_who_wait_and_tried_again(kept: Revali
 
 
 @scenario
-async def test_the_least_lately_asked_for_goes_first(kept: Revalidation, worker: Worker) -> None:
-    for name in "abc":
-        asking = asyncio.create_task(kept.answer(name, 1, worker.compute, wait=0))
-        await _settled()
-        await worker.gives(1, b"four")
-        await asking
-    assert [kept._cache.held(name, 1) is not None for name in "abc"] == [False, True, True]
-
-
-def test_answers_begun_elsewhere_are_bounded_too() -> None:
-    kept = Revalidation(AnswerCache(1_000))
-    for number in range(50):
-        kept.begin(number, 1, b"x" * 100)
-    assert [number for number in range(50) if kept.knows(number)] == list(range(40, 50))
-
-
-@scenario
-async def test_an_answer_that_is_made_again_and_again_counts_once(kept: Revalidation, worker: Worker) -> None:
-    kept.begin("other", 1, b"four")
-    for revision in range(1, 20):
-        body = b"four"[: 1 + revision % 4]
-        asking = asyncio.create_task(kept.answer("a", revision, worker.compute, wait=10))
-        await _settled()
-        await worker.gives(revision, body)
-        assert await asking == (revision, Answer.of(body))
-    assert kept.knows("other")
-    kept.begin("third", 1, b"four")
-    assert [name for name in ("other", "a", "third") if kept.knows(name)] == ["a", "third"]
-
-
-@scenario
 async def test_what_is_being_made_is_not_made_twice_to_make_room(kept: Revalidation, worker: Worker) -> None:
     kept.begin("renewed", 1, b"four")
     assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, Answer.of(b"four"))
-    first = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))
-    await _settled()
+    first = await _asking(kept.answer("made", 1, worker.compute, wait=0))
     for name in ("a", "b", "c"):
         kept.begin(name, 1, b"four")
     second = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))

@@ -1,17 +1,23 @@
-"""Who may do what: one table of the routes, and every key tried at every one of them."""
+"""Who may do what: one table of the routes, and every key tried at every one of them; without keys, this machine alone,
+under no other name than its own."""
 
-from collections.abc import Mapping
+import re
+import socket
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
-from service.web.auth import SCOPES, Scope
+from service.web.auth import SCOPES, Scope, is_loopback
 from storage import jobs, keys
 from storage.jobs import NewJob
-from tests.service.web.routes.granting import AT, context_of, granted
-from tests.service.web.routes.routes_of import routes_of
-from tests.support import stationary
+from tests.service.clients import client_on
+from tests.service.web.routes.granting import AT, context_of, granted, revoke_all
+from tests.service.work.waiting import until
+from tests.support import serving, stationary
 
 CLUTCH = "/v1/clutches/{clutch_id}"
 #: Routes that show nothing of a clutch: pages without data, the description, whether the service lives.
@@ -86,8 +92,21 @@ TABLE = NARROWED | OF_ALL | OF_ONE
 def ask(client: TestClient, route: tuple[str, str], headers: Mapping[str, str] | None, clutch_id: str = "c1") -> int:
     """The status; nothing is changed, for what is sent has no type."""
     method, path = route
-    address = path.replace("{clutch_id}", clutch_id).replace("{run_id}", "r1").replace("{diagnosis_id}", "d1")
-    return client.request(method, address, headers=headers, content=None if method == "GET" else b"nothing").status_code
+    content = None if method == "GET" else b"nothing"
+    return client.request(method, address_of(path, clutch_id), headers=headers, content=content).status_code
+
+
+def address_of(path: str, clutch_id: str = "c1") -> str:
+    return path.replace("{clutch_id}", clutch_id).replace("{run_id}", "r1").replace("{diagnosis_id}", "d1")
+
+
+def routes_of(routes: Iterable[Any]) -> Iterator[tuple[str, str]]:
+    """Method and path of every route as the application routes them, included routers too; HEAD goes with GET."""
+    for route in routes:
+        if (included := getattr(route, "original_router", None)) is not None:
+            yield from routes_of(included.routes)
+        else:
+            yield from ((method, route.path) for method in (getattr(route, "methods", None) or {"GET"}) - {"HEAD"})
 
 
 def test_every_route_of_the_application_is_in_the_table(client: TestClient) -> None:
@@ -150,16 +169,14 @@ def test_the_last_use_of_a_key_is_noted(client: TestClient) -> None:
     before = datetime.now(UTC).isoformat(timespec="seconds")
     assert client.get("/v1/clutches", headers=used).status_code == 200
     client.get("/readyz")
-    context = context_of(client)
-    names = [headers["Authorization"].split("_")[1] for headers in (used, unused)]
-    for _ in range(200):
-        with context.database.reading() as connection:
-            noted = {row.key_id: row.last_used_at for row in keys.all_keys(connection)}
-        if noted[names[0]] is not None:
-            break
-        client.get("/livez")
-    assert noted[names[0]] >= before
-    assert noted[names[1]] is None
+
+    def noted(headers: Mapping[str, str]) -> str | None:
+        with context_of(client).database.reading() as connection:
+            rows = {row.key_id: row.last_used_at for row in keys.all_keys(connection)}
+        return rows[headers["Authorization"].split("_")[1]]
+
+    assert (until(lambda: noted(used)) or "") >= before
+    assert noted(unused) is None
 
 
 def test_an_ingest_key_has_a_diagnosis_made_and_not_adopted(client: TestClient) -> None:
@@ -172,19 +189,106 @@ def test_an_ingest_key_has_a_diagnosis_made_and_not_adopted(client: TestClient) 
 
 def test_a_key_bound_to_one_clutch_sees_and_cancels_jobs_of_that_alone(client: TestClient) -> None:
     client.post("/v1/clutches", json={"clutch_id": "c2"})
+    arguments = {"last_run_key": 0, "adopt_by": None, "request": ""}
     with context_of(client).database.writing() as connection:
         for clutch_id in ("c1", "c2", None):
-            job = NewJob(
-                job_id=f"j-{clutch_id}", kind=jobs.DIAGNOSIS, clutch_id=clutch_id, asked_at=AT, asked_by="local",
-                arguments={"last_run_key": 0, "adopt_by": None, "request": ""},
-            )  # fmt: skip
-            jobs.insert(connection, job)
-            jobs.end(connection, job.job_id, jobs.FINISHED, AT)
+            of = {"job_id": f"j-{clutch_id}", "kind": jobs.DIAGNOSIS, "clutch_id": clutch_id, "arguments": arguments}
+            jobs.insert(connection, NewJob(asked_at=AT, asked_by="local", **of))
+            jobs.end(connection, f"j-{clutch_id}", jobs.FINISHED, AT)
     bound = granted(client, "admin", clutches=["c2"])
     assert [item["job_id"] for item in client.get("/v1/jobs", headers=bound).json()["items"]] == ["j-c2"]
     for method in ("GET", "DELETE"):
-        statuses = [
-            client.request(method, f"/v1/jobs/j-{name}", headers=bound).status_code for name in ("c1", "c2", None)
-        ]
-        assert statuses == [404, 200, 404]
+        for name, status in (("c1", 404), ("c2", 200), (None, 404)):
+            assert client.request(method, f"/v1/jobs/j-{name}", headers=bound).status_code == status
     assert len(client.get("/v1/jobs", headers=granted(client, "read")).json()["items"]) == 3
+
+
+def test_every_route_that_can_be_read_can_be_headed(client: TestClient) -> None:
+    """All but when and which request it was; of what changes with every request, all but its length."""
+    client.post("/v1/clutches/c1/runs", json=stationary(0, run_id="r1"))
+    (asset,) = set(re.findall(r'"[^"]*?(assets/[^"]*/clutch\.js)"', client.get("/clutches/c1").text))
+    wrong = []
+    for path in [path for method, path in (*OPEN, *TABLE) if method == "GET"]:
+        address = f"/{asset}" if path.startswith("/assets/") else address_of(path)
+        there, head = client.get(address), client.head(address)
+        differ = {name for name, _ in there.headers.items() ^ head.headers.items()}
+        ignored = {"date", "x-request-id"} | ({"content-length"} if path == "/metrics" else set())
+        if (head.status_code, head.content) != (there.status_code, b"") or not differ <= ignored:
+            wrong.append((address, there.status_code, head.status_code, differ))
+    assert wrong == []
+
+
+@pytest.mark.parametrize(
+    "host", ["127.0.0.1", "127.0.0.1:8000", "localhost", "LOCALHOST:80", "[::1]:8000", "localhost."]
+)
+def test_this_machine_is_answered(client: TestClient, host: str) -> None:
+    assert client.get("/v1/clutches", headers={"Host": host}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "host", ["rig.example", "127.0.0.1.rig.example", "10.0.0.5:8000", "[fe80::1]", "", "localhost@evil"]
+)
+def test_another_name_is_refused(client: TestClient, host: str) -> None:
+    """A page in a browser could have made a name of its own point here."""
+    answer = client.get("/v1/clutches", headers={"Host": host})
+    assert (answer.status_code, answer.headers["content-type"]) == (403, "application/problem+json")
+
+
+def test_another_machine_is_refused(client: TestClient) -> None:
+    elsewhere = TestClient(client.app, base_url="http://127.0.0.1", client=("192.0.2.7", 50000))
+    assert elsewhere.get("/v1/clutches").status_code == 403
+    assert elsewhere.get("/livez").status_code == 200
+
+
+def test_loopback_names() -> None:
+    assert all(is_loopback(name) for name in ("127.8.9.1", "::1", "localhost"))
+    assert not any(is_loopback(name) for name in ("192.0.2.1", "example", "", "::"))
+
+
+def test_after_the_last_key_is_revoked_the_service_stays_shut(client: TestClient) -> None:
+    assert client.get("/v1/clutches").status_code == 200
+    headers = granted(client, "admin")
+    assert [client.get("/v1/clutches", headers=said).status_code for said in ({}, headers)] == [401, 200]
+    revoke_all(client)
+    assert [client.get("/v1/clutches", headers=said).status_code for said in ({}, headers)] == [401, 401]
+
+
+PROXIED = ["Forwarded", "Via", "X-Forwarded-For", "X-Forwarded-Host", "X-Forwarded-Proto", "X-Real-IP"]
+PROXIED += ["Fastly-Client-IP", "X-Original-Forwarded-For", "X-Envoy-External-Address", "CDN-Loop"]
+
+
+@pytest.mark.parametrize("header", PROXIED)
+def test_what_a_proxy_passes_on_is_refused_without_keys(client: TestClient, header: str) -> None:
+    """It comes from this machine and may be anybody's."""
+    answer = client.get("/v1/clutches", headers={header: "127.0.0.1"})
+    assert (answer.status_code, header.lower() in answer.json()["detail"].lower()) == (403, True)
+    assert client.get("/livez", headers={header: "127.0.0.1"}).status_code == 200
+
+
+@pytest.mark.parametrize(("version", "status"), [("1.0", b"403"), ("1.1", b"200")])
+def test_a_proxy_that_adds_no_header_is_known_by_its_version(tmp_path: Path, version: str, status: bytes) -> None:
+    """nginx as it is installed: it asks in HTTP/1.0, under the name of this machine."""
+    with serving(tmp_path / "a.db", loaded=True) as server:
+        asked = f"GET /v1/clutches HTTP/{version}\r\nHost: 127.0.0.1:{server.port}\r\nConnection: close\r\n\r\n"
+        with socket.create_connection(("127.0.0.1", server.port), timeout=30) as line:
+            line.sendall(asked.encode())
+            assert line.recv(12).partition(b" ")[2] == status
+
+
+def test_insecure_local_answers_what_a_proxy_passes_on(database_url: str) -> None:
+    with client_on(database_url, insecure_local=True) as client:
+        assert client.get("/v1/clutches", headers={"X-Forwarded-For": "192.0.2.7"}).status_code == 200
+        assert client.get("/v1/clutches", headers={"Host": "rig.example"}).status_code == 403
+        elsewhere = TestClient(client.app, base_url="http://127.0.0.1", client=("192.0.2.7", 50000))
+        assert elsewhere.get("/v1/clutches").status_code == 200
+
+
+def test_a_key_is_long_and_kept_as_a_hash(client: TestClient) -> None:
+    headers = granted(client)
+    secret = headers["Authorization"].removeprefix("Bearer ")
+    assert len(secret.rpartition("_")[2]) >= 43 or len(secret) >= 60, "256 bits"
+    database = context_of(client).database
+    files = [path for path in database.path.parent.iterdir() if path.is_file()]
+    assert all(secret.encode() not in path.read_bytes() for path in files)
+    assert any(b"secret_sha256" in path.read_bytes() for path in files), "the files were not looked at"
+    assert client.get(f"/v1/clutches?key={secret}").status_code == 401, "a key in an address ends in logs"
