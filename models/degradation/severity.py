@@ -53,7 +53,7 @@ class Block:
             raise ValueError("cycles must be positive, got 0")
 
     def since(self, origin: float) -> "Block":
-        """The same block with its cycles counted from `origin` < end."""
+        """The block with its cycles counted from `origin` < end."""
         return replace(self, end=self.end - origin)
 
     def work(self, basis: SeverityBasis) -> float | None:
@@ -165,8 +165,8 @@ def _recent(lengths: FloatArray, rates: FloatArray) -> float:
     total = float(lengths.sum())
     window = min(total, max(0.1 * total, 1_000.0))  # the last tenth of the cycles, a thousand at least
     ends = np.cumsum(lengths)
-    kept = np.clip(ends - (total - window), 0.0, lengths)
-    return float(kept @ rates / kept.sum())
+    weights = np.clip(ends - (total - window), 0.0, lengths)
+    return float(weights @ rates / weights.sum())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -86,9 +86,9 @@ class Extension:
 
     def _facts(self, campaign: Campaign) -> Facts:
         """The campaign's facts, with the temperature, the states and the days that the diagnosis referred to."""
-        kept = facts_from(self.content["facts"])
+        stored_facts = facts_from(self.content["facts"])
         names = ("states", "first_moment", "last_moment", "plate_warming", *REFERENCES)
-        return replace(facts_of(campaign), **{name: getattr(kept, name) for name in names})
+        return replace(facts_of(campaign), **{name: getattr(stored_facts, name) for name in names})
 
     def _changes(self, points: Points, facts: Facts, kind: Kind) -> FloatArray:
         """Changes [d, P] Nm of one kind under each draw."""
@@ -129,7 +129,7 @@ class Extension:
 
 
 def build_extension(draws: Sequence[Draw], facts: Facts, ranges: Ranges, *, courses: bool) -> Extension:
-    """From weighted draws, and the campaign's facts and ranges that they refer to.
+    """An extension from weighted draws, and the campaign's facts and ranges that they refer to.
 
     `courses`: whether effects of use are to be followed beyond the data; where they did not help to predict the last states
     from the first, a life is tracked without them. ζ counts by the mean exponent of severity.

@@ -76,15 +76,15 @@ def reference_of(courses: Sequence[SpeedCourse]) -> SpeedCourse:
 def compared(course: SpeedCourse, reference: SpeedCourse) -> Comparison:
     """A course against the reference. Standard errors are of the speed's noise and of the moments of contact and end."""
     x, r = course.at(reference.time), reference.speed
-    size, whole = float(np.linalg.norm(x)), float(np.linalg.norm(r))
-    cosine = float(x @ r) / (size * whole)
+    size, measured_size = float(np.linalg.norm(x)), float(np.linalg.norm(r))
+    cosine = float(x @ r) / (size * measured_size)
     rate = float(np.linalg.norm(np.gradient(x, reference.time)))
     error = math.hypot(course.noise, reference.noise, rate * course.duration.sd)
     ratio = course.duration.value / reference.duration.value
     ratio_sd = math.hypot(course.duration.sd, ratio * reference.duration.sd) / reference.duration.value
     return Comparison(
         normalised_duration=Estimate(value=ratio, sd=ratio_sd),
-        euclidean_distance=Estimate(value=float(np.linalg.norm(x - r)) / whole, sd=error / whole),
+        euclidean_distance=Estimate(value=float(np.linalg.norm(x - r)) / measured_size, sd=error / measured_size),
         spectral_angle=Estimate(value=math.acos(min(max(cosine, -1.0), 1.0)), sd=error / size),
     )
 

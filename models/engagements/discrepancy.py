@@ -87,8 +87,8 @@ def discrepancy(
 def _drive_of(slip: Slip, speed: float) -> Drive | None:
     """The drive of a record; None where the shaft was not slowed by the clutch's torque."""
     until = slip.time[-1] if slip.again is None else slip.again
-    held = slip.torque[slip.between(slip.end.value + 2 * slip.end.sd, float(until))]
-    limit = max(float(np.median(held)), 0.0) if held.size >= 3 else 0.0
+    sticking_torque = slip.torque[slip.between(slip.end.value + 2 * slip.end.sd, float(until))]
+    limit = max(float(np.median(sticking_torque)), 0.0) if sticking_torque.size >= 3 else 0.0
     rows = slip.between(slip.contact, slip.end.value)
     rows &= (slip.speed <= INITIAL * speed) & (slip.speed >= ENDPOINT * speed)
     if np.count_nonzero(rows) < 3:

@@ -175,10 +175,10 @@ def _breakaway(slip: Slip, channels: _Channels, per_pascal: float) -> Estimate |
     """μ at the moment at which slip begins again, by the samples between the standstill and it."""
     if slip.again is None:
         return None
-    held = slip.between(slip.end.value, slip.again)
-    friction = _friction(slip, per_pascal, held)
-    kept = np.median(slip.pressure[held][-criteria.FEWEST_LOCAL :]) if held.any() else 0.0
-    if friction is None or kept < 0.5 * channels.pressure.values[-1]:  # else the clutch was opened
+    sticking = slip.between(slip.end.value, slip.again)
+    friction = _friction(slip, per_pascal, sticking)
+    pressure_held = np.median(slip.pressure[sticking][-criteria.FEWEST_LOCAL :]) if sticking.any() else 0.0
+    if friction is None or pressure_held < 0.5 * channels.pressure.values[-1]:  # else the clutch was opened
         return None
     return friction.at(slip.again, channels.width)
 

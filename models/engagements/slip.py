@@ -156,25 +156,25 @@ def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
         return Refusal(status=SlipStatus.NO_SLIP, message=rule)
     fast, slow = smooth >= 0.5 * highest, smooth <= criteria.SLOW * highest
     first = int(np.argmax(fast))
-    rest = first + int(np.argmax(slow[first:]))
-    if not slow[rest]:
+    standstill = first + int(np.argmax(slow[first:]))
+    if not slow[standstill]:
         least = 100 * float(smooth[first:].min()) / highest
         limit = f"and must fall to {100 * criteria.SLOW:g} % or less"
         return _never_ends(f"the lowest speed is {least:.3g} % of the highest, {limit}")
-    slowing = int(np.flatnonzero(fast[:rest])[-1])
-    turning = np.flatnonzero(smooth[rest:] > 2 * criteria.SLOW * highest)
-    leaves = rest + int(turning[0]) if turning.size else time.size
-    window = slice(slowing, min(leaves, rest + 2 * (rest - slowing) + 5))
-    latest = min(2 * rest - slowing + 2, leaves - 1)
+    slowing = int(np.flatnonzero(fast[:standstill])[-1])
+    turning = np.flatnonzero(smooth[standstill:] > 2 * criteria.SLOW * highest)
+    leaves = standstill + int(turning[0]) if turning.size else time.size
+    window = slice(slowing, min(leaves, standstill + 2 * (standstill - slowing) + 5))
+    latest = min(2 * standstill - slowing + 2, leaves - 1)
     end, zero = _rest(time[window], speed[window], float(time[slowing]), float(time[latest]))
     if abs(zero) > criteria.LARGEST_ZERO * highest:
         limit = f"and must come within {100 * criteria.LARGEST_ZERO:g} % of zero"
         return _never_ends(f"the speed stays at {100 * zero / highest:.3g} % of the highest, {limit}")
-    again = None
+    slips_again = None
     if turning.size:
-        still = np.flatnonzero(speed[rest:leaves] - zero <= criteria.LARGEST_ZERO * highest)
-        again = float(time[rest + (int(still[-1]) if still.size else 0)])
-    return Standstill(fast=first, slowing=slowing, rest=rest, end=end, zero=zero, again=again)
+        still = np.flatnonzero(speed[standstill:leaves] - zero <= criteria.LARGEST_ZERO * highest)
+        slips_again = float(time[standstill + (int(still[-1]) if still.size else 0)])
+    return Standstill(fast=first, slowing=slowing, rest=standstill, end=end, zero=zero, again=slips_again)
 
 
 def _rpm(speed: float) -> str:
@@ -192,15 +192,15 @@ def _rest(time: FloatArray, speed: FloatArray, earliest: float, latest: float) -
 
     The power of g rises from 2 for as long as that explains more than chance would.
     """
-    rest = _rest_of(2, time, speed, earliest, latest)
+    standstill = _rest_of(2, time, speed, earliest, latest)
     # a shaft that its drive almost keeps turning creeps to rest, and a parabola places that 3 % too early
     for power in (3, 4):
         better = _rest_of(power, time, speed, earliest, latest)
         few = better.freedom < criteria.FEWEST_SLIPPING
-        if few or rest.misfit - better.misfit < 3.0**2 * better.misfit / better.freedom:
+        if few or standstill.misfit - better.misfit < 3.0**2 * better.misfit / better.freedom:
             break
-        rest = better
-    return rest.end, rest.zero
+        standstill = better
+    return standstill.end, standstill.zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -264,7 +264,7 @@ class Slip:
 
     @property
     def duration(self) -> Estimate:
-        """From start to end of slip [s]."""
+        """Duration from start to end of slip [s]."""
         return Estimate(value=self.end.value - self.start.value, sd=math.hypot(self.start.sd, self.end.sd))
 
     def between(self, low: float, high: float) -> NDArray[np.bool_]:
@@ -352,7 +352,7 @@ class _Contact:
 
 
 def _contact_of(time: FloatArray, torque: FloatArray, slowing: int) -> _Contact | Refusal:
-    """From the rows before the end of slip; the shaft is fast up to row `slowing`."""
+    """Fit the contact to the rows before the end of slip; the shaft is fast up to row `slowing`."""
     from scipy.ndimage import uniform_filter1d  # start-up time: what answers cuts no record
 
     smooth = uniform_filter1d(torque, max(3, (time.size - slowing) // 100), mode="nearest")

@@ -87,18 +87,18 @@ def estimate_noise(
 
     A given deviation is `disbelieved` where the residuals exceed the 1 - this quantile of χ².
     """
-    given, estimable = np.isfinite(given_sd), freedom >= 1
+    is_given, estimable = np.isfinite(given_sd), freedom >= 1
     spare = np.maximum(freedom, 1.0)
-    given_sd = np.where(given, given_sd, 1.0)
-    inflated = given & estimable & (residual / given_sd**2 > chdtri(spare, disbelieved))
-    estimated = (estimable & ~given) | inflated
-    sd = np.where(estimated, np.sqrt(residual / spare), np.where(given, given_sd, criteria.ASSUMED_NOISE * level))
+    given_sd = np.where(is_given, given_sd, 1.0)
+    inflated = is_given & estimable & (residual / given_sd**2 > chdtri(spare, disbelieved))
+    estimated = (estimable & ~is_given) | inflated
+    sd = np.where(estimated, np.sqrt(residual / spare), np.where(is_given, given_sd, criteria.ASSUMED_NOISE * level))
     return Noise(
         sd=np.maximum(sd, 1e-6 * level),  # some noise there is
         widening=np.where(estimated, stdtrit(spare, 0.95) / criteria.Z90, 1.0),
         inflated=inflated,
-        assumed=~estimated & ~given,
-        shaped=estimated & ~given,
+        assumed=~estimated & ~is_given,
+        shaped=estimated & ~is_given,
     )
 
 
@@ -414,12 +414,12 @@ def _describe(
 
 def _undetermined(folded: _Folded, too_wide: NDArray[np.bool_]) -> tuple[str, ...]:
     """Names by the width of their uncertainty; with fewer than four speeds all, except M_s where it was measured at rest."""
-    few = folded.distinct < len(PARAMETER_NAMES)
+    too_few = folded.distinct < len(PARAMETER_NAMES)
     seen_at_rest = bool((folded.speed == 0).any())
     return tuple(
         name
         for name, wide in zip(PARAMETER_NAMES, too_wide, strict=True)
-        if wide or (few and not (name == "static_torque" and seen_at_rest))
+        if wide or (too_few and not (name == "static_torque" and seen_at_rest))
     )
 
 

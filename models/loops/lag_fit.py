@@ -69,17 +69,17 @@ class LagProblem:
         change = self.without((little - still) / lag)
         gain = self.gain(base)
         residual = self.left - gain * base
-        own = change - base * float(base @ change) / float(base @ base)
-        strength = max(float(own @ own), 1e-300)
-        estimate = float(own @ residual) / strength
-        return self._deviation(residual - estimate * own) / math.sqrt(strength), estimate
+        orthogonal = change - base * float(base @ change) / float(base @ base)
+        strength = max(float(orthogonal @ orthogonal), 1e-300)
+        estimate = float(orthogonal @ residual) / strength
+        return self._deviation(residual - estimate * orthogonal) / math.sqrt(strength), estimate
 
     def step(self, course: FloatArray, change: FloatArray, lag: float) -> tuple[float, float]:
         """u after a Gauss-Newton step from `lag`, whose torque is `course` and changes by `change`, and the gain there."""
         base, slope = self.without(course), self.without(change)
         gain = self.gain(base)
-        own = slope - base * float(base @ slope) / float(base @ base)
-        move = float(own @ (self.left - gain * base)) / (gain * max(float(own @ own), 1e-300))
+        orthogonal = slope - base * float(base @ slope) / float(base @ base)
+        move = float(orthogonal @ (self.left - gain * base)) / (gain * max(float(orthogonal @ orthogonal), 1e-300))
         return lag + move, self.gain(base + move * slope)
 
     def deviation(
@@ -297,12 +297,12 @@ def _by_curve(estimate: Callable[[StribeckParameters], float], curve: Stationary
     if not deviation.any():
         return 0.0
     values = curve.parameters.as_array()
-    here = estimate(curve.parameters)
+    estimated = estimate(curve.parameters)
     gradient = np.zeros(values.size)
     for k in np.flatnonzero(deviation):
         moved = values.copy()
         moved[k] += _MOVED * deviation[k]
-        gradient[k] = (estimate(StribeckParameters.from_array(moved)) - here) / (moved[k] - values[k])
+        gradient[k] = (estimate(StribeckParameters.from_array(moved)) - estimated) / (moved[k] - values[k])
     variance = float(gradient @ curve.covariance @ gradient)
     return math.sqrt(max(variance, 0.0)) if math.isfinite(variance) else math.inf
 

@@ -50,7 +50,7 @@ class Area:
 
     @property
     def direction(self) -> Direction:
-        """By the sign of the area, where that is beyond its noise."""
+        """Direction of the loop by the sign of its area, if that exceeds its noise."""
         if abs(self.area) <= Z90 * self.area_sd:
             return Direction.NONE
         return Direction.HIGHER_ACCELERATING if self.area > 0 else Direction.HIGHER_DECELERATING
@@ -129,10 +129,10 @@ def _design(cycle: Cycle, phase: FloatArray, count: int) -> FloatArray:
 
 def _solve(design: FloatArray, measured: FloatArray, keep: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
     """Inverse normal matrix and coefficients over the kept rows, the latter refined once."""
-    kept, wanted = design[keep], measured[keep]
-    inverse = np.asarray(np.linalg.pinv(kept.T @ kept, rcond=1e-13, hermitian=True), dtype=np.float64)
-    solution = inverse @ (kept.T @ wanted)
-    return inverse, solution + inverse @ (kept.T @ (wanted - kept @ solution))
+    design_kept, target = design[keep], measured[keep]
+    inverse = np.asarray(np.linalg.pinv(design_kept.T @ design_kept, rcond=1e-13, hermitian=True), dtype=np.float64)
+    solution = inverse @ (design_kept.T @ target)
+    return inverse, solution + inverse @ (design_kept.T @ (target - design_kept @ solution))
 
 
 def _area_gradients(cycle: Cycle, solution: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
@@ -169,11 +169,11 @@ def _between_periods(cycle: Cycle, phase: FloatArray, measured: FloatArray, coun
     areas = []
     for period in range(cycle.periods):
         rows = number == period
-        own = min(count, _harmonics_for(phase[rows])) if rows.any() else 0
-        if rows.sum() < 3 * (2 * own + 2):
+        harmonics = min(count, _harmonics_for(phase[rows])) if rows.any() else 0
+        if rows.sum() < 3 * (2 * harmonics + 2):
             continue
-        design = _design(single, phase[rows], own)
+        design = _design(single, phase[rows], harmonics)
         _, solution = _solve(design, measured[rows], np.ones(int(rows.sum()), dtype=np.bool_))
-        along, _ = _area_gradients(cycle, solution, own)
+        along, _ = _area_gradients(cycle, solution, harmonics)
         areas.append(float(along @ solution))
     return float(np.var(areas, ddof=1)) / len(areas) if len(areas) >= 3 else 0.0

@@ -56,8 +56,8 @@ def _own_clock(cycles: FloatArray, latest: float) -> FloatArray:
         return np.tile(np.minimum(cycles, 1.0), (_LOG_SCALES.size, 1))
     log_scale = (_LOG_SCALES + math.log(latest))[:, None]
     course = np.full(1, Course.LOGARITHM, dtype=np.intp)
-    at, whole = (basis(zeta, log_scale, np.zeros((1, 1)), course) for zeta in (cycles[None], np.array([[latest]])))
-    return np.asarray(at / whole)
+    at, at_end = (basis(zeta, log_scale, np.zeros((1, 1)), course) for zeta in (cycles[None], np.array([[latest]])))
+    return np.asarray(at / at_end)
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ class Predicted:
     variance: FloatArray
 
     def at(self, places: NDArray[np.intp]) -> "Predicted":
-        """The same at these places of its cycles [k]."""
+        """The prediction at these places of its cycles [k]."""
         return replace(self, mean=self.mean[:, places], variance=self.variance[:, places])
 
     def log_density(self, log_cof: FloatArray, spread: FloatArray, new_level: FloatArray) -> FloatArray:

@@ -82,9 +82,9 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> Judgement:
     """
     clutch = _Clutch(runs=tuple(runs), about=frozenset(about))
     best, weighed = _searched(clutch)
-    held = _held(clutch, best, weighed)
+    held_runs = _held(clutch, best, weighed)
     levels = best.belief.levels & clutch.followed
-    return Judgement(held=held, tests=clutch.followed, levels=levels - held.keys())
+    return Judgement(held=held_runs, tests=clutch.followed, levels=levels - held_runs.keys())
 
 
 def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> dict[int, Verdict]:
@@ -172,8 +172,8 @@ class _Clutch:
     @cached_property
     def followed(self) -> frozenset[int]:
         """The tests that are looked at with the five right before them, by which a new level is seen."""
-        tests, seen = [i for i, run in enumerate(self.runs) if run.tests], set(self.tests)
-        return frozenset(i for k, i in enumerate(tests) if seen.issuperset(tests[max(k - 5, 0) : k + 1]))
+        tests, known_tests = [i for i, run in enumerate(self.runs) if run.tests], set(self.tests)
+        return frozenset(i for k, i in enumerate(tests) if known_tests.issuperset(tests[max(k - 5, 0) : k + 1]))
 
     @cached_property
     def compared(self) -> frozenset[int]:
@@ -198,7 +198,7 @@ class _Clutch:
 
     @cached_property
     def block(self) -> FloatArray:
-        return np.array([math.nan if (own := self.runs[i].block) is None else own for i in self.near])
+        return np.array([math.nan if (block_of_run := self.runs[i].block) is None else block_of_run for i in self.near])
 
     @cached_property
     def dated(self) -> list[int]:
@@ -216,8 +216,8 @@ class _Clutch:
             start = cycles[self.dated] - np.nan_to_num(self.block[self.dated])
             without = np.tile(start, (1 + start.size, 1))
             without[1:][np.diag_indices(start.size)] = math.inf
-            made = pace.log_order(without, self.moments)
-            total[self.dated] += made[0] - made[1:]
+            log_orders = pace.log_order(without, self.moments)
+            total[self.dated] += log_orders[0] - log_orders[1:]
         return total
 
     def log_cycles(self, sets: FloatArray) -> FloatArray:
@@ -262,10 +262,10 @@ class _Weighed:
         fits: list[tuple[Fit, list[int]]] = []
         level, level_sd = math.log(criteria.COF), criteria.LOG_COF_SD
         for life in range(len(self.origins)):
-            own = [i for i in self.clutch.tests if self.life_of[i] == life and i not in self.belief.slipped]
-            fit = self._fit(own, life, level, level_sd)
-            fits.append((fit, own))
-            if own:
+            tests_of_life = [i for i in self.clutch.tests if self.life_of[i] == life and i not in self.belief.slipped]
+            fit = self._fit(tests_of_life, life, level, level_sd)
+            fits.append((fit, tests_of_life))
+            if tests_of_life:
                 # of a rebuilt clutch from the life before
                 level, level_sd = float(fit.tests.log_cof[np.argmin(fit.tests.cycles)]), 0.3
         return fits
@@ -294,10 +294,10 @@ class _Weighed:
 
     def _without(self, index: int, life: int) -> Fit:
         """The course of a life without one of its tests."""
-        fit, own = self.fits[life]
-        if index not in own:
+        fit, fitted_tests = self.fits[life]
+        if index not in fitted_tests:
             return fit
-        return self._fit([i for i in own if i != index], life, fit.tests.level, fit.tests.level_sd)
+        return self._fit([i for i in fitted_tests if i != index], life, fit.tests.level, fit.tests.level_sd)
 
     def _shifts(self, life: int) -> FloatArray:
         """The cycles of the events of a life that may have shifted its level."""
@@ -318,7 +318,7 @@ class _Weighed:
     @cached_property
     def base(self) -> float:
         """The part of the tests' course, of cycles and dates, and the prior of the belief."""
-        total = sum(fit.log_evidence for fit, own in self.fits if own)
+        total = sum(fit.log_evidence for fit, fitted_tests in self.fits if fitted_tests)
         total += len(self.belief.outlying) * _log_odds(criteria.OUTLYING_SHARE)
         total += sum(self._log_level(i) for i in self.belief.levels)
         return total + float(self.clutch.log_cycles(self._sets([]))[0])
@@ -348,10 +348,10 @@ class _Weighed:
         return criteria.LEVEL_AFTER_EVENT if declared else criteria.LEVEL_UNDECLARED
 
     def _new_level(self, index: int, life: int, cycles: float) -> float:
-        """The same where no other test comes later: else they would have the new level too. 0 before the first test."""
+        """Log probability of a new level from this test on; later tests would have it too. 0 before the first test."""
         runs = self.clutch.runs
-        others = [runs[i].sent.cycles for i in self.fits[life][1] if i != index]
-        return self._level_share(life, cycles) if others and max(others) < cycles else 0.0
+        other_cycles = [runs[i].sent.cycles for i in self.fits[life][1] if i != index]
+        return self._level_share(life, cycles) if other_cycles and max(other_cycles) < cycles else 0.0
 
     def log_cof(self, index: int, readings: Sequence[Reading]) -> list[float]:
         """log density of the COF of readings of a run by the course of the others; 0 for one that shows none."""
@@ -386,17 +386,17 @@ class _Weighed:
         """The cycles at which a run that mistook them was most likely made: one gap after the last of its kind, or where
         its block ends after the last run."""
         run = self.clutch.runs[index]
-        others = [self.clutch.runs[i].sent.cycles for i in self.clutch.near if i in set(self.kept) and i != index]
-        latest = max(others, default=0.0)
+        other_cycles = [self.clutch.runs[i].sent.cycles for i in self.clutch.near if i in set(self.kept) and i != index]
+        latest = max(other_cycles, default=0.0)
         if run.block is not None:
             return latest + run.block
         gaps = np.diff(self._of_kind(index))
         return latest + (float(gaps[-1]) if gaps.size else 0.0)
 
     def _of_kind(self, index: int) -> FloatArray:
-        kind, kept = self.clutch.runs[index].kind, set(self.kept)
-        own = [i for i in self.clutch.near if i in kept and i != index and self.clutch.runs[i].kind == kind]
-        return np.unique(self.clutch.cycles[own]) if own else np.zeros(0)
+        kind, kept_runs = self.clutch.runs[index].kind, set(self.kept)
+        same_kind = [i for i in self.clutch.near if i in kept_runs and i != index and self.clutch.runs[i].kind == kind]
+        return np.unique(self.clutch.cycles[same_kind]) if same_kind else np.zeros(0)
 
     def weigh(self, index: int) -> tuple[float, float, Slip] | None:
         """Of a run: log L as sent, log Σ P(slip) L without it, and the most probable slip; None where none is possible."""
@@ -407,7 +407,7 @@ class _Weighed:
     def _slip_of(self, index: int) -> tuple[float, float, Slip] | None:
         run = self.clutch.runs[index]
         slips = self.clutch.slips(index, self.expected(index))
-        if all(own in ([], [index]) for _, own in self.fits):
+        if all(fitted_tests in ([], [index]) for _, fitted_tests in self.fits):
             slips = [slip for slip in slips if slip.name not in OF_CLUTCH]
         if not slips:
             return None
@@ -429,8 +429,8 @@ class _Weighed:
             return [0.0] * len(cycles)
         values, of = np.unique(cycles, return_inverse=True)
         sets = self._sets([{index: math.inf}, *({index: value} for value in values.tolist())])
-        made = self.clutch.log_cycles(sets[1:])
-        return [float(value) for value in (made[1:] - made[0])[of]]
+        log_cycles = self.clutch.log_cycles(sets[1:])
+        return [float(value) for value in (log_cycles[1:] - log_cycles[0])[of]]
 
     @cached_property
     def suspects(self) -> frozenset[int]:
@@ -438,21 +438,25 @@ class _Weighed:
         pressures, speeds and oil beside the others of their kind. One without others is always asked about."""
         runs = self.clutch.runs
         of_cycles = dict(zip(self.clutch.near, self.clutch.surprise(self._sets([])[0]).tolist(), strict=True))
-        asked = [i for i in self.kept if i in self.clutch.compared and i in of_cycles]
+        compared_runs = [i for i in self.kept if i in self.clutch.compared and i in of_cycles]
         surprise: dict[int, float] = {}
-        for i in asked:
-            others = [j for j in asked if j != i and runs[j].kind == runs[i].kind]
-            protocol = max((runs[j].sent.log_protocol for j in others), default=math.inf)
+        for i in compared_runs:
+            same_kind = [j for j in compared_runs if j != i and runs[j].kind == runs[i].kind]
+            protocol = max((runs[j].sent.log_protocol for j in same_kind), default=math.inf)
             surprise[i] = protocol - runs[i].sent.log_protocol
-            surprise[i] += max((of_cycles[j] for j in others), default=0.0) - of_cycles[i]
-        for life, (fit, own) in enumerate(self.fits):
-            shows = [i for i in asked if i not in own and self.life_of[i] == life and runs[i].sent.log_cof is not None]
-            of_tests = dict(zip(own, (fit.misses() if own else np.zeros(0)).tolist(), strict=True))
+            surprise[i] += max((of_cycles[j] for j in same_kind), default=0.0) - of_cycles[i]
+        for life, (fit, fitted_tests) in enumerate(self.fits):
+            shows = [
+                i
+                for i in compared_runs
+                if i not in fitted_tests and self.life_of[i] == life and runs[i].sent.log_cof is not None
+            ]
+            of_tests = dict(zip(fitted_tests, (fit.misses() if fitted_tests else np.zeros(0)).tolist(), strict=True))
             of_others = dict(zip(shows, self._misses(shows, life, fit).tolist(), strict=True))
             for i in surprise.keys() & (of_tests | of_others):
                 surprise[i] += (of_tests | of_others)[i]
         least = math.log(criteria.HELD / criteria.DIGIT_SLIP)  # by less no slip is as probable as that
-        odd = sorted((i for i in asked if surprise[i] > least), key=lambda i: (-surprise[i], i))
+        odd = sorted((i for i in compared_runs if surprise[i] > least), key=lambda i: (-surprise[i], i))
         return frozenset(odd[:4])
 
     def _misses(self, shows: Sequence[int], life: int, fit: Fit) -> FloatArray:
@@ -467,8 +471,8 @@ class _Weighed:
     @cached_property
     def log_odds(self) -> dict[int, float]:
         """log odds of a slip for every run that is asked about, all else as the belief has it."""
-        asked = sorted(self.suspects | self.belief.slipped)
-        return {i: slips[1] - slips[0] for i in asked if (slips := self.weigh(i)) is not None}
+        questioned = sorted(self.suspects | self.belief.slipped)
+        return {i: slips[1] - slips[0] for i in questioned if (slips := self.weigh(i)) is not None}
 
     def moves(self) -> Iterator[tuple[Belief, float]]:
         """Single changes, and by how much they would change the log probability, about."""
@@ -476,31 +480,31 @@ class _Weighed:
         for i, log_odds in self.log_odds.items():
             gain = -log_odds if i in belief.slipped else log_odds
             yield belief.turned(i), gain
-        for fit, own in self.fits:
-            if not own:
+        for fit, fitted_tests in self.fits:
+            if not fitted_tests:
                 continue
             mean, variance, log_weight = fit.without
             off = fit.tests.log_cof - mean
-            sign = np.array([-1.0 if i in belief.outlying else 1.0 for i in own])
+            sign = np.array([-1.0 if i in belief.outlying else 1.0 for i in fitted_tests])
             now, then = (
                 np.logaddexp.reduce(log_weight + log_normal(off, variance + more * criteria.OUTLYING_SD**2), axis=0)
                 for more in (0.0, sign)
             )
             turned = then - now + sign * _log_odds(criteria.OUTLYING_SHARE)
-            for i, gain in zip(own, turned.tolist(), strict=True):
+            for i, gain in zip(fitted_tests, turned.tolist(), strict=True):
                 if gain > _WORTH:
                     yield replace(belief, outlying=belief.outlying ^ {i}), gain
             gains = fit.log_step_gains()
             for k in np.flatnonzero(gains > _WORTH).tolist():
-                i = own[k]
+                i = fitted_tests[k]
                 if i not in belief.levels and fit.tests.cycles[k] > fit.tests.cycles.min():
                     yield replace(belief, levels=belief.levels | {i}), float(gains[k]) + self._log_level(i)
 
     def instead(self) -> Iterator[Belief]:
         """A slip in place of the latest test of a life where that is outlying, or begins a level that none has after it."""
         belief = self.belief
-        for _, own in self.fits:
-            i = max(own, key=lambda j: float(self.clutch.cycles[j]), default=-1)
+        for _, fitted_tests in self.fits:
+            i = max(fitted_tests, key=lambda j: float(self.clutch.cycles[j]), default=-1)
             if i in belief.outlying | belief.levels:
                 yield belief.turned(i)
 
@@ -509,11 +513,11 @@ class _Weighed:
         sent = self.clutch.runs[index].sent
         weighed = self.weigh(index)
         slip = Slip(name=OTHER_CYCLES, log_prior=0.0, likely=sent) if weighed is None else weighed[2]
-        made = self._of_kind(index)
-        if made.size == 0:
-            made = np.unique(self.clutch.cycles[[i for i in self.kept if i != index]])
-        before = made[made < sent.cycles - 0.5]
-        gaps = np.diff(made)
+        other_cycles = self._of_kind(index)
+        if other_cycles.size == 0:
+            other_cycles = np.unique(self.clutch.cycles[[i for i in self.kept if i != index]])
+        before = other_cycles[other_cycles < sent.cycles - 0.5]
+        gaps = np.diff(other_cycles)
         return Verdict(
             log_odds=log_odds,
             slip=slip,
@@ -522,12 +526,12 @@ class _Weighed:
             against_time=self._against_time(index),
             usual_gap=float(np.median(gaps[-5:])) if gaps.size else None,
             before=float(before[-1]) if before.size else None,
-            latest=float(made[-1]) if made.size else None,
+            latest=float(other_cycles[-1]) if other_cycles.size else None,
         )
 
     def _interval(self, index: int, reading: Reading) -> tuple[float, float] | None:
         life = self._life_at(reading.cycles)
-        if all(own in ([], [index]) for _, own in self.fits):
+        if all(fitted_tests in ([], [index]) for _, fitted_tests in self.fits):
             return None
         return self._predicted(index, life, np.array([reading.cycles])).interval(0, reading.spread)
 

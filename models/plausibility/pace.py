@@ -40,9 +40,11 @@ def roundness(cycles: FloatArray | float, scale: FloatArray | float) -> FloatArr
     People and rigs plan in round numbers: a share ROUND of all numbers are multiples of 1, 2, 2.5, 5, 10, 20 and so on, each
     grain G from a thousandth of `scale` on as probable as the others. R = 1 - ROUND + ROUND mean(G [G divides the cycles]).
     """
-    whole, place = np.unique(np.where(np.isfinite(cycles), cycles, 0.0), return_inverse=True)
-    times = whole[:, None] / _GRAINS
-    up_to = np.concatenate([np.zeros((whole.size, 1)), np.cumsum(_GRAINS * (times == np.rint(times)), axis=1)], axis=1)
+    distinct, place = np.unique(np.where(np.isfinite(cycles), cycles, 0.0), return_inverse=True)
+    times = distinct[:, None] / _GRAINS
+    up_to = np.concatenate(
+        [np.zeros((distinct.size, 1)), np.cumsum(_GRAINS * (times == np.rint(times)), axis=1)], axis=1
+    )
     grains = np.searchsorted(_GRAINS, scale, side="right")
     place, least = place.reshape(np.shape(cycles)), np.maximum(grains - 12, 0)
     mean = (up_to[place, grains] - up_to[place, least]) / np.maximum(grains - least, 1)
@@ -56,7 +58,7 @@ def log_anywhere(cycles: FloatArray | float) -> FloatArray:
 
 
 def _log_of_any(cycles: FloatArray | float) -> FloatArray:
-    """The same where no number is round; 0.7 is the deviation of the logarithm beyond."""
+    """Log probability of any cycles, if no number is round; 0.7 is the deviation of the logarithm beyond."""
     at = np.maximum(cycles, 1.0)
     beyond = np.maximum(np.log(at / criteria.MAX_CYCLES), 0.0) / 0.7
     return np.asarray(-np.log(at * math.log(1e8 / 1e1)) - 0.5 * beyond**2)
@@ -67,34 +69,34 @@ def log_probability(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArra
 
     Cycles are infinite where a run is not among a set.
     """
-    there = np.isfinite(cycles)
-    finite = np.where(there, cycles, -1.0)
+    is_known = np.isfinite(cycles)
+    finite = np.where(is_known, cycles, -1.0)
     meets, left, in_life = _meets(cycles, finite, rank, block)
     total = np.zeros(cycles.shape[0])
     for kind in set(rank.tolist()):
-        own = np.flatnonzero(rank == kind)
-        law = in_life[:, own] if kind == _FREE else _by_gaps(cycles[:, own])
-        p = meets[:, own] + left[own] * law
-        total += np.where(there[:, own], np.log(np.maximum(p, _LEAST)), 0.0).sum(axis=1)
+        of_kind = np.flatnonzero(rank == kind)
+        law = in_life[:, of_kind] if kind == _FREE else _by_gaps(cycles[:, of_kind])
+        p = meets[:, of_kind] + left[of_kind] * law
+        total += np.where(is_known[:, of_kind], np.log(np.maximum(p, _LEAST)), 0.0).sum(axis=1)
     return total
 
 
 def log_given_others(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArray) -> FloatArray:
     """log P [n] of each run's cycles [n] given those of the others; 0 for a run that is not there."""
-    there = np.isfinite(cycles)
-    finite = np.where(there, cycles, -1.0)
+    is_known = np.isfinite(cycles)
+    finite = np.where(is_known, cycles, -1.0)
     meets, left, in_life = _meets(cycles[None], finite[None], rank, block)
     total = np.zeros(cycles.size)
     for kind in set(rank.tolist()):
-        own = np.flatnonzero(rank == kind)
+        of_kind = np.flatnonzero(rank == kind)
         if kind == _FREE:
-            total[own] = np.log(in_life[0, own])
+            total[of_kind] = np.log(in_life[0, of_kind])
             continue
-        sets = np.tile(cycles[own], (1 + own.size, 1))
-        sets[1:][np.diag_indices(own.size)] = math.inf
-        made = np.where(np.isfinite(sets), np.log(np.maximum(_by_gaps(sets), _LEAST)), 0.0).sum(axis=1)
-        total[own] = made[0] - made[1:]
-    return np.where(there, np.log(meets[0] + left * np.exp(np.minimum(total, 0.0))), 0.0)
+        sets = np.tile(cycles[of_kind], (1 + of_kind.size, 1))
+        sets[1:][np.diag_indices(of_kind.size)] = math.inf
+        log_gaps = np.where(np.isfinite(sets), np.log(np.maximum(_by_gaps(sets), _LEAST)), 0.0).sum(axis=1)
+        total[of_kind] = log_gaps[0] - log_gaps[1:]
+    return np.where(is_known, np.log(meets[0] + left * np.exp(np.minimum(total, 0.0))), 0.0)
 
 
 def _meets(
@@ -105,10 +107,10 @@ def _meets(
     is_block = np.isfinite(block)
     length = np.where(is_block, block, 1.0)
     with np.errstate(invalid="ignore"):
-        apart = np.abs(cycles[:, :, None] - cycles[:, None, :]) < 0.5
+        coincide = np.abs(cycles[:, :, None] - cycles[:, None, :]) < 0.5
     free = rank == _FREE
     joins = np.where(free[:, None], rank != _FREE, rank[:, None] > np.where(free, math.inf, rank))
-    joined = (apart & joins).any(axis=2)
+    joined = (coincide & joins).any(axis=2)
     in_life = _anywhere_in_life(finite)
     meets = np.asarray(criteria.JOINS * joined, dtype=np.float64)
     meets[:, free] /= np.maximum((finite[:, ~free] >= 0.0).sum(axis=1), 1)[:, None]  # any one of them
@@ -129,8 +131,8 @@ def _anywhere_in_life(finite: FloatArray) -> FloatArray:
     ordered = np.sort(finite, axis=1)
     latest = np.where(finite >= ordered[:, -1:], ordered[:, -2:-1] if finite.shape[1] > 1 else 0.0, ordered[:, -1:])
     share = np.where(finite <= latest, criteria.WITHIN, np.where(finite <= 2.0 * latest, criteria.BEYOND, 0.0))
-    rest = np.where(latest >= 1.0, 1.0 - criteria.WITHIN - criteria.BEYOND, 1.0)
-    return np.asarray(share / np.maximum(latest, 1.0) + rest * np.exp(_log_of_any(finite)))
+    remaining_share = np.where(latest >= 1.0, 1.0 - criteria.WITHIN - criteria.BEYOND, 1.0)
+    return np.asarray(share / np.maximum(latest, 1.0) + remaining_share * np.exp(_log_of_any(finite)))
 
 
 def _by_gaps(cycles: FloatArray) -> FloatArray:
@@ -169,8 +171,8 @@ def _of_gaps(gaps: FloatArray, round_by: FloatArray) -> FloatArray:
     like = np.where(growing, (1.0 - criteria.GROWING) * like + criteria.GROWING * further, like)
     similar = _log_normal(log_gap, (weight * log_before).sum(axis=2), 1.5)  # of their order
     anything = np.exp(_log_of_any(gaps))
-    rest = 1.0 - criteria.SAME_GAP - criteria.LIKE_GAP - criteria.SIMILAR_GAP
-    spread = criteria.LIKE_GAP * like + criteria.SIMILAR_GAP * similar + rest * anything
+    remaining_share = 1.0 - criteria.SAME_GAP - criteria.LIKE_GAP - criteria.SIMILAR_GAP
+    spread = criteria.LIKE_GAP * like + criteria.SIMILAR_GAP * similar + remaining_share * anything
     earlier = total[:, :, 0] > 0
     law = criteria.SAME_GAP * same + np.minimum(round_by * np.where(earlier, spread, anything), 1.0 - criteria.SAME_GAP)
     return np.where(gaps < 0.5, 0.02, law)  # it repeats another of its kind
@@ -191,18 +193,18 @@ def log_order(start: FloatArray, moment: FloatArray) -> FloatArray:
         return np.zeros(start.shape[0])
     by_moment = np.argsort(moment, kind="stable")
     begun = start[:, by_moment]
-    there = np.isfinite(begun)
+    is_known = np.isfinite(begun)
     # a run is out of order where it lies below its predecessor: one misplaced run makes one or two such steps
     last = _last_seen(begun)
-    wrong = (there[:, 1:] & (begun[:, 1:] < last[:, :-1] - 0.5)).sum(axis=1)
-    count = there.sum(axis=1)
+    wrong = (is_known[:, 1:] & (begun[:, 1:] < last[:, :-1] - 0.5)).sum(axis=1)
+    count = is_known.sum(axis=1)
     a, b = (2e-3, 1.0)  # so many wrong among so many right: clocks are set wrongly at times
     return np.asarray(betaln(a + wrong, b + np.maximum(count - wrong, 0)) - betaln(a, b))
 
 
 def _last_seen(values: FloatArray) -> FloatArray:
     """Each value [h, n], or the last finite one before it; -inf before the first."""
-    there = np.isfinite(values)
-    index = np.maximum.accumulate(np.where(there, np.arange(values.shape[1]), -1), axis=1)
+    is_known = np.isfinite(values)
+    index = np.maximum.accumulate(np.where(is_known, np.arange(values.shape[1]), -1), axis=1)
     latest = np.take_along_axis(values, np.maximum(index, 0), axis=1)
     return np.where(index >= 0, latest, -np.inf)

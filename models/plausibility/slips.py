@@ -78,8 +78,8 @@ def slips_of(run: Run, expected: float) -> Iterator[Slip]:
     if sent.log_cof is not None:
         off = (sent.log_cof - math.log(criteria.COF)) / criteria.LOG_COF_SD
         of_any = -0.5 * off * off - math.log(criteria.LOG_COF_SD * math.sqrt(2 * math.pi))
-        own = math.log(criteria.OTHER_CLUTCH) + of_any + anywhere
-        yield Slip(name=OTHER_CLUTCH, log_prior=own, likely=sent)
+        log_other_clutch = math.log(criteria.OTHER_CLUTCH) + of_any + anywhere
+        yield Slip(name=OTHER_CLUTCH, log_prior=log_other_clutch, likely=sent)
         yield Slip(name=OTHER_TEST, log_prior=math.log(criteria.OTHER_TEST) + of_any, likely=sent)
 
 
@@ -94,6 +94,6 @@ def mistyped(cycles: float) -> dict[str, list[float]]:
         for k in range(len(padded) - 1)
     }
     lost, extra = [10.0 * cycles], [cycles / 10.0] if cycles % 10 == 0 else []
-    others = sorted(swapped - {int(cycles), *map(int, lost), *map(int, extra)})
-    found = {EXTRA_ZERO: extra, LOST_ZERO: lost, SWAPPED: [float(value) for value in others]}
+    other_numbers = sorted(swapped - {int(cycles), *map(int, lost), *map(int, extra)})
+    found = {EXTRA_ZERO: extra, LOST_ZERO: lost, SWAPPED: [float(value) for value in other_numbers]}
     return {name: values for name, values in found.items() if values}

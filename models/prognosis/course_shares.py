@@ -42,10 +42,12 @@ def course_shares(posterior: Posterior) -> list[CourseShare]:
         CourseName.ACCELERATING: (posterior.course != Course.EQ_6) & accelerates,
     }
     shares = []
-    for name, here in kinds.items():
-        probability = float(posterior.weight[here].sum())
+    for name, kinds_here in kinds.items():
+        probability = float(posterior.weight[kinds_here].sum())
         if probability > 0.0:
-            shares.append(CourseShare(name=name, probability=min(probability, 1.0), order=_order(posterior, here)))
+            shares.append(
+                CourseShare(name=name, probability=min(probability, 1.0), order=_order(posterior, kinds_here))
+            )
     return sorted(shares, key=lambda share: share.probability, reverse=True)
 
 

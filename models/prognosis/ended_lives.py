@@ -101,7 +101,7 @@ class EndedLife:
         return np.asarray(np.interp(share, shares, np.append(self.damage, 1.0)))
 
     def in_unit(self, cycles: float) -> "EndedLife":
-        """The same life with ζ counted in units of so many cycles."""
+        """The life with ζ counted in units of `cycles`."""
         return replace(self, end=self.end / cycles, progress=tuple(zeta / cycles for zeta in self.progress))
 
     def to_dict(self) -> dict[str, Any]:
@@ -278,13 +278,13 @@ def _as_its_kind(
     if not stated.any():
         return None
     log_anywhere = np.linspace(earliest, earliest + _ANYWHERE, _ENDS)
-    others = decline.nodes(log_anywhere, _plain_courses(decline.progress / np.exp(log_anywhere)[:, None]))
+    other_nodes = decline.nodes(log_anywhere, _plain_courses(decline.progress / np.exp(log_anywhere)[:, None]))
     step = log_end[1] - log_end[0]
     log_prior = of_ends.log_density(log_end - centre) + math.log(step)
     log_odds = logsumexp(kin.log_evidence + log_prior[:, None, None]) - math.log(pace.size)
     anywhere = logsumexp(kin.log_evidence) + math.log(step / _ANYWHERE) - math.log(pace.size)
-    beside = logsumexp(others.log_evidence) - math.log(_ENDS * others.log_evidence.shape[2])
-    log_odds -= np.logaddexp(anywhere, beside) - math.log(2.0)
+    log_others = logsumexp(other_nodes.log_evidence) - math.log(_ENDS * other_nodes.log_evidence.shape[2])
+    log_odds -= np.logaddexp(anywhere, log_others) - math.log(2.0)
     lawful, lean = _forms(tests[0], courses)
     return Kin(
         ends=np.exp(places),
@@ -401,8 +401,8 @@ class _Nodes:
         order = np.argsort(share)[::-1]
         within = np.cumsum(share[order])
         # those that hold nearly all of it are led on
-        held = order[: int(np.searchsorted(within, 0.999 * within[-1])) + 1]
-        e, k, j = np.unravel_index(held, self.log_evidence.shape)
+        nodes_kept = order[: int(np.searchsorted(within, 0.999 * within[-1])) + 1]
+        e, k, j = np.unravel_index(nodes_kept, self.log_evidence.shape)
         end, weight, variance = np.exp(log_end[e]), self.weight[e, k], np.square(self.size[e, k])
         ahead = np.maximum(end / decline.span, 1.0)
         across = _walked(decline.progress / decline.span, ahead[:, None]) @ decline.turn
@@ -416,7 +416,7 @@ class _Nodes:
         to_come = np.maximum(1.0 - as_of / end, 0.0)
         step = (log_end[1] - log_end[0]) / math.sqrt(12.0)
         deviation = np.sqrt(spread / np.square(pace[j]) + np.square(wander[k] * to_come**1.5) + step**2)
-        return log_end[e] + np.log1p(-early), deviation, share[held] / share[held].sum()
+        return log_end[e] + np.log1p(-early), deviation, share[nodes_kept] / share[nodes_kept].sum()
 
 
 def _walked(early: FloatArray, late: FloatArray) -> FloatArray:
@@ -477,14 +477,14 @@ def _predictive(
 
     Each value is known up to its own `variance` [n], or not `exact` [n]: greater than that.
     """
-    own = values[exact]
-    precision = own.size + deviation**-2
-    mean = float(own.sum()) / precision
-    squares = float(own @ own + variance[exact].sum())
+    exact_values = values[exact]
+    precision = exact_values.size + deviation**-2
+    mean = float(exact_values.sum()) / precision
+    squares = float(exact_values @ exact_values + variance[exact].sum())
     return _Predictive(
         mean=mean,
         precision=precision,
-        shape=worth[0] + 0.5 * own.size,
+        shape=worth[0] + 0.5 * exact_values.size,
         rate=worth[1] + 0.5 * (squares - precision * mean**2),
         beyond=values[~exact],
     )

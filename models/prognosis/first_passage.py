@@ -118,10 +118,10 @@ def ends_of_life(
     threshold = fraction * posterior.initial
     crossing = general_order.first_passage(threshold, posterior.degradation)
     passages = np.where(posterior.initial <= threshold, 0.0, crossing)
-    beside = posterior.discrepancy
-    if offset is None and beside is None:
+    discrepancy = posterior.discrepancy
+    if offset is None and discrepancy is None:
         return np.minimum(passages, posterior.course_end)
-    walked = np.ones(passages.size, dtype=bool) if offset is not None or beside is None else beside.present
+    walked = np.ones(passages.size, dtype=bool) if offset is not None or discrepancy is None else discrepancy.present
     index = np.flatnonzero(walked)
     if index.size:
         walked_draws = posterior.taken(index, posterior.weight[index])
@@ -170,8 +170,8 @@ def _along_paths(posterior: Posterior, fraction: float, offset: Offset | None, h
     passed = np.flatnonzero(below.any(axis=0))
     left = sparse[np.maximum(first[passed] - 1, 0)]
     index = np.minimum(left + np.arange(_STRIDE + 1)[:, None], sparse[first[passed]])
-    own = np.zeros(1, dtype=np.intp) if course.shape[1] == 1 else passed
-    near = posterior.taken(passed, posterior.weight[passed]).values(places[index]) + course[index, own]
+    path_rows = np.zeros(1, dtype=np.intp) if course.shape[1] == 1 else passed
+    near = posterior.taken(passed, posterior.weight[passed]).values(places[index]) + course[index, path_rows]
     passages = np.full(first.size, np.inf)
     passages[passed] = first_below(near, places[index], level[passed])
     return passages

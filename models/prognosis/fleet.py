@@ -59,7 +59,7 @@ class FleetPrior:
         return criteria.TRUST * self.clutches / (self.clutches + criteria.DOUBT)
 
     def in_unit(self, cycles: float) -> "FleetPrior":
-        """The same population with φ counted in units of so many cycles."""
+        """The population with φ counted in units of `cycles`."""
         return replace(self, mean=self.mean - np.array([0.0, math.log(cycles), 0.0, 0.0]))
 
     def prior_for(self, first: Measurement) -> Prior:
@@ -201,8 +201,8 @@ def _log_prior(drawn: Posterior, prior: Prior) -> FloatArray:
     """Log density of (Δ, log φ, log ε, log s) [n] under a prior; ξ0 has the same under all."""
     spread = math.log(prior.change_sd * prior.log_scale_sd * prior.log_exponent_sd * prior.log_scatter_sd)
     off = (drawn.change * UNIT_OF_CHANGE[drawn.course] - prior.change_mean) / prior.change_sd
-    rest = prior.log_density(drawn.log_scale, drawn.log_exponent, np.log(drawn.scatter))
-    density = rest - 0.5 * off**2 - spread - 2.0 * math.log(2.0 * math.pi)
+    log_other_parts = prior.log_density(drawn.log_scale, drawn.log_exponent, np.log(drawn.scatter))
+    density = log_other_parts - 0.5 * off**2 - spread - 2.0 * math.log(2.0 * math.pi)
     no_exponent = WITHOUT_EXPONENT[drawn.course]
     of_exponent = -0.5 * (drawn.log_exponent - prior.log_exponent_mean) ** 2 / prior.log_exponent_sd**2
     of_exponent -= math.log(prior.log_exponent_sd) + 0.5 * math.log(2.0 * math.pi)

@@ -69,9 +69,9 @@ def draw_jointly(
     for column in range(quantities):
         alone = 1.0 / spread[:, column, column]
         evidence -= _solved(b[:, [column]], scaled[:, [column]], alone[:, None, None])[2]
-    kept = systematic(tempered(np.ones(_TRIED), evidence), size, float(rng.random()))
-    drawn = mean[kept] + np.linalg.solve(
-        np.swapaxes(root[kept], 1, 2), rng.standard_normal((size, 2 * quantities, 1))
+    drawn_rows = systematic(tempered(np.ones(_TRIED), evidence), size, float(rng.random()))
+    drawn = mean[drawn_rows] + np.linalg.solve(
+        np.swapaxes(root[drawn_rows], 1, 2), rng.standard_normal((size, 2 * quantities, 1))
     ).squeeze(2)
     drawn = drawn.reshape(size, 2, quantities) * typical
     return [
@@ -79,9 +79,9 @@ def draw_jointly(
             weight=np.full(size, 1.0 / size),
             initial=drawn[:, 0, column],
             change=drawn[:, 1, column],
-            scale=np.exp(scale[column, kept]),
-            exponent=np.exp(exponent[column, kept]),
-            scatter=own[column].scatter[index[kept, column]],
+            scale=np.exp(scale[column, drawn_rows]),
+            exponent=np.exp(exponent[column, drawn_rows]),
+            scatter=own[column].scatter[index[drawn_rows, column]],
         )
         for column in range(quantities)
     ]
@@ -292,9 +292,9 @@ def _together(levels: Sequence[PressureLevel], at_levels: Sequence[FloatArray], 
         expected = level.cof_track.values(level.cof_progress) @ level.cof_track.weight
         for test, residual in zip(level.tests, (level.cof - expected).tolist(), strict=True):
             residuals.setdefault(test, []).append(residual)
-    whole = [row for _, row in sorted(residuals.items()) if len(row) == len(levels)]
-    wanted = shrunk_correlation(np.array(whole).reshape(-1, len(levels)))
-    index = paired(np.stack([paths[_BEHIND - 1] for paths in at_levels], axis=1), wanted, rng)
+    complete = [row for _, row in sorted(residuals.items()) if len(row) == len(levels)]
+    correlation = shrunk_correlation(np.array(complete).reshape(-1, len(levels)))
+    index = paired(np.stack([paths[_BEHIND - 1] for paths in at_levels], axis=1), correlation, rng)
     return np.asarray(np.mean([paths[:, index[:, i]] for i, paths in enumerate(at_levels)], axis=0))
 
 

@@ -160,5 +160,5 @@ def stated_end(
 
 def _mean(posterior: Posterior, offsets: FloatArray) -> FloatArray:
     """What an offset adds [b, k], in the mean over the branches [1, k]."""
-    beside = posterior.beside(offsets)
-    return np.asarray(beside.T if beside.shape[1] == 1 else (beside @ posterior.weight)[None])
+    at_offsets = posterior.beside(offsets)
+    return np.asarray(at_offsets.T if at_offsets.shape[1] == 1 else (at_offsets @ posterior.weight)[None])

@@ -61,10 +61,10 @@ def clean(record: Record) -> tuple[Record, float, tuple[Note, ...]]:
 
     Raises UnusableRecordError as `plan_cleaning` does.
     """
-    kept = plan_cleaning(record)
-    if kept.rows is not None:
-        record = record.take(kept.rows)
-    return record, kept.period, kept.notes
+    plan = plan_cleaning(record)
+    if plan.rows is not None:
+        record = record.take(plan.rows)
+    return record, plan.period, plan.notes
 
 
 def plan_cleaning(record: Sampled) -> Cleaning:
@@ -160,8 +160,8 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
 def _spikes(channel: FloatArray, longest: int) -> NDArray[np.intp]:
     """Indices of samples that belong to a spike of at most `longest` samples."""
     stride = max(1, channel.size // SCALE_SAMPLES)
-    apart = np.abs(channel[longest::stride] - channel[:-longest:stride][: channel[longest::stride].size])
-    scale = 1.05 * float(np.median(apart))  # of a normal deviation: 1.4826 / sqrt(2)
+    jumps = np.abs(channel[longest::stride] - channel[:-longest:stride][: channel[longest::stride].size])
+    scale = 1.05 * float(np.median(jumps))  # of a normal deviation: 1.4826 / sqrt(2)
     moved = np.abs(channel[1::stride] - channel[:-1:stride])
     if scale == 0.0 and moved.any():  # a coarse recorder: its count
         scale = float(moved[moved > 0].min())

@@ -20,20 +20,20 @@ def extreme_rows(columns: Iterable[FloatArray], count: int, *, samples: int, poi
     """
     bins = max(1, (points - 2) // (2 * count))
     length = -(-samples // bins)  # rounded up
-    kept = np.zeros(samples, dtype=np.bool_)
-    kept[[0, -1]] = True
+    keep = np.zeros(samples, dtype=np.bool_)
+    keep[[0, -1]] = True
     for column in columns:
         for start, rows in _equal_bins(column, length):
             places = start + np.arange(len(rows)) * length
-            kept[places + rows.argmin(axis=1)] = True
-            kept[places + rows.argmax(axis=1)] = True
-    return np.flatnonzero(kept)
+            keep[places + rows.argmin(axis=1)] = True
+            keep[places + rows.argmax(axis=1)] = True
+    return np.flatnonzero(keep)
 
 
 def _equal_bins(column: FloatArray, length: int) -> Iterable[tuple[int, FloatArray]]:
     """Where they begin, and bins [b, length] of a column; the last, shorter one by itself."""
-    whole = column.size // length * length
-    if whole:
-        yield 0, column[:whole].reshape(-1, length)
-    if whole < column.size:
-        yield whole, column[whole:].reshape(1, -1)
+    whole_length = column.size // length * length
+    if whole_length:
+        yield 0, column[:whole_length].reshape(-1, length)
+    if whole_length < column.size:
+        yield whole_length, column[whole_length:].reshape(1, -1)

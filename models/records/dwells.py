@@ -117,16 +117,16 @@ class _Channel:
         size = self.values.size
         window = min(self.window, size // 2)
         total = np.concatenate([[0.0], np.cumsum(self.values - self.values.mean())])
-        apart = np.abs(total[2 * window :] - 2 * total[window : size - window + 1] + total[: size - 2 * window + 1])
-        apart = (apart / window)[np.clip(np.arange(size) - window, 0, size - 2 * window)]
+        curvature = np.abs(total[2 * window :] - 2 * total[window : size - window + 1] + total[: size - 2 * window + 1])
+        curvature = (curvature / window)[np.clip(np.arange(size) - window, 0, size - 2 * window)]
         # A quarter of a normal variable's absolute values lies below 0.3186 deviations: ramps are above that.
-        deviation = float(np.quantile(apart[active] if active.any() else apart, 0.25)) / 0.3186
+        deviation = float(np.quantile(curvature[active] if active.any() else curvature, 0.25)) / 0.3186
         self.threshold = max(
             # changes above 2 % of the highest are always steps, below 0.05 % never
             self.threshold,
             min(6.0 * deviation, 0.02 * self.highest),
         )
-        self.steady = apart <= self.threshold
+        self.steady = curvature <= self.threshold
 
     def level(self, core: tuple[int, int]) -> tuple[float, float]:
         """The level of a core and how far a block may lie off it; only after `judge`."""
@@ -223,9 +223,9 @@ def _crest(channels: tuple[_Channel, ...], before: slice, dwell: slice, followin
         return False
     beyond = False
     for channel in channels:
-        first, here, last = (float(channel.values[part].mean()) for part in (before, dwell, after))
+        first, middle, last = (float(channel.values[part].mean()) for part in (before, dwell, after))
         # off its level by 30 % of the step at most
-        if abs(here - last) > 0.3 * abs(last - first) + channel.threshold:
+        if abs(middle - last) > 0.3 * abs(last - first) + channel.threshold:
             return False
         on_the_way = np.copysign(1.0, last - first) * (channel.values[before.stop : dwell.stop] - last)
         beyond |= abs(last - first) > 2 * channel.threshold and bool(on_the_way.max() > channel.threshold)

@@ -31,12 +31,12 @@ def slow_correlation(residuals: Sequence[FloatArray], most: int = 64) -> FloatAr
     longest = max(residual.size for residual in residuals)
     group = -(-longest // most)
     means = [residual[: residual.size // group * group].reshape(-1, group).mean(axis=1) for residual in residuals]
-    kept = [k for k, average in enumerate(means) if average.size >= 8 and float(average @ average) > 0]
-    if not kept:
+    usable = [k for k, average in enumerate(means) if average.size >= 8 and float(average @ average) > 0]
+    if not usable:
         return np.zeros(0)
-    size = np.array([means[k].size for k in kept])
-    table = np.zeros((int(size.max()), len(kept)))
-    for column, k in enumerate(kept):
+    size = np.array([means[k].size for k in usable])
+    table = np.zeros((int(size.max()), len(usable)))
+    for column, k in enumerate(usable):
         table[: size[column], column] = means[k]
     # of correlation times and of shares of the variance all are equally probable
     times = np.geomspace(0.5 * group, 2.0 * longest, 16)
@@ -47,14 +47,14 @@ def slow_correlation(residuals: Sequence[FloatArray], most: int = 64) -> FloatAr
     weight /= weight.sum()
     lost = sum(
         float(residuals[k] @ residuals[k]) / residuals[k].size - float(means[k] @ means[k]) / means[k].size
-        for k in kept
+        for k in usable
     )
     lag = np.arange(1, longest)
     correlation = np.zeros(lag.size)
     for (time, share), (_, scale, variance), part in zip(places, restricted, weight, strict=True):
         if part > 1e-9:
             # averaging takes off the white part what the averages' mean squares have less than those of all
-            correlation += part * share * scale / (variance + lost / len(kept)) * np.exp(-lag / time)
+            correlation += part * share * scale / (variance + lost / len(usable)) * np.exp(-lag / time)
     return correlation
 
 

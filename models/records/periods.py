@@ -146,15 +146,15 @@ def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
     for count in criteria.CORNERS:
         if richer.noise < 0.002 * cycle.amplitude or count > most or t.size < 4 * (2 * count + 2):
             break
-        again = _refine(t, y, richer.frequency, count, _EXACT)
-        if isinstance(again, str) or again.noise > criteria.TAKEN * richer.noise:
+        refined = _refine(t, y, richer.frequency, count, _EXACT)
+        if isinstance(refined, str) or refined.noise > criteria.TAKEN * richer.noise:
             break
-        richer = again
+        richer = refined
     if richer is cycle:
         return cycle
     # a corner at an end may have been cut off as no part of the swing
-    whole = _without_ends(time, value, richer.frequency, richer.cosine.size)
-    return richer if isinstance(whole, str) or whole.noise > richer.noise / criteria.TAKEN else whole
+    trimmed = _without_ends(time, value, richer.frequency, richer.cosine.size)
+    return richer if isinstance(trimmed, str) or trimmed.noise > richer.noise / criteria.TAKEN else trimmed
 
 
 def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
@@ -234,8 +234,10 @@ def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, t
     for step in range(_STEPS):
         basis = harmonics(2 * math.pi * frequency * (time - origin), count)
         design = np.column_stack([np.ones_like(time), basis])
-        kept = design[keep]
-        coefficients = np.asarray(np.linalg.lstsq(kept.T @ kept, kept.T @ value[keep], rcond=None)[0], dtype=np.float64)
+        design_kept = design[keep]
+        coefficients = np.asarray(
+            np.linalg.lstsq(design_kept.T @ design_kept, design_kept.T @ value[keep], rcond=None)[0], dtype=np.float64
+        )
         cosine, sine = coefficients[1 : count + 1], coefficients[count + 1 :]
         slope = basis @ np.concatenate([order * sine, -order * cosine])
         by_frequency = 2 * math.pi * (time - origin) / duration * slope  # per cycle over the record

@@ -52,8 +52,8 @@ def cut_plateaus(record: Sampled, torque_filter: float = 0.0) -> PlateauCut:
     samples spike, signals be quantised. Raises UnusableRecordError on fewer than 16 samples, a clock that does not advance
     or falls back, and a record without any steady dwell in motion, and under pressure where there is any.
     """
-    kept = plan_cleaning(record)
-    blocks = _filtered(average(record, kept), torque_filter)
+    plan = plan_cleaning(record)
+    blocks = _filtered(average(record, plan), torque_filter)
     dwells, left_out = find_dwells(blocks)
     if not dwells:
         reasons = " ".join(sentence for _, sentence in left_out)
@@ -75,10 +75,10 @@ def cut_plateaus(record: Sampled, torque_filter: float = 0.0) -> PlateauCut:
     noise = np.sqrt(_mean(blocks.scatter, used) + moments.average**2)
     # of the mean by its transient, where one is resolved
     shift = np.nan_to_num(amplitude * mean_decay(transients.time_constant, drop, duration))
-    half = 0.5 * (blocks.duration - kept.period)
+    half = 0.5 * (blocks.duration - plan.period)
     cut = PlateauCut(
         plateaus=_plateaus(
-            blocks, used, np.sqrt(moments.mean**2 + _rounding(kept.of(record.torque), noise) ** 2 + shift**2)
+            blocks, used, np.sqrt(moments.mean**2 + _rounding(plan.of(record.torque), noise) ** 2 + shift**2)
         ),
         count=np.array([(dwell.stop - dwell.start) * blocks.size for dwell in used]),
         drift=moments.drift,
@@ -88,7 +88,7 @@ def cut_plateaus(record: Sampled, torque_filter: float = 0.0) -> PlateauCut:
         noise=noise,
         start=np.array([blocks.time[dwell.start] for dwell in used]) - half,
         stop=np.array([blocks.time[dwell.stop - 1] for dwell in used]) + half,
-        notes=(*kept.notes, *left_out),
+        notes=(*plan.notes, *left_out),
     )
     notes = [*cut.notes, *_notes(cut, drop)]
     if not moments.resolved:

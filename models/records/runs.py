@@ -39,7 +39,7 @@ class _Columns:
         return {name: column for name, column in columns.items() if column is not None}
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Self:
-        """The same at `rows`, at least one."""
+        """The record at `rows`, at least one."""
         return replace(self, **{name: column[rows] for name, column in self._measured().items()})
 
 

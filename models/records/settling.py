@@ -109,9 +109,9 @@ def _common(
     dwells = worth.shape[0]
     if share @ gain[:, together.argmax()] - dwells <= 5.0 * np.sqrt(2.0 * dwells):
         return None
-    own = np.array([_peak(row, place) for row in worth])
+    peaks = np.array([_peak(row, place) for row in worth])
     visible = gain[np.arange(dwells), worth.argmax(axis=1)] > criteria.OWN_GAIN
-    determined = own[visible & (own[:, 1] < most_spread)]
+    determined = peaks[visible & (peaks[:, 1] < most_spread)]
     centre = _peak(together, place)[0]
     if determined.shape[0] < 8:
         return centre, most_spread
@@ -143,8 +143,8 @@ def _fit(
     """τ, its upper limit, A and its deviation."""
     if common is None and gain[worth.argmax()] < criteria.OWN_GAIN:
         return np.nan, np.nan, 0.0, 0.0
-    held = 0.0 if common is None else ((place - common[0]) / common[1]) ** 2
-    at, deviation = _peak(worth - held, place)
+    penalty = 0.0 if common is None else ((place - common[0]) / common[1]) ** 2
+    at, deviation = _peak(worth - penalty, place)
     tau = float(np.exp(at))
     decay = _basis(stretch.time, np.array([tau])).decay[0]
     square = max(float(decay @ decay), 1e-12)

@@ -71,10 +71,10 @@ def hidden_in(run: SimulatedRun, clutch: SimulatedClutch, sizes: Mapping[str, fl
         effect = effect_of(slug)
         if run.duty is not None:
             continue
-        held = run.record if run.record is not None else run.plateaus
-        if held is None:
+        measured = run.record if run.record is not None else run.plateaus
+        if measured is None:
             continue
-        changed = _changed(effect, size, held, clutch, run)
+        changed = _changed(effect, size, measured, clutch, run)
         run = replace(run, record=changed) if isinstance(changed, Record) else replace(run, plateaus=changed)
     return run
 

@@ -74,8 +74,8 @@ class Recorder:
             rounded(measured, self.torque_counts),
             oil_temperature(time, rng, sensor, kept_at),
         )
-        kept = slice(None) if self.lost == 0 else rng.random(count) >= self.lost
-        at, p, w, m, oil = (column[kept] for column in columns)
+        is_kept = slice(None) if self.lost == 0 else rng.random(count) >= self.lost
+        at, p, w, m, oil = (column[is_kept] for column in columns)
         return Record(time=at, pressure=p, speed=w, torque=m, oil_temperature=oil)
 
 
@@ -86,10 +86,10 @@ EXACT = Recorder(
 
 def _coloured(white: FloatArray, memory: float, step: float) -> FloatArray:
     """Noise [n] of unit deviation whose correlation falls by e in `memory` s, from white noise [n]."""
-    kept = math.exp(-step / memory) if memory > 0 else 0.0
-    entering = white * math.sqrt(1 - kept * kept)
+    correlation = math.exp(-step / memory) if memory > 0 else 0.0
+    entering = white * math.sqrt(1 - correlation * correlation)
     entering[:1] = white[:1]
-    return np.asarray(lfilter([1.0], [1.0, -kept], entering), dtype=np.float64)
+    return np.asarray(lfilter([1.0], [1.0, -correlation], entering), dtype=np.float64)
 
 
 #: The protocol's pressures [Pa].

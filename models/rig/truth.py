@@ -64,13 +64,13 @@ class SimulatedClutch:
         """The true parameters at pressure > 0 [Pa] after cycles >= 0; arrays broadcast. Raises ValueError outside.
 
         Below the protocol's lowest pressure they are those there, with both torques in proportion to pressure."""
-        given, zeta = np.asarray(pressure, dtype=np.float64), np.asarray(cycles, dtype=np.float64)
-        if not (np.isfinite(given).all() and (given > 0).all()):
+        pressures, zeta = np.asarray(pressure, dtype=np.float64), np.asarray(cycles, dtype=np.float64)
+        if not (np.isfinite(pressures).all() and (pressures > 0).all()):
             raise ValueError(f"pressure must be finite and positive, got {pressure}")
         if not (np.isfinite(zeta).all() and (zeta >= 0).all()):
             raise ValueError(f"cycles must be finite and not negative, got {cycles}")
-        p = np.maximum(given, PROTOCOL_PRESSURES[0])
-        share = given / p
+        p = np.maximum(pressures, PROTOCOL_PRESSURES[0])
+        share = pressures / p
         return StribeckParameters(
             static_torque=share * self.static_torque(p) * value(zeta, self.static_torque_course),
             coulomb_ratio=self.coulomb_ratio(p) * value(zeta, self.coulomb_ratio_course),

@@ -85,19 +85,19 @@ def basis(
     Accurate to 2e-16 absolute, not relative: here b is only compared with measurement noise. What grows is cut at LOG_MOST.
     """
     scale_inverse, exponent, height = np.exp(-log_scale), np.exp(log_exponent), np.ones(())
-    others = bool(course.any())
-    if others:
+    has_courses = bool(course.any())
+    if has_courses:
         fixed = _EXPONENT[course]
         scale_inverse = scale_inverse / _PLAIN_SCALE[course]
         exponent = np.where(np.isnan(fixed), exponent * EXPONENT_SIGN[course], fixed)
         height = _HEIGHT[course]
     power = np.asarray(progress * scale_inverse)
     power += 1.0
-    if others:
+    if has_courses:
         np.maximum(power, ENDED, out=power)
     np.log(power, out=power)
     power *= -exponent
-    if others:
+    if has_courses:
         np.minimum(power, LOG_MOST, out=power)
     np.exp(power, out=power)
     power *= -height
@@ -109,8 +109,8 @@ def basis(
 def log_form_weight(prior: Prior) -> FloatArray:
     """Log prior probability of each form; -inf for those that the prior is sure are not."""
     home = prior.eq_6_share * np.concatenate([[prior.law_share], (1.0 - prior.law_share) * SHARES])
-    others = (1.0 - prior.eq_6_share) * np.outer(COURSE_SHARES, OTHER_SHARES).ravel()
-    once = np.concatenate([home, others])
+    other_forms = (1.0 - prior.eq_6_share) * np.outer(COURSE_SHARES, OTHER_SHARES).ravel()
+    once = np.concatenate([home, other_forms])
     weight = np.outer([1.0 - prior.proportional_share, prior.proportional_share], once).ravel()
     with np.errstate(divide="ignore"):
         np.log(weight, out=weight)
@@ -125,7 +125,7 @@ def form_of(course: NDArray[np.intp], size: FloatArray, proportional: NDArray[np
 
 
 def scatter_growth(form: NDArray[np.intp], relative: FloatArray) -> FloatArray:
-    """By what s² is to be multiplied at values of `relative` size squared [t] under forms [n]; [n, t]."""
+    """Factor on s² at values of `relative` size squared [t] under forms [n]; [n, t]."""
     return np.where(FORM_PROPORTIONAL[form][:, None], relative, 1.0)
 
 

@@ -110,7 +110,7 @@ class Discrepancy:
         return np.asarray(smooth_part + np.einsum("kne,ne->kn", begun, self.height))
 
     def measured(self, progress: FloatArray) -> FloatArray:
-        """The same at progress [k] of what was measured, up to T, where every draw's own time is ζ; [k, n]."""
+        """The discrepancy at progress [k] of what was measured, up to T, where every draw's own time is ζ; [k, n]."""
         terms = np.concatenate([smooth(progress, self.span, PAST), progress[:, None] >= self.at], axis=1)
         return np.asarray(terms @ np.concatenate([self.curvature[:, :PAST], self.height], axis=1).T)
 

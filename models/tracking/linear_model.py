@@ -183,7 +183,7 @@ def last_outlying(history: History, prior: Prior, points: Points, sums: Sums, te
     growth = scatter_growth(points.form, prior.relative_squared(history.value)[-1:])[:, 0]
     r = 1.0 / (history.variance[-1] + growth * np.exp(2.0 * points.log_scatter))
     pivot = 1.0 + sd**2 * r
-    own = sd * r * np.stack([np.ones_like(last), np.full_like(last, y), last])
+    scaled = sd * r * np.stack([np.ones_like(last), np.full_like(last, y), last])
     if terms.where.size:
         at, rows = terms.where, terms.rows
         shared = terms.sd * columns(history)[-1][:, None] * (sd * r[at])
@@ -191,9 +191,9 @@ def last_outlying(history: History, prior: Prior, points: Points, sums: Sums, te
             shared[k] /= rows[k, k]
             shared[k + 1 :] -= rows[k, k + 1 : shared.shape[0]] * shared[k]
         pivot[at] -= np.square(shared).sum(axis=0)
-        own[:, at] -= np.einsum("kj,ckj->cj", shared, terms.cross)
-    own /= np.sqrt(pivot)
-    lost = {name: own[i] * own[j] for name, (i, j) in _PRODUCTS.items()} | {"log_r": np.log(pivot)}
+        scaled[:, at] -= np.einsum("kj,ckj->cj", shared, terms.cross)
+    scaled /= np.sqrt(pivot)
+    lost = {name: scaled[i] * scaled[j] for name, (i, j) in _PRODUCTS.items()} | {"log_r": np.log(pivot)}
     return Sums(**{name: getattr(sums, name) - loss for name, loss in lost.items()})
 
 

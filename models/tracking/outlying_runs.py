@@ -102,7 +102,7 @@ class Search:
 
     @classmethod
     def begun(cls, prior: Prior, history: History) -> "Search":
-        """From the empty set."""
+        """A search that begins from the empty set."""
         none = np.zeros(history.value.size)
         return cls(prior=prior, history=history, log_probability={none.tobytes(): 0.0}, expanded=set())
 

@@ -83,14 +83,14 @@ class Posterior:
 
     def values(self, progress: FloatArray) -> FloatArray:
         """ξ at progress ζ >= 0 [k], or [k, n] where draws differ, discrepancy and all; [k, n]."""
-        beside, zeta = self.discrepancy, progress if progress.ndim == 2 else progress[:, None]
+        discrepancy, zeta = self.discrepancy, progress if progress.ndim == 2 else progress[:, None]
         values = self._without_knee(progress)
         furthest = float(progress.max(initial=0.0))
-        if beside is None or not (beside.knee < furthest).any():
+        if discrepancy is None or not (discrepancy.knee < furthest).any():
             return values
-        knee = np.minimum(beside.knee, furthest)
+        knee = np.minimum(discrepancy.knee, furthest)
         pace = (self._without_knee(knee[None])[0] - self.initial) / knee
-        return np.asarray(values + beside.steepening * pace * np.maximum(zeta - knee, 0.0))
+        return np.asarray(values + discrepancy.steepening * pace * np.maximum(zeta - knee, 0.0))
 
     def _without_knee(self, progress: FloatArray) -> FloatArray:
         zeta = progress if progress.ndim == 2 else progress[:, None]
@@ -101,11 +101,13 @@ class Posterior:
         span = self.discrepancy.span
         if progress.ndim == 1 and progress.max(initial=0.0) <= span:
             return np.asarray(law + self.discrepancy.measured(progress))
-        whole = np.broadcast_to(self._share(np.full((1, 1), span)), share.shape)
-        own = np.broadcast_to(zeta, share.shape).copy()  # where rounding leaves nothing of a course up to the span
-        np.divide(span * share, whole, out=own, where=whole != 0.0)
-        own = np.maximum(zeta, own)
-        return np.asarray(law + self.discrepancy(np.where(zeta > span, own, zeta), zeta))
+        full_share = np.broadcast_to(self._share(np.full((1, 1), span)), share.shape)
+        zeta_kept = np.broadcast_to(
+            zeta, share.shape
+        ).copy()  # where rounding leaves nothing of a course up to the span
+        np.divide(span * share, full_share, out=zeta_kept, where=full_share != 0.0)
+        zeta_kept = np.maximum(zeta, zeta_kept)
+        return np.asarray(law + self.discrepancy(np.where(zeta > span, zeta_kept, zeta), zeta))
 
     def _share(self, progress: FloatArray) -> FloatArray:
         """b at progress [k, n] or [k, 1]; [k, n]."""
@@ -127,9 +129,9 @@ class Posterior:
         """The draws at `index`, with new weights."""
         columns = ("initial", "change", "scale", "exponent", "scatter", "proportional", "branch")
         rows = {name: getattr(self, name) for name in columns}
-        taken: dict[str, Any] = {name: column[index] for name, column in rows.items() if column is not None}
-        beside = None if self.discrepancy is None else self.discrepancy.taken(index)
-        return replace(self, weight=weight, discrepancy=beside, **taken)
+        rows_taken: dict[str, Any] = {name: column[index] for name, column in rows.items() if column is not None}
+        discrepancy = None if self.discrepancy is None else self.discrepancy.taken(index)
+        return replace(self, weight=weight, discrepancy=discrepancy, **rows_taken)
 
     def beside(self, offsets: FloatArray) -> FloatArray:
         """Of what is added to each branch [b, k], or to all of them [1, k], what is added to each draw; [k, n] or [k, 1]."""

@@ -36,11 +36,11 @@ def normalised(log_weight: FloatArray) -> FloatArray:
 def tempered(weight: FloatArray, log_factor: FloatArray, fewest: float = 60) -> FloatArray:
     """Weights [n] times a factor [n], normalised, its logarithm shrunk until the `fewest` count that are a sample, or half
     as many as without it."""
-    whole = weight / weight.sum()
-    fewest = min(fewest, 0.5 / float(whole @ whole))
+    normalized = weight / weight.sum()
+    fewest = min(fewest, 0.5 / float(normalized @ normalized))
     off = log_factor - log_factor[weight > 0.0].max()
     while True:
-        counted = whole * np.exp(off)
+        counted = normalized * np.exp(off)
         counted /= counted.sum()
         if 1.0 / float(counted @ counted) >= fewest:
             return np.asarray(counted)
@@ -72,7 +72,7 @@ def _halton(size: int, dimension: int) -> FloatArray:
 
 
 def spread_normals(size: int, offset: FloatArray) -> FloatArray:
-    """The same, as standard normals [size, d]."""
+    """Evenly spread standard normals [size, d]."""
     return np.asarray(ndtri(spread_points(size, offset)), dtype=np.float64)
 
 
@@ -82,8 +82,8 @@ def correlated_pair(
     """Standard normals [n, 2] made to have the variances and covariance [n] of each row; [n, 2]."""
     first = np.sqrt(np.maximum(first_variance, 1e-300))
     lean = covariance / first
-    rest = np.sqrt(np.maximum(second_variance - lean**2, 0.0))
-    return np.stack([first * normals[:, 0], lean * normals[:, 0] + rest * normals[:, 1]], axis=1)
+    remaining_sd = np.sqrt(np.maximum(second_variance - lean**2, 0.0))
+    return np.stack([first * normals[:, 0], lean * normals[:, 0] + remaining_sd * normals[:, 1]], axis=1)
 
 
 def with_linear_terms(
@@ -98,9 +98,9 @@ def with_linear_terms(
     """Points of weights [n] that sum to one, with what is linear drawn given each: ξ0 and Δ by standard normals [n, 2], the
     discrepancy and the steps by `rng`. `solved` is `linear_model.pointwise` of the points."""
     sums, terms = solved
-    given = conditional(sums, prior)
-    pair = correlated_pair(normals, given.initial_variance, given.change_variance, given.covariance)
-    initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
+    conditioned = conditional(sums, prior)
+    pair = correlated_pair(normals, conditioned.initial_variance, conditioned.change_variance, conditioned.covariance)
+    initial, change = conditioned.initial + pair[:, 0], conditioned.change + pair[:, 1]
     further = rng.standard_normal((weight.size, PAST + history.steps.size))
     further = drawn_terms(terms, initial - prior.initial_mean, change, further)
     scale, exponent = coefficients_at(points.log_scale, points.log_exponent, points.course)

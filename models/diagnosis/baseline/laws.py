@@ -123,7 +123,7 @@ class Laws:
         return values, by_fall
 
     def raised(self, place: int, by: float) -> "Laws":
-        """The same but for one of M_s, M̄_c, V_S, C_v, log C, which is larger by so much everywhere."""
+        """The laws with one of M_s, M̄_c, V_S, C_v, log C (by `place`) larger by `by` everywhere."""
         theta = self.theta.copy()
         if place == BLOCKS:
             theta[KAPPA] += by
@@ -176,9 +176,11 @@ def falling_weight(
     by_decay = left * (along * (1.0 - tangent) + tangent * (1.0 - curvature * along))
     by_curvature = left * ((logs / curvature - along) * (1.0 - tangent) + tangent * curvature * along)
     slopes = np.stack([by_decay, by_curvature], axis=-1)
-    whole = 1.0 - weight[-1]
-    by_fall = (slopes[:-1] - slopes[-1]) / whole + ((weight[:-1] - weight[-1]) / whole**2)[:, None] * slopes[-1]
-    return (weight[:-1] - weight[-1]) / whole, by_fall
+    full_weight = 1.0 - weight[-1]
+    by_fall = (slopes[:-1] - slopes[-1]) / full_weight + ((weight[:-1] - weight[-1]) / full_weight**2)[
+        :, None
+    ] * slopes[-1]
+    return (weight[:-1] - weight[-1]) / full_weight, by_fall
 
 
 def _progress(cycles: FloatArray, log_half: float, log_exponent: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -78,8 +78,8 @@ def lag_of(curve: FloatArray, attractor: FloatArray, angular_frequency: FloatArr
 
 def _relaxed(keep: FloatArray, mean_keep: FloatArray, target: FloatArray) -> FloatArray:
     """R[target] for targets [l, k, m]."""
-    here, before = (1 - mean_keep)[:, :, None], (mean_keep - keep)[:, :, None]
-    return _periodic(keep, here * target + before * np.roll(target, 1, axis=1))
+    share_here, before = (1 - mean_keep)[:, :, None], (mean_keep - keep)[:, :, None]
+    return _periodic(keep, share_here * target + before * np.roll(target, 1, axis=1))
 
 
 def _periodic(keep: FloatArray, gain: FloatArray) -> FloatArray:

@@ -77,11 +77,11 @@ _USUAL |= dict.fromkeys(("temperature", "plate_rise", "moment"), np.nan)
 
 
 def points_of(count: int, **known: FloatArray | IntArray | float | None) -> Points:
-    """So many points, plateaus of a closed clutch that turns forwards unless given; what was not measured is None."""
+    """`count` points: plateaus of a closed clutch that turns forwards unless given; what was not measured is None."""
     columns: dict[str, Any] = {}
     for field in fields(Points):
-        given = known.get(field.name)
-        values = _USUAL.get(field.name, 0) if given is None else given
+        known_values = known.get(field.name)
+        values = _USUAL.get(field.name, 0) if known_values is None else known_values
         columns[field.name] = np.full(count, values, dtype=np.intp if field.type is IntArray else np.float64)
     return Points(**columns)
 
@@ -178,13 +178,13 @@ class Design:
 def build_design(campaign: Campaign) -> Design:
     """All rows of a campaign. Never raises on a campaign that is valid by itself; it may have no rows."""
     notes: list[str] = []
-    kept = thinned(campaign, notes)
+    thinned_campaign = thinned(campaign, notes)
     runs: list[RunInfo] = []
     blocks = [points_of(0)]
     torques = [np.zeros(0)]
     plateaus = 0
-    for run in kept.stationary:
-        points, torque = _plateaus(run, kept, len(runs), plateaus, notes)
+    for run in thinned_campaign.stationary:
+        points, torque = _plateaus(run, thinned_campaign, len(runs), plateaus, notes)
         if torque.size:
             runs.append(RunInfo(run_id=run.run_id, cycles=run.cycles))
             blocks.append(points)
@@ -192,8 +192,8 @@ def build_design(campaign: Campaign) -> Design:
             plateaus += torque.size
     loops: list[BinnedLoop] = []
     reasons: list[str] = []  # why a dynamic test gave no loop at all
-    for dynamic in kept.dynamic:
-        test_loops, sentences = binned_loops(dynamic.record, kept.geometry)
+    for dynamic in thinned_campaign.dynamic:
+        test_loops, sentences = binned_loops(dynamic.record, thinned_campaign.geometry)
         notes.extend(f"{dynamic.run_id}: {sentence}" for sentence in sentences)
         reasons += sentences[:1] if not test_loops else []
         for loop in test_loops:
@@ -202,7 +202,7 @@ def build_design(campaign: Campaign) -> Design:
         if test_loops:
             runs.append(RunInfo(run_id=dynamic.run_id, cycles=dynamic.cycles))
     if reasons:
-        count = f"{len(reasons)} of {len(kept.dynamic)} ({reasons[0].rstrip('.')})"
+        count = f"{len(reasons)} of {len(thinned_campaign.dynamic)} ({reasons[0].rstrip('.')})"
         notes.append(f"Dynamic tests that could not be evaluated and were left out: {count}.")
     columns = {field.name: [getattr(block, field.name) for block in blocks] for field in fields(Points)}
     points = mark_open(Points(**{name: np.concatenate(parts) for name, parts in columns.items()}))
@@ -232,7 +232,7 @@ def build_design(campaign: Campaign) -> Design:
         loops=len(loops),
         bin_autocorrelation=bin_autocorrelation([loop.autocorrelation for loop in loops]),
         runs=tuple(runs),
-        facts=facts_of(kept),
+        facts=facts_of(thinned_campaign),
         notes=tuple(notes),
     )
 

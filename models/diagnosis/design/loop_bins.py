@@ -40,9 +40,11 @@ def period_differences(torque: FloatArray, bins: NDArray[np.intp], turns: FloatA
     full = samples >= (2 / 3) * samples.max(axis=0)
     samples, sums = np.where(full, samples, 0.0), np.where(full, sums, 0.0)
     before, sum_before = np.cumsum(samples, axis=0)[:-1], np.cumsum(sums, axis=0)[:-1]
-    here, sum_here = samples[1:], sums[1:]
+    samples_here, sum_here = samples[1:], sums[1:]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray((sum_here / here - sum_before / before) / np.sqrt(1 / here + 1 / before), dtype=np.float64)
+        return np.asarray(
+            (sum_here / samples_here - sum_before / before) / np.sqrt(1 / samples_here + 1 / before), dtype=np.float64
+        )
 
 
 #: Phases at which a loop is computed, and bins in which it is compared; a bin holds a whole number of phases. With two a bin

@@ -20,7 +20,7 @@ from enum import StrEnum
 from typing import TypeAlias
 
 import numpy as np
-from scipy.linalg import solve_banded
+from scipy.linalg.lapack import dtbtrs
 from scipy.special import logsumexp
 
 from models.arrays import FloatArray
@@ -147,7 +147,7 @@ class Effect:
         return shape[-1] if self.begins else FROM_THE_START
 
     def from_the_start(self, shape: Shape) -> Shape:
-        """The same at work in every test."""
+        """The shape of an effect that is at work in every test."""
         return (*shape[:-1], FROM_THE_START) if self.begins else shape
 
     def lags(self, shape: Shape) -> bool:
@@ -242,7 +242,8 @@ def log_amplitude_peak(effect: Effect) -> float:
 def ends_of(target: FloatArray, keep: FloatArray) -> FloatArray:
     """What each plateau ends with [P], x_i = (1 - k_i) target_i + k_i x_{i-1}: plateaus follow each other."""
     bands = np.stack([np.ones(keep.size), np.append(-keep[1:], 0.0)])
-    return np.asarray(solve_banded((1, 0), bands, (1.0 - keep) * target), dtype=np.float64)
+    ends, _ = dtbtrs(bands, ((1.0 - keep) * target)[:, None], uplo="L", diag="U")
+    return np.asarray(ends[:, 0], dtype=np.float64)
 
 
 def followed(target: FloatArray, points: Points, settling: float) -> FloatArray:

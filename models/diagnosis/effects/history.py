@@ -210,8 +210,8 @@ def _rest_recovery_change(scene: Scene, amplitude: float, shape: Shape) -> Float
     grown = np.log1p(np.maximum(np.array(scene.facts.rest_lengths, dtype=np.float64), 60.0) / 3600.0)
     timed = np.isfinite(grown)
     strengths = np.where(timed, grown / max(float(grown[timed].max(initial=0.0)), 1e-9), 1.0) ** power
-    for rest, moment, strength in zip(scene.facts.rests, scene.facts.rest_moments, strengths.tolist(), strict=True):
-        since = points.cycles - rest
+    for pause, moment, strength in zip(scene.facts.rests, scene.facts.rest_moments, strengths.tolist(), strict=True):
+        since = points.cycles - pause
         left = np.where(since >= 0, strength * np.exp(-np.maximum(since, 0.0) / length), 0.0)
         if clocked == BY_CLOCK and np.isfinite(moment):
             waited = np.where(np.isfinite(points.moment), points.moment - moment, points.clock)

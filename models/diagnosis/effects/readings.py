@@ -265,11 +265,13 @@ def _channel_delay_change(scene: Scene, amplitude: float, _shape: Shape) -> Floa
 
 def _shifted(curves: FloatArray, steps: FloatArray) -> FloatArray:
     """Periodic curves [l, k] as they were `steps` [l, 1] phases before, by parabolas through the nearest three."""
-    whole = np.round(steps)
-    x = steps - whole
-    at = (np.arange(curves.shape[1]) - whole.astype(np.intp)) % curves.shape[1]
-    here, after, before = (np.take_along_axis(curves, (at + k) % curves.shape[1], axis=1) for k in (0, 1, -1))
-    return np.asarray(here - 0.5 * x * (after - before) + 0.5 * x * x * (after - 2 * here + before), dtype=np.float64)
+    whole_steps = np.round(steps)
+    x = steps - whole_steps
+    at = (np.arange(curves.shape[1]) - whole_steps.astype(np.intp)) % curves.shape[1]
+    at_step, after, before = (np.take_along_axis(curves, (at + k) % curves.shape[1], axis=1) for k in (0, 1, -1))
+    return np.asarray(
+        at_step - 0.5 * x * (after - before) + 0.5 * x * x * (after - 2 * at_step + before), dtype=np.float64
+    )
 
 
 CHANNEL_DELAY = Effect(

@@ -119,9 +119,9 @@ def runs_of(key: str) -> float:
     trial = TRIALS[key]
     if trial.parts:
         return sum(runs_of(part) for part in trial.parts)
-    made = 3.0 * trial.later if trial.later else float(trial.times)
-    made += 2.0 * (trial.pressure not in {0.0, 1.0}) + 4.0 * (trial.energy != 1.0) + 1.0 * (trial.rest > 0)
-    return made + 10.0 * (trial.temperature is not None)
+    run_cost = 3.0 * trial.later if trial.later else float(trial.times)
+    run_cost += 2.0 * (trial.pressure not in {0.0, 1.0}) + 4.0 * (trial.energy != 1.0) + 1.0 * (trial.rest > 0)
+    return run_cost + 10.0 * (trial.temperature is not None)
 
 
 def with_trial(campaign: Campaign, key: str) -> Campaign | None:
@@ -129,10 +129,10 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
     campaign has no pattern for it."""
     trial = TRIALS[key]
     if trial.parts:
-        whole: Campaign | None = campaign
+        extended: Campaign | None = campaign
         for part in trial.parts:
-            whole = None if whole is None else with_trial(whole, part)
-        return whole
+            extended = None if extended is None else with_trial(extended, part)
+        return extended
     states = np.unique([run.cycles for run in campaign.tests])
     if states.size == 0 or (trial.later and states.size < 2):
         return None
@@ -198,8 +198,8 @@ def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, res
     oil = table.oil_temperature
     if trial.temperature is not None:
         oil = np.full(rows.size, trial.temperature)
-    taken = criteria.PLATEAU_DURATION * rows.size * (number + 1) + rested
-    moment = None if pattern.moment is None else pattern.moment + taken
+    duration = criteria.PLATEAU_DURATION * rows.size * (number + 1) + rested
+    moment = None if pattern.moment is None else pattern.moment + duration
     return StationaryRun(
         run_id=f"trial-{number}",
         cycles=cycles,

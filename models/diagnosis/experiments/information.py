@@ -63,7 +63,7 @@ class CandidateDistances:
         return self.with_freedom(ahead)[0]
 
     def with_freedom(self, ahead: Sequence[list[Gram]]) -> tuple[FloatArray, FloatArray]:
-        """The same, and [k] nats of what the freedom of each candidate is worth: -½ ln det of all that it has free."""
+        """The distances, and [k] nats of what the freedom of each candidate is worth: -½ ln det of all that it has free."""
         grams = self._measured
         for more in ahead:
             grams = [_joined(gram, added) for gram, added in zip(grams, more, strict=True)]

@@ -31,7 +31,7 @@ from models.diagnosis.pooled_fit.projection import Gram
 
 
 def rivals_of(judgement: Judgement) -> tuple[tuple[Fitted, ...], tuple[Fitted, ...]]:
-    """Those that stand, and those of as many effects that are not far behind, best first."""
+    """The candidates of the verdict, and the rivals of as many effects that are not far behind, best first."""
     if not judgement.stand:
         return (), ()
     best = judgement.stand[0]
@@ -159,10 +159,10 @@ def distinguished(nats: FloatArray, lead: FloatArray | float = 0.0) -> FloatArra
 
 def _names(best: Fit, rival: Fit | None) -> tuple[str, str]:
     """An effect of the best that the rival does not have, and one of the rival."""
-    mine = [effect.effect.slug for effect in best.effects]
-    others = [effect.effect.slug for effect in rival.effects] if rival is not None else []
-    own = [slug for slug in mine if slug not in others] or mine
-    return own[0], next((slug for slug in others if slug not in mine), BASELINE)
+    leading = [effect.effect.slug for effect in best.effects]
+    rival_names = [effect.effect.slug for effect in rival.effects] if rival is not None else []
+    distinguishing = [slug for slug in leading if slug not in rival_names] or leading
+    return distinguishing[0], next((slug for slug in rival_names if slug not in leading), BASELINE)
 
 
 def bare(fit: Fit) -> Fit:
@@ -180,12 +180,12 @@ def trials_of(campaign: Campaign, design: Design, distances: CandidateDistances)
             added = _added(campaign, design, key)
             if added is not None:
                 single[key] = [distances.ahead(added)] * trial.times
-    made = {}
+    trials = {}
     for key, trial in TRIALS.items():
         parts = trial.parts or (key,)
         if trial.text and all(part in single for part in parts):
-            made[key] = [gram for part in parts for gram in single[part]]
-    return made
+            trials[key] = [gram for part in parts for gram in single[part]]
+    return trials
 
 
 def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[Fit]) -> list[Advice]:

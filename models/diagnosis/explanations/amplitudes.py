@@ -46,12 +46,12 @@ class Proportional:
         open_ = [np.full(len(self.effects), np.nan)]
         for place in range(len(self.effects)):
             further = []
-            for given in open_:
-                steps, logs = self._along(given)
+            for condition in open_:
+                steps, logs = self._along(condition)
                 gone = np.cumsum(np.exp(logs - logs.max()))
                 shares = (np.arange(count) + rng.random(count)) / count
                 for step in np.interp(shares, (gone - 0.5 * np.diff(gone, prepend=0.0)) / gone[-1], steps).tolist():
-                    more = given.copy()
+                    more = condition.copy()
                     more[place] = step
                     further.append(more)
             open_ = further
@@ -67,11 +67,11 @@ class Proportional:
         info, score = self._beside(given)
         mean, root = np.zeros(score.size), np.zeros(info.shape)
         mean[np.isinf(self.sd)] = given
-        rest = np.flatnonzero(np.isfinite(self.sd) & (self.sd > 0))
-        sd = self.sd[rest]
-        values, vectors = independent(sd[:, None] * info[np.ix_(rest, rest)] * sd)
-        root[np.ix_(rest, rest)] = sd[:, None] * vectors / np.sqrt(1.0 + values)
-        mean[rest] = root[np.ix_(rest, rest)] @ root[np.ix_(rest, rest)].T @ score[rest]
+        finite = np.flatnonzero(np.isfinite(self.sd) & (self.sd > 0))
+        sd = self.sd[finite]
+        values, vectors = independent(sd[:, None] * info[np.ix_(finite, finite)] * sd)
+        root[np.ix_(finite, finite)] = sd[:, None] * vectors / np.sqrt(1.0 + values)
+        mean[finite] = root[np.ix_(finite, finite)] @ root[np.ix_(finite, finite)].T @ score[finite]
         return mean, root
 
     def _beside(self, given: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -86,15 +86,18 @@ class Proportional:
         info, score = self._beside(given)
         at_work = self.sd > 0
         at_work[np.flatnonzero(np.isinf(self.sd))[~np.isnan(given)]] = False
-        mine, others = np.flatnonzero(at_work & (self.of == place)), np.flatnonzero(at_work & (self.of != place))
-        known = info[np.ix_(others, others)] + np.diag(self.sd[others] ** -2.0)
-        known[np.diag_indices(others.size)] *= 1.0 + 1e-12  # two that are one have no inverse
-        absorbed = np.linalg.solve(known, np.column_stack([info[np.ix_(others, mine)], score[others]]))
-        across = info[np.ix_(mine, others)]
-        own, along = info[np.ix_(mine, mine)] - across @ absorbed[:, :-1], score[mine] - across @ absorbed[:, -1]
-        beyond = 0.5 * float(score[others] @ absorbed[:, -1] - np.linalg.slogdet(known)[1])
-        beyond -= float(np.log(self.sd[others][np.isfinite(self.sd[others])]).sum())
-        steps, logs = _along_amplitude(own, along, self.sd[mine[1:]], self.effects[place])
+        of_place, elsewhere = np.flatnonzero(at_work & (self.of == place)), np.flatnonzero(at_work & (self.of != place))
+        known = info[np.ix_(elsewhere, elsewhere)] + np.diag(self.sd[elsewhere] ** -2.0)
+        known[np.diag_indices(elsewhere.size)] *= 1.0 + 1e-12  # two that are one have no inverse
+        absorbed = np.linalg.solve(known, np.column_stack([info[np.ix_(elsewhere, of_place)], score[elsewhere]]))
+        across = info[np.ix_(of_place, elsewhere)]
+        information, along = (
+            info[np.ix_(of_place, of_place)] - across @ absorbed[:, :-1],
+            score[of_place] - across @ absorbed[:, -1],
+        )
+        beyond = 0.5 * float(score[elsewhere] @ absorbed[:, -1] - np.linalg.slogdet(known)[1])
+        beyond -= float(np.log(self.sd[elsewhere][np.isfinite(self.sd[elsewhere])]).sum())
+        steps, logs = _along_amplitude(information, along, self.sd[of_place[1:]], self.effects[place])
         return steps, logs + beyond
 
 

@@ -53,10 +53,10 @@ def contrasts_of(design: Design, prediction: Prediction) -> tuple[FloatArray, li
         add(CYCLES, _cosine(z, life))
         add(CYCLES, _cosine(z, life) * steady)
     for state in np.unique(rows.cycles)[:12]:
-        here = rows.cycles == state
-        add(CYCLES, here.astype(np.float64))
+        in_state = rows.cycles == state
+        add(CYCLES, in_state.astype(np.float64))
         for s in (1, 2):
-            add(CYCLES, here * _cosine(s, speed) * steady)
+            add(CYCLES, in_state * _cosine(s, speed) * steady)
     reading = _unit(torque, design.closed)
     for t in range(1, TORQUE_WAVES + 1):
         add(TORQUE, _cosine(t, reading))
@@ -95,9 +95,9 @@ def _over_the_laws(design: Design, prediction: Prediction) -> tuple[list[FloatAr
     ]
     shapes += [(SPEED, wave(np.pi * s * even)) for s in SPEED_WAVES for wave in (np.cos, np.sin)]
     # at even speeds a sine may be 0 at each
-    seen = [(axis, shape) for axis, shape in shapes if np.abs(shape).max() > 1e-6]
-    changes = friction[:, None] * np.stack([shape for _, shape in seen], axis=1)
-    return list(prediction.change_at_rows(design, changes, before_lag=True).T), [axis for axis, _ in seen]
+    varied = [(axis, shape) for axis, shape in shapes if np.abs(shape).max() > 1e-6]
+    changes = friction[:, None] * np.stack([shape for _, shape in varied], axis=1)
+    return list(prediction.change_at_rows(design, changes, before_lag=True).T), [axis for axis, _ in varied]
 
 
 def _axis(s: int, p: int, z: int) -> str:

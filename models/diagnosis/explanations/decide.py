@@ -102,7 +102,7 @@ def judge(posterior: Posterior) -> Judgement:
 
 
 def _averaged_causes(effects: Sequence[str], posterior: Posterior) -> frozenset[str]:
-    """Those of an explanation that averages of plateaus and loops show."""
+    """The causes of an explanation that averages of plateaus and loops show."""
     return frozenset(effects) - {UNCATALOGUED, *posterior.vibrations}
 
 

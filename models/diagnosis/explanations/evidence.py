@@ -54,12 +54,12 @@ def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = No
     design = problem.design
     nothing = np.zeros((design.torque.size, 0))
     contrasts, lies = contrasts_of(design, fitted.prediction) if smooth else (nothing, [])
-    factors, own = template_errors(design, fitted)
+    factors, uncertain = template_errors(design, fitted)
     changes = (nothing if beside is None else beside, contrasts, off_by(design, fitted, factors))
     gram = gram_of(problem, fitted, np.concatenate(changes, axis=1))
     gram, outward = _held_at_bounds(gram, int(problem.priors.free.sum()), fitted)
     ends = np.cumsum([outward.size, *(change.shape[1] for change in changes)])
-    held, catalogue, contrasted, wrong = (slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
+    at_bounds, catalogue, contrasted, wrong = (slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
     axes = np.array(lies)
     places = {axis: contrasted.start + np.flatnonzero(axes == axis) for axis in dict.fromkeys(lies)}
     prior = _log_prior(fitted)
@@ -67,27 +67,33 @@ def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = No
     structures: dict[str, list[float]] = {axis: [] for axis in places}
     projections = projections_beside(gram, problem.noise)
     for projected in projections:
-        base = projected.evidence + _beside_bounds(projected, held, outward) + prior
-        wholes.append(base + _averaged(projected, wrong, own, criteria.TEMPLATE_ERRORS))
-        for axis, mine in places.items():
-            structures[axis].append(base + structure_gain(projected.info[np.ix_(mine, mine)], projected.score[mine]))
+        base = projected.evidence + _beside_bounds(projected, at_bounds, outward) + prior
+        wholes.append(base + _averaged(projected, wrong, uncertain, criteria.TEMPLATE_ERRORS))
+        for axis, columns_of_axis in places.items():
+            structures[axis].append(
+                base
+                + structure_gain(
+                    projected.info[np.ix_(columns_of_axis, columns_of_axis)], projected.score[columns_of_axis]
+                )
+            )
         info, score = projected.info[catalogue, catalogue], projected.score[catalogue]
         screened.append(replace(projected, info=info, score=score, whole=projected.whole[catalogue], evidence=base))
-    whole = log_sum(wholes)
+    total = log_sum(wholes)
     likely = projections[int(np.argmax(wholes))]
     flexible = slice(contrasted.start, wrong.stop)
     sd = np.concatenate(
-        [np.full(len(axes), criteria.CONTRAST_SIZES[-1]), np.where(own > 0, *criteria.TEMPLATE_ERRORS[-1])]
+        [np.full(len(axes), criteria.CONTRAST_SIZES[-1]), np.where(uncertain > 0, *criteria.TEMPLATE_ERRORS[-1])]
     )
     values, vectors = independent(sd[:, None] * likely.info[flexible, flexible] * sd)
     score = vectors.T @ (sd * likely.score[flexible])
     return Evidence(
         misfit=(likely.miss - float((score**2 / (1.0 + values)).sum())) / design.torque.size,
-        whole=whole,
-        structure={axis: log_sum(logs) - whole for axis, logs in structures.items()},
+        whole=total,
+        structure={axis: log_sum(logs) - total for axis, logs in structures.items()},
         patterns={
-            axis: contrasts[:, axes == axis] @ _likeliest(projections[int(np.argmax(structures[axis]))], mine)
-            for axis, mine in places.items()
+            axis: contrasts[:, axes == axis]
+            @ _likeliest(projections[int(np.argmax(structures[axis]))], columns_of_axis)
+            for axis, columns_of_axis in places.items()
         },
         screened=tuple(screened),
     )
@@ -104,14 +110,16 @@ def template_errors(design: Design, fitted: Fit) -> tuple[list[FloatArray], Floa
     an effect's form is uncertain by itself, 0 for the others."""
     small = small_factors_at(design.rows, ranges_of(design.rows))
     uncertain = [discrepancy_factors(design, effect.effect) for effect in fitted.effects]
-    own = [np.repeat([1.0, 0.0], [factors.shape[1], small.shape[1]]) for factors in uncertain]
-    return [np.concatenate([factors, small], axis=1) for factors in uncertain], np.concatenate([np.zeros(0), *own])
+    uncertain_by_itself = [np.repeat([1.0, 0.0], [factors.shape[1], small.shape[1]]) for factors in uncertain]
+    return [np.concatenate([factors, small], axis=1) for factors in uncertain], np.concatenate(
+        [np.zeros(0), *uncertain_by_itself]
+    )
 
 
 def off_by(design: Design, fitted: Fit, factors: Sequence[FloatArray]) -> FloatArray:
     """The changes [N, Σ m] Nm by every factor [N, m] with which the effects may be off."""
     rows = [effect_rows(design, fitted.prediction, effect) for effect in fitted.effects]
-    changes = [change[:, None] * own for change, own in zip(rows, factors, strict=True)]
+    changes = [change[:, None] * effect_factors for change, effect_factors in zip(rows, factors, strict=True)]
     return np.concatenate([np.zeros((design.torque.size, 0)), *changes], axis=1)
 
 
@@ -155,10 +163,12 @@ def _held_at_bounds(gram: Gram, first: int, fitted: Fit) -> tuple[Gram, FloatArr
         out = np.array([1.0, *(1.0 if 2 * x > shape.lowest + shape.highest else -1.0 for x, shape in smooth)])
         ways += np.where(free_shapes(effect), 0.0, out).tolist()
     outward = np.array(ways)
-    held = first + np.flatnonzero(outward)
-    order = np.concatenate([np.setdiff1d(np.arange(gram.base), held), held, np.arange(gram.base, gram.matrix.shape[0])])
+    at_bound = first + np.flatnonzero(outward)
+    order = np.concatenate(
+        [np.setdiff1d(np.arange(gram.base), at_bound), at_bound, np.arange(gram.base, gram.matrix.shape[0])]
+    )
     matrix, along = gram.matrix[np.ix_(order, order)], gram.along[:, order]
-    return replace(gram, matrix=matrix, along=along, base=gram.base - held.size), outward[outward != 0]
+    return replace(gram, matrix=matrix, along=along, base=gram.base - at_bound.size), outward[outward != 0]
 
 
 def _beside_bounds(projected: Projected, held: slice, outward: FloatArray) -> float:

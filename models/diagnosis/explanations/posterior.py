@@ -58,7 +58,7 @@ class Start(NamedTuple):
 
 
 def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str, list[Start]]:
-    """By effect its kinds of shapes, best first."""
+    """The kinds of shapes of each effect, best first."""
     if not columns:
         return {}
     sd = np.array([column.effect.prior_sd for column in columns])
@@ -77,14 +77,14 @@ def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str
     for place, column in enumerate(columns):
         kinds.setdefault((column.effect.slug, column.effect.stiff(column.shape)), []).append(place)
     by_effect: dict[str, list[Start]] = {}
-    for (slug, _), mine in kinds.items():
-        best = mine[int(np.argmax(total[mine]))]
+    for (slug, _), kind_starts in kinds.items():
+        best = kind_starts[int(np.argmax(total[kind_starts]))]
         likely = int(np.argmax(table[:, best]))
         precision = screened[likely].info[best, best] + (SCALES[-1] * sd[best]) ** -2.0
         amplitude = float(screened[likely].score[best] / precision)
         column = columns[best]
         fitted = FittedEffect(effect=column.effect, amplitude=amplitude, shape=column.shape)
-        promise = log_sum(total[mine]) - null
+        promise = log_sum(total[kind_starts]) - null
         by_effect.setdefault(slug, []).append(Start(promise, column, likely, fitted))
     return {slug: sorted(by_kind, key=lambda start: -start.promise) for slug, by_kind in by_effect.items()}
 
@@ -221,12 +221,12 @@ class Search:
             screened = [node for node in nodes if node.evidence.structure]
             if len(alternative.causes) > 1 or alternative.unknown or not screened:
                 continue
-            others = self._evidence(alternative) - log_sum([node.log_evidence for node in screened])
+            unscreened_share = self._evidence(alternative) - log_sum([node.log_evidence for node in screened])
             for axis in screened[0].evidence.structure:
                 beside = Alternative(alternative.causes, axis)
                 if beside not in self.nodes:
                     logs = [node.log_evidence + node.evidence.structure[axis] for node in screened]
-                    out[beside] = log_sum(logs) + others + self.prior(beside)
+                    out[beside] = log_sum(logs) + unscreened_share + self.prior(beside)
         return out
 
     def _evidence(self, alternative: Alternative) -> float:
@@ -272,9 +272,9 @@ class Search:
     def _screen(self, alternatives: set[Alternative]) -> None:
         """What smooth structure and the catalogue promise beside single causes, or nothing, that were refitted."""
         for alternative in sorted(alternatives):
-            first, *others = self.nodes[alternative]
+            first, *other_nodes = self.nodes[alternative]
             evidence = evidence_of(self.problem, first.fit, self._changes)
-            self.nodes[alternative] = [replace(first, evidence=evidence), *others]
+            self.nodes[alternative] = [replace(first, evidence=evidence), *other_nodes]
             if alternative != NOTHING:
                 self._promise(alternative, self.nodes[alternative][0])
         self._unscreened -= alternatives
@@ -296,8 +296,8 @@ class Search:
         leader does in another way."""
         alternative = key[0]
         short = [n.log_evidence + self.prior(alternative) - n.promise for n in self.nodes.get(alternative, [])]
-        beside = set(leader.causes) <= set(alternative.causes) and leader.unknown in {"", alternative.unknown}
-        return self._promises[key][0] + min(short, default=0.0) + (0.0 if beside else slack)
+        adds_to_leader = set(leader.causes) <= set(alternative.causes) and leader.unknown in {"", alternative.unknown}
+        return self._promises[key][0] + min(short, default=0.0) + (0.0 if adds_to_leader else slack)
 
     def _down(self, leader: Alternative) -> None:
         """The leader with one thing less, from where it has the rest."""
@@ -331,8 +331,8 @@ class Search:
         first = not before or node.log_evidence > before[0].log_evidence
         same = next((other for other in before if other.kind == node.kind), None)
         if same is None or node.log_evidence > same.log_evidence:
-            kept = [node, *(other for other in before if other is not same)]
-            self.nodes[alternative] = sorted(kept, key=lambda node: -node.log_evidence)
+            nodes_kept = [node, *(other for other in before if other is not same)]
+            self.nodes[alternative] = sorted(nodes_kept, key=lambda node: -node.log_evidence)
         if first and len(effects) < 2 and not alternative.unknown:
             self._unscreened.add(alternative)
 
@@ -376,8 +376,8 @@ class Search:
                 continue
             for start in kinds:
                 value = node.log_evidence + start.promise + self._by_raw(more.causes, start.promise) + self.prior(more)
-                own = (slug, start.column.effect.stiff(start.column.shape))
-                promises[more, tuple(sorted((*node.kind, own)))] = (value, node, start)
+                kind = (slug, start.column.effect.stiff(start.column.shape))
+                promises[more, tuple(sorted((*node.kind, kind)))] = (value, node, start)
         for axis, gained in node.evidence.structure.items():
             more = Alternative(parent.causes, axis)
             if more not in self.nodes:
@@ -441,8 +441,8 @@ def _shown(problem: FitProblem, fitted: Fit, columns: Sequence[Column]) -> tuple
     no drift along it."""
     changes = columns_at_rows(problem.design, fitted.prediction, columns)
     shown = {column.effect.slug for column, change in zip(columns, changes.T, strict=True) if change.any()}
-    kept = [column.effect.slug in shown for column in columns]
-    return list(compress(columns, kept)), changes[:, kept]
+    is_shown = [column.effect.slug in shown for column in columns]
+    return list(compress(columns, is_shown)), changes[:, is_shown]
 
 
 def is_vibration(record: RawEvidence) -> bool:

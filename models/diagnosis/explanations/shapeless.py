@@ -106,16 +106,16 @@ def _runs(design: Design, noise: Noise, residual: FloatArray) -> list[_Run]:
     white = whitened(np.column_stack([residual, design.torque]), design, noise)[steady]
     runs = []
     for run in np.unique(design.rows.run[steady]):
-        mine = np.flatnonzero(design.rows.run[steady] == run)
-        left, along = white[mine].T
-        deviation = noise.deviation[mine]
-        steps = np.maximum(np.diff(design.rows.clock[mine], prepend=design.rows.clock[mine[0]]), 0.0)
-        usual = float(np.median(steps[1:])) if mine.size > 1 else 0.0
+        rows_of_run = np.flatnonzero(design.rows.run[steady] == run)
+        left, along = white[rows_of_run].T
+        deviation = noise.deviation[rows_of_run]
+        steps = np.maximum(np.diff(design.rows.clock[rows_of_run], prepend=design.rows.clock[rows_of_run[0]]), 0.0)
+        usual = float(np.median(steps[1:])) if rows_of_run.size > 1 else 0.0
         runs.append(
             _Run(
                 time=np.cumsum(np.minimum(steps, 5.0 * usual)),  # longer pauses are shortened
                 left=left - along * float(along @ left) / max(float(along @ along), 1e-300),
-                weights=np.stack([1 / deviation, np.abs(design.torque[mine]) / deviation], axis=1),
+                weights=np.stack([1 / deviation, np.abs(design.torque[rows_of_run]) / deviation], axis=1),
             )
         )
     return runs
@@ -133,8 +133,8 @@ def outlying_run(problem: FitProblem, fitted: Fit) -> str:
     if worst is None:
         return ""
     design = problem.design
-    here = design.rows.run == worst
-    error, usual = (float(np.sqrt((left[rows] ** 2).mean())) for rows in (here, ~here))
+    in_worst = design.rows.run == worst
+    error, usual = (float(np.sqrt((left[rows] ** 2).mean())) for rows in (in_worst, ~in_worst))
     run = design.runs[worst]
     return (
         f"Run {run.run_id} at {run.cycles:,.0f} cycles does not fit the other runs: the model without effects misses its "
@@ -148,16 +148,16 @@ def outlier_evidence(problem: FitProblem, fitted: Fit) -> float:
     if worst is None:
         return -np.inf
     design, deviation = problem.design, problem.noise.deviation
-    here = design.rows.run == worst
-    wide = max(float(np.sqrt(((left / deviation)[here] ** 2).mean())), 1.0)
-    others = problem.with_noise(replace(problem.noise, deviation=np.where(here, wide * wide, 1.0) * deviation))
-    columns = _own_curve(design, here)
-    alone = fit(others, fitted.laws)
-    coefficients = np.linalg.lstsq(columns[here], alone.residual[here], rcond=None)[0]
-    beside = refit_beside(problem, alone, columns @ coefficients)
-    if beside is None:
+    in_worst = design.rows.run == worst
+    wide = max(float(np.sqrt(((left / deviation)[in_worst] ** 2).mean())), 1.0)
+    widened = problem.with_noise(replace(problem.noise, deviation=np.where(in_worst, wide * wide, 1.0) * deviation))
+    columns = _own_curve(design, in_worst)
+    alone = fit(widened, fitted.laws)
+    coefficients = np.linalg.lstsq(columns[in_worst], alone.residual[in_worst], rcond=None)[0]
+    refitted = refit_beside(problem, alone, columns @ coefficients)
+    if refitted is None:
         return -np.inf
-    gram = gram_of(problem, beside, columns)
+    gram = gram_of(problem, refitted, columns)
     projections = projections_beside(gram, problem.noise)
     logs = [p.evidence + log_mean([log_gain(p.info, p.score, size) for size in _SIZES]) for p in projections]
     return log_sum(logs) - float(np.log(len(design.runs)))
@@ -205,15 +205,15 @@ def _courses(design: Design, fitted: Fit) -> tuple[FloatArray, FloatArray, Float
     viscous = fitted.prediction.change_at_rows(design, fitted.prediction.scene.viscous, before_lag=True)
     columns, relative = [], []
     for run in np.unique(design.rows.run):
-        here = design.rows.run == run
-        own = np.where(here, viscous, 0.0)
-        columns.append(own)
+        in_run = design.rows.run == run
+        viscous_of_run = np.where(in_run, viscous, 0.0)
+        columns.append(viscous_of_run)
         relative.append(0.0)
-        if not design.rows.steady[here].all():
+        if not design.rows.steady[in_run].all():
             continue
-        turn = 2 * np.pi * design.rows.clock / max(float(np.ptp(design.rows.clock[here])), 1e-9)
+        turn = 2 * np.pi * design.rows.clock / max(float(np.ptp(design.rows.clock[in_run])), 1e-9)
         for k in range(1, 4 + 1):
-            columns += [own * np.cos(k * turn), own * np.sin(k * turn)]
+            columns += [viscous_of_run * np.cos(k * turn), viscous_of_run * np.sin(k * turn)]
             relative += [1.0 / k, 1.0 / k]
     within = np.array(relative)
     return np.stack(columns, axis=1), np.where(within == 0, 1.0, 0.0), within

@@ -139,14 +139,14 @@ def _shares(judgement: Judgement) -> list[tuple[Fit, float]]:
     something beside it that does not stand counts as the largest that it holds."""
     shares = [0.0] * len(judgement.stand)
     for each in judgement.explanations:
-        held = [k for k, cause in enumerate(judgement.stand) if set(cause.slugs) <= {*each.effects}]
-        if held:
-            shares[max(held, key=lambda k: len(judgement.stand[k].slugs))] += each.probability
+        places = [k for k, cause in enumerate(judgement.stand) if set(cause.slugs) <= {*each.effects}]
+        if places:
+            shares[max(places, key=lambda k: len(judgement.stand[k].slugs))] += each.probability
     return [(cause.fit, share) for cause, share in zip(judgement.stand, shares, strict=True) if share > 0.0]
 
 
 def _size(pairs: Sequence[tuple[float, int]]) -> Size:
-    """From samples, each with what is the same for all of one refit."""
+    """A size from samples, each with the number of its refit."""
     sizes, of = np.array([size for size, _ in pairs]), np.array([index for _, index in pairs])
     likelier = max(float((sizes > 0).mean()), float((sizes < 0).mean()))
     signs = {bool((sizes[of == index] > 0).mean() > 0.5) for index in np.unique(of) if (of == index).mean() > 0.02}
@@ -183,7 +183,7 @@ def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
     for place, effect in enumerate(fitted.effects):
         if effect.effect.courses is None:
             continue
-        held = replace(
+        held_problem = replace(
             effect.effect,
             shapes=tuple(replace(shape, smooth=shape.smooth and not shape.held) for shape in effect.effect.shapes),
         )
@@ -196,7 +196,7 @@ def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
                 near, laws = fitted.effects, fitted.laws
                 for index in way:
                     shape = _with_free(kind[index].shape, effect)
-                    tried = replace(near[place], effect=held, shape=shape)
+                    tried = replace(near[place], effect=held_problem, shape=shape)
                     refit = fit(problem, laws, (*near[:place], tried, *near[place + 1 :]), steps=criteria.FEW_STEPS)
                     if not np.isfinite(refit.cost) or refit.wrong_sign:
                         break
@@ -220,15 +220,15 @@ def _most_alike(fitted: Fit, effect: FittedEffect, kind: Sequence[Tried]) -> int
     """Which of the courses changes torque most like an effect as it is fitted."""
     scene = fitted.prediction.scene
     change = effect.effect.change(scene, effect.amplitude, effect.shape)
-    others = effect.effect.changes(scene, [(effect.amplitude, tried.shape) for tried in kind])
-    along = np.abs(change @ others) / np.maximum(np.linalg.norm(others, axis=0), 1e-300)
+    other_changes = effect.effect.changes(scene, [(effect.amplitude, tried.shape) for tried in kind])
+    along = np.abs(change @ other_changes) / np.maximum(np.linalg.norm(other_changes, axis=0), 1e-300)
     return int(np.argmax(along))
 
 
 def _components_of(problem: FitProblem, fitted: Fit, weight: float, rng: np.random.Generator) -> Iterator[_Component]:
     """A refit's components: one for each scatter of the gains and size of the templates' errors that counts."""
     design, free = problem.design, int(problem.priors.free.sum())
-    factors, own = template_errors(design, fitted)
+    factors, uncertain = template_errors(design, fitted)
     errors = off_by(design, fitted, factors)
     gram = replace(gram_of(problem, fitted, errors), base=free)
     effects, places = fitted.effects, np.arange(len(fitted.effects))
@@ -240,7 +240,7 @@ def _components_of(problem: FitProblem, fitted: Fit, weight: float, rng: np.rand
         info = projected.info.copy()
         info[np.diag_indices(shapes.size)] -= np.where(np.isinf(shapes), 0.0, shapes**-2.0)  # their priors stand in sd
         for size in criteria.TEMPLATE_ERRORS:
-            sd = np.concatenate([shapes, np.where(own > 0, *size)])
+            sd = np.concatenate([shapes, np.where(uncertain > 0, *size)])
             one = Proportional(info=info, score=projected.score, sd=sd, of=of, effects=effects)
             supposed.append((projected.evidence + one.log_integral(), one))
     steady = design.closed & design.rows.steady
@@ -256,8 +256,8 @@ def _components_of(problem: FitProblem, fitted: Fit, weight: float, rng: np.rand
         share = weight * float(np.exp(log - total))
         if share * criteria.SIZES_SAMPLED >= 1.0:
             count = int(np.ceil((_AMPLITUDES * share) ** (1.0 / len(effects))))
-            for given in one.amplitudes(count, rng):
-                mean, root = one.normal(given)
-                rises = rising * one.ratio(given)
+            for sample in one.amplitudes(count, rng):
+                mean, root = one.normal(sample)
+                rises = rising * one.ratio(sample)
                 part = share / count ** len(effects)
                 yield _Component(weight=part, fit=fitted, mean=mean, root=root, trend=(trend, rises), last=at_end)

@@ -106,8 +106,8 @@ def without_gains(columns: FloatArray, gains: Gains, run_gain: float, curve_gain
     norm = gains.by_run(left[:, 0] ** 2 * gains.squares)
     factor = _shrink(run_gain**2 * norm) / np.maximum(norm, 1e-300)
     of_run = factor[:, None] * gains.by_run(left**2 * along)
-    taken = (removed / np.maximum(gains.squares, 1e-300))[:, None] * along + left * of_run[gains.run_of_curve]
-    return np.asarray(columns - gains.torque[:, None] * taken[gains.curve], dtype=np.float64)
+    gains_along = (removed / np.maximum(gains.squares, 1e-300))[:, None] * along + left * of_run[gains.run_of_curve]
+    return np.asarray(columns - gains.torque[:, None] * gains_along[gains.curve], dtype=np.float64)
 
 
 def _shrink(variance: FloatArray) -> FloatArray:

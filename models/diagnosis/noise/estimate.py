@@ -102,12 +102,14 @@ def calm_pieces(design: Design, part: NDArray[np.bool_], residual: FloatArray) -
     """The pieces of `part` [N] whose remainder of residual [N] Nm is noise: whole curves, unless short pieces typically show
     less than a SHARP-th of their mean square; then those short ones that show less than SHARP times what is typical."""
     rows, owner = np.flatnonzero(part), owners(design)
-    whole, short = (_pieces(design, rows, owner, longest) for longest in (_LONGEST, _SHORT))
+    whole_curves, short = (_pieces(design, rows, owner, longest) for longest in (_LONGEST, _SHORT))
     if not part[0] or not short:  # a loop's harmonics do not become fewer in a part of it
-        return whole
-    of_whole, of_short = (np.array([piece.mean_square(residual) for piece in pieces]) for pieces in (whole, short))
+        return whole_curves
+    of_whole, of_short = (
+        np.array([piece.mean_square(residual) for piece in pieces]) for pieces in (whole_curves, short)
+    )
     if criteria.SHARP * np.median(of_short) >= np.median(of_whole):
-        return whole
+        return whole_curves
     typical = float(np.median(of_short))
     return [piece for piece, square in zip(short, of_short, strict=True) if square < criteria.SHARP * typical]
 

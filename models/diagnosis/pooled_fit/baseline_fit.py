@@ -165,8 +165,8 @@ def missing_for_baseline(design: Design) -> str:
     """What is missing for a pooled baseline, or nothing."""
     steady = design.rows.velocity[design.closed & design.rows.steady]
     if steady.size < criteria.FEWEST_ROWS:
-        few = f"there are {steady.size} plateaus of stationary tests under pressure"
-        return f"{few}, and at least {criteria.FEWEST_ROWS} are needed."
+        plateaus_found = f"there are {steady.size} plateaus of stationary tests under pressure"
+        return f"{plateaus_found}, and at least {criteria.FEWEST_ROWS} are needed."
     usual, largest = design.usual_torque, float(np.abs(design.torque).max())
     if not (usual > 1e-6 and largest < 1e7):  # no clutch's
         return f"the torques (median {usual:.3g} Nm, largest {largest:.3g} Nm) are not possible: check the unit."

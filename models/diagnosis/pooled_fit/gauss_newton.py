@@ -73,7 +73,7 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
     white, priors = whitening(problem.design, problem.gained, problem.noise), problem.priors
     state = _evaluated(problem, white, start, tuple(effects))
     damping, growth = 1e-3, 2.0
-    status, made = FitStatus.OUT_OF_STEPS, 0
+    status, steps_made = FitStatus.OUT_OF_STEPS, 0
     for _ in range(steps):
         with np.errstate(over="ignore", invalid="ignore"):
             gram, gradient = _normal(problem, white, state)
@@ -98,25 +98,25 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
         if fallen <= 0:
             status = FitStatus.STALLED
             break
-        state, made = candidate, made + 1
+        state, steps_made = candidate, steps_made + 1
         if fallen < 0.01:  # nats
             status = FitStatus.CONVERGED
             break
-    return replace(state, status=status if np.isfinite(state.cost) else FitStatus.NOT_FINITE, steps=made)
+    return replace(state, status=status if np.isfinite(state.cost) else FitStatus.NOT_FINITE, steps=steps_made)
 
 
 def _inside(state: Fit, priors: Priors, matrix: FloatArray, gradient: FloatArray) -> FloatArray:
     """The step [m] that matrix · step = gradient asks for; shapes at a bound beyond which it would lead are held there."""
     step = np.asarray(np.linalg.solve(matrix, gradient), dtype=np.float64)
-    at, held = int(priors.free.sum()), np.zeros(step.size, dtype=np.bool_)
+    at, at_bound = int(priors.free.sum()), np.zeros(step.size, dtype=np.bool_)
     for fitted in state.effects:
         at += 1
         for value, shape in fitted.effect.smooth(fitted.shape):
-            held[at] = (value <= shape.lowest and step[at] < 0) or (value >= shape.highest and step[at] > 0)
+            at_bound[at] = (value <= shape.lowest and step[at] < 0) or (value >= shape.highest and step[at] > 0)
             at += 1
-    if held.any():
-        step[held] = 0.0
-        step[~held] = np.linalg.solve(matrix[np.ix_(~held, ~held)], gradient[~held])
+    if at_bound.any():
+        step[at_bound] = 0.0
+        step[~at_bound] = np.linalg.solve(matrix[np.ix_(~at_bound, ~at_bound)], gradient[~at_bound])
     return step
 
 

@@ -88,5 +88,5 @@ class FitProblem:
         return self.design.torque if self.fitted is None else self.fitted
 
     def with_noise(self, noise: Noise) -> "FitProblem":
-        """The same rows and priors under another noise."""
+        """The problem with its rows and priors under another noise."""
         return replace(self, noise=noise)

@@ -48,10 +48,10 @@ class Gram:
         member = np.zeros((int(self.run_of_curve.max()) + 1, self.run_of_curve.size))
         member[self.run_of_curve, np.arange(self.run_of_curve.size)] = freed
         along, squares = member @ self.along, member @ self.squares
-        taken = (run_gain / np.sqrt(1 + run_gain**2 * squares))[:, None] * along
+        removed = (run_gain / np.sqrt(1 + run_gain**2 * squares))[:, None] * along
         if curve_gain > 0.0:
-            taken = np.concatenate([taken, (curve_gain * np.sqrt(freed))[:, None] * self.along])
-        matrix = self.matrix - taken.T @ taken
+            removed = np.concatenate([removed, (curve_gain * np.sqrt(freed))[:, None] * self.along])
+        matrix = self.matrix - removed.T @ removed
         return matrix, float(np.log1p(run_gain**2 * squares).sum() - np.log(freed).sum())
 
     def covariance(self, run_gain: float, curve_gain: float) -> FloatArray:
@@ -72,8 +72,8 @@ def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None, *,
     white = whitened(np.column_stack([jacobian, *off, changes, fit.residual]), design, noise)
     gains = gains_of(design, fit.torque, noise)
     matrix = white.T @ white
-    own = np.append(np.arange(jacobian.shape[1]), -1)
-    matrix[np.ix_(own, own)] += prior_gram(problem.priors, fit)
+    effect_parts = np.append(np.arange(jacobian.shape[1]), -1)
+    matrix[np.ix_(effect_parts, effect_parts)] += prior_gram(problem.priors, fit)
     loose = jacobian.shape[1] + np.arange(sum(columns.shape[1] for columns in off))
     matrix[loose, loose] += criteria.DISCREPANCY_SD**-2.0
     return Gram(

@@ -120,8 +120,8 @@ def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> L
     best, highest = Line(), -np.inf
     for order, probability in ORDERS.items():
         logs = np.zeros((len(_LAWS), len(_COHERENT)))
-        for (i, law), (j, kept) in itertools.product(enumerate(_LAWS), enumerate(_COHERENT)):
-            found = _order_evidence(demodulated, order, sizes[law], groups[kept])
+        for (i, law), (j, coherent_time) in itertools.product(enumerate(_LAWS), enumerate(_COHERENT)):
+            found = _order_evidence(demodulated, order, sizes[law], groups[coherent_time])
             logs[i, j] = found.evidence
             if found.evidence + np.log(probability) > highest and found.peak > 0:
                 highest, best = found.evidence + float(np.log(probability)), found
@@ -216,8 +216,8 @@ def _order_evidence(demodulated: dict[float, Demodulated], order: float, size: F
         return Line()
     noise = 0.0  # that of the louder side
     for side in (-1.0, 1.0):
-        beside = [_powers(demodulated[round(order + side * offset, 1)], size, firsts)[0] for offset in _BESIDE]
-        total, count = sum(float(values.sum()) for values in beside), sum(values.size for values in beside)
+        neighbours = [_powers(demodulated[round(order + side * offset, 1)], size, firsts)[0] for offset in _BESIDE]
+        total, count = sum(float(values.sum()) for values in neighbours), sum(values.size for values in neighbours)
         noise = max(noise, (total + PRIOR_STRETCHES) / (count + PRIOR_STRETCHES))
     logs = log_likelihood_ratios(power / noise, weight / noise, trial_amplitudes(weight / noise))
     return Line(
@@ -439,11 +439,11 @@ def _noise_levels(power: FloatArray, beside: Bools, independent: float) -> Float
     Where it is louder, something other than noise remains, with crests of its own: there it is the highest crest.
     `independent` is how many independent values a bin counts for."""
     total, count = np.where(beside, power, 0.0).sum(axis=0), beside.sum(axis=0).astype(float)
-    own = max(1, round(1.0 / independent))
-    near, side = max(_NEAREST_BIN, 3 * own // 2), max(34 - _NEAREST_BIN, 4 * own)
+    width = max(1, round(1.0 / independent))
+    near, side = max(_NEAREST_BIN, 3 * width // 2), max(34 - _NEAREST_BIN, 4 * width)
     mean = _smoothed(total, count, side, independent, PRIOR_STRETCHES)
     loud = _smoothed(total, count, side, independent, 1.0)
-    crest = maximum_filter1d(_smoothed(total, count, own, independent, 1.0), side)
+    crest = maximum_filter1d(_smoothed(total, count, width, independent, 1.0), side)
     pad, shift = near + side, near + side // 2
     padded = np.arange(total.size) + pad
     mean, loud, crest = (

@@ -111,16 +111,16 @@ def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
     null = posterior.null.fit
     info = posterior.null.evidence.screened[0].info
     place_of = {id(column): place for place, column in enumerate(posterior.columns)}
-    own = {}  # the most probable shape in which an effect is seen, and the amplitude [SI] that is thought to be at work
+    likeliest = {}  # the most probable shape in which an effect is seen, and its amplitude [SI] there
     for slug, shapes in visible.items():
         seen = [shape for shape in shapes if np.isfinite(shape[1])]
         column, size = max(seen, key=lambda shape: shape[0].log_weight)
-        own[slug] = column, _TIMES_VISIBLE * size
+        likeliest[slug] = column, _TIMES_VISIBLE * size
     pairs = []
     for first, second in combinations(visible, 2):
         ways = []
         for true, rival in ((first, second), (second, first)):
-            column, size = own[true]
+            column, size = likeliest[true]
             at, others = place_of[id(column)], [place_of[id(other)] for other, _ in visible[rival]]
             # the rival's column that imitates it best, at the amplitude at which it does
             absorbed = np.maximum(np.diag(info)[others], 1e-300)

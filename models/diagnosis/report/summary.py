@@ -123,8 +123,8 @@ def summarise(report: Report) -> str:
         found = say[report.verdict](report)
     tests = f"{report.tests} tests" if report.tests != 1 else "1 test"
     data = f"{tests} at {_points_of_life(report.states)} {'were' if report.tests != 1 else 'was'} examined."
-    said = {sentence.text: sentence for sentence in (Sentence(data, MAY), *found, *_noted(report.notes))}
-    kept = list(said.values())  # each once
+    sentences = {sentence.text: sentence for sentence in (Sentence(data, MAY), *found, *_noted(report.notes))}
+    kept = list(sentences.values())  # each once
     for matters in (MAY, SHOULD):
         for place in range(len(kept) - 1, -1, -1):
             if _words(kept) > criteria.MAX_WORDS and kept[place].matters == matters:
@@ -259,18 +259,18 @@ def _ambiguous(report: Report) -> list[Sentence]:
         ]
         choices.append((" together with ".join(names) or "nothing", probability(item.probability), sizes))
     certain = [Sentence(f"{_capitalised(signed(sized[slug]))}.") for slug in sure if slug in sized]
-    rest = [Sentence(_error(report), MAY), *_gained(report), *_next(report)]
-    whole = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in choices]
-    ways = [whole]  # then without sizes, which are in the report's fields, and with fewer probabilities
+    remaining = [Sentence(_error(report), MAY), *_gained(report), *_next(report)]
+    descriptions = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in choices]
+    ways = [descriptions]  # then without sizes, which are in the report's fields, and with fewer probabilities
     for shown in range(min(len(choices), 8), 0, -1):
         brief = [
             f"{name.partition(', such as ')[0]} ({'; '.join((chance, *(size for size in sizes if size == _NO_SIZE)))})"
             for name, chance, sizes in choices[:shown]
         ]
-        others = [effect_name(slug) for slug in report.causes if slug not in {*sure, UNCATALOGUED}]
-        ways.append([*brief, *(name for name in others if not any(name in alternative for alternative in brief))])
+        other_names = [effect_name(slug) for slug in report.causes if slug not in {*sure, UNCATALOGUED}]
+        ways.append([*brief, *(name for name in other_names if not any(name in alternative for alternative in brief))])
     for alternatives in ways:
-        sentences = [*_open(report, sure, certain, alternatives), *rest]
+        sentences = [*_open(report, sure, certain, alternatives), *remaining]
         if _words([sentence for sentence in sentences if sentence.matters == MUST]) <= criteria.MAX_WORDS:
             break
     return sentences
@@ -291,8 +291,8 @@ def _open(
         return [Sentence(f"The data {disagree}. {first}: {listed(alternatives)}.")]
     share = sum(item.probability for item in report.explanations if set(sure) <= set(item.effects))
     verb = "is at work" if len(sure) == 1 else "are at work"
-    said = f"{listed([_with_article(slug) for slug in sure])} {verb} (probability {probability(share)})"
-    sentences = [Sentence(f"{_capitalised(said)}."), *certain]
+    names_in_words = f"{listed([_with_article(slug) for slug in sure])} {verb} (probability {probability(share)})"
+    sentences = [Sentence(f"{_capitalised(names_in_words)}."), *certain]
     if len(alternatives) == 1:
         sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
     elif alternatives:
@@ -311,13 +311,20 @@ def _unexplained(report: Report) -> list[Sentence]:
         f"The model is wrong in a way that no effect of the catalogue explains (probability {probability(unknown)}), "
     )
     first += f"so no cause is named.{resembles}"
-    again = "Next: repeat the last test at once. If the error is gone, it came from one run; if it stays, look for"
+    repeat_advice = (
+        "Next: repeat the last test at once. If the error is gone, it came from one run; if it stays, look for"
+    )
     swings = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{FIXED_LINE}: ")]
     if swings and _axes(report.baseline).startswith(_AXES[FREQUENCY]):
-        found = [Sentence(f"In the raw records {swing}") for swing in swings]
-        return [Sentence(first), *found, Sentence(f"{again} what turns, or is driven, like that.")]
+        swing_sentences = [Sentence(f"In the raw records {swing}") for swing in swings]
+        return [Sentence(first), *swing_sentences, Sentence(f"{repeat_advice} what turns, or is driven, like that.")]
     where = _axes(report.baseline) or "the rig"
-    return [Sentence(first), Sentence(_error(report)), *_gained(report), Sentence(f"{again} what depends on {where}.")]
+    return [
+        Sentence(first),
+        Sentence(_error(report)),
+        *_gained(report),
+        Sentence(f"{repeat_advice} what depends on {where}."),
+    ]
 
 
 def _error(report: Report) -> str:
@@ -330,8 +337,8 @@ def _error(report: Report) -> str:
     if misfit.rmse <= misfit.noise:
         pattern = f", but in a pattern that depends on {where}" if where else ""
         return f"{error}, as much as noise alone gives{pattern}."
-    rest = f"; the rest depends on {where}" if where else ""
-    return f"{error}, where noise alone gives {number(misfit.noise)} Nm{rest}."
+    rest_in_words = f"; the rest depends on {where}" if where else ""
+    return f"{error}, where noise alone gives {number(misfit.noise)} Nm{rest_in_words}."
 
 
 def _axes(misfit: Misfit | None) -> str:
@@ -373,8 +380,8 @@ def _hardest(gain: Gain, extended: Misfit | None) -> str:
     if hardest is None or extended is None or gain.rmse_after < 5.0 * extended.rmse:  # less is what gains make
         return ""
     what, size, unit = ("curves", 1e-5, "bar") if hardest.axis == PRESSURE else ("tests", 1.0, "cycles")
-    kept = f"{number(size * hardest.beyond)} {unit} outside" if hardest.beyond > 0.0 else "within"
-    place = f"{number(size * hardest.value)} {unit}, {kept} the others' range"
+    extrapolation = f"{number(size * hardest.beyond)} {unit} outside" if hardest.beyond > 0.0 else "within"
+    place = f"{number(size * hardest.value)} {unit}, {extrapolation} the others' range"
     errors = f"{number(hardest.rmse)} Nm RMS, against {number(extended.rmse)} Nm for all tests when none is left out"
     return f" Worst are the {what} at {place}: {errors}."
 
@@ -433,5 +440,7 @@ def _range(values: Sequence[float]) -> str:
 
 def _noted(notes: Sequence[str]) -> list[Sentence]:
     """Notes on the whole campaign; those on single runs or effects, which begin with a name, stay in the report."""
-    whole = [note for note in notes if " " in note.split(":")[0] or ":" not in note]
-    return [Sentence(note if note.endswith(".") else f"{note}.", MUST if ADVICE in note else SHOULD) for note in whole]
+    plain_notes = [note for note in notes if " " in note.split(":")[0] or ":" not in note]
+    return [
+        Sentence(note if note.endswith(".") else f"{note}.", MUST if ADVICE in note else SHOULD) for note in plain_notes
+    ]

@@ -67,15 +67,15 @@ class _Held:
 def measure_gain(problem: FitProblem, baseline: Fit, extended: Fit, rng: np.random.Generator) -> Gain | None:
     """The gain of an extended model over the baseline, or None where there are too few states and pressures to leave out."""
     design, noise = problem.design, problem.noise
-    held = [_held(problem, baseline, extended, fold) for fold in _folds(design)]
+    folds = [_held(problem, baseline, extended, fold) for fold in _folds(design)]
     ahead = _ahead(design)
     forecast = 0.0
     if ahead is not None:
         scores = [_forecast_score(problem, model, ahead) for model in (baseline, extended)]
         forecast = scores[1] - scores[0]
-    if not held:
+    if not folds:
         return None
-    rows, before, after = (np.concatenate([getattr(f, name) for f in held]) for name in ("rows", "before", "after"))
+    rows, before, after = (np.concatenate([getattr(f, name) for f in folds]) for name in ("rows", "before", "after"))
     reduction, spread = _reduction(design.curve[rows], before, after, rng)
     scatter = (noise.run_gain**2 + noise.curve_gain**2) * design.torque[rows] ** 2
     floor = float(np.mean(noise.deviation[rows] ** 2 + scatter))
@@ -91,9 +91,9 @@ def measure_gain(problem: FitProblem, baseline: Fit, extended: Fit, rng: np.rand
         excess_after=max(square_after - floor, 0.0) ** 0.5,
         mse_percent_before=100 * square_before / total,
         mse_percent_after=100 * square_after / total,
-        log_score_gain=sum(fold.score for fold in held) * design.torque.size / rows.size,
+        log_score_gain=sum(fold.score for fold in folds) * design.torque.size / rows.size,
         forecast_log_score_gain=forecast,
-        hardest=max((group for fold in held for group in _groups(design, fold)), key=lambda group: group.rmse),
+        hardest=max((group for fold in folds for group in _groups(design, fold)), key=lambda group: group.rmse),
     )
 
 
@@ -103,10 +103,10 @@ def _groups(design: Design, fold: _Held) -> list[Hardest]:
     out = np.zeros(design.torque.size, dtype=np.bool_)
     out[fold.rows] = True
     for axis, values in ((CYCLES, design.rows.cycles), (PRESSURE, design.level)):
-        kept = np.unique(values[design.closed & ~out])
-        left = np.setdiff1d(values[out], kept)  # none along the other axis
+        groups_left = np.unique(values[design.closed & ~out])
+        left = np.setdiff1d(values[out], groups_left)  # none along the other axis
         for value in left.tolist():
-            beyond = max(value - float(kept[-1]), float(kept[0]) - value, 0.0)
+            beyond = max(value - float(groups_left[-1]), float(groups_left[0]) - value, 0.0)
             error = _rms(fold.after[values[fold.rows] == value])
             groups.append(Hardest(axis=axis, value=value, rmse=error, beyond=beyond))
     return groups
@@ -146,10 +146,10 @@ def _forecast_score(problem: FitProblem, model: Fit, out: BoolArray) -> float:
     refit = fit(problem.with_noise(before), model.laws, model.effects, steps=criteria.FEW_STEPS)
     jacobian = sensitivities(problem, refit)
     fitted = whitening(design, problem.gained, before)(jacobian)
-    held = whitening(design, problem.gained, _without(noise, ~out))(np.column_stack([jacobian, refit.residual]))
+    whitened = whitening(design, problem.gained, _without(noise, ~out))(np.column_stack([jacobian, refit.residual]))
     precision = fitted.T @ fitted + prior_gram(problem.priors, refit)[:-1, :-1]
     precision[np.diag_indices_from(precision)] *= 1.0 + 1e-12
-    columns, residual = held[:, :-1], held[:, -1]
+    columns, residual = whitened[:, :-1], whitened[:, -1]
     scale = 1 / np.sqrt(np.diag(precision))
     inner = (precision + columns.T @ columns) * scale[:, None] * scale
     along = (columns.T @ residual) * scale
@@ -177,11 +177,11 @@ def _bridged(laws: Laws, design: Design, out: BoolArray) -> Laws:
     """With C at pressures whose loops were all held out taken from the pressures beside them (log C linear between)."""
     nodes = laws.frame.loop_pressures
     looping = ~design.rows.steady
-    kept = np.isin(nodes, np.unique(design.level[looping & ~out]))
-    if kept.all() or not kept.any():
+    is_known = np.isin(nodes, np.unique(design.level[looping & ~out]))
+    if is_known.all() or not is_known.any():
         return laws
     theta = laws.theta.copy()
-    theta[KAPPA] = np.interp(nodes, nodes[kept], theta[KAPPA][kept])
+    theta[KAPPA] = np.interp(nodes, nodes[is_known], theta[KAPPA][is_known])
     return replace(laws, theta=theta)
 
 
@@ -192,8 +192,8 @@ def _reduction(
     _, index = np.unique(curve, return_inverse=True)
     sums = np.stack([np.bincount(index, weights=errors**2) for errors in (before, after)])
     drawn = rng.integers(sums.shape[1], size=(400, sums.shape[1]))
-    again = sums[:, drawn].sum(axis=2)
-    reductions = 100 * (1 - np.sqrt(again[1] / np.maximum(again[0], 1e-300)))
+    resampled = sums[:, drawn].sum(axis=2)
+    reductions = 100 * (1 - np.sqrt(resampled[1] / np.maximum(resampled[0], 1e-300)))
     return 100 * (1 - _rms(after) / max(_rms(before), 1e-300)), float(np.std(reductions))
 
 

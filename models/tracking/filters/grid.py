@@ -104,7 +104,7 @@ class Grid:
         return self.drawn(state, self.laid(state), size, rng)
 
     def drawn(self, state: GridState, laid: Laid, size: int, rng: np.random.Generator) -> Posterior:
-        """The same, of a posterior that is laid already."""
+        """Draws from a posterior that is laid already."""
         prior, history = state.prior, state.history
         offset = rng.random(7)
         count = size * min(max(MANY // max(history.progress.size, 1), 1), OVERSAMPLING)
@@ -155,8 +155,8 @@ def _placed(
     frame, (kind, level, row, node) = laid.frame, cell
     log_scatter = _within(frame.log_scatter, kind, level, uniform[:, 0])
     log_exponent = _within(frame.log_exponent, kind, row, uniform[:, 1])
-    own = frame.taken(kind)
-    lower, upper = (own.at(log_exponent[:, None], edge)[:, 0] for edge in (own.lower, own.upper))
+    kind_frame = frame.taken(kind)
+    lower, upper = (kind_frame.at(log_exponent[:, None], edge)[:, 0] for edge in (kind_frame.lower, kind_frame.upper))
     nodes = laid.mass.shape[3]
     steps = np.ptp(frame.log_exponent, axis=1) * np.ptp(frame.log_scatter, axis=1)
     log_rate = lower + (upper - lower) * (node + uniform[:, 2] - 0.5) / (nodes - 1)

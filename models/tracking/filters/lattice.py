@@ -61,7 +61,7 @@ class Kinds:
 
     @classmethod
     def of(cls, prior: Prior, outlying: FloatArray, forms: NDArray[np.intp]) -> "Kinds":
-        """Each of the forms that the prior has possible with each of the sets [c, t]."""
+        """Every form that the prior allows, with every set [c, t]."""
         weight = log_form_weight(prior)
         possible = forms[np.isfinite(weight[forms])]
         sets = np.repeat(outlying, possible.size, axis=0)
@@ -106,7 +106,7 @@ class Frame:
     upper: FloatArray
 
     def resized(self, rows: int, levels: int) -> "Frame":
-        """The same regions with other numbers of rows and levels; intervals are interpolated between rows."""
+        """The regions with other numbers of rows and levels; intervals are interpolated between rows."""
         log_exponent = _spaced(self.log_exponent[:, 0], self.log_exponent[:, -1], rows)
         return Frame(
             log_exponent=log_exponent,
@@ -195,9 +195,9 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame, FloatArray]
     log_mass = log_masses(density, first.cells(_FIRST)) - kinds.log_weight
     kinds, laid = represented(prior, kinds)
     log_mass = log_mass[laid] + kinds.log_weight
-    kept = np.flatnonzero(log_mass > log_mass.max() - 10.0)  # the first lattice is blurred
-    kinds, frame, log_mass = kinds.taken(kept), frame.taken(laid[kept]), log_mass[kept]
-    shares, left = np.full(kept.size, share), np.ones(kept.size, dtype=bool)
+    likely_nodes = np.flatnonzero(log_mass > log_mass.max() - 10.0)  # the first lattice is blurred
+    kinds, frame, log_mass = kinds.taken(likely_nodes), frame.taken(laid[likely_nodes]), log_mass[likely_nodes]
+    shares, left = np.full(likely_nodes.size, share), np.ones(likely_nodes.size, dtype=bool)
     for _ in range(8):
         now = np.flatnonzero(left)
         if now.size == 0:
@@ -210,8 +210,8 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame, FloatArray]
         for field in fields(Frame):
             getattr(frame, field.name)[now] = getattr(closer, field.name)
     log_mass[left] = log_mass.max()
-    kept = np.flatnonzero(log_mass > log_mass.max() - 6.0)
-    return kinds.taken(kept), frame.taken(kept), log_mass[kept]
+    likely_nodes = np.flatnonzero(log_mass > log_mass.max() - 6.0)
+    return kinds.taken(likely_nodes), frame.taken(likely_nodes), log_mass[likely_nodes]
 
 
 def _closer(
@@ -307,9 +307,11 @@ def shrunk(frame: Frame, density: FloatArray) -> Frame:
 
 def _held(density: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The first and last index along the last axis that hold mass, with one to spare."""
-    held = density > density.max(axis=-1, keepdims=True) - DEPTH
+    is_likely = density > density.max(axis=-1, keepdims=True) - DEPTH
     last = density.shape[-1] - 1
-    return np.maximum(held.argmax(axis=-1) - 1, 0), np.minimum(last - held[..., ::-1].argmax(axis=-1) + 1, last)
+    return np.maximum(is_likely.argmax(axis=-1) - 1, 0), np.minimum(
+        last - is_likely[..., ::-1].argmax(axis=-1) + 1, last
+    )
 
 
 def _shrinkage(wide: Frame, closer: Frame) -> FloatArray:
@@ -351,8 +353,8 @@ def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame, log_ma
     best = sorted(overlooked.values(), key=lambda candidate: candidate[0], reverse=True)[:MOST]
     of, outlying = np.array([leader for _, leader, _ in best]), np.stack([runs for _, _, runs in best])
     weight = leading.log_weight[of] - log_outlying(prior, leading.outlying[of].T) + log_outlying(prior, outlying.T)
-    more, there = Kinds(form=leading.form[of], outlying=outlying, log_weight=weight), where.taken(of)
-    closer = shrunk(there, log_density(prior, history, more, there, table[of]))
+    more, places = Kinds(form=leading.form[of], outlying=outlying, log_weight=weight), where.taken(of)
+    closer = shrunk(places, log_density(prior, history, more, places, table[of]))
     return joined(kinds, more), joined(frame, closer)
 
 

@@ -72,10 +72,10 @@ def entered(prior: Prior, history: History, cloud: Cloud, rng: np.random.Generat
     table = points.basis(history.progress)
     sums, terms = pointwise(history, prior, points, table)
     turned = last_outlying(history, prior, points, sums, terms, table[-1])
-    others = _log_prior(prior, cloud) + _log_alive(history, cloud)
+    log_prior = _log_prior(prior, cloud) + _log_alive(history, cloud)
     flag_sound, flag_outlying = log_outlying(prior, np.array([[0.0, 1.0]]))
-    sound = evidence(sums, prior) + others + flag_sound
-    outlying = evidence(turned, prior) + others + flag_outlying
+    sound = evidence(sums, prior) + log_prior + flag_sound
+    outlying = evidence(turned, prior) + log_prior + flag_outlying
     total = np.logaddexp(sound, outlying)
     is_outlying = np.log(rng.random(total.size)) < outlying - total
     as_sound.outlying[:, -1] = is_outlying
@@ -108,8 +108,8 @@ def merged(old: Cloud, new: Cloud, accepted: NDArray[np.bool_]) -> Cloud:
     """The new particles where they were accepted, the old ones elsewhere."""
     columns = {}
     for field in fields(Cloud):
-        kept, offered = getattr(old, field.name), getattr(new, field.name)
-        columns[field.name] = np.where(accepted if kept.ndim == 1 else accepted[:, None], offered, kept)
+        old_values, offered = getattr(old, field.name), getattr(new, field.name)
+        columns[field.name] = np.where(accepted if old_values.ndim == 1 else accepted[:, None], offered, old_values)
     return Cloud(**columns)
 
 
@@ -233,9 +233,9 @@ def _shapes(cloud: Cloud, weight: FloatArray, span: float) -> FloatArray:
     """A square root of the covariance of the places of each course's particles [6, 3, 3]."""
     shapes, places = np.zeros((len(Course), 3, 3)), _places(cloud, span)
     for course in np.unique(cloud.course):
-        here = cloud.course == course
-        share = weight[here] / max(float(weight[here].sum()), 1e-300)
-        off = places[here] - share @ places[here]
+        in_course = cloud.course == course
+        share = weight[in_course] / max(float(weight[in_course].sum()), 1e-300)
+        off = places[in_course] - share @ places[in_course]
         shapes[course] = _root((share * off.T) @ off)
     return shapes
 
@@ -245,9 +245,9 @@ def _kept(course: NDArray[np.intp], weight: FloatArray, least: float = 0.05) -> 
     it [n]: what the data do not speak for today they may speak for later."""
     share = np.bincount(course, weights=weight, minlength=len(Course))
     alive = share > 1e-100  # what makes up for it must not overflow
-    kept = np.where(alive, np.maximum(share, least), share)
-    kept /= kept.sum()
-    more = np.divide(kept, share, out=np.ones(len(Course)), where=alive)[course]
+    shares = np.where(alive, np.maximum(share, least), share)
+    shares /= shares.sum()
+    more = np.divide(shares, share, out=np.ones(len(Course)), where=alive)[course]
     return weight * more, -np.log(more)
 
 

@@ -145,9 +145,9 @@ def stepped(state: UkfState, way: Way, forget: float = 0.3) -> UkfState:
     gain = across[:, :, None] / variances[:, None, :]
     moves = gain * off[:, None, None]
     middle = (moves * share[:, None, :]).sum(axis=2)
-    apart = (moves - middle[:, :, None]) * np.sqrt(share)[:, None, :]
-    kept = gain * (variances * share)[:, None, :]
-    learnt = covariance - kept @ gain.swapaxes(1, 2) + apart @ apart.swapaxes(1, 2)
+    deviations = (moves - middle[:, :, None]) * np.sqrt(share)[:, None, :]
+    gains = gain * (variances * share)[:, None, :]
+    learnt = covariance - gains @ gain.swapaxes(1, 2) + deviations @ deviations.swapaxes(1, 2)
     log_weight = state.log_weight + np.log(np.maximum(total, 1e-300))
     squared_innovation = float(normalised(log_weight) @ np.minimum((share * squared).sum(axis=1), OUTLIER**2))
     return replace(
@@ -185,8 +185,10 @@ def measured(
     away = points @ np.linalg.cholesky(covariance).swapaxes(1, 2)
     rows = unscaled(prior, mean[:, None] + away)
     scale, exponent = coefficients(rows[..., 2], rows[..., 3], FORM_COURSE[form][:, None], way.reference)
-    share, whole = progress_fraction(np.array([way.progress, way.reference])[:, None, None], scale, exponent)
-    values = rows[..., 0] + (rows[..., 1] - rows[..., 0]) * share / whole + rows[..., 4] + rows[..., 6:].sum(axis=2)
+    share, at_reference = progress_fraction(np.array([way.progress, way.reference])[:, None, None], scale, exponent)
+    values = (
+        rows[..., 0] + (rows[..., 1] - rows[..., 0]) * share / at_reference + rows[..., 4] + rows[..., 6:].sum(axis=2)
+    )
     values /= prior.initial_sd
     expected = values @ weight
     off = values - expected[:, None]
@@ -338,14 +340,14 @@ class Ukf:
         normals = np.column_stack([normals, rng.standard_normal((size, state.mean.shape[1] - normals.shape[1]))])
         root = np.linalg.cholesky(state.covariance)
         point = state.mean[kind] + np.einsum("nij,nj->ni", root[kind], normals)
-        initial, at_reference, place, log_exponent, *beside = unscaled(prior, point).T
+        initial, at_reference, place, log_exponent, *discrepancy_terms = unscaled(prior, point).T
         form = state.kinds[kind]
         scale, exponent = coefficients(place, log_exponent, FORM_COURSE[form], state.reference)
         change = (at_reference - initial) / progress_fraction(state.reference, scale, exponent)
-        ends = np.stack([beside[0], beside[1] * history.span / state.reference])
+        ends = np.stack([discrepancy_terms[0], discrepancy_terms[1] * history.span / state.reference])
         sizes = FORM_SIZE[form]
         course = np.where(sizes[:, None] > 0.0, (np.linalg.pinv(value_and_slope_now()) @ ends).T, 0.0)
-        heights = np.stack(beside[2:], axis=1) if len(beside) > 2 else np.zeros((size, 0))
+        heights = np.stack(discrepancy_terms[2:], axis=1) if len(discrepancy_terms) > 2 else np.zeros((size, 0))
         weight = np.where((scale < 0.0) & (-scale <= history.span), 0.0, 1.0)
         weight = weight if weight.any() else np.ones(size)
         return Posterior(
@@ -404,18 +406,20 @@ def _started(prior: Prior, history: History) -> UkfState:
     shares = np.bincount(form, weights=draws.weight, minlength=FORM_SIZE.size)
     # a covariance of d numbers needs more than d draws; the exact posterior's rare courses are those that end soon
     enough = np.bincount(form, minlength=FORM_SIZE.size) > 2 * points.shape[1]
-    kept = np.flatnonzero(enough | (shares == shares.max()))
-    moments = [_moments(points[form == kind], draws.weight[form == kind]) for kind in kept]
+    likely_kinds = np.flatnonzero(enough | (shares == shares.max()))
+    moments = [_moments(points[form == kind], draws.weight[form == kind]) for kind in likely_kinds]
     log_scatter = np.log(draws.scatter)
-    variance = [math.exp(2.0 * np.average(log_scatter[form == k], weights=draws.weight[form == k])) for k in kept]
+    variance = [
+        math.exp(2.0 * np.average(log_scatter[form == k], weights=draws.weight[form == k])) for k in likely_kinds
+    ]
     worth = max(1.0, 0.5 / prior.log_scatter_sd**2) + history.value.size
     return UkfState(
         prior=prior,
         history=history,
         reference=reference,
         squared_innovation=1.0,
-        form=kept.astype(np.float64),
-        log_weight=np.log(shares[kept] / shares[kept].max()),
+        form=likely_kinds.astype(np.float64),
+        log_weight=np.log(shares[likely_kinds] / shares[likely_kinds].max()),
         mean=np.stack([mean for mean, _ in moments]),
         covariance=np.stack([covariance for _, covariance in moments]),
         scatter=np.array([(s_squared, worth) for s_squared in variance]),
@@ -424,10 +428,10 @@ def _started(prior: Prior, history: History) -> UkfState:
 
 def _beside(draws: Posterior, steps: int) -> tuple[FloatArray, FloatArray]:
     """Of every draw (δ, T δ') at the end of what was measured [n, 2], and the level's steps [n, steps]."""
-    beside = draws.discrepancy
-    if beside is None:
+    discrepancy = draws.discrepancy
+    if discrepancy is None:
         return np.zeros((draws.weight.size, 2)), np.zeros((draws.weight.size, steps))
-    return beside.curvature[:, :PAST] @ value_and_slope_now().T, beside.height
+    return discrepancy.curvature[:, :PAST] @ value_and_slope_now().T, discrepancy.height
 
 
 def _moments(points: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -33,18 +33,21 @@ export function spread(items, most = 6) {
 export const pressuresOf = (tests) => distinct(tests.flatMap((test) => test.fits.map((fit) => fit.pressure_bar)));
 
 /**
- * The highest speed of the drawn records, rpm, and no less than 100.
+ * The highest speed of the tests whose records have been read, rpm, and no less than 100.
  * @param {Record<string, Channels>} channels
+ * @param {StribeckItem[]} tests
  */
-const fastest = (channels) =>
-  Object.values(channels).reduce((most, { speed_rpm: speeds }) => speeds.reduce((a, b) => Math.max(a, b), most), 100);
+const fastest = (channels, tests) =>
+  tests
+    .flatMap(({ run_id: id }) => channels[id]?.speed_rpm ?? [])
+    .reduce((most, speed) => Math.max(most, speed), 100);
 
 /**
  * Some tests at some pressures: measured points where the channels have been read, the fit in any case.
  * @type {(answers: Answers, tests: StribeckItem[], wanted: (pressure: number) => boolean) => Drawn[]}
  */
 function drawnOf({ channels, clutch }, tests, wanted) {
-  const end = fastest(channels);
+  const end = fastest(channels, tests);
   return tests.flatMap((test) =>
     test.fits
       .filter((fit) => wanted(fit.pressure_bar))
