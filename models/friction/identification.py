@@ -141,8 +141,10 @@ def uncertainty(
 def _covariance(
     columns: FloatArray, prior: FloatArray, shape: FloatArray, sd: FloatArray, stray: FloatArray, transform: FloatArray
 ) -> FloatArray:
-    """Of the four parameters [P, 4, 4], for columns J [P, n, 4], their priors' deviations [P, 4] and points of variance
-    `shape` [P, n] times sd² [P], widened where V_S strays [P]."""
+    """Covariance [P, 4, 4] of the four parameters: columns J [P, n, 4] of the linearised fit, priors' deviations [P, 4] and
+    variances of the points, `shape` [P, n] times sd² [P]; `transform` [P, 4, 4] leads from the fit's coordinates to the
+    parameters. Where the 90 % interval of log V_S, the fourth coordinate, reaches further than a factor e (`stray` [P] > 1),
+    the variance along it is widened to that half-range: the linearised fit is too sure."""
     inner = _linearised(columns * prior[:, None, :], shape, sd)
     inner *= prior[:, :, None] * prior[:, None, :]
     variance = inner[:, 3, 3]

@@ -69,9 +69,9 @@ def evaluate_loops(
 ) -> tuple[Loop, ...]:
     """A loop for each stretch of constant pressure, in the record's order; empty where the pressure is never constant.
 
-    `stationary` maps pressure levels [Pa] to the state's stationary curves, whose covariance contributes to the lag's
-    deviation: the nearest within a level's width is taken; without one there is area and direction and no lag. Times that
-    fall are put in order.
+    `stationary` maps pressure levels [Pa] to the stationary curves measured in the clutch's present state; their covariance
+    contributes to the lag's deviation. The curve nearest in pressure within a level's width is used; without one, a loop has
+    area and direction but no lag. Times that run backwards are sorted.
     """
     order = np.argsort(record.time, kind="stable")
     time, pressure = record.time[order], record.pressure[order]

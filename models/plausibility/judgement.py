@@ -132,16 +132,16 @@ class _Clutch:
     runs: tuple[Run, ...]
     about: frozenset[int]
     fits: dict[tuple[Any, ...], Fit] = field(default_factory=dict)
-    _slips: dict[int, list[Slip]] = field(default_factory=dict)
+    _weighed_slips: dict[int, list[Slip]] = field(default_factory=dict)
 
     def slips(self, index: int, expected: float) -> list[Slip]:
         """All slips of a run; its cycles were most likely `expected` where they are mistaken altogether."""
         run = self.runs[index]
-        if index not in self._slips:
-            self._slips[index] = list(slips_of(run, expected))
+        if index not in self._weighed_slips:
+            self._weighed_slips[index] = list(slips_of(run, expected))
         return [
             replace(slip, likely=replace(run.sent, cycles=expected)) if slip.name == OTHER_CYCLES else slip
-            for slip in self._slips[index]
+            for slip in self._weighed_slips[index]
         ]
 
     @cached_property
@@ -235,7 +235,7 @@ class _Weighed:
 
     clutch: _Clutch
     belief: Belief
-    _slips: dict[int, tuple[float, float, Slip] | None] = field(default_factory=dict)
+    _weighed_slips: dict[int, tuple[float, float, Slip] | None] = field(default_factory=dict)
 
     @cached_property
     def kept(self) -> list[int]:
@@ -399,10 +399,11 @@ class _Weighed:
         return np.unique(self.clutch.cycles[same_kind]) if same_kind else np.zeros(0)
 
     def weigh(self, index: int) -> tuple[float, float, Slip] | None:
-        """Of a run: log L as sent, log Σ P(slip) L without it, and the most probable slip; None where none is possible."""
-        if index not in self._slips:
-            self._slips[index] = self._slip_of(index)
-        return self._slips[index]
+        """Weights of a run and its most probable slip: log L as sent, and log Σ P(slip) L with the slip undone. None if it
+        can have none."""
+        if index not in self._weighed_slips:
+            self._weighed_slips[index] = self._slip_of(index)
+        return self._weighed_slips[index]
 
     def _slip_of(self, index: int) -> tuple[float, float, Slip] | None:
         run = self.clutch.runs[index]

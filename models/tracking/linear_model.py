@@ -213,10 +213,14 @@ def tabulated(
     outlying: FloatArray,
     blur: FloatArray | float = 0.0,
 ) -> Sums:
-    """The sums of k kinds by scatter levels by cells, by matrix products; [k, l, g], those without b [k, l, 1].
+    """Weighted sums of the linear model over all nodes of a grid, by matrix products: [k, l, g] for k kinds (a form of the
+    course with a set of outlying runs), l levels of scatter and g cells of the grid; sums without the basis b are [k, l, 1].
 
-    `table` holds b, [t, g] or [k, t, g]; a kind has its own levels log_scatter [k, l], a form [k] and outlying runs
-    [t, k]. `blur` is a further deviation of every measurement, one or [k].
+    `table` holds the basis b at the tests, [t, g] or [k, t, g]; a kind has its own levels log_scatter [k, l], a form [k] and
+    outlying runs [t, k]. `blur` is a further deviation of every measurement, one or [k].
+
+    Kinds whose courses may be disturbed have the precision R - R Z (I + Zᵀ R Z)⁻¹ Zᵀ R (Woodbury) with the disturbances'
+    columns Z times their deviations, instead of R = diag(r).
     """
     further, growth = (
         (prior.outlying_size * prior.size) ** 2,

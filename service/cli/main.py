@@ -46,8 +46,9 @@ class Commands(TyperGroup):
         except _UsageError as error:
             if type(error).__name__ == "NoArgsIsHelpError":
                 raise  # the help of a command that was called without anything
-            place = getattr(error, "ctx", None) or ctx
-            text = f"{error.format_message().rstrip('.')}: see {place.command_path} --help"
+            failed = getattr(error, "ctx", None) or ctx
+            text = f"{error.format_message().rstrip('.')}: see {failed.command_path} --help"
+            # `clutchlife status` ends with the codes of monitoring plug-ins, of which UNKNOWN is one
             fail(text, clutches.UNKNOWN if ctx.invoked_subcommand == "status" else EX_USAGE)
 
 

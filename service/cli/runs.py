@@ -81,7 +81,7 @@ def confirm(
             run["run_id"] for run in held_runs if every or doubt in {question["code"] for question in run["doubts"]}
         ]
     if not runs:
-        print_line(f"{clutch} has no {f'runs held_runs for {doubt}' if doubt else 'held_runs runs'}")
+        print_line(f"{clutch} has no {f'runs held for {doubt}' if doubt else 'held runs'}")
         return
     for receipt in service.post(f"/v1/clutches/{clutch}/runs/confirm", {"run_ids": runs, "reason": reason})["items"]:
         _show(receipt)

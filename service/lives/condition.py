@@ -226,9 +226,11 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping
     if name == CHECK and summary.get("status", INSUFFICIENT) != INSUFFICIENT:
         return "Find out why the rig sends nothing."
     if name == CHECK:
-        missing = FEWEST_TESTS - _places(summary)
+        missing = FEWEST_TESTS - _distinct_test_cycles(summary)
         tests = "one more stationary test" if missing == 1 else f"{missing} more stationary tests, at different cycles"
-        like_the_first = ", with the pressures and oil of this life's first test" if _left_out(summary) else ""
+        like_the_first = (
+            ", with the pressures and oil of this life's first test" if _tests_unlike_first(summary) else ""
+        )
         return f"Run {tests}{like_the_first}: then the remaining life is predicted."
     if name == NORMAL or diagnosis is None:
         return "Its life has ended: nothing to do." if summary.get("ended") else "Nothing to do: carry on testing."
@@ -263,19 +265,21 @@ def _cause_in_words(slug: str) -> str:
 
 def _tests(summary: Mapping[str, Any]) -> str:
     """How many of the tests that a prediction needs there are, as a clause."""
-    known = f"{_places(summary)} of the {FEWEST_TESTS} tests that a prediction needs"
-    if _places(summary) < summary["runs_used"]:
-        known = f"tests at {_places(summary)} of the {FEWEST_TESTS} different cycles that a prediction needs"
-    left_out = _left_out(summary)
+    known = f"{_distinct_test_cycles(summary)} of the {FEWEST_TESTS} tests that a prediction needs"
+    if _distinct_test_cycles(summary) < summary["runs_used"]:
+        known = (
+            f"tests at {_distinct_test_cycles(summary)} of the {FEWEST_TESTS} different cycles that a prediction needs"
+        )
+    left_out = _tests_unlike_first(summary)
     return f"{known} ({left_out} more cannot be compared with the first)" if left_out else known
 
 
-def _places(summary: Mapping[str, Any]) -> int:
+def _distinct_test_cycles(summary: Mapping[str, Any]) -> int:
     """At how many different cycles there are tests that count; of a summary that does not state it, how many tests count."""
     return int(summary.get("places", summary.get("runs_used", 0)))
 
 
-def _left_out(summary: Mapping[str, Any]) -> int:
+def _tests_unlike_first(summary: Mapping[str, Any]) -> int:
     """How many tests cannot be compared with the first."""
     return int(summary.get("tests", 0) - summary.get("runs_used", 0)) if "tests" in summary else 0
 

@@ -278,11 +278,11 @@ def _values(source: _Source) -> NDArray[Any]:
     values = np.asarray(source.leaf.data[source.index]).reshape(-1)
     stated = {key.lower(): _number(value) for key, value in source.leaf.attributes.items()}
     attributes = source.leaf.attributes
-    others = {key: held for key, held in attributes.items() if key.lower() not in ("scale_factor", "add_offset")}
-    refuse_counts(source.column.shown(), values, others)
+    unscaled = {key: held for key, held in attributes.items() if key.lower() not in ("scale_factor", "add_offset")}
+    refuse_counts(source.column.shown(), values, unscaled)
     factor, offset = (stated.get(name, default) for name, default in (("scale_factor", 1.0), ("add_offset", 0.0)))
-    none = [value for name in ("_fillvalue", "missing_value") if (value := stated.get(name)) is not None]
-    invalid = np.isin(values, none) if none and values.dtype.kind in "iuf" else None
+    fill_values = [value for name in ("_fillvalue", "missing_value") if (value := stated.get(name)) is not None]
+    invalid = np.isin(values, fill_values) if fill_values and values.dtype.kind in "iuf" else None
     if (factor, offset) != (1.0, 0.0):
         values = values * (1.0 if factor is None else factor) + (0.0 if offset is None else offset)
     return values if invalid is None or not invalid.any() else np.ma.MaskedArray(values, mask=invalid)

@@ -159,7 +159,8 @@ def _clocks(
 
 
 def _column_clock(columns: Sequence[Column], column: Taken, values: Mapping[int, FloatArray]) -> Clock:
-    """A column of times. LabVIEW's text files count where they have no clock, and a clock that was found may be none."""
+    """A column as a clock. LabVIEW's text files number their rows where they have no clock, so a guessed time column, or one
+    with whole numbers from 0, may be a sample counter (`counts`)."""
     times = values[column.index]
     counts = column.guessed or (is_counter(columns[column.index]) and np.array_equal(times, np.arange(times.size)))
     return Clock(column.index, lambda: times, counts=counts)

@@ -412,7 +412,7 @@ class Stamps:
             raise InvalidError.of(message, code="ambiguous_date", pointer="/channels/time_s")
 
     def _day(self, written: str) -> int | None:
-        """The day's number; None where it is no date."""
+        """The day as a number; None if it is no date. Orders that cannot be mistaken are tried first."""
         if written not in self._dates:
             days = (_day_by(written, order) for order in (*_ORDERS, *sorted(self._orders)))
             self._dates[written] = next((number for number in days if number is not None), None)

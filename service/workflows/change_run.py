@@ -299,7 +299,7 @@ def _one_as_asked(database: Database, loaded: _Loaded, request: _Request) -> Run
 def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     """The run at other cycles: accepted where it is plausible there, else held."""
     row, sent_cycles = loaded.row, loaded.row.cycles if loaded.row.sent_cycles is None else loaded.row.sent_cycles
-    other_runs = _state_without_these(loaded)
+    other_runs = _state_without_changed_runs(loaded)
     sent = replace(loaded.reader(database).read(row.run_id), cycles=cycles)
     event = loaded.event.at(cycles)
     event = replace(event, cofs=cofs_among(other_runs, event, loaded.levels.get(row.run_id, ())))
@@ -323,7 +323,7 @@ def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     )
 
 
-def _state_without_these(loaded: _Loaded) -> ClutchState:
+def _state_without_changed_runs(loaded: _Loaded) -> ClutchState:
     """The clutch's state without the runs that are being changed, whether they were accepted or held."""
     return replace(
         loaded.state,
@@ -339,7 +339,7 @@ def _together(others: ClutchState, incoming: Event | None, changed: Sequence[Eve
 
 def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
     """What becomes of the other runs; the runs themselves are as they were asked for, these of them `accepted`."""
-    other_runs = _state_without_these(loaded)
+    other_runs = _state_without_changed_runs(loaded)
     for event in accepted:
         cofs = cofs_among(other_runs, event, loaded.levels.get(event.run_id, ()))
         other_runs = replace(other_runs, events=order([*other_runs.events, replace(event, cofs=cofs, confirmed=True)]))
@@ -348,7 +348,7 @@ def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
 
 def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _Changed:
     """All that follows from the runs as they are to be."""
-    before, other_runs = loaded.state, _state_without_these(loaded)
+    before, other_runs = loaded.state, _state_without_changed_runs(loaded)
     pairs = [(row, event.at(row.cycles)) for row, event in zip(rows, loaded.events, strict=True)]
     accepted = [event for row, event in pairs if row.state == runs.ACCEPTED]
     out = [event for row, event in pairs if row.state != runs.ACCEPTED]

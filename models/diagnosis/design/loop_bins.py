@@ -29,8 +29,9 @@ from models.records.runs import Record, plate_rise
 
 
 def period_differences(torque: FloatArray, bins: NDArray[np.intp], turns: FloatArray, count: int) -> FloatArray:
-    """d [p - 1, count] Nm of torque [n] Nm in its bins [n] (0 ... count - 1) and turns since its start [n]; p is how many
-    turns were begun. NaN where no earlier period holds samples in the bin, or this period too few."""
+    """How far each bin's mean lies from its mean over all earlier periods, scaled to one sample's deviation:
+    [p - 1, count] Nm, from torque [n] Nm, its bins [n] (0 ... count - 1) and the periods since the start [n], of which p
+    were begun. NaN where no earlier period has samples in the bin, or this period has too few."""
     turn = np.floor(turns).astype(np.intp)
     periods = int(turn.max(initial=0)) + 1
     cell = turn * count + bins

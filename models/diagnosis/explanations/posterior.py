@@ -337,7 +337,8 @@ class Search:
             self._unscreened.add(alternative)
 
     def _add_structure(self, alternative: Alternative, parent: Node, promise: float) -> None:
-        """Structure on an axis beside a parent, about the baseline that leaves its likeliest form."""
+        """Add structure on an axis (`alternative.unknown`) beside a parent explanation. The baseline is refitted with the
+        likeliest form of the structure taken off; `promise` is the log evidence [nats] that was expected."""
         axis = alternative.unknown
         fitted = refit_beside(self.problem, parent.fit, parent.evidence.patterns[axis])
         node = None if fitted is None else self._node(fitted, alternative.causes, parent.shape_evidence, smooth=True)

@@ -130,7 +130,8 @@ def estimate_correlation(
 
     w ρ and w ρ², the correlations of the first and second neighbour, are averaged over the grid: a likelihood that is flat
     along a ridge must not choose its end. Where samples show both (`from_samples`), these are used unless bins contradict.
-    `period_differences` [n] each are further series of neighbouring bins, in deviations, free of the loop as they are.
+    `period_differences` [n] each are further series of neighbouring bins in units of their deviation; the loop cancels in
+    them.
     """
     groups: dict[int, tuple[FloatArray, list[FloatArray]]] = {}
     for piece in pieces:
@@ -139,9 +140,10 @@ def estimate_correlation(
             np.clip(relative, -criteria.SPIKE, criteria.SPIKE)
         )
     grid = [Correlation(), *(Correlation(share=share, decay=decay) for share in _SHARES for decay in _DECAYS)]
-    expected, price = Correlation(), criteria.CORRELATION_PRICE
+    expected, penalty = Correlation(), criteria.CORRELATION_PRICE
     if from_samples is not None:
-        expected, price = Correlation.of_neighbours(*from_samples), 5.0  # they are more than bins are
+        # [nats]; more than for bins alone, because a loop has many more samples than bins
+        expected, penalty = Correlation.of_neighbours(*from_samples), 5.0
         grid = [expected, *grid]
     if len(groups) > 40:  # loops whose bins all differ: each would have a likelihood of its own to be factorised
         grid = grid[:1]
@@ -152,9 +154,9 @@ def estimate_correlation(
     logs, variances = [], []
     for number, correlation in enumerate(grid):
         likelihood, variance = _restricted_likelihood(correlation, groups)
-        off = abs(float(np.log(correlation.variance_inflation / expected.variance_inflation)))
+        mismatch = abs(float(np.log(correlation.variance_inflation / expected.variance_inflation)))
         # slow noise was taken off with everything smooth, so the data say little about it
-        logs.append(likelihood - (0.0 if number == 0 else price) - 2.0 * off)
+        logs.append(likelihood - (0.0 if number == 0 else penalty) - 2.0 * mismatch)
         variances.append(variance)
     weights = np.exp(np.array(logs) - max(logs))
     weights /= weights.sum()
