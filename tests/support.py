@@ -13,6 +13,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import cached_property
 from importlib import import_module
 from multiprocessing import forkserver
 from multiprocessing.process import BaseProcess
@@ -253,6 +254,11 @@ class Server:
         else:
             self.process = subprocess.Popen([sys.executable, "-m", "service.cli.main", *arguments], env=environment)
         wait_until_ready(self.url, lambda: self.exit_code() is not None)
+
+    @cached_property
+    def http(self) -> httpx2.Client:
+        """A client of it, which keeps no connection either."""
+        return httpx2.Client(base_url=self.url, timeout=120, limits=httpx2.Limits(max_keepalive_connections=0))
 
     @property
     def pid(self) -> int:

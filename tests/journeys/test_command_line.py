@@ -27,8 +27,8 @@ def test_a_campaign_is_pushed_exported_and_pushed_again(campaign: Path, server: 
     push = ("push", campaign, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
     assert f"{runs + inspections} stored now, 0 stored before, 0 refused" in clutchlife(*push)
     assert f"0 stored now, {runs + inspections} stored before, 0 refused" in clutchlife(*push)
-    inspected = ONCE.get(f"{server.url}/v1/clutches/sim-7/inspections").json()["items"]
-    tests = ONCE.get(f"{server.url}/v1/clutches/sim-7/stribeck?limit=1000").json()["items"]
+    inspected = server.http.get("/v1/clutches/sim-7/inspections").json()["items"]
+    tests = server.http.get("/v1/clutches/sim-7/stribeck?limit=1000").json()["items"]
     assert [item["cycles"] for item in inspected] == [item["cycles"] for item in tests]
     assert len(inspected) == inspections
     roughness = [item["roughness_um"] for item in inspected]
@@ -96,7 +96,7 @@ def test_keys_open_and_close_the_service(server: Server) -> None:
 
     assert [ask("GET", None), ask("GET", "wrong"), ask("GET", keys["read"])] == [401, 401, 200]
     assert [ask("POST", keys["read"]), ask("POST", keys["ingest"]), ask("POST", keys["admin"])] == [403, 201, 200]
-    assert ONCE.get(f"{server.url}/readyz").status_code == 200
+    assert server.http.get("/readyz").status_code == 200
     key_id = keys["read"].split("_")[1]
     assert key_id in clutchlife("key", "list", "--database", database)
     clutchlife("key", "revoke", key_id, "--database", database)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.service.clients import described
 from tests.support import Server
 
 ROOT = Path(__file__).parents[2]
@@ -35,9 +34,8 @@ def test_the_examples_of_the_api_run(server: Server) -> None:
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_commands_that_are_named_are_there(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
-    commands = set(
-        re.findall(r"\bclutchlife ((?:key )?[a-z]+)\b", "\n".join(blocks(path, "console") + blocks(path, "sh")))
-    )
+    shown = "\n".join(blocks(path, "console") + blocks(path, "sh"))
+    commands = set(re.findall(r"\bclutchlife ((?:key )?[a-z]+)\b", shown))
     for command in commands - {"clutchlife"}:
         called = [sys.executable, "-m", "service.cli.main", *command.split(), "--help"]
         done = subprocess.run(called, capture_output=True, text=True, check=False)
@@ -58,7 +56,12 @@ def own_words(path: Path) -> str:
     return re.sub(r"<!-- example-[a-z-]+ -->.*?<!-- end -->", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
 
 
-@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: str(path.relative_to(ROOT)))
+every_document = pytest.mark.parametrize(
+    "path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: str(path.relative_to(ROOT))
+)
+
+
+@every_document
 def test_paths_exist(path: Path) -> None:
     """Every file, folder and module that a document names, from the top of the repository."""
     text = own_words(path)
@@ -73,17 +76,13 @@ SHORT = re.compile(r"`((?:[\w-]+/)*\w+\.py)`")
 
 def missing(text: str) -> list[str]:
     """The Python files that a text names in backticks and that are nowhere: no path of product or tests ends so."""
-    ends = {"/".join(path.parts[-n:]) for path in product_files() for n in range(1, len(path.parts) + 1)}
+    folders = ("docs", "models", "service", "storage", "tests")
+    files = [path.relative_to(ROOT).parts for folder in folders for path in (ROOT / folder).rglob("*.py")]
+    ends = {"/".join(parts[-n:]) for parts in files for n in range(1, len(parts) + 1)}
     return [name for name in SHORT.findall(text) if name not in ends]
 
 
-def product_files() -> list[Path]:
-    """The Python files of the product and its tests, from the top of the repository."""
-    folders = ("docs", "models", "service", "storage", "tests")
-    return [path.relative_to(ROOT) for folder in folders for path in (ROOT / folder).rglob("*.py")]
-
-
-@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: str(path.relative_to(ROOT)))
+@every_document
 def test_files_that_are_named_shortly_exist(path: Path) -> None:
     """`decide.py` or `explanations/decide.py`."""
     assert missing(own_words(path)) == []
@@ -94,11 +93,27 @@ def test_a_file_that_is_gone_is_noticed() -> None:
     assert missing("`repeats.py`, `detection/decide.py`, `cide.py`") == ["repeats.py", "detection/decide.py", "cide.py"]
 
 
-def test_every_address_is_documented() -> None:
-    description = described()
-    text = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8") + (
-        ROOT / "docs" / "reference" / "operations.md"
-    ).read_text(encoding="utf-8")
-    for address in description["paths"]:
-        name = address.rstrip("/").rsplit("/", 1)[-1].removesuffix(".csv")
-        assert name.startswith("{") or name in text, address
+# --- docs/paper.md names, for each part of the paper, files that are there.
+
+OF_THE_PAPER = [line for line in (ROOT / "docs" / "paper.md").read_text().splitlines() if line.startswith("| ")][1:]
+
+
+@pytest.mark.parametrize("row", OF_THE_PAPER)
+def test_what_stands_in_the_table_is_there(row: str) -> None:
+    what, files, address, section, test = (cell.strip() for cell in row.strip("|").split(" | "))
+    if files == "**not built**":
+        assert (address, section, test) == ("-", "-", "-")
+        return
+    named = re.findall(r"`([^`]+)`", f"{files} {test}")
+    assert len(named) >= 2, what
+    assert [name for name in named if not (ROOT / name).is_file()] == []
+
+
+def test_all_equations_and_figures_are_in_it() -> None:
+    first = " ".join(row.split(" | ")[0] for row in OF_THE_PAPER)
+    equations = {
+        int(number) for part in re.findall(r"eq\. ([\d, ]+)", first) for number in part.split(",") if number.strip()
+    }
+    assert equations == set(range(1, 9))
+    figures = {int(number) for part in re.findall(r"figs?\. ([\d, ab]+)", first) for number in re.findall(r"\d+", part)}
+    assert figures == set(range(1, 18))

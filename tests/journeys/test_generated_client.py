@@ -4,13 +4,12 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.support import ONCE, Server, serving, stationary
+from tests.support import Server, stationary
 
 #: `make slow` sets it up: the generator asks for other releases than ours, and its clients for none of our packages.
 ENVIRONMENT = Path(f"{sys.prefix}-generator") / "bin"
@@ -35,12 +34,6 @@ print([item.run_id for item in page.items])
 """
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serving(tmp_path_factory.mktemp("written") / "clutchlife.db", loaded=True) as running:
-        yield running
-
-
 def run(*arguments: str | Path, folder: Path) -> str:
     environment = {"PATH": f"{ENVIRONMENT}:{os.environ['PATH']}", "PYTHONPATH": str(folder)}
     command = [str(ENVIRONMENT / arguments[0]), *map(str, arguments[1:])]
@@ -58,7 +51,7 @@ def sends_an_image(operation: dict[str, Any]) -> bool:
 def test_a_client_is_generated_that_compiles_and_posts_a_run(server: Server, tmp_path: Path) -> None:
     assert ENVIRONMENT.is_dir(), f"{ENVIRONMENT} is not there: make slow sets it up"
     description = tmp_path / "openapi.json"
-    description.write_bytes(ONCE.get(f"{server.url}/openapi.json").content)
+    description.write_bytes(server.http.get("/openapi.json").content)
     output = ("--output-path", "written", "--meta", "none")
     run("openapi-python-client", "generate", "--path", description, *output, folder=tmp_path)
     operations = [

@@ -1,4 +1,5 @@
-"""A service on PostgreSQL answers as one on a file does: the same is sent to both, and every address is asked of both."""
+"""A service on PostgreSQL answers as one on a file does: the same is sent to both, and every address is asked of both; and
+where its database goes from a file to a server and back, its answers and every table are the same."""
 
 import csv
 import io
@@ -17,7 +18,8 @@ import pytest
 from tests.service.web.routes.surfaces import FRESH, WORN, png
 from tests.service.workflows import stand_in_engine
 from tests.storage.engine.postgresql.server import PostgresServer
-from tests.support import ONCE, PRESSURES_BAR, Server, clutchlife, serving, stationary
+from tests.storage.test_transfer import digests
+from tests.support import PRESSURES_BAR, Server, clutchlife, serving, stationary
 
 #: What hangs on the clock or is drawn at random.
 OF_ITS_OWN = re.compile(
@@ -114,20 +116,18 @@ def names(http: httpx2.Client, kind: str, address: str) -> list[str]:
     return [item[f"{kind}_id"] for item in items]
 
 
-def shared(value: Any) -> Any:
-    """A value of JSON without what hangs on the clock or on chance."""
-    if isinstance(value, dict):
-        return {name: shared(each) for name, each in value.items() if not OF_ITS_OWN.fullmatch(name)}
-    return [shared(each) for each in value] if isinstance(value, list) else value
+def shared(found: dict[str, Any]) -> dict[str, Any]:
+    """An object of JSON, or a row, without what hangs on the clock or on chance."""
+    return {name: each for name, each in found.items() if not OF_ITS_OWN.fullmatch(name)}
 
 
 def content(answer: httpx2.Response) -> Any:
     """What both services must answer alike: status, and body."""
     kind = answer.headers["content-type"]
     if "json" in kind:
-        return answer.status_code, shared(answer.json())
+        return answer.status_code, answer.json(object_hook=shared)
     if "csv" in kind:
-        return answer.status_code, shared(list(csv.DictReader(io.StringIO(answer.text))))
+        return answer.status_code, [shared(row) for row in csv.DictReader(io.StringIO(answer.text))]
     return answer.status_code, answer.content
 
 
@@ -135,17 +135,17 @@ def asked(server: Server) -> dict[str, Any]:
     """address -> what it answers, diagnoses by their place in the list."""
     with httpx2.Client(base_url=server.url, timeout=120, headers={"Prefer": "wait=60"}) as http:
         answers = {address: content(http.get(address)) for address in addresses(http)}
-        answers |= {f"{address} in pages": (200, shared(in_pages(http, address))) for address in LISTS}
+        answers |= {f"{address} in pages": (200, in_pages(http, address)) for address in LISTS}
         ids = {id_: f"diagnosis {clutch} {place}" for clutch in ("bench", "b2") for place, id_ in listed(http, clutch)}
     return {re.sub(r"(?<=diagnoses/)\w+", lambda match: ids[match[0]], name): each for name, each in answers.items()}
 
 
 def in_pages(http: httpx2.Client, address: str) -> list[Any]:
     """A list as its pages of two items give it."""
-    page = http.get(address, params={"limit": 2}).json()
-    items = page["items"]
+    page = http.get(address, params={"limit": 2}).json(object_hook=shared)
+    items: list[Any] = page["items"]
     while page["next"] is not None:
-        page = http.get(address, params={"limit": 2, "cursor": page["next"]}).json()
+        page = http.get(address, params={"limit": 2, "cursor": page["next"]}).json(object_hook=shared)
         items += page["items"]
     return items
 
@@ -163,23 +163,12 @@ def exported(server: Server, folder: Path) -> dict[str, Any]:
     for path in sorted(each for each in folder.rglob("*") if each.is_file()):
         name, text = str(path.relative_to(folder)), path.read_bytes()
         if path.suffix == ".json":
-            files[name] = shared(json.loads(text))
+            files[name] = json.loads(text, object_hook=shared)
         elif path.suffix == ".csv":
             files[name] = MOMENT.sub("", text.decode())
         else:  # the same table, packed
             files[name] = path.suffix in (".parquet", ".xlsx") or text
     return files
-
-
-def test_commands_run_beside_a_service(postgresql: PostgresServer) -> None:
-    address = postgresql.fresh()
-    with serving(address, loaded=True) as server:
-        key = clutchlife("key", "create", "--scope", "read", "--database", address).strip()
-        headers = {"Authorization": f"Bearer {key}"}
-        assert [ONCE.get(f"{server.url}/v1/clutches", headers=each).status_code for each in ({}, headers)] == [401, 200]
-        assert clutchlife("key", "list", "--database", address).startswith(key.split("_")[1])
-        assert ONCE.get(f"{server.url}/v1/clutches/%00", headers=headers).status_code == 422
-        assert ONCE.get(f"{server.url}/readyz").json()["journal_mode"] is None
 
 
 @pytest.mark.slow
@@ -197,3 +186,28 @@ def test_every_answer_is_that_of_a_service_on_a_file(both: tuple[Server, Server]
     files = [exported(server, tmp_path / str(number)) for number, server in enumerate(both)]
     assert files[0] == files[1]
     assert len(files[0]) > 10
+
+
+@pytest.mark.slow
+def test_there_and_back_answers_and_tables_are_the_same(tmp_path: Path, postgresql: PostgresServer) -> None:
+    on_server = postgresql.empty()
+    in_file, back = (f"sqlite:///{tmp_path}/{name}.db" for name in ("first", "back"))
+    with serving(in_file, loaded=True, environment=ENVIRONMENT) as server:
+        fill(server.url)
+        answers = asked(server)
+        running = clutchlife("migrate", "--from", in_file, "--to", on_server, code=1)
+        assert "a service uses this database already" in running
+    before = digests(in_file)
+    said = clutchlife("migrate", "--from", in_file, "--to", on_server)
+    assert f"{sum(rows for rows, _ in before.values())} rows of 5 clutches are the same in both databases" in said
+    assert "must be empty" in clutchlife("migrate", "--from", in_file, "--to", on_server, code=1)
+    assert digests(on_server) == before
+    clutchlife("migrate", "--from", on_server, "--to", back)
+    assert digests(back) == before
+    assert " 0 findings" in clutchlife("verify", "--sample", "1", "--database", back)
+    for address in (on_server, back):
+        with serving(address, loaded=True, environment=ENVIRONMENT) as server:
+            again = asked(server)
+        assert again.keys() == answers.keys()
+        assert [name for name, answer in answers.items() if again[name] != answer] == []
+    postgresql.drop(on_server)

@@ -47,11 +47,10 @@ def servers(address: str) -> Iterator[list[Server]]:
 def seen(server: Server, paths: Sequence[str] = READ) -> dict[str, Any]:
     """Every answer, with its entity tag and revision."""
     answers = {}
-    with httpx2.Client(base_url=server.url, timeout=120) as http:
-        for path in paths:
-            answer = http.get(path)
-            assert answer.status_code == 200, answer.text
-            answers[path] = (answer.headers["etag"], answer.headers.get("clutchlife-revision"), answer.json())
+    for path in paths:
+        answer = server.http.get(path)
+        assert answer.status_code == 200, answer.text
+        answers[path] = (answer.headers["etag"], answer.headers.get("clutchlife-revision"), answer.json())
     return answers
 
 
@@ -90,7 +89,7 @@ def test_the_same_run_sent_to_all_at_once_is_one_run(servers: list[Server]) -> N
         asked = [pool.submit(ONCE.post, f"{server.url}{CLUTCH}/runs", json=sent) for server in servers * 3]
         statuses = sorted(each.result().status_code for each in asked)
     assert statuses == [200] * 5 + [201]
-    assert [len(ONCE.get(f"{server.url}{CLUTCH}/runs").json()["items"]) for server in servers] == [1] * 2
+    assert [len(server.http.get(f"{CLUTCH}/runs").json()["items"]) for server in servers] == [1] * 2
 
 
 @pytest.mark.slow
@@ -102,32 +101,35 @@ def test_a_job_that_one_has_another_cancels(address: str, tmp_path: Path) -> Non
     }
     with ExitStack() as stack:
         one, other = (stack.enter_context(serving(address, loaded=True, environment=environment)) for _ in range(2))
-        ONCE.post(f"{one.url}/v1/clutches", json={"clutch_id": "c1"}).raise_for_status()
-        asked = ONCE.post(f"{one.url}{CLUTCH}/diagnoses", json={}, headers={"Prefer": "wait=0"}).json()["diagnosis_id"]
+        one.http.post("/v1/clutches", json={"clutch_id": "c1"}).raise_for_status()
+        asked = one.http.post(f"{CLUTCH}/diagnoses", json={}, headers={"Prefer": "wait=0"}).json()["diagnosis_id"]
         deadline = time.monotonic() + 60
         while not (tmp_path / "pid").exists():
             assert time.monotonic() < deadline, "it does not begin"
             time.sleep(0.05)
         process = (tmp_path / "pid").read_text()
         for server in (one, other):
-            assert ONCE.delete(f"{server.url}/v1/jobs/{asked}").json()["state"] == "cancelled"
+            assert server.http.delete(f"/v1/jobs/{asked}").json()["state"] == "cancelled"
         while Path("/proc", process).exists():
             assert time.monotonic() < deadline, "its process goes on"
             time.sleep(0.05)
-        assert ONCE.get(f"{other.url}{CLUTCH}/diagnoses/{asked}").json()["problem"] == "cancelled by local"
+        assert other.http.get(f"{CLUTCH}/diagnoses/{asked}").json()["problem"] == "cancelled by local"
 
 
 def test_a_key_that_is_made_or_revoked_counts_everywhere(servers: list[Server], address: str) -> None:
+    """A key that a command makes beside the services."""
     key = clutchlife("key", "create", "--scope", "read", "--database", address).strip()
     headers = {"Authorization": f"Bearer {key}"}
+    assert clutchlife("key", "list", "--database", address).startswith(key.split("_")[1])
 
     def statuses() -> list[list[int]]:
         return [
-            [ONCE.get(f"{server.url}/v1/clutches", headers=each).status_code for each in ({}, headers)]
-            for server in servers
+            [server.http.get("/v1/clutches", headers=each).status_code for each in ({}, headers)] for server in servers
         ]
 
     assert statuses() == [[401, 200]] * 2
+    assert ONCE.get(f"{servers[0].url}/v1/clutches/%00", headers=headers).status_code == 422
+    assert ONCE.get(f"{servers[0].url}/readyz").json()["journal_mode"] is None
     clutchlife("key", "revoke", key.split("_")[1], "--database", address)
     assert statuses() == [[401, 401]] * 2
 

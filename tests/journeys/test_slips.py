@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.support import ONCE, Server, clutchlife, serving, stationary
+from tests.support import Server, clutchlife, serving, stationary
 
 PRESSURES = (4.0, 6.0)
 
@@ -18,17 +18,17 @@ def post(
     body = stationary(cycles, run_id=run_id, pressures=PRESSURES)
     body["channels"]["torque_nm"] = [gain * torque for torque in body["channels"]["torque_nm"]]
     body["cycles"] = cycles if sent is None else sent
-    return ONCE.post(f"{server.url}/v1/clutches/{clutch}/runs", json=body).json()
+    return server.http.post(f"/v1/clutches/{clutch}/runs", json=body).json()
 
 
 def life(server: Server, clutch: str) -> Any:
-    answer = ONCE.get(f"{server.url}/v1/clutches/{clutch}/remaining-useful-life").json()
+    answer = server.http.get(f"/v1/clutches/{clutch}/remaining-useful-life").json()
     return {name: value for name, value in answer.items() if name != "revision"}
 
 
 @pytest.mark.slow
 def test_slips_are_seen_and_mended_in_the_terminal(server: Server, tmp_path: Path) -> None:
-    ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
+    server.http.post("/v1/clutches", json={"clutch_id": "c1"})
     at = ("--url", server.url)
     for cycles in (0.0, 1000.0, 2000.0):
         post(server, "c1", cycles, run_id=f"r{cycles:g}")
@@ -81,7 +81,7 @@ def test_slips_are_seen_and_mended_in_the_terminal(server: Server, tmp_path: Pat
 
 
 def test_all_that_are_held_of_one_cause_are_confirmed_in_one_line(server: Server) -> None:
-    ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c2"})
+    server.http.post("/v1/clutches", json={"clutch_id": "c2"})
     at = ("--url", server.url)
     for cycles in (0.0, 1000.0, 2000.0):
         post(server, "c2", cycles, run_id=f"r{cycles:g}")

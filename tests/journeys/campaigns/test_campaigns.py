@@ -2,7 +2,6 @@
 
 import json
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import pytest
 
 from models.rig import campaign
 from service.run_files.simulated import simulated_body
-from tests.support import ONCE, Server, clutchlife, stationary
+from tests.support import Server, clutchlife, stationary
 
 # --- Simulated campaigns go through the whole way in text and in a binary format: simulate, push, receipts.
 
@@ -25,9 +24,9 @@ def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(serve
         push = ("push", folder, "--clutch", form, "--url", server.url, "--spool", tmp_path / "spool")
         assert "4 stored now, 0 stored before, 0 refused" in clutchlife(*push)
         assert "0 stored now, 4 stored before, 0 refused" in clutchlife(*push)
-        (inspection,) = ONCE.get(f"{server.url}/v1/clutches/{form}/inspections").json()["items"]
+        (inspection,) = server.http.get(f"/v1/clutches/{form}/inspections").json()["items"]
         assert (inspection["cycles"], inspection["roughness_um"], inspection["skewness"]) == (0, 9.52, -0.87)
-        items = ONCE.get(f"{server.url}/v1/clutches/{form}/runs").json()["items"]
+        items = server.http.get(f"/v1/clutches/{form}/runs").json()["items"]
         runs: dict[str, dict[str, Any]] = {run["kind"]: run for run in items}
         assert set(runs) == {"run_in", "stationary_stribeck", "dynamic_stribeck"}
         assert {(run["origin"], run["cycles"]) for run in items} == {("simulated", 0)}
@@ -43,7 +42,7 @@ def test_a_record_that_no_manifest_lists_is_named(server: Server, tmp_path: Path
     folder.mkdir()
     (folder / "first.json").write_text(json.dumps(stationary(0.0, run_id="first")), encoding="utf-8")
     (folder / "lonely.csv").write_text("torque_nm\n1\n", encoding="utf-8")
-    ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
+    server.http.post("/v1/clutches", json={"clutch_id": "c1"})
     output = clutchlife("push", folder, "--clutch", "c1", "--url", server.url, "--spool", tmp_path / "spool")
     assert "not sent, because kind and cycles are not known: " in output
     assert "lonely.csv" in output
@@ -90,14 +89,9 @@ def post(http: httpx2.Client, name: str, scale: float, last: int) -> None:
         assert http.post(f"/v1/clutches/{name}/runs", json=body).status_code == 201
 
 
-@pytest.fixture
-def http(server: Server) -> Iterator[httpx2.Client]:
-    with httpx2.Client(base_url=server.url, timeout=60) as client:
-        yield client
-
-
 @pytest.mark.slow
-def test_a_fleet_is_refreshed_and_scored_beside_the_service(server: Server, http: httpx2.Client) -> None:
+def test_a_fleet_is_refreshed_and_scored_beside_the_service(server: Server) -> None:
+    http = server.http
     database = ("--database", f"sqlite:///{server.database}")
     assert "no prior has been learned" in clutchlife("fleet", *database)
     assert "nothing to score" in clutchlife("score", *database)

@@ -9,15 +9,14 @@ from datetime import datetime, timedelta, tzinfo
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from service.lives.plausibility.doubts import Judged
-from tests.journeys.faults.test_kills import findings, kills, stored
+from tests.journeys.faults.test_kills import bits, findings, kills, numbered, stored
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import granted, revoke_all
 from tests.service.workflows.benches import CLUTCH, body
-from tests.support import ONCE, serving, stationary
+from tests.support import serving
 
 HOUR, DAY = timedelta(hours=1), timedelta(days=1)
 BASE = f"/v1/clutches/{CLUTCH}"
@@ -81,18 +80,14 @@ def served(path: Path, clock: type[Clock], *, jumps: bool) -> dict[str, Any]:
         again = client.post(f"{BASE}/runs", json=SENT[0][1])
         assert (again.status_code, again.json()["received_at"]) == (200, moments[0])
         names = ("", "/runs", "/changes", "/remaining-useful-life", "/degradation", "/stribeck", "/series", "/scores")
-        answers = {name: timeless(client.get(f"{BASE}{name}").json()) for name in names}
+        answers = {name: client.get(f"{BASE}{name}").json(object_hook=timeless) for name in names}
     assert (moments == sorted(moments)) is not jumps, "the clock did not do what was asked of it"
     return answers | {"revisions": revisions}
 
 
-def timeless(answer: Any) -> Any:
-    """An answer without what says when something happened."""
-    if isinstance(answer, list):
-        return [timeless(item) for item in answer]
-    if isinstance(answer, dict):
-        return {name: timeless(value) for name, value in answer.items() if name not in TIMES}
-    return answer
+def timeless(answer: dict[str, Any]) -> dict[str, Any]:
+    """An object of an answer without what says when something happened."""
+    return {name: value for name, value in answer.items() if name not in TIMES}
 
 
 def test_a_clock_that_is_set_back_changes_no_answer_and_loses_no_run(tmp_path: Path, clock: type[Clock]) -> None:
@@ -140,17 +135,16 @@ def test_what_a_client_that_is_killed_sends_to_a_service_that_comes_and_goes_arr
     folder.mkdir()
     sent = {}
     for index in range(RUNS_PER_KILL * number):
-        run = stationary(100 * index, run_id=f"r{index}", pressures=(4.0, 6.0))
-        (folder / f"{index:03}.json").write_text(json.dumps(run))
-        sent[CLUTCH, f"r{index}"] = {name: np.array(column).tobytes() for name, column in run["channels"].items()}
+        (folder / f"{index:03}.json").write_text(json.dumps(numbered(index)))
+        sent[CLUTCH, f"r{index}"] = bits(numbered(index))
     amid = 0
     with serving(path, loaded=True) as server:
         push = [sys.executable, "-m", "service.cli.main", "push", str(folder), "--clutch", CLUTCH, "--url", server.url]
         push += ["--spool", str(tmp_path / "spool"), "--patience", "60"]
-        ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": CLUTCH})
+        server.http.post("/v1/clutches", json={"clutch_id": CLUTCH})
 
         def there() -> int:
-            return int(ONCE.get(f"{server.url}{BASE}").json()["runs"])
+            return int(server.http.get(f"{BASE}").json()["runs"])
 
         for kill in range(number):
             before = there()
@@ -173,7 +167,7 @@ def test_what_a_client_that_is_killed_sends_to_a_service_that_comes_and_goes_arr
         assert amid >= number / 2, f"{amid} of {number} kills came while runs were sent"
         done = subprocess.run(push, capture_output=True, text=True, check=False)
         assert (done.returncode, "0 refused" in done.stdout) == (0, True), done.stdout + done.stderr
-        page = ONCE.get(f"{server.url}{BASE}/runs", params={"limit": 1000}).json()
+        page = server.http.get(f"{BASE}/runs", params={"limit": 1000}).json()
         assert [item["run_id"] for item in page["items"]] == [f"r{index}" for index in range(len(sent))]
     assert stored(path) == sent
     assert findings(path) == []

@@ -1,4 +1,5 @@
-"""Killed at any moment, in whatever it does, the service and its commands lose nothing and leave nothing half done.
+"""Killed at any moment, in whatever they do, the service, its commands and its PostgreSQL server lose nothing and leave
+nothing half done.
 
 Kills are spread evenly over the time that the work takes; `make faults` makes many more of them.
 """
@@ -10,25 +11,31 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
+from typing import Any
 
 import httpx2
 import numpy as np
 import pytest
 
+from service.client.clutchlife import Client, ServiceAwayError
 from service.queries.verification import check_results, check_runs
 from service.workflows.adopt_model import adopt
-from storage import assumptions, channels, clutches, runs
+from storage import assumptions, channels, clutches, jobs, runs
+from storage.engine.database import Database
 from storage.engine.integrity import other_schema
 from storage.engine.opening import find_database, open_database
 from storage.engine.sqlite.backup import restore
 from storage.engine.sqlite.database import back_up
 from storage.migrations.upgrade import head
+from tests.service.alarms.receiving import SECRET, Receiver, receiving
+from tests.service.work.replaying import ended
+from tests.service.workflows import stand_in_engine
 from tests.service.workflows.benches import Bench, body, stood_in
-from tests.storage.engine.postgresql.server import PostgresServer
+from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
 from tests.storage.samples import OLD, integrity, old_database, revision
-from tests.support import Server, stationary
+from tests.support import ONCE, Server, one_quick, serving, stationary
 
 #: Channels of runs, bit for bit, by clutch and run.
 Acknowledged = dict[tuple[str, str], dict[str, bytes]]
@@ -96,6 +103,16 @@ def stored(path: Path | str) -> Acknowledged:
     return content
 
 
+def numbered(number: int) -> dict[str, Any]:
+    """The test of that number in a clutch's life."""
+    return stationary(100 * number, run_id=f"r{number}", pressures=(4.0, 6.0))
+
+
+def bits(sent: dict[str, Any]) -> dict[str, bytes]:
+    """The channels of a body, bit for bit."""
+    return {name: np.array(column).tobytes() for name, column in sent["channels"].items()}
+
+
 def require_all(database: Path | str, acknowledged: Acknowledged, on_their_way: int) -> None:
     """Every acknowledged run is there bit for bit, with results that follow, and at most those beside it that were sent."""
     content = stored(database)
@@ -140,10 +157,9 @@ def post_until_killed(url: str, clutch: str, acknowledged: Acknowledged) -> None
         try:
             assert http.post("/v1/clutches", json={"clutch_id": clutch}).status_code == 201
             for index in range(40):
-                sent = stationary(100 * index, run_id=f"r{index}", pressures=(4.0, 6.0))
+                sent = numbered(index)
                 assert http.post(f"/v1/clutches/{clutch}/runs", json=sent).status_code == 201
-                bits = {name: np.array(column).tobytes() for name, column in sent["channels"].items()}
-                acknowledged[clutch, f"r{index}"] = bits
+                acknowledged[clutch, f"r{index}"] = bits(sent)
         except httpx2.TransportError:
             return
 
@@ -255,3 +271,173 @@ def test_an_adoption_that_is_killed_is_whole_or_not_begun(
 def adopt_on(url: str) -> None:
     with closing(open_database(url)) as database:
         adopt(database, "c1", "d0", "2026-11-02T10:00:00+00:00")
+
+
+# --- On PostgreSQL: the server is killed, or one of several services.
+
+#: [s] Within which a server that was killed is used again.
+IN_TIME = 60.0
+#: The clutch that is diagnosed, by an engine that takes two seconds; a killed service's job is begun again soon.
+DIAGNOSED = "diagnosed"
+SEVERAL = {"CLUTCHLIFE_ENGINE": f"{stand_in_engine.__name__}:slow", "CLUTCHLIFE_JOB_LEASE_SECONDS": "2"}
+
+
+@pytest.fixture
+def postgres() -> Iterator[PostgresServer]:
+    """A server of the test's own, which it may kill."""
+    with postgresql_server() as server:
+        yield server
+
+
+@pytest.mark.slow
+@kills(3, 50)
+def test_no_acknowledged_run_is_lost_where_postgresql_is_killed(postgres: PostgresServer, number: int) -> None:
+    """The service lives on: it refuses what it cannot store, and goes on when the server is back."""
+    url, rng = postgres.fresh(), random.Random(number)  # noqa: S311 - moments, not secrets
+    acknowledged: Acknowledged = {}
+    refused: list[int] = []
+    done = threading.Event()
+    with serving(url, loaded=True) as server:
+        poster = threading.Thread(target=post_until_done, args=(server.url, acknowledged, refused, done))
+        poster.start()
+        try:
+            for _ in range(number):
+                wait_for_runs(acknowledged, 2)
+                time.sleep(rng.uniform(0.0, 0.08))
+                postgres.kill()
+                time.sleep(0.1)
+                postgres.start()
+            wait_for_runs(acknowledged, 2)
+        finally:
+            done.set()
+            poster.join()
+        items = server.http.get("/v1/clutches/c1/runs", params={"limit": 1000}).json()["items"]
+    assert set(refused) <= {503}
+    assert {("c1", item["run_id"]) for item in items} >= acknowledged.keys()
+    require_all(url, acknowledged, on_their_way=0)
+
+
+@pytest.mark.slow
+@kills(1, 20)
+def test_what_a_killed_service_of_several_was_diagnosing_another_makes(postgres: PostgresServer, number: int) -> None:
+    """Runs are posted at all services; the one that has a diagnosis is killed, and comes back later."""
+    url, rng = postgres.fresh(), random.Random(number)  # noqa: S311 - moments, not secrets
+    acknowledged: Acknowledged = {}
+    with ExitStack() as stack:
+        servers = [
+            stack.enter_context(serving(url, loaded=True, environment=SEVERAL)) for _ in range(2 if number == 1 else 3)
+        ]
+        database = stack.enter_context(closing(find_database(url)))
+        ONCE.post(f"{servers[0].url}/v1/clutches", json={"clutch_id": DIAGNOSED}).raise_for_status()
+        for kill in range(number):
+            asked_of = f"{servers[kill % len(servers)].url}/v1/clutches/{DIAGNOSED}"
+            ONCE.post(f"{asked_of}/runs", json=numbered(kill)).raise_for_status()
+            acknowledged[DIAGNOSED, f"r{kill}"] = bits(numbered(kill))
+            posters = [
+                threading.Thread(target=post_until_killed, args=(server.url, f"c{kill}-{place}", acknowledged))
+                for place, server in enumerate(servers)
+            ]
+            for poster in posters:
+                poster.start()
+            job_id = ONCE.post(f"{asked_of}/diagnoses", json={}, headers={"Prefer": "wait=0"}).json()["diagnosis_id"]
+            killed = next(each for each in servers if each.pid == claimer(database, job_id))
+            time.sleep(rng.uniform(0.0, 0.3))
+            killed.kill()
+            other = next(each for each in servers if each is not killed)
+            job = ended(other, job_id)
+            assert (job["state"], job["attempts"]) == ("finished", 2), job
+            for poster in posters:
+                poster.join()
+            killed.start()
+        found = ONCE.get(f"{servers[0].url}/v1/clutches/{DIAGNOSED}/diagnoses").json()["items"]
+    assert [item["status"] for item in found] == ["finished"] * number
+    assert len(acknowledged) > 40 * (len(servers) - 1) * number, "the others went on"
+    require_all(url, acknowledged, on_their_way=number)
+
+
+def claimer(database: Database, job_id: str) -> int:
+    """The number of the process that has the job, once one has."""
+    deadline = time.monotonic() + IN_TIME
+    while True:
+        with database.reading() as connection:
+            job = jobs.get(connection, job_id)
+        if job is not None and job.claimed_by is not None:
+            return int(job.claimed_by.split(":")[1])
+        assert time.monotonic() < deadline, "nobody claims it"
+        time.sleep(0.01)
+
+
+def wait_for_runs(acknowledged: Acknowledged, number: int) -> None:
+    """Wait until so many more runs are acknowledged."""
+    enough, deadline = len(acknowledged) + number, time.monotonic() + IN_TIME
+    while len(acknowledged) < enough:
+        assert time.monotonic() < deadline, "no run was acknowledged"
+        time.sleep(0.001)
+
+
+def post_until_done(url: str, acknowledged: Acknowledged, refused: list[int], done: threading.Event) -> None:
+    """Post runs of one clutch, each until it is acknowledged."""
+    with httpx2.Client(base_url=url, timeout=60) as http:
+        http.post("/v1/clutches", json={"clutch_id": "c1"}).raise_for_status()
+        for number in range(100_000):
+            sent, status = numbered(number), 0
+            while status not in (200, 201):
+                with suppress(httpx2.TransportError):
+                    status = http.post("/v1/clutches/c1/runs", json=sent).status_code
+                if status not in (200, 201):
+                    refused.append(status)
+                    time.sleep(0.02)
+            acknowledged["c1", f"r{number}"] = bits(sent)
+            if done.is_set():
+                return
+
+
+# --- Between raising an alarm and delivering it: delivered once or twice, never not.
+
+
+def prepared(server: Server, receiver: Receiver) -> None:
+    """A clutch whose next test raises an alarm, and the receiver."""
+    with Client(server.url) as client:
+        client.register("e")
+        for cycles in (0.0, 1000.0, 2000.0, 3000.0):
+            client.post_run("e", stationary(cycles))
+        client.service.post("/v1/webhooks", {"url": receiver.url, "secret": SECRET})
+        client.service.post("/v1/alarms", {"clutch_id": "e", "quantity": "held_runs"})
+
+
+def raise_alarm(server: Server) -> None:
+    """Post the test; the service may be killed before it has answered, and has stored it then."""
+    with Client(server.url, patience=0.0) as client, suppress(ServiceAwayError):
+        assert client.post_run("e", stationary(4000.0, wear=0.0))["state"] == "held"
+
+
+@pytest.mark.parametrize("answers", one_quick([True, False]), ids=["while it is asked", "before the receiver is asked"])
+def test_a_killed_service_delivers_after_its_next_start(tmp_path: Path, answers: bool) -> None:
+    server = Server(tmp_path / "clutchlife.db", loaded=True)
+    server.start()
+    with receiving() as receiver:
+        prepared(server, receiver)
+        if answers:  # the request has arrived, and its answer never does
+            receiver.before = lambda _handler: server.kill() if server.exit_code() is None else None
+            raise_alarm(server)
+            receiver.await_requests(1)
+        else:
+            receiver.status = 503  # taken by nobody
+            raise_alarm(server)
+            server.kill()
+            receiver.status = 200
+        receiver.before = lambda _handler: None
+        before = len(receiver.requests)
+        server.start()
+        try:
+            bodies = receiver.await_requests(before + 1)
+            assert len({body["event"]["event_id"] for body in bodies}) == 1
+            assert len({body["delivery_id"] for body in bodies}) == 1
+            with Client(server.url, frames="list") as client:
+                (webhook,) = client.service.pages("/v1/webhooks")
+                address = f"/v1/webhooks/{webhook['webhook_id']}/deliveries"
+                (item,) = client.service.pages(address)
+            assert item["state"] in ("delivered", "waiting")
+            assert len(bodies) - before <= 1
+        finally:
+            server.stop()

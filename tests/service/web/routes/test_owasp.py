@@ -64,7 +64,7 @@ def test_api7_the_service_asks_no_address_that_it_is_sent_but_receivers_of_alarm
 
 @pytest.mark.parametrize("path", ["/", "/clutches/c1", "/docs", "/docs/start.js", CLUTCHES, "/nowhere", "/livez"])
 def test_api8_every_answer_has_the_headers_that_browsers_heed(shared_client: TestClient, path: str) -> None:
-    """In a browser: tests/journeys/test_pages.py and test_files.py."""
+    """In a browser: tests/journeys/dashboard/test_files.py."""
     answer = shared_client.get(path, headers={"Origin": "http://127.0.0.1"})
     policy = dict(part.strip().split(" ", 1) for part in answer.headers["content-security-policy"].split(";"))
     assert (policy["script-src"], policy["frame-ancestors"], policy["object-src"]) == ("'self'", "'none'", "'none'")
