@@ -1,12 +1,13 @@
 """Driving a browser: launched the same way everywhere, and pages that note whatever they must not do."""
 
-from collections.abc import Iterator
+import base64
+import os
+import shutil
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 from playwright.sync_api import Browser, BrowserType, Page, expect, sync_playwright
-
-from tests.browser import system
 
 #: [ms] How long a page may take to show what is waited for: on a busy machine a diagnosis took more than 20 s.
 _PATIENCE = 60_000
@@ -29,6 +30,12 @@ document.addEventListener("securitypolicyviolation", (event) => {
   window.violations.push(`${event.effectiveDirective} ${event.blockedURI} ${event.sourceFile}`);
 });
 """
+
+
+def system() -> str | None:
+    """$CHROMIUM or one on the path; where there is none, Playwright launches its own."""
+    names = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
+    return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
 
 
 def launched(kind: BrowserType, *, more: tuple[str, ...] = ()) -> Browser:
@@ -65,6 +72,21 @@ def turned(page: Page, tab: str) -> Page:
         page.locator(f"#tabs a[href='#/{tab}']").click()
     page.locator(f"#tab-{tab}").wait_for()
     return page
+
+
+_DROP = """(files) => {
+  const transfer = new DataTransfer();
+  for (const [name, data] of files)
+    transfer.items.add(new File([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], name));
+  for (const type of ["dragenter", "dragover", "drop"])
+    document.body.dispatchEvent(new DragEvent(type, {bubbles: true, cancelable: true, dataTransfer: transfer}));
+}"""
+
+
+def drop(page: Page, files: Mapping[str, str | bytes]) -> None:
+    """Drop files on a page as a person would: text or bytes, by their names, all at once."""
+    contents = {name: content.encode() if isinstance(content, str) else content for name, content in files.items()}
+    page.evaluate(_DROP, [[name, base64.b64encode(content).decode()] for name, content in contents.items()])
 
 
 class Watched:

@@ -3,7 +3,7 @@
 import base64
 from dataclasses import dataclass
 
-from playwright.sync_api import Browser
+from playwright.sync_api import Locator
 
 _COUNT = """async (png) => {
   const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${png}`)).blob());
@@ -47,8 +47,10 @@ class Seen:
         return max(self.ground >> 16, (self.ground >> 8) & 255, self.ground & 255) < 80
 
 
-def seen(browser: Browser, png: bytes) -> Seen:
-    """What is in a screenshot."""
+def seen(place: Locator) -> Seen:
+    """What is in a place of a page, in an empty page of the same browser: the place's own may not read pictures."""
+    png, browser = place.screenshot(), place.page.context.browser
+    assert browser is not None
     page = browser.new_page()
     drawn, coloured, ground = page.evaluate(_COUNT, base64.b64encode(png).decode())
     page.close()

@@ -2,9 +2,8 @@
 
 from collections.abc import Iterator
 
-import httpx2
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 from tests.browser.driving import Watched
 from tests.browser.lives import post
@@ -15,17 +14,15 @@ pytestmark = pytest.mark.browser
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serving(tmp_path_factory.mktemp("alarms") / "clutchlife.db", loaded=True) as server:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            http.post("/v1/clutches", json={"clutch_id": "bench"}).raise_for_status()
-            for cycles in (0, 1000, 2000):
-                post(http, "bench", stationary(cycles, pressures=(5.0,)))
-        yield server
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with serving(tmp_path_factory.mktemp("alarms") / "clutchlife.db", loaded=True) as running:
+        running.http.post("/v1/clutches", json={"clutch_id": "bench"}).raise_for_status()
+        for cycles in (0, 1000, 2000):
+            post(running.http, "bench", stationary(cycles, pressures=(5.0,)))
+        yield running
 
 
-def test_a_rule_is_made_an_alarm_raised_and_acknowledged(browser: Browser, bench: Server) -> None:
-    watched = Watched(browser, bench.url)
+def test_a_rule_is_made_an_alarm_raised_and_acknowledged(watched: Watched, server: Server) -> None:
     page = watched.open("/clutches/bench#/alarms")
     page.get_by_text("No alarm has been raised.").wait_for()
     page.get_by_role("button", name="New rule …").click()
@@ -36,19 +33,16 @@ def test_a_rule_is_made_an_alarm_raised_and_acknowledged(browser: Browser, bench
     form.get_by_label("Name").fill("soon")
     page.keyboard.press("Enter")
     expect(page.get_by_role("table", name="Rules")).to_contain_text("below 900,001 cycles")
-    with httpx2.Client(base_url=bench.url, timeout=60) as http:
-        post(http, "bench", stationary(3000, pressures=(5.0,)))
+    post(server.http, "bench", stationary(3000, pressures=(5.0,)))
     events = page.get_by_role("table", name="Alarms, the newest first")
     expect(events).to_contain_text("Not acknowledged")
     assert violations(page) == []
     events.get_by_role("button", name="Acknowledge").click()
     expect(events).to_contain_text("Acknowledged by")
-    with httpx2.Client(base_url=bench.url, timeout=60) as http:
-        post(http, "bench", stationary(4000, pressures=(5.0,)))
-    page.goto(f"{bench.url}/#/alarms")
+    post(server.http, "bench", stationary(4000, pressures=(5.0,)))
+    page.goto(f"{server.url}/#/alarms")
     events.wait_for()
     expect(events.get_by_role("row")).to_have_count(2)
     expect(events).to_contain_text("Acknowledged by")
     page.get_by_role("button", name="Delete: Remaining cycles").click()
     page.get_by_text("No rule yet: nothing raises an alarm.").wait_for()
-    watched.close()

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from typing import Any
 
-import httpx2
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Browser, Page, expect
@@ -23,17 +22,16 @@ WIDE = {"width": 1360, "height": 900}
 def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     engine = {"CLUTCHLIFE_ENGINE": f"{stand_in_engine.__name__}:diagnose"}
     with serving(tmp_path_factory.mktemp("axe") / "clutchlife.db", loaded=True, environment=engine) as server:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            worn(http, "bench", last=4000)
-            odd = stationary(5000, run_id="odd")
-            odd["channels"]["torque_nm"] = [100 * value for value in odd["channels"]["torque_nm"]]
-            assert post(http, "bench", odd)["state"] == "held"
-            post(http, "bench", stationary(4500, run_id="aside"))
-            http.post("/v1/clutches/bench/runs/aside/withdraw", json={"reason": "to look at"}).raise_for_status()
-            http.post("/v1/clutches", json={"clutch_id": "waiting"})
-            http.post("/v1/clutches/bench/diagnoses", json={"adopt": False}).raise_for_status()
-            # what the charts show is made before the page asks: this is not about how long that takes beside a browser
-            http.get("/v1/clutches/bench/degradation", headers={"Prefer": "wait=60"}).raise_for_status()
+        worn(server.http, "bench", last=4000)
+        odd = stationary(5000, run_id="odd")
+        odd["channels"]["torque_nm"] = [100 * value for value in odd["channels"]["torque_nm"]]
+        assert post(server.http, "bench", odd)["state"] == "held"
+        post(server.http, "bench", stationary(4500, run_id="aside"))
+        server.http.post("/v1/clutches/bench/runs/aside/withdraw", json={"reason": "to look at"}).raise_for_status()
+        server.http.post("/v1/clutches", json={"clutch_id": "waiting"})
+        server.http.post("/v1/clutches/bench/diagnoses", json={"adopt": False}).raise_for_status()
+        # what the charts show is made before the page asks: this is not about how long that takes beside a browser
+        server.http.get("/v1/clutches/bench/degradation", headers={"Prefer": "wait=60"}).raise_for_status()
         yield server.url
 
 

@@ -6,44 +6,144 @@ After each step every answer of the clutch is that of a clutch which was sent th
 import json
 import re
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import httpx2
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Locator, Page, expect
 
-from tests.browser.driving import Watched, turned
-from tests.browser.dropping import drop
-from tests.browser.lives import post
-from tests.browser.slips import (
-    CLUTCH,
-    LAST,
-    accepted_part,
-    answers,
-    ask,
-    done,
-    fill,
-    opened,
-    right,
-    run_in,
-    settled,
-    trail,
-    typed,
-)
-from tests.support import ONCE, Server, serving
+from tests.browser.driving import Watched, drop, turned
+from tests.browser.lives import loops, post
+from tests.support import ONCE, Server, serving, stationary
 
 pytestmark = pytest.mark.browser
+
+CLUTCH = "/v1/clutches/bench"
+#: What the answers are compared in; all else of `/runs` is the trail of what was sent.
+ANSWERS = [
+    "/v1/clutches",
+    CLUTCH,
+    *(f"{CLUTCH}/remaining-useful-life?method={method}" for method in ("particle", "ukf", "grid")),
+    f"{CLUTCH}/remaining-useful-life?at_cycles=5000",
+    f"{CLUTCH}/degradation",
+    *(f"{CLUTCH}/series?limit=1000&quantity={quantity}" for quantity in ("mean_cof", "remaining_cycles")),
+    f"{CLUTCH}/stribeck",
+    f"{CLUTCH}/loops",
+]
+#: When something was stored, and how many changes there were.
+TIMES = {"revision", "created_at", "received_at"}
+#: What says that runs are held, and what follows from it while they are.
+OF_HELD_RUNS = {"held_runs", "at_least", "at_least_at", "counted_from", "state", "statement", "warnings", "items"}
+LAST = 7000
+PRESSURES = (4.0, 5.0, 6.0)
+#: Of the first test; the others follow as their cycles do, 1,000 an hour.
+FIRST = datetime(2026, 11, 2, 8, tzinfo=UTC)
+
+
+def right(cycles: int) -> dict[str, Any]:
+    """A test as it ought to be sent; its name says nothing of its cycles."""
+    return stationary(cycles, run_id=f"test-{cycles // 1000}", pressures=PRESSURES) | {"started_at": at(cycles)}
+
+
+def at(cycles: int) -> str:
+    return (FIRST + timedelta(hours=cycles / 1000)).isoformat()
+
+
+def typed() -> dict[str, Any]:
+    """The last test with a zero too many."""
+    return right(LAST) | {"cycles": 10 * LAST}
+
+
+def fill(http: httpx2.Client) -> None:
+    """A life up to the test before the last."""
+    http.post("/v1/clutches", json={"clutch_id": "bench"}).raise_for_status()
+    for cycles in range(0, LAST, 1000):
+        assert post(http, "bench", right(cycles))["state"] == "accepted"
+    post(http, "bench", loops(4000, pressures=(5.0,)) | {"started_at": at(4000)})
+
+
+def plain(answer: dict[str, Any]) -> dict[str, Any]:
+    """An object of an answer without times and revisions."""
+    return {key: part for key, part in answer.items() if key not in TIMES}
+
+
+def answers(url: str) -> dict[str, Any]:
+    newest = {"Prefer": "wait=60"}  # a page that reads as well keeps the workers busy
+    read = {path: ONCE.get(f"{url}{path}", headers=newest).raise_for_status() for path in ANSWERS}
+    return {path: answer.json(object_hook=plain) for path, answer in read.items()}
+
+
+def accepted_part(found: dict[str, Any]) -> dict[str, Any]:
+    """Of a clutch's answers, what depends on accepted runs alone."""
+    return {
+        path: {key: value for key, value in answer.items() if key not in OF_HELD_RUNS}
+        for path, answer in found.items()
+        if path.startswith(f"{CLUTCH}/")
+    }
+
+
+def opened(watched: Watched) -> Page:
+    page = watched.open("/clutches/bench#/runs")
+    page.locator("#runs .runs details").first.wait_for()
+    return page
+
+
+def run_in(page: Page, run_id: str) -> Locator:
+    """A run in the list, opened."""
+    turned(page, "runs")
+    details = page.locator(f"#runs details[data-run='{run_id}']")
+    details.wait_for()
+    if details.get_attribute("open") is None:
+        details.locator("summary").first.click()
+    return details
+
+
+def ask(place: Locator, button: str, reason: str, *, cycles: int | None = None) -> None:
+    """Press a run's button and answer its question."""
+    place.get_by_role("button", name=button).click()
+    dialog = place.page.get_by_role("dialog")
+    if cycles is not None:
+        dialog.get_by_label("Duty cycles since new").fill(str(cycles))
+    dialog.get_by_label("Reason").fill(reason)
+    place.page.keyboard.press("Enter")
+    expect(dialog).to_have_count(0)
+
+
+def done(page: Page, text: str) -> None:
+    """The page says what was done, and holds the focus there for the next key."""
+    place = page.locator(".done")
+    expect(place).to_contain_text(text)
+    expect(place).to_be_focused()
+
+
+def settled(page: Page, held: int) -> None:
+    """The page shows so many held runs at its top."""
+    turned(page, "overview")
+    if held == 0:
+        expect(page.locator("#held")).to_have_count(0)
+        expect(page.locator("#head .mark-held")).to_have_count(0)
+    else:
+        expect(page.locator("#held")).to_contain_text(f"{held} run is held")
+        expect(page.locator("#head .mark-held")).to_have_text(f"{held} run held")
+
+
+def trail(page: Page) -> list[list[str]]:
+    """What, who and why in the audit trail."""
+    turned(page, "history")
+    rows = page.locator("#changes tbody tr")
+    expect(page.locator("#changes tbody")).to_be_visible()
+    return [[row.locator("td").nth(cell).inner_text() for cell in (1, 3, 4)] for row in rows.all()]
 
 
 @pytest.fixture(scope="module")
 def references(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """The answers of a clutch that never had a typo: `before` the last test, and `after` it."""
     with serving(tmp_path_factory.mktemp("right") / "clutchlife.db", loaded=True) as server:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            fill(http)
-            before = answers(server.url)
-            post(http, "bench", right(LAST))
+        fill(server.http)
+        before = answers(server.url)
+        post(server.http, "bench", right(LAST))
         return {"before": before, "after": answers(server.url)}
 
 
@@ -51,8 +151,7 @@ def references(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 def server(tmp_path: Path) -> Iterator[Server]:
     """The same life up to the test before the last."""
     with serving(tmp_path / "clutchlife.db", loaded=True) as running:
-        with httpx2.Client(base_url=running.url, timeout=60) as http:
-            fill(http)
+        fill(running.http)
         yield running
 
 
@@ -108,18 +207,14 @@ def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server, r
 
     turned(page, "history")
     expect(page.locator("#changes tbody tr")).to_have_count(6)
-    changes = trail(page)
-    assert [row[0] for row in changes[:2]] == ["Cycles corrected: 70,000 to 7,000", "Cycles corrected: 7,000 to 70,000"]
-    assert [row[2] for row in changes] == [
-        "and back",
-        "only to see it",
-        "it was a zero too many after all",
-        "the correction is undone",
-        "a zero too many",
-        "–",
+    assert trail(page) == [
+        ["Cycles corrected: 70,000 to 7,000", "this machine", "and back"],
+        ["Cycles corrected: 7,000 to 70,000", "this machine", "only to see it"],
+        ["Cycles corrected: 70,000 to 7,000", "this machine", "it was a zero too many after all"],
+        ["Cycles corrected: 7,000 to 70,000", "this machine", "the correction is undone"],
+        ["Cycles corrected: 70,000 to 7,000", "this machine", "a zero too many"],
+        ["Held on arrival", "this machine", "–"],
     ]
-    assert changes[-1][0] == "Held on arrival"
-    assert {row[1] for row in changes} == {"this machine"}
     with page.expect_download() as sheet:
         page.locator("#changes").get_by_role("link", name="CSV").click()
     assert Path(sheet.value.path()).read_text(encoding="utf-8").count("a zero too many") == 2
@@ -134,7 +229,7 @@ def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server, r
 @pytest.mark.slow
 def test_a_doubt_is_answered_with_one_click(watched: Watched, server: Server, references: dict[str, Any]) -> None:
     page = opened(watched)
-    post_typed(server)
+    post(server.http, "bench", typed())
     page.reload()
     settled(page, 1)
     held = page.locator("#held .held > li")
@@ -149,12 +244,6 @@ def test_a_doubt_is_answered_with_one_click(watched: Watched, server: Server, re
     done(page, "Corrected from 70,000 to 7,000 cycles.")
     settled(page, 0)
     assert answers(server.url) == references["after"]
-
-
-def post_typed(server: Server) -> None:
-    """The last test, with a zero too many."""
-    with httpx2.Client(base_url=server.url, timeout=60) as http:
-        post(http, "bench", typed())
 
 
 @pytest.mark.slow
@@ -173,7 +262,7 @@ def test_a_reason_is_asked_for_and_a_refusal_is_shown(watched: Watched, server: 
     page.keyboard.press("Enter")
     dialog.get_by_text("Nothing was changed. Not possible now").wait_for()
     page.keyboard.press("Escape")
-    assert ONCE.get(f"{server.url}{CLUTCH}/changes").json()["items"] == []
+    assert server.http.get(f"{CLUTCH}/changes").json()["items"] == []
     assert all("409" in line for line in watched.errors())
     watched.said.clear()
 
@@ -218,8 +307,7 @@ def test_warnings_of_a_life_stand_on_its_page(watched: Watched, server: Server) 
     expect(page.locator("#tab-overview")).not_to_contain_text("The last test does not fit")
     odd = right(LAST)
     odd["channels"]["torque_nm"] = [0.93 * value for value in odd["channels"]["torque_nm"]]
-    with httpx2.Client(base_url=server.url, timeout=60) as http:
-        assert [warning["code"] for warning in post(http, "bench", odd)["warnings"]] == ["off_track"]
+    assert [warning["code"] for warning in post(server.http, "bench", odd)["warnings"]] == ["off_track"]
     warning = page.locator("#warnings li").filter(has_text="The last test does not fit")
     warning.get_by_text(re.compile("its mean COF of .* is .* standard deviations below")).wait_for()
     link = warning.get_by_role("link", name="Stationary Stribeck test at 7,000 cycles")
@@ -232,9 +320,8 @@ def test_warnings_of_a_life_stand_on_its_page(watched: Watched, server: Server) 
 
 @pytest.mark.slow
 def test_runs_are_listed_page_by_page_the_latest_first(watched: Watched, server: Server) -> None:
-    with httpx2.Client(base_url=server.url, timeout=60) as http:
-        for cycles in range(6010, 6330, 10):
-            post(http, "bench", {"kind": "maintenance", "cycles": cycles, "event": "other", "note": f"n{cycles}"})
+    for cycles in range(6010, 6330, 10):
+        post(server.http, "bench", {"kind": "maintenance", "cycles": cycles, "event": "other", "note": f"n{cycles}"})
     page = opened(watched)
     listed = page.locator("#runs .runs details .at")
     pager = page.get_by_role("navigation", name="Pages of runs")

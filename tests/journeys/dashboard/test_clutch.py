@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-import httpx2
 import openpyxl
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
@@ -58,10 +57,9 @@ MAX_OVERVIEW_PX, MAX_TOP_LINE_MS = 1700, 1000
 def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """The demo's life as sim-1, with an oil change beside what the simulation gives."""
     with serving(tmp_path_factory.mktemp("life") / "clutchlife.db", loaded=True) as server:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            clutch_id = demo(http)
-            note = "<img src=x onerror=alert(1)>"
-            post(http, clutch_id, {"kind": "maintenance", "cycles": 5000, "event": "oil_change", "note": note})
+        clutch_id = demo(server.http)
+        note = "<img src=x onerror=alert(1)>"
+        post(server.http, clutch_id, {"kind": "maintenance", "cycles": 5000, "event": "oil_change", "note": note})
         yield server
 
 
@@ -95,19 +93,19 @@ def drawn(page: Page, name: str) -> Locator:
 
 
 @pytest.mark.slow
-def test_every_chart_is_drawn(browser: Browser, watched_3d: Watched) -> None:
+def test_every_chart_is_drawn(watched_3d: Watched) -> None:
     page = opened(watched_3d)
     pointed_at(page)
     for tab, names in CHARTS.items():
         turned(page, tab)
         expect(page.locator("figure.chart:visible h3")).to_have_text(list(names.values()))
         for name in names:
-            found = seen(browser, drawn(page, name).locator(".plot").screenshot())
+            found = seen(drawn(page, name).locator(".plot"))
             assert found.is_chart, (name, found)
             assert not found.is_dark, name
     turned(page, "overview")
     # the check itself can fail: what is no chart is not taken for one
-    assert not seen(browser, page.locator("#chart-fan figcaption .note").screenshot()).is_chart
+    assert not seen(page.locator("#chart-fan figcaption .note")).is_chart
 
 
 @pytest.mark.slow
@@ -190,7 +188,7 @@ def test_units_are_chosen_and_kept(browser: Browser, life: Server) -> None:
 
 
 @pytest.mark.slow
-def test_dark_and_light_are_chosen_and_the_charts_follow(browser: Browser, watched_3d: Watched) -> None:
+def test_dark_and_light_are_chosen_and_the_charts_follow(watched_3d: Watched) -> None:
     page = opened(watched_3d)
     pointed_at(page)
     button = page.locator("#theme")
@@ -201,11 +199,11 @@ def test_dark_and_light_are_chosen_and_the_charts_follow(browser: Browser, watch
         for name in ("fan", "roughness") if theme == "dark" else ("fan",):
             chart = drawn(page, name)
             page.wait_for_timeout(300)
-            found = seen(browser, chart.locator(".plot").screenshot())
+            found = seen(chart.locator(".plot"))
             assert (found.is_chart, found.is_dark) == (True, dark), (theme, name)
     page.emulate_media(color_scheme="dark")
     page.wait_for_timeout(300)
-    assert seen(browser, drawn(page, "fan").locator(".plot").screenshot()).is_dark
+    assert seen(drawn(page, "fan").locator(".plot")).is_dark
     page.emulate_media(color_scheme="light")
 
 
@@ -288,28 +286,24 @@ def test_pressure_and_view_are_chosen_by_keyboard(watched: Watched) -> None:
 
 
 @pytest.mark.slow
-def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, tmp_path: Path) -> None:
-    with (
-        serving(tmp_path / "clutchlife.db", loaded=True) as server,
-        httpx2.Client(base_url=server.url, timeout=60) as http,
-    ):
-        http.post("/v1/clutches", json={"clutch_id": "live"})
-        watched = Watched(browser, server.url)
-        page = watched.open("/clutches/live")
-        page.get_by_role("heading", name="No run has arrived").wait_for()
-        page.evaluate("window.same = true")
-        post(http, "live", stationary(0))
-        pointed_at(page)
-        expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(1)
-        turned(page, "history").locator("#chart-predicted").get_by_text("From the third stationary test on").wait_for()
-        turned(page, "loops").locator("#chart-loop-curves").get_by_text("No dynamic Stribeck test yet").wait_for()
-        for cycles in (1000, 2000):
-            post(http, "live", stationary(cycles))
-        expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(3)
-        turned(page, "history")
-        page.locator("#chart-predicted[data-drawn]").wait_for()
-        assert page.evaluate("window.same")
-        watched.close()
+def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, server: Server) -> None:
+    server.http.post("/v1/clutches", json={"clutch_id": "live"})
+    watched = Watched(browser, server.url)
+    page = watched.open("/clutches/live")
+    page.get_by_role("heading", name="No run has arrived").wait_for()
+    page.evaluate("window.same = true")
+    post(server.http, "live", stationary(0))
+    pointed_at(page)
+    expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(1)
+    turned(page, "history").locator("#chart-predicted").get_by_text("From the third stationary test on").wait_for()
+    turned(page, "loops").locator("#chart-loop-curves").get_by_text("No dynamic Stribeck test yet").wait_for()
+    for cycles in (1000, 2000):
+        post(server.http, "live", stationary(cycles))
+    expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(3)
+    turned(page, "history")
+    page.locator("#chart-predicted[data-drawn]").wait_for()
+    assert page.evaluate("window.same")
+    watched.close()
 
 
 @pytest.mark.slow
@@ -324,7 +318,7 @@ def test_the_report_is_one_page_and_light(browser: Browser, life: Server) -> Non
     report = page.locator("#report")
     for part in ("sim-1", "Remaining cycles", "Threshold", "Diagnosis:", "The last tests", "Made of: Clutchlife "):
         assert part in report.inner_text()
-    assert not seen(browser, report.screenshot()).is_dark
+    assert not seen(report).is_dark
     watched.close()
 
 

@@ -1,55 +1,52 @@
 """A diagnosis from the page: run, read, adopted after a question, taken back. The engine is a quick stand-in."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
-import httpx2
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from tests.browser.driving import Watched, turned
 from tests.browser.lives import post, worn
 from tests.browser.pixels import seen
-from tests.support import ONCE, serving, stationary
+from tests.support import Server, serving, stationary
 
 pytestmark = pytest.mark.browser
-expect.set_options(timeout=30_000)
 
 ENGINE = "tests.service.workflows.stand_in_engine:diagnose"
 
 
 @pytest.fixture
-def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    database = tmp_path_factory.mktemp("diagnosis") / "clutchlife.db"
-    with serving(database, loaded=True, environment={"CLUTCHLIFE_ENGINE": ENGINE}) as server:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            worn(http, "bench", last=5000)
-        yield server.url
+def server(tmp_path: Path) -> Iterator[Server]:
+    environment = {"CLUTCHLIFE_ENGINE": ENGINE}
+    with serving(tmp_path / "clutchlife.db", loaded=True, environment=environment) as running:
+        worn(running.http, "bench", last=5000)
+        yield running
 
 
-def told(url: str, path: str) -> dict[str, Any]:
-    found: dict[str, Any] = ONCE.get(f"{url}/v1/clutches/bench{path}", timeout=60).json()
+def told(server: Server, path: str) -> dict[str, Any]:
+    found: dict[str, Any] = server.http.get(f"/v1/clutches/bench{path}").json()
     return found
 
 
-def test_a_diagnosis_is_run_adopted_and_taken_back(browser: Browser, url: str) -> None:
-    watched = Watched(browser, url)
+def test_a_diagnosis_is_run_adopted_and_taken_back(watched: Watched, server: Server) -> None:
     page = watched.open("/clutches/bench#/diagnosis")
     section = page.locator("#diagnosis")
     section.get_by_text("No diagnosis has been run yet").wait_for()
     section.get_by_role("button", name="Run the diagnosis").click()
     section.get_by_text("Cause named.").wait_for(timeout=60_000)
-    report = told(url, f"/diagnoses/{told(url, '/diagnoses')['items'][0]['diagnosis_id']}")
+    report = told(server, f"/diagnoses/{told(server, '/diagnoses')['items'][0]['diagnosis_id']}")
     for part in (report["summary"], "Zero of the torque sensor", "17 % less error", "read the unloaded zero", "98 %"):
         assert part in section.inner_text(), part
-    maps_are_drawn(browser, page)
+    maps_are_drawn(page)
     expect(page.locator("#head .verdict")).to_contain_text("Out of specification")
 
     adopt(page, agree=False)
-    assert told(url, "/remaining-useful-life")["model"]["name"] == "baseline"
+    assert told(server, "/remaining-useful-life")["model"]["name"] == "baseline"
     adopt(page, agree=True)
     expect(section).to_contain_text("This diagnosis is adopted")
-    assert told(url, "/remaining-useful-life")["model"]["effects"] == report["causes"]
+    assert told(server, "/remaining-useful-life")["model"]["effects"] == report["causes"]
     turned(page, "overview")
     expect(page.locator(".tiles")).to_contain_text("For torque zero shift")
     expect(page.locator("#head .verdict")).not_to_contain_text("Out of specification")
@@ -60,15 +57,14 @@ def test_a_diagnosis_is_run_adopted_and_taken_back(browser: Browser, url: str) -
     assert "no longer account for" in dialog.inner_text()
     dialog.get_by_role("button", name="Go back").click()
     section.get_by_role("button", name="Adopt the extended model").wait_for()
-    assert told(url, "/remaining-useful-life")["model"]["name"] == "baseline"
+    assert told(server, "/remaining-useful-life")["model"]["name"] == "baseline"
     turned(page, "overview")
     expect(page.locator(".tiles")).to_contain_text("no diagnosis is adopted")
 
-    page.goto(f"{url}/")
+    page.goto(f"{server.url}/")
     row = page.locator("tr[data-clutch='bench']")
     expect(row).to_contain_text("Out of specification")
     expect(row.locator("td[data-label='Diagnosis']")).to_contain_text("Cause named")
-    watched.close()
 
 
 def adopt(page: Page, *, agree: bool) -> None:
@@ -84,49 +80,39 @@ def adopt(page: Page, *, agree: bool) -> None:
     expect(dialog).to_have_count(0)
 
 
-def maps_are_drawn(browser: Browser, page: Page) -> None:
+def maps_are_drawn(page: Page) -> None:
     page.locator("#chart-map-speed").get_by_role("button", name="Draw it").click()
     for name in ("map-speed", "map-cycles", "diagnosis-loops"):
         page.locator(f"#chart-{name}").scroll_into_view_if_needed()
         page.locator(f"#chart-{name}[data-drawn]").wait_for()
     page.wait_for_timeout(200)
-    assert seen(browser, page.locator("#chart-diagnosis-loops .plot").screenshot()).is_chart
+    assert seen(page.locator("#chart-diagnosis-loops .plot")).is_chart
 
 
 @pytest.mark.slow
-def test_a_rebuild_ends_what_a_diagnosis_said(browser: Browser, url: str) -> None:
-    ONCE.post(f"{url}/v1/clutches/bench/diagnoses", json={"adopt": False}, timeout=60).raise_for_status()
-    watched = Watched(browser, url)
+def test_a_rebuild_ends_what_a_diagnosis_said(watched: Watched, server: Server) -> None:
+    server.http.post("/v1/clutches/bench/diagnoses", json={"adopt": False}).raise_for_status()
     page = watched.open("/")
     row = page.locator("tr[data-clutch='bench']")
     expect(row).to_contain_text("Out of specification")
     expect(row).not_to_contain_text("before the rebuild")
-    with httpx2.Client(base_url=url, timeout=60) as http:
-        post(http, "bench", {"kind": "maintenance", "cycles": 5000, "event": "rebuild"})
-        for cycles in (5100, 6000, 7000):
-            post(http, "bench", stationary(cycles, wear=(cycles - 5000) / 26_000))
+    post(server.http, "bench", {"kind": "maintenance", "cycles": 5000, "event": "rebuild"})
+    for cycles in (5100, 6000, 7000):
+        post(server.http, "bench", stationary(cycles, wear=(cycles - 5000) / 26_000))
     expect(row).to_contain_text("Normal")
     expect(row.locator("td[data-label='Diagnosis']")).to_contain_text("before the rebuild")
     watched.open("/clutches/bench#/diagnosis")
     page.locator("#diagnosis").get_by_text("which concerns the earlier life").wait_for()
     expect(page.locator("#head .verdict")).to_contain_text("Normal")
     expect(page.get_by_role("button", name="Adopt the extended model")).to_have_count(0)
-    watched.close()
 
 
 @pytest.mark.slow
-def test_a_failed_diagnosis_says_why(browser: Browser, url: str) -> None:
-    watched = Watched(browser, url)
+def test_a_failed_diagnosis_says_why(watched: Watched, server: Server) -> None:
     page = watched.page
-    answer = told(url, "/diagnoses")
-    problem = {
-        "type": "about:blank",
-        "title": "Busy",
-        "status": 503,
-        "detail": "16 diagnoses wait already: ask again",
-        "errors": [],
-        "total_errors": 0,
-    }
+    answer = told(server, "/diagnoses")
+    problem = {"type": "about:blank", "title": "Busy", "status": 503, "detail": "16 diagnoses wait already: ask again"}
+    problem |= {"errors": [], "total_errors": 0}
 
     def refuse(route: Any) -> None:
         if route.request.method == "POST":
@@ -139,7 +125,6 @@ def test_a_failed_diagnosis_says_why(browser: Browser, url: str) -> None:
     page.get_by_role("button", name="Run the diagnosis").click()
     page.locator("#diagnosis").get_by_text("16 diagnoses wait already").wait_for()
     assert page.get_by_role("button", name="Run the diagnosis").is_enabled()
-    assert told(url, "/diagnoses") == answer
+    assert told(server, "/diagnoses") == answer
     assert all("503" in line for line in watched.errors())
     watched.said.clear()
-    watched.close()

@@ -1,45 +1,27 @@
-"""The pages' files: what browsers may keep, what is compressed, what may run; and that no chart library is imported."""
+"""The pages' files: what is compressed, that no chart library is imported; and the API's own page."""
 
 import gzip
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 
-import httpx2
 import pytest
+from playwright.sync_api import Browser
 
-from tests.support import serving
-
-PAGES = ("/", "/clutches/bench3-017")
-
-
-@pytest.fixture(scope="module")
-def http(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx2.Client]:
-    """A client of an empty service."""
-    with (
-        serving(tmp_path_factory.mktemp("files") / "clutchlife.db", loaded=True) as server,
-        httpx2.Client(base_url=server.url, timeout=60) as found,
-    ):
-        yield found
+from tests.support import Server
 
 
-def assets_of(http: httpx2.Client, path: str) -> list[str]:
-    """Paths of a page's files; the page names them relative to itself, so that it may stand behind any path."""
-    page = http.get(path)
-    names = re.findall(r'(?:src|href)="([^"]*assets/[^"]+)"', page.text)
-    return [page.url.join(name).path for name in names]
-
-
-def test_the_plotting_library_goes_out_compressed(http: httpx2.Client) -> None:
-    name = "/".join([*assets_of(http, PAGES[1])[0].split("/")[:3], "plotly.min.js"])
-    with http.stream("GET", name, headers={"Accept-Encoding": "gzip"}) as answer:
+def test_the_plotting_library_goes_out_compressed(server: Server) -> None:
+    assets = re.search(r"/assets/[0-9a-f]+", server.http.get("/").text)
+    assert assets is not None
+    name = f"{assets[0]}/plotly.min.js"
+    with server.http.stream("GET", name, headers={"Accept-Encoding": "gzip"}) as answer:
         raw = b"".join(answer.iter_raw())
+    plain = server.http.get(name, headers={"Accept-Encoding": "identity"})
     assert len(raw) < 1_700_000
     text = gzip.decompress(raw).decode()
     assert "plotly.js v" in text[:200]
     assert "MIT license" in text[:400]
-    plain = http.get(name, headers={"Accept-Encoding": "identity"})
     assert "content-encoding" not in plain.headers
     assert plain.text == text
     assert plain.headers["etag"] != answer.headers["etag"]
@@ -49,3 +31,27 @@ def test_the_plotting_library_is_found_and_not_imported() -> None:
     code = "import sys; from service.dashboard import assets; assets.load(); print('plotly' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+@pytest.mark.browser
+@pytest.mark.slow  # that no page loads anything from elsewhere tests/service/web/test_root_path.py says of its addresses
+def test_the_api_describes_itself_without_the_internet(server: Server, browser: Browser) -> None:
+    page = browser.new_page()
+    requested: list[str] = []
+    logged: list[str] = []
+    page.on("request", lambda request: requested.append(request.url))
+    page.on("console", lambda message: logged.append(f"{message.type}: {message.text}"))
+    page.on("pageerror", lambda error: logged.append(str(error)))
+    page.goto(f"{server.url}/docs")
+    page.get_by_text("/v1/clutches/{clutch_id}/remaining-useful-life", exact=True).wait_for()
+    assert page.get_by_role("heading", name="Clutchlife").is_visible()
+    assert [url for url in requested if not url.startswith((server.url, "data:"))] == []
+    assert [line for line in logged if line.startswith(("error", "Refused"))] == []
+    ran = page.evaluate("""() => {
+      const script = document.createElement("script");
+      script.textContent = "window.ran = true";
+      document.body.append(script);
+      return window.ran === true;
+    }""")
+    assert not ran, "a script in the page would reach the key that the dashboard keeps"
+    assert any("Content Security Policy" in line for line in logged)

@@ -4,13 +4,11 @@ import io
 from collections.abc import Iterator
 from typing import Any
 
-import httpx2
 import openpyxl
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.driving import Watched, turned
-from tests.browser.dropping import drop
+from tests.browser.driving import Watched, drop, turned
 from tests.journeys.dashboard.test_axe import violations
 from tests.support import ONCE, SPEEDS_RPM, Server, serving, stationary
 
@@ -24,8 +22,7 @@ UNITS = ("bar", "1/min", "kNm", "°C", "")
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     with serving(tmp_path_factory.mktemp("importer") / "clutchlife.db", loaded=True) as running:
-        with httpx2.Client(base_url=running.url, timeout=60) as http:
-            http.post("/v1/clutches", json={"clutch_id": "bench3-017"}).raise_for_status()
+        running.http.post("/v1/clutches", json={"clutch_id": "bench3-017"}).raise_for_status()
         yield running
 
 
@@ -42,15 +39,8 @@ def workbook(cycles: int) -> bytes:
     sheet = book.active
     assert sheet is not None
     sheet.title = "Messung"
-    for line in [
-        ("Prüfstand", "3"),
-        ("Prüfer", "Müller"),
-        ("Lastspiele", cycles),
-        (),
-        OF_WORKBOOK,
-        UNITS,
-        *rows_of(cycles),
-    ]:
+    head = [("Prüfstand", "3"), ("Prüfer", "Müller"), ("Lastspiele", cycles), (), OF_WORKBOOK, UNITS]
+    for line in [*head, *rows_of(cycles)]:
         sheet.append(line)
     content = io.BytesIO()
     book.save(content)
@@ -84,7 +74,7 @@ def test_the_second_file_of_a_rig_is_taken_without_a_question(
     dialog.get_by_label("Kind of test").select_option("stationary_stribeck")
     expect(dialog.get_by_text("3 curves are fitted")).to_be_visible()
     expect(dialog.get_by_label("File names")).to_have_value(f"Stat_{{cycles}}_a.{ending}")
-    assert ONCE.get(f"{server.url}/v1/clutches/bench3-017/runs").json()["items"] == [] or ending == "xlsx"
+    assert server.http.get("/v1/clutches/bench3-017/runs").json()["items"] == [] or ending == "xlsx"
     dialog.get_by_label("Name of the rig").fill(rig)
     dialog.get_by_label("File names").fill(f"Stat_{{cycles}}_*.{ending}")
     dialog.get_by_role("button", name="Save as rig profile").click()
@@ -95,9 +85,9 @@ def test_the_second_file_of_a_rig_is_taken_without_a_question(
     page = opened(watched)
     drop(page, {f"Stat_{second}_b.{ending}": content(second)})
     expect(page.get_by_role("dialog").get_by_text("Stored", exact=True)).to_be_visible()
-    receipt = ONCE.get(f"{server.url}/v1/clutches/bench3-017/runs").json()["items"][-1]
+    receipt = server.http.get("/v1/clutches/bench3-017/runs").json()["items"][-1]
     assert (receipt["cycles"], receipt["kind"], receipt["file"]["rig"]) == (second, "stationary_stribeck", rig)
-    channels = ONCE.get(f"{server.url}/v1/clutches/bench3-017/runs/{receipt['run_id']}").json()["channels"]
+    channels = server.http.get(f"/v1/clutches/bench3-017/runs/{receipt['run_id']}").json()["channels"]
     assert channels["torque_nm"] == pytest.approx([1000 * row[2] for row in rows_of(second)])
 
 
@@ -125,13 +115,13 @@ def test_a_file_is_read_again_by_the_mended_profile(watched: Watched, server: Se
     columns = [{"title": "p", "channel": "pressure_bar"}, {"title": "n", "channel": "speed_rpm"}]
     torque = {"title": "Mz", "channel": "torque_nm", "unit": "Nm"}
     profile = {"name": "bench-4", "kind": "stationary_stribeck", "columns": [*columns, torque]}
-    assert ONCE.post(f"{server.url}/v1/rigs", json=profile).status_code == 201
+    assert server.http.post("/v1/rigs", json=profile).status_code == 201
     rows = "p [bar],n [1/min],Mz\n5,20,209\n5,120,219\n5,520,214\n5,1020,207\n5,1970,199\n"
     run = f"{server.url}/v1/clutches/bench3-017/runs"
     sent = {"rig": "bench-4", "filename": "tenfold.csv", "run_id": "tenfold", "cycles": 6000}
     assert ONCE.post(f"{run}/file", params=sent, content=rows).status_code == 201
     mended = profile | {"columns": [*columns, torque | {"scale": 0.1}]}
-    assert ONCE.put(f"{server.url}/v1/rigs/bench-4", json=mended).status_code == 200
+    assert server.http.put("/v1/rigs/bench-4", json=mended).status_code == 200
     page = turned(opened(watched), "runs")
     shown = page.locator("#runs details[data-run='tenfold']")
     shown.locator("summary").first.click()

@@ -1,21 +1,16 @@
 """Inspections on a clutch's page: R_a and R_sk over cycles, photographs by state, and a form that sends them."""
 
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 
-import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from service.web.auth import make_key
-from storage import keys
-from storage.engine.opening import open_database
 from tests.browser.driving import Watched
 from tests.browser.lives import worn
 from tests.journeys.dashboard.test_axe import violations
 from tests.service.web.routes.surfaces import FRESH, WORN, png
-from tests.support import Server, serving
+from tests.support import Server, clutchlife, serving
 
 pytestmark = pytest.mark.browser
 
@@ -27,16 +22,15 @@ PICTURE = {"name": "worn.png", "mimeType": "image/png", "buffer": png(size=64)}
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A clutch that was inspected fresh and worn, two photographs of the latter; a clutch that was never inspected."""
     with serving(tmp_path_factory.mktemp("inspections") / "clutchlife.db", loaded=True) as server:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            worn(http, "bench", last=2000)
-            for clutch_id in ("waiting", "sent"):
-                http.post("/v1/clutches", json={"clutch_id": clutch_id}).raise_for_status()
-            for body in (FRESH, FRESH | {"cycles": 4000, "roughness_um": 4.1, "skewness": -2.2}, WORN):
-                answer = http.post("/v1/clutches/bench/inspections", json=body).raise_for_status()
-            for red in (90, 160):
-                address = f"{answer.headers['location']}/photographs"
-                headers = {"Content-Type": "image/png"}
-                http.post(address, content=png(red, size=64), headers=headers).raise_for_status()
+        worn(server.http, "bench", last=2000)
+        for clutch_id in ("waiting", "sent"):
+            server.http.post("/v1/clutches", json={"clutch_id": clutch_id}).raise_for_status()
+        for body in (FRESH, FRESH | {"cycles": 4000, "roughness_um": 4.1, "skewness": -2.2}, WORN):
+            answer = server.http.post("/v1/clutches/bench/inspections", json=body).raise_for_status()
+        for red in (90, 160):
+            address = f"{answer.headers['location']}/photographs"
+            headers = {"Content-Type": "image/png"}
+            server.http.post(address, content=png(red, size=64), headers=headers).raise_for_status()
         yield server
 
 
@@ -105,38 +99,37 @@ def polled(page: Page, times: int) -> None:
 
 @pytest.mark.slow
 def test_photographs_are_kept_small_and_drawn_again_only_where_they_changed(browser: Browser, bench: Server) -> None:
-    with httpx2.Client(base_url=bench.url, timeout=60) as http:
-        http.post("/v1/clutches", json={"clutch_id": "large"}).raise_for_status()
-        address = http.post("/v1/clutches/large/inspections", json=WORN).headers["location"]
-        http.post(f"{address}/photographs", content=png(size=1200), headers={"Content-Type": "image/png"})
-        watched = Watched(browser, bench.url)
-        watched.page.add_init_script(_COUNTING)
-        page = watched.open("/clutches/large#/history")
-        section = page.locator("#inspections")
-        section.locator(".thumbnail").scroll_into_view_if_needed()
-        drawing = section.locator(".thumbnail canvas").first
-        assert drawing.evaluate("(canvas) => [canvas.width, canvas.height]") == [352, 352]
-        drawing.evaluate("(canvas) => { canvas.dataset.marked = 'drawing'; }")
-        listed = section.get_by_role("table", name="Inspections, by duty cycles")
-        listed.evaluate("(table) => { table.dataset.marked = 'table'; }")
-        holding = page.locator("html")
-        assert holding.get_attribute("data-held") is None
+    bench.http.post("/v1/clutches", json={"clutch_id": "large"}).raise_for_status()
+    address = bench.http.post("/v1/clutches/large/inspections", json=WORN).headers["location"]
+    bench.http.post(f"{address}/photographs", content=png(size=1200), headers={"Content-Type": "image/png"})
+    watched = Watched(browser, bench.url)
+    watched.page.add_init_script(_COUNTING)
+    page = watched.open("/clutches/large#/history")
+    section = page.locator("#inspections")
+    section.locator(".thumbnail").scroll_into_view_if_needed()
+    drawing = section.locator(".thumbnail canvas").first
+    assert drawing.evaluate("(canvas) => [canvas.width, canvas.height]") == [352, 352]
+    drawing.evaluate("(canvas) => { canvas.dataset.marked = 'drawing'; }")
+    listed = section.get_by_role("table", name="Inspections, by duty cycles")
+    listed.evaluate("(table) => { table.dataset.marked = 'table'; }")
+    holding = page.locator("html")
+    assert holding.get_attribute("data-held") is None
 
-        polled(page, 2)
-        expect(listed).to_have_attribute("data-marked", "table")
-        http.post(address.rsplit("/", 1)[0], json=FRESH).raise_for_status()
-        expect(listed.get_by_role("row")).to_have_count(3)
-        assert listed.get_attribute("data-marked") is None
-        expect(drawing).to_have_attribute("data-marked", "drawing")
-        assert len([url for url in watched.asked if "/photographs/" in url]) == 1
+    polled(page, 2)
+    expect(listed).to_have_attribute("data-marked", "table")
+    bench.http.post(address.rsplit("/", 1)[0], json=FRESH).raise_for_status()
+    expect(listed.get_by_role("row")).to_have_count(3)
+    assert listed.get_attribute("data-marked") is None
+    expect(drawing).to_have_attribute("data-marked", "drawing")
+    assert len([url for url in watched.asked if "/photographs/" in url]) == 1
 
-        section.get_by_role("button", name="show it larger").click()
-        dialog = page.get_by_role("dialog", name="Photograph 1 of 1 at 11,000 cycles")
-        image = dialog.get_by_role("img")
-        expect(image).to_have_js_property("naturalWidth", 1200)
-        expect(holding).to_have_attribute("data-held", "1")
-        dialog.get_by_role("button", name="Close").click()
-        expect(holding).to_have_attribute("data-held", "0")
+    section.get_by_role("button", name="show it larger").click()
+    dialog = page.get_by_role("dialog", name="Photograph 1 of 1 at 11,000 cycles")
+    image = dialog.get_by_role("img")
+    expect(image).to_have_js_property("naturalWidth", 1200)
+    expect(holding).to_have_attribute("data-held", "1")
+    dialog.get_by_role("button", name="Close").click()
+    expect(holding).to_have_attribute("data-held", "0")
     watched.close()
 
 
@@ -182,14 +175,11 @@ def test_an_inspection_is_sent_by_the_form_withdrawn_and_restored(browser: Brows
 @pytest.mark.slow
 def test_with_keys_photographs_are_shown_and_sent_with_the_readers_key(browser: Browser, tmp_path: Path) -> None:
     with serving(tmp_path / "clutchlife.db", loaded=True) as server:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            http.post("/v1/clutches", json={"clutch_id": "secret"}).raise_for_status()
-            address = http.post("/v1/clutches/secret/inspections", json=WORN).headers["location"]
-            headers = {"Content-Type": "image/png"}
-            http.post(f"{address}/photographs", content=png(size=64), headers=headers).raise_for_status()
-        text, row = make_key("ingest", "bench 3", created_at="2026-01-01T00:00:00Z")
-        with closing(open_database(f"sqlite:///{server.database}")) as database, database.writing() as connection:
-            keys.insert(connection, row)
+        server.http.post("/v1/clutches", json={"clutch_id": "secret"}).raise_for_status()
+        address = server.http.post("/v1/clutches/secret/inspections", json=WORN).headers["location"]
+        headers = {"Content-Type": "image/png"}
+        server.http.post(f"{address}/photographs", content=png(size=64), headers=headers).raise_for_status()
+        text = clutchlife("key", "create", "--scope", "ingest", "--database", server.address).strip()
         watched = Watched(browser, server.url)
         page = watched.open("/clutches/secret#/history")
         page.get_by_role("textbox", name="Key").fill(text)

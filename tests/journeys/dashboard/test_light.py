@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from typing import Any
 
-import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
@@ -38,8 +37,7 @@ _LIGHT = "circles => circles.map((c) => c.getBoundingClientRect()).map((r) => [r
 @pytest.fixture(scope="module")
 def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     with serving(tmp_path_factory.mktemp("light") / "clutchlife.db", loaded=True) as server:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            worn(http, "bench", last=6000)
+        worn(server.http, "bench", last=6000)
         yield server
 
 
@@ -63,7 +61,7 @@ def test_the_library_takes_the_place_of_the_light_drawing(
     page.locator("#chart-fan[data-sketched]").wait_for()
     chart = page.locator("#chart-fan .plot")
     chart.scroll_into_view_if_needed()
-    found = seen(browser, chart.screenshot())
+    found = seen(chart)
     assert (found.is_chart, found.is_dark) == (True, scheme == "dark")
     page.locator("#chart-fan summary").click()
     page.locator("#chart-fan table tbody tr").nth(20).wait_for()
@@ -111,7 +109,7 @@ def test_without_the_library_the_light_charts_stay(browser_3d: Browser, life: Se
         for name in names:
             page.locator(f"#chart-{name}").scroll_into_view_if_needed()
             page.locator(f"#chart-{name}[data-sketched]").wait_for()
-            assert seen(browser_3d, page.locator(f"#chart-{name} .plot").screenshot()).is_chart, name
+            assert seen(page.locator(f"#chart-{name} .plot")).is_chart, name
     page.locator("#chart-surface").scroll_into_view_if_needed()
     page.locator("#chart-surface").get_by_text("The plotting library did not load").wait_for()
     page.get_by_text("Live, as of").wait_for()

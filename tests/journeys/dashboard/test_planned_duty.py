@@ -3,14 +3,13 @@
 import re
 from collections.abc import Iterator
 
-import httpx2
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from tests.browser.driving import Watched
 from tests.browser.lives import post
 from tests.journeys.dashboard.test_axe import violations
-from tests.support import ONCE, Server, serving, stationary
+from tests.support import Server, serving, stationary
 
 pytestmark = pytest.mark.browser
 
@@ -18,31 +17,28 @@ BASE = "/v1/clutches/bench"
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A clutch whose severity is its energy, 18 kJ a cycle, tested at four states and one pressure."""
-    with serving(tmp_path_factory.mktemp("planned") / "clutchlife.db", loaded=True) as server:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            record = {"clutch_id": "bench", "severity": {"basis": "dissipated_energy"}}
-            http.post("/v1/clutches", json=record).raise_for_status()
-            for cycles in range(0, 4000, 1000):
-                post(http, "bench", stationary(cycles, pressures=(5.0,)))
-            duty = {"cycles": 3000, "energy_per_cycle_kj": 18}
-            post(http, "bench", {"kind": "duty_cycles", "cycles": 3000, "duty": duty})
-        yield server
+    with serving(tmp_path_factory.mktemp("planned") / "clutchlife.db", loaded=True) as running:
+        record = {"clutch_id": "bench", "severity": {"basis": "dissipated_energy"}}
+        running.http.post("/v1/clutches", json=record).raise_for_status()
+        for cycles in range(0, 4000, 1000):
+            post(running.http, "bench", stationary(cycles, pressures=(5.0,)))
+        duty = {"cycles": 3000, "energy_per_cycle_kj": 18}
+        post(running.http, "bench", {"kind": "duty_cycles", "cycles": 3000, "duty": duty})
+        yield running
 
 
 @pytest.fixture
-def page(browser: Browser, bench: Server) -> Iterator[Page]:
-    watched = Watched(browser, bench.url)
+def page(watched: Watched) -> Iterator[Page]:
     page = watched.open("/clutches/bench")
     page.get_by_text("Planned duty", exact=True).click()
     yield page
     # the browser notes every refusal in its console, and a plan that is refused is one
     watched.said = [line for line in watched.said if "422" not in line]
-    watched.close()
 
 
-def test_a_plan_is_typed_by_keyboard_and_answered_with_cycles_blocks_and_dates(page: Page, bench: Server) -> None:
+def test_a_plan_is_typed_by_keyboard_and_answered_with_cycles_blocks_and_dates(page: Page, server: Server) -> None:
     page.get_by_label("Energy per cycle, kJ").fill("25,5")
     page.keyboard.press("Tab")
     page.keyboard.type("5000")
@@ -54,7 +50,7 @@ def test_a_plan_is_typed_by_keyboard_and_answered_with_cycles_blocks_and_dates(p
     table = page.get_by_role("table", name="Remaining life under planned duty, by probability")
     expect(table).to_contain_text("Remaining blocks")
     plan = {"programme": [{"cycles": 5000, "energy_per_cycle_kj": 25.5, "sd": 2}], "pace_cycles_per_hour": 120}
-    said = ONCE.post(f"{bench.url}{BASE}/remaining-useful-life/forecast", json=plan).json()
+    said = server.http.post(f"{BASE}/remaining-useful-life/forecast", json=plan).json()
     median = said["remaining_cycles"]["0.5"]
     assert median is not None
     for words in (f"{median:,.0f}", f"{said['remaining_blocks']['0.5']:.1f}", said["end_of_life_at"]["0.5"][:10]):

@@ -2,14 +2,13 @@
 
 from collections.abc import Iterator
 
-import httpx2
 import pytest
 from playwright.sync_api import Browser, expect
 
 from tests.browser.driving import Watched, turned
 from tests.browser.lives import loops, post
 from tests.journeys.dashboard.test_axe import violations
-from tests.support import ONCE, Server, serving, stationary
+from tests.support import Server, serving, stationary
 
 pytestmark = pytest.mark.browser
 
@@ -18,17 +17,16 @@ CRITERIA = [{"quantity": "mean_cof"}, {"quantity": "slope", "pressure_bar": 5, "
 
 
 @pytest.fixture(scope="module")
-def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A clutch with two criteria, three stationary tests and two dynamic ones."""
-    with serving(tmp_path_factory.mktemp("quantities") / "clutchlife.db", loaded=True) as server:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            record = {"clutch_id": "bench", "end_of_life": {"criteria": CRITERIA}}
-            http.post("/v1/clutches", json=record).raise_for_status()
-            for cycles in (0, 2000, 4000):
-                post(http, "bench", stationary(cycles, pressures=PRESSURES))
-            for cycles in (0, 4000):
-                post(http, "bench", loops(cycles, pressures=(4.0, 5.0)))
-        yield server
+    with serving(tmp_path_factory.mktemp("quantities") / "clutchlife.db", loaded=True) as running:
+        record = {"clutch_id": "bench", "end_of_life": {"criteria": CRITERIA}}
+        running.http.post("/v1/clutches", json=record).raise_for_status()
+        for cycles in (0, 2000, 4000):
+            post(running.http, "bench", stationary(cycles, pressures=PRESSURES))
+        for cycles in (0, 4000):
+            post(running.http, "bench", loops(cycles, pressures=(4.0, 5.0)))
+        yield running
 
 
 def asked(watched: Watched, text: str) -> int:
@@ -38,18 +36,18 @@ def asked(watched: Watched, text: str) -> int:
 
 @pytest.mark.slow
 def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_the_clutch_changes(
-    browser: Browser, life: Server
+    browser: Browser, server: Server
 ) -> None:
-    watched = Watched(browser, life.url, color_scheme="dark")
+    watched = Watched(browser, server.url, color_scheme="dark")
     page = watched.open("/clutches/bench")
     rows = page.locator(".limits tbody tr")
     expect(rows).to_have_count(2)
     expect(page.locator(".limits")).to_contain_text("Mean COF")
     expect(page.locator(".limits")).to_contain_text("Slope dμ/dv, 100 rpm, 5.0 bar")
-    ends = ONCE.get(f"{life.url}/v1/clutches/bench/remaining-useful-life").json()["criteria"]
+    ends = server.http.get("/v1/clutches/bench/remaining-useful-life").json()["criteria"]
     assert [end["quantity"] for end in ends] == ["mean_cof", "slope"]
 
-    page.goto(f"{life.url}/")  # another document, so that the tab of the curves is the first that is opened
+    page.goto(f"{server.url}/")  # another document, so that the tab of the curves is the first that is opened
     watched.asked.clear()
     watched.open("/clutches/bench#/curves")
     page.locator("#chart-stribeck[data-sketched]").wait_for()
@@ -61,7 +59,7 @@ def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_
     expect(margin.locator(".note")).to_contain_text("At 100 rpm")
     assert asked(watched, "remaining-useful-life?quantity=slope") == 0  # the record has that criterion
     margin.locator("summary").click()
-    items = ONCE.get(f"{life.url}/v1/clutches/bench/degradation", params={"quantity": "slope"}).json()["items"]
+    items = server.http.get("/v1/clutches/bench/degradation", params={"quantity": "slope"}).json()["items"]
     measured = sum(len(item["measured"]["cycles"]) for item in items if item["pressure_bar"] == 5.0)
     assert measured >= 6
     expect(margin.locator("tbody tr").filter(has_text="measured")).to_have_count(measured)
@@ -79,8 +77,7 @@ def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_
     assert violations(page) == []
 
     before = asked(watched, "degradation?quantity=slope")
-    with httpx2.Client(base_url=life.url, timeout=60) as http:
-        post(http, "bench", {"kind": "maintenance", "cycles": 4000, "event": "oil_change"})
+    post(server.http, "bench", {"kind": "maintenance", "cycles": 4000, "event": "oil_change"})
     expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(6)
     turned(page, "overview")
     margin.scroll_into_view_if_needed()
@@ -90,8 +87,7 @@ def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_
 
 
 @pytest.mark.slow
-def test_curves_of_one_state_and_its_pressure_law(browser: Browser, life: Server) -> None:
-    watched = Watched(browser, life.url)
+def test_curves_of_one_state_and_its_pressure_law(watched: Watched) -> None:
     page = watched.open("/clutches/bench#/curves")
     curves = page.locator("#chart-stribeck")
     curves.scroll_into_view_if_needed()
@@ -105,12 +101,10 @@ def test_curves_of_one_state_and_its_pressure_law(browser: Browser, life: Server
     expect(law.locator(".note")).to_contain_text("falls to an asymptote")
     law.locator("summary").click()
     expect(law.locator("tbody tr").filter(has_text="identified")).to_have_count(len(PRESSURES))
-    watched.close()
 
 
 @pytest.mark.slow
-def test_remaining_life_by_any_quantity_and_pressure_is_chosen_on_the_page(browser: Browser, life: Server) -> None:
-    watched = Watched(browser, life.url)
+def test_remaining_life_by_any_quantity_and_pressure_is_chosen_on_the_page(watched: Watched) -> None:
     page = watched.open("/clutches/bench")
     assert asked(watched, "remaining-useful-life?quantity") == 0  # nothing is computed before it is opened
     page.get_by_text("Remaining life by another quantity").click()
@@ -129,4 +123,3 @@ def test_remaining_life_by_any_quantity_and_pressure_is_chosen_on_the_page(brows
     quantity.select_option("Stop time")
     expect(part.get_by_role("alert")).to_contain_text("stop_time_s is not measured in this life")
     watched.said = [line for line in watched.said if "404" not in line]  # the browser notes the refusal
-    watched.close()

@@ -4,7 +4,6 @@ import csv
 from collections.abc import Iterator
 from typing import Any
 
-import httpx2
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
@@ -52,11 +51,11 @@ def record(cycles: float, rng: np.random.Generator, *, swept: bool) -> dict[str,
 def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """Tests that were posted as plateaus and short loops, so that they are evaluated at once, and are then made raw."""
     path = tmp_path_factory.mktemp("raw") / "clutchlife.db"
-    with serving(path, loaded=True) as server, httpx2.Client(base_url=server.url, timeout=120) as http:
-        http.post("/v1/clutches", json={"clutch_id": "bench"}).raise_for_status()
+    with serving(path, loaded=True) as server:
+        server.http.post("/v1/clutches", json={"clutch_id": "bench"}).raise_for_status()
         for number in range(TESTS):
-            post(http, "bench", stationary(1000.0 * number, pressures=(4.0, 5.0, 6.0)))
-            post(http, "bench", loops(1000.0 * number + 1))
+            post(server.http, "bench", stationary(1000.0 * number, pressures=(4.0, 5.0, 6.0)))
+            post(server.http, "bench", loops(1000.0 * number + 1))
         database, rng = open_database(f"sqlite:///{path}"), np.random.default_rng(8)
         with database.writing() as connection:
             connection.exec_driver_sql("DELETE FROM channel")
