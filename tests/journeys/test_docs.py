@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.service.clients import described
 from tests.support import Server
 
 ROOT = Path(__file__).parents[2]
@@ -117,3 +118,13 @@ def test_all_equations_and_figures_are_in_it() -> None:
     assert equations == set(range(1, 9))
     figures = {int(number) for part in re.findall(r"figs?\. ([\d, ab]+)", first) for number in re.findall(r"\d+", part)}
     assert figures == set(range(1, 18))
+
+
+def test_every_address_is_documented() -> None:
+    description = described()
+    text = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8") + (
+        ROOT / "docs" / "reference" / "operations.md"
+    ).read_text(encoding="utf-8")
+    for address in description["paths"]:
+        name = address.rstrip("/").rsplit("/", 1)[-1].removesuffix(".csv")
+        assert name.startswith("{") or name in text, address

@@ -38,9 +38,7 @@ export const pressuresOf = (tests) => distinct(tests.flatMap((test) => test.fits
  * @param {StribeckItem[]} tests
  */
 const fastest = (channels, tests) =>
-  tests
-    .flatMap(({ run_id: id }) => channels[id]?.speed_rpm ?? [])
-    .reduce((most, speed) => Math.max(most, speed), 100);
+  tests.flatMap(({ run_id: id }) => channels[id]?.speed_rpm ?? []).reduce((most, speed) => Math.max(most, speed), 100);
 
 /**
  * Some tests at some pressures: measured points where the channels have been read, the fit in any case.
