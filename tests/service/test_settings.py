@@ -90,3 +90,26 @@ def test_a_start_prints_the_settings_without_the_password() -> None:
     line = json.loads(done.stderr.splitlines()[0])
     assert (line["message"], line["workers"], line["database"]) == ("settings", 1, "postgresql://rig:***@host/db")
     assert "s3cr3t" not in done.stdout + done.stderr
+
+
+#: Each setting's variable, a text, the attribute and its value: renamed, a deployed limit would silently be off.
+VARIABLES = {
+    "CLUTCHLIFE_DATABASE": ("sqlite:///other.db", "database", "sqlite:///other.db"),
+    "CLUTCHLIFE_ROOT_PATH": ("a/clutch/", "root_path", "/a/clutch"),
+    "CLUTCHLIFE_WORKERS": ("0", "workers", 0),
+    "CLUTCHLIFE_MAX_BODY_MB": ("3", "max_body_mb", 3),
+    "CLUTCHLIFE_BODY_SECONDS": ("7", "body_seconds", 7),
+    "CLUTCHLIFE_REQUESTS_PER_SECOND": ("8", "requests_per_second", 8),
+    "CLUTCHLIFE_REQUESTS_AT_ONCE": ("9", "requests_at_once", 9),
+    "CLUTCHLIFE_CONNECTIONS_AT_ONCE": ("9", "connections_at_once", 9),
+    "CLUTCHLIFE_DIAGNOSIS_SECONDS": ("10", "diagnosis_seconds", 10),
+    "CLUTCHLIFE_DIAGNOSIS_MEMORY_MB": ("11", "diagnosis_memory_mb", 11),
+}
+
+
+@pytest.mark.parametrize("name", VARIABLES)
+def test_every_limit_is_set_by_its_variable(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    text, attribute, value = VARIABLES[name]
+    assert getattr(Settings.from_environment(), attribute) != value
+    monkeypatch.setenv(name, text)
+    assert getattr(Settings.from_environment(), attribute) == value

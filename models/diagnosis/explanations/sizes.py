@@ -183,7 +183,7 @@ def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
     for place, effect in enumerate(fitted.effects):
         if effect.effect.courses is None:
             continue
-        held_problem = replace(
+        refittable = replace(
             effect.effect,
             shapes=tuple(replace(shape, smooth=shape.smooth and not shape.held) for shape in effect.effect.shapes),
         )
@@ -196,7 +196,7 @@ def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
                 near, laws = fitted.effects, fitted.laws
                 for index in way:
                     shape = _with_free(kind[index].shape, effect)
-                    tried = replace(near[place], effect=held_problem, shape=shape)
+                    tried = replace(near[place], effect=refittable, shape=shape)
                     refit = fit(problem, laws, (*near[:place], tried, *near[place + 1 :]), steps=criteria.FEW_STEPS)
                     if not np.isfinite(refit.cost) or refit.wrong_sign:
                         break

@@ -196,6 +196,8 @@ def test_bad_questions_are_422(client: TestClient) -> None:
         {"clutch_id": "c2", "oil": {"kinematic_viscosity_40c_cst": 5}},
         {"clutch_id": "c2", "geometry": {"mean_radius_mm": -1}},
         {"clutch_id": "c2", "revision": 1},
+        {"clutch_id": "c2", "archived": True},
+        {"clutch_id": "c2", "created_at": "2020-01-01T00:00:00Z"},
         {},
     ],
     ids=str,

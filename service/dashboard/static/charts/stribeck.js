@@ -44,8 +44,8 @@ const fastest = (channels, tests) =>
  * Some tests at some pressures: measured points where the channels have been read, the fit in any case.
  * @type {(answers: Answers, tests: StribeckItem[], wanted: (pressure: number) => boolean) => Drawn[]}
  */
-function drawnOf({ channels, clutch }, tests, wanted) {
-  const end = fastest(channels, tests);
+function drawnOf({ channels, clutch, tests: known }, tests, wanted) {
+  const end = fastest(channels, known);
   return tests.flatMap((test) =>
     test.fits
       .filter((fit) => wanted(fit.pressure_bar))

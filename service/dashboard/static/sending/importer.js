@@ -220,7 +220,7 @@ export class Importer {
         "Missing values",
         h("small", {}, "for example -9999, n/a; “none” if every number is a measurement"),
       ),
-      tables.length > 1 && field(select(sheet, sheets, profile.table), "Sheet or test"),
+      tables.length > 1 && field(select(sheet, sheets, profile.table ?? ""), "Sheet or test"),
     );
   }
 
