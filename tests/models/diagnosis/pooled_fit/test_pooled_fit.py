@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.arrays import FloatArray
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.effect import FROM_THE_START
+from models.diagnosis.effects.effect import FROM_THE_START, amplitude_cost
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
-from models.diagnosis.pooled_fit.gauss_newton import FitStatus, fit
+from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus, fit, prior_gram
 from models.diagnosis.pooled_fit.projection import RunScatter, gram_of, projections_of, run_scatter
-from tests.models.diagnosis.campaigns import Study, campaign, rehearsal, start_of, study
+from tests.models.diagnosis.campaigns import Study, campaign, of_size, rehearsal, start_of, study
 
 # --- A fit says how it ended: converged, without a step that lowers the cost, out of steps, without a finite cost.
 
@@ -43,6 +44,47 @@ def test_numbers_that_cannot_be_fitted_are_a_status(given: Study) -> None:
     broken = fit(replace(given.problem, design=replace(given.design, torque=torque)), start_of(given.design))
     assert broken.status is FitStatus.NOT_FINITE
     assert np.isinf(broken.cost)
+
+
+# --- Priors: their part of the gradient is the slope of their cost, and the projection holds them as the fit does.
+
+
+@pytest.fixture(scope="module")
+def beside_heat(given: Study) -> Fit:
+    """The laws off their priors' means, and an effect of some size."""
+    laws = given.baseline.fit.laws
+    off = replace(laws, theta=laws.theta + 0.1)
+    return fit(given.problem, off, (of_size("interface_heating", 0.3, (2.0, 0.0, 1.0)),), steps=0)
+
+
+def test_the_gradient_of_the_priors_is_the_slope_of_their_cost(given: Study, beside_heat: Fit) -> None:
+    priors, (heat,), theta = given.problem.priors, beside_heat.effects, beside_heat.laws.theta
+
+    def cost(theta: FloatArray, amplitude: float) -> float:
+        return 0.5 * float(np.square(priors.rows @ theta - priors.means).sum()) + amplitude_cost(heat.effect, amplitude)
+
+    slopes = -prior_gram(priors, beside_heat)[:-1, -1]
+    free = np.flatnonzero(priors.free)
+    for place, of_theta in enumerate(free):
+        step = 1e-4 * np.eye(theta.size)[of_theta]
+        slope = (cost(theta + step, heat.amplitude) - cost(theta - step, heat.amplitude)) / 2e-4
+        assert slopes[place] == pytest.approx(slope, rel=1e-5, abs=1e-5)
+    slope = (cost(theta, heat.amplitude + 1e-5) - cost(theta, heat.amplitude - 1e-5)) / 2e-5
+    assert slope > 0
+    assert slopes[free.size] == pytest.approx(slope, rel=1e-5)
+
+
+def test_the_projection_holds_the_priors(given: Study, beside_heat: Fit) -> None:
+    priors = given.problem.priors
+    firmer = replace(priors, rows=np.sqrt(2.0) * priors.rows, means=np.sqrt(2.0) * priors.means)
+    usual = gram_of(given.problem, beside_heat).matrix
+    held = gram_of(replace(given.problem, priors=firmer), beside_heat).matrix
+    rows = priors.rows[:, priors.free]
+    count = rows.shape[1]
+    assert np.abs(rows).max() > 1.0
+    np.testing.assert_allclose(
+        (held - usual)[:count, :count], rows.T @ rows, rtol=1e-6, atol=1e-6 * np.abs(usual).max()
+    )
 
 
 # --- The scatter from run to run is estimated where there are runs to tell it, and said to be assumed where there are
