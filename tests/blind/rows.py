@@ -57,16 +57,6 @@ class Count:
         return f"≤ {100 * self.most:g} %" if self.most is not None else ""
 
 
-def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
-    """The 95 % interval of a share after Wilson (1927)."""
-    if count == 0:
-        return 0.0, 1.0
-    share, extra = hits / count, z * z / count
-    middle = (share + extra / 2) / (1 + extra)
-    half = z * np.sqrt(share * (1 - share) / count + extra / (4 * count)) / (1 + extra)
-    return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
-
-
 def _seeds(row: str, seed: int, count: int) -> Iterator[tuple[int, ...]]:
     return ((seed, zlib.crc32(row.encode()), k) for k in range(count))
 

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from tests.blind.rig.hide import DRAWS
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
-from tests.blind.rows import HALVED, LOUDNESSES, calibration, counts, wilson
+from tests.blind.rows import HALVED, LOUDNESSES, calibration, counts
 from tests.blind.trials import Outcome
+from tests.measuring import wilson
 
 
 def _share(hits: int, count: int) -> str:

@@ -9,7 +9,7 @@ from tests.blind import __main__ as blind
 from tests.blind import table
 from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
-from tests.blind.rows import counts, trials, wilson
+from tests.blind.rows import counts, trials
 from tests.blind.trials import Outcome, Trial, judge
 
 
@@ -53,11 +53,6 @@ def test_every_effect_has_its_row_and_every_line_its_trials() -> None:
     assert all(line.of(outcomes)[1] > 0 for line in counts() if "ambiguous" not in line.title)
     assert len({trial.seed for trial in made}) == len(made)
     assert {trial.seed for trial in made}.isdisjoint(trial.seed for trial in trials(2))
-
-
-def test_intervals_are_wilsons() -> None:
-    assert wilson(0, 10) == pytest.approx((0.0, 0.2775), abs=1e-4)  # Newcombe 1998, method 3
-    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=1e-4)  # the same, table I
 
 
 def test_what_cannot_be_made_is_an_outcome_that_counts_nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
