@@ -1,11 +1,8 @@
-"""`/v1/clutches`: clutches worst first or by name, as lists show them; `/v1/fleet/totals`: how many there are; and six
-numbers of all that is stored, for the metrics.
-"""
+"""`/v1/clutches`: clutches worst first or by name, as lists show them; `/v1/fleet/totals`: how many there are."""
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
 from typing import Any
 
 from sqlalchemy import Connection
@@ -17,38 +14,9 @@ from service.lives.condition import STATES, stated
 from service.queries.cache import AnswerCache, to_json
 from service.schemas.base import schema_fields
 from service.schemas.clutch import ClutchOut
-from storage import assumptions, clutches, diagnoses, jobs, runs
+from storage import clutches, diagnoses, runs
 from storage.clutches import Choice, ClutchRow
 from storage.engine.database import Database
-
-#: Remaining cycles up to which clutches are counted, ascending; 0: at the end of life. Chosen: days and weeks of a rig.
-WITHIN = (0.0, 1e3, 1e4)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Totals:
-    """Clutches, archived ones too; how many of those in use are safe for at most so many more cycles (95 %); runs, and
-    how many of them are held; ended lives that the fleets' priors know of; diagnoses that wait or run."""
-
-    clutches: int
-    within: dict[float, int]
-    runs: int
-    held: int
-    ended_lives: int
-    diagnoses: int
-
-
-def service_totals(database: Database) -> Totals:
-    with database.reading() as connection:
-        return Totals(
-            clutches=clutches.count(connection),
-            within=clutches.count_within(connection, WITHIN),
-            runs=runs.count(connection),
-            held=runs.count_held(connection),
-            ended_lives=assumptions.count_ended_lives(connection),
-            diagnoses=jobs.count_open(connection, jobs.DIAGNOSIS),
-        )
-
 
 #: Share of the clutches whose bars fit, and the cycles at the bars' end where nothing is predicted. Chosen: one that lasts
 #: much longer than the others must not shorten their bars to nothing; a rig's usual life.
@@ -59,7 +27,7 @@ def look_up(database: Database, clutch_id: str) -> dict[str, Any]:
     """A clutch; raises NotFoundError."""
     with database.reading() as connection:
         (shown,) = _shown(connection, [records.clutch(connection, clutch_id)])
-    return _item(*shown)
+    return _item(shown)
 
 
 def every(database: Database, *, at_once: int) -> Iterator[dict[str, Any]]:
@@ -68,7 +36,7 @@ def every(database: Database, *, at_once: int) -> Iterator[dict[str, Any]]:
     while part is not None:
         with database.reading() as connection:
             rows = clutches.page(connection, Choice(), limit=part.most, after=part.after, by_name=True)
-            items = [_item(*clutch) for clutch in _shown(connection, rows[:at_once])]
+            items = list(map(_item, _shown(connection, rows[:at_once])))
         yield from items
         place = part.next(rows, by_name("clutch_id"))
         part = None if place is None else Part(at_once, place)
@@ -87,20 +55,18 @@ def page_as_json(
             connection, choice, limit=part.most, after=after, left_out=offset, by_name=sort == "name", by_kind=by_kind
         )
         clutches_shown = _shown(connection, rows[:limit])
-    items = [
-        cache.answer(
-            ("clutch", row.clutch_id),
-            (row.revision, row.state, to_json(verdict)),
-            partial(_as_json, row, held_count, verdict, state),
-        )
-        for row, held_count, verdict, state in clutches_shown
-    ]
+
+    def item(clutch: _Shown) -> bytes:
+        row, _, diagnosis, _ = clutch
+        version = (row.revision, row.state, to_json(diagnosis))
+        return cache.answer(("clutch", row.clutch_id), version, lambda: to_json(_item(clutch))).body
+
     places = {
         "worst": lambda row: (row.rank, row.clutch_id),
         "name": by_name("clutch_id"),
         "kind": lambda _: (float(offset + limit), ""),
     }
-    return page_as_bytes([item.body for item in items], part.next(rows, places[sort]))
+    return page_as_bytes(list(map(item, clutches_shown)), part.next(rows, places[sort]))
 
 
 def totals(database: Database, choice: Choice) -> dict[str, Any]:
@@ -126,27 +92,24 @@ def _round_above(row: ClutchRow) -> float:
     return next(step * unit for step in (1, 2, 5, 10) if step * unit >= end)
 
 
-def _as_json(row: ClutchRow, held: int, verdict: dict[str, Any] | None, state: dict[str, Any]) -> bytes:
-    return to_json(_item(row, held, verdict, state))
+#: A clutch with the number of its held runs, its newest finished diagnosis as it goes out, and its state with headline and
+#: action.
+_Shown = tuple[ClutchRow, int, dict[str, Any] | None, dict[str, Any]]
 
 
-def _shown(
-    connection: Connection, rows: Sequence[ClutchRow]
-) -> list[tuple[ClutchRow, int, dict[str, Any] | None, dict[str, Any]]]:
-    """Clutches, each with the number of its held runs, its newest finished diagnosis as it goes out, and its state with
-    headline and action."""
+def _shown(connection: Connection, rows: Sequence[ClutchRow]) -> list[_Shown]:
     names = [row.clutch_id for row in rows]
     newest, held_counts = diagnoses.newest(connection, names), runs.held(connection, names)
     shown = []
     for row in rows:
         diagnosis = records.latest_diagnosis(row, newest.get(row.clutch_id))
-        first = records.first_line(row, diagnosis)
-        state = {"state": records.condition(row)}
-        shown.append((row, held_counts.get(row.clutch_id, 0), diagnosis, state | first))
+        state = {"state": records.condition(row)} | records.first_line(row, diagnosis)
+        shown.append((row, held_counts.get(row.clutch_id, 0), diagnosis, state))
     return shown
 
 
-def _item(row: ClutchRow, held: int, diagnosis: dict[str, Any] | None, state: dict[str, Any]) -> dict[str, Any]:
+def _item(clutch: _Shown) -> dict[str, Any]:
+    row, held, diagnosis, state = clutch
     from_summary = {
         "runs": row.summary.get("runs", 0),
         "recent": row.summary.get("recent"),

@@ -44,7 +44,7 @@ class Caller:
     address: str | None
     host: str | None
     origin: str | None
-    proxy: str | None = None
+    proxy: str | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,21 +192,18 @@ def context_of(request: Request) -> Context:
 
 
 def caller_of(request: Request) -> Caller:
-    first: dict[bytes, str] = {}
     proxy = "HTTP/1.0" if request.scope["http_version"] == _VERSION_OF_PROXIES else None
-    for name, value in request.scope["headers"]:
-        if name in (b"authorization", b"host", b"origin"):
-            first.setdefault(name, value.decode("latin-1"))
-        elif name in _OF_PROXIES or _FORWARDED in name or name.endswith(_CLIENT_IP):
+    for name, _ in request.scope["headers"]:
+        if name in _OF_PROXIES or _FORWARDED in name or name.endswith(_CLIENT_IP):
             proxy = name.decode("latin-1").title()
     address = None if request.client is None else request.client.host
     if context_of(request).settings.insecure_local:
         address = proxy = None
     return Caller(
-        authorization=first.get(b"authorization"),
+        authorization=request.headers.get("authorization"),
         address=address,
-        host=first.get(b"host"),
-        origin=first.get(b"origin"),
+        host=request.headers.get("host"),
+        origin=request.headers.get("origin"),
         proxy=proxy,
     )
 
@@ -274,17 +271,17 @@ def _refuse_unknown_arguments(request: Request) -> None:
     if not request.scope["query_string"]:
         return
     arguments = {field.alias for field in query_fields(request.scope["route"])}
-    unknown = [name for name in request.query_params if name not in arguments]
-    if unknown:
-        errors = [
-            FieldError(
-                pointer=f"/query/{name}",
-                code="extra_forbidden",
-                message=f"{name} is not an argument of this route; its arguments: {', '.join(sorted(arguments)) or 'none'}",
-                value=request.query_params[name][:80],
-            )
-            for name in unknown
-        ]
+    errors = [
+        FieldError(
+            pointer=f"/query/{name}",
+            code="extra_forbidden",
+            message=f"{name} is not an argument of this route; its arguments: {', '.join(sorted(arguments)) or 'none'}",
+            value=value[:80],
+        )
+        for name, value in request.query_params.items()
+        if name not in arguments
+    ]
+    if errors:
         raise InvalidError(errors[0].message, errors=errors)
 
 

@@ -4,7 +4,7 @@ They cost the same however many clutches are stored; series of every clutch are 
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from operator import add
 from pathlib import Path
@@ -15,14 +15,16 @@ from prometheus_client.multiprocess import MultiProcessCollector, mark_process_d
 from prometheus_client.registry import Collector
 
 from service.queries import clutch_list
-from service.queries.clutch_list import service_totals
 from service.web.limits import METRICS_PAGE
 from service.work.workers import Lane
+from storage import assumptions, clutches, jobs, runs
 from storage.engine.database import Database
 
 #: Where several processes keep their numbers, for prometheus_client, which reads it when it is imported.
 FOLDER_VARIABLE = "PROMETHEUS_MULTIPROC_DIR"
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+#: Remaining cycles up to which clutches are counted, ascending; 0: at the end of life. Chosen: days and weeks of a rig.
+WITHIN = (0.0, 1e3, 1e4)
 
 
 class Metrics:
@@ -52,84 +54,78 @@ class Metrics:
     def exposition(self, database: Database) -> bytes:
         """All metrics as text, the clutches as they stand now."""
         present = CollectorRegistry()
-        present.register(Present(database))
+        present.register(_Made(partial(_totals, database)))
         if self._each_clutch:
-            present.register(Clutches(database))
+            present.register(_Made(partial(_each_clutch, database)))
         folder = os.environ.get(FOLDER_VARIABLE)
         if folder is None:
             ProcessCollector(registry=present)
             return generate_latest(self._registry) + generate_latest(present)
-        present.register(Processes(Path(folder)))
+        present.register(_Made(partial(_processes, Path(folder))))
         MultiProcessCollector(present, folder)  # type: ignore[no-untyped-call]
         return generate_latest(present)
 
 
-class Processes(Collector):
+class _Made(Collector):
+    """Metrics that `make` gives when they are asked for."""
+
+    def __init__(self, make: Callable[[], Iterator[Metric]]) -> None:
+        self._make = make
+
+    def collect(self) -> Iterator[Metric]:
+        return self._make()
+
+
+def _processes(folder: Path) -> Iterator[Metric]:
     """What the processes that write into a folder take of the machine together; of one that has ended only counts stay."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def collect(self) -> Iterator[Metric]:
-        metrics: dict[str, Metric] = {}
-        for number in {path.stem.rpartition("_")[2] for path in self._folder.glob("*.db")}:
-            if not Path("/proc", number).exists():
-                mark_process_dead(int(number), str(self._folder))  # type: ignore[no-untyped-call]
-                continue
-            registry = CollectorRegistry()
-            ProcessCollector(registry=registry, pid=partial(int, number))
-            for metric in registry.collect():
-                sum_up = min if metric.name == "process_start_time_seconds" else add
-                merged = metrics.setdefault(metric.name, metric)
-                if merged is not metric:
-                    pairs = zip(merged.samples, metric.samples, strict=True)
-                    merged.samples = [
-                        sample._replace(value=sum_up(sample.value, other.value)) for sample, other in pairs
-                    ]
-        yield from metrics.values()
+    metrics: dict[str, Metric] = {}
+    for number in {path.stem.rpartition("_")[2] for path in folder.glob("*.db")}:
+        if not Path("/proc", number).exists():
+            mark_process_dead(int(number), str(folder))  # type: ignore[no-untyped-call]
+            continue
+        registry = CollectorRegistry()
+        ProcessCollector(registry=registry, pid=partial(int, number))
+        for metric in registry.collect():
+            sum_up = min if metric.name == "process_start_time_seconds" else add
+            merged = metrics.setdefault(metric.name, metric)
+            if merged is not metric:
+                pairs = zip(merged.samples, metric.samples, strict=True)
+                merged.samples = [sample._replace(value=sum_up(sample.value, other.value)) for sample, other in pairs]
+    yield from metrics.values()
 
 
-class Present(Collector):
+def _totals(database: Database) -> Iterator[Metric]:
     """What is there now and what waits, in numbers of all clutches together."""
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
-
-    def collect(self) -> Iterator[Metric]:
-        numbers = service_totals(self._database)
-        yield GaugeMetricFamily("clutchlife_clutches", "Clutches, archived ones too", value=numbers.clutches)
-        text = "Clutches in use that are safe for at most this number of cycles (95 %); 0: they may be at their end of life"
-        within = GaugeMetricFamily("clutchlife_clutches_within", text, labels=["cycles"])
-        for cycles, count in numbers.within.items():
+    text = "Clutches in use that are safe for at most this number of cycles (95 %); 0: they may be at their end of life"
+    within = GaugeMetricFamily("clutchlife_clutches_within", text, labels=["cycles"])
+    with database.reading() as connection:
+        for cycles, count in clutches.count_within(connection, WITHIN).items():
             within.add_metric([f"{cycles:g}"], count)
-        yield within
-        yield GaugeMetricFamily("clutchlife_runs", "Runs stored", value=numbers.runs)
-        yield GaugeMetricFamily("clutchlife_runs_held", "Runs that wait to be confirmed", value=numbers.held)
-        text = "Ended lives that the priors of fleets know of"
-        yield GaugeMetricFamily("clutchlife_ended_lives", text, value=numbers.ended_lives)
-        text = "Diagnoses that wait or run"
-        yield GaugeMetricFamily("clutchlife_diagnoses_waiting", text, value=numbers.diagnoses)
+        counts = (
+            ("clutches", "Clutches, archived ones too", clutches.count(connection)),
+            ("runs", "Runs stored", runs.count(connection)),
+            ("runs_held", "Runs that wait to be confirmed", runs.count_held(connection)),
+            ("ended_lives", "Ended lives that the priors of fleets know of", assumptions.count_ended_lives(connection)),
+            ("diagnoses_waiting", "Diagnoses that wait or run", jobs.count_open(connection, jobs.DIAGNOSIS)),
+        )
+    first, *others = (GaugeMetricFamily(f"clutchlife_{name}", says, value=count) for name, says, count in counts)
+    yield from (first, within, *others)
 
 
-class Clutches(Collector):
+def _each_clutch(database: Database) -> Iterator[Metric]:
     """Runs, health and remaining cycles of every clutch; what is not known is left out."""
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
-
-    def collect(self) -> Iterator[Metric]:
-        runs = GaugeMetricFamily("clutchlife_clutch_runs", "Runs stored", labels=["clutch"])
-        health = GaugeMetricFamily("clutchlife_clutch_health", "1 when new, 0 at end of life", labels=["clutch"])
-        text = "Duty cycles until end of life"
-        remaining = GaugeMetricFamily("clutchlife_clutch_remaining_cycles", text, labels=["clutch", "quantile"])
-        for item in clutch_list.every(self._database, at_once=METRICS_PAGE):
-            name, summary = item["clutch_id"], item["summary"]
-            runs.add_metric([name], item["runs"])
-            if summary is None:
-                continue
-            if summary["current"]["health"] is not None:
-                health.add_metric([name], summary["current"]["health"])
-            for quantile, cycles in summary["remaining_cycles"].items():
-                if cycles is not None:
-                    remaining.add_metric([name, quantile], cycles)
-        yield from (runs, health, remaining)
+    counts = GaugeMetricFamily("clutchlife_clutch_runs", "Runs stored", labels=["clutch"])
+    health = GaugeMetricFamily("clutchlife_clutch_health", "1 when new, 0 at end of life", labels=["clutch"])
+    text = "Duty cycles until end of life"
+    remaining = GaugeMetricFamily("clutchlife_clutch_remaining_cycles", text, labels=["clutch", "quantile"])
+    for item in clutch_list.every(database, at_once=METRICS_PAGE):
+        name, summary = item["clutch_id"], item["summary"]
+        counts.add_metric([name], item["runs"])
+        if summary is None:
+            continue
+        if summary["current"]["health"] is not None:
+            health.add_metric([name], summary["current"]["health"])
+        for quantile, cycles in summary["remaining_cycles"].items():
+            if cycles is not None:
+                remaining.add_metric([name, quantile], cycles)
+    yield from (counts, health, remaining)

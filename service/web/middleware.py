@@ -39,7 +39,20 @@ from service.web.problems import refused, unexpected
 from storage.engine.errors import StorageError
 
 
-class Shares:
+class _OfRequests:
+    """Middleware whose `handle` is given requests; what else the server sends passes by."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await (self.handle if scope["type"] == "http" else self.app)(scope, receive, send)
+
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
+        raise NotImplementedError
+
+
+class Shares(_OfRequests):
     """Each caller has a share: so many requests a second, and so many at once; more are refused with 429.
 
     What was not asked for two seconds is saved up. A caller is a key that was let in before, else an address: who tries
@@ -47,41 +60,43 @@ class Shares:
     """
 
     def __init__(self, app: ASGIApp, per_second: float, at_once: int) -> None:
-        self.app = app
+        super().__init__(app)
         self.per_second = per_second
         self.at_once = at_once
         self._shares: OrderedDict[str, _Share] = OrderedDict()
         self._keys: OrderedDict[bytes, str] = OrderedDict()  # by the digest of what was sent as Authorization
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http" or scope["path"] in limits.UNLIMITED:
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["path"] in limits.UNLIMITED:
             await self.app(scope, receive, send)
             return
         header = next((value for name, value in scope["headers"] if name == b"authorization"), None)
         sent = None if header is None else hashlib.sha256(header).digest()
         share = self._share_of(sent, scope.get("client"))
         if (wait := self._wait(share)) > 0:
-            await self._refuse(wait, scope, receive, send)
+            detail = f"one caller may send {self.per_second:g} requests a second and have {self.at_once} open at once"
+            response = refused(TooManyError, detail)
+            response.headers["Retry-After"] = str(math.ceil(wait))
+            await response(scope, receive, send)
             return
         share.running += 1
         try:
             await self.app(scope, receive, send)
         finally:
             share.running -= 1
-            if sent is not None:
-                self._know(sent, scope)
+            grant = scope.get("state", {}).get("grant")
+            if sent is not None and grant is not None and grant.key_id is not None:
+                self._keys[sent] = f"key {grant.key_id}"
+                if len(self._keys) > limits.MAX_CALLERS:
+                    self._keys.popitem(last=False)
 
     def _share_of(self, sent: bytes | None, client: tuple[str, int] | None) -> "_Share":
-        name = None if sent is None else self._keys.get(sent)
-        if name is None:
-            name = "" if client is None else client[0]
-        share = self._shares.get(name)
-        if share is None:
-            share = self._shares[name] = _Share(limits.SAVED_SECONDS * self.per_second, time.monotonic())
-            while len(self._shares) > limits.MAX_CALLERS:
-                self._shares.popitem(last=False)
-        else:
-            self._shares.move_to_end(name)
+        name = self._keys.get(sent or b"") or ("" if client is None else client[0])
+        full = _Share(limits.SAVED_SECONDS * self.per_second, time.monotonic())
+        share = self._shares.setdefault(name, full)
+        self._shares.move_to_end(name)
+        if len(self._shares) > limits.MAX_CALLERS:
+            self._shares.popitem(last=False)
         return share
 
     def _wait(self, share: "_Share") -> float:
@@ -96,19 +111,6 @@ class Shares:
         share.saved -= 1
         return 0
 
-    def _know(self, sent: bytes, scope: Scope) -> None:
-        grant = scope.get("state", {}).get("grant")
-        if grant is not None and grant.key_id is not None:
-            self._keys[sent] = f"key {grant.key_id}"
-            while len(self._keys) > limits.MAX_CALLERS:
-                self._keys.popitem(last=False)
-
-    async def _refuse(self, wait: float, scope: Scope, receive: Receive, send: Send) -> None:
-        detail = f"one caller may send {self.per_second:g} requests a second and have {self.at_once} open at once"
-        response = refused(TooManyError, detail)
-        response.headers["Retry-After"] = str(math.ceil(wait))
-        await response(scope, receive, send)
-
 
 @dataclass(slots=True)
 class _Share:
@@ -119,31 +121,7 @@ class _Share:
     running: int = 0
 
 
-class Room:
-    """Bytes that all requests share; used from the event loop alone."""
-
-    def __init__(self, most: int) -> None:
-        self._left = most
-
-    def take(self, size: int) -> bool:
-        if size > self._left:
-            return False
-        self._left -= size
-        return True
-
-    def give_back(self, size: int) -> None:
-        self._left += size
-
-
-@dataclass(frozen=True, slots=True)
-class _Bound:
-    """Bytes of a body at an address, and how many of them stay in memory where the rest is kept on disk."""
-
-    most: int
-    in_memory: int
-
-
-class BodyLimit:
+class BodyLimit(_OfRequests):
     """Refuses a body over the bytes of its address with 413, announced or grown so far, and one that takes longer than
     `seconds`, and the time that its bytes so far may take, with 408.
 
@@ -152,29 +130,27 @@ class BodyLimit:
     """
 
     def __init__(self, app: ASGIApp, most: int, most_file: int, seconds: float) -> None:
-        self.app = app
+        super().__init__(app)
         short = min(most, limits.MAX_SHORT_BODY_BYTES)
+        # by the end of an address: bytes of a body, and how many of them stay in memory where the rest is kept on disk
         self.bounds = {
-            "/runs/file": _Bound(most_file, 0),
-            "/import/preview": _Bound(most_file, 0),
-            "/runs": _Bound(most, limits.MAX_BYTES_IN_MEMORY),
-            "/photographs": _Bound(most, most),
-            "": _Bound(short, short),
+            "/runs/file": (most_file, 0),
+            "/import/preview": (most_file, 0),
+            "/runs": (most, limits.MAX_BYTES_IN_MEMORY),
+            "/photographs": (most, most),
+            "": (short, short),
         }
-        self.memory, self.disk = Room(limits.MAX_BODIES_IN_MEMORY), Room(2 * max(most, most_file))
+        self.left = {"memory": limits.MAX_BODIES_IN_MEMORY, "disk": 2 * max(most, most_file)}
         self.seconds = seconds
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        bound = next(bound for end, bound in self.bounds.items() if scope["path"].endswith(end))
-        detail = f"a request may hold at most {bound.most} bytes here"
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
+        bound, in_memory = next(bound for end, bound in self.bounds.items() if scope["path"].endswith(end))
+        detail = f"a request may hold at most {bound} bytes here"
         announced = dict(scope["headers"]).get(b"content-length", b"0")
-        if announced.isdigit() and int(announced) > bound.most:
+        if announced.isdigit() and int(announced) > bound:
             await refused(TooLargeError, detail)(scope, receive, send)
             return
-        body = _Body(self, bound)
+        body = _Body(self.left, in_memory)
         clock = asyncio.get_running_loop().time
         begun, whole = clock(), False
 
@@ -194,7 +170,7 @@ class BodyLimit:
                 message = await arrived()
                 whole = not message.get("more_body", False)
                 has_room = body.grow(len(message.get("body", b"")))
-                if body.taken > bound.most:
+                if body.taken > bound:
                     raise TooLargeError(detail)
                 if has_room:
                     return message
@@ -208,41 +184,38 @@ class BodyLimit:
 
 
 class _Body:
-    """The body of a request as far as it has arrived, and the room that it takes."""
+    """The body of a request as far as it has arrived, and what it takes of the bytes `left` to all, by place."""
 
-    def __init__(self, limit: BodyLimit, bound: _Bound) -> None:
+    def __init__(self, left: dict[str, int], in_memory: int) -> None:
         self.taken = 0
-        self._limit, self._bound = limit, bound
-        self._held = {limit.memory: 0, limit.disk: 0}
+        self._left, self._in_memory = left, in_memory
+        self._held = dict.fromkeys(left, 0)
         self._has_room = True
 
     def grow(self, size: int) -> bool:
         """Whether so many bytes more have room; what has none takes none any more."""
         self.taken += size
-        in_memory = min(self.taken, self._bound.in_memory)
-        needed = {self._limit.memory: in_memory, self._limit.disk: self.taken - in_memory}
-        for room, most in needed.items():
-            if self._has_room and most > self._held[room]:
-                self._has_room = room.take(most - self._held[room])
-                self._held[room] = most if self._has_room else self._held[room]
-        if not self._has_room:
-            self.leave()
+        if self._has_room:
+            in_memory = min(self.taken, self._in_memory)
+            needed = {"memory": in_memory, "disk": self.taken - in_memory}
+            self._has_room = all(most <= self._left[place] + self._held[place] for place, most in needed.items())
+            self._hold(needed if self._has_room else dict.fromkeys(needed, 0))
         return self._has_room
 
     def leave(self) -> None:
-        for room, size in self._held.items():
-            room.give_back(size)
-            self._held[room] = 0
+        self._hold(dict.fromkeys(self._held, 0))
+
+    def _hold(self, sizes: dict[str, int]) -> None:
+        for place, size in sizes.items():
+            self._left[place] += self._held[place] - size
+        self._held = sizes
 
 
-class Heads:
+class Heads(_OfRequests):
     """HEAD is answered wherever GET is: the same status and headers, and no body (RFC 9110, section 9.3.2)."""
 
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http" or scope["method"] != "HEAD":
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["method"] != "HEAD":
             await self.app(scope, receive, send)
             return
 
@@ -271,17 +244,14 @@ _SAFE = {
 _PROBES = ("/livez", "/readyz", "/metrics")
 
 
-class Edge:
+class Edge(_OfRequests):
     """What every request has: an id, safe headers, a count and a time by its route's template, a line in the log."""
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
-        self.app = app
+        super().__init__(app)
         self.metrics = metrics
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
         sent = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
         own_id = (sane(sent) if sent else None) or secrets.token_hex(8)
         request_id.set(own_id)
@@ -329,60 +299,53 @@ def remember(request: Request, again: Again) -> None:
     request.scope[_REMEMBERED] = again
 
 
-@dataclass(frozen=True, slots=True)
-class _Place:
-    """What a path leads to."""
-
-    route: Any
-    clutch_id: str | None
-
-
-class Polls:
+class Polls(_OfRequests):
     """Answers what was asked before without looking at anything else, for what was asked for last.
 
     An answer is found by its path and its arguments as they were checked: however a number is written, it is one entry.
     """
 
     def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-        self._places: OrderedDict[str, _Place] = OrderedDict()
+        super().__init__(app)
+        self._places: OrderedDict[str, tuple[Any, str | None]] = OrderedDict()  # the route and the clutch of a path
         self._polls: OrderedDict[tuple[str, Hashable], Again] = OrderedDict()
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http" or scope["method"] != "GET":
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["method"] != "GET":
             await self.app(scope, receive, send)
             return
         path, query = scope["path"], scope["query_string"]
-        place = self._places.get(path)
-        if place is not None:
-            again = self._polls.get((path, _arguments(place.route, query)))
-            if again is not None and (response := await self._answered(place, again, scope)) is not None:
+        if path in self._places:
+            route, clutch_id = self._places[path]
+            again = self._polls.get((path, _arguments(route, query)))
+            if again is not None and (response := await _answered(route, clutch_id, again, scope)) is not None:
                 await response(scope, receive, send)
                 return
         await self.app(scope, receive, send)
         again = scope.get(_REMEMBERED)
         if again is not None:
-            self._places[path] = _Place(scope["route"], clutch_of(Request(scope)))
+            self._places[path] = scope["route"], clutch_of(Request(scope))
             self._polls[path, _arguments(scope["route"], query)] = again
             for index in (self._places, self._polls):
                 while len(index) > limits.MAX_POLLED:
                     index.popitem(last=False)
 
-    async def _answered(self, place: _Place, again: Again, scope: Scope) -> Response | None:
-        request = Request(scope)
-        try:
-            context, caller = context_of(request), caller_of(request)
-            snapshot = await snapshot_at(request, caller, place.clutch_id)
-            grant = authorise(snapshot, caller, "read", place.clutch_id)
-            request.state.grant = grant
-            response = again(request)
-        except (ServiceError, StorageError):  # the usual way says what is wrong
-            return None
-        if response is not None:
-            scope["route"] = place.route  # by which requests are counted
-            if grant.key_id is not None:
-                context.key_uses.note(context.database, grant.key_id)
-        return response
+
+async def _answered(route: Any, clutch_id: str | None, again: Again, scope: Scope) -> Response | None:
+    request = Request(scope)
+    try:
+        context, caller = context_of(request), caller_of(request)
+        snapshot = await snapshot_at(request, caller, clutch_id)
+        grant = authorise(snapshot, caller, "read", clutch_id)
+        request.state.grant = grant
+        response = again(request)
+    except (ServiceError, StorageError):  # the usual way says what is wrong
+        return None
+    if response is not None:
+        scope["route"] = route  # by which requests are counted
+        if grant.key_id is not None:
+            context.key_uses.note(context.database, grant.key_id)
+    return response
 
 
 def _arguments(route: Any, query: bytes) -> Hashable:
@@ -442,20 +405,17 @@ class Unpacked:
         return piece
 
 
-class Encodings:
+class Encodings(_OfRequests):
     """Bodies packed by gzip, both ways, unless they are files that are packed already; any other encoding sent is a 415.
 
     An answer's entity tag names its bytes, so the packed ones have a tag of their own: the same with a mark.
     """
 
     def __init__(self, app: ASGIApp) -> None:
-        self.app = app
+        super().__init__(app)
         self.packing = GZipMiddleware(app, limits.MIN_PACKED_BYTES, limits.PACKING_LEVEL)
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
         headers = MutableHeaders(scope=scope)
         encoding = headers.get("content-encoding", "identity").strip().lower()
         if encoding not in ("identity", "gzip"):
@@ -485,17 +445,14 @@ class Encodings:
         await app(scope, receive, tagged)
 
 
-class RootPath:
+class RootPath(_OfRequests):
     """Middleware outside of all others. `root` is the path as `/clutch`, or empty."""
 
     def __init__(self, app: ASGIApp, root: str) -> None:
-        self.app = app
+        super().__init__(app)
         self.root = root
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
         host = Headers(scope=scope).get("host", "")
         path = scope["path"]
 

@@ -11,7 +11,6 @@ from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 
 from service.errors import (
-    MAX_ERRORS,
     ConflictError,
     FieldError,
     ForbiddenError,
@@ -83,19 +82,18 @@ def _printable(text: str) -> str:
 
 def install(app: FastAPI) -> None:
     """Map every error of the service to its answer."""
-    app.add_exception_handler(ServiceError, _service_error)
-    app.add_exception_handler(StorageError, _storage_error)
-    app.add_exception_handler(RequestValidationError, _request_error)
-    app.add_exception_handler(HTTPException, _http_error)
-    app.add_exception_handler(OSError, _system_error)
+    app.exception_handler(ServiceError)(_service_error)
+    app.exception_handler(StorageError)(_storage_error)
+    app.exception_handler(RequestValidationError)(_request_error)
+    app.exception_handler(HTTPException)(_http_error)
+    app.exception_handler(OSError)(_system_error)
 
 
-def _service_error(_: Request, error: Exception) -> Response:
-    assert isinstance(error, ServiceError)  # noqa: S101  (registered for it)
+def _service_error(_: Request, error: ServiceError) -> Response:
     return problem(error.status, error.slug, error.title, _printable(error.detail), error.errors, error.total)
 
 
-def _storage_error(_: Request, error: Exception) -> Response:
+def _storage_error(_: Request, error: StorageError) -> Response:
     if isinstance(error, UnstorableText):
         return refused(InvalidError, str(error))
     _log.error("storage: %s", error)
@@ -105,12 +103,10 @@ def _storage_error(_: Request, error: Exception) -> Response:
     return problem(503, slug, title, "nothing was changed: send the request again, or see the service's log")
 
 
-def _request_error(_: Request, error: Exception) -> Response:
-    assert isinstance(error, RequestValidationError)  # noqa: S101  (registered for it)
+def _request_error(request: Request, error: RequestValidationError) -> Response:
     errors = [_argument_error(details) for details in error.errors()]
     more = f"; {len(errors)} errors in all" if len(errors) > 1 else ""
-    detail = errors[0].message + more
-    return problem(422, InvalidError.slug, InvalidError.title, detail, tuple(errors[:MAX_ERRORS]), len(errors))
+    return _service_error(request, InvalidError(errors[0].message + more, errors=errors))
 
 
 def _argument_error(details: dict[str, Any]) -> FieldError:
@@ -124,16 +120,14 @@ def _argument_error(details: dict[str, Any]) -> FieldError:
     )
 
 
-def _http_error(_: Request, error: Exception) -> Response:
-    assert isinstance(error, HTTPException)  # noqa: S101  (registered for it)
+def _http_error(_: Request, error: HTTPException) -> Response:
     title = http.HTTPStatus(error.status_code).phrase
     response = problem(error.status_code, title.lower().replace(" ", "-"), title, str(error.detail))
     response.headers.update(error.headers or {})
     return response
 
 
-def _system_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, OSError)  # noqa: S101  (registered for it)
+def _system_error(request: Request, error: OSError) -> Response:
     if error.errno not in _NO_ROOM:
         return unexpected(request, error)
     _log.error("%s %s: %s", request.method, route_of(request), error)
@@ -141,13 +135,13 @@ def _system_error(request: Request, error: Exception) -> Response:
         f"the service's disk has no room for the file ({error.strerror}). Nothing was stored: make room and send it again. "
         "A form also needs room in the system's temporary folder; a file sent as the request's body does not"
     )
-    return problem(NoRoomError.status, NoRoomError.slug, NoRoomError.title, detail)
+    return refused(NoRoomError, detail)
 
 
 def unexpected(request: Request, error: Exception) -> Response:
     """The answer for an error of the program, which the log says all of and the answer nothing."""
     _log.error("%s %s", request.method, route_of(request), exc_info=error)
-    return problem(500, ServiceError.slug, ServiceError.title, "the service's log describes this error")
+    return refused(ServiceError, "the service's log describes this error")
 
 
 #: For the API's description: which problems an address may answer with.
