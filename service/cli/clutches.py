@@ -20,11 +20,11 @@ from service.cli.options import (
     Reason,
     Url,
     asking,
-    err,
     fail,
     listed,
     out,
     print_line,
+    say,
 )
 from service.cli.tables import cycles, show_table
 from service.client.clutchlife import Client, ClutchlifeError
@@ -105,7 +105,7 @@ def status(clutch: ClutchId, as_json: Json = False, url: Url = URL, key: Key = N
         with Client(url, key, patience=patience) as client:
             item = client.clutch(clutch)
     except (ClutchlifeError, httpx2.InvalidURL, ValueError, OSError) as error:
-        err.print(f"clutchlife: the state is unknown: {error}", markup=False, soft_wrap=True)
+        say(f"clutchlife: the state is unknown: {error}")
         raise typer.Exit(UNKNOWN) from None
     if as_json:
         out.print_json(json.dumps(item))

@@ -1,6 +1,8 @@
 """Commands on the database itself, for the machine that holds it: a backup, the results computed again, and the like."""
 
 import random
+from collections import Counter
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,11 +20,14 @@ from service.cli.options import (
     existing,
     fail,
     print_line,
-    read_only,
     require_database,
     require_file,
+    say,
 )
 from storage.engine.errors import DatabaseTooOld
+
+if TYPE_CHECKING:
+    from service.work.background import AtOnce
 
 
 def backup(path: Path, database: Database = DATABASE) -> None:
@@ -36,8 +41,7 @@ def backup(path: Path, database: Database = DATABASE) -> None:
         left_out = _left_out(path)
     print_line(str(path))
     for address, blobs in left_out.items():
-        line = f"the backup does not contain {blobs} raw records: copy them now from {address}"
-        err.print(line, markup=False, soft_wrap=True)
+        say(f"the backup does not contain {blobs} raw records: copy them now from {address}")
 
 
 def _left_out(path: Path) -> dict[str, int]:
@@ -71,10 +75,6 @@ def restore(
         print_line(f"the old database is kept as {replaced_file}")
 
 
-if TYPE_CHECKING:
-    from service.work.background import AtOnce
-
-
 def replay(
     clutch_ids_given: Annotated[
         list[str] | None, typer.Argument(metavar="[ID...]", help="The clutches; default: all")
@@ -97,7 +97,7 @@ def replay(
         for replayed in workflow.replay(opened, clutch_ids, computing, at_once=at_once):
             if replayed.error is not None:
                 left.append(replayed.clutch_id)
-                err.print(f"{replayed.clutch_id}: not replayed: {replayed.error}", markup=False, soft_wrap=True)
+                say(f"{replayed.clutch_id}: not replayed: {replayed.error}")
             else:
                 print_line(f"{replayed.clutch_id}: {replayed.runs} runs")
             advance()
@@ -126,14 +126,14 @@ def verify(
 
     use_one_blas_thread()
     findings = runs = inspections = photographs = 0
-    earlier: dict[str, int] = {}
+    earlier: Counter[str] = Counter()
 
-    def tell(lines: "list[str] | tuple[str, ...]") -> int:
+    def tell(lines: Sequence[str]) -> int:
         for line in lines:
             print_line(line)
         return len(lines)
 
-    with read_only(database) as opened, Progress(console=err, transient=True) as progress:
+    with existing(database, read_only=True) as opened, Progress(console=err, transient=True) as progress:
         with opened.reading() as connection:
             damaged = tell(opened.damage(connection))
             if damaged:  # what is read of a damaged file is not to be trusted: neither runs nor what follows from them
@@ -151,12 +151,12 @@ def verify(
             if clutch_id in chosen and not content.findings:
                 results = verification.check_results(opened, clutch_id)
                 findings += tell(results.findings)
-                for version, count in results.earlier.items():
-                    earlier[version] = earlier.get(version, 0) + count
+                earlier.update(results.earlier)
             progress.advance(task)
     for version, count in sorted(earlier.items()):
-        note = f"{count} results were computed by release {version}: a replay computes them again and may change them"
-        print_line(note)
+        print_line(
+            f"{count} results were computed by release {version}: a replay computes them again and may change them"
+        )
     if inspections:
         print_line(f"{inspections} inspections with {photographs} photographs were checked")
     checked = f"{runs} runs of {len(ids)} clutches were checked"
@@ -208,11 +208,6 @@ def migrate(
 
 app = typer.Typer(help="Where long raw records are kept beside the database.", no_args_is_help=True)
 
-_SECONDS_AN_HOUR = 3600.0
-#: Hours that a blob may be without a run that names it. Chosen: no run takes longer from its arrival to its commit, nor do
-#: the clocks of a store and of this machine differ by more; the least that is allowed is what a single run may take.
-_GRACE_HOURS, _MIN_GRACE_HOURS = 24.0, 1.0
-
 Address = Annotated[str, typer.Option("--to", help="database, folder:///path or s3://bucket/prefix")]
 
 
@@ -225,8 +220,7 @@ def list_stores(database: Database = DATABASE) -> None:
         stores, numbers = raw_stores.all_of(connection), raw_stores.numbers(connection)
     for store in stores:
         columns, blobs = numbers.get(store.address, (0, 0))
-        used = ", in use" if store.in_use else ""
-        print_line(f"{store.address}: {columns} channels in {blobs} files{used}")
+        print_line(f"{store.address}: {columns} channels in {blobs} files{', in use' if store.in_use else ''}")
     if not any(store.in_use for store in stores):
         print_line("new raw records go into the database")
 
@@ -265,14 +259,17 @@ def relocate(
 @app.command()
 def collect(
     database: Database = DATABASE,
+    # no run takes longer than a day from its arrival to its commit, nor do the clocks of a store and of this machine differ
+    # by more; at least what a single run may take
     grace_hours: Annotated[
-        float, typer.Option(min=_MIN_GRACE_HOURS, help="Keep files that are younger than this many hours")
-    ] = _GRACE_HOURS,
+        float, typer.Option(min=1.0, help="Keep files that are younger than this many hours")
+    ] = 24.0,
 ) -> None:
     """Remove files of raw records that no run uses, as interrupted requests leave them. Safe while services run."""
     from service.workflows.raw_records import collect as collect_all  # start-up time
 
     with existing(database) as opened:
-        for store in collect_all(opened, grace=grace_hours * _SECONDS_AN_HOUR):
-            line = f"{store.address}: {store.named} files in use, {store.removed} removed, {store.new} too new to be removed"
-            print_line(line)
+        for store in collect_all(opened, grace=grace_hours * 3600.0):
+            print_line(
+                f"{store.address}: {store.named} files in use, {store.removed} removed, {store.new} too new to be removed"
+            )

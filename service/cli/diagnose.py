@@ -20,7 +20,7 @@ from service.cli.tables import chance, cycles, number
 from service.client.clutchlife.client import diagnosed
 from service.client.clutchlife.transport import Service
 
-_Table = list[list[float | None]]
+_Cells = list[list[float | None]]
 _VERDICTS = {
     "model_adequate": ("The model is adequate", "green"),
     "cause_named": ("The cause is named", "yellow"),
@@ -92,15 +92,19 @@ def _use(advice: Mapping[str, Any]) -> str:
 
 
 def _in_unit(value: str, unit: str) -> str:
-    """A value with its unit, "-" where it has none."""
     return value if unit == "-" else f"{value} {unit}"
 
 
-def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
+def _table(*columns: str, right: Sequence[str] = ()) -> Table:
+    """A table without frames, the columns named in `right` justified there."""
     table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("candidate")
-    table.add_column("probability", justify="right")
-    table.add_column("estimate")
+    for name in columns:
+        table.add_column(name, justify="right" if name in right else "left")
+    return table
+
+
+def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
+    table = _table("candidate", "probability", "estimate", right=["probability"])
     for candidate in candidates:
         estimate = candidate["estimate"]
         size = f"{number(estimate['value'])} ± {number(estimate['sd'], 2)}"
@@ -111,9 +115,8 @@ def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
 
 def _visible(visible: Sequence[Mapping[str, Any]]) -> Table:
     """From which size on an effect would be seen: in any of its forms, and in the one that shows best."""
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("smallest visible size of", "in every shape", "in the most visible shape"):
-        table.add_column(name, justify="left" if name == "smallest visible size of" else "right")
+    shapes = ("in every shape", "in the most visible shape")
+    table = _table("smallest visible size of", *shapes, right=shapes)
     for item in visible:
         sizes = (
             "at no size" if size is None else _in_unit(number(size), item["unit"])
@@ -126,17 +129,11 @@ def _visible(visible: Sequence[Mapping[str, Any]]) -> Table:
 def _isolability(isolability: Mapping[str, Any]) -> Iterator[RenderableType]:
     """The pairs that these tests could not tell apart for sure, hardest first, and what they cannot show."""
     hard = [pair for pair in isolability["pairs"] if not pair["apart"]]
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("causes", "distinguished", "better by this test", "then"):
-        table.add_column(name)
+    table = _table("causes", "distinguished", "better by this test", "then")
     for pair in hard:
         before, then = (f"{100 * pair[name]:.0f} %" for name in ("probability", "with_test"))
-        table.add_row(
-            Text(" and ".join(map(_spelt, pair["effects"]))),
-            before,
-            Text(pair["test"] or "no single test distinguishes them"),
-            then,
-        )
+        best = Text(pair["test"] or "no single test distinguishes them")
+        table.add_row(Text(" and ".join(map(_spelt, pair["effects"]))), before, best, then)
     if hard:
         yield table
     sure = len(isolability["pairs"]) - len(hard)
@@ -153,19 +150,19 @@ def _evidence(gain: float | None) -> str:
 
 
 def _maps(maps: Mapping[str, Any]) -> Group:
-    axes, drawn = maps["axes"], []
-    tables = {when: _tables(maps[when]) for when in ("before", "after")}
-    largest = [
-        max((abs(value) for line in tables["before"][place] for value in line if value is not None), default=0.0)
-        for place in (0, 1)
-    ]
+    """Both models' residuals by pressure over speed and over cycles, as shares of the baseline's largest."""
+    drawn: list[Group] = []
+    largest: list[float] = []
+    levels, speeds, cycles_at = (maps["axes"][name] for name in ("pressure_bar", "speed_rpm", "cycles"))
     for when, title in (("before", "Baseline"), ("after", "Extended")):
-        over = zip((("rpm", axes["speed_rpm"]), ("cycles", axes["cycles"])), tables[when], largest, strict=True)
-        grids = [
-            _grid(f"{title}: bar over {name}", axes["pressure_bar"], columns, table, most)
-            for (name, columns), table, most in over
+        by_cycles = list(zip(*maps[when]["pressure_cycles"], strict=True))
+        tables = [_thinned(maps[when]["speed_pressure"]), _thinned(by_cycles)]
+        largest = largest or [
+            max((abs(value) for line in table for value in line if value is not None), default=0.0) for table in tables
         ]
-        drawn.append(Group(*grids))
+        over_speed = _grid(f"{title}: bar over rpm", levels, speeds, tables[0], largest[0])
+        over_cycles = _grid(f"{title}: bar over cycles", levels, cycles_at, tables[1], largest[1])
+        drawn.append(Group(over_speed, over_cycles))
     legend = Text("Mean residual as a share of the largest one of the baseline ")
     legend.append(f"(over rpm {number(largest[0], 2)}, over cycles {number(largest[1], 2)} standard deviations): ")
     for least, mark, above, below in reversed(_MARKS):
@@ -175,18 +172,13 @@ def _maps(maps: Mapping[str, Any]) -> Group:
     return Group(Columns(drawn, padding=(0, 3)), legend)
 
 
-def _tables(residuals: Mapping[str, Any]) -> tuple[_Table, _Table]:
-    """Both maps with a row a pressure, thinned to what fits."""
-    by_pressure = [list(line) for line in zip(*residuals["pressure_cycles"], strict=True)]
-    return _thinned(residuals["speed_pressure"]), _thinned(by_pressure)
-
-
-def _thinned(table: _Table) -> _Table:
+def _thinned(table: Sequence[Sequence[float | None]]) -> _Cells:
+    """A map with a row a pressure, its columns averaged until they fit."""
     size = max(1, math.ceil(max(map(len, table), default=0) / _MAX_CELLS))
     return [[_mean(line[start : start + size]) for start in range(0, len(line), size)] for line in table]
 
 
-def _grid(title: str, rows: Sequence[float], columns: Sequence[float], table: _Table, largest: float) -> Text:
+def _grid(title: str, rows: Sequence[float], columns: Sequence[float], table: _Cells, largest: float) -> Text:
     """Residuals as coloured blocks that can be read without colours too, the highest row first."""
     text = Text(f"{title}\n", style="bold")
     for level, line in sorted(zip(rows, table, strict=True), key=lambda pair: -pair[0]):

@@ -7,18 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.options import (
-    DATABASE,
-    EX_USAGE,
-    Database,
-    Scheduler,
-    err,
-    executor,
-    existing,
-    fail,
-    print_line,
-    read_only,
-)
+from service.cli.options import DATABASE, EX_USAGE, Database, Scheduler, err, executor, existing, fail, print_line
 
 if TYPE_CHECKING:
     from service.work.background import AtOnce
@@ -34,7 +23,7 @@ def show(context: typer.Context, database: Database = DATABASE) -> None:
         return
     from service.queries.fleet_priors import newest  # start-up time
 
-    with read_only(database) as opened:
+    with existing(database, read_only=True) as opened:
         priors = newest(opened)
     for item in priors:
         print_line(_line(item))
@@ -99,7 +88,7 @@ def score(
 
     if method not in METHODS:
         fail(f"method must be one of {', '.join(METHODS)}, got {method!r}", EX_USAGE)
-    with read_only(database) as opened:
+    with existing(database, read_only=True) as opened:
         with opened.reading() as connection:
             clutch_ids = clutches.all_ids(connection)
         fleet = scores.scores_of_fleet(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, existing, fail, print_line, read_only
+from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, existing, fail, print_line
 
 if TYPE_CHECKING:
     from storage.keys import KeyRow
@@ -51,15 +51,14 @@ def list_keys(database: Database = DATABASE) -> None:
     """List all keys: name, scope, creation, validity, last use (to the hour), and clutches."""
     from storage import keys  # start-up time
 
-    with read_only(database) as opened, opened.reading() as connection:
+    with existing(database, read_only=True) as opened, opened.reading() as connection:
         rows = keys.all_keys(connection)
     if not rows:
         print_line("no key exists")
     for row in rows:
         used = "never used" if row.last_used_at is None else f"used {row.last_used_at}"
         clutches = "" if row.clutches is None else f"  only {', '.join(row.clutches)}"
-        line = f"{row.key_id}  {row.scope:<6}  {row.created_at}  {_state(row)}  {used}{clutches}  {row.note}"
-        print_line(line)
+        print_line(f"{row.key_id}  {row.scope:<6}  {row.created_at}  {_state(row)}  {used}{clutches}  {row.note}")
 
 
 def _state(row: "KeyRow") -> str:

@@ -93,24 +93,14 @@ def errors_in_a_line() -> Iterator[None]:
 
 
 @contextmanager
-def existing(url: str) -> Iterator["Opened"]:
-    """An open database that exists already: a mistyped address makes no new one. An older one is migrated."""
-    from storage.engine.opening import open_database  # start-up time: most commands open no database
+def existing(url: str, *, read_only: bool = False) -> Iterator["Opened"]:
+    """An open database that exists already: a mistyped address makes no new one. An older one is migrated, or with
+    `read_only` left at its revision."""
+    from storage.engine.opening import find_database, open_database  # start-up time: most commands open no database
 
     with errors_in_a_line():
         require_database(url)
-        with closing(open_database(url)) as opened:
-            yield opened
-
-
-@contextmanager
-def read_only(url: str) -> Iterator["Opened"]:
-    """An existing database for a command that only reads it: it stays as it is, at whatever revision."""
-    from storage.engine.opening import find_database  # start-up time: most commands open no database
-
-    with errors_in_a_line():
-        require_database(url)
-        with closing(find_database(url)) as opened:
+        with closing((find_database if read_only else open_database)(url)) as opened:
             yield opened
 
 
@@ -149,6 +139,11 @@ def print_line(text: str) -> None:
     out.print(text, markup=False, soft_wrap=True)
 
 
+def say(text: str) -> None:
+    """A line on standard error, names of files as they are."""
+    err.print(text, markup=False, soft_wrap=True)
+
+
 def fail(message: str, code: int = 1) -> NoReturn:
     """Print the error on standard error, and end."""
     err.print(f"[bold red]clutchlife:[/] {escape(message)}", soft_wrap=True)
@@ -156,18 +151,6 @@ def fail(message: str, code: int = 1) -> NoReturn:
 
 
 _OPTIONS = {"url": (Url, URL), "key": (Key, None), "patience": (Patience, 10.0)}
-
-
-@contextmanager
-def service_at(url: str, key: str | None, patience: float) -> Iterator[Service]:
-    """The service at `url`; `patience` [s] is how long a request is tried again while the service is away."""
-    with errors_in_a_line(), connect(url, key=key) as http:
-        try:
-            yield Service(http=http, patience=patience)
-        except ServiceAwayError as error:
-            fail(str(error), EX_TEMPFAIL)
-        except RefusedError as error:
-            fail(str(error), EX_DATAERR)
 
 
 def asking(command: Callable[..., None]) -> Callable[..., None]:
@@ -178,8 +161,13 @@ def asking(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def with_service(*, url: str, key: str | None, patience: float, **given: Any) -> None:
-        with service_at(url, key, patience) as service:
-            command(service, **given)
+        with errors_in_a_line(), connect(url, key=key) as http:
+            try:
+                command(Service(http=http, patience=patience), **given)
+            except ServiceAwayError as error:
+                fail(str(error), EX_TEMPFAIL)
+            except RefusedError as error:
+                fail(str(error), EX_DATAERR)
 
     with_service.__signature__ = inspect.Signature([*parameters, *shared])  # type: ignore[attr-defined]
     with_service.__annotations__ = {parameter.name: parameter.annotation for parameter in [*parameters, *shared]}

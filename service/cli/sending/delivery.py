@@ -8,16 +8,11 @@ from typing import Any
 
 from rich.progress import Progress
 
-from service.cli.options import EX_DATAERR, EX_TEMPFAIL, err, fail, out
+from service.cli.options import EX_DATAERR, EX_TEMPFAIL, err, fail, out, say
 from service.cli.sending import spool as entries
 from service.cli.sending.spool import INSPECTIONS, RUNS, Entry, HeldError, Spool
 from service.client.clutchlife.answers import RefusedError, ServiceAwayError
 from service.client.clutchlife.transport import NoLongerWantedError, Service, connect
-
-
-def say(line: str) -> None:
-    """A line on standard error, names of files as they are."""
-    err.print(line, markup=False, soft_wrap=True)
 
 
 def transmit(

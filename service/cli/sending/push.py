@@ -22,8 +22,9 @@ from service.cli.options import (
     errors_in_a_line,
     fail,
     print_line,
+    say,
 )
-from service.cli.sending.delivery import say, transmit
+from service.cli.sending.delivery import transmit
 from service.cli.sending.spool import (
     INSPECTIONS,
     REFUSED,
