@@ -1,5 +1,6 @@
 """The errors that a caller may get: one base, mapped to HTTP once (`service.web.problems`); and notices."""
 
+import signal
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -136,3 +137,11 @@ class UnauthorizedError(ServiceError, status=401, slug="unauthorized", title="A 
 
 class ForbiddenError(ServiceError, status=403, slug="forbidden", title="Not allowed"):
     """The caller's key, or its address where no key exists, does not allow this."""
+
+
+def exit_text(code: int) -> str:
+    """How a process ended, by the code of `subprocess`: the signal, or its status."""
+    try:
+        return signal.Signals(-code).name if code < 0 else f"status {code}"
+    except ValueError:
+        return f"signal {-code}"

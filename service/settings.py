@@ -23,24 +23,20 @@ MIB = 2**20
 #: How alike a name must be to that of a setting (2 x signs in common / signs of both) to be one misspelt. Tried: seven
 #: slips are alike by 0.93 to 0.98, eight names of commands and orchestrators by at most 0.81. See its tests.
 _ALIKE = 0.9
-#: A password in an address, greedy for one that holds an @ itself; and all options, which may hold one.
-_SECRETS = ((re.compile(r"://([^:/@]*):.*@"), r"://\1:***@"), (re.compile(r"\?.*"), "?***"))
-
-
 #: What the service's own addresses begin with: a path that a proxy adds and takes off again must be told from them.
 _OWN = ("v1", "clutches", "assets", "docs", "help", "openapi.json", "static-offline-docs", "livez", "readyz", "metrics")
-_SEGMENTS = re.compile(r"(?:/[A-Za-z0-9._~-]+)*")
+_SEGMENT = re.compile(r"[A-Za-z0-9._~-]+")
 
 
 def _below(path: str) -> str:
     """The path as `/clutch`, without a slash at its end; empty where there is none. Raises ValueError."""
     path = path.strip("/")
-    path = path and f"/{path}"
-    if not _SEGMENTS.fullmatch(path) or {".", ".."} & set(path.split("/")):
+    segments = path.split("/")
+    if (path and not all(map(_SEGMENT.fullmatch, segments))) or {".", ".."} & set(segments):
         raise ValueError("a path of letters, digits, -, ., _ and ~, such as /clutch")
-    if path.split("/")[1:2] and path.split("/")[1] in _OWN:
+    if segments[0] in _OWN:
         raise ValueError(f"a path that does not begin with an address of the service ({', '.join(_OWN)})")
-    return path
+    return path and f"/{path}"
 
 
 class Settings(BaseSettings):
@@ -133,15 +129,13 @@ class Settings(BaseSettings):
     )
 
     @classmethod
-    def from_environment(cls, database: str | None = None, **given: Any) -> "Settings":
+    def from_environment(cls, **given: Any) -> "Settings":
         """Settings from the environment; what is given here wins. Raises ValueError, a line that names all wrong ones."""
-        if database is not None:
-            given["database"] = database
         try:
             return cls(**given)
         except ValidationError as error:
-            wrong = [_wrong(details["type"], details) for details in error.errors()]
-        raise ValueError("; ".join(wrong))
+            wrong = "; ".join(map(_wrong, error.errors()))
+        raise ValueError(wrong)
 
     def to_environment(self) -> None:
         """Set the environment so that `from_environment` gives these settings, in this process and those it starts."""
@@ -170,14 +164,13 @@ class Settings(BaseSettings):
 
 
 def redacted(address: str) -> str:
-    for secret, mark in _SECRETS:
-        address = secret.sub(mark, address)
-    return address
+    """An address without its password, which may hold an @, and without its options, which may hold one."""
+    return re.sub(r"\?.*", "?***", re.sub(r"://([^:/@]*):.*@", r"://\1:***@", address))
 
 
-def _wrong(kind: str, details: Any) -> str:
+def _wrong(details: Any) -> str:
     """One wrong variable, the rule and its value."""
     least = details.get("ctx", {}).get("ge")
     rules = {"int_parsing": "a whole number", "greater_than_equal": f"a whole number of at least {least}"}
-    rule = rules.get(kind, details["msg"].removeprefix("Input should be ").removeprefix("Value error, "))
+    rule = rules.get(details["type"], details["msg"].removeprefix("Input should be ").removeprefix("Value error, "))
     return f"{PREFIX}{details['loc'][0].upper()} must be {rule}, got {details['input']!r}"

@@ -12,6 +12,7 @@ import httpx2
 import typer
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.markup import escape
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.segment import Segment
 
 from service.client.clutchlife.answers import RefusedError, ServiceAwayError
@@ -142,6 +143,12 @@ def print_line(text: str) -> None:
 def say(text: str) -> None:
     """A line on standard error, names of files as they are."""
     err.print(text, markup=False, soft_wrap=True)
+
+
+def spinning(console: Console) -> Progress:
+    """A bar of how far a simulation has come."""
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    return Progress(*columns, console=console, transient=True)
 
 
 def fail(message: str, code: int = 1) -> NoReturn:

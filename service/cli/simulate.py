@@ -6,15 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from service.cli.options import EX_USAGE, Seed, err, errors_in_a_line, fail, out, print_line
+from service.cli.options import EX_USAGE, Seed, err, errors_in_a_line, fail, out, print_line, spinning
 from service.run_files import manifest
 
 if TYPE_CHECKING:
     from models.rig.programme import Programme
     from models.rig.simulated_runs import SimulatedRun
-    from models.rig.truth import Surface
     from service.run_files.record_writer import RecordFormat
 
 #: The campaign ends at this share of the mean COF when new. Chosen: a little below the end of life at 0.5.
@@ -104,7 +102,7 @@ def simulate(
         wear_and_cycles: list[tuple[float, float]] = []
         inspections = 0
         listed: list[dict[str, Any]] = []
-        with _progress() as progress:
+        with spinning(err) as progress:
             task = progress.add_task("run-in", total=clutch.end_of_life(_STOP))
             sensor = stationary.SHARP if noise is None else replace(stationary.SHARP, noise=noise)
             runs = campaign.simulate(
@@ -118,7 +116,10 @@ def simulate(
                     record = temperatures.with_plate(record, clutch.geometry, plate_rise)
                 listed += _write(out_folder, record, record_format)
                 if run.kind is RunKind.STATIONARY_STRIBECK:
-                    _inspect(out_folder, truth.surface(clutch, run.wear), run.cycles)
+                    inspection = simulated.simulated_inspection(truth.surface(clutch, run.wear), run.cycles)
+                    (out_folder / manifest.INSPECTIONS).mkdir(exist_ok=True)
+                    name = f"inspection-{run.cycles:05.0f}.json"
+                    manifest.write(out_folder / manifest.INSPECTIONS / name, inspection)
                     inspections += 1
                 wear_and_cycles.append((run.wear, run.cycles))
         if listed:
@@ -223,18 +224,3 @@ def _write(folder: Path, run: "SimulatedRun", record_format: "RecordFormat") -> 
     head, name = simulated.simulated_head(run), f"{run.run_id}{record_format.suffix}"
     record_writer.write_record(folder / name, record_format, simulated.simulated_channels(run), head)
     return [{"file": name} | head]
-
-
-def _inspect(folder: Path, surface: "Surface", cycles: float) -> None:
-    """The inspection of a lining into a file of its own."""
-    from service.run_files import simulated  # start-up time
-
-    inspections = folder / manifest.INSPECTIONS
-    inspections.mkdir(exist_ok=True)
-    body = simulated.simulated_inspection(surface, cycles)
-    manifest.write(inspections / f"inspection-{cycles:05.0f}.json", body)
-
-
-def _progress() -> Progress:
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    return Progress(*columns, console=err, transient=True)

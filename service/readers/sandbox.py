@@ -25,7 +25,7 @@ from typing import Any, BinaryIO, Literal
 import numpy as np
 
 from service.columns import CHANNELS
-from service.errors import BusyError, FieldError, InvalidError, Notice, ServiceError, TooLargeError
+from service.errors import BusyError, FieldError, InvalidError, Notice, ServiceError, TooLargeError, exit_text
 from service.readers.channels import Channels, to_channels
 from service.readers.confinement import close_files, close_network_and_processes
 from service.readers.detect import Format, is_packed, opened, overdue, too_slow
@@ -123,7 +123,7 @@ def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Lim
         result.seek(0)
         if result.read(len(_STARTED)) != _STARTED and ended.returncode != -signal.SIGTERM:
             raise BusyError(
-                f"the program that reads {kind} files could not start ({_exit_text(ended.returncode)}). The file is not the "
+                f"the program that reads {kind} files could not start ({exit_text(ended.returncode)}). The file is not the "
                 "cause: send it again later. If this repeats, tell the operator of the service"
             )
         if ended.returncode == -signal.SIGXCPU:
@@ -133,11 +133,11 @@ def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Lim
         if ended.returncode == -signal.SIGABRT and kind is Format.WORKBOOK:  # how a library in Rust ends without memory
             raise _too_much(kind)
         if -ended.returncode in _CRASHES:  # in the C code of its library, which is what the process is for
-            crash = _exit_text(ended.returncode)
+            crash = exit_text(ended.returncode)
             why = f"it is damaged or of another type (the library for it ended with {crash})"
             raise _unreadable(kind, why, "reader_crashed")
         if ended.returncode:
-            raise _broken_off(kind, _exit_text(ended.returncode))
+            raise _broken_off(kind, exit_text(ended.returncode))
         return _answer(result, kind, answer, limits)
 
 
@@ -150,13 +150,6 @@ def _broken_off(kind: Format, how: str) -> InvalidError:
     return _unreadable(
         kind, f"the program that reads it broke off ({how}). Export the file again, or save it in another format"
     )
-
-
-def _exit_text(code: int) -> str:
-    try:
-        return signal.Signals(-code).name if code < 0 else f"status {code}"
-    except ValueError:
-        return f"signal {-code}"
 
 
 def _too_much(kind: Format) -> TooLargeError:

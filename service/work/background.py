@@ -57,16 +57,16 @@ def yield_to_others() -> None:
         os.nice(19)
 
 
-def end_with_parent() -> None:
+def end_with_parent(end: Callable[[], object] = lambda: os._exit(3)) -> None:
     """Have this process end when the one that started it has, however that ended."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(3)
+
+    def await_it() -> None:
+        if parent is not None:
+            parent.join()
+            end()
+
+    threading.Thread(target=await_it, daemon=True).start()
 
 
 def in_background(work: Callable[[AtOnce], Result]) -> Result:
@@ -76,11 +76,11 @@ def in_background(work: Callable[[AtOnce], Result]) -> Result:
     itself: a transaction is one of the calling thread, which the interrupt rolls back.
     """
     done: Future[Result] = Future()
-    calls: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+    calls: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = queue.SimpleQueue()
 
     def at_once(function: Callable[..., Any], /, *arguments: Any) -> Any:
         answer: Future[Any] = Future()
-        calls.put(partial(_answer, answer, function, *arguments))
+        calls.put((answer, partial(function, *arguments)))
         return answer.result()
 
     def whole() -> None:
@@ -93,17 +93,13 @@ def in_background(work: Callable[[AtOnce], Result]) -> Result:
             calls.put(None)
 
     threading.Thread(target=whole, name="background", daemon=True).start()
-    while (call := calls.get()) is not None:
-        call()
+    while (asked := calls.get()) is not None:
+        answer, call = asked
+        try:
+            answer.set_result(call())
+        except Exception as error:  # noqa: BLE001  (raised again for who waits; an interrupt ends this thread's wait)
+            answer.set_exception(error)
     return done.result()
-
-
-def _answer(answer: "Future[Result]", function: Callable[..., Result], *arguments: Any) -> None:
-    """Give the future what the function returns or the error it raises; an interrupt ends the calling thread's wait."""
-    try:
-        answer.set_result(function(*arguments))
-    except Exception as error:  # noqa: BLE001  (raised again for who waits)
-        answer.set_exception(error)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
@@ -239,13 +240,11 @@ class Processes(_Elsewhere):
         with self._lock:
             if self._closed:
                 raise RuntimeError("the executor is closed")
-            if self._pool is None or self._pool.broken:
-                self._pool = _Pool(self.count)
-            try:
-                return self._pool.submit(called, function, item)
-            except BrokenExecutor:
-                self._pool = _Pool(self.count)
-                return self._pool.submit(called, function, item)
+            if self._pool is not None:
+                with suppress(BrokenExecutor):  # one of its processes has ended: it takes no calls any more
+                    return self._pool.submit(called, function, item)
+            self._pool = _Pool(self.count)
+            return self._pool.submit(called, function, item)
 
     def first(self, futures: Sequence["Future[Any]"]) -> set["Future[Any]"]:
         return wait(futures, return_when=FIRST_COMPLETED).done
@@ -265,11 +264,6 @@ class _Pool(ProcessPoolExecutor):
 
     def __init__(self, count: int) -> None:
         super().__init__(count, mp_context=multiprocessing.get_context("forkserver"), initializer=_begin)
-
-    @property
-    def broken(self) -> bool:
-        """Whether one of its processes has ended: it takes no calls any more."""
-        return bool(self._broken)
 
     def end(self) -> None:
         """End the processes at once; by SIGKILL, for they are deaf to SIGTERM where a service's workers began what forks
@@ -312,9 +306,8 @@ class Cluster(_Elsewhere):
                 f"{address}: a Dask cluster needs its library: pip install -e '.[cluster]' in a checkout"
             ) from error
         self.address = address
-        self._client: Any  # its library has no types
-        try:
-            self._client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
+        try:  # its library has no types
+            self._client: Any = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, TimeoutError, ValueError) as error:
             raise ExecutorUnavailableError(f"{address}: no Dask scheduler answers there ({error})") from error
         self._completed: Any = as_completed(loop=self._client.loop)  # type: ignore[no-untyped-call]
@@ -424,12 +417,7 @@ def _called(wanted: Mapping[str, str], function: Callable[[Any], Any], item: Any
     return called(function, item)
 
 
-@cache
-def _prepare() -> None:
-    use_one_blas_thread()
-
-
-LOCAL, _POOL, _CLUSTER = "local", "processes", ("tcp://", "tls://")
+_prepare = cache(use_one_blas_thread)
 
 
 def executor_of(scheduler: str) -> Executor:
@@ -437,14 +425,14 @@ def executor_of(scheduler: str) -> Executor:
 
     Raises ValueError on anything else, ExecutorUnavailableError where the cluster cannot be used.
     """
-    if scheduler == LOCAL:
+    if scheduler == "local":
         return InProcess()
-    if scheduler.startswith(_CLUSTER):
-        return Cluster(scheduler)
-    kind, colon, count = scheduler.partition(":")
-    if kind == _POOL and not colon:
+    if scheduler == "processes":
         return Processes(os.cpu_count() or 1)
-    if kind == _POOL and count.isdecimal() and int(count) > 0:
+    if scheduler.startswith(("tcp://", "tls://")):
+        return Cluster(scheduler)
+    kind, _, count = scheduler.partition(":")
+    if kind == "processes" and count.isdecimal() and int(count) > 0:
         return Processes(int(count))
     raise ValueError(f"the scheduler must be {SCHEDULERS}, got {scheduler!r}")
 

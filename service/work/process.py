@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import IO, Any
 
+from service.errors import exit_text
 from service.settings import DATABASE_VARIABLE
 from storage.encoding import Json, to_text
 
@@ -89,9 +90,9 @@ class Child:
             raise AwayError
         if code != 0:
             if output:
-                raise FailedError(f"the computation ended with {_ending(code)}: see the service's log")
+                raise FailedError(f"the computation ended with {exit_text(code)}: see the service's log")
             raise FailedError(
-                f"the computation was stopped ({_ending(code)}), perhaps for want of memory: start it again. If it fails "
+                f"the computation was stopped ({exit_text(code)}), perhaps for want of memory: start it again. If it fails "
                 "again, tell the operator of the service"
             )
         try:
@@ -128,13 +129,6 @@ def running(work: Work, database_url: str) -> Iterator[Child]:
             process.wait()
             if process.stdin is not None:
                 process.stdin.close()
-
-
-def _ending(code: int) -> str:
-    try:
-        return signal.Signals(-code).name if code < 0 else f"status {code}"
-    except ValueError:
-        return f"signal {-code}"
 
 
 def end_with_the_service() -> None:

@@ -37,7 +37,7 @@ _WARM = 20
 def serve(port: int, database: Path) -> None:
     """The service with an empty route beside its own: what the transport and the framework take of any answer."""
     threadpool_limits(limits=1, user_api="blas")
-    app = create_app(Settings.from_environment(f"sqlite:///{database}"))
+    app = create_app(Settings.from_environment(database=f"sqlite:///{database}"))
 
     @app.get("/empty")
     async def empty() -> Response:

@@ -13,7 +13,7 @@ from service.settings import PREFIX, Settings, redacted
 
 def test_what_is_given_wins(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CLUTCHLIFE_DATABASE", "sqlite:///other.db")
-    assert Settings.from_environment("sqlite:///own.db").database == "sqlite:///own.db"
+    assert Settings.from_environment(database="sqlite:///own.db").database == "sqlite:///own.db"
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from service.cli.diagnose import shown
-from service.cli.options import Seed, fail, out
+from service.cli.options import Seed, fail, out, print_line, spinning
 from service.client.clutchlife.answers import ServiceAwayError
 from service.client.clutchlife.client import diagnosed
 from service.client.clutchlife.transport import Service, connect
@@ -37,16 +36,14 @@ def demo(
 ) -> None:
     """Simulate a clutch's life, send it to a service run by run, and watch the prediction of its remaining life."""
     with tempfile.TemporaryDirectory(prefix="clutchlife-demo-") as folder, _service(Path(folder)) as (url, process):
-        out.print(f"Clutchlife at {url}, its database in {folder}", markup=False, soft_wrap=True)
+        print_line(f"Clutchlife at {url}, its database in {folder}")
         with connect(url) as http:
             _life(Service(http=http), seed)
             if exit_at_end:
                 return
         page = f"{url}/clutches/sim-{seed}"
         with suppress(KeyboardInterrupt):
-            out.print(
-                f"\nThe dashboard stays open at {page} until Ctrl-C; all clutches: {url}", markup=False, soft_wrap=True
-            )
+            print_line(f"\nThe dashboard stays open at {page} until Ctrl-C; all clutches: {url}")
             if browser and sys.stdout.isatty() and "CI" not in os.environ:
                 webbrowser.open(page)
             process.wait()
@@ -67,7 +64,7 @@ def _life(service: Service, seed: int) -> None:
     out.print("Remaining duty cycles until its mean COF has halved:\n")
     out.print(_HEADER, style="bold")
     inside: list[bool] = []
-    with _progress() as progress:
+    with spinning(out) as progress:
         task = progress.add_task("run-in", total=end)
         for run in life.runs(seed):
             progress.update(task, description=f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles")
@@ -92,7 +89,7 @@ def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:
     out.print("\nWhat does the simulation get wrong?\n", style="bold")
     halfway = {} if end is None else {"at_cycles": round(end / 2)}
     before = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life", **halfway)
-    with _progress() as progress:
+    with spinning(out) as progress:
         progress.add_task("diagnosing", total=None)
         report = diagnosed(service, clutch_id, adopt=True)
     if report["status"] != "finished":
@@ -136,11 +133,6 @@ def _inside(prediction: dict[str, Any], end: float | None) -> list[bool]:
 
 def _count(cycles: float | None) -> str:
     return "-" if cycles is None else f"{cycles:.0f}"
-
-
-def _progress() -> Progress:
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    return Progress(*columns, console=out, transient=True)
 
 
 @contextmanager

@@ -125,11 +125,11 @@ def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Repo
         spool.note(entry, last_answer=str(error), perhaps_stored=entry.perhaps_stored or error.status >= 500)
         if error.of_all_runs:
             raise
-        if not error.of_the_run:
+        if error.of_the_run:
+            sent.refused += 1
+            _refused(spool, entry, error, report)
+        else:
             _stays(spool, entry, sent, report, str(error))
-            return
-        sent.refused += 1
-        _refused(spool, entry, error, report)
         return
     if not {_NAMES[entry.resource], "duplicate"} <= receipt.keys():
         raise ServiceAwayError(
@@ -138,8 +138,7 @@ def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Repo
     sent.unanswered = 0
     sent.duplicates += bool(receipt["duplicate"])
     sent.stored += not receipt["duplicate"]
-    waited = spool.done(entry)
-    for line in _remarks(receipt, receipt[_NAMES[entry.resource]], spool, waited=waited):
+    for line in _remarks(receipt, receipt[_NAMES[entry.resource]], spool, waited=spool.done(entry)):
         report(line)
 
 

@@ -104,21 +104,25 @@ def push(
 def _request(
     file: manifest.RunFile, kind: str | None, cycles: float | None, reading: Mapping[str, str | None], rig: str | None
 ) -> tuple[Path, dict[str, str] | None]:
-    """A file and the parameters of its request; None for a JSON body."""
+    """A file and the parameters of its request, of its manifest or else of the options; None for a JSON body."""
     if file.path.suffix == ".json":
         return file.path, None
-    options = {name: value for name, value in {**reading, "rig": rig}.items() if value is not None}
-    return file.path, options | _parameters(file, kind, cycles, by_rig=rig is not None)
+    stated: Mapping[str, str | None]
+    if file.parameters is not None:
+        stated = file.parameters
+    elif rig is None and (kind is None or cycles is None):  # a rig's profile finds them
+        fail(f"the kind and the cycles of {file.path} are not known. {_REMEDY}", EX_USAGE)
+    else:
+        stated = {"kind": kind, "cycles": None if cycles is None else repr(cycles), "filename": file.path.name}
+    parameters = {**reading, "rig": rig, **stated}
+    return file.path, {name: value for name, value in parameters.items() if value is not None}
 
 
 def _replacement(spool: Spool, entry: Entry) -> str:
-    stored = (
-        "; one attempt got no answer, so the old version may be stored: if so, withdraw it"
-        if entry.perhaps_stored
-        else ""
-    )
-    place = spool.body(entry)
-    return f"{entry.label}: replaces the version that waited since {entry.since}; the old version is kept in {place}{stored}"
+    kept = f"the old version is kept in {spool.body(entry)}"
+    if entry.perhaps_stored:
+        kept += "; one attempt got no answer, so the old version may be stored: if so, withdraw it"
+    return f"{entry.label}: replaces the version that waited since {entry.since}; {kept}"
 
 
 def _warn_of_others(spool: Spool, digests: set[str]) -> None:
@@ -128,18 +132,6 @@ def _warn_of_others(spool: Spool, digests: set[str]) -> None:
         oldest = min(entry.since for entry in other_entries)
         count = "1 other run waits" if len(other_entries) == 1 else f"{len(other_entries)} other runs wait"
         say(f"{count} for {spool.clutch_id} since {oldest} and will be sent too: see clutchlife spool list")
-
-
-def _parameters(file: manifest.RunFile, kind: str | None, cycles: float | None, *, by_rig: bool) -> dict[str, str]:
-    """The parameters of a record's request: from its manifest, else from the options; a rig's profile finds the others."""
-    if file.parameters is not None:
-        return dict(file.parameters)
-    if by_rig:
-        parameters = {"kind": kind, "cycles": None if cycles is None else repr(cycles), "filename": file.path.name}
-        return {name: value for name, value in parameters.items() if value is not None}
-    if kind is None or cycles is None:
-        fail(f"the kind and the cycles of {file.path} are not known. {_REMEDY}", EX_USAGE)
-    return {"kind": kind, "cycles": repr(cycles), "filename": file.path.name}
 
 
 def _record(paths: list[Path], clutch_id: str) -> dict[str, Any] | None:
@@ -202,26 +194,17 @@ def send(
     """Send the runs that wait for the service at --url. Runs for other addresses stay, because the key belongs to this
     service."""
     with errors_in_a_line():
-        spools = [waiting_spool for waiting_spool in Spool.every(spool) if waiting_spool.waiting()]
-        if clutch is not None:
-            spools = [waiting_spool for waiting_spool in [Spool.of(spool, url, clutch)] if waiting_spool.waiting()]
-        same_service = [waiting_spool for waiting_spool in spools if waiting_spool.url == url.rstrip("/")]
-        for waiting_spool in spools:
-            if waiting_spool not in same_service:
-                whose = f"{waiting_spool.clutch_id} at {waiting_spool.url}"
-                say(
-                    f"{len(waiting_spool.waiting())} runs in {waiting_spool.folder} are not sent: they belong to {whose}"
-                )
+        same_service: list[Spool] = []
+        for each in Spool.every(spool) if clutch is None else [Spool.of(spool, url, clutch)]:
+            count = len(each.waiting())
+            if count and each.url == url.rstrip("/"):
+                same_service.append(each)
+            elif count:
+                say(f"{count} runs in {each.folder} are not sent: they belong to {each.clutch_id} at {each.url}")
         if not same_service:
             print_line(f"nothing waits for {url}")
             return
-        transmit(
-            same_service,
-            url,
-            key,
-            patience,
-            lambda service, waiting_spool: service.get(f"/v1/clutches/{waiting_spool.clutch_id}"),
-        )
+        transmit(same_service, url, key, patience, lambda service, each: _register(service, each.clutch_id, None))
 
 
 @app.command()
@@ -296,11 +279,12 @@ def _line(entry: Entry) -> str:
     head = entry.head
     kind = "inspection" if entry.resource == INSPECTIONS else head.kind or "kind not stated"
     cycles = "cycles not stated" if head.cycles is None else f"{head.cycles:g} cycles"
-    tried = (
-        "not tried yet" if not entry.tries else f"tried {entry.tries} times, last {entry.last_try}: {entry.last_answer}"
-    )
     if entry.state == REFUSED:
         tried = str(entry.problem.get("detail") or entry.problem.get("title") or "no reason is stored")
     elif entry.state == REPLACED:
         tried = "a newer version was pushed"
+    elif entry.tries:
+        tried = f"tried {entry.tries} times, last {entry.last_try}: {entry.last_answer}"
+    else:
+        tried = "not tried yet"
     return f"{entry.state:<8}  {entry.label}  {kind}  {cycles}  since {entry.since}  {tried}"

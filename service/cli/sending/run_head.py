@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -34,17 +34,16 @@ def head_of_body(body: bytes) -> RunHead:
     head = _stated(run)
     if head.started_at is None:
         return head
-    measured_fields = {name: value for name, value in run.items() if name not in _DESCRIBING}
-    digest = hashlib.sha256(json.dumps(measured_fields, sort_keys=True).encode()).hexdigest()
-    return _stated(run, measurements=digest)
+    measured = {name: value for name, value in run.items() if name not in _DESCRIBING}
+    return replace(head, measurements=hashlib.sha256(json.dumps(measured, sort_keys=True).encode()).hexdigest())
 
 
 def head_of_file(parameters: Mapping[str, str], measurements: str) -> RunHead:
     """The head of a record file: its request's parameters, and the hash of its bytes."""
-    return _stated(parameters, measurements=measurements)
+    return replace(_stated(parameters), measurements=measurements)
 
 
-def _stated(run: Mapping[str, Any], *, measurements: str = "") -> RunHead:
+def _stated(run: Mapping[str, Any]) -> RunHead:
     try:
         cycles: float | None = float(run.get("cycles", "none"))
     except (TypeError, ValueError, OverflowError):
@@ -52,7 +51,7 @@ def _stated(run: Mapping[str, Any], *, measurements: str = "") -> RunHead:
     if cycles is not None and not math.isfinite(cycles):
         cycles = None
     run_id, kind, started_at = (_text(run.get(name)) for name in ("run_id", "kind", "started_at"))
-    return RunHead(run_id=run_id, kind=kind, cycles=cycles, started_at=started_at, measurements=measurements)
+    return RunHead(run_id=run_id, kind=kind, cycles=cycles, started_at=started_at)
 
 
 def _text(value: object) -> str | None:

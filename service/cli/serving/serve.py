@@ -1,6 +1,8 @@
-"""`clutchlife serve`: the service."""
+"""`clutchlife serve`: what is checked and said before the service runs, and the port that it listens at."""
 
+import errno
 import signal
+import socket
 from contextlib import ExitStack, closing
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, get_args
@@ -8,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, get_args
 import typer
 
 from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, fail
-from service.cli.serving import listening
 from service.defaults import LOOPBACK
 from service.logging import LogLevel, configure, start
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 #: Seconds that requests on their way have once the service is to stop. Chosen: less than `docker stop` waits.
 STOP_SECONDS = 10
 LOG_LEVELS = get_args(LogLevel)
+#: How an address says that it is every one of the machine.
+_EVERY = ("0.0.0.0", "::", "")  # noqa: S104  (compared, not bound)
 
 
 def serve(
@@ -59,15 +62,10 @@ def serve(
     from storage.engine.opening import database_exists  # start-up time
     from storage.engine.postgresql.connect import is_on_server  # start-up time
 
-    settings_given = {
-        "insecure_local": insecure_local or None,
-        "log_level": log_level,
-        "raw": raw,
-        "root_path": root_path,
-    }
+    named = {"insecure_local": insecure_local, "log_level": log_level, "raw": raw, "root_path": root_path}
     with errors_in_a_line(), ExitStack() as resources:
         settings = Settings.from_environment(
-            database, **{name: value for name, value in settings_given.items() if value}
+            database=database, **{name: value for name, value in named.items() if value}
         )
         configure(settings.log_format, settings.log_level)
         if processes > 1 and not is_on_server(settings.database):
@@ -77,15 +75,15 @@ def serve(
             )
         # a port that is not free ends the start before anything is made; without a database there are no keys
         first = host if is_loopback(host) or database_exists(settings.database) else LOOPBACK
-        sockets = [resources.enter_context(at_address) for at_address in listening.bound(first, port)]
+        sockets = [resources.enter_context(at_address) for at_address in bound(first, port)]
         start.info("settings", extra={"fields": settings.shown()})
         for line in Settings.misspelt():
             start.warning(line)
         host = _allowed(host, settings)
         if host != first:
             resources.close()
-            sockets = [resources.enter_context(at_address) for at_address in listening.bound(host, port)]
-        shown = (listening.page(host, listening.port_of(sockets), settings.root_path), _place(settings.database))
+            sockets = [resources.enter_context(at_address) for at_address in bound(host, port)]
+        shown = (page(host, port_of(sockets), settings.root_path), _place(settings.database))
         resources.pop_all()
     from service.cli.serving import services  # start-up time
 
@@ -160,3 +158,56 @@ def _allowed(host: str, settings: "Settings") -> str:
 
 def _end(*_: object) -> NoReturn:
     raise SystemExit(0)
+
+
+def bound(host: str, port: int) -> list[socket.socket]:
+    """Sockets at the port, one for each address that the host's name has; port 0 takes a free one.
+
+    Raises OSError, a line that says what to do, where the port is not free or is none of this machine's to take.
+    """
+    with ExitStack() as open_sockets:
+        sockets: list[socket.socket] = []
+        for family, kind, protocol, _, address in _addresses(host, port):
+            # where asyncio knows the protocol it sends at once: else a body waits 40 ms for the receipt of its head
+            at = open_sockets.enter_context(socket.socket(family, kind, protocol))
+            at.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            if family == socket.AF_INET6:
+                at.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+            try:
+                at.bind((address[0], port_of(sockets) if sockets else port, *address[2:]))
+            except OSError as error:
+                if error.errno == errno.EADDRNOTAVAIL and sockets:  # a name with an address that this machine lacks
+                    continue
+                raise OSError(_why(error, host, port)) from None
+            at.set_inheritable(True)
+            sockets.append(at)
+        open_sockets.pop_all()
+        return sockets
+
+
+def port_of(taken: list[socket.socket]) -> int:
+    return int(taken[0].getsockname()[1])
+
+
+def page(host: str, port: int, root: str) -> str:
+    """The address of the fleet's page for a browser on this machine; `root` is the path that a proxy adds."""
+    name = LOOPBACK if host in _EVERY else f"[{host}]" if ":" in host else host
+    return f"http://{name}:{port}{root}/"
+
+
+def _addresses(host: str, port: int) -> list[tuple[int, int, int, str, tuple[str, ...]]]:
+    try:
+        addresses: list[tuple[int, int, int, str, tuple[str, ...]]] = socket.getaddrinfo(  # type: ignore[assignment]
+            host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )
+    except OSError as error:
+        raise OSError(f"--host {host}: this name has no known address ({error.strerror})") from None
+    return list(dict.fromkeys(addresses))
+
+
+def _why(error: OSError, host: str, port: int) -> str:
+    if error.errno == errno.EADDRINUSE:
+        return f"port {port} at {host} is in use, perhaps by another service: stop it, or give another port with --port"
+    if error.errno == errno.EADDRNOTAVAIL:
+        return f"--host {host} is no address of this machine"
+    return f"cannot listen at port {port} of {host}: {error.strerror}"

@@ -1,19 +1,17 @@
 """The application of one service, made ready to answer; and several services at one port, each in a process of its own."""
 
 import gc
-import multiprocessing
 import os
 import signal
 import socket
 import tempfile
-import threading
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
-from threadpoolctl import threadpool_limits
 from uvicorn.config import STARTUP_FAILURE
 from uvicorn.supervisors import Multiprocess
 
@@ -22,6 +20,7 @@ from service.logging import configure
 from service.settings import Settings
 from service.web.connections import allow_many, bounded
 from service.web.metrics import FOLDER_VARIABLE
+from service.work.background import end_with_parent, use_one_blas_thread
 
 #: [s] After which a process that does not answer its parent is taken for hung, and replaced. Chosen: one that starts loads
 #: the libraries first, beside all others on a busy machine.
@@ -30,9 +29,7 @@ _HUNG_SECONDS = 60
 
 def prepared(settings: Settings) -> FastAPI:
     """The application; from now on this process does nothing but serve it."""
-    # the arrays are small: BLAS threads that wait for each other cost more than they gain
-    threadpool_limits(limits=1, user_api="blas")
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    use_one_blas_thread()  # the arrays are small: threads that wait for each other cost more than they gain
     app = create_app(settings)
     allow_many()
     # loaded modules stay: the collector's walk through all of them would delay an answer by a tenth of a second
@@ -87,12 +84,5 @@ def one_of_several() -> FastAPI:
     """The application in one of the processes, which end with their parent however that ends."""
     settings = Settings.from_environment()
     configure(settings.log_format, settings.log_level)
-    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+    end_with_parent(partial(os.kill, os.getpid(), signal.SIGTERM))
     return prepared(settings)
-
-
-def _end_with_the_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os.kill(os.getpid(), signal.SIGTERM)

@@ -15,7 +15,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
-from service.cli.serving import listening
+from service.cli.serving.serve import bound
 from service.settings import Settings
 from storage.engine.sqlite.connect import service_lock
 from tests.service.clients import client_on, clutchlife
@@ -160,7 +160,7 @@ def test_every_line_of_a_service_is_json_from_its_start_to_its_stop(tmp_path: Pa
 
 def test_an_answers_body_does_not_wait_until_its_head_was_received() -> None:
     """asyncio sends at once (TCP_NODELAY) on connections whose protocol it knows."""
-    (at,) = listening.bound("127.0.0.1", 0)
+    (at,) = bound("127.0.0.1", 0)
     with at:
         at.listen()
         with socket.create_connection(at.getsockname()), at.accept()[0] as accepted:
