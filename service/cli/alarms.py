@@ -21,17 +21,15 @@ def alarms(
 ) -> None:
     """List raised alarms, newest first, or acknowledge one."""
     if acknowledge is not None:
-        items = iter([service.post(f"/v1/alarms/events/{acknowledge}/acknowledge", {"note": note})])
+        event = service.post(f"/v1/alarms/events/{acknowledge}/acknowledge", {"note": note})
+        listed([event], as_json, _show_events, "")
     elif rules:
-        items = service.pages("/v1/alarms")
+        rows = service.pages("/v1/alarms")
+        listed(rows, as_json, _show_rules, "no alarm rule exists: add one on the page Alarms")
     else:
         chosen = {"state": None if everything else "open", "clutch_id": clutch}
         options = {name: value for name, value in chosen.items() if value is not None}
-        items = service.pages("/v1/alarms/events", **options)
-    if rules and acknowledge is None:
-        listed(items, as_json, _show_rules, "no alarm rule exists: add one on the page Alarms")
-    else:
-        listed(items, as_json, _show_events, "no alarm is raised")
+        listed(service.pages("/v1/alarms/events", **options), as_json, _show_events, "no alarm is raised")
 
 
 def _show_events(items: list[dict[str, Any]]) -> None:
@@ -40,9 +38,10 @@ def _show_events(items: list[dict[str, Any]]) -> None:
 
 
 def _show_rules(items: list[dict[str, Any]]) -> None:
-    show_table(("rule", "of", "quantity", "limit"), ([*map(str, _rule(item))] for item in items))
+    show_table(("rule", "of", "quantity", "limit"), map(_rule, items))
 
 
-def _rule(item: dict[str, object]) -> tuple[object, ...]:
+def _rule(item: dict[str, Any]) -> list[str]:
     limit = next((f"{side} {item[side]:g}" for side in ("below", "above") if item[side] is not None), "")
-    return item["name"] or item["alarm_id"], item["clutch_id"] or item["kind"] or "all", item["quantity"], limit
+    whose = item["clutch_id"] or item["kind"] or "all"
+    return [item["name"] or item["alarm_id"], str(whose), item["quantity"], limit]

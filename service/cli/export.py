@@ -24,11 +24,8 @@ from service.cli.workbook import write_workbook
 from service.client.clutchlife.transport import Service
 from service.run_files import manifest
 
-#: The folder of what was sent and does not count so.
-AS_SENT = "as-sent"
-#: The folder of the files that runs were read from.
-FILES = "files"
-CODE_VERSION = version("clutchlife")
+#: The folders of what was sent and does not count so, and of the files that runs were read from.
+AS_SENT, FILES = "as-sent", "files"
 #: The tables of the API that have a CSV export.
 TABLES = (
     "runs", "changes", "inspections", "remaining-useful-life", "degradation", "stribeck", "surfaces", "scores", "loops",
@@ -68,9 +65,10 @@ def _export(service: Service, clutch: str, out_folder: Path) -> None:
         record = {name: value for name, value in clutch_out.items() if name in ClutchIn.model_fields}
         manifest.write(out_folder / manifest.CLUTCH_FILE, record)
         count = 0
-        for receipt in service.pages(f"/v1/clutches/{clutch}/runs"):
-            run = service.get(f"/v1/clutches/{clutch}/runs/{receipt['run_id']}")
-            name = f"{count:05d}-{_safe(receipt['run_id'])}.json"
+        for count, receipt in enumerate(service.pages(f"/v1/clutches/{clutch}/runs"), start=1):
+            address = f"/v1/clutches/{clutch}/runs/{receipt['run_id']}"
+            run = service.get(address)
+            name = f"{count - 1:05d}-{_safe(receipt['run_id'])}.json"
             counts, corrected = run["state"] == "accepted", run["cycles"] != run["sent_cycles"]
             if counts:
                 manifest.write(out_folder / name, _as_sent(run))
@@ -79,9 +77,8 @@ def _export(service: Service, clutch: str, out_folder: Path) -> None:
                 manifest.write(out_folder / AS_SENT / name, _as_sent(run | {"cycles": run["sent_cycles"]}))
             if run["file"] is not None:
                 (out_folder / FILES).mkdir(exist_ok=True)
-                sent = service.file(f"/v1/clutches/{clutch}/runs/{receipt['run_id']}/file")
-                (out_folder / FILES / f"{count:05d}-{_safe(run['file']['filename'])}").write_bytes(sent)
-            count += 1
+                name = f"{count - 1:05d}-{_safe(run['file']['filename'])}"
+                (out_folder / FILES / name).write_bytes(service.file(f"{address}/file"))
             progress.advance(task)
         _results(service, clutch, results)
         _inspections(service, clutch, results)
@@ -95,22 +92,18 @@ def _export(service: Service, clutch: str, out_folder: Path) -> None:
 def _tables(service: Service, clutch: str, folder: Path) -> None:
     """Every table of the API as CSV, all of them as sheets of a workbook, and as Parquet where its library is installed."""
     tables = {name: service.table(f"/v1/clutches/{clutch}/{name}.csv") for name in TABLES}
-    place = folder / "tables"
-    place.mkdir(exist_ok=True)
+    (folder / "tables").mkdir(exist_ok=True)
     for name, text in tables.items():
-        (place / f"{name}.csv").write_text(text, encoding="utf-8", newline="")
+        path = folder / "tables" / f"{name}.csv"
+        path.write_text(text, encoding="utf-8", newline="")
         if _parquet_can_be_written():
-            _write_parquet(place / f"{name}.csv")
+            arrow_csv, parquet = (importlib.import_module(f"pyarrow.{module}") for module in ("csv", "parquet"))
+            parquet.write_table(arrow_csv.read_csv(path), path.with_suffix(".parquet"))
     write_workbook(folder / "tables.xlsx", {name: csv.reader(io.StringIO(text)) for name, text in tables.items()})
 
 
 def _parquet_can_be_written() -> bool:
     return importlib.util.find_spec("pyarrow") is not None  # an extra
-
-
-def _write_parquet(path: Path) -> None:
-    arrow_csv, parquet = (importlib.import_module(f"pyarrow.{name}") for name in ("csv", "parquet"))  # an extra
-    parquet.write_table(arrow_csv.read_csv(path), path.with_suffix(".parquet"))
 
 
 def _description(service: Service, clutch: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
@@ -119,7 +112,7 @@ def _description(service: Service, clutch: dict[str, Any], record: dict[str, Any
     return {
         "clutch_id": clutch["clutch_id"],
         "exported_at": datetime.now(UTC).isoformat(timespec="seconds"),
-        "release": CODE_VERSION,
+        "release": version("clutchlife"),
         "revision": clutch["revision"],
         "settings": record,
         "model": service.get(f"/v1/clutches/{clutch['clutch_id']}/model"),
@@ -140,19 +133,14 @@ def _results(service: Service, clutch: str, folder: Path) -> None:
 
     base = f"/v1/clutches/{clutch}"
     for method in get_args(MethodName):
-        _write(
-            folder / f"remaining-useful-life-{method}.json", service.get(f"{base}/remaining-useful-life", method=method)
-        )
-    for name in ("degradation", "loops", "series"):
+        answer = service.get(f"{base}/remaining-useful-life", method=method)
+        _write(folder / f"remaining-useful-life-{method}.json", answer)
+    for name in ("degradation", "loops", "series", "model"):
         _write(folder / f"{name}.json", service.get(f"{base}/{name}"))
-    diagnosis_ids = [diagnosis["diagnosis_id"] for diagnosis in service.pages(f"{base}/diagnoses")]
-    _write(
-        folder / "diagnoses.json", [service.get(f"{base}/diagnoses/{diagnosis_id}") for diagnosis_id in diagnosis_ids]
-    )
-    _write(folder / "model.json", service.get(f"{base}/model"))
-    _write(folder / "runs.json", list(service.pages(f"{base}/runs")))
-    _write(folder / "stribeck.json", list(service.pages(f"{base}/stribeck")))
-    _write(folder / "changes.json", list(service.pages(f"{base}/changes")))
+    for name in ("runs", "stribeck", "changes"):
+        _write(folder / f"{name}.json", list(service.pages(f"{base}/{name}")))
+    diagnoses = service.pages(f"{base}/diagnoses")
+    _write(folder / "diagnoses.json", [service.get(f"{base}/diagnoses/{item['diagnosis_id']}") for item in diagnoses])
 
 
 def _inspections(service: Service, clutch: str, folder: Path) -> None:

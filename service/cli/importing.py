@@ -39,15 +39,15 @@ def import_file(
 
     For the next file of the rig use `clutchlife push --rig NAME`, or import again.
     """
-    options: dict[str, Any] = {"kind": kind, "cycles": cycles, "rig": rig}
-    options |= {"map": channel_map, "decimal": decimal, "missing": missing}
+    reading = {"map": channel_map, "decimal": decimal, "missing": missing}
+    options: dict[str, Any] = {"kind": kind, "cycles": cycles, "rig": rig} | reading
     profile: dict[str, Any] | None = None
-    shown = _preview(service, file, clutch, options, profile)
-    _show(shown)
-    while shown["missing"] and shown["problem"] is None and not yes:
-        profile = _answered(shown, options, profile)
-        shown = _preview(service, file, clutch, options, profile)
+    while True:
+        shown = _sent(service, "/v1/import/preview", file, options | {"clutch_id": clutch}, profile)
         _show(shown)
+        if not shown["missing"] or shown["problem"] is not None or yes:
+            break
+        profile = _answered(shown, options, profile)
     if shown["problem"] is not None:
         fail(shown["problem"], EX_DATAERR)
     if shown["missing"]:
@@ -55,12 +55,8 @@ def import_file(
     if not yes and not typer.confirm(f"Send it to {clutch}?", default=True):
         raise typer.Exit(0)
     if shown["rig"] is None and save is None and not yes:
-        save = (
-            typer.prompt(
-                "Name of a new rig profile for such files (leave it empty to save none)", default="", show_default=False
-            )
-            or None
-        )
+        question = "Name of a new rig profile for such files (leave it empty to save none)"
+        save = typer.prompt(question, default="", show_default=False) or None
     if save is not None:
         _save(service, save, shown)
         options, profile = options | {"rig": save, "map": None}, None
@@ -69,12 +65,6 @@ def import_file(
     options |= {"kind": options["kind"] or shown["kind"], "cycles": shown["cycles"]}
     receipt = _sent(service, f"/v1/clutches/{clutch}/runs/file", file, options, profile)
     print_line(run_line(receipt) + ("  stored before" if receipt["duplicate"] else ""))
-
-
-def _preview(
-    service: Service, file: Path, clutch: str, given: dict[str, Any], profile: dict[str, Any] | None
-) -> dict[str, Any]:
-    return _sent(service, "/v1/import/preview", file, given | {"clutch_id": clutch}, profile)
 
 
 def _sent(
@@ -91,35 +81,30 @@ def _sent(
 
 def _show(shown: dict[str, Any]) -> None:
     """The preview: a row a column of the file, then what is cut and fitted."""
-    grid = Table(
-        title=None if shown["rig"] is None else f"read by the rig profile {shown['rig']}", title_justify="left"
-    )
+    title = None if shown["rig"] is None else f"read by the rig profile {shown['rig']}"
+    grid = Table(title=title, title_justify="left")
     for name in ("#", "column", "channel", "unit", "scale", "offset", *(f"row {row + 1}" for row in range(_ROWS))):
         grid.add_column(name)
     for index, column in enumerate(shown["columns"]):
         read = column["channel"] is not None
-        unit = column["unit"] if read else column["stated_unit"]
-        cells = [
-            (column["channel"] or "left out")
-            + (" (check: its title was recognised only in part)" if column["in_part"] else ""),
-            unit or "",
-            *(f"{column[name]:g}" if read else "" for name in ("scale", "offset")),
-        ]
-        rows = [row[index] if index < len(row) else "" for row in shown["first_rows"][:_ROWS]]
-        grid.add_row(str(index + 1), column["title"], *cells, *rows)
+        channel = column["channel"] or "left out"
+        if column["in_part"]:
+            channel += " (check: its title was recognised only in part)"
+        unit = (column["unit"] if read else column["stated_unit"]) or ""
+        converted = (f"{column[name]:g}" if read else "" for name in ("scale", "offset"))
+        rows = (row[index] if index < len(row) else "" for row in shown["first_rows"][:_ROWS])
+        grid.add_row(str(index + 1), column["title"], channel, unit, *converted, *rows)
     out.print(grid)
     for warning in shown["warnings"]:
         print_line(f"{warning['code']}: {warning['message']}")
     pieces = f", {len(shown['pieces'])} pieces are cut" if shown["pieces"] else ""
     cycles = "cycles not known" if shown["cycles"] is None else f"{shown['cycles']:g} cycles"
-    out.print(
-        f"{shown['kind'] or 'kind not known'}, {cycles}: {shown['rows']} rows{pieces}, {len(shown['fits'])} curves"
-    )
+    kind = shown["kind"] or "kind not known"
+    out.print(f"{kind}, {cycles}: {shown['rows']} rows{pieces}, {len(shown['fits'])} curves")
     for fit in shown["fits"]:
         mse = "" if fit["mse_percent"] is None else f", MSE {fit['mse_percent']:.2g} %"
-        out.print(
-            f"  {fit['pressure_bar']:g} bar: {fit['points']} points, RMSE {fit['rmse_nm']:.2g} Nm{mse}", markup=False
-        )
+        points = f"{fit['points']} points, RMSE {fit['rmse_nm']:.2g} Nm{mse}"
+        out.print(f"  {fit['pressure_bar']:g} bar: {points}", markup=False)
 
 
 def _answered(shown: dict[str, Any], given: dict[str, Any], profile: dict[str, Any] | None) -> dict[str, Any] | None:

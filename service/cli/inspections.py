@@ -13,8 +13,6 @@ from service.client.clutchlife.transport import Service
 
 #: The media type of a photograph by its file's suffix.
 MEDIA_TYPES = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
-#: The note of an inspection that has nothing but photographs.
-_PHOTOGRAPHS_ONLY = "photographs"
 _COLUMNS = ("inspection", "lining", "state", "cycles", "R_a, µm", "R_sk", "photographs")
 
 
@@ -35,13 +33,13 @@ def inspect(
     """Send an inspection of a clutch's friction surface: roughness, skewness, a note, photographs. You may repeat it."""
     photographs = {path: _media_type(path) for path in photo or []}
     if not note and photographs and ra is None and rsk is None:
-        note = _PHOTOGRAPHS_ONLY
+        note = "photographs"
     body = {"cycles": cycles, "roughness_um": ra, "skewness": rsk, "lining": lining, "note": note}
     if at is not None:
         body["performed_at"] = at.astimezone().isoformat()
     address = f"/v1/clutches/{clutch}/inspections"
     inspection = service.post(address, body)
-    address = f"{address}/{inspection['inspection_id']}"
+    address += f"/{inspection['inspection_id']}"
     for path, media_type in photographs.items():
         service.post_photograph(f"{address}/photographs", path, media_type)
     inspection = service.get(address)

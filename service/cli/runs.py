@@ -34,7 +34,8 @@ def withdraw(
     undo: Annotated[bool, typer.Option("--undo", help="Undo the withdrawal")] = False,
 ) -> None:
     """Withdraw a run: it no longer counts, but stays stored."""
-    _post(service, f"/v1/clutches/{clutch}/runs/{run}/{'restore' if undo else 'withdraw'}", {"reason": reason})
+    change = "restore" if undo else "withdraw"
+    _show(service.post(f"/v1/clutches/{clutch}/runs/{run}/{change}", {"reason": reason}))
 
 
 @asking
@@ -57,7 +58,8 @@ def end(
     if cycles is None:
         fail(f"{clutch} has no run yet: state --cycles", EX_USAGE)
     declared = {"kind": "maintenance", "event": "end_of_life", "cycles": cycles, "reason": reason, "note": note}
-    receipt = _post(service, f"/v1/clutches/{clutch}/runs", declared)
+    receipt = service.post(f"/v1/clutches/{clutch}/runs", declared)
+    _show(receipt)
     if receipt["state"] == "accepted":
         undo = f"clutchlife withdraw {clutch} {receipt['run_id']} --reason ..."
         print_line(f"{clutch}: ended at {receipt['cycles']:,.0f} cycles ({reason}); to undo this: {undo}")
@@ -77,9 +79,7 @@ def confirm(
         fail("name the runs, or use --all or --doubt CODE", EX_USAGE)
     if not runs:
         held_runs = service.pages(f"/v1/clutches/{clutch}/runs", state="held")
-        runs = [
-            run["run_id"] for run in held_runs if every or doubt in {question["code"] for question in run["doubts"]}
-        ]
+        runs = [run["run_id"] for run in held_runs if every or doubt in {item["code"] for item in run["doubts"]}]
     if not runs:
         print_line(f"{clutch} has no {f'runs held for {doubt}' if doubt else 'held runs'}")
         return
@@ -103,12 +103,6 @@ def correct(
         raise typer.BadParameter("use --cycles or --rig")
     change = {"rig": rig} if cycles is None else {"cycles": cycles}
     _show(service.patch(f"/v1/clutches/{clutch}/runs/{run}", change | {"reason": reason}))
-
-
-def _post(service: Service, address: str, content: dict[str, Any]) -> dict[str, Any]:
-    receipt = service.post(address, content)
-    _show(receipt)
-    return receipt
 
 
 def _show(receipt: dict[str, Any]) -> None:

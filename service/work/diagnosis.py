@@ -61,11 +61,7 @@ def main() -> None:
     process.answer(ended)
 
 
-def _nothing(_: Json) -> None:
-    """Nobody wants to know how far it has come."""
-
-
-def diagnosed(task: Task, say: Callable[[Json], None] = _nothing) -> dict[str, Any]:
+def diagnosed(task: Task, say: Callable[[Json], None] = lambda _: None) -> dict[str, Any]:
     """The report in the public shape, and the extension. The same runs give the same, whatever their clutch is called."""
     module, _, function = task.engine.partition(":")
     diagnose = getattr(importlib.import_module(module), function)
@@ -84,7 +80,7 @@ def diagnosed(task: Task, say: Callable[[Json], None] = _nothing) -> dict[str, A
 
 
 def read_life(
-    database: Database, clutch_id: str, *, last_run_key: int, say: Callable[[Json], None] = _nothing
+    database: Database, clutch_id: str, *, last_run_key: int, say: Callable[[Json], None] = lambda _: None
 ) -> DiagnosedLife:
     """The present life by the runs up to `last_run_key`. Raises NotFoundError.
 
@@ -111,13 +107,10 @@ def read_life(
             campaign.append(run_of(sent, origin=life.origin, torque_filter=record.torque_filter, keep_record=keep))
         except ValueError as error:
             notes.append(f"{event.run_id} is left out: {error}")
-    left_out = [
-        event for event in life.events if event.kind == STATIONARY and event.run_id in samples.keys() - with_records
-    ]
-    if left_out:
-        notes.append(
-            f"The raw records of {len(left_out)} stationary tests are left out for their size; their plateaus count."
-        )
+    left_out = samples.keys() - with_records
+    count = sum(event.kind == STATIONARY and event.run_id in left_out for event in life.events)
+    if count:
+        notes.append(f"The raw records of {count} stationary tests are left out for their size; their plateaus count.")
     return DiagnosedLife(record=record, life=life, runs=tuple(campaign), notes=tuple(notes))
 
 
@@ -132,19 +125,17 @@ def before_and_after(
         by_key = results.cofs_of(connection, clutch_id)
         cofs = {run_id: by_key[key] for run_id, key in runs.keys(connection, clutch_id).items() if key in by_key}
     plain = diagnosed_life.life.with_cofs(cofs)
-    predicted = [plain]
-    if extension is not None:
-        runs_before = stored_runs.run_reader(database, clutch_id).campaign_runs(plain.events, origin=plain.origin)
-        tests = [run for run in diagnosed_life.runs if isinstance(run, StationaryRun)]
-        freed = corrected_cofs(extension, diagnosed_life.record, plain, runs_before, tests)
-        predicted.append(plain.corrected(freed))
 
     def prediction(life: Life, model: Extension | None) -> dict[str, Any]:
-        assumptions = state.assumptions_under(model, life)
-        return predict_at(life.events, assumptions, state.fraction, method=_METHOD)
+        return predict_at(life.events, state.assumptions_under(model, life), state.fraction, method=_METHOD)
 
-    before = prediction(predicted[0], None)
-    return before, before if extension is None else prediction(predicted[1], extension)
+    before = prediction(plain, None)
+    if extension is None:
+        return before, before
+    runs_before = stored_runs.run_reader(database, clutch_id).campaign_runs(plain.events, origin=plain.origin)
+    tests = [run for run in diagnosed_life.runs if isinstance(run, StationaryRun)]
+    freed = corrected_cofs(extension, diagnosed_life.record, plain, runs_before, tests)
+    return before, prediction(plain.corrected(freed), extension)
 
 
 if __name__ == "__main__":

@@ -159,26 +159,17 @@ class _Elsewhere(Executor):
         An input whose process has ended twice is sent alone: where others run in processes that end together, it is the
         one to blame if it ends so again.
         """
-        numbered = iter(enumerate(items))
+        inputs = (_Task(index, item) for index, item in enumerate(items))
         running: dict[Any, _Task] = {}
         waiting: list[_Task] = []
         done: dict[int, Outcome[Result]] = {}
-        following, exhausted = 0, False
-
-        def take() -> _Task | None:
-            nonlocal exhausted
-            if waiting:
-                return waiting.pop(0)
-            following_input = None if exhausted else next(numbered, None)
-            exhausted = following_input is None
-            return None if following_input is None else _Task(*following_input)
-
+        following = 0
         try:
             while True:
                 alone = any(task.lost > 1 for task in (*waiting, *running.values()))
                 width = 1 if alone else self.width()
                 while len(running) + len(done) * in_order < width or not running:
-                    task = take()
+                    task = waiting.pop(0) if waiting else next(inputs, None)
                     if task is None:
                         break
                     running[self.submit(function, task.item)] = task
@@ -195,22 +186,14 @@ class _Elsewhere(Executor):
                             continue
                         result, error = None, lost
                     done[task.index] = Outcome(index=task.index, result=result, error=error)
-                ready = sorted(done) if not in_order else _run_of(done, following)
-                for index in ready:
+                for index in sorted(done):
+                    if in_order and index != following:
+                        break
+                    following += 1
                     yield done.pop(index)
-                following += len(ready)
         finally:
             for future in running:
                 future.cancel()
-
-
-def _run_of(done: dict[int, Any], first: int) -> list[int]:
-    """`first` and the indices that follow it without a gap."""
-    ready = []
-    while first in done:
-        ready.append(first)
-        first += 1
-    return ready
 
 
 #: Inputs on their way for each process or thread. Chosen: one is computed, and one is there when that has ended.
@@ -383,27 +366,24 @@ class Cluster(_Elsewhere):
         try:
             self._client.wait_for_workers(1, timeout=WORKER_SECONDS)
         except TimeoutError as error:
-            raise ExecutorUnavailableError(
-                f"{self.address}: the Dask scheduler has no worker: dask worker {self.address} --nthreads 1"
-            ) from error
+            start = f"dask worker {self.address} --nthreads 1"
+            raise ExecutorUnavailableError(f"{self.address}: the Dask scheduler has no worker: {start}") from error
         try:
-            worker_differences: Mapping[str, str | None] = self._client.run(_difference, release())
+            differences: Mapping[str, str | None] = self._client.run(_difference, release())
         except Exception as error:  # a worker without this program cannot read the question
             raise ExecutorUnavailableError(
                 f"{self.address}: a worker cannot import clutchlife ({error}): install this release there"
             ) from error
-        for worker, difference in worker_differences.items():
+        for worker, difference in differences.items():
             if difference is not None:
                 raise ExecutorUnavailableError(f"worker {worker}: {difference}")
 
 
 def _difference(wanted: Mapping[str, str]) -> str | None:
     """How this process's release differs from what is wanted, in words; None where it does not."""
-    this_release = release()
+    own = release()
     differing = [
-        f"{name} {this_release.get(name)} instead of {wanted[name]}"
-        for name in wanted
-        if this_release.get(name) != wanted[name]
+        f"{name} {own.get(name)} instead of {wanted[name]}" for name in wanted if own.get(name) != wanted[name]
     ]
     return f"it has {', '.join(differing)}: results could differ" if differing else None
 

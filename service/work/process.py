@@ -84,8 +84,7 @@ class Child:
         self._errors.seek(max(0, self._errors.seek(0, os.SEEK_END) - _TAIL))
         output = self._errors.read().decode(errors="replace")
         if output:
-            level = logging.ERROR if code else logging.WARNING
-            _log.log(level, "%s: %s", name, output)
+            _log.log(logging.ERROR if code else logging.WARNING, "%s: %s", name, output)
         if code == AWAY:
             raise AwayError
         if code != 0:
@@ -133,7 +132,13 @@ def running(work: Work, database_url: str) -> Iterator[Child]:
 
 def end_with_the_service() -> None:
     """Have this process end when its service does, however that comes; what it held in memory goes to no file."""
-    threading.Thread(target=_end_with_standard_input, daemon=True).start()
+
+    def await_end() -> None:  # of standard input, a pipe held open by the service
+        while os.read(0, 1):  # not by way of sys.stdin, whose lock would be in the way when this process ends
+            pass
+        os._exit(3)
+
+    threading.Thread(target=await_end, daemon=True).start()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
@@ -145,10 +150,3 @@ def say(progress: Json) -> None:
 def answer(ended: Mapping[str, Any]) -> None:
     """Write the last line: how the job ended."""
     sys.stdout.write(f"{json.dumps(ended, allow_nan=False)}\n")
-
-
-def _end_with_standard_input() -> None:
-    """End this process when its standard input ends: that is a pipe held open by the service."""
-    while os.read(0, 1):  # not by way of sys.stdin, whose lock would be in the way when this process ends
-        pass
-    os._exit(3)

@@ -30,32 +30,28 @@ from storage.jobs import JobRow
 #: Seconds by the clock that a diagnosis may take for each second of processor time that it may: it runs on idle processors
 #: only, beside a full load for many times as long as alone. Chosen; no table. It ends a diagnosis that waits for ever.
 CLOCK_PER_PROCESSOR_SECOND = 6.0
-_SECONDS_PER_HOUR = 3600.0
-#: Stores how a job ended: what its process answered, or its `problem`.
-Finish = Callable[[JobRow, Mapping[str, Any]], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """How a kind's jobs are done and ended."""
+    """How a kind's jobs are done; `finish` stores how one ended: what its process answered, or its `problem`."""
 
     work: Callable[[JobRow, Settings], Work]
-    finish: Finish
+    finish: Callable[[JobRow, Mapping[str, Any]], None]
 
 
 def diagnosis_work(job: JobRow, settings: Settings) -> Work:
     """A diagnosis only reads and computes: all of its process yields to others."""
-    task = {
-        "clutch_id": job.clutch_id,
-        "last_run_key": job.arguments["last_run_key"],
-        "isolability": job.arguments.get("isolability", False),  # jobs of 1.0.0 have none
-        "engine": settings.engine,
-        "bytes": settings.diagnosis_memory_mb * MIB,
-        "processor_seconds": settings.diagnosis_seconds,
-    }
     return Work(
         modules=("service.work.background", "service.work.diagnosis"),
-        task=task,
+        task={
+            "clutch_id": job.clutch_id,
+            "last_run_key": job.arguments["last_run_key"],
+            "isolability": job.arguments.get("isolability", False),  # jobs of 1.0.0 have none
+            "engine": settings.engine,
+            "bytes": settings.diagnosis_memory_mb * MIB,
+            "processor_seconds": settings.diagnosis_seconds,
+        },
         longest=settings.diagnosis_seconds * CLOCK_PER_PROCESSOR_SECOND,
         processor_seconds=settings.diagnosis_seconds,
     )
@@ -75,8 +71,7 @@ def workflow_work(function: str) -> Callable[[JobRow, Settings], Work]:
             "by": job.asked_by,
             "arguments": job.arguments,
         }
-        longest = settings.replay_hours * _SECONDS_PER_HOUR
-        return Work(modules=("service.work.workflow",), task=task, longest=longest)
+        return Work(modules=("service.work.workflow",), task=task, longest=settings.replay_hours * 3600.0)
 
     return work
 
@@ -143,7 +138,11 @@ class JobQueue:
 
     def _work(self, group: Mapping[str, Kind]) -> None:
         """Do the jobs of a group one after the other; where none is free, wait until the queue is woken, or for a pause."""
-        seen_wakes = 0
+        seen = 0
+
+        def woken() -> bool:
+            return self._wakes != seen or self._closing
+
         while not self._closing:
             try:
                 job = self._claimed(group)
@@ -152,13 +151,9 @@ class JobQueue:
                     continue
             except Exception:  # noqa: BLE001  (the next job is to be done whatever became of this one)
                 _log.exception("a job could not be started")
-            seen_wakes = self._waited(seen_wakes)
-
-    def _waited(self, seen_wakes: int) -> int:
-        """How often the queue was woken by now, once that is more than was seen, or after a pause."""
-        with self._change:
-            self._change.wait_for(lambda: self._wakes != seen_wakes or self._closing, timeout=self._pause)
-            return self._wakes
+            with self._change:
+                self._change.wait_for(woken, self._pause)
+                seen = self._wakes
 
     def _claimed(self, group: Mapping[str, Kind]) -> JobRow | None:
         """The next job of a group, claimed; None where there is none, or the database is away for a while."""

@@ -34,13 +34,11 @@ _LAST_SECONDS = 15.0
 #: [s] Between two signs of life. Chosen: a tenth of the silence after which a process is ended.
 _BEAT = 1.0
 
-_opened: list[Database] = []
 
-
-def begin(database_url: str, nice: int | None, log: tuple[logging.LogFormat, logging.LogLevel]) -> None:
-    """Prepare this process: it logs so; it yields by `nice` or, where that is None, to all others; it ends with the service,
-    and leaves it to the service to stop: what stops all processes at once must not take a run from it that is being stored.
-    """
+def begin(database_url: str, nice: int | None, log: tuple[logging.LogFormat, logging.LogLevel]) -> Database:
+    """Prepare this process, and open its database. It logs so; it yields by `nice` or, where that is None, to all others; it
+    ends with the service, and leaves it to the service to stop: what stops all processes at once must not take a run from
+    it that is being stored."""
     logging.configure(*log)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end_later)
@@ -54,7 +52,7 @@ def begin(database_url: str, nice: int | None, log: tuple[logging.LogFormat, log
     for name in LOADED_EARLY:
         importlib.import_module(name)
     gc.freeze()  # what is loaded stays: the collector need not walk through it
-    _opened.append(open_database(database_url))
+    return open_database(database_url)
 
 
 def main(
@@ -71,23 +69,23 @@ def main(
             line.send(message)
 
     threading.Thread(target=_beat, args=(send,), daemon=True).start()
-    begin(database_url, nice, log)
+    database = begin(database_url, nice, log)
     with suppress(EOFError, OSError):  # the service has closed the line, or has ended
         send(())
         while True:
-            answer = _answered(line.recv_bytes())
+            answer = _answered(database, line.recv_bytes())
             try:
                 send(answer)
             except (TypeError, AttributeError, ValueError, pickle.PicklingError) as error:
                 send((None, RuntimeError(f"the result cannot be sent: {error}")))
 
 
-def _answered(message: bytes) -> tuple[Any, BaseException | None]:
+def _answered(database: Database, message: bytes) -> tuple[Any, BaseException | None]:
     """What a call returns, or raises with where it was raised."""
     try:
         function, arguments, request = pickle.loads(message)  # noqa: S301  (of our own service)
         logging.request_id.set(request)
-        return function(_opened[0], *arguments), None
+        return function(database, *arguments), None
     except BaseException as error:  # noqa: BLE001  (raised again for who asked)
         error.add_note("".join(traceback.format_exception(error)))
         return None, error

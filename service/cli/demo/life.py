@@ -60,12 +60,13 @@ def runs(seed: int) -> Iterator[SimulatedRun]:
 def _looped(seed: int, truth: SimulatedClutch, cycles: int) -> SimulatedRun:
     """The dynamic test after so many duty cycles; `runs` ages the clutch by cycles alone."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_STREAM, cycles)))
-    record = _recorded(sampled_test(truth, cycles, _TEST, rng, Sensor()))
+    record = sampled_test(truth, cycles, _TEST, rng, Sensor())
+    recorded = np.any([np.abs(record.pressure - level) < _NEAR for level in _RECORDED], axis=0)
     return SimulatedRun(
         run_id=f"sim-{seed}-dynamic-{cycles:05d}",
         kind=RunKind.DYNAMIC_STRIBECK,
         cycles=cycles,
-        record=warmed(record, truth, cycles),
+        record=warmed(record.take(recorded), truth, cycles),
         wear=cycles,
     )
 
@@ -109,15 +110,3 @@ def _capacity(truth: SimulatedClutch, cycles: int, fastest: float) -> Capacity:
         return float(table.ev(level, sliding)) * line / level
 
     return transferred
-
-
-def _recorded(record: Record) -> Record:
-    """The part of a record at the recorded pressures."""
-    near_level = np.any([np.abs(record.pressure - level) < _NEAR for level in _RECORDED], axis=0)
-    return Record(
-        time=record.time[near_level],
-        pressure=record.pressure[near_level],
-        speed=record.speed[near_level],
-        torque=record.torque[near_level],
-        oil_temperature=None if record.oil_temperature is None else record.oil_temperature[near_level],
-    )

@@ -8,7 +8,7 @@ cycles = Client("http://127.0.0.1:8000").remaining_useful_life("e")["at_least"]
 import json
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -184,7 +184,6 @@ def diagnosed(
     adopt: bool,
     isolability: bool = False,
     wait: float = math.inf,
-    look: Callable[[float], None] = time.sleep,
 ) -> Answer:
     """The report of a diagnosis that is asked for, once it has ended. Raises TimeoutError after `wait` [s]."""
     address = f"{_clutch(clutch_id)}/diagnoses"
@@ -197,7 +196,7 @@ def diagnosed(
             raise TimeoutError(
                 f"diagnosis {report['diagnosis_id']} of {clutch_id} still runs after {wait:g} s: ask again"
             )
-        look(_LOOK)
+        time.sleep(_LOOK)
         report = service.get(f"{address}/{report['diagnosis_id']}")
     return report
 
