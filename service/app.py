@@ -22,14 +22,13 @@ from service.web.files import emptied_folder
 from service.web.limits import MAX_CACHED_BYTES
 from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Edge, Encodings, Heads, Polls, RootPath, Shares
-from service.web.readiness import Needs, Readiness
+from service.web.readiness import Readiness
 from service.web.revalidation import Revalidation
 from service.web.routes import (
     alarms,
     clutches,
     diagnoses,
     exports,
-    files,
     fleet,
     health,
     inspections,
@@ -93,14 +92,13 @@ def create_app(settings: Settings) -> FastAPI:
         database = open_database(settings.database, serving=True)
         raw_records.use(database, settings.raw)
         folder = emptied_folder(database.path)
-        log = (settings.log_format, settings.log_level)
-        note = metrics.note_calls
+        log, note = (settings.log_format, settings.log_level), metrics.note_calls
         workers = (
             in_processes(database, settings.workers, log, note) if settings.workers else in_threads(database, note)
         )
         queue = JobQueue(database, settings, _kinds(database, workers))
-        needs = Needs(disk=settings.least_free_mb * MIB, memory=settings.least_memory_mb * MIB)
-        readiness = Readiness(database, workers, queue, needs)
+        least = {"least_disk": settings.least_free_mb * MIB, "least_memory": settings.least_memory_mb * MIB}
+        readiness = Readiness(database, workers, queue, **least)
         outbox = Outbox(database, settings)
         try:
             workers.warm()
@@ -144,19 +142,11 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
     )
     problems.install(app)
-    for part in (health, clutches, files, runs, inspections, life, diagnoses, jobs, fleet, rigs, alarms):
-        app.include_router(part.router)
-    for beside in (
-        clutches.fleet_router,
-        exports.router,
-        exports.fleet_router,
-        health.description_router,
-        rigs.import_router,
-    ):
-        app.include_router(beside)
-    app.include_router(alarms.webhook_router)
-    app.include_router(dashboard.router(assets.load()))
-    app.include_router(site.router())
+    parts = [part.router for part in (health, clutches, runs, inspections, life, diagnoses, jobs, fleet, rigs, alarms)]
+    beside = [clutches.fleet_router, exports.router, exports.fleet_router, health.description_router]
+    beside += [rigs.import_router, alarms.webhook_router, dashboard.router(assets.load()), site.router()]
+    for router in parts + beside:
+        app.include_router(router)
     openapi.install(app, settings.root_path)
     app.add_middleware(Polls)
     app.add_middleware(

@@ -161,18 +161,13 @@ def _tracked(measured: MeasuredLife, several: Iterable[Series], method: str) -> 
 def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Eq. 6's coefficients as rows of a table, a row a quantity and place."""
     for item in payload["items"]:
+        coefficients = item["coefficients"] or {name: {"value": None, "sd": None} for name in COEFFICIENTS}
         yield (
             {name: item[name] for name in COLUMNS[:5]}
             | {"held_runs": payload["held_runs"]}
-            | {name: _part(item, name, "value") for name in COEFFICIENTS}
-            | {f"{name}_sd": _part(item, name, "sd") for name in COEFFICIENTS}
+            | {name: coefficients[name]["value"] for name in COEFFICIENTS}
+            | {f"{name}_sd": coefficients[name]["sd"] for name in COEFFICIENTS}
         )
-
-
-def _part(item: Mapping[str, Any], name: str, part: str) -> float | None:
-    """A number of a coefficient of eq. 6; None where the quantity does not follow it."""
-    coefficients = item["coefficients"]
-    return None if coefficients is None else coefficients[name][part]
 
 
 def _from_parameters(

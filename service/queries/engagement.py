@@ -1,7 +1,6 @@
 """`/engagement`: what a tracked clutch would give at any state of its degradation, and the measured ones beside it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -36,15 +35,16 @@ def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id:
         state, levels = records.state(connection, clutch_id), records.levels(connection, clutch_id)
         measured = stored_runs.engagements(connection, clutch_id)
     happened = [event for event in state.events if at_cycles is None or event.cycles <= at_cycles]
-    if not lives_of(happened):
+    lives = lives_of(happened)
+    if not lives:
         raise NotFoundError(
             "no engagement can be simulated: there is no stationary test up to these cycles. Ask for later cycles"
         )
-    tracked = _Tracked(life=lives_of(happened)[-1], assumptions=state.assumptions(), fits=levels)
+    assumptions = state.assumptions()
     cycles = happened[-1].cycles if at_cycles is None else at_cycles
-    row = _compared_row(measured, tracked.life, run_id)
+    row = _compared_row(measured, lives[-1], run_id)
     moments = [cycles] if row is None else [cycles, float(row["cycles"])]
-    capacities = [capacity_of(parameters) for parameters in tracked.parameters(moments)]
+    capacities = [capacity_of(parameters) for parameters in _parameters(lives[-1], assumptions, levels, moments)]
     comparison = None
     if row is not None:
         run = stored_runs.run_reader(database, clutch_id).read(row["run_id"])
@@ -54,7 +54,7 @@ def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id:
         "origin": state.record.origin,
         "simulated": True,
         "at_cycles": whole(cycles),
-        "model": dict(tracked.assumptions.model.name),
+        "model": dict(assumptions.model.name),
         **_simulated(capacities[0], state.geometry),
         "measured": measured,
         "compared": comparison,
@@ -121,41 +121,36 @@ def _model_part(found: Discrepancy, contact: float) -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Tracked:
-    """A life as its Stribeck parameters are tracked."""
+def _parameters(
+    life: Life, assumptions: Assumptions, fits: Mapping[str, Sequence[LevelFit]], moments: Sequence[float]
+) -> list[dict[float, StribeckParameters]]:
+    """At each of several cycles since new, the parameters by pressure [Pa], each the median of its own track."""
+    tests = tests_of(life, fits)
+    at: dict[float, dict[str, list[float]]] = {}
+    for name in PARAMETER_NAMES:
+        for series in parameter_series(life, assumptions, tests, name):
+            if series.measurements:
+                at.setdefault(series.pressure, {})[name] = _medians(series, assumptions, moments)
+    complete = {level: values for level, values in at.items() if len(values) == len(PARAMETER_NAMES)}
+    if not complete:
+        raise NotFoundError(
+            "no engagement can be simulated: no test up to these cycles determines all four Stribeck parameters. Send "
+            "one over more speeds"
+        )
+    return [
+        {
+            level: StribeckParameters(**{name: max(median[place], 0.0) for name, median in values.items()})
+            for level, values in complete.items()
+        }
+        for place in range(len(moments))
+    ]
 
-    life: Life
-    assumptions: Assumptions
-    fits: Mapping[str, Sequence[LevelFit]]
 
-    def parameters(self, moments: Sequence[float]) -> list[dict[float, StribeckParameters]]:
-        """At each of several cycles since new, the parameters by pressure [Pa], each the median of its own track."""
-        tests = tests_of(self.life, self.fits)
-        at: dict[float, dict[str, list[float]]] = {}
-        for name in PARAMETER_NAMES:
-            for series in parameter_series(self.life, self.assumptions, tests, name):
-                if series.measurements:
-                    at.setdefault(series.pressure, {})[name] = self._medians(series, moments)
-        complete = {level: values for level, values in at.items() if len(values) == len(PARAMETER_NAMES)}
-        if not complete:
-            raise NotFoundError(
-                "no engagement can be simulated: no test up to these cycles determines all four Stribeck parameters. Send "
-                "one over more speeds"
-            )
-        return [
-            {
-                level: StribeckParameters(**{name: max(median[place], 0.0) for name, median in values.items()})
-                for level, values in complete.items()
-            }
-            for place in range(len(moments))
-        ]
-
-    def _medians(self, series: Series, moments: Sequence[float]) -> list[float]:
-        posterior = posterior_of(series, self.assumptions)
-        progress = [float(series.scale.progress(cycles)) for cycles in moments]
-        values = (posterior.values(np.array([zeta]))[0] for zeta in progress)
-        return [float(weighted_quantiles(value, posterior.weight, (0.5,))[0]) for value in values]
+def _medians(series: Series, assumptions: Assumptions, moments: Sequence[float]) -> list[float]:
+    posterior = posterior_of(series, assumptions)
+    progress = [float(series.scale.progress(cycles)) for cycles in moments]
+    values = (posterior.values(np.array([zeta]))[0] for zeta in progress)
+    return [float(weighted_quantiles(value, posterior.weight, (0.5,))[0]) for value in values]
 
 
 def _course(trace: Engagement, contact: float = 0.0) -> dict[str, list[float]]:

@@ -26,8 +26,8 @@ def newest(database: Database) -> list[dict[str, Any]]:
         return [_item(row) for row in assumptions.current_fleet_priors(connection)]
 
 
-def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    for item in items:
+def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    for item in payload["items"]:
         yield (
             {name: item["kind"][name] for name in _KINDS}
             | {"severity": item["kind"]["severity"]["basis"]}

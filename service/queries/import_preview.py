@@ -87,7 +87,7 @@ def preview(
         **evaluated,
         "missing": [
             *evaluated["missing"],
-            *_missing_units(columns),
+            *(f"unit of {column['title']}" for column in columns if column["channel"] and not column["unit"]),
             *(["kind"] if kind is None else []),
             *(["cycles"] if cycles is None else []),
         ],
@@ -117,15 +117,13 @@ def _fitting(database: Database, shown: Mapping[str, Any], filename: str) -> tup
     with database.reading() as connection:
         fitting = [records.rig_out(row) for row in rigs.every(connection) if fits(row.content, titles)]
     if len(fitting) > 1:
+        # a name that says nothing leaves the profile's own kind
         fitting = [
-            profile for profile in fitting if profile.file_name and named(profile, filename, {}) != _nothing(profile)
+            profile
+            for profile in fitting
+            if profile.file_name and named(profile, filename, {}) != Named(kind=profile.kind)
         ]
     return (fitting[0].name, fitting[0]) if len(fitting) == 1 else (None, None)
-
-
-def _nothing(profile: RigProfile) -> Named:
-    """What a profile says of a file whose name says nothing."""
-    return Named(kind=profile.kind)
 
 
 def _by_titles(shown: Mapping[str, Any]) -> RigProfile | None:
@@ -157,11 +155,6 @@ def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, 
     }
 
 
-def _missing_units(columns: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What is missing of columns that are channels: nothing is taken for the channel's own unit without a word."""
-    return [f"unit of {column['title']}" for column in columns if column["channel"] and not column["unit"]]
-
-
 def _saveable(
     shown: Mapping[str, Any], used: RigProfile | None, kind: str | None, filename: str, cycles: float | None
 ) -> dict[str, Any]:
@@ -174,12 +167,8 @@ def _saveable(
         "kind": profile_fields.get("kind") or kind,
     }
     columns = [profile_columns.get(title, {"title": title, "channel": None}) for title in titles]
-    field_names = set(RigProfile.model_fields)
-    return {
-        name: value
-        for name, value in (profile_fields | suggested | {"columns": columns}).items()
-        if name in field_names
-    }
+    fields = profile_fields | suggested | {"columns": columns}
+    return {name: value for name, value in fields.items() if name in RigProfile.model_fields}
 
 
 def _evaluated(
@@ -226,12 +215,12 @@ def _pieces(run: IncomingRun, torque_filter: float) -> list[dict[str, Any]]:
     """The plateaus of a sampled stationary test, or the stretches of constant pressure of a dynamic one."""
     if "time_s" not in run.channels:
         return []
+    record = SampledChannels(run.channels)
     if run.kind == "stationary_stribeck":
-        cut = cut_plateaus(SampledChannels(run.channels), torque_filter)
+        cut = cut_plateaus(record, torque_filter)
         speeds: Sequence[float | None] = (cut.plateaus.speed / RADIANS_PER_SECOND_PER_RPM).tolist()
         plateaus = zip(cut.start.tolist(), cut.stop.tolist(), cut.plateaus.pressure.tolist(), speeds, strict=True)
         return [_piece(*piece) for piece in plateaus]
-    record = SampledChannels(run.channels)
     order = np.argsort(record.time, kind="stable")
     time = record.time[order]
     stretches = pressure_stretches(time, record.pressure[order])

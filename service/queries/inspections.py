@@ -1,6 +1,6 @@
 """`/inspections`: what was found on a clutch's friction surface, by cycles, and the files of its photographs."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from service import records
@@ -25,8 +25,8 @@ def page(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
     return part.of(rows, by_cycles("inspection_id"), lambda row: items[row.inspection_id])
 
 
-def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    for item in items:
+def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    for item in payload["items"]:
         yield {name: item[name] for name in COLUMNS} | {"photographs": len(item["photographs"])}
 
 

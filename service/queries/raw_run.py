@@ -8,11 +8,10 @@ import gzip
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, BinaryIO, Literal, Protocol
+from typing import IO, Any, BinaryIO, Literal
 
 from pydantic_core import to_json
 
@@ -33,18 +32,13 @@ _ROW_GROUP = 1 << 20
 _PACKAGE, _EXTRA = "pyarrow", "parquet"
 
 
-class Writable(Protocol):
-    """A file, or what packs into one."""
-
-    def write(self, data: bytes, /) -> object:
-        """Add bytes."""
-
-
 #: A channel's values by its name, read when they are asked for.
 Values = Callable[[str], FloatArray]
 
 
-def write_json(file: Writable, head: Mapping[str, Any], names: tuple[str, ...], values: Values) -> None:
+def write_json(
+    file: IO[bytes] | gzip.GzipFile, head: Mapping[str, Any], names: tuple[str, ...], values: Values
+) -> None:
     """`head` as JSON with `channels` as its last field, numbers such that the same doubles are read from them."""
     file.write(to_text(head).encode()[:-1] + b',"channels":{')
     for index, name in enumerate(names):
@@ -89,27 +83,6 @@ _FORM = 1
 _LEVEL = 6
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Run:
-    """A stored run before its channels are read: what is said of it, and how many values its channels have, by name."""
-
-    run_key: int
-    head: dict[str, Any]
-    lengths: dict[str, int]
-
-    @property
-    def samples(self) -> int:
-        """Values of each channel, 0 for a run without."""
-        return max(self.lengths.values(), default=0)
-
-    def tag(self, points: int | None, kind: Kind, compressed: bool) -> str:
-        """The entity tag of the answer: the hashes in the receipt and, where its file was read again,
-        in the audit trail stand for the channels."""
-        writer = parquet_writer() if kind == "parquet" else "json"
-        content = to_text([_FORM, self.head, points, writer, compressed])
-        return f'"{hashlib.sha256(content.encode()).hexdigest()[:32]}"'
-
-
 def entity_tag(
     database: Database, clutch_id: str, run_id: str, *, points: int | None, kind: Kind, compressed: bool = False
 ) -> str:
@@ -117,7 +90,15 @@ def entity_tag(
 
     Raises NotFoundError, and NotAcceptableError where the format is not written here.
     """
-    return _look_up(database, clutch_id, run_id).tag(points, kind, compressed)
+    _, head, _ = _look_up(database, clutch_id, run_id)
+    return _tag(head, points, kind, compressed)
+
+
+def _tag(head: Mapping[str, Any], points: int | None, kind: Kind, compressed: bool) -> str:
+    """The hashes in the receipt and, where its file was read again, in the audit trail stand for the channels."""
+    writer = parquet_writer() if kind == "parquet" else "json"
+    content = to_text([_FORM, head, points, writer, compressed])
+    return f'"{hashlib.sha256(content.encode()).hexdigest()[:32]}"'
 
 
 def write_run(
@@ -136,15 +117,14 @@ def write_run(
     Parquet. `compressed`: JSON as a gzip file. Memory: one channel as it is stored and one decoded; for Parquet all decoded.
     Raises NotFoundError, and NotAcceptableError where the format is not written here.
     """
-    run = _look_up(database, clutch_id, run_id)
-    names = tuple(run.lengths)
-    values = partial(_values, database, run.run_key)
+    run_key, head, names = _look_up(database, clutch_id, run_id)
+    values = partial(_values, database, run_key)
     if kind == "parquet":
-        write_parquet(path, run.head, names, values)
+        write_parquet(path, head, names, values)
     else:
         with path.open("wb") as file, _packed(file) if compressed else file as body:
-            write_json(body, run.head, names, _thinned(run, values, points))
-    return run.tag(points, kind, compressed)
+            write_json(body, head, names, _thinned(values, names, head["samples"], points))
+    return _tag(head, points, kind, compressed)
 
 
 def file_sha256(database: Database, clutch_id: str, run_id: str) -> str:
@@ -171,7 +151,8 @@ def _packed(file: BinaryIO) -> gzip.GzipFile:
     return gzip.GzipFile(filename="", mode="wb", compresslevel=_LEVEL, fileobj=file, mtime=0)
 
 
-def _look_up(database: Database, clutch_id: str, run_id: str) -> _Run:
+def _look_up(database: Database, clutch_id: str, run_id: str) -> tuple[int, dict[str, Any], tuple[str, ...]]:
+    """A stored run before its channels are read: its key, what is said of it, and the names of its channels."""
     with database.reading() as connection:
         row = stored_runs.run(connection, clutch_id, run_id)
         lengths = channels.lengths(connection, row.run_key)
@@ -181,7 +162,7 @@ def _look_up(database: Database, clutch_id: str, run_id: str) -> _Run:
         "changes": [change.entry() for change in trail],
         "samples": max(lengths.values(), default=0),
     }
-    return _Run(run_key=row.run_key, head=head, lengths=lengths)
+    return row.run_key, head, tuple(lengths)
 
 
 def _values(database: Database, run_key: int, name: str) -> FloatArray:
@@ -190,10 +171,10 @@ def _values(database: Database, run_key: int, name: str) -> FloatArray:
     return stored.values()
 
 
-def _thinned(run: _Run, values: Values, points: int | None) -> Values:
+def _thinned(values: Values, names: tuple[str, ...], samples: int, points: int | None) -> Values:
     """The channels of a plot; all values of plateaus and of short records."""
-    if points is None or run.samples <= points or _TIME not in run.lengths:
+    if points is None or samples <= points or _TIME not in names:
         return values
-    drawn = [name for name in run.lengths if name != _TIME]
-    rows = extreme_rows(map(values, drawn), len(drawn), samples=run.samples, points=points)
+    drawn = [name for name in names if name != _TIME]
+    rows = extreme_rows(map(values, drawn), len(drawn), samples=samples, points=points)
     return lambda name: values(name)[rows]

@@ -3,13 +3,14 @@
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from sqlalchemy import Connection
 
 from service import records, stored_runs
-from service.errors import NotFoundError, unknown_clutch
+from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.condition import with_held_runs
 from service.lives.outlook import Evidence, measured_life, with_held
@@ -27,7 +28,7 @@ from service.lives.recomputation import ClutchState
 from service.lives.tracks import CARRIED, predict_at
 from service.schemas.clutch import EndOfLifeIn
 from service.schemas.life import CriterionIn
-from storage import clutches, results
+from storage import results
 from storage.engine.database import Database
 
 #: What `criteria_of` says of a clutch whose life ends by mean COF alone.
@@ -37,9 +38,7 @@ NO_CRITERIA = b"[]"
 def criteria_of(database: Database, clutch_id: str) -> bytes:
     """The criteria of a clutch's record as a JSON array, empty where mean COF alone counts. Raises NotFoundError."""
     with database.reading() as connection:
-        row = clutches.get(connection, clutch_id)
-    if row is None:
-        raise unknown_clutch(clutch_id)
+        row = records.clutch(connection, clutch_id)
     return json.dumps(row.record["end_of_life"].get("criteria", [])).encode()
 
 
@@ -52,15 +51,11 @@ def remaining_life(
     computed. Raises NotFoundError for an unknown clutch or a pressure that its first stationary test did not measure.
     """
     with database.reading() as connection:
-        row = clutches.get(connection, clutch_id)
-        if row is None:
-            raise unknown_clutch(clutch_id)
-        stored = (
-            results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)
-            if pressure_bar is None
-            else None
-        )
-        disagree = [] if pressure_bar is not None else _disagreement(connection, clutch_id, at_cycles)
+        row = records.clutch(connection, clutch_id)
+        stored, disagree = None, []
+        if pressure_bar is None:
+            stored = results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)
+            disagree = _disagreement(connection, clutch_id, at_cycles)
         carried_on = pressure_bar is None and at_cycles is None
         now = at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf)
         earlier = not now and bool(row.summary.get("held"))
@@ -174,45 +169,43 @@ def life_by_criteria(
         evidence = stored_runs.evidence(connection, clutch_id)
         plain = quantity is None and life is None and pressure_bar is None
         disagree = _disagreement(connection, clutch_id, at_cycles) if plain else []
-    request = _Request(method=method, quantity=quantity, criterion=criterion, pressure_bar=pressure_bar)
+    by_criteria = partial(
+        _by_criteria, method=method, quantity=quantity, criterion=criterion, pressure_bar=pressure_bar
+    )
     chosen = chosen_life(state, life, at_cycles)
-    answer = _by_criteria(state, chosen, evidence, request)
+    answer = by_criteria(state, chosen, evidence)
     answer["warnings"] = [*answer["warnings"], *disagree]
     now = chosen.number == chosen.of and (at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf))
     answer_with_held = None
     if chosen.held:
         evidence = replace(evidence, reader=stored_runs.run_reader(database, clutch_id))
         state_with_held = with_held(state, evidence)
-        answer_with_held = _by_criteria(
-            state_with_held, chosen_life(state_with_held, life, None if now else at_cycles), evidence, request
-        )
+        chosen_with_held = chosen_life(state_with_held, life, None if now else at_cycles)
+        answer_with_held = by_criteria(state_with_held, chosen_with_held, evidence)
     head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": state.record.origin}
     return head | answer | with_held_runs(answer, row.summary if now else {}, answer_with_held, len(chosen.held))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Request:
-    """The filter and the criteria that a request names."""
-
-    method: str
-    quantity: str | None
-    criterion: str | None
-    pressure_bar: float | None
-
-
-def _by_criteria(state: ClutchState, chosen: ChosenLife, evidence: Evidence, request: _Request) -> dict[str, Any]:
+def _by_criteria(
+    state: ClutchState,
+    chosen: ChosenLife,
+    evidence: Evidence,
+    *,
+    method: str,
+    quantity: str | None,
+    criterion: str | None,
+    pressure_bar: float | None,
+) -> dict[str, Any]:
     events = () if chosen.life is None else chosen.life.events
-    by_mean_cof = predict_at(events, chosen.assumptions, state.fraction, method=request.method)
+    by_mean_cof = predict_at(events, chosen.assumptions, state.fraction, method=method)
     answer = by_mean_cof | {"life": chosen.item(), "criteria": []}
     measured = measured_life(state, chosen, evidence)
     if measured is None:
         return answer
-    requested = _requested_criteria(
-        state.record.end_of_life, measured, request.quantity, request.criterion, request.pressure_bar
-    )
+    requested = _requested_criteria(state.record.end_of_life, measured, quantity, criterion, pressure_bar)
     if all(criterion_in.quantity != MEAN_COF for criterion_in in requested):
         answer |= _NOT_OF_MEAN_COF
-    ends = [criterion_end(measured, criterion_in, request.method) for criterion_in in requested]
+    ends = [criterion_end(measured, criterion_in, method) for criterion_in in requested]
     return ended(answer | criteria_answer(measured, ends, answer["current"]), measured.life.end)
 
 

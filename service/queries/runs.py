@@ -1,11 +1,12 @@
 """`/runs` and `/loops`: receipts by cycles, and the friction loops of the dynamic tests."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from service import records
 from service.columns import whole
 from service.lists import Part, by_cycles, by_key, page_as_bytes
+from service.lives.condition import held_runs_left_out
 from service.lives.history import DYNAMIC
 from storage import changes, runs
 from storage.encoding import to_text
@@ -19,7 +20,7 @@ TRAIL_COLUMNS = changes.SHOWN
 
 
 def page_as_json(
-    database: Database, clutch_id: str, part: Part, *, state: str | None = None, kind: str | None = None
+    database: Database, clutch_id: str, part: Part, state: str | None = None, kind: str | None = None
 ) -> bytes:
     """Receipts by cycles, of runs in one state or all, of one kind or all, as JSON. Raises NotFoundError.
 
@@ -38,9 +39,9 @@ def _as_json(row: runs.ReceiptRow) -> bytes:
     return f"{row.receipt[:-1]},{present}}}".encode()
 
 
-def rows(items: Iterable[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Receipts as rows of a table, with the number of warnings and fits."""
-    for item in items:
+    for item in payload["items"]:
         counted = {name: len(item[name]) for name in ("warnings", "fits")}
         yield {name: item[name] for name in COLUMNS} | counted
 
@@ -53,18 +54,18 @@ def trail(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
     return part.of(rows, by_key("change_key"), changes.ChangeRow.entry)
 
 
-def trail_rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    for item in items:
+def trail_rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    for item in payload["items"]:
         yield {name: item[name] for name in TRAIL_COLUMNS} | {name: to_text(item[name]) for name in ("before", "after")}
 
 
-def loops(database: Database, clutch_id: str) -> tuple[list[dict[str, Any]], int]:
-    """Friction loops by cycles and pressure, and how many runs are held. Raises NotFoundError."""
+def loops(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+    """Friction loops by cycles and pressure. Raises NotFoundError."""
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED)
         held_count = runs.held(connection, [clutch_id]).get(clutch_id, 0)
-    loop_rows = [
+    items = [
         {"run_id": row.run_id, "cycles": whole(row.cycles)} | loop for row in rows for loop in row.receipt["loops"]
     ]
-    return loop_rows, held_count
+    return held_runs_left_out(held_count) | part.sliced(items)

@@ -150,7 +150,7 @@ def _histogram(tests: Sequence[dict[str, Any]]) -> list[float]:
     return scoring.pit_histogram([test["pit"] for test in tests]).tolist() if tests else []
 
 
-def rows(items: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+def rows(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
     names = (
         "cycles", "runs_used", "share_of_life", "true_remaining_cycles", "crps_cycles", "crps_share", "interval_share",
     )  # fmt: skip
@@ -160,6 +160,6 @@ def rows(items: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         | {name: test[name] for name in names}
         | {f"remaining_cycles_{quantile}": value for quantile, value in test["remaining_cycles"].items()}
         | {name: test[name] for name in judged}
-        for item in items
+        for item in payload["items"]
         for test in item["predictions"]
     ]

@@ -4,12 +4,14 @@ Every row is stored or follows in closed form from a stored fit, as the slopes d
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 from models.clutch import Geometry
 from models.friction.criteria import Z90
 from service import records, stored_runs
 from service.columns import bar, whole
+from service.lists import Part
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.condition import SHOWN
 from service.lives.engagements import ALL_INDICATORS
@@ -35,7 +37,7 @@ from storage.runs import RunRow
 _NOWHERE = {"pressure_bar": None, "frequency_hz": None, "speed_rpm": None}
 
 
-def series(database: Database, clutch_id: str, quantity: str | None) -> list[dict[str, Any]]:
+def series(database: Database, clutch_id: str, part: Part, quantity: str | None) -> dict[str, Any]:
     """Each quantity of each test by cycles, the slopes of its curves, those of each friction loop, the indicators of each
     engagement, then the remaining cycles as they were predicted, and how many runs are held; of one quantity, or of all.
 
@@ -55,17 +57,10 @@ def series(database: Database, clutch_id: str, quantity: str | None) -> list[dic
     lags = (item for row in dynamic for loop in row.receipt["loops"] for item in _rows_of_loop(row.receipt, loop))
     indicators = (item for row in engaged for item in _indicators(row))
     ahead = (item for row in predicted for item in _predicted(row))
-    waiting = (
-        [_ahead_row(predicted[-1].cycles if predicted else 0.0, "held_runs", "1", float(held_count))]
-        if held_count
-        else []
-    )
-    return [
-        item
-        for items in (measured, slopes, lags, indicators, ahead, waiting)
-        for item in items
-        if quantity in (None, item["quantity"])
-    ]
+    newest = predicted[-1].cycles if predicted else 0.0
+    waiting = [_ahead_row(newest, "held_runs", "1", float(held_count))] if held_count else []
+    items = chain(measured, slopes, lags, indicators, ahead, waiting)
+    return part.sliced([item for item in items if quantity in (None, item["quantity"])])
 
 
 def _measured(receipt: dict[str, Any], fit: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from typing import Annotated, Any, TypeVar
 
 from fastapi import Depends, Request
@@ -37,6 +38,8 @@ from storage import clutches
 from storage.engine.database import Database
 
 Rows = Iterable[Mapping[str, Any]]
+#: What computes an answer of a database, a clutch's name and further arguments.
+Query = Callable[..., dict[str, Any]]
 #: How a text begins that spreadsheets take for a formula. Source: https://owasp.org/www-community/attacks/CSV_Injection.
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
@@ -45,35 +48,25 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 class Table:
     """A table that is exported: the `rows` of an answer, and their columns where there are none."""
 
-    rows: Callable[[Any], Rows]
+    rows: Callable[[Mapping[str, Any]], Rows]
     columns: Sequence[str]
 
-    def page(self, answer: Mapping[str, Any]) -> Page:
-        """The rows of a list's page, which goes on where the list does."""
-        return Page(encode_table(self.columns, self.rows(answer["items"])), answer["next"])
-
-    def sliced(self, answer: Any, part: Part) -> Page:
-        """The part of all rows that was asked for."""
+    def page(self, answer: Mapping[str, Any], part: Part = WHOLE) -> Page:
+        """The part of an answer's rows that was asked for; the table goes on where the part or the answer does."""
         page = part.sliced(list(self.rows(answer)))
-        return Page(encode_table(self.columns, page["items"]), page["next"])
+        return Page(encode_table(self.columns, page["items"]), page["next"] or answer.get("next"))
 
 
-def encode_table(columns: Sequence[str], rows: Rows) -> bytes:
+def encode_table(columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> bytes:
     """CSV after RFC 4180 in UTF-8, a header row first; null is an empty field.
 
     A first row with other names than `columns` gives the columns. Text that a spreadsheet would take for a formula has an
     apostrophe before it: a note that a rig has sent must compute nothing, and send nothing, where an engineer opens it.
     """
     text = io.StringIO()
-    writer: csv.DictWriter[str] | None = None
-    for row in rows:
-        if writer is None:
-            names = columns if row.keys() == set(columns) else tuple(row)
-            writer = csv.DictWriter(text, fieldnames=names, extrasaction="raise", restval="")
-            writer.writeheader()
-        writer.writerow({name: _cell(value) for name, value in row.items()})
-    if writer is None:
-        csv.writer(text).writerow(columns)
+    writer = csv.DictWriter(text, columns if not rows or rows[0].keys() == set(columns) else tuple(rows[0]))
+    writer.writeheader()
+    writer.writerows({name: _cell(value) for name, value in row.items()} for row in rows)
     return text.getvalue().encode()
 
 
@@ -164,72 +157,70 @@ PageOf = Annotated[OfClutch, Depends(_page_of_clutch)]
 WholeOf = Annotated[OfClutch, Depends(_whole_of_clutch)]
 
 
-async def clutch_bytes(of: OfClutch, name: str, make: Callable[[], bytes]) -> bytes:
+async def clutch_bytes(of: OfClutch, query: Callable[[Database, str], bytes]) -> bytes:
     """An intermediate result of a clutch's revision that an answer needs. Raises NotFoundError."""
-    return (await cached_answer(of.context, (of.clutch_id, name), _revision(of.request, of.clutch_id), make)).body
+    key = (of.clutch_id, name_of(query))
+    return (await cached_answer(of.context, key, _revision(of), lambda: query(of.database, of.clutch_id))).body
 
 
-async def clutch_answer(of: OfClutch, name: str, make: Callable[[], bytes], *arguments: Hashable) -> Response:
-    """A GET's answer that follows from a clutch's revision, JSON made by `make`. Raises NotFoundError.
+async def clutch_answer(of: OfClutch, query: Callable[..., dict[str, Any] | bytes], *arguments: Hashable) -> Response:
+    """A GET's answer that follows from a clutch's revision: `query(database, clutch_id, *arguments)`, whose bytes are JSON.
 
-    `name` and `arguments` tell the clutch's answers apart. Where it was made for this revision already, nothing is read.
+    Where it was made for this revision already, nothing is read. Raises NotFoundError.
     """
-    context, revision = of.context, _revision(of.request, of.clutch_id)
+
+    def make() -> bytes:
+        made = query(of.database, of.clutch_id, *arguments)
+        return made if isinstance(made, bytes) else to_json(made)
+
     # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
-    key = (of.clutch_id, name, *arguments)
-    answer = await cached_answer(context, key, revision, make)
-    remember(of.request, repeated_answer(context, key))
+    revision = _revision(of)
+    key = (of.clutch_id, name_of(query), *arguments)
+    answer = await cached_answer(of.context, key, revision, make)
+    remember(of.request, repeated_answer(of.context, key))
     return tagged(of.request, answer, JSON_TYPE, revision)
 
 
-async def clutch_table(of: OfClutch, name: str, make: Callable[[], Page], *arguments: Hashable) -> Response:
-    """The CSV export of an answer that follows from a clutch's revision, a page of it. Raises NotFoundError."""
-    revision = _revision(of.request, of.clutch_id)
-    exported = await cached_answer(of.context, (of.clutch_id, f"{name}.csv", *arguments, of.part), revision, make)
-    return tagged(of.request, exported, CSV_TYPE, revision)
+async def clutch_table(of: OfClutch, query: Query, table: Table, *arguments: Hashable) -> Response:
+    """The CSV export of a page that follows from a clutch's revision. Raises NotFoundError."""
+    revision = _revision(of)
+    key = (of.clutch_id, f"{name_of(query)}.csv", *arguments)
+    make = partial(query, of.database, of.clutch_id, *arguments)
+    return tagged(
+        of.request, await cached_answer(of.context, key, revision, lambda: table.page(make())), CSV_TYPE, revision
+    )
 
 
 async def computed_answer(
-    of: OfClutch,
-    query: Callable[..., dict[str, Any]],
-    *arguments: Hashable,
-    prefer: str | None = None,
-    lane: Lane = Lane.ANSWERS,
+    of: OfClutch, query: Query, *arguments: Hashable, prefer: str | None = None, lane: Lane = Lane.ANSWERS
 ) -> Response:
     """A GET's answer that takes long: `query(database, clutch_id, *arguments)`, computed by a worker of that lane; a page of
     its items where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError."""
-    request, context, clutch_id = of.request, of.context, of.clutch_id
-    revision = _revision(request, clutch_id)
-    revision, answer = await _computed(request, context, clutch_id, revision, query, arguments, prefer, lane)
+    revision, answer = await _computed(of, _revision(of), query, arguments, prefer, lane)
     if of.part == WHOLE:
-        remember(request, repeated_answer(context, (clutch_id, name_of(query), *arguments)))
-        return tagged(request, answer, JSON_TYPE, revision)
+        remember(of.request, repeated_answer(of.context, (of.clutch_id, name_of(query), *arguments)))
+        return tagged(of.request, answer, JSON_TYPE, revision)
 
     def page_of_cached() -> bytes:
         payload = json.loads(answer.body)
         return to_json(payload | of.part.sliced(payload["items"]))
 
-    key = (clutch_id, f"{name_of(query)}.page", *arguments, of.part)
-    return tagged(request, await cached_answer(context, key, revision, page_of_cached), JSON_TYPE, revision)
+    key = (of.clutch_id, f"{name_of(query)}.page", *arguments, of.part)
+    return tagged(of.request, await cached_answer(of.context, key, revision, page_of_cached), JSON_TYPE, revision)
 
 
 async def computed_table(
-    of: OfClutch, query: Callable[..., dict[str, Any]], table: Table, *arguments: Hashable, prefer: str | None = None
+    of: OfClutch, query: Query, table: Table, *arguments: Hashable, prefer: str | None = None
 ) -> Response:
     """The CSV export of the same: a page of the rows of its JSON, which goes on where that does. Raises NotFoundError."""
-    revision = _revision(of.request, of.clutch_id)
-    revision, answer = await _computed(of.request, of.context, of.clutch_id, revision, query, arguments, prefer)
-
-    def page_of_cached() -> Page:
-        page = table.sliced(json.loads(answer.body), of.part)
-        return Page(page.body, page.next or answer.next)
-
+    revision, answer = await _computed(of, _revision(of), query, arguments, prefer)
     key = (of.clutch_id, f"{name_of(query)}.csv", *arguments, of.part)
-    return tagged(of.request, await cached_answer(of.context, key, revision, page_of_cached), CSV_TYPE, revision)
+    page = await cached_answer(of.context, key, revision, lambda: table.page(json.loads(answer.body), of.part))
+    return tagged(of.request, page, CSV_TYPE, revision)
 
 
 async def computed_of_each(
-    request: Request, context: Context, query: Callable[..., dict[str, Any]], *arguments: Hashable
+    request: Request, context: Context, query: Query, *arguments: Hashable
 ) -> list[dict[str, Any]]:
     """The newest answers of a query about each clutch, one after the other: the same that are given for the clutch alone.
 
@@ -244,28 +235,27 @@ async def computed_of_each(
     for clutch_id, revision in (await run_in_threadpool(newest)).items():
         if await request.is_disconnected():
             raise ClientDisconnect
-        wait = f"wait={LONGEST_WAIT_SECONDS}"
-        _, answer = await _computed(request, context, clutch_id, revision, query, arguments, wait)
+        of = OfClutch(request=request, context=context, clutch_id=clutch_id)
+        _, answer = await _computed(of, revision, query, arguments, f"wait={LONGEST_WAIT_SECONDS}")
         items.append(await run_in_threadpool(json.loads, answer.body))
     return items
 
 
 async def _computed(
-    request: Request,
-    context: Context,
-    clutch_id: str,
+    of: OfClutch,
     revision: int,
-    query: Callable[..., dict[str, Any]],
+    query: Query,
     arguments: tuple[Hashable, ...],
     prefer: str | None,
     lane: Lane = Lane.ANSWERS,
 ) -> tuple[int, Answer]:
+    context, clutch_id = of.context, of.clutch_id
     preferred = preferred_wait(prefer)
     wait = preferred if preferred is not None else WAIT_SECONDS if context.workers.are_idle() else 0
 
     def compute(waited_for: bool) -> "Future[Made]":
         lane_used = lane if waited_for or lane is not Lane.ANSWERS else Lane.RENEWALS
-        turn = f"{lane_used.name} for {name_of_caller(request)}"
+        turn = f"{lane_used.name} for {name_of_caller(of.request)}"
         return context.workers.submit(lane_used, revision_and_json, query, clutch_id, arguments, turn=turn)
 
     key = (clutch_id, name_of(query), *arguments)
@@ -276,7 +266,7 @@ async def _computed(
     return await context.revalidation.answer(key, revision, compute, wait=wait)
 
 
-async def begin_computed(context: Context, clutch_id: str, query: Callable[..., dict[str, Any]]) -> None:
+async def begin_computed(context: Context, clutch_id: str, query: Query) -> None:
     """Hold the answer of a clutch that has just been registered, so that the one after its first run is not waited for."""
     revision, body = await run_in_threadpool(revision_and_json, context.database, query, clutch_id, ())
     context.revalidation.begin((clutch_id, name_of(query)), revision, body)
@@ -300,11 +290,11 @@ def preferred_wait(prefer: str | None) -> int | None:
     return None if preferred is None else min(int(preferred[1]), LONGEST_WAIT_SECONDS)
 
 
-def _revision(request: Request, clutch_id: str) -> int:
+def _revision(of: OfClutch) -> int:
     """The revision of the clutch in the path when the request came in. Raises NotFoundError."""
-    revision = snapshot_of(request).revision
+    revision = snapshot_of(of.request).revision
     if revision is None:
-        raise unknown_clutch(clutch_id)
+        raise unknown_clutch(of.clutch_id)
     return revision
 
 

@@ -5,7 +5,6 @@ Keys, entity tags and 304, the headers of pages and refusals, compression, and a
 """
 
 import json
-from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
@@ -25,7 +24,6 @@ _SECURITY = {
 _OPEN = ("/livez", "/readyz")
 #: Ends the name of what is sent where what is answered has the name already.
 _SENT = "Sent"
-_METHODS = ("get", "post", "put", "patch", "delete")
 
 
 def _header(description: str, example: object) -> Json:
@@ -67,7 +65,8 @@ def completed(api: Json) -> Json:
     schemas = api.setdefault("components", {}).setdefault("schemas", {})
     api["components"]["securitySchemes"] = {"key": _SECURITY}
     api["security"] = [{"key": []}, {}]
-    for path, method, operation in _operations(api):
+    operations = [(path, *item) for path, items in api["paths"].items() for item in items.items()]
+    for path, method, operation in operations:
         for place in [operation.get("requestBody", {}), *operation["responses"].values()]:
             for content in place.get("content", {}).values():
                 content["schema"] = _named(content.get("schema", {}), schemas)
@@ -77,13 +76,6 @@ def completed(api: Json) -> Json:
     for name, schema in schemas.items():
         _exemplify(schema, name.removesuffix(_SENT))
     return api
-
-
-def _operations(api: Json) -> Iterator[tuple[str, str, Json]]:
-    for path, item in api["paths"].items():
-        for method in _METHODS:
-            if method in item:
-                yield path, method, item[method]
 
 
 def _complete(path: str, method: str, operation: Json) -> None:

@@ -7,7 +7,6 @@ lock is taken, so that nobody who holds one makes the service look dead.
 import asyncio
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 
 from service.web.limits import LONGEST_LOOK_SECONDS, LONGEST_RAW_LOOK_SECONDS, RAW_LOOK_SECONDS
@@ -27,22 +26,17 @@ _GROUPS = Path("/sys/fs/cgroup")
 _GIVEN_BACK = ("inactive_file", "active_file", "slab_reclaimable")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Needs:
-    """Bytes that must be left on the disk and of memory."""
-
-    disk: int
-    memory: int
-
-
 class Readiness:
-    """What keeps the service from working. Asked from the event loop; `close` at the end."""
+    """What keeps the service from working, which needs so many bytes `least_disk` and `least_memory` left. Asked from the
+    event loop; `close` at the end."""
 
-    def __init__(self, database: Database, workers: Workers, jobs: JobQueue, needs: Needs) -> None:
+    def __init__(
+        self, database: Database, workers: Workers, jobs: JobQueue, *, least_disk: int, least_memory: int
+    ) -> None:
         self._database = database
         self._workers = workers
         self._jobs = jobs
-        self._needs = needs
+        self._least_disk, self._least_memory = least_disk, least_memory
         # looks at everything
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="readiness")
         # asks the store of raw records, and may hang in it
@@ -71,14 +65,18 @@ class Readiness:
         self._raw_thread.shutdown(wait=False)
 
     def _look(self) -> dict[str, str]:
-        wrong = self._database.faults(least_free=self._needs.disk)
+        wrong = self._database.faults(least_free=self._least_disk)
         if "database" not in wrong and (away := self._fault_of_raw_records()) is not None:
             wrong["raw"] = away
         left = available_memory()
-        if left is not None and left < self._needs.memory:
-            wrong["memory"] = f"{left >> 20} MiB of memory are left, {self._needs.memory >> 20} are needed"
-        workers = self._fault_of_workers()
-        return wrong if workers is None else wrong | {"workers": workers}
+        if left is not None and left < self._least_memory:
+            wrong["memory"] = f"{left >> 20} MiB of memory are left, {self._least_memory >> 20} are needed"
+        if not self._jobs.is_working():
+            wrong["workers"] = "a thread that runs jobs has ended: restart the service"
+        elif ended := self._workers.ended():
+            lanes = ", ".join(lane.name.lower() for lane in ended)
+            wrong["workers"] = f"a worker process has ended and is being started again: {lanes}"
+        return wrong
 
     def _fault_of_raw_records(self) -> str | None:
         """Why the store of raw records cannot be used, as it was found at the last look at it."""
@@ -106,15 +104,6 @@ class Readiness:
             self._asking_store = False
             self._look_again = time.monotonic() + RAW_LOOK_SECONDS
         return None
-
-    def _fault_of_workers(self) -> str | None:
-        if not self._jobs.is_working():
-            return "a thread that runs jobs has ended: restart the service"
-        ended = self._workers.ended()
-        if not ended:
-            return None
-        lanes = ", ".join(lane.name.lower() for lane in ended)
-        return f"a worker process has ended and is being started again: {lanes}"
 
 
 def available_memory() -> int | None:

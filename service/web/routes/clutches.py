@@ -133,8 +133,4 @@ async def edit_clutch(request: Request, context: auth.Admin, clutch_id: ClutchId
 @router.get("/{clutch_id}/changes", response_model=ChangePage, responses=READING)
 async def list_changes(of: answers.PageOf) -> Response:
     """The audit trail of the clutch and its runs: who changed what, when and why, newest first."""
-
-    def make() -> bytes:
-        return to_json(runs.trail(of.database, of.clutch_id, of.part))
-
-    return await answers.clutch_answer(of, "changes", make, of.part)
+    return await answers.clutch_answer(of, runs.trail, of.part)

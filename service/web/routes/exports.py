@@ -1,11 +1,12 @@
 """The CSV exports: every table of the API as rows for a spreadsheet."""
 
 import json
+from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
-from service.lists import WHOLE
+from service.lists import Part
 from service.queries import (
     degradation,
     diagnoses,
@@ -18,7 +19,6 @@ from service.queries import (
     stribeck,
     surfaces,
 )
-from service.queries.cache import Page
 from service.schemas.life import Method
 from service.schemas.over_life import LoopItem, SeriesItem
 from service.schemas.parameters import DiagnosisId, LifeNumber, Quantity, State, TrackedQuantity
@@ -27,6 +27,7 @@ from service.web.answers import Table
 from service.web.auth import Reader
 from service.web.context import AtCycles, Prefer, PressureBar
 from service.web.problems import READING
+from storage.engine.database import Database
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["spreadsheets"], responses=READING)
 fleet_router = APIRouter(prefix="/v1/fleet", tags=["spreadsheets"], responses=READING)
@@ -38,51 +39,45 @@ _REMAINING = Table(remaining_life.rows, remaining_life.COLUMNS)
 _DEGRADATION = Table(degradation.rows, degradation.COLUMNS)
 _STRIBECK = Table(stribeck.rows, ("run_id", "cycles", "held_runs"))
 _SURFACES = Table(surfaces.rows, ("cycles", "pressure_bar"))
-_SCORES = Table(lambda answer: scores.rows(answer["items"]), ("end_of_life_cycles", "cycles"))
-_LOOPS = Table(lambda loops: loops, (*LoopItem.model_fields, "held_runs"))
-_SERIES = Table(lambda series: series, tuple(SeriesItem.model_fields))
+_SCORES = Table(scores.rows, ("end_of_life_cycles", "cycles"))
+_LOOPS = Table(
+    lambda loops: [loop | {"held_runs": loops["held_runs"]} for loop in loops["items"]],
+    (*LoopItem.model_fields, "held_runs"),
+)
+_SERIES = Table(lambda series: series["items"], tuple(SeriesItem.model_fields))
 _STAGES = Table(lambda fleet: [*fleet["stages"], {"share_of_life": None} | fleet["overall"]], ("share_of_life",))
 _PRIORS = Table(fleet_priors.rows, fleet_priors.COLUMNS)
+
+
+def _receipts(database: Database, clutch_id: str, part: Part, state: str | None) -> dict[str, Any]:
+    answer: dict[str, Any] = json.loads(runs.page_as_json(database, clutch_id, part, state))
+    return answer
 
 
 @router.get("/runs.csv", response_class=Response)
 async def list_runs_csv(of: answers.WholeOf, state: State = None) -> Response:
     """Receipts by cycles as CSV; warnings and fits are counted."""
-
-    def make() -> Page:
-        return _RUNS.page(json.loads(runs.page_as_json(of.database, of.clutch_id, of.part, state=state)))
-
-    return await answers.clutch_table(of, "runs", make, state)
+    return await answers.clutch_table(of, _receipts, _RUNS, of.part, state)
 
 
 @router.get("/changes.csv", response_class=Response)
 async def list_changes_csv(of: answers.WholeOf) -> Response:
     """The audit trail as CSV, newest first; what changed is JSON."""
-
-    def make() -> Page:
-        return _CHANGES.page(runs.trail(of.database, of.clutch_id, of.part))
-
-    return await answers.clutch_table(of, "changes", make)
+    return await answers.clutch_table(of, runs.trail, _CHANGES, of.part)
 
 
 @router.get("/inspections.csv", response_class=Response)
 async def list_inspections_csv(of: answers.WholeOf) -> Response:
     """Inspections by cycles as CSV; photographs are counted."""
-
-    def make() -> Page:
-        return _INSPECTIONS.page(inspections.page(of.database, of.clutch_id, of.part))
-
-    return await answers.table(of.request, make)
+    return await answers.table(
+        of.request, lambda: _INSPECTIONS.page(inspections.page(of.database, of.clutch_id, of.part))
+    )
 
 
 @router.get("/diagnoses/{diagnosis_id}/plan.csv", response_class=Response)
 async def diagnosis_plan_csv(of: answers.WholeOf, diagnosis_id: DiagnosisId) -> Response:
     """The tests that a diagnosis advises as CSV, one row per step."""
-
-    def make() -> Page:
-        return _PLAN.sliced(diagnoses.plan(of.database, of.clutch_id, diagnosis_id), WHOLE)
-
-    return await answers.table(of.request, make)
+    return await answers.table(of.request, lambda: _PLAN.page(diagnoses.plan(of.database, of.clutch_id, diagnosis_id)))
 
 
 @router.get("/remaining-useful-life.csv", response_class=Response)
@@ -133,22 +128,13 @@ async def clutch_scores_csv(of: answers.WholeOf, method: Method = "particle", pr
 @router.get("/loops.csv", response_class=Response)
 async def loops_csv(of: answers.WholeOf) -> Response:
     """Friction loops, one row each."""
-
-    def make() -> Page:
-        rows, held_count = runs.loops(of.database, of.clutch_id)
-        return _LOOPS.sliced([loop | {"held_runs": held_count} for loop in rows], of.part)
-
-    return await answers.clutch_table(of, "loops", make)
+    return await answers.clutch_table(of, runs.loops, _LOOPS, of.part)
 
 
 @router.get("/series.csv", response_class=Response)
 async def series_csv(of: answers.WholeOf, quantity: Quantity = None) -> Response:
     """The flat rows as CSV."""
-
-    def make() -> Page:
-        return _SERIES.sliced(series.series(of.database, of.clutch_id, quantity), of.part)
-
-    return await answers.clutch_table(of, "series", make, quantity)
+    return await answers.clutch_table(of, series.series, _SERIES, of.part, quantity)
 
 
 @fleet_router.get("/scores.csv", response_class=Response)
@@ -157,10 +143,10 @@ async def fleet_scores_csv(
 ) -> Response:
     """Scores of all predictions, one row per stage of life; the last row has all."""
     scored = await answers.computed_of_each(request, context, scores.scores_of_clutch, method)
-    return await answers.table(request, lambda: _STAGES.sliced(scores.scores_of_fleet(scored, method=method), part))
+    return await answers.table(request, lambda: _STAGES.page(scores.scores_of_fleet(scored, method=method), part))
 
 
 @fleet_router.get("/priors.csv", response_class=Response)
 async def priors_csv(request: Request, context: Reader, part: answers.WholePaged) -> Response:
     """The fleet's priors, one row each."""
-    return await answers.table(request, lambda: _PRIORS.sliced(fleet_priors.newest(context.database), part))
+    return await answers.table(request, lambda: _PRIORS.page(part.sliced(fleet_priors.newest(context.database))))

@@ -5,12 +5,10 @@ import asyncio
 from fastapi import APIRouter
 from fastapi.responses import Response
 
-from service.lives.condition import held_runs_left_out
 from service.lives.tracks import CARRIED
 from service.queries import runs, scores
 from service.queries import series as series_query
 from service.queries import stribeck as stribeck_query
-from service.queries.cache import to_json
 from service.queries.degradation import arguments as degradation_arguments
 from service.queries.degradation import degradation as degradation_of
 from service.queries.engagement import engaged
@@ -44,17 +42,13 @@ async def remaining_useful_life(
     """The remaining duty cycles until the first of the clutch's criteria is reached, with their uncertainty. The
     default criterion is a fraction of mean COF.
     """
-    own = await answers.clutch_bytes(of, "criteria", lambda: criteria_of(of.database, of.clutch_id))
+    own = await answers.clutch_bytes(of, criteria_of)
     if own != NO_CRITERIA or (quantity, criterion, life) != (None, None, None):
         arguments = (method, pressure_bar, at_cycles, quantity, criterion, life)
         return await answers.computed_answer(of, life_by_criteria, *arguments, prefer=prefer)
     if method not in CARRIED or pressure_bar is not None:
         return await answers.computed_answer(of, remaining_life, method, pressure_bar, at_cycles, prefer=prefer)
-
-    def make() -> bytes:
-        return to_json(remaining_life(of.database, of.clutch_id, method, pressure_bar, at_cycles))
-
-    return await answers.clutch_answer(of, "remaining-useful-life", make, method, at_cycles)
+    return await answers.clutch_answer(of, remaining_life, method, None, at_cycles)
 
 
 @router.post(
@@ -127,19 +121,10 @@ async def clutch_scores(of: answers.WholeOf, method: Method = "particle", prefer
 @router.get("/loops", response_model=LoopPage, responses=READING)
 async def loops(of: answers.WholeOf) -> Response:
     """Friction loops of the dynamic tests by cycles and pressure."""
-
-    def make() -> bytes:
-        rows, held_count = runs.loops(of.database, of.clutch_id)
-        return to_json(held_runs_left_out(held_count) | of.part.sliced(rows))
-
-    return await answers.clutch_answer(of, "loops", make, of.part)
+    return await answers.clutch_answer(of, runs.loops, of.part)
 
 
 @router.get("/series", response_model=SeriesPage, responses=READING)
 async def series(of: answers.WholeOf, quantity: Quantity = None) -> Response:
     """Flat rows for dashboards and spreadsheets: fitted quantities, indicators of engagements, then predictions."""
-
-    def make() -> bytes:
-        return to_json(of.part.sliced(series_query.series(of.database, of.clutch_id, quantity)))
-
-    return await answers.clutch_answer(of, "series", make, quantity, of.part)
+    return await answers.clutch_answer(of, series_query.series, of.part, quantity)

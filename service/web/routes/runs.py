@@ -1,4 +1,7 @@
-"""The routes of runs: post, list, look up and change."""
+"""The routes of runs: post, as JSON or as a file, list, look up and change.
+
+A file is the body itself, or a form with a `file` part; it is kept on disk while it is read, never in memory whole.
+"""
 
 import asyncio
 import tempfile
@@ -11,24 +14,128 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.errors import NotAcceptableError, NotFoundError
-from service.queries import runs
-from service.queries.raw_run import Kind, entity_tag, write_run
+from service.errors import NoRoomError, NotAcceptableError, NotFoundError
+from service.queries import rigs, runs
+from service.queries.raw_run import Kind, copy_file, entity_tag, file_sha256, write_run
+from service.readers.read_file import reading_of
 from service.run_files.json_run import checked, read_run, read_run_on_disk
-from service.schemas.parameters import ClutchId, Points, RunId, RunKind, State
+from service.run_files.upload import read_file_run
+from service.schemas.base import Origin
+from service.schemas.parameters import (
+    ClutchId,
+    FileCycles,
+    FileDecimal,
+    FileKind,
+    FileMap,
+    FileMissing,
+    FileName,
+    FileRig,
+    FileRunId,
+    FileSkipRows,
+    FileStartedAt,
+    FileTable,
+    FileTime,
+    Points,
+    RunId,
+    RunKind,
+    State,
+)
 from service.schemas.run import RUN_IN, Confirmation, Confirmations, Correction, Receipt, RunOut, RunPage, Withdrawal
 from service.web import answers
 from service.web.auth import Ingester, Reader, name_of_caller
-from service.web.files import PARQUET_TYPE, body_or_file, preferred, streamed
+from service.web.files import (
+    FILE_BODY,
+    FILE_CONTENT,
+    FILE_TYPE,
+    PARQUET_TYPE,
+    body_or_file,
+    preferred,
+    received,
+    streamed,
+)
 from service.web.limits import LARGE_BODY_BYTES
 from service.web.problems import READING, SENDING, described
 from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import change_run
 from service.workflows.ingest_run import ingest_posted
-from storage.encoding import to_text
 from storage.engine.database import Database
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
+
+SENDING_FILE = SENDING | described(NoRoomError)
+
+
+@router.post(
+    "/file",
+    status_code=201,
+    response_model=Receipt,
+    responses=SENDING_FILE
+    | {200: {"model": Receipt, "description": "The run was stored before; the answer is its receipt"}},
+    openapi_extra=FILE_BODY,
+)
+async def post_run_file(
+    request: Request,
+    context: Ingester,
+    clutch_id: ClutchId,
+    kind: FileKind = None,
+    cycles: FileCycles = None,
+    rig: FileRig = None,
+    map: FileMap = None,  # noqa: A002
+    table: FileTable = "",
+    time: FileTime = "",
+    decimal: FileDecimal = "",
+    skip_rows: FileSkipRows = 0,
+    missing: FileMissing = "",
+    filename: FileName = "upload",
+    run_id: FileRunId = None,
+    started_at: FileStartedAt = None,
+    origin: Origin = "measured",
+) -> Response:
+    """Post a run as CSV, XLSX, ODS, TDMS, MDF4, MATLAB, HDF5 or Parquet, plain, gzipped or in a ZIP archive. The file
+    is kept as sent. A form may also hold a `profile` to read this file with.
+    """
+    profile = None if rig is None else await run_in_threadpool(rigs.rig_profile, context.database, rig)
+    with tempfile.TemporaryDirectory(dir=context.folder) as folder:
+        path = Path(folder) / "run"
+        filename, content = await received(request, path, filename)
+        read = partial(
+            read_file_run,
+            path,
+            filename=filename,
+            kind=kind,
+            cycles=cycles,
+            reading=reading_of(map, table=table, time=time, decimal=decimal, skip_rows=skip_rows, missing=missing),
+            profile=content or profile,
+            rig=None if content else rig,
+            run_id=run_id,
+            started_at=started_at,
+            origin=origin,
+        )
+        by = name_of_caller(request)
+        # without a turn: a file that takes long to read would have the clutch's other runs wait
+        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, answers.now(), by, path)
+        receipt, new = await asyncio.wrap_future(taken_in)
+    return answers.json_answer(
+        receipt, 201 if new else 200, Location=f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"
+    )
+
+
+_READING_FILE = READING | {200: {"content": FILE_CONTENT, "description": "The file as it was sent"}}
+
+
+@router.get("/{run_id}/file", response_class=Response, responses=_READING_FILE)
+async def read_run_file(of: answers.Of, run_id: RunId) -> Response:
+    """The file that a run was read from, as it was sent."""
+    sha256 = await run_in_threadpool(file_sha256, of.database, of.clutch_id, run_id)
+    headers = {"Cache-Control": "no-cache", "ETag": f'"{sha256}"', "Content-Disposition": "attachment"}
+    if held := answers.unchanged(of.request, headers):
+        return held
+    with tempfile.TemporaryDirectory(dir=of.context.folder) as folder:
+        path = Path(folder) / "file"
+        await asyncio.wrap_future(of.context.workers.submit(Lane.RECORDS, copy_file, of.clutch_id, run_id, path))
+        body = path.open("rb")  # its name goes with the folder, its content when it is closed
+    return streamed(body, FILE_TYPE, headers)
+
 
 _PARQUET = {"schema": {"type": "string", "format": "binary"}}
 READING_RUN = described(NotFoundError, NotAcceptableError) | {
@@ -72,20 +179,14 @@ async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> 
             turn=clutch_id,
         )
         receipt, new = await asyncio.wrap_future(taken_in)
-    headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
-    return Response(
-        content=to_text(receipt), status_code=201 if new else 200, media_type=answers.JSON_TYPE, headers=headers
-    )
+    address = f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"
+    return answers.json_answer(receipt, 201 if new else 200, Location=address)
 
 
 @router.get("", response_model=RunPage, responses=READING)
 async def list_runs(of: answers.PageOf, state: State = None, kind: RunKind = None) -> Response:
     """Receipts by cycles."""
-
-    def make() -> bytes:
-        return runs.page_as_json(of.database, of.clutch_id, of.part, state=state, kind=kind)
-
-    return await answers.clutch_answer(of, "runs", make, state, kind, of.part)
+    return await answers.clutch_answer(of, runs.page_as_json, of.part, state, kind)
 
 
 @router.get("/{run_id}", response_model=RunOut, responses=READING_RUN)
@@ -171,4 +272,4 @@ async def _changed(
     edit = partial(change, reason=reason, **more, by=name_of_caller(of.request), at=answers.now())
     clutch_id, submit = of.clutch_id, of.context.workers.submit
     changing = submit(Lane.RUNS, edit, clutch_id, run_id, turn=clutch_id, seconds=CHANGE_SECONDS)
-    return Response(content=to_text(await asyncio.wrap_future(changing)), media_type=answers.JSON_TYPE)
+    return answers.json_answer(await asyncio.wrap_future(changing))

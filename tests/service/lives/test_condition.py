@@ -13,6 +13,7 @@ from fastapi.testclient import TestClient
 
 from models.diagnosis.experiments.candidates import TRIALS
 from models.prognosis.criteria import QUANTILES
+from service.lists import WHOLE
 from service.lives.condition import (
     STATE_WORDS,
     bound_in_words,
@@ -69,7 +70,8 @@ def test_after_one_test_and_a_block_of_duty_health_is_unknown_and_mean_cof_is_th
     for tracked in degradation.degradation(bench.database, CLUTCH)["items"]:
         assert tracked["measured"]["cycles"] == [100]
         assert (tracked["coefficients"], tracked["trajectory"]["cycles"]) == (None, [])
-    stated = {row["quantity"]: row["value"] for row in series.series(bench.database, CLUTCH, None) if not row["run_id"]}
+    rows = series.series(bench.database, CLUTCH, WHOLE, None)["items"]
+    stated = {row["quantity"]: row["value"] for row in rows if not row["run_id"]}
     assert stated == dict.fromkeys(stated) | {"at_least": 0.0}
     assert item(bench)["state"]["name"] == "check"
 

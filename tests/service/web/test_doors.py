@@ -17,7 +17,7 @@ from fastapi.testclient import TestClient
 from service.queries import scores
 from service.web import limits
 from service.web.files import emptied_folder
-from service.web.routes import files
+from service.web.routes import runs
 from storage.encoding import to_text
 from tests.benchmarks.memory import family, resident
 from tests.service.clients import client_on
@@ -205,7 +205,7 @@ def full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             (place / "run").unlink()
             place.rmdir()
 
-    monkeypatch.setattr(files.tempfile, "TemporaryDirectory", folder)
+    monkeypatch.setattr(runs.tempfile, "TemporaryDirectory", folder)
 
 
 def test_a_file_for_which_the_disk_has_no_room_is_refused_with_the_reason(
@@ -228,13 +228,13 @@ def test_files_are_kept_beside_the_database_while_they_are_read(
     path = Path(database_url.removeprefix("sqlite:///"))
     beside = path.with_name(f"{path.name}-files")
     seen: list[Path] = []
-    read = files.read_file_run
+    read = runs.read_file_run
 
     def watched(given: Path, **of_run: object) -> object:
         seen.append(given)
         return read(given, **of_run)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(files, "read_file_run", watched)
+    monkeypatch.setattr(runs, "read_file_run", watched)
     assert client.post(ADDRESS, content=text()).status_code == 201
     assert [given.parent.parent for given in seen] == [beside]
     assert list(beside.iterdir()) == []

@@ -153,8 +153,8 @@ class Bench:
         if degradation_too:
             named["degradation"] = degradation.degradation(database, CLUTCH)
         named["stribeck"] = stribeck.curves(database, CLUTCH, WHOLE)
-        named["series"] = series.series(database, CLUTCH, None)
-        named["loops"] = runs.loops(database, CLUTCH)[0]
+        named["series"] = series.series(database, CLUTCH, WHOLE, None)["items"]
+        named["loops"] = runs.loops(database, CLUTCH, WHOLE)["items"]
         named["scores"] = scores.scores_of_clutch(database, CLUTCH, method="particle")
         named["clutch"] = clutch_list.look_up(database, CLUTCH) | {"held": None}
         named["runs"] = [
