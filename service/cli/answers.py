@@ -9,9 +9,8 @@ from urllib.parse import urlencode
 
 import typer
 
-from service.cli.options import EX_USAGE, ClutchId, Json, asking, errors_in_a_line, fail, out, print_line
-from service.cli.tables import chance, coefficient, cycles, number, place, show_table, warn, with_deviation
-from service.cli.tables import pressure as pressure_of
+from service.cli.options import EX_USAGE, ClutchId, Json, asking, fail, out, print_line
+from service.cli.tables import chance, coefficient, cycles, model_name, number, show_table, warn, with_deviation
 from service.client.clutchlife.transport import Service
 
 Method = Annotated[str | None, typer.Option(help="The filter: particle, ukf or grid")]
@@ -141,8 +140,11 @@ def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
         cof, fraction = with_deviation(current["mean_cof"], current["mean_cof_sd"]), current["fraction_of_initial"]
         if fraction is None:
             yield f"mean COF {cof} as measured at {current['measured_at_cycles']:,.0f} cycles"
+        elif criterion["threshold_mean_cof"] is None or criterion["fraction"] is None:
+            yield f"mean COF {cof}, {100 * fraction:.0f} % of new"
         else:
-            yield f"mean COF {cof}, {100 * fraction:.0f} % of new{_threshold(criterion)}"
+            end = f"the end of life is at {100 * criterion['fraction']:g} %"
+            yield f"mean COF {cof}, {100 * fraction:.0f} % of new; {end}"
     if answer["at_least_at"] is not None and answer["at_least"] >= 1.0:
         pace = "planned pace" if answer.get("pace_from") == "request" else "pace so far"
         since = answer["counted_from"]
@@ -151,10 +153,8 @@ def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
         yield f"safe for {shown} at the {pace}, counted from the last run on {since[:10]}"
     course = answer.get("course")
     described = "" if course is None else f", {_COURSES[course['name']]} ({chance(course['probability'])} sure)"
-    effects = ", ".join(answer["model"]["effects"])
-    model = f"{answer['model']['name']} ({effects})" if effects else answer["model"]["name"]
     tests = "1 test" if answer["runs_used"] == 1 else f"{answer['runs_used']} tests"
-    yield f"{tests}, method {answer['method']}, model {model}{described}"
+    yield f"{tests}, method {answer['method']}, model {model_name(answer['model'])}{described}"
     if (lives := answer.get("ended_lives", 0)) > 0:
         yield f"calibrated on {lives} ended {'life' if lives == 1 else 'lives'}"
     if answer.get("pace_cycles_per_hour") is not None:
@@ -170,26 +170,24 @@ def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
 _COURSES = {"eq6": "ages as expected", "slowing": "ages slower and slower", "accelerating": "ages faster and faster"}
 
 
-def _threshold(criterion: Mapping[str, Any]) -> str:
-    """Where the end of life is, of mean COF alone: others have a table of their own."""
-    if criterion["threshold_mean_cof"] is None or criterion["fraction"] is None:
-        return ""
-    return f"; the end of life is at {100 * criterion['fraction']:g} %"
-
-
 def _criterion(end: Mapping[str, Any]) -> list[str]:
     """A criterion: what it is now, its limit, when that is reached, and how probably it is the first."""
     current = end["current"]
     return [
-        end["quantity"],
-        pressure_of(end["pressure_bar"]),
-        place(end["speed_rpm"]),
-        place(end["frequency_hz"]),
+        *_quantity(end),
         with_deviation(current["value"], current["sd"]),
         number(end["limit"]),
         *(cycles(end["end_of_life_cycles"][q]) for q in ("0.05", "0.5", "0.95")),
         chance(end["probability_first"]),
     ]
+
+
+def _quantity(item: Mapping[str, Any]) -> Iterator[str]:
+    """A quantity, the pressure at which it holds or the mean over them, and its speed or frequency where it has one."""
+    yield item["quantity"]
+    yield "mean" if item["pressure_bar"] is None else f"{item['pressure_bar']:g}"
+    for name in ("speed_rpm", "frequency_hz"):
+        yield "" if item[name] is None else f"{item[name]:g}"
 
 
 def _quantiles(answer: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], Any]]:
@@ -203,27 +201,18 @@ def _quantiles(answer: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, An
         yield "remaining blocks", answer["remaining_blocks"], number
         yield "under recent duty", answer["recent_duty_cycles"], cycles
     if answer.get("end_of_life_at") is not None and answer["counted_from"] is not None:
-        yield (
-            f"date, counted from {answer['counted_from'][:10]}",
-            answer["end_of_life_at"],
-            lambda date: "-" if date is None else date[:10],
-        )
+        name = f"date, counted from {answer['counted_from'][:10]}"
+        yield name, answer["end_of_life_at"], lambda date: "-" if date is None else date[:10]
 
 
 def _programme(plan: Path | None, blocks: list[str], pace: float | None) -> dict[str, Any]:
     """The request body; what is wrong with its content the service says. A pace that is given replaces the file's."""
     if plan is not None and blocks:
         fail("use --plan or --block, not both", EX_USAGE)
-    body = {"programme": [_block(text) for text in blocks]} if plan is None else _read(plan)
-    return body if pace is None else body | {"pace_cycles_per_hour": pace}
-
-
-def _read(plan: Path) -> dict[str, Any]:
-    with errors_in_a_line():
-        body = json.loads(plan.read_bytes())
+    body = {"programme": [_block(text) for text in blocks]} if plan is None else json.loads(plan.read_bytes())
     if not isinstance(body, dict):
         fail(f'{plan} must hold an object, {{"programme": [...]}}', EX_USAGE)
-    return body
+    return body if pace is None else body | {"pace_cycles_per_hour": pace}
 
 
 def _block(text: str) -> dict[str, float]:
@@ -272,15 +261,7 @@ def _tracked(item: Mapping[str, Any]) -> list[str]:
     coefficients = item["coefficients"]
     estimates = [None if coefficients is None else coefficients[name] for name in _COEFFICIENTS]
     shown = ["-" if part is None else coefficient(part["value"], part["sd"]) for part in estimates]
-    return [
-        item["quantity"],
-        pressure_of(item["pressure_bar"]),
-        place(item["speed_rpm"]),
-        place(item["frequency_hz"]),
-        *_last(item),
-        *shown,
-        number(item["eq6_probability"], 2),
-    ]
+    return [*_quantity(item), *_last(item), *shown, number(item["eq6_probability"], 2)]
 
 
 def _last(item: Mapping[str, Any]) -> tuple[str, str]:

@@ -26,7 +26,7 @@ from service.cli.options import (
     print_line,
     say,
 )
-from service.cli.tables import cycles, show_table
+from service.cli.tables import cycles, model_name, show_table
 from service.client.clutchlife import Client, ClutchlifeError
 from service.client.clutchlife.transport import Service
 
@@ -75,12 +75,8 @@ def list_clutches(
     chosen = {"state": state, "find": find, "archived": "true" if archived else None}
     items = service.pages("/v1/clutches", **{name: value for name, value in chosen.items() if value is not None})
     columns = ("clutch", "state", "at", "safe for", "50 % chance of", "held")
-    listed(
-        items,
-        as_json,
-        lambda items: show_table(columns, map(_row, items)),
-        "no clutch is registered; register one with: clutchlife register ID",
-    )
+    nothing = "no clutch is registered; register one with: clutchlife register ID"
+    listed(items, as_json, lambda items: show_table(columns, map(_row, items)), nothing)
 
 
 def _row(item: dict[str, Any]) -> list[str]:
@@ -208,12 +204,7 @@ def model(
     address = f"/v1/clutches/{clutch}/model"
     changes = adopt is not None or baseline
     current = service.put(address, {"diagnosis_id": adopt}) if changes else service.get(address)
-    print_line(f"{clutch} is tracked with: {_named(current['model'])}")
+    print_line(f"{clutch} is tracked with: {model_name(current['model'])}")
     for version in current["versions"]:
-        since = f"  version {version['version']}, {version['adopted_at']}: {_named(version['model'])}"
+        since = f"  version {version['version']}, {version['adopted_at']}: {model_name(version['model'])}"
         print_line(since + (f" by {version['diagnosis_id']}" if version["diagnosis_id"] else ""))
-
-
-def _named(model: dict[str, Any]) -> str:
-    effects = ", ".join(model["effects"])
-    return f"{model['name']} ({effects})" if effects else str(model["name"])

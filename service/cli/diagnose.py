@@ -196,10 +196,9 @@ def _cell(value: float | None, largest: float) -> Text:
     if value is None:
         return Text("  ")
     for share, mark, above, below in _MARKS:
-        if value >= share * largest > 0:
-            return Text(mark, style=f"not bold black on color({above})")
-        if -value >= share * largest > 0:
-            return Text(_below(mark), style=f"not bold black on color({below})")
+        if abs(value) >= share * largest > 0:
+            sign, colour = (mark, above) if value > 0 else (_below(mark), below)
+            return Text(sign, style=f"not bold black on color({colour})")
     return Text("· ", style="not bold dim")
 
 

@@ -57,13 +57,10 @@ def cycles(value: float | None) -> str:
     return BEYOND_HORIZON if value is None else f"{value:,.0f}"
 
 
-def pressure(value: float | None) -> str:
-    return "mean" if value is None else f"{value:g}"
-
-
-def place(value: float | None) -> str:
-    """A speed or frequency; empty where the quantity has none of its own."""
-    return "" if value is None else f"{value:g}"
+def model_name(model: Mapping[str, Any]) -> str:
+    """A model with the effects that extend it."""
+    effects = ", ".join(model["effects"])
+    return f"{model['name']} ({effects})" if effects else str(model["name"])
 
 
 def warn(warnings: Iterable[Mapping[str, Any]]) -> None:

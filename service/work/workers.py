@@ -83,10 +83,6 @@ _LONG = (Lane.SIMULATIONS, Lane.FILES)
 Note = Callable[[Lane, int], None]
 
 
-def _unnoted(_lane: Lane, _count: int) -> None:
-    """Nobody counts."""
-
-
 @dataclass(slots=True, eq=False, kw_only=True)
 class _Call:
     """A call on its way, made for the request with that id; `retried` once its process ended without an answer.
@@ -539,7 +535,10 @@ def _kill(pid: int) -> None:
 
 
 def in_processes(
-    database: Database, processes: int, log: tuple[LogFormat, LogLevel] = ("auto", "warning"), note: Note = _unnoted
+    database: Database,
+    processes: int,
+    log: tuple[LogFormat, LogLevel] = ("auto", "warning"),
+    note: Note = lambda _lane, _count: None,
 ) -> Workers:
     """Workers in processes of their own, which log so: `processes` that take in runs, one for each other lane."""
     starter = _Starter()
@@ -552,5 +551,5 @@ def in_processes(
     return Workers(make, dict.fromkeys(Lane, 1) | {Lane.RUNS: processes}, note)
 
 
-def in_threads(database: Database, note: Note = _unnoted) -> Workers:
+def in_threads(database: Database, note: Note = lambda _lane, _count: None) -> Workers:
     return Workers(lambda _: _Here(database), dict.fromkeys(Lane, 1) | {Lane.RUNS: 2}, note)

@@ -44,8 +44,6 @@ _COPIES = """SELECT number FROM entry
     WHERE url = ? AND clutch_id = ? AND digest = ? AND (state <> 'waiting' OR number = ?) ORDER BY number"""
 _THERE = "SELECT * FROM entry WHERE number = ? AND digest = ? AND state = 'waiting'"
 
-RunFiles = Sequence[tuple[Path, Mapping[str, str] | None]]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
@@ -209,7 +207,9 @@ class Spool:
                 (self.folder / name).unlink()
             self._remove(database, [(number, name) for name, number in numbers.items() if name not in names])
 
-    def add(self, files: RunFiles, resource: str = RUNS) -> tuple[set[str], list[Entry]]:
+    def add(
+        self, files: Sequence[tuple[Path, Mapping[str, str] | None]], resource: str = RUNS
+    ) -> tuple[set[str], list[Entry]]:
         """Keep runs: JSON bodies (no parameters), or files with the parameters of their requests; or inspections' bodies.
 
         The same content is kept once. An older version that waits is replaced in the same instant in which the newer one is
