@@ -84,60 +84,54 @@ def create_app(settings: Settings) -> FastAPI:
 
     Starting raises ServiceRuns where another service uses the file; a database on a server is any number's.
     """
-
     metrics = Metrics(each_clutch=settings.clutch_metrics)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        database = open_database(settings.database, serving=True)
-        raw_records.use(database, settings.raw)
-        folder = emptied_folder(database.path)
-        log, note = (settings.log_format, settings.log_level), metrics.note_calls
-        workers = (
-            in_processes(database, settings.workers, log, note) if settings.workers else in_threads(database, note)
-        )
-        queue = JobQueue(database, settings, _kinds(database, workers))
-        least = {"least_disk": settings.least_free_mb * MIB, "least_memory": settings.least_memory_mb * MIB}
-        readiness = Readiness(database, workers, queue, **least)
-        outbox = Outbox(database, settings)
-        try:
-            workers.warm()
-            queue.start()
-            outbox.start()
-            cache = AnswerCache(MAX_CACHED_BYTES)
-            app.state.context = Context(
-                database=database,
-                cache=cache,
-                metrics=metrics,
-                jobs=queue,
-                outbox=outbox,
-                settings=settings,
-                workers=workers,
-                revalidation=Revalidation(cache),
-                readiness=readiness,
-                folder=folder,
-            )
-            yield
-        finally:
-            readiness.close()
-            outbox.close()
-            queue.close()
-            workers.close()
-            database.close()
-            if database.path is None:
-                shutil.rmtree(folder, ignore_errors=True)
-
-    @asynccontextmanager
-    async def alone(app: FastAPI) -> AsyncIterator[None]:
         with service_lock(settings.database):
-            async with lifespan(app):
+            database = open_database(settings.database, serving=True)
+            raw_records.use(database, settings.raw)
+            folder = emptied_folder(database.path)
+            log, note = (settings.log_format, settings.log_level), metrics.note_calls
+            workers = (
+                in_processes(database, settings.workers, log, note) if settings.workers else in_threads(database, note)
+            )
+            queue = JobQueue(database, settings, _kinds(database, workers))
+            least = {"least_disk": settings.least_free_mb * MIB, "least_memory": settings.least_memory_mb * MIB}
+            readiness = Readiness(database, workers, queue, **least)
+            outbox = Outbox(database, settings)
+            try:
+                workers.warm()
+                queue.start()
+                outbox.start()
+                cache = AnswerCache(MAX_CACHED_BYTES)
+                app.state.context = Context(
+                    database=database,
+                    cache=cache,
+                    metrics=metrics,
+                    jobs=queue,
+                    outbox=outbox,
+                    settings=settings,
+                    workers=workers,
+                    revalidation=Revalidation(cache),
+                    readiness=readiness,
+                    folder=folder,
+                )
                 yield
+            finally:
+                readiness.close()
+                outbox.close()
+                queue.close()
+                workers.close()
+                database.close()
+                if database.path is None:
+                    shutil.rmtree(folder, ignore_errors=True)
 
     app = FastAPIOffline(
         title="Clutchlife",
         version=CODE_VERSION,
         description=_DESCRIPTION,
-        lifespan=alone,
+        lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
     )

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from service.errors import FieldError, InvalidError
+from service.errors import InvalidError
 
 #: Items of a list that is answered whole where no limit is given.
 ALL_ITEMS = 1_000_000
@@ -33,10 +33,8 @@ def from_cursor(cursor: str | None) -> Place | None:
     except (ValueError, TypeError, OverflowError, RecursionError, binascii.Error):
         place = (math.nan, "")
     if not math.isfinite(place[0]):
-        message = "cursor must be the `next` of the previous page"
-        shown = cursor[:80]
-        error = FieldError(pointer="/query/cursor", code="cursor", message=f"{message}, got {shown!r}", value=shown)
-        raise InvalidError(error.message, errors=[error])
+        message = f"cursor must be the `next` of the previous page, got {cursor[:80]!r}"
+        raise InvalidError.of(message, code="cursor", pointer="/query/cursor", value=cursor)
     return place
 
 

@@ -108,8 +108,7 @@ def revision_and_json(
 
 
 def shared_answer(database: Database, query: Callable[..., object], clutch_id: str) -> tuple[int, bytes] | None:
-    """The last answer that any of the services on this database computed without arguments, and its revision; None too
-    where it cannot be read now: it is computed then."""
+    """What a service on this database computed last without arguments, and its revision; None where it cannot be read."""
     if database.answers is None:
         return None
     try:
@@ -160,23 +159,20 @@ class AnswerCache:
             self._hold(key, version, answer, self._begun)
 
     def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> Answer:
-        """The answer for `key`, made by `make` where that of `version` is not there. What `make` raises is raised for all
-        who wait."""
+        """The answer for `key` and `version`, made by `make` where it is not there. All who wait get what that raises."""
         with self._lock:
             cached = self._current(key, version)
             if cached is not None:
                 return cached
             pending = self._making.get((key, version))
-            if pending is not None:
-                makes_it = False
-            else:
-                makes_it, pending = True, Future()
-                self._making[key, version] = pending
+            if pending is None:
+                mine = self._making[key, version] = Future()
                 self._begun += 1
-            begun = self._begun
-        if makes_it:
-            self._make(key, version, make, pending, begun)
-        return pending.result()
+                begun = self._begun
+        if pending is not None:
+            return pending.result()
+        self._make(key, version, make, mine, begun)
+        return mine.result()
 
     def _current(self, key: Hashable, version: Hashable) -> Answer | None:
         cached_version, answer, _ = self._answers.get(key, (None, None, 0))

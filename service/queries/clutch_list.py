@@ -45,8 +45,8 @@ def every(database: Database, *, at_once: int) -> Iterator[dict[str, Any]]:
 def page_as_json(
     database: Database, cache: AnswerCache, choice: Choice, part: Part, *, offset: int = 0, sort: str = "worst"
 ) -> bytes:
-    """A page of the clutches of a choice as JSON; each clutch's item is made once for its revision and verdict. By kind a
-    page's place is how many clutches are before it."""
+    """A page of the clutches of a choice; each one's item is made once for its revision and verdict. By kind, a page's place
+    is how many clutches are before it."""
     by_kind, limit, after = sort == "kind", part.limit, part.after
     if by_kind:
         offset, after = offset + int(part.number or 0), None

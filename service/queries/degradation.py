@@ -1,8 +1,5 @@
-"""`/degradation`: the tracks of mean COF, of every Stribeck parameter and of any other quantity, and mean COF computed back
-from the parameters.
-
-The numerics of the latter are in `models.prognosis.from_parameters`, to which a life hands its tests and tracks by pressure.
-"""
+"""`/degradation`: the tracks of mean COF, of every Stribeck parameter and of any other quantity, and mean COF from the
+parameters (`models.prognosis.from_parameters`)."""
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping
 from typing import Any
@@ -13,7 +10,7 @@ from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.criteria import FEWEST_TESTS, QUANTILES
 from models.prognosis.first_passage import ends_of_life, horizon_at
 from models.prognosis.first_passage import paths as track_paths
-from models.prognosis.from_parameters import CofPaths, Disagreement, disagreement, far_apart, mean_cof_paths
+from models.prognosis.from_parameters import CofPaths, disagreement, far_apart, mean_cof_paths
 from service import records, stored_runs
 from service.errors import Notice
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
@@ -173,11 +170,7 @@ def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 def _from_parameters(
     measured: MeasuredLife, tracks: ParameterTracks, direct: Mapping[float, Track]
 ) -> dict[str, Any] | None:
-    """The trajectory from the parameters with its band, its end of life, and its disagreement with the direct track; None
-    where there are too few tests.
-
-    `tracks` are by parameter and pressure; `direct` is mean COF by pressure and over all reference pressures.
-    """
+    """Mean COF from the parameters, in the public shape; None with too few tests. `direct`: its own tracks by pressure."""
     life, (series, _) = measured.life, direct[ALL_PRESSURES]
     tested = {measurement.progress for measurement in series.measurements}
     if life.speed_range is None or len(tested) < FEWEST_TESTS:
@@ -228,13 +221,21 @@ def _disagreements(payload: Mapping[str, Any] | None) -> list[Notice]:
 
 def _payload(paths: CofPaths, direct: Track, assumptions: Assumptions, fraction: float) -> dict[str, Any]:
     """The paths of mean COF in the public shape, beside the direct track."""
-    series, _ = direct
+    series, posterior = direct
     now = float(paths.progress[paths.now])
     ends = series.scale.cycles(paths.ends_of_life(fraction))
     shown = paths.progress <= max(1.0, now) * 1.5
     cap = float(series.scale.cycles(paths.progress[-1]))
     quantiles = np.quantile(np.minimum(ends, 10 * cap), QUANTILES).tolist()
-    differences = _apart(paths, ends, direct, assumptions, fraction)
+    offset, horizon = offset_of(series, assumptions), float(paths.progress[-1])
+    differences = disagreement(
+        paths.present,
+        ends,
+        track_paths(posterior, paths.progress[paths.now : paths.now + 1], offset)[0],
+        series.scale.cycles(ends_of_life(posterior, fraction, offset=offset, horizon=horizon)),
+        posterior.weight,
+        series.scale.origin,
+    )
     return {
         "trajectory": {
             "cycles": series.scale.cycles(paths.progress)[shown].tolist(),
@@ -245,24 +246,3 @@ def _payload(paths: CofPaths, direct: Track, assumptions: Assumptions, fraction:
         },
         "disagreement": {"now_sd": differences.now, "end_of_life_sd": differences.end_of_life},
     }
-
-
-def _apart(
-    paths: CofPaths,
-    ends: np.ndarray[Any, np.dtype[np.float64]],
-    direct: Track,
-    assumptions: Assumptions,
-    fraction: float,
-) -> Disagreement:
-    """How far the value now and the `ends` of life [n] cycles are from the direct track's."""
-    series, posterior = direct
-    offset = offset_of(series, assumptions)
-    horizon = float(paths.progress[-1])
-    return disagreement(
-        paths.present,
-        ends,
-        track_paths(posterior, paths.progress[paths.now : paths.now + 1], offset)[0],
-        series.scale.cycles(ends_of_life(posterior, fraction, offset=offset, horizon=horizon)),
-        posterior.weight,
-        series.scale.origin,
-    )

@@ -107,8 +107,7 @@ def _comparison(run: IncomingRun, row: dict[str, Any], capacity: Capacity, geome
 
 
 def _model_part(found: Discrepancy, contact: float) -> dict[str, Any]:
-    """The model's engagement from the measured one's conditions, and how far the measured one is from it, in the public
-    shape."""
+    """The model's engagement from the measured one's conditions, and how far the measured one is from it."""
     difference = found.stop_time_difference
     return {
         "channels": _course(found.trace, contact),

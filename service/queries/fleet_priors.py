@@ -1,7 +1,7 @@
 """`/v1/fleet/priors`: the newest version of every fleet's prior."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -66,13 +66,11 @@ def _severity_exponent(row: FleetPriorRow) -> dict[str, float] | None:
 
 
 def _population(prior: FleetPrior) -> Mapping[str, Any]:
-    names: Sequence[str] = ("change", "scale_cycles", "exponent", "scatter")
-    deviations = [math.sqrt(prior.scale[index, index]) for index in range(len(names))]
     population: dict[str, Any] = {}
-    for index, name in enumerate(names):
-        middle = float(prior.mean[index])
+    for index, name in enumerate(("change", "scale_cycles", "exponent", "scatter")):
+        middle, deviation = float(prior.mean[index]), math.sqrt(prior.scale[index, index])
         if name == "change":
-            population[name] = {"median": middle, "sd": deviations[index]}
+            population[name] = {"median": middle, "sd": deviation}
         else:
-            population[name] = {"median": math.exp(middle), "log_sd": deviations[index]}
+            population[name] = {"median": math.exp(middle), "log_sd": deviation}
     return population

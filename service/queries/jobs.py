@@ -26,8 +26,6 @@ def page(database: Database, part: Part, *, state: str | None, only: Collection[
 
 
 def shown(row: JobRow) -> dict[str, Any]:
-    progress = row.progress or {}
-    result = progress.get("result")
-    if result is not None:
-        progress = {name: value for name, value in progress.items() if name != "result"}
+    progress = dict(row.progress or {})
+    result = progress.pop("result", None)
     return schema_fields(JobOut, row, progress=None if row.progress is None else progress, result=result)

@@ -112,8 +112,7 @@ def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[s
 
 
 def _planned_answer(programme: Programme, end: StatedEnd, series: Series, *, now: float, most: float) -> dict[str, Any]:
-    """When the life ends, in the public shape: as it was where that is behind, else after as many cycles as ζ takes to get
-    there, up to `most`."""
+    """When the life ends: as it was where that is past, else after as many cycles as ζ takes to get there, up to `most`."""
     draws = np.arange(end.ends.size) % programme.rates.shape[0]
     ahead = end.ends - float(series.scale.progress(now))
     spread = Programme(cycles=programme.cycles, rates=programme.rates[draws])

@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import records, stored_runs
-from service.errors import NotFoundError
+from service.errors import NotFoundError, unknown_clutch
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.condition import with_held_runs
 from service.lives.outlook import Evidence, measured_life, with_held
@@ -28,7 +28,7 @@ from service.lives.recomputation import ClutchState
 from service.lives.tracks import CARRIED, predict_at
 from service.schemas.clutch import EndOfLifeIn
 from service.schemas.life import CriterionIn
-from storage import results
+from storage import clutches, results
 from storage.engine.database import Database
 
 #: What `criteria_of` says of a clutch whose life ends by mean COF alone.
@@ -38,7 +38,9 @@ NO_CRITERIA = b"[]"
 def criteria_of(database: Database, clutch_id: str) -> bytes:
     """The criteria of a clutch's record as a JSON array, empty where mean COF alone counts. Raises NotFoundError."""
     with database.reading() as connection:
-        row = records.clutch(connection, clutch_id)
+        row = clutches.get(connection, clutch_id)
+    if row is None:
+        raise unknown_clutch(clutch_id)
     return json.dumps(row.record["end_of_life"].get("criteria", [])).encode()
 
 
@@ -51,7 +53,9 @@ def remaining_life(
     computed. Raises NotFoundError for an unknown clutch or a pressure that its first stationary test did not measure.
     """
     with database.reading() as connection:
-        row = records.clutch(connection, clutch_id)
+        row = clutches.get(connection, clutch_id)
+        if row is None:
+            raise unknown_clutch(clutch_id)
         stored, disagree = None, []
         if pressure_bar is None:
             stored = results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
-from models.clutch import Geometry
 from models.friction.criteria import Z90
 from service import records, stored_runs
 from service.columns import bar, whole
@@ -82,14 +81,10 @@ def _slopes(
     for row in rows:
         for curve in curves_of(levels.get(row.run_id, ())):
             for speed in speeds:
-                yield from _slope(row.receipt, curve, geometry, speed)
-
-
-def _slope(receipt: dict[str, Any], curve: LevelFit, geometry: Geometry, speed_rpm: float) -> Iterator[dict[str, Any]]:
-    slope = slope_of(curve, geometry, speed_rpm)
-    if slope is not None:
-        place = {"pressure_bar": bar(curve.fit.pressure), "speed_rpm": speed_rpm}
-        yield _columns_of_run(receipt) | _row(SLOPE, QUANTITIES[SLOPE].unit, *slope) | place
+                slope = slope_of(curve, geometry, speed)
+                if slope is not None:
+                    place = {"pressure_bar": bar(curve.fit.pressure), "speed_rpm": speed}
+                    yield _columns_of_run(row.receipt) | _row(SLOPE, QUANTITIES[SLOPE].unit, *slope) | place
 
 
 def _rows_of_loop(receipt: dict[str, Any], loop: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -9,7 +9,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from sqlalchemy import Connection
@@ -33,19 +33,23 @@ from storage.runs import RunRow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CheckedRuns:
-    """How many runs were checked, and what was found, a sentence each."""
+class Checked:
+    """What was found, a sentence each; how many runs, inspections and photographs were checked; and how many results earlier
+    releases made, by release: these are only recomputed."""
 
-    runs: int
     findings: tuple[str, ...]
+    runs: int = 0
+    inspections: int = 0
+    photographs: int = 0
+    earlier: Mapping[str, int] = field(default_factory=dict)
 
 
-def check_runs(database: Database, clutch_id: str) -> CheckedRuns:
+def check_runs(database: Database, clutch_id: str) -> Checked:
     """Every run of a clutch against the hash that its sender was given; one run in memory at a time."""
     with database.reading() as connection:
         rows = runs.page(connection, clutch_id)
     findings = [finding for row in rows if (finding := _finding(database, row)) is not None]
-    return CheckedRuns(runs=len(rows), findings=tuple(f"{clutch_id}: {finding}" for finding in findings))
+    return Checked(runs=len(rows), findings=tuple(f"{clutch_id}: {finding}" for finding in findings))
 
 
 def _finding(database: Database, row: RunRow) -> str | None:
@@ -91,15 +95,7 @@ _MAX_LISTED = 10
 _Results = Mapping[str, tuple[str, Any]]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CheckedResults:
-    """What was found, a sentence each, and how many results earlier releases made, by release: these are only recomputed."""
-
-    findings: tuple[str, ...]
-    earlier: Mapping[str, int]
-
-
-def check_results(database: Database, clutch_id: str) -> CheckedResults:
+def check_results(database: Database, clutch_id: str) -> Checked:
     """All results of a clutch computed again and compared; those of earlier releases need not be the same."""
     while True:
         with database.reading() as connection:
@@ -108,13 +104,13 @@ def check_results(database: Database, clutch_id: str) -> CheckedResults:
         try:
             recomputed = _recomputed(stored_runs.recomputed(stored_runs.recorded(database, state)))
         except (InvalidError, DamagedData) as error:
-            return CheckedResults(findings=(f"{clutch_id}: results cannot be computed again: {error}",), earlier={})
+            return Checked(findings=(f"{clutch_id}: results cannot be computed again: {error}",))
         with database.reading() as connection:
             if records.unchanged(connection, clutch_id, state.revision):
                 return _compared(clutch_id, stored, recomputed)
 
 
-def _compared(clutch_id: str, stored: _Results, again: Mapping[str, Any]) -> CheckedResults:
+def _compared(clutch_id: str, stored: _Results, again: Mapping[str, Any]) -> Checked:
     earlier = Counter(version for version, _ in stored.values() if version != CODE_VERSION)
     lines = [f"{name} is stored, but the runs do not give it" for name in stored.keys() - again.keys()]
     lines += [f"{name} is missing, although the runs give it" for name in again.keys() - stored.keys()]
@@ -126,7 +122,7 @@ def _compared(clutch_id: str, stored: _Results, again: Mapping[str, Any]) -> Che
     lines = sorted(lines) if not earlier else sorted(line for line in lines if "differs" in line)
     more = [f"and {len(lines) - _MAX_LISTED} more"] if len(lines) > _MAX_LISTED else []
     findings = tuple(f"{clutch_id}: {line}" for line in [*lines[:_MAX_LISTED], *more])
-    return CheckedResults(findings=findings, earlier=earlier)
+    return Checked(findings=findings, earlier=earlier)
 
 
 def _stored(connection: Connection, clutch_id: str) -> _Results:
@@ -184,16 +180,7 @@ def _are_numbers(*values: Any) -> bool:
     return all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CheckedInspections:
-    """How many inspections and photographs were checked, and what was found, a sentence each."""
-
-    inspections: int
-    photographs: int
-    findings: tuple[str, ...]
-
-
-def check_inspections(database: Database, clutch_id: str) -> CheckedInspections:
+def check_inspections(database: Database, clutch_id: str) -> Checked:
     """Every inspection of a clutch and every photograph of it against its hash; one photograph in memory at a time."""
     with database.reading() as connection:
         rows = inspections.page(connection, clutch_id)
@@ -201,7 +188,7 @@ def check_inspections(database: Database, clutch_id: str) -> CheckedInspections:
     photographs = [(row, photograph) for row in rows for photograph in of_keys[row.inspection_key]]
     findings = [finding for row in rows if (finding := _inspection_finding(row)) is not None]
     findings += [finding for pair in photographs if (finding := _photograph_finding(database, *pair)) is not None]
-    return CheckedInspections(
+    return Checked(
         inspections=len(rows),
         photographs=len(photographs),
         findings=tuple(f"{clutch_id}: {finding}" for finding in findings),

@@ -26,17 +26,20 @@ from starlette.requests import ClientDisconnect
 from service.errors import UnsupportedMediaTypeError, unknown_clutch
 from service.lists import ALL_ITEMS, WHOLE, Part, from_cursor
 from service.queries.cache import Answer, Page, name_of, revision_and_json, shared_answer, to_json
+from service.run_files.json_run import checked
 from service.schemas.parameters import ClutchId
-from service.web.auth import Admin, Reader, name_of_caller, snapshot_of
+from service.web.auth import Admin, Reader, grant_of, snapshot_of
 from service.web.context import Context, Cursor, Limit, Whole
 from service.web.limits import LONGEST_WAIT_SECONDS, USUAL_ITEMS, WAIT_SECONDS
 from service.web.middleware import Again, remember
 from service.web.problems import CHANGING
 from service.web.revalidation import Made
-from service.work.workers import Lane
+from service.work.workers import CHANGE_SECONDS, Lane
 from storage import clutches
+from storage.encoding import to_text
 from storage.engine.database import Database
 
+Body = TypeVar("Body", bound=BaseModel)
 Rows = Iterable[Mapping[str, Any]]
 #: What computes an answer of a database, a clutch's name and further arguments.
 Query = Callable[..., dict[str, Any]]
@@ -255,7 +258,7 @@ async def _computed(
 
     def compute(waited_for: bool) -> "Future[Made]":
         lane_used = lane if waited_for or lane is not Lane.ANSWERS else Lane.RENEWALS
-        turn = f"{lane_used.name} for {name_of_caller(of.request)}"
+        turn = f"{lane_used.name} for {grant_of(of.request).name}"
         return context.workers.submit(lane_used, revision_and_json, query, clutch_id, arguments, turn=turn)
 
     key = (clutch_id, name_of(query), *arguments)
@@ -273,8 +276,7 @@ async def begin_computed(context: Context, clutch_id: str, query: Query) -> None
 
 
 def repeated_answer(context: Context, key: Hashable, *, of_clutch: bool = True) -> Again:
-    """What answers the same address again, by what the cache holds for the clutch's present revision, or else for the last
-    commit of all."""
+    """What answers the same address again by what the cache holds of the clutch's revision, or of the last commit of all."""
 
     def again(request: Request) -> Response | None:
         snapshot = snapshot_of(request)
@@ -321,7 +323,7 @@ def _following(request: Request, cursor: str) -> str:
 
 def json_answer(content: object, status: int = 200, **headers: str) -> Response:
     """An answer to a change, or to a question that is asked once: JSON without a tag."""
-    return Response(content=to_json(content), status_code=status, media_type=JSON_TYPE, headers=headers)
+    return Response(content=to_text(content), status_code=status, media_type=JSON_TYPE, headers=headers)
 
 
 def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:
@@ -332,10 +334,13 @@ def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:
     return None
 
 
-async def json_body(request: Request) -> bytes:
-    """The body of a request that says it is JSON; a browser cannot send such a one across sites unasked."""
+async def sent(request: Request, schema: type[Body]) -> Body:
+    """The body of a request that says it is JSON; a browser cannot send such a one across sites unasked.
+
+    Raises UnsupportedMediaTypeError, and InvalidError, which names every place that is wrong.
+    """
     require_json(request)
-    return await request.body()
+    return checked(schema, await request.body())
 
 
 def require_json(request: Request) -> None:
@@ -364,6 +369,16 @@ def taking(
         "responses": dict(responses) | other_responses,
         "openapi_extra": {"requestBody": {"required": required, "content": content}},
     }
+
+
+Changed = TypeVar("Changed")
+
+
+async def changed(of: OfClutch, change: Callable[..., Changed], *arguments: Any) -> Changed:
+    """What a worker returns that changes a clutch. The changes of one clutch take turns."""
+    submit, clutch_id = of.context.workers.submit, of.clutch_id
+    changing = submit(Lane.RUNS, change, clutch_id, *arguments, turn=clutch_id, seconds=CHANGE_SECONDS)
+    return await asyncio.wrap_future(changing)
 
 
 Looked = TypeVar("Looked")

@@ -27,8 +27,6 @@ Scope = Literal["read", "ingest", "admin"]
 SCOPES: tuple[Scope, ...] = get_args(Scope)
 #: What a request is called that no route answers.
 UNMATCHED = "unmatched"
-#: The caller's name where no key exists.
-LOCAL = "local"
 #: Headers by which proxies say that a request is another's; those whose names hold or end in one of the others, too. And the
 #: version in which a proxy asks that adds no header: nginx, where it is not told otherwise; no browser has it.
 _OF_PROXIES = {b"via", b"x-real-ip", b"cf-connecting-ip", b"x-envoy-external-address", b"x-original-host", b"cdn-loop"}
@@ -37,19 +35,11 @@ _VERSION_OF_PROXIES = "1.0"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Caller:
-    """What a request tells of its sender; `proxy` is what shows that a proxy has passed it on."""
-
-    authorization: str | None
-    address: str | None
-    host: str | None
-    origin: str | None
-    proxy: str | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Grant:
-    """What a caller may do: `clutches` is None if all are allowed, `key_id` is None if no key exists."""
+    """What a caller may do, by its name in the audit trail: a key's id and note, or `local`.
+
+    `clutches` is None if all are allowed, `key_id` is None if no key exists.
+    """
 
     name: str
     scope: Scope
@@ -58,7 +48,7 @@ class Grant:
 
 
 _MAKE_ONE = "make a key with clutchlife key create"
-_LOCAL_GRANT = Grant(name=LOCAL, scope="admin")
+_LOCAL_GRANT = Grant(name="local", scope="admin")
 
 
 def make_key(
@@ -79,23 +69,30 @@ def make_key(
     return text, row
 
 
-def authorise(snapshot: Snapshot, caller: Caller, scope: Scope, clutch_id: str | None = None) -> Grant:
+def authorise(
+    request: Request, snapshot: Snapshot, scope: Scope, clutch_id: str | None, *, narrowed: bool = False
+) -> Grant:
     """Let the caller pass and return what it may, or raise UnauthorizedError or ForbiddenError.
 
-    `snapshot` is of the caller's key; `clutch_id` is the clutch that is asked about, None where it is all of them.
+    `snapshot` is of the caller's key; `clutch_id` is the clutch that is asked about, None where it is all of them. A key
+    that is bound to clutches passes where it is one of them, or where the route itself keeps to them (`narrowed`).
     """
-    grant = identify(snapshot, caller)
+    grant = identify(request, snapshot)
     require_scope(grant, scope)
-    _require_clutch_of_key(grant, clutch_id)
+    request.state.grant = grant
+    if not narrowed:
+        require_clutch(grant, clutch_id)
     return grant
 
 
-def identify(snapshot: Snapshot, caller: Caller) -> Grant:
+def identify(request: Request, snapshot: Snapshot) -> Grant:
     """The grant of a caller. Raises UnauthorizedError, or ForbiddenError if no key exists and the caller is not local."""
     if not snapshot.keys_are_needed:
-        _require_loopback(caller)
+        if not context_of(request).settings.insecure_local:
+            _require_direct(request)
+        _require_own_host(request)
         return _LOCAL_GRANT
-    if _key_of(caller) is None:
+    if _key_of(request) is None:
         raise UnauthorizedError("send a key as: Authorization: Bearer KEY")
     key = snapshot.key
     if key is None:
@@ -105,14 +102,14 @@ def identify(snapshot: Snapshot, caller: Caller) -> Grant:
     return _grant(key)
 
 
-def _key_of(caller: Caller) -> str | None:
-    scheme, _, text = (caller.authorization or "").partition(" ")
+def _key_of(request: Request) -> str | None:
+    scheme, _, text = request.headers.get("authorization", "").partition(" ")
     return text.strip() if scheme.lower() == "bearer" and text else None
 
 
-async def snapshot_at(request: Request, caller: Caller, clutch_id: str | None) -> Snapshot:
+async def snapshot_at(request: Request, clutch_id: str | None) -> Snapshot:
     """The caller's key and the clutch's revision, read once a request and kept with it."""
-    key = _key_of(caller)
+    key = _key_of(request)
     if clutch_id is not None and len(clutch_id) > LONGEST_IDENTIFIER:
         clutch_id = None  # no clutch is called so, and whoever asks is not known yet
     question = Question(clutch_id, None if key is None else _digest(key))
@@ -139,7 +136,8 @@ def require_scope(grant: Grant, scope: Scope) -> None:
         raise ForbiddenError(f"the key has the scope {grant.scope}, and this request needs {scope}")
 
 
-def _require_clutch_of_key(grant: Grant, clutch_id: str | None) -> None:
+def require_clutch(grant: Grant, clutch_id: str | None) -> None:
+    """Raise ForbiddenError where the key is bound to other clutches; None: it is about all of them."""
     if grant.clutches is not None and clutch_id not in grant.clutches:
         subject = "all clutches" if clutch_id is None else f"clutch {clutch_id[:80]!r}"
         raise ForbiddenError(f"the key is for certain clutches only, and this request is about {subject}")
@@ -153,21 +151,29 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
-def _require_loopback(caller: Caller) -> None:
-    if caller.proxy is not None:
+def _require_direct(request: Request) -> None:
+    proxy = "HTTP/1.0" if request.scope["http_version"] == _VERSION_OF_PROXIES else None
+    for name, _ in request.scope["headers"]:
+        if name in _OF_PROXIES or _FORWARDED in name or name.endswith(_CLIENT_IP):
+            proxy = name.decode("latin-1").title()
+    if proxy is not None:
         raise ForbiddenError(
-            f"no key exists, so a request through a proxy ({caller.proxy}) has no access: {_MAKE_ONE}, or serve with "
+            f"no key exists, so a request through a proxy ({proxy}) has no access: {_MAKE_ONE}, or serve with "
             "--insecure-local"
         )
-    if caller.address is not None and not is_loopback(caller.address):
-        raise ForbiddenError(f"no key exists, so only this machine has access, not {caller.address}: {_MAKE_ONE}")
-    host = (caller.host or "").strip()
+    address = None if request.client is None else request.client.host
+    if address is not None and not is_loopback(address):
+        raise ForbiddenError(f"no key exists, so only this machine has access, not {address}: {_MAKE_ONE}")
+
+
+def _require_own_host(request: Request) -> None:
+    host, origin = request.headers.get("host", "").strip(), request.headers.get("origin")
     if not is_loopback(_name(host)):
         raise ForbiddenError(
             f"no key exists, so the service answers at localhost only, not at {host[:80]!r}: {_MAKE_ONE}"
         )
-    if caller.origin is not None and caller.origin.partition("://")[2] != host:
-        raise ForbiddenError(f"no key exists, so a page of {caller.origin[:80]!r} has no access: {_MAKE_ONE}")
+    if origin is not None and origin.partition("://")[2] != host:
+        raise ForbiddenError(f"no key exists, so a page of {origin[:80]!r} has no access: {_MAKE_ONE}")
 
 
 def _name(host: str) -> str:
@@ -191,38 +197,13 @@ def context_of(request: Request) -> Context:
     return context
 
 
-def caller_of(request: Request) -> Caller:
-    proxy = "HTTP/1.0" if request.scope["http_version"] == _VERSION_OF_PROXIES else None
-    for name, _ in request.scope["headers"]:
-        if name in _OF_PROXIES or _FORWARDED in name or name.endswith(_CLIENT_IP):
-            proxy = name.decode("latin-1").title()
-    address = None if request.client is None else request.client.host
-    if context_of(request).settings.insecure_local:
-        address = proxy = None
-    return Caller(
-        authorization=request.headers.get("authorization"),
-        address=address,
-        host=request.headers.get("host"),
-        origin=request.headers.get("origin"),
-        proxy=proxy,
-    )
-
-
 def allowed(scope: Scope, *, narrowed: bool = False) -> Callable[[Request], Awaitable[Context]]:
-    """A dependency that gives the context to callers with that scope and stops the others.
-
-    A key that is bound to clutches passes where the path names one of them; elsewhere only where the route itself keeps to
-    them (`narrowed`).
-    """
+    """A dependency that gives the context to callers whom `authorise` lets pass and stops the others."""
 
     async def check(request: Request) -> Context:
-        context, caller = context_of(request), caller_of(request)
-        snapshot = getattr(request.state, "snapshot", None) or await snapshot_at(request, caller, clutch_of(request))
-        grant = identify(snapshot, caller)
-        require_scope(grant, scope)
-        request.state.grant = grant
-        if not narrowed:
-            require_clutch(request, clutch_of(request))
+        context, clutch_id = context_of(request), clutch_of(request)
+        snapshot = getattr(request.state, "snapshot", None) or await snapshot_at(request, clutch_id)
+        grant = authorise(request, snapshot, scope, clutch_id, narrowed=narrowed)
         _refuse_unknown_arguments(request)
         if grant.key_id is not None:
             context.key_uses.note(context.database, grant.key_id)
@@ -241,27 +222,8 @@ def route_of(request: Request) -> str:
     return getattr(request.scope.get("route"), "path", UNMATCHED)
 
 
-def name_of_caller(request: Request) -> str:
-    """Who sent a request that was allowed, as the audit trail names it: a key's id and note, or `local`."""
-    return _grant_of(request).name
-
-
-def clutches_of_key(request: Request) -> frozenset[str] | None:
-    """The clutches that an allowed request is bound to, None where to none."""
-    return _grant_of(request).clutches
-
-
-def require(request: Request, scope: Scope) -> None:
-    """Raise ForbiddenError where an allowed request asks for what needs a wider scope."""
-    require_scope(_grant_of(request), scope)
-
-
-def require_clutch(request: Request, clutch_id: str | None) -> None:
-    """Raise ForbiddenError where an allowed request's key is bound to other clutches; None: it is of all of them."""
-    _require_clutch_of_key(_grant_of(request), clutch_id)
-
-
-def _grant_of(request: Request) -> Grant:
+def grant_of(request: Request) -> Grant:
+    """What the sender of a request that was allowed may do."""
     grant: Grant = request.state.grant
     return grant
 

@@ -26,8 +26,7 @@ _HEAD_TOO_LARGE = (
 
 
 def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Protocol]:
-    """uvicorn's protocol with at most `most` connections of one address, each of which has sent the head of its first
-    request, and of every further one that it begins, after `head_seconds`."""
+    """uvicorn's protocol with `most` connections of one address, each request's head sent within `head_seconds`."""
 
     class Bounded(HttpToolsProtocol):
         def __init__(self, config: Config, *arguments: Any, **more: Any) -> None:
@@ -41,7 +40,9 @@ def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Proto
 
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
             super().connection_made(transport)
-            if self.client is not None and _connections_of(self.client[0], self.connections) > most:
+            others: set[Any] = self.connections  # of this protocol all of them
+            addresses = [other.client[0] for other in others if other.client is not None]
+            if self.client is not None and addresses.count(self.client[0]) > most:
                 self._refuse(http.HTTPStatus.TOO_MANY_REQUESTS, f"one address may have {most} connections at once")
                 return
             self._expect_head()
@@ -114,8 +115,7 @@ def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Proto
             raise ValueError(text)
 
         def _refuse(self, status: http.HTTPStatus, text: str) -> None:
-            """Answer, where no answer has begun, and close; what still comes is thrown away for a while, since a socket that
-            is closed with unread bytes takes the answer with it."""
+            """Answer, where no answer has begun, and close later: closed with unread bytes, a socket loses the answer."""
             if self._refused or self.transport.is_closing():
                 return
             self._refused = True
@@ -149,10 +149,6 @@ def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Proto
                 self._deadline = None
 
     return Bounded
-
-
-def _connections_of(address: str, connections: set[Any]) -> int:
-    return sum(other.client is not None and other.client[0] == address for other in connections)
 
 
 def allow_many() -> None:

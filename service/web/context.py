@@ -31,8 +31,7 @@ _log = logging.getLogger("clutchlife")
 
 
 class KeyUses:
-    """When each key was last used, noted once an hour: a commit at every request would cost more than the request. Used from
-    the event loop alone."""
+    """When each key was last used, noted once an hour: a commit costs more than a request. For the event loop alone."""
 
     def __init__(self) -> None:
         self._due: dict[str, float] = {}

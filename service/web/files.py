@@ -1,6 +1,4 @@
-"""Receives and sends files, which are kept on disk meanwhile. `Accept` chooses the form of an answer, which is sent piece by
-piece.
-"""
+"""Receives and sends files, which are kept on disk meanwhile; `Accept` chooses the form of an answer."""
 
 import os
 import re
@@ -33,11 +31,8 @@ _CHUNK = 1 << 20
 
 
 def emptied_folder(database: Path | None) -> Path:
-    """The folder `FILE-files` beside a database, for files that come in and go out; what a killed service left is gone.
-
-    Beside the database there is room for what is to be stored in it; the system's folder of temporary files may be memory.
-    It is there that the folder is where the database is on a server (None): a new one, which the caller removes.
-    """
+    """An empty folder `FILE-files` beside the database, where there is room for what is to be stored, for files that come in
+    and go out; where the database is on a server (None) a new one of the system's, which the caller removes."""
     if database is None:
         return Path(tempfile.mkdtemp(prefix="clutchlife-"))
     folder = database.with_name(f"{database.name}-files")

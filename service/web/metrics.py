@@ -102,13 +102,17 @@ def _totals(database: Database) -> Iterator[Metric]:
         for cycles, count in clutches.count_within(connection, WITHIN).items():
             within.add_metric([f"{cycles:g}"], count)
         counts = (
-            ("clutches", "Clutches, archived ones too", clutches.count(connection)),
-            ("runs", "Runs stored", runs.count(connection)),
-            ("runs_held", "Runs that wait to be confirmed", runs.count_held(connection)),
-            ("ended_lives", "Ended lives that the priors of fleets know of", assumptions.count_ended_lives(connection)),
-            ("diagnoses_waiting", "Diagnoses that wait or run", jobs.count_open(connection, jobs.DIAGNOSIS)),
+            ("clutchlife_clutches", "Clutches, archived ones too", clutches.count(connection)),
+            ("clutchlife_runs", "Runs stored", runs.count(connection)),
+            ("clutchlife_runs_held", "Runs that wait to be confirmed", runs.count_held(connection)),
+            (
+                "clutchlife_ended_lives",
+                "Ended lives that the priors of fleets know of",
+                assumptions.count_ended_lives(connection),
+            ),
+            ("clutchlife_diagnoses_waiting", "Diagnoses that wait or run", jobs.count_open(connection, jobs.DIAGNOSIS)),
         )
-    first, *others = (GaugeMetricFamily(f"clutchlife_{name}", says, value=count) for name, says, count in counts)
+    first, *others = (GaugeMetricFamily(name, says, value=count) for name, says, count in counts)
     yield from (first, within, *others)
 
 

@@ -32,7 +32,7 @@ from service.errors import (
 )
 from service.logging import access, log_request, request_id, sane
 from service.web import limits
-from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context_of, query_fields, route_of, snapshot_at
+from service.web.auth import UNMATCHED, authorise, clutch_of, context_of, query_fields, route_of, snapshot_at
 from service.web.files import PARQUET_TYPE
 from service.web.metrics import Metrics
 from service.web.problems import refused, unexpected
@@ -334,10 +334,9 @@ class Polls(_OfRequests):
 async def _answered(route: Any, clutch_id: str | None, again: Again, scope: Scope) -> Response | None:
     request = Request(scope)
     try:
-        context, caller = context_of(request), caller_of(request)
-        snapshot = await snapshot_at(request, caller, clutch_id)
-        grant = authorise(snapshot, caller, "read", clutch_id)
-        request.state.grant = grant
+        context = context_of(request)
+        snapshot = await snapshot_at(request, clutch_id)
+        grant = authorise(request, snapshot, "read", clutch_id)
         response = again(request)
     except (ServiceError, StorageError):  # the usual way says what is wrong
         return None

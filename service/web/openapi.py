@@ -73,8 +73,11 @@ def completed(api: Json) -> Json:
         if path in _OPEN:
             operation["security"] = []
         _complete(path, method, operation)
-    for name, schema in schemas.items():
-        _exemplify(schema, name.removesuffix(_SENT))
+    for owner, schema in schemas.items():
+        for name, field in schema.get("properties", {}).items():
+            example = _example(field, owner.removesuffix(_SENT), name)
+            if example is not None and "examples" not in field:
+                field["examples"] = [example]
     return api
 
 
@@ -107,17 +110,14 @@ def _named(schema: Json, schemas: Json) -> Json:
     title = schema.get("title") if "properties" in schema else None
     if title is not None:
         parts = parts | {title: schema}
-    names = {name: _free_name(name, part, schemas) for name, part in parts.items()}
+    # unless another schema has the name: as a body's and an answer's of one kind, which differ in what is required
+    taken = {name for name, part in parts.items() if _content(schemas.get(name, part)) != _content(part)}
+    names = {name: f"{name}{_SENT}" if name in taken else name for name in parts}
     for part in (schema, *parts.values()):
         _refer(part, names)
     for name, part in parts.items():
         schemas.setdefault(names[name], part | {"title": names[name]})
     return schema if title is None else {"$ref": f"#/components/schemas/{names[title]}"}
-
-
-def _free_name(name: str, part: Json, schemas: Json) -> str:
-    """The name, unless another schema has it: as a body's and an answer's of one kind, which differ in what is required."""
-    return name if _content(schemas.get(name, part)) == _content(part) else f"{name}{_SENT}"
 
 
 def _content(part: Json) -> str:
@@ -136,13 +136,6 @@ def _refer(part: Any, names: dict[str, str]) -> None:
             if inside == "#/$defs":
                 part[key] = f"#/components/schemas/{names[name]}"
             _refer(value, names)
-
-
-def _exemplify(schema: Json, owner: str) -> None:
-    for name, field in schema.get("properties", {}).items():
-        example = _example(field, owner, name)
-        if example is not None and "examples" not in field:
-            field["examples"] = [example]
 
 
 def _example(schema: Json, owner: str, name: str) -> Any:

@@ -1,8 +1,7 @@
 """Answers that take a second to compute: made by a worker, once, and given as they were while a newer one is made.
 
-The directive stale-while-revalidate of RFC 5861, decided by the service: where the workers are idle, who asks waits a while
-for the newest answer; where they have more to do, the last one is given at once and its revision says of when it is.
-`Prefer: wait=SECONDS` waits in any case.
+As stale-while-revalidate of RFC 5861: where the workers are idle, who asks waits a while for the newest answer; where they
+have more to do, the last one is given at once. `Prefer: wait=SECONDS` waits in any case.
 """
 
 import asyncio
@@ -16,6 +15,7 @@ from service.queries.cache import Answer, AnswerCache
 #: What a worker returns: the revision that it computed the answer from, and the answer's bytes.
 Made = tuple[int, bytes]
 Compute = Callable[[bool], "Future[Made]"]
+_Making = asyncio.Task[tuple[int, Answer]]
 
 _log = logging.getLogger("clutchlife")
 
@@ -29,8 +29,8 @@ class Revalidation:
 
     def __init__(self, cache: AnswerCache) -> None:
         self._cache = cache
-        self._making: dict[Hashable, asyncio.Task[tuple[int, Answer]]] = {}
-        self._renewing: dict[Hashable, asyncio.Task[tuple[int, Answer]]] = {}
+        self._making: dict[Hashable, _Making] = {}
+        self._renewing: dict[Hashable, _Making] = {}
 
     def knows(self, key: Hashable) -> bool:
         """Whether an answer is held, of whichever revision, or is being made."""
@@ -72,7 +72,7 @@ class Revalidation:
             newest = max([newest, *results], key=lambda answered: answered[0])
         return newest
 
-    def _begin(self, key: Hashable, compute: Compute, *, waits: bool) -> "asyncio.Task[tuple[int, Answer]]":
+    def _begin(self, key: Hashable, compute: Compute, *, waits: bool) -> _Making:
         """Have the next answer made, for one who waits or for later. Raises BusyError."""
         tasks = self._making if waits else self._renewing
         task = tasks[key] = asyncio.create_task(self._make(key, compute(waits), tasks))
@@ -81,7 +81,7 @@ class Revalidation:
         return task
 
     async def _make(
-        self, key: Hashable, computing: "Future[Made]", tasks: dict[Hashable, "asyncio.Task[tuple[int, Answer]]"]
+        self, key: Hashable, computing: "Future[Made]", tasks: dict[Hashable, _Making]
     ) -> tuple[int, Answer]:
         try:
             revision, body = await asyncio.wrap_future(computing)
@@ -97,11 +97,11 @@ class Revalidation:
         return result
 
 
-def _failed(task: "asyncio.Task[tuple[int, Answer]]") -> bool:
+def _failed(task: _Making) -> bool:
     return task.cancelled() or task.exception() is not None
 
 
-def _logged(task: "asyncio.Task[tuple[int, Answer]]") -> None:
+def _logged(task: _Making) -> None:
     """Log a failed renewal: the caller has already got the previous answer and does not see the error."""
     if not task.cancelled() and task.exception() is not None:
         _log.warning("an answer could not be computed again: %s", task.exception())

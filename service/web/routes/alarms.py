@@ -10,11 +10,10 @@ from pydantic import Field
 
 from service.alarms.notify import require_address
 from service.queries import alarms
-from service.run_files.json_run import checked
 from service.schemas import alarm as schemas
 from service.schemas.base import IDENTIFIER_PATTERN, LONGEST_IDENTIFIER
 from service.web import auth
-from service.web.answers import Paged, answer, json_answer, json_body, now, taking, until_ended
+from service.web.answers import Paged, answer, json_answer, now, sent, taking, until_ended
 from service.web.context import Context
 from service.web.problems import CHANGING, READING, SENDING
 from service.workflows import change_alarms
@@ -43,7 +42,7 @@ OfClutch = Annotated[
 @router.get("", response_model=schemas.AlarmPage, responses=READING)
 async def list_alarms(request: Request, context: auth.OwnReader, part: Paged) -> Response:
     """Rules by name. A key that is bound to clutches gets the rules of these clutches."""
-    return await answer(request, partial(alarms.page, context.database, part, only=auth.clutches_of_key(request)))
+    return await answer(request, partial(alarms.page, context.database, part, only=auth.grant_of(request).clutches))
 
 
 @router.post(
@@ -66,9 +65,9 @@ async def list_events(
     clutch_id: OfClutch = None,
 ) -> Response:
     """Alarms, newest first. A key that is bound to clutches gets those of these clutches."""
-    clutches = auth.clutches_of_key(request)
+    clutches = auth.grant_of(request).clutches
     if clutch_id is not None:
-        auth.require_clutch(request, clutch_id)
+        auth.require_clutch(auth.grant_of(request), clutch_id)
         clutches = frozenset({clutch_id})
     return await answer(
         request, partial(alarms.events, context.database, part, state=state, alarm_id=alarm_id, only=clutches)
@@ -78,7 +77,7 @@ async def list_events(
 @router.get("/events/{event_id}", response_model=schemas.EventOut, responses=READING)
 async def read_event(request: Request, context: auth.OwnReader, event_id: EventId) -> Response:
     """One alarm."""
-    clutches = auth.clutches_of_key(request)
+    clutches = auth.grant_of(request).clutches
     return await answer(request, lambda: alarms.event(context.database, event_id, only=clutches))
 
 
@@ -88,31 +87,30 @@ async def read_event(request: Request, context: auth.OwnReader, event_id: EventI
 )
 async def acknowledge_event(request: Request, context: auth.OwnIngester, event_id: EventId) -> Response:
     """Acknowledge an alarm: somebody has seen it. The body is optional."""
-    body = await json_body(request) if await request.body() else b"{}"
-    remark = checked(schemas.AcknowledgeIn, body)
-    await run_in_threadpool(alarms.event, context.database, event_id, only=auth.clutches_of_key(request))
-    acknowledge = partial(change_alarms.acknowledge, note=remark.note, by=auth.name_of_caller(request), at=now())
+    remark = await sent(request, schemas.AcknowledgeIn) if await request.body() else schemas.AcknowledgeIn()
+    await run_in_threadpool(alarms.event, context.database, event_id, only=auth.grant_of(request).clutches)
+    acknowledge = partial(change_alarms.acknowledge, note=remark.note, by=auth.grant_of(request).name, at=now())
     return json_answer(await run_in_threadpool(acknowledge, context.database, event_id))
 
 
 @router.get("/{alarm_id}", response_model=schemas.AlarmOut, responses=READING)
 async def read_alarm(request: Request, context: auth.OwnReader, alarm_id: AlarmId) -> Response:
     """A rule in force."""
-    clutches = auth.clutches_of_key(request)
+    clutches = auth.grant_of(request).clutches
     return await answer(request, lambda: alarms.look_up(context.database, alarm_id, only=clutches))
 
 
 @router.put("/{alarm_id}", **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE))
 async def put_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Replace a rule. Alarms that the new rule would not raise are cleared."""
-    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.clutches_of_key(request))
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.grant_of(request).clutches)
     return await _saved(request, context, alarm_id)
 
 
 @router.delete("/{alarm_id}", status_code=204, response_class=Response, responses=READING)
 async def delete_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Delete a rule. Its alarms are cleared and stay listed."""
-    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.clutches_of_key(request))
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.grant_of(request).clutches)
     await run_in_threadpool(change_alarms.remove, context.database, alarm_id)
     return Response(status_code=204)
 
@@ -120,7 +118,7 @@ async def delete_alarm(request: Request, context: auth.OwnAdmin, alarm_id: Alarm
 @router.post("/{alarm_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
 async def test_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Send a test to each of the rule's receivers, and report the results."""
-    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.clutches_of_key(request))
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.grant_of(request).clutches)
     names = await run_in_threadpool(change_alarms.test, context.database, alarm_id)
     return await _tested(context, names)
 
@@ -140,12 +138,12 @@ async def list_webhooks(request: Request, context: auth.Reader, part: Paged) -> 
 )
 async def post_webhook(request: Request, context: auth.Admin) -> Response:
     """Add a receiver. Without a secret, the service makes one and shows it once."""
-    receiver = checked(schemas.WebhookIn, await json_body(request))
+    receiver = await sent(request, schemas.WebhookIn)
     private = await run_in_threadpool(
         change_alarms.inside_allowed, context.database, context.settings.private_receivers
     )
     await run_in_threadpool(require_address, receiver.url, private=private)
-    add = partial(change_alarms.add_receiver, by=auth.name_of_caller(request), at=now())
+    add = partial(change_alarms.add_receiver, by=auth.grant_of(request).name, at=now())
     row = await run_in_threadpool(add, context.database, receiver)
     new_secret = None if receiver.secret else row.secret
     return json_answer(alarms.receiver_out(row, secret=new_secret), 201, Location=f"/v1/webhooks/{row.webhook_id}")
@@ -178,9 +176,9 @@ async def test_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
 
 
 async def _saved(request: Request, context: Context, alarm_id: str | None) -> Response:
-    rule = checked(schemas.AlarmIn, await json_body(request))
-    auth.require_clutch(request, rule.clutch_id)
-    save = partial(change_alarms.save, by=auth.name_of_caller(request), at=now(), alarm_id=alarm_id)
+    rule = await sent(request, schemas.AlarmIn)
+    auth.require_clutch(auth.grant_of(request), rule.clutch_id)
+    save = partial(change_alarms.save, by=auth.grant_of(request).name, at=now(), alarm_id=alarm_id)
     row, new = await run_in_threadpool(save, context.database, rule)
     context.outbox.wake()
     return json_answer(alarms.rule_out(row), 201 if new else 200, Location=f"/v1/alarms/{row.alarm_id}")

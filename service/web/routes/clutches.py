@@ -1,6 +1,5 @@
 """Clutches: register, list, count, look up, edit and archive, and the audit trail."""
 
-import asyncio
 from collections.abc import Callable, Hashable
 from functools import partial
 
@@ -11,7 +10,6 @@ from fastapi.responses import Response
 from service.queries import clutch_list, runs
 from service.queries.cache import to_json
 from service.queries.degradation import degradation
-from service.run_files.json_run import checked
 from service.schemas.clutch import ClutchEdit, ClutchIn, ClutchOut, ClutchPage
 from service.schemas.fleet import FleetTotals
 from service.schemas.parameters import Archived, ClutchId, ClutchStateName, Find, Held, Offset, Sort
@@ -20,7 +18,6 @@ from service.web import answers, auth
 from service.web.context import Context
 from service.web.middleware import remember
 from service.web.problems import READING, SENDING
-from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import edit_clutch as registration
 from service.workflows.edit_clutch import edit
 from storage.clutches import Choice
@@ -47,9 +44,8 @@ EXAMPLE = {
 )
 async def register_clutch(request: Request, context: auth.OwnIngester) -> Response:
     """Register a clutch. Everything but `clutch_id` has a default: the reference's clutch."""
-    body = await answers.json_body(request)
-    fields = checked(ClutchIn, body)
-    auth.require_clutch(request, fields.clutch_id)
+    fields = await answers.sent(request, ClutchIn)
+    auth.require_clutch(auth.grant_of(request), fields.clutch_id)
     clutch, new = await run_in_threadpool(_register, context, fields)
     if new:
         await answers.begin_computed(context, str(clutch["clutch_id"]), degradation)
@@ -76,7 +72,7 @@ async def list_clutches(
     """The clutches of the key, with health and remaining life: the lowest safe bound first, or by name. To read all
     of them, sort by name: then none is missed or repeated.
     """
-    choice = Choice(archived=archived, only=auth.clutches_of_key(request), state=state, held=held, find=find)
+    choice = Choice(archived=archived, only=auth.grant_of(request).clutches, state=state, held=held, find=find)
     make = partial(clutch_list.page_as_json, context.database, context.cache, choice, part, offset=offset, sort=sort)
     return await _answer_about_all_clutches(request, context, ("clutches", choice, part, offset, sort), make)
 
@@ -84,7 +80,7 @@ async def list_clutches(
 @fleet_router.get("/totals", response_model=FleetTotals, responses=READING)
 async def totals(request: Request, context: auth.OwnReader, archived: Archived = False, find: Find = "") -> Response:
     """The number of the key's clutches, by state."""
-    choice = Choice(archived=archived, only=auth.clutches_of_key(request), find=find)
+    choice = Choice(archived=archived, only=auth.grant_of(request).clutches, find=find)
     return await _answer_about_all_clutches(
         request, context, ("totals", choice), lambda: to_json(clutch_list.totals(context.database, choice))
     )
@@ -96,7 +92,7 @@ async def _answer_about_all_clutches(
     """A GET's answer that any commit may change, made once for what is committed."""
     # the version before the rows are read: what is committed meanwhile makes another
     answer = await answers.cached_answer(context, key, auth.snapshot_of(request).version, make)
-    if auth.clutches_of_key(request) is None:
+    if auth.grant_of(request).clutches is None:
         remember(request, answers.repeated_answer(context, key, of_clutch=False))
     return answers.tagged(request, answer, answers.JSON_TYPE)
 
@@ -115,19 +111,14 @@ async def read_clutch(request: Request, context: auth.Reader, clutch_id: ClutchI
         {"reason": "the drawing says so", "geometry": {"inner_diameter_mm": 98, "outer_diameter_mm": 133}},
     ),
 )
-async def edit_clutch(request: Request, context: auth.Admin, clutch_id: ClutchId) -> Response:
+async def edit_clutch(of: answers.ChangeOf) -> Response:
     """Edit a clutch's record (each field in the request replaces the whole field), archive the clutch or bring it
     back. Results are computed again.
     """
-    fields = checked(ClutchEdit, await answers.json_body(request))
-    change = partial(
-        edit, archived=fields.archived, reason=fields.reason, by=auth.name_of_caller(request), at=answers.now()
-    )
-    editing = context.workers.submit(
-        Lane.RUNS, change, clutch_id, fields.fields(), turn=clutch_id, seconds=CHANGE_SECONDS
-    )
-    await asyncio.wrap_future(editing)
-    return answers.json_answer(await run_in_threadpool(clutch_list.look_up, context.database, clutch_id))
+    fields, by = await answers.sent(of.request, ClutchEdit), auth.grant_of(of.request).name
+    change = partial(edit, archived=fields.archived, reason=fields.reason, by=by, at=answers.now())
+    await answers.changed(of, change, fields.fields())
+    return answers.json_answer(await run_in_threadpool(clutch_list.look_up, of.database, of.clutch_id))
 
 
 @router.get("/{clutch_id}/changes", response_model=ChangePage, responses=READING)

@@ -1,6 +1,5 @@
 """The routes of diagnoses and of the adopted model."""
 
-import asyncio
 from functools import partial
 from typing import Annotated
 
@@ -10,14 +9,12 @@ from fastapi.responses import Response
 
 from service.logging import request_id
 from service.queries import diagnoses
-from service.run_files.json_run import checked
 from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut, PlanOut
 from service.schemas.parameters import ClutchId, DiagnosisId
 from service.web import answers
-from service.web.auth import Admin, Ingester, name_of_caller, require
+from service.web.auth import Ingester, grant_of, require_scope
 from service.web.limits import WAIT_SECONDS
 from service.web.problems import READING, SENDING
-from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import adopt_model, run_diagnosis
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["diagnosis"])
@@ -37,12 +34,12 @@ Prefer = Annotated[
 )
 async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
     """Diagnose all runs of the clutch's present life. A request during a diagnosis of the same runs gets that diagnosis."""
-    question = checked(DiagnosisIn, await answers.json_body(request))
+    question = await answers.sent(request, DiagnosisIn)
     if question.adopt:
-        require(request, "admin")
+        require_scope(grant_of(request), "admin")
     ask = partial(
         run_diagnosis.ask,
-        by=name_of_caller(request),
+        by=grant_of(request).name,
         adopt=question.adopt,
         isolability=question.isolability,
         request=request_id.get(),
@@ -87,10 +84,8 @@ async def read_model(of: answers.Of) -> Response:
 
 
 @router.put("/model", **answers.taking(ModelIn, ModelOut, {"diagnosis_id": "3f9a1c0b7d2e4f56"}, SENDING))
-async def put_model(request: Request, context: Admin, clutch_id: ClutchId) -> Response:
+async def put_model(of: answers.ChangeOf) -> Response:
     """Adopt the extended model of a diagnosis, or return to the baseline. The clutch is tracked again before the answer."""
-    model = checked(ModelIn, await answers.json_body(request))
-    arguments = (clutch_id, model.diagnosis_id, answers.now(), name_of_caller(request))
-    adopting = context.workers.submit(Lane.RUNS, adopt_model.adopt, *arguments, turn=clutch_id, seconds=CHANGE_SECONDS)
-    await asyncio.wrap_future(adopting)
-    return answers.json_answer(await run_in_threadpool(diagnoses.model, context.database, clutch_id))
+    model = await answers.sent(of.request, ModelIn)
+    await answers.changed(of, adopt_model.adopt, model.diagnosis_id, answers.now(), grant_of(of.request).name)
+    return answers.json_answer(await run_in_threadpool(diagnoses.model, of.database, of.clutch_id))

@@ -17,7 +17,6 @@ from service.queries import (
     scores,
     series,
     stribeck,
-    surfaces,
 )
 from service.schemas.life import Method
 from service.schemas.over_life import LoopItem, SeriesItem
@@ -38,7 +37,7 @@ _PLAN = Table(diagnoses.plan_rows, diagnoses.PLAN_COLUMNS)
 _REMAINING = Table(remaining_life.rows, remaining_life.COLUMNS)
 _DEGRADATION = Table(degradation.rows, degradation.COLUMNS)
 _STRIBECK = Table(stribeck.rows, ("run_id", "cycles", "held_runs"))
-_SURFACES = Table(surfaces.rows, ("cycles", "pressure_bar"))
+_SURFACES = Table(stribeck.surface_rows, ("cycles", "pressure_bar"))
 _SCORES = Table(scores.rows, ("end_of_life_cycles", "cycles"))
 _LOOPS = Table(
     lambda loops: [loop | {"held_runs": loops["held_runs"]} for loop in loops["items"]],
@@ -116,7 +115,7 @@ async def stribeck_csv(of: answers.WholeOf, prefer: Prefer = None) -> Response:
 @router.get("/surfaces.csv", response_class=Response)
 async def surfaces_csv(of: answers.WholeOf, prefer: Prefer = None) -> Response:
     """The surfaces, one row per count of cycles, pressure and speed."""
-    return await answers.computed_table(of, surfaces.surface, _SURFACES, prefer=prefer)
+    return await answers.computed_table(of, stribeck.surface, _SURFACES, prefer=prefer)
 
 
 @router.get("/scores.csv", response_class=Response)

@@ -10,13 +10,12 @@ from fastapi.responses import Response
 
 from service.errors import TooLargeError, UnsupportedMediaTypeError
 from service.queries import inspections
-from service.run_files.json_run import checked
 from service.schemas.base import MAX_PHOTOGRAPH_BYTES
 from service.schemas.inspection import InspectionIn, InspectionOut, InspectionPage, MediaType, PhotographOut
 from service.schemas.parameters import ClutchId, InspectionId, PhotographId
 from service.schemas.run import Withdrawal
 from service.web import answers
-from service.web.auth import Ingester, Reader, name_of_caller
+from service.web.auth import Ingester, Reader, grant_of
 from service.web.problems import CHANGING, READING, SENDING
 from service.workflows import inspect_clutch
 
@@ -62,9 +61,9 @@ EXAMPLE = {
 )
 async def post_inspection(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Post an inspection of the friction surface: roughness R_a, skewness R_sk, a note."""
-    sent = checked(InspectionIn, await answers.json_body(request))
+    sent = await answers.sent(request, InspectionIn)
     store = partial(inspect_clutch.inspect, context.database, clutch_id, sent)
-    inspection, new = await run_in_threadpool(store, by=name_of_caller(request), at=answers.now())
+    inspection, new = await run_in_threadpool(store, by=grant_of(request).name, at=answers.now())
     address = f"/v1/clutches/{clutch_id}/inspections/{inspection['inspection_id']}"
     return answers.json_answer(inspection, 201 if new else 200, Location=address)
 
@@ -111,7 +110,7 @@ async def post_photograph(
     """Add a photograph to an inspection: the file itself as the body, PNG, JPEG or WebP, 16 MiB at most."""
     media_type = _media_type(request)
     add = partial(inspect_clutch.add_photograph, context.database, clutch_id, inspection_id, await _file(request))
-    photograph, new = await run_in_threadpool(add, media_type, by=name_of_caller(request), at=answers.now())
+    photograph, new = await run_in_threadpool(add, media_type, by=grant_of(request).name, at=answers.now())
     address = f"/v1/clutches/{clutch_id}/inspections/{inspection_id}/photographs/{photograph['photograph_id']}"
     return answers.json_answer(photograph, 201 if new else 200, Location=address)
 
@@ -150,6 +149,6 @@ async def _file(request: Request) -> bytes:
 
 async def _changed(change: Callable[..., dict[str, Any]], of: answers.OfClutch, inspection_id: str) -> Response:
     """The inspection after a change."""
-    withdrawal = checked(Withdrawal, await answers.json_body(of.request))
-    edit = partial(change, reason=withdrawal.reason, by=name_of_caller(of.request), at=answers.now())
+    withdrawal = await answers.sent(of.request, Withdrawal)
+    edit = partial(change, reason=withdrawal.reason, by=grant_of(of.request).name, at=answers.now())
     return answers.json_answer(await run_in_threadpool(edit, of.database, of.clutch_id, inspection_id))

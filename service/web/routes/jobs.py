@@ -9,11 +9,10 @@ from fastapi.responses import Response
 
 from service.logging import request_id
 from service.queries import jobs
-from service.run_files.json_run import checked
 from service.schemas.diagnosis import JobIn, JobOut, JobPage
 from service.schemas.parameters import JobId, OfState
-from service.web.answers import Paged, answer, json_answer, json_body, now, preferred_wait, taking, until_ended
-from service.web.auth import OwnAdmin, OwnReader, clutches_of_key, name_of_caller, require_clutch
+from service.web.answers import Paged, answer, json_answer, now, preferred_wait, sent, taking, until_ended
+from service.web.auth import OwnAdmin, OwnReader, grant_of, require_clutch
 from service.web.problems import READING, SENDING
 from service.workflows import ask_job
 from storage.jobs import OPEN
@@ -39,11 +38,11 @@ Prefer = Annotated[
 )
 async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -> Response:
     """Start a replay or a fleet refresh. If the same job already waits or runs, the answer is that job."""
-    job_in = checked(JobIn, await json_body(request))
-    require_clutch(request, job_in.clutch_id)
+    job_in = await sent(request, JobIn)
+    require_clutch(grant_of(request), job_in.clutch_id)
     ask = partial(
         ask_job.ask,
-        by=name_of_caller(request),
+        by=grant_of(request).name,
         request=request_id.get(),
         most=context.settings.most_replays,
         asked_at=now(),
@@ -63,19 +62,21 @@ async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -
 @router.get("", response_model=JobPage, responses=READING)
 async def list_jobs(request: Request, context: OwnReader, part: Paged, state: OfState = None) -> Response:
     """Jobs of the key's clutches, newest first."""
-    return await answer(request, partial(jobs.page, context.database, part, state=state, only=clutches_of_key(request)))
+    return await answer(
+        request, partial(jobs.page, context.database, part, state=state, only=grant_of(request).clutches)
+    )
 
 
 @router.get("/{job_id}", response_model=JobOut, responses=READING)
 async def read_job(request: Request, context: OwnReader, job_id: JobId) -> Response:
     """One job, with its progress and result."""
-    clutches = clutches_of_key(request)
+    clutches = grant_of(request).clutches
     return await answer(request, lambda: jobs.shown(jobs.find(context.database, job_id, only=clutches)))
 
 
 @router.delete("/{job_id}", response_model=JobOut, responses=READING)
 async def delete_job(request: Request, context: OwnAdmin, job_id: JobId) -> Response:
     """Cancel a job. A waiting job does not start, a running job ends within seconds, an ended job stays unchanged."""
-    row = await run_in_threadpool(jobs.find, context.database, job_id, only=clutches_of_key(request))
-    cancel = partial(ask_job.cancel, context.database, row, by=name_of_caller(request), at=now())
+    row = await run_in_threadpool(jobs.find, context.database, job_id, only=grant_of(request).clutches)
+    cancel = partial(ask_job.cancel, context.database, row, by=grant_of(request).name, at=now())
     return json_answer(jobs.shown(await run_in_threadpool(cancel)))

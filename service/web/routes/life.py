@@ -14,8 +14,6 @@ from service.queries.degradation import degradation as degradation_of
 from service.queries.engagement import engaged
 from service.queries.planned_duty import planned_life
 from service.queries.remaining_life import NO_CRITERIA, criteria_of, life_by_criteria, remaining_life
-from service.queries.surfaces import surface
-from service.run_files.json_run import checked
 from service.schemas.fleet import Scores
 from service.schemas.life import Method, PlannedLife, ProgrammeIn, RemainingLife
 from service.schemas.over_life import Degradation, EngagementOut, LoopPage, SeriesPage, StribeckPage, Surfaces
@@ -67,7 +65,7 @@ async def remaining_useful_life(
 )
 async def planned_remaining_life(of: answers.Of, method: Method = "particle") -> Response:
     """Remaining life under planned duty: blocks that are repeated until the end of life. Nothing is stored."""
-    planned = checked(ProgrammeIn, await answers.json_body(of.request))
+    planned = await answers.sent(of.request, ProgrammeIn)
     answer = of.context.workers.submit(Lane.SIMULATIONS, planned_life, of.clutch_id, method, planned)
     return answers.json_answer(await asyncio.wrap_future(answer))
 
@@ -109,7 +107,7 @@ async def engagement(
 @router.get("/surfaces", response_model=Surfaces, responses=READING)
 async def surfaces(of: answers.Of, prefer: Prefer = None) -> Response:
     """The tracked Stribeck parameters over pressure and cycles (figs. 10, 11), and torque over speed."""
-    return await answers.computed_answer(of, surface, prefer=prefer)
+    return await answers.computed_answer(of, stribeck_query.surface, prefer=prefer)
 
 
 @router.get("/scores", response_model=Scores, responses=READING)

@@ -9,26 +9,14 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.errors import FieldError, InvalidError
+from service.errors import InvalidError
 from service.queries import rigs
-from service.queries.import_preview import preview
 from service.readers.read_file import reading_of
-from service.run_files.json_run import checked
 from service.run_files.rig_profile import require_usable
-from service.schemas.parameters import (
-    FileCycles,
-    FileDecimal,
-    FileKind,
-    FileMap,
-    FileMissing,
-    FileName,
-    FileRig,
-    OfClutch,
-    RigName,
-)
+from service.schemas import parameters
 from service.schemas.rig import Preview, RigIn, RigOut, RigPage
-from service.web.answers import Paged, answer, json_answer, json_body, now, taking
-from service.web.auth import Admin, Ingester, OwnIngester, OwnReader, name_of_caller, require_clutch
+from service.web.answers import Paged, answer, json_answer, now, sent, taking
+from service.web.auth import Admin, Ingester, OwnIngester, OwnReader, grant_of, require_clutch
 from service.web.context import Context
 from service.web.files import FILE_BODY, received
 from service.web.problems import CHANGING, READING, SENDING
@@ -60,7 +48,7 @@ async def list_rigs(request: Request, context: OwnReader, part: Paged) -> Respon
 
 
 @router.get("/{name}", response_model=RigOut, responses=READING)
-async def read_rig(request: Request, context: OwnReader, name: RigName) -> Response:
+async def read_rig(request: Request, context: OwnReader, name: parameters.RigName) -> Response:
     """A saved rig profile."""
     return await answer(request, lambda: rigs.look_up(context.database, name))
 
@@ -72,20 +60,19 @@ async def post_rig(request: Request, context: Ingester) -> Response:
 
 
 @router.put("/{name}", **taking(RigIn, RigOut, EXAMPLE, CHANGING, {201: "The profile is new"}))
-async def put_rig(request: Request, context: Admin, name: RigName) -> Response:
+async def put_rig(request: Request, context: Admin, name: parameters.RigName) -> Response:
     """Replace a rig profile. Runs that were read with the former profile stay unchanged until they are read again."""
     return await _saved(request, context, name)
 
 
 async def _saved(request: Request, context: Context, name: str | None) -> Response:
     """Save the profile of the body, in the place of that of the name in the path."""
-    rig = checked(RigIn, await json_body(request))
+    rig = await sent(request, RigIn)
     require_usable(rig)
     if name not in (None, rig.name):
         message = f"name must be that of the address, {name!r}, got {rig.name!r}"
-        raise InvalidError(message, errors=[FieldError(pointer="/name", code="other_name", message=message)])
-    replacing = name is not None
-    saving = partial(save, context.database, rig, by=name_of_caller(request), at=now(), replacing=replacing)
+        raise InvalidError.of(message, code="other_name", pointer="/name")
+    saving = partial(save, context.database, rig, by=grant_of(request).name, at=now(), replacing=name is not None)
     saved, new = await run_in_threadpool(saving)
     return json_answer(saved.model_dump(mode="json"), 201 if new else 200, Location=f"/v1/rigs/{saved.name}")
 
@@ -94,26 +81,26 @@ async def _saved(request: Request, context: Context, name: str | None) -> Respon
 async def preview_file(
     request: Request,
     context: OwnIngester,
-    filename: FileName = "upload",
-    rig: FileRig = None,
-    kind: FileKind = None,
-    cycles: FileCycles = None,
-    clutch_id: OfClutch = None,
-    map: FileMap = None,  # noqa: A002
-    decimal: FileDecimal = "",
-    missing: FileMissing = "",
+    filename: parameters.FileName = "upload",
+    rig: parameters.FileRig = None,
+    kind: parameters.FileKind = None,
+    cycles: parameters.FileCycles = None,
+    clutch_id: parameters.OfClutch = None,
+    map: parameters.FileMap = None,  # noqa: A002
+    decimal: parameters.FileDecimal = "",
+    missing: parameters.FileMissing = "",
 ) -> Response:
     """A preview of a file: its first rows, the channel and unit of each column, what would be cut and fitted. Nothing
     is stored. Without `rig` or a `profile` in the form, the saved profile that has the file's columns is used, else
     the titles of the columns.
     """
     if clutch_id is not None:
-        require_clutch(request, clutch_id)
+        require_clutch(grant_of(request), clutch_id)
     with tempfile.TemporaryDirectory(dir=context.folder) as folder:
         path = Path(folder) / "run"
         filename, profile = await received(request, path, filename)
         computing = partial(
-            preview,
+            rigs.preview,
             filename=filename,
             rig=rig,
             profile=profile,

@@ -18,44 +18,16 @@ from service.errors import NoRoomError, NotAcceptableError, NotFoundError
 from service.queries import rigs, runs
 from service.queries.raw_run import Kind, copy_file, entity_tag, file_sha256, write_run
 from service.readers.read_file import reading_of
-from service.run_files.json_run import checked, read_run, read_run_on_disk
+from service.run_files.json_run import read_run, read_run_on_disk
 from service.run_files.upload import read_file_run
+from service.schemas import parameters
 from service.schemas.base import Origin
-from service.schemas.parameters import (
-    ClutchId,
-    FileCycles,
-    FileDecimal,
-    FileKind,
-    FileMap,
-    FileMissing,
-    FileName,
-    FileRig,
-    FileRunId,
-    FileSkipRows,
-    FileStartedAt,
-    FileTable,
-    FileTime,
-    Points,
-    RunId,
-    RunKind,
-    State,
-)
 from service.schemas.run import RUN_IN, Confirmation, Confirmations, Correction, Receipt, RunOut, RunPage, Withdrawal
-from service.web import answers
-from service.web.auth import Ingester, Reader, name_of_caller
-from service.web.files import (
-    FILE_BODY,
-    FILE_CONTENT,
-    FILE_TYPE,
-    PARQUET_TYPE,
-    body_or_file,
-    preferred,
-    received,
-    streamed,
-)
+from service.web import answers, files
+from service.web.auth import Ingester, Reader, grant_of
 from service.web.limits import LARGE_BODY_BYTES
 from service.web.problems import READING, SENDING, described
-from service.work.workers import CHANGE_SECONDS, Lane
+from service.work.workers import Lane
 from service.workflows import change_run
 from service.workflows.ingest_run import ingest_posted
 from storage.engine.database import Database
@@ -71,24 +43,24 @@ SENDING_FILE = SENDING | described(NoRoomError)
     response_model=Receipt,
     responses=SENDING_FILE
     | {200: {"model": Receipt, "description": "The run was stored before; the answer is its receipt"}},
-    openapi_extra=FILE_BODY,
+    openapi_extra=files.FILE_BODY,
 )
 async def post_run_file(
     request: Request,
     context: Ingester,
-    clutch_id: ClutchId,
-    kind: FileKind = None,
-    cycles: FileCycles = None,
-    rig: FileRig = None,
-    map: FileMap = None,  # noqa: A002
-    table: FileTable = "",
-    time: FileTime = "",
-    decimal: FileDecimal = "",
-    skip_rows: FileSkipRows = 0,
-    missing: FileMissing = "",
-    filename: FileName = "upload",
-    run_id: FileRunId = None,
-    started_at: FileStartedAt = None,
+    clutch_id: parameters.ClutchId,
+    kind: parameters.FileKind = None,
+    cycles: parameters.FileCycles = None,
+    rig: parameters.FileRig = None,
+    map: parameters.FileMap = None,  # noqa: A002
+    table: parameters.FileTable = "",
+    time: parameters.FileTime = "",
+    decimal: parameters.FileDecimal = "",
+    skip_rows: parameters.FileSkipRows = 0,
+    missing: parameters.FileMissing = "",
+    filename: parameters.FileName = "upload",
+    run_id: parameters.FileRunId = None,
+    started_at: parameters.FileStartedAt = None,
     origin: Origin = "measured",
 ) -> Response:
     """Post a run as CSV, XLSX, ODS, TDMS, MDF4, MATLAB, HDF5 or Parquet, plain, gzipped or in a ZIP archive. The file
@@ -97,7 +69,7 @@ async def post_run_file(
     profile = None if rig is None else await run_in_threadpool(rigs.rig_profile, context.database, rig)
     with tempfile.TemporaryDirectory(dir=context.folder) as folder:
         path = Path(folder) / "run"
-        filename, content = await received(request, path, filename)
+        filename, content = await files.received(request, path, filename)
         read = partial(
             read_file_run,
             path,
@@ -111,7 +83,7 @@ async def post_run_file(
             started_at=started_at,
             origin=origin,
         )
-        by = name_of_caller(request)
+        by = grant_of(request).name
         # without a turn: a file that takes long to read would have the clutch's other runs wait
         taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, answers.now(), by, path)
         receipt, new = await asyncio.wrap_future(taken_in)
@@ -120,11 +92,11 @@ async def post_run_file(
     )
 
 
-_READING_FILE = READING | {200: {"content": FILE_CONTENT, "description": "The file as it was sent"}}
+_READING_FILE = READING | {200: {"content": files.FILE_CONTENT, "description": "The file as it was sent"}}
 
 
 @router.get("/{run_id}/file", response_class=Response, responses=_READING_FILE)
-async def read_run_file(of: answers.Of, run_id: RunId) -> Response:
+async def read_run_file(of: answers.Of, run_id: parameters.RunId) -> Response:
     """The file that a run was read from, as it was sent."""
     sha256 = await run_in_threadpool(file_sha256, of.database, of.clutch_id, run_id)
     headers = {"Cache-Control": "no-cache", "ETag": f'"{sha256}"', "Content-Disposition": "attachment"}
@@ -134,12 +106,12 @@ async def read_run_file(of: answers.Of, run_id: RunId) -> Response:
         path = Path(folder) / "file"
         await asyncio.wrap_future(of.context.workers.submit(Lane.RECORDS, copy_file, of.clutch_id, run_id, path))
         body = path.open("rb")  # its name goes with the folder, its content when it is closed
-    return streamed(body, FILE_TYPE, headers)
+    return files.streamed(body, files.FILE_TYPE, headers)
 
 
 _PARQUET = {"schema": {"type": "string", "format": "binary"}}
 READING_RUN = described(NotFoundError, NotAcceptableError) | {
-    200: {"model": RunOut, "content": {PARQUET_TYPE: _PARQUET}, "description": "The run; all samples as Parquet"}
+    200: {"model": RunOut, "content": {files.PARQUET_TYPE: _PARQUET}, "description": "The run; all samples as Parquet"}
 }
 
 EXAMPLE = {
@@ -163,11 +135,11 @@ EXAMPLE = {
         RUN_IN.json_schema(), Receipt, EXAMPLE, SENDING, {200: "The run was stored before; the answer is its receipt"}
     ),
 )
-async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
+async def post_run(request: Request, context: Ingester, clutch_id: parameters.ClutchId) -> Response:
     """Post a run, in any order of cycles. The receipt has the results. When you get it, the run is stored for good."""
     answers.require_json(request)
-    by = name_of_caller(request)
-    async with body_or_file(request, context.folder) as body:
+    by = grant_of(request).name
+    async with files.body_or_file(request, context.folder) as body:
         is_short = isinstance(body, bytes) and len(body) <= LARGE_BODY_BYTES
         taken_in = context.workers.submit(
             Lane.RUNS if is_short else Lane.RECORDS,
@@ -184,18 +156,22 @@ async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> 
 
 
 @router.get("", response_model=RunPage, responses=READING)
-async def list_runs(of: answers.PageOf, state: State = None, kind: RunKind = None) -> Response:
+async def list_runs(of: answers.PageOf, state: parameters.State = None, kind: parameters.RunKind = None) -> Response:
     """Receipts by cycles."""
     return await answers.clutch_answer(of, runs.page_as_json, of.part, state, kind)
 
 
 @router.get("/{run_id}", response_model=RunOut, responses=READING_RUN)
 async def read_run_with_channels(
-    request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId, points: Points = None
+    request: Request,
+    context: Reader,
+    clutch_id: parameters.ClutchId,
+    run_id: parameters.RunId,
+    points: parameters.Points = None,
 ) -> Response:
     """One receipt with the run's channels: as sent, or thinned for a plot, or as Parquet if `Accept` prefers it."""
-    media_type = preferred(request, (answers.JSON_TYPE, PARQUET_TYPE))
-    kind: Kind = "parquet" if media_type == PARQUET_TYPE else "json"
+    media_type = files.preferred(request, (answers.JSON_TYPE, files.PARQUET_TYPE))
+    kind: Kind = "parquet" if media_type == files.PARQUET_TYPE else "json"
     packed = kind == "json" and points is not None and "gzip" in request.headers.get("accept-encoding", "")
     headers = {"Cache-Control": "no-cache", "Vary": "Accept, Accept-Encoding"}
     headers |= {"Content-Encoding": "gzip"} if packed else {}
@@ -209,33 +185,31 @@ async def read_run_with_channels(
         write = partial(write_run, points=points, kind=kind, path=path, compressed=packed)
         headers["ETag"] = await asyncio.wrap_future(context.workers.submit(Lane.RECORDS, write, clutch_id, run_id))
         body = path.open("rb")  # its name goes with the folder, its content when it is closed
-    return streamed(body, media_type, headers)
+    return files.streamed(body, media_type, headers)
 
 
 @router.patch("/{run_id}", **answers.taking(Correction, Receipt, {"cycles": 7000, "reason": "typed a zero too many"}))
-async def correct_run(of: answers.ChangeOf, run_id: RunId) -> Response:
+async def correct_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Response:
     """Correct a run's cycles, or read its file again with a rig profile. If it is plausible then, it counts. What was
     sent stays stored.
     """
-    correction = checked(Correction, await answers.json_body(of.request))
+    correction = await answers.sent(of.request, Correction)
     if correction.rig is not None:
         reread = partial(change_run.read_again, rig=correction.rig, folder=of.context.folder)
-        return await _changed(reread, of, run_id, correction.reason)
-    return await _changed(change_run.correct, of, run_id, correction.reason, cycles=correction.cycles)
+        return await _changed(reread, of, run_id, correction)
+    return await _changed(change_run.correct, of, run_id, correction, cycles=correction.cycles)
 
 
 @router.post("/{run_id}/withdraw", **answers.taking(Withdrawal, Receipt, {"reason": "the torque sensor was unplugged"}))
-async def withdraw_run(of: answers.ChangeOf, run_id: RunId) -> Response:
+async def withdraw_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Response:
     """Withdraw a run: it no longer counts, but stays stored and listed."""
-    reason = checked(Withdrawal, await answers.json_body(of.request)).reason
-    return await _changed(change_run.withdraw, of, run_id, reason)
+    return await _changed(change_run.withdraw, of, run_id, await answers.sent(of.request, Withdrawal))
 
 
 @router.post("/{run_id}/restore", **answers.taking(Withdrawal, Receipt, {"reason": "it was the other sensor"}))
-async def restore_run(of: answers.ChangeOf, run_id: RunId) -> Response:
+async def restore_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Response:
     """Undo a withdrawal: the run is accepted or held again, as before."""
-    reason = checked(Withdrawal, await answers.json_body(of.request)).reason
-    return await _changed(change_run.restore, of, run_id, reason)
+    return await _changed(change_run.restore, of, run_id, await answers.sent(of.request, Withdrawal))
 
 
 @router.post(
@@ -248,17 +222,16 @@ async def confirm_runs(of: answers.ChangeOf) -> Response:
     """Accept several held runs as they were sent, in one step. If one does not exist, none is accepted. Runs that are
     not held stay unchanged.
     """
-    confirmations = checked(Confirmations, await answers.json_body(of.request))
-    return await _changed(_confirmed, of, confirmations.run_ids, confirmations.reason)
+    confirmations = await answers.sent(of.request, Confirmations)
+    return await _changed(_confirmed, of, confirmations.run_ids, confirmations)
 
 
 @router.post(
     "/{run_id}/confirm", **answers.taking(Confirmation, Receipt, {"reason": "the clutch was run over the weekend"})
 )
-async def confirm_run(of: answers.ChangeOf, run_id: RunId) -> Response:
+async def confirm_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Response:
     """Accept a held run as it was sent."""
-    reason = checked(Confirmation, await answers.json_body(of.request)).reason
-    return await _changed(change_run.confirm, of, run_id, reason)
+    return await _changed(change_run.confirm, of, run_id, await answers.sent(of.request, Confirmation))
 
 
 def _confirmed(database: Database, clutch_id: str, run_ids: Sequence[str], **wanted: Any) -> dict[str, Any]:
@@ -266,10 +239,12 @@ def _confirmed(database: Database, clutch_id: str, run_ids: Sequence[str], **wan
 
 
 async def _changed(
-    change: Callable[..., dict[str, Any]], of: answers.OfClutch, run_id: str | Sequence[str], reason: str, **more: Any
+    change: Callable[..., dict[str, Any]],
+    of: answers.OfClutch,
+    run_id: str | Sequence[str],
+    sent: Correction | Withdrawal | Confirmation | Confirmations,
+    **more: Any,
 ) -> Response:
     """The receipt, or receipts, after a change."""
-    edit = partial(change, reason=reason, **more, by=name_of_caller(of.request), at=answers.now())
-    clutch_id, submit = of.clutch_id, of.context.workers.submit
-    changing = submit(Lane.RUNS, edit, clutch_id, run_id, turn=clutch_id, seconds=CHANGE_SECONDS)
-    return answers.json_answer(await asyncio.wrap_future(changing))
+    edit = partial(change, reason=sent.reason, **more, by=grant_of(of.request).name, at=answers.now())
+    return answers.json_answer(await answers.changed(of, edit, run_id))

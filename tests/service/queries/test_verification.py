@@ -4,19 +4,11 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from typing import TypeVar
 
 import pytest
 from fastapi.testclient import TestClient
 
-from service.queries.verification import (
-    CheckedInspections,
-    CheckedResults,
-    CheckedRuns,
-    check_inspections,
-    check_results,
-    check_runs,
-)
+from service.queries.verification import Checked, check_inspections, check_results, check_runs
 from storage.engine.database import Database
 from storage.engine.opening import find_database
 from storage.engine.sqlite.database import back_up
@@ -26,7 +18,6 @@ from tests.support import stationary
 
 BASE = "/v1/clutches/c1"
 DAMAGE = "UPDATE channel SET data = zeroblob(9) WHERE run_key = 1 AND position = 0"
-Checked = TypeVar("Checked")
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +67,8 @@ def fill(client: TestClient) -> None:
 
 def test_nothing_is_found_where_all_is_as_it_was_stored_and_the_file_is_only_read(life: str, tmp_path: Path) -> None:
     before = (tmp_path / "copy.db").read_bytes()
-    assert checked(life, check_runs) == CheckedRuns(runs=9, findings=())
-    assert checked(life, check_results) == CheckedResults(findings=(), earlier={})
+    assert checked(life, check_runs) == Checked(runs=9, findings=())
+    assert checked(life, check_results) == Checked(findings=(), earlier={})
     assert (tmp_path / "copy.db").read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["copy.db"]
 
@@ -149,7 +140,7 @@ def copy(inspected_twice: str, tmp_path: Path) -> str:
 
 
 def test_a_backup_holds_inspections_and_photographs_and_verify_checks_them(copy: str) -> None:
-    assert checked(copy, check_inspections) == CheckedInspections(inspections=2, photographs=3, findings=())
+    assert checked(copy, check_inspections) == Checked(inspections=2, photographs=3, findings=())
     assert "2 inspections with 3 photographs were checked" in clutchlife("verify", "--database", copy)
 
 
