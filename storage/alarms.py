@@ -5,10 +5,9 @@ Lists begin with the newest.
 from collections.abc import Collection
 from dataclasses import dataclass
 
-import sqlalchemy as sa
-from sqlalchemy import Connection, Double, Text, bindparam, delete, func, or_, select, update
+from sqlalchemy import Connection, delete, func, or_, select, update
 
-from storage.dialects import ALL_ROWS, among, upsert
+from storage.dialects import among, newest_first, upsert
 from storage.encoding import Json, Rows, to_text
 from storage.tables import NOT_CLEARED, alarm, alarm_event, run
 
@@ -56,29 +55,6 @@ class EventRow(NewEvent):
 
 
 _rules, _new_events, _events = Rows(AlarmRow), Rows(NewEvent), Rows(EventRow)
-_put = upsert(alarm)
-_by_id = select(alarm).where(alarm.c.alarm_id == bindparam("wanted"))
-_in_order = select(alarm).where(alarm.c.alarm_id > bindparam("after")).order_by(alarm.c.alarm_id)
-_enabled = select(alarm).where(alarm.c.enabled == 1).order_by(alarm.c.alarm_id)
-_of_or_all = or_(alarm.c.clutch_id.is_(None), alarm.c.clutch_id == bindparam("of_clutch"))
-_delete = delete(alarm).where(alarm.c.alarm_id == bindparam("wanted"))
-_insert_event = sa.insert(alarm_event)
-_event_by_id = select(alarm_event).where(alarm_event.c.event_id == bindparam("wanted"))
-_open = select(alarm_event).where(NOT_CLEARED, alarm_event.c.clutch_id == bindparam("of_clutch"))
-_open_of_alarm = select(alarm_event).where(NOT_CLEARED, alarm_event.c.alarm_id == bindparam("of_alarm"))
-_newest = (
-    select(alarm_event)
-    .where(
-        alarm_event.c.event_key < bindparam("before", type_=Double),
-        or_(bindparam("of_alarm", type_=Text).is_(None), alarm_event.c.alarm_id == bindparam("of_alarm")),
-    )
-    .order_by(alarm_event.c.event_key.desc())
-    .limit(bindparam("most"))
-)
-_set_event = update(alarm_event).where(alarm_event.c.event_id == bindparam("wanted"))
-_last_heard = (
-    select(run.c.clutch_id, func.max(run.c.received_at)).where(among(run.c.clutch_id, "of_clutches"))
-).group_by(run.c.clutch_id)
 _IN_STATE = {
     RAISED: NOT_CLEARED & alarm_event.c.acknowledged_at.is_(None),
     ACKNOWLEDGED: NOT_CLEARED & alarm_event.c.acknowledged_at.is_not(None),
@@ -89,47 +65,52 @@ _IN_STATE = {
 
 def put(connection: Connection, row: AlarmRow) -> None:
     """Store a rule, in the place of the one of that name."""
-    connection.execute(_put[connection.dialect.name], _rules.values(row))
+    upsert(connection, alarm, [_rules.values(row)])
 
 
 def get(connection: Connection, alarm_id: str) -> AlarmRow | None:
-    return _rules.first(connection.execute(_by_id, {"wanted": alarm_id}))
+    return _rules.first(connection.execute(select(alarm).where(alarm.c.alarm_id == alarm_id)))
 
 
 def remove(connection: Connection, alarm_id: str) -> None:
-    connection.execute(_delete, {"wanted": alarm_id})
+    connection.execute(delete(alarm).where(alarm.c.alarm_id == alarm_id))
 
 
-def page(connection: Connection, *, limit: int, after: str = "", only: Collection[str] | None = None) -> list[AlarmRow]:
+def page(
+    connection: Connection, *, limit: int | None = None, after: str = "", only: Collection[str] | None = None
+) -> list[AlarmRow]:
     """Rules by name behind the name `after`; those of `only` these clutches."""
-    query, values = _in_order.limit(limit), {"after": after}
+    query = select(alarm).where(alarm.c.alarm_id > after).order_by(alarm.c.alarm_id).limit(limit)
     if only is not None:
-        query, values = query.where(among(alarm.c.clutch_id, "of_only")), values | {"of_only": to_text(sorted(only))}
-    return _rules.all(connection.execute(query, values))
+        query = query.where(among(alarm.c.clutch_id, sorted(only)))
+    return _rules.all(connection.execute(query))
 
 
 def enabled(connection: Connection, clutch_id: str | None = None) -> list[AlarmRow]:
     """The rules that are in use, those that may be of a clutch where it is named."""
-    query = _enabled if clutch_id is None else _enabled.where(_of_or_all)
-    return _rules.all(connection.execute(query, {} if clutch_id is None else {"of_clutch": clutch_id}))
+    query = select(alarm).where(alarm.c.enabled == 1).order_by(alarm.c.alarm_id)
+    if clutch_id is not None:
+        query = query.where(or_(alarm.c.clutch_id.is_(None), alarm.c.clutch_id == clutch_id))
+    return _rules.all(connection.execute(query))
 
 
 def insert_event(connection: Connection, row: NewEvent) -> None:
     """Raise an alarm. Raises IntegrityError where the rule's alarm of the clutch is not cleared yet."""
-    connection.execute(_insert_event, _new_events.values(row))
+    connection.execute(alarm_event.insert(), _new_events.values(row))
 
 
 def event(connection: Connection, event_id: str) -> EventRow | None:
-    return _events.first(connection.execute(_event_by_id, {"wanted": event_id}))
+    return _events.first(connection.execute(select(alarm_event).where(alarm_event.c.event_id == event_id)))
 
 
 def open_of_clutch(connection: Connection, clutch_id: str) -> dict[str, EventRow]:
     """alarm_id -> the alarm of a clutch that is not cleared."""
-    return {raised.alarm_id: raised for raised in _events.all(connection.execute(_open, {"of_clutch": clutch_id}))}
+    query = select(alarm_event).where(NOT_CLEARED, alarm_event.c.clutch_id == clutch_id)
+    return {raised.alarm_id: raised for raised in _events.all(connection.execute(query))}
 
 
 def open_of_alarm(connection: Connection, alarm_id: str) -> list[EventRow]:
-    return _events.all(connection.execute(_open_of_alarm, {"of_alarm": alarm_id}))
+    return _events.all(connection.execute(select(alarm_event).where(NOT_CLEARED, alarm_event.c.alarm_id == alarm_id)))
 
 
 def events(
@@ -143,35 +124,37 @@ def events(
 ) -> list[EventRow]:
     """Alarms, newest first: in a state (`open`: raised or acknowledged), of a rule, of `only` these clutches; `before` is
     the key of the last of the page before."""
-    query = _newest if state is None else _newest.where(_IN_STATE[state])
-    values: dict[str, object] = {
-        "most": ALL_ROWS if limit is None else limit,
-        "before": 2.0**62 if before is None else before,
-        "of_alarm": alarm_id,
-    }
+    query = newest_first(select(alarm_event), alarm_event.c.event_key, before=before, limit=limit)
+    if state is not None:
+        query = query.where(_IN_STATE[state])
+    if alarm_id is not None:
+        query = query.where(alarm_event.c.alarm_id == alarm_id)
     if only is not None:
-        query = query.where(among(alarm_event.c.clutch_id, "of_only"))
-        values["of_only"] = to_text(sorted(only))
-    return _events.all(connection.execute(query, values))
+        query = query.where(among(alarm_event.c.clutch_id, sorted(only)))
+    return _events.all(connection.execute(query))
 
 
 def clear(connection: Connection, event_id: str, at: str, content: Json) -> None:
     """Note that what raised an alarm is over, with what is said of it from now on."""
-    connection.execute(_set_event, {"wanted": event_id, "cleared_at": at, "content": to_text(content)})
+    _change_event(connection, event_id, cleared_at=at, content=to_text(content))
 
 
 def reopen(connection: Connection, event_id: str) -> None:
     """Note that an alarm is not over: it is as it was, acknowledged or not."""
-    connection.execute(_set_event, {"wanted": event_id, "cleared_at": None})
+    _change_event(connection, event_id, cleared_at=None)
 
 
 def acknowledge(connection: Connection, event_id: str, *, at: str, by: str, note: str) -> None:
     """Note who has seen an alarm, when, and what they remarked."""
-    acknowledged = {"acknowledged_at": at, "acknowledged_by": by, "note": note}
-    connection.execute(_set_event, {"wanted": event_id} | acknowledged)
+    _change_event(connection, event_id, acknowledged_at=at, acknowledged_by=by, note=note)
+
+
+def _change_event(connection: Connection, event_id: str, **columns: str | None) -> None:
+    connection.execute(update(alarm_event).where(alarm_event.c.event_id == event_id).values(columns))
 
 
 def last_heard(connection: Connection, clutch_ids: Collection[str]) -> dict[str, str]:
     """clutch_id -> when its last run arrived, of those of these clutches that have one."""
-    rows = connection.execute(_last_heard, {"of_clutches": to_text(sorted(clutch_ids))})
+    last = select(run.c.clutch_id, func.max(run.c.received_at)).where(among(run.c.clutch_id, sorted(clutch_ids)))
+    rows = connection.execute(last.group_by(run.c.clutch_id))
     return {row.clutch_id: row[1] for row in rows}

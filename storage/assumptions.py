@@ -5,10 +5,9 @@ Priors are kept by kind of clutch, version, and the clutches that were left out.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
-import sqlalchemy as sa
-from sqlalchemy import Connection, bindparam, delete, func, select
+from sqlalchemy import Connection, Select, delete, func, select
 
 from storage.dialects import json_length
 from storage.encoding import Json, Rows, to_list, to_text
@@ -30,74 +29,55 @@ class AdoptedRow:
 
 
 _adoptions = Rows(AdoptedRow)
-_adoption_versions = (
-    select(adopted_model)
-    .where(adopted_model.c.clutch_id == bindparam("of_clutch"))
-    .order_by(adopted_model.c.version.desc())
-)
-_adoption_newest = _adoption_versions.limit(1)
-_adoption_adopt = sa.insert(adopted_model)
-_adoption_cofs = (
-    select(
-        corrected_cof.c.run_key,
-        corrected_cof.c.pressure,
-        corrected_cof.c.mean_cof,
-        corrected_cof.c.mean_cof_sd,
-        corrected_cof.c.mean_cof_draws,
-    )
-    .join(run, run.c.run_key == corrected_cof.c.run_key)
-    .where(run.c.clutch_id == bindparam("of_clutch"))
-    .order_by(corrected_cof.c.run_key, corrected_cof.c.pressure)
-)
-_adoption_write = sa.insert(corrected_cof)
-_adoption_clear_run = delete(corrected_cof).where(corrected_cof.c.run_key == bindparam("of_run"))
-_adoption_clear = delete(corrected_cof).where(
-    corrected_cof.c.run_key.in_(select(run.c.run_key).where(run.c.clutch_id == bindparam("of_clutch")))
-)
+
+
+def _adopted(clutch_id: str) -> Select[Any]:
+    """The versions of a clutch, the newest first."""
+    of_clutch = select(adopted_model).where(adopted_model.c.clutch_id == clutch_id)
+    return of_clutch.order_by(adopted_model.c.version.desc())
 
 
 def current_adoption(connection: Connection, clutch_id: str) -> AdoptedRow | None:
     """The version in force, None before the first."""
-    return _adoptions.first(connection.execute(_adoption_newest, {"of_clutch": clutch_id}))
+    return _adoptions.first(connection.execute(_adopted(clutch_id).limit(1)))
 
 
 def adoptions_of(connection: Connection, clutch_id: str) -> list[AdoptedRow]:
-    return _adoptions.all(connection.execute(_adoption_versions, {"of_clutch": clutch_id}))
+    return _adoptions.all(connection.execute(_adopted(clutch_id)))
 
 
 def insert_adoption(connection: Connection, clutch_id: str, row: AdoptedRow) -> None:
     """Store a version. Raises IntegrityError where it is there or its diagnosis unknown."""
-    connection.execute(_adoption_adopt, _adoptions.values(row, clutch_id=clutch_id))
+    connection.execute(adopted_model.insert(), _adoptions.values(row, clutch_id=clutch_id))
 
 
 def corrected_cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, CorrectedCof]]:
     """run_key -> pressure -> mean COF, its deviation, and mean COF under each draw of the model in force, where it corrects
     them."""
     cofs: dict[int, dict[float, CorrectedCof]] = {}
-    for run_key, pressure, mean, deviation, draws in connection.execute(_adoption_cofs, {"of_clutch": clutch_id}):
+    query = (
+        select(corrected_cof)
+        .join(run, run.c.run_key == corrected_cof.c.run_key)
+        .where(run.c.clutch_id == clutch_id)
+        .order_by(corrected_cof.c.run_key, corrected_cof.c.pressure)
+    )
+    for run_key, pressure, mean, deviation, draws in connection.execute(query):
         cofs.setdefault(run_key, {})[pressure] = (mean, deviation, tuple(to_list(draws or "[]")))
     return cofs
 
 
 def write_corrected_cofs(connection: Connection, run_key: int, cofs: Mapping[float, CorrectedCof]) -> None:
     """Store a run's corrected mean COFs by pressure in place of those it had."""
-    connection.execute(_adoption_clear_run, {"of_run": run_key})
-    rows = [
-        {
-            "run_key": run_key,
-            "pressure": pressure,
-            "mean_cof": mean,
-            "mean_cof_sd": deviation,
-            "mean_cof_draws": to_text(list(draws)),
-        }
-        for pressure, (mean, deviation, draws) in cofs.items()
-    ]
+    connection.execute(delete(corrected_cof).where(corrected_cof.c.run_key == run_key))
+    names = [column.name for column in corrected_cof.columns]
+    rows = [(run_key, pressure, mean, sd, to_text(list(draws))) for pressure, (mean, sd, draws) in cofs.items()]
     if rows:
-        connection.execute(_adoption_write, rows)
+        connection.execute(corrected_cof.insert(), [dict(zip(names, row, strict=True)) for row in rows])
 
 
 def clear_corrected_cofs(connection: Connection, clutch_id: str) -> None:
-    connection.execute(_adoption_clear, {"of_clutch": clutch_id})
+    runs_of_clutch = select(run.c.run_key).where(run.c.clutch_id == clutch_id)
+    connection.execute(delete(corrected_cof).where(corrected_cof.c.run_key.in_(runs_of_clutch)))
 
 
 # --- fleet priors ---
@@ -124,23 +104,10 @@ class FleetPriorRow:
 
 
 _priors = Rows(FleetPriorRow)
-_fleet_insert = sa.insert(fleet_prior)
-_fleet_current = (
-    select(fleet_prior)
-    .where(fleet_prior.c.fleet == bindparam("of_fleet"), fleet_prior.c.left_out == NOBODY)
-    .order_by(fleet_prior.c.version.desc())
-    .limit(1)
-)
-_fleet_members = _fleet_current.with_only_columns(fleet_prior.c.version, fleet_prior.c.members)
-_fleet_members_of = _fleet_members.where(fleet_prior.c.version == bindparam("of_version"))
-_fleet_without = select(fleet_prior).where(
-    fleet_prior.c.fleet == bindparam("of_fleet"),
-    fleet_prior.c.version == bindparam("of_version"),
-    fleet_prior.c.left_out == bindparam("wanted"),
-)
+_from_all = fleet_prior.c.left_out == NOBODY
 _fleet_newest = (
     select(fleet_prior.c.fleet, func.max(fleet_prior.c.version).label("version"))
-    .where(fleet_prior.c.left_out == NOBODY)
+    .where(_from_all)
     .group_by(fleet_prior.c.fleet)
     .subquery()
 )
@@ -150,27 +117,28 @@ _fleet_all_current = (
         _fleet_newest,
         (fleet_prior.c.fleet == _fleet_newest.c.fleet) & (fleet_prior.c.version == _fleet_newest.c.version),
     )
-    .where(fleet_prior.c.left_out == NOBODY)
+    .where(_from_all)
     .order_by(fleet_prior.c.fleet)
 )
 _fleet_ended_lives = _fleet_all_current.with_only_columns(
     func.coalesce(func.sum(json_length(fleet_prior.c.content, "ended")), 0)
 ).order_by(None)
-_fleet_forget = delete(fleet_prior).where(
-    fleet_prior.c.fleet == bindparam("of_fleet"),
-    fleet_prior.c.version < bindparam("before"),
-    fleet_prior.c.left_out != NOBODY,
-)
 
 
 def insert_fleet_prior(connection: Connection, row: FleetPriorRow) -> None:
     """Store a prior. Raises IntegrityError where this version is there."""
-    connection.execute(_fleet_insert, _priors.values(row, fleet=fleet_key(row.fleet)))
+    connection.execute(fleet_prior.insert(), _priors.values(row, fleet=fleet_key(row.fleet)))
 
 
 def current_fleet_prior(connection: Connection, fleet: Json) -> FleetPriorRow | None:
     """The newest version of a kind of clutch, learned from all of them; None before the first."""
-    return _priors.first(connection.execute(_fleet_current, {"of_fleet": fleet_key(fleet)}))
+    return _priors.first(connection.execute(_versions(fleet).limit(1)))
+
+
+def _versions(fleet: Json) -> Select[Any]:
+    """The versions of a kind of clutch that were learned from all, the newest first."""
+    of_fleet = select(fleet_prior).where(fleet_prior.c.fleet == fleet_key(fleet), _from_all)
+    return of_fleet.order_by(fleet_prior.c.version.desc())
 
 
 def groups(members: Sequence[str]) -> list[Sequence[str]]:
@@ -185,16 +153,16 @@ def fleet_prior_for(connection: Connection, fleet: Json, clutch_id: str, version
     """
     if version == 0:
         return None
-    values: dict[str, object] = {"of_fleet": fleet_key(fleet), "of_version": version}
-    version_row = (
-        connection.execute(_fleet_members_of, values).first() or connection.execute(_fleet_members, values).first()
-    )
+    versions = _versions(fleet).with_only_columns(fleet_prior.c.version, fleet_prior.c.members).limit(1)
+    wanted = versions.where(fleet_prior.c.version == version)
+    version_row = connection.execute(wanted).first() or connection.execute(versions).first()
     if version_row is None:
         return None
     members = to_list(version_row.members)
     left_out = members[members.index(clutch_id) % _GROUPS] if clutch_id in members else NOBODY
-    values |= {"of_version": version_row.version, "wanted": left_out}
-    return _priors.first(connection.execute(_fleet_without, values))
+    of_version = (fleet_prior.c.fleet == fleet_key(fleet), fleet_prior.c.version == version_row.version)
+    query = select(fleet_prior).where(*of_version, fleet_prior.c.left_out == left_out)
+    return _priors.first(connection.execute(query))
 
 
 def current_fleet_priors(connection: Connection) -> list[FleetPriorRow]:
@@ -208,7 +176,8 @@ def count_ended_lives(connection: Connection) -> int:
 
 def forget_left_out(connection: Connection, fleet: Json, *, before: int) -> None:
     """Drop the priors with a clutch left out of all versions before `before`; those learned from all clutches stay."""
-    connection.execute(_fleet_forget, {"of_fleet": fleet_key(fleet), "before": before})
+    of_fleet = delete(fleet_prior).where(fleet_prior.c.fleet == fleet_key(fleet), fleet_prior.c.version < before)
+    connection.execute(of_fleet.where(~_from_all))
 
 
 def fleet_key(fleet: Json) -> str:

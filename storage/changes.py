@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 
-import sqlalchemy as sa
-from sqlalchemy import Connection, Double, Text, bindparam, func, or_, select
+from sqlalchemy import Connection, func, select
 
-from storage.dialects import ALL_ROWS
+from storage.dialects import newest_first
 from storage.encoding import Json, Rows, to_text
 from storage.tables import change
 
@@ -42,19 +41,6 @@ class ChangeRow:
 
 
 _rows = Rows(ChangeRow)
-_insert = sa.insert(change)
-_of_clutch = change.c.clutch_id == bindparam("of_clutch")
-_newest_first = (
-    select(change)
-    .where(
-        _of_clutch,
-        change.c.change_key < bindparam("before_key", type_=Double),
-        or_(bindparam("of_run", type_=Text).is_(None), change.c.run_id == bindparam("of_run")),
-    )
-    .order_by(change.c.change_key.desc())
-    .limit(bindparam("most"))
-)
-_last_of_history = select(func.max(change.c.revision)).where(_of_clutch, change.c.action.in_(OF_HISTORY))
 
 
 def insert(
@@ -72,7 +58,7 @@ def insert(
 ) -> None:
     """Store a change. Raises IntegrityError where the clutch is unknown."""
     of = {"clutch_id": clutch_id, "run_id": run_id, "action": action, "at": at, "by": by, "revision": revision}
-    connection.execute(_insert, of | {"reason": reason, "before": to_text(before), "after": to_text(after)})
+    connection.execute(change.insert(), of | {"reason": reason, "before": to_text(before), "after": to_text(after)})
 
 
 def page(
@@ -84,15 +70,14 @@ def page(
     before: float | None = None,
 ) -> list[ChangeRow]:
     """Changes of a clutch and its runs, or of one run, newest first; `before` is the key of the last of the page before."""
-    values = {
-        "of_clutch": clutch_id,
-        "of_run": run_id,
-        "most": ALL_ROWS if limit is None else limit,
-        "before_key": 2.0**62 if before is None else before,
-    }
-    return _rows.all(connection.execute(_newest_first, values))
+    query = newest_first(select(change), change.c.change_key, before=before, limit=limit)
+    query = query.where(change.c.clutch_id == clutch_id)
+    if run_id is not None:
+        query = query.where(change.c.run_id == run_id)
+    return _rows.all(connection.execute(query))
 
 
 def last_of_history(connection: Connection, clutch_id: str) -> int:
     """The revision of the last change of what the clutch's history holds, 0 where there was none."""
-    return connection.execute(_last_of_history, {"of_clutch": clutch_id}).scalar() or 0
+    of_history = (change.c.clutch_id == clutch_id, change.c.action.in_(OF_HISTORY))
+    return connection.execute(select(func.max(change.c.revision)).where(*of_history)).scalar() or 0

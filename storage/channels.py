@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-import sqlalchemy as sa
 from numpy.typing import NDArray
-from sqlalchemy import ColumnElement, Connection, Row, and_, bindparam, func, or_, select, tuple_, update
+from sqlalchemy import ColumnElement, Connection, and_, delete, func, or_, select, tuple_, update
 
 from storage.blobs import raw_stores
 from storage.blobs.raw_stores import RawStore
@@ -38,33 +37,9 @@ _FILE_LEVEL, _FILE_BLOCK = 1, 1 << 20
 #: Packed over plain bytes from which a file is kept as it was sent. Chosen; no table.
 _HARDLY_SHORTER = 0.95
 
-_insert = sa.insert(channel)
 _columns = select(
     channel.c.name, channel.c.codec, channel.c.length, channel.c.data, channel.c.blob, raw_store.c.address
 ).select_from(channel.outerjoin(raw_store, raw_store.c.store_key == channel.c.store_key))
-_of_run = _columns.where(channel.c.run_key == bindparam("of_run"), channel.c.name != FILE).order_by(channel.c.position)
-_lengths = (
-    select(channel.c.name, channel.c.length)
-    .where(channel.c.run_key == bindparam("of_run"), channel.c.name != FILE)
-    .order_by(channel.c.position)
-)
-_by_name = _columns.where(channel.c.run_key == bindparam("of_run"), channel.c.name == bindparam("wanted"))
-_samples = (
-    select(channel.c.run_key, channel.c.length)
-    .join(run, run.c.run_key == channel.c.run_key)
-    .where(run.c.clutch_id == bindparam("of_clutch"), channel.c.name == "time_s")
-)
-
-
-_LONG_HERE = (channel.c.blob.is_(None), func.length(channel.c.data) > MAX_INLINE)
-_elsewhere = (
-    select(channel.c.run_key, channel.c.name)
-    .where(tuple_(channel.c.run_key, channel.c.name) > tuple_(bindparam("after_key"), bindparam("after_name")))
-    .order_by(channel.c.run_key, channel.c.name)
-    .limit(bindparam("most"))
-)
-_remove = sa.delete(channel).where(channel.c.run_key == bindparam("of_run"), channel.c.name != FILE)
-_move = update(channel).where(channel.c.run_key == bindparam("of_run"), channel.c.name == bindparam("wanted"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,12 +125,12 @@ def write(connection: Connection, run_key: int, channels: Encoded) -> None:
         for position, (name, codec, length, data) in enumerate(channels.columns)
     ]
     if rows:
-        connection.execute(_insert, rows)
+        connection.execute(channel.insert(), rows)
 
 
 def rewrite(connection: Connection, run_key: int, channels: Encoded) -> None:
     """Store channels in the place of those that the run has; its file stays. Raises DatabaseBusy as `write` does."""
-    connection.execute(_remove, {"of_run": run_key})
+    connection.execute(delete(channel).where(channel.c.run_key == run_key, channel.c.name != FILE))
     write(connection, run_key, channels)
 
 
@@ -221,21 +196,26 @@ class Stored:
 
 def stored_of_run(connection: Connection, run_key: int) -> list[Stored]:
     """The channels of a run in the order they were sent, not fetched and not decoded; none for a run without."""
-    return [_stored(run_key, row) for row in connection.execute(_of_run, {"of_run": run_key})]
+    of_run = _columns.where(channel.c.run_key == run_key, channel.c.name != FILE).order_by(channel.c.position)
+    return [Stored(run_key, **row._asdict()) for row in connection.execute(of_run)]
 
 
 def file_of(connection: Connection, run_key: int) -> Stored | None:
     """The file that a run was read from, not fetched and not unpacked; None for a run that was sent otherwise."""
-    row = connection.execute(_by_name, {"of_run": run_key, "wanted": FILE}).first()
-    return None if row is None else _stored(run_key, row)
+    return _named(connection, run_key, FILE)
 
 
 def stored(connection: Connection, run_key: int, name: str) -> Stored:
     """One channel of a run likewise. Raises LookupError where the run has no such channel."""
-    row = connection.execute(_by_name, {"of_run": run_key, "wanted": name}).first()
-    if row is None:
+    found = _named(connection, run_key, name)
+    if found is None:
         raise LookupError(f"run {run_key} has no channel {name}")
-    return _stored(run_key, row)
+    return found
+
+
+def _named(connection: Connection, run_key: int, name: str) -> Stored | None:
+    row = connection.execute(_columns.where(channel.c.run_key == run_key, channel.c.name == name)).first()
+    return None if row is None else Stored(run_key, **row._asdict())
 
 
 def stored_elsewhere(
@@ -245,9 +225,11 @@ def stored_elsewhere(
     `after`: those in other stores and, for a store, long ones in the database."""
     condition: ColumnElement[bool] = channel.c.blob.is_not(None)
     if store is not None:
-        condition = or_(and_(channel.c.blob.is_not(None), channel.c.store_key != store.store_key), and_(*_LONG_HERE))
-    values = {"after_key": after[0], "after_name": after[1], "most": most}
-    return [(run_key, name) for run_key, name in connection.execute(_elsewhere.where(condition), values)]
+        long_here = and_(channel.c.blob.is_(None), func.length(channel.c.data) > MAX_INLINE)
+        condition = or_(and_(condition, channel.c.store_key != store.store_key), long_here)
+    keys = (channel.c.run_key, channel.c.name)
+    query = select(*keys).where(tuple_(*keys) > tuple_(*after), condition).order_by(*keys).limit(most)
+    return [(run_key, name) for run_key, name in connection.execute(query)]
 
 
 def move(connection: Connection, column: Stored, data: bytes, store: RawStore | None) -> None:
@@ -259,7 +241,8 @@ def move(connection: Connection, column: Stored, data: bytes, store: RawStore | 
     if store is not None:
         place = {"data": b"", "blob": name_of(data), "store_key": store.store_key}
         _refuse_removed(connection, store, [place["blob"]])
-    connection.execute(_move, {"of_run": column.run_key, "wanted": column.name} | place)
+    this = update(channel).where(channel.c.run_key == column.run_key, channel.c.name == column.name)
+    connection.execute(this.values(place))
 
 
 def _refuse_removed(connection: Connection, store: RawStore, blobs: Iterable[str]) -> None:
@@ -281,15 +264,13 @@ def read(connection: Connection, run_key: int) -> dict[str, NDArray[np.float64]]
 
 def lengths(connection: Connection, run_key: int) -> dict[str, int]:
     """How many values each channel of a run has, in the order they were sent; no values are read."""
-    rows = connection.execute(_lengths, {"of_run": run_key})
+    query = select(channel.c.name, channel.c.length).where(channel.c.run_key == run_key, channel.c.name != FILE)
+    rows = connection.execute(query.order_by(channel.c.position))
     return {name: length for name, length in rows}  # noqa: C416  (rows are no pairs to mypy)
 
 
 def samples(connection: Connection, clutch_id: str) -> dict[int, int]:
     """run_key -> how many samples its record has, of the runs of a clutch that are sampled records."""
-    rows = connection.execute(_samples, {"of_clutch": clutch_id})
+    query = select(channel.c.run_key, channel.c.length).join(run, run.c.run_key == channel.c.run_key)
+    rows = connection.execute(query.where(run.c.clutch_id == clutch_id, channel.c.name == "time_s"))
     return {run_key: length for run_key, length in rows}  # noqa: C416  (rows are no pairs to mypy)
-
-
-def _stored(run_key: int, row: Row[*tuple[Any, ...]]) -> Stored:
-    return Stored(run_key, **row._asdict())

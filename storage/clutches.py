@@ -4,8 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import sqlalchemy as sa
-from sqlalchemy import Connection, Select, Text, Update, bindparam, case, func, select, tuple_, update
+from sqlalchemy import Connection, Select, case, func, select, tuple_, update
 
 from storage.dialects import among, json_fields
 from storage.encoding import Json, Rows, to_text
@@ -61,48 +60,28 @@ class Counts:
 
 
 _stored = Rows(ClutchRow)
-_insert = sa.insert(clutch)
-_of_wanted = clutch.c.clutch_id == bindparam("wanted")
-_by_id = select(clutch).where(_of_wanted)
 #: What stands for itself in a pattern.
 _ESCAPED = str.maketrans({sign: f"/{sign}" for sign in "%_/"})
-_rows = select(clutch).where(clutch.c.clutch_id.in_(bindparam("wanted", expanding=True)))
-_ids_of_page = select(clutch.c.clutch_id).limit(bindparam("most")).offset(bindparam("left_out"))
-_worst_first = _ids_of_page.order_by(clutch.c.rank, clutch.c.clutch_id)
-_by_name = _ids_of_page.order_by(clutch.c.clutch_id)
 _kind = json_fields(clutch.c.record, "friction_material", "reaction_plate", "fluid")
-_by_kind = _ids_of_page.order_by(_kind, clutch.c.rank, clutch.c.clutch_id)
-_after = tuple_(clutch.c.rank, clutch.c.clutch_id) > tuple_(bindparam("after_rank"), bindparam("after_id"))
-_after_name = clutch.c.clutch_id > bindparam("after_id")
+_worst_first = (clutch.c.rank, clutch.c.clutch_id)
 _with_held_runs = clutch.c.clutch_id.in_(select(run.c.clutch_id).where(HELD_ONLY))
-_states = select(clutch.c.state, func.count()).group_by(clutch.c.state)
 _number = select(func.count()).select_from(clutch)
-_below = (clutch.c.rank > 0, clutch.c.rank < bindparam("below"))
-_life_as_disputed = case(
-    (clutch.c.disputed == bindparam("life", type_=Text), bindparam("if_disputed", type_=Text)),
-    else_=bindparam("else", type_=Text),
-)
-_set = update(clutch).where(_of_wanted)
-_set_summary, _bump = _set.values(state=_life_as_disputed), _set.values(revision=clutch.c.revision + 1)
-_revision: Select[int] = select(clutch.c.revision).where(_of_wanted)
-_ids = select(clutch.c.clutch_id).order_by(clutch.c.clutch_id)
-_revisions = select(clutch.c.clutch_id, clutch.c.revision).order_by(clutch.c.clutch_id)
 
 
 def insert(connection: Connection, row: ClutchRow) -> None:
     """Store a new clutch. Raises IntegrityError where its id is taken."""
-    connection.execute(_insert, _stored.values(row, searched=_searched(row.clutch_id, row.record)))
+    connection.execute(clutch.insert(), _stored.values(row, searched=_searched(row.clutch_id, row.record)))
 
 
 def get(connection: Connection, clutch_id: str) -> ClutchRow | None:
-    return _stored.first(connection.execute(_by_id, {"wanted": clutch_id}))
+    return _stored.first(connection.execute(select(clutch).where(clutch.c.clutch_id == clutch_id)))
 
 
 def page(
     connection: Connection,
     choice: Choice = Choice(),
     *,
-    limit: int,
+    limit: int | None,
     after: tuple[float, str] | None = None,
     left_out: int = 0,
     by_name: bool = False,
@@ -111,53 +90,47 @@ def page(
     """At most `limit` clutches of a choice, worst first, or by their ids: then none is left out or repeated however ranks
     change between two pages. `after` is the (rank, clutch_id) of the last clutch of the page before; the first `left_out`
     behind it are passed over. `by_kind`: those of the same materials and fluid together, worst first; without `after`."""
-    query, values = _chosen(_by_kind if by_kind else _by_name if by_name else _worst_first, choice)
-    values |= {"most": limit, "left_out": left_out}
+    order = (clutch.c.clutch_id,) if by_name else (_kind, *_worst_first) if by_kind else _worst_first
+    query = _chosen(select(clutch.c.clutch_id), choice).order_by(*order).limit(limit).offset(left_out)
     if after is not None:
-        query = query.where(_after_name if by_name else _after)
-        values |= {"after_id": after[1]} if by_name else {"after_rank": after[0], "after_id": after[1]}
+        query = query.where(clutch.c.clutch_id > after[1] if by_name else tuple_(*_worst_first) > tuple_(*after))
     # their ids by an index alone, however many are passed over; then the rows
-    ids = list(connection.execute(query, values).scalars())
-    rows = {row.clutch_id: row for row in _stored.all(connection.execute(_rows, {"wanted": ids}))}
+    ids = list(connection.execute(query).scalars())
+    found = _stored.all(connection.execute(select(clutch).where(clutch.c.clutch_id.in_(ids))))
+    rows = {row.clutch_id: row for row in found}
     return [rows[clutch_id] for clutch_id in ids]
 
 
 def counts(connection: Connection, choice: Choice) -> Counts:
-    by_state, values = _chosen(_states, choice)
-    with_held, _ = _chosen(_number.where(_with_held_runs), choice)
+    by_state = _chosen(select(clutch.c.state, func.count()), choice).group_by(clutch.c.state)
     return Counts(
-        states={state: int(number) for state, number in connection.execute(by_state, values)},
-        held=connection.execute(with_held, values).scalar_one(),
+        states={state: int(number) for state, number in connection.execute(by_state)},
+        held=connection.execute(_chosen(_number, choice).where(_with_held_runs)).scalar_one(),
     )
 
 
 def at_rank(connection: Connection, choice: Choice, share: float, *, below: float) -> ClutchRow | None:
     """The clutch that this share of a choice is worse than, of those with a rank between 0 and `below`; None without any."""
-    counted, values = _chosen(_number.where(*_below), choice)
-    number: int = connection.execute(counted, values | {"below": below}).scalar_one()
-    query, _ = _chosen(_worst_first.where(*_below), choice)
-    values |= {"below": below, "most": 1, "left_out": int(share * max(0, number - 1))}
-    clutch_id = connection.execute(query, values).scalar()
+    ranked = (clutch.c.rank > 0, clutch.c.rank < below)
+    number: int = connection.execute(_chosen(_number, choice).where(*ranked)).scalar_one()
+    ids = _chosen(select(clutch.c.clutch_id), choice).where(*ranked).order_by(*_worst_first)
+    clutch_id = connection.execute(ids.limit(1).offset(int(share * max(0, number - 1)))).scalar()
     return None if clutch_id is None else get(connection, clutch_id)
 
 
-def _chosen(query: Select[Any], choice: Choice) -> tuple[Select[Any], dict[str, object]]:
-    """A query of a choice's clutches alone, with its parameters."""
-    query = query.where(clutch.c.archived == bindparam("of_archived"))
-    values: dict[str, object] = {"of_archived": int(choice.archived)}
+def _chosen(query: Select[Any], choice: Choice) -> Select[Any]:
+    """A query of a choice's clutches alone."""
+    query = query.where(clutch.c.archived == int(choice.archived))
     if choice.only is not None:
-        query, values = (
-            query.where(among(clutch.c.clutch_id, "of_only")),
-            values | {"of_only": to_text(sorted(choice.only))},
-        )
+        query = query.where(among(clutch.c.clutch_id, sorted(choice.only)))
     if choice.state is not None:
-        query, values = query.where(clutch.c.state == bindparam("of_state")), values | {"of_state": choice.state}
+        query = query.where(clutch.c.state == choice.state)
     if choice.held:
         query = query.where(_with_held_runs)
     if choice.find:
-        query = query.where(clutch.c.searched.like(bindparam("of_find"), escape="/"))
-        values["of_find"] = f"%{choice.find.casefold().translate(_ESCAPED)}%"
-    return query, values
+        pattern = f"%{choice.find.casefold().translate(_ESCAPED)}%"
+        query = query.where(clutch.c.searched.like(pattern, escape="/"))
+    return query
 
 
 def set_record(
@@ -171,7 +144,7 @@ def set_record(
 ) -> None:
     """Replace a clutch's record, and whether lists leave it out. Raises LookupError on an unknown clutch."""
     fields = {"record": record, "content_sha256": content_sha256, "registered": registered, "archived": archived}
-    _change(connection, _set, clutch_id, _stored.columns(**fields) | {"searched": _searched(clutch_id, record)})
+    _change(connection, clutch_id, _stored.columns(**fields) | {"searched": _searched(clutch_id, record)})
 
 
 def set_summary(
@@ -179,35 +152,35 @@ def set_summary(
 ) -> None:
     """Replace what lists show of a clutch: `state` is its state's name, or `if_disputed` where `life` is in dispute. Raises
     LookupError on an unknown one."""
-    states = {"life": life, "else": state, "if_disputed": if_disputed}
-    _change(connection, _set_summary, clutch_id, {"rank": rank, "summary": to_text(summary)} | states)
+    state_name = case((clutch.c.disputed == life, if_disputed), else_=state)
+    _change(connection, clutch_id, {"rank": rank, "summary": to_text(summary), "state": state_name})
 
 
 def set_disputed(connection: Connection, clutch_id: str, disputed: str | None, *, state: str) -> None:
     """Note of which life data and model are in dispute, None: of none, and the state that follows. Raises LookupError on an
     unknown clutch."""
-    _change(connection, _set, clutch_id, {"disputed": disputed, "state": state})
+    _change(connection, clutch_id, {"disputed": disputed, "state": state})
 
 
 def set_silent(connection: Connection, clutch_id: str, silent: str | None, *, state: str) -> None:
     """Note since when a clutch's rig has sent nothing, None: it has, and the state that follows. Raises LookupError on an
     unknown clutch."""
-    _change(connection, _set, clutch_id, {"silent": silent, "state": state})
+    _change(connection, clutch_id, {"silent": silent, "state": state})
 
 
-def _change(connection: Connection, statement: Update, clutch_id: str, columns: Mapping[str, object]) -> None:
-    if connection.execute(statement, {"wanted": clutch_id} | dict(columns)).rowcount != 1:
+def _change(connection: Connection, clutch_id: str, columns: Mapping[str, object]) -> None:
+    if connection.execute(update(clutch).where(clutch.c.clutch_id == clutch_id).values(columns)).rowcount != 1:
         raise LookupError(f"clutch {clutch_id!r} is not stored")
 
 
 def bump_revision(connection: Connection, clutch_id: str) -> int:
     """Raise the clutch's revision by one and return it. Raises LookupError on an unknown one."""
-    _change(connection, _bump, clutch_id, {})
-    return connection.execute(_revision, {"wanted": clutch_id}).scalar_one()
+    _change(connection, clutch_id, {"revision": clutch.c.revision + 1})
+    return int(connection.execute(select(clutch.c.revision).where(clutch.c.clutch_id == clutch_id)).scalar_one())
 
 
 def revision(connection: Connection, clutch_id: str) -> int | None:
-    return connection.execute(_revision, {"wanted": clutch_id}).scalar_one_or_none()
+    return connection.execute(select(clutch.c.revision).where(clutch.c.clutch_id == clutch_id)).scalar_one_or_none()
 
 
 def count(connection: Connection) -> int:
@@ -223,11 +196,12 @@ def count_within(connection: Connection, ranks: Sequence[float]) -> dict[float, 
 
 
 def all_ids(connection: Connection) -> list[str]:
-    return list(connection.execute(_ids).scalars())
+    return list(connection.execute(select(clutch.c.clutch_id).order_by(clutch.c.clutch_id)).scalars())
 
 
 def revisions(connection: Connection) -> dict[str, int]:
-    return {row.clutch_id: row.revision for row in connection.execute(_revisions)}
+    rows = connection.execute(select(clutch.c.clutch_id, clutch.c.revision).order_by(clutch.c.clutch_id))
+    return {row.clutch_id: row.revision for row in rows}
 
 
 def _searched(clutch_id: str, record: Json) -> str:

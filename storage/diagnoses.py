@@ -5,10 +5,9 @@ finished diagnosis.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import sqlalchemy as sa
-from sqlalchemy import Connection, Double, bindparam, select, update
+from sqlalchemy import Connection, func, select, update
 
-from storage.dialects import json_fields
+from storage.dialects import json_fields, newest_first
 from storage.encoding import Json, Rows, to_object
 from storage.runs import ACCEPTED
 from storage.tables import adopted_model, diagnosis, run
@@ -46,66 +45,56 @@ class DiagnosisRow(NewDiagnosis):
 
 
 _new, _rows = Rows(NewDiagnosis), Rows(DiagnosisRow)
-_insert = sa.insert(diagnosis)
-_of_clutch = diagnosis.c.clutch_id == bindparam("of_clutch")
-_by_id = select(diagnosis).where(_of_clutch, diagnosis.c.diagnosis_id == bindparam("wanted"))
-_newest = (
-    select(diagnosis)
-    .where(_of_clutch, diagnosis.c.diagnosis_key < bindparam("before", type_=Double))
-    .order_by(diagnosis.c.diagnosis_key.desc())
-    .limit(bindparam("most"))
-)
-_same = (
-    select(diagnosis.c.diagnosis_id)
-    .where(
-        _of_clutch,
-        diagnosis.c.status == RUNNING,
-        diagnosis.c.last_run_key == bindparam("up_to"),
-        diagnosis.c.revision >= bindparam("since"),
-    )
-    .order_by(diagnosis.c.diagnosis_key)
-)
-_end = update(diagnosis).where(diagnosis.c.diagnosis_id == bindparam("wanted"), diagnosis.c.status == RUNNING)
-_last_run = select(sa.func.max(run.c.run_key)).where(run.c.clutch_id == bindparam("of_clutch"), run.c.state == ACCEPTED)
 
 
 def insert(connection: Connection, row: NewDiagnosis) -> None:
     """Store a diagnosis that is running. Raises IntegrityError where its clutch is unknown or its id taken."""
-    connection.execute(_insert, _new.values(row, status=RUNNING))
+    connection.execute(diagnosis.insert(), _new.values(row, status=RUNNING))
 
 
 def get(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisRow | None:
-    return _rows.first(connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": diagnosis_id}))
+    of_id = (diagnosis.c.clutch_id == clutch_id, diagnosis.c.diagnosis_id == diagnosis_id)
+    return _rows.first(connection.execute(select(diagnosis).where(*of_id)))
 
 
 def page(connection: Connection, clutch_id: str, *, limit: int, before: float | None = None) -> list[DiagnosisRow]:
     """At most `limit` diagnoses, newest first; `before` is the key of the last diagnosis of the page before."""
-    values = {"of_clutch": clutch_id, "most": limit, "before": 2.0**62 if before is None else before}
-    return _rows.all(connection.execute(_newest, values))
+    of_clutch = select(diagnosis).where(diagnosis.c.clutch_id == clutch_id)
+    query = newest_first(of_clutch, diagnosis.c.diagnosis_key, before=before, limit=limit)
+    return _rows.all(connection.execute(query))
 
 
 def running(connection: Connection, clutch_id: str, last_run_key: int, *, since: int = 0) -> list[str]:
     """The ids of the diagnoses of the same runs that are running, oldest first; `since` is the revision of their last
     change."""
-    values = {"of_clutch": clutch_id, "up_to": last_run_key, "since": since}
-    return list(connection.execute(_same, values).scalars())
+    query = select(diagnosis.c.diagnosis_id).where(
+        diagnosis.c.clutch_id == clutch_id,
+        diagnosis.c.status == RUNNING,
+        diagnosis.c.last_run_key == last_run_key,
+        diagnosis.c.revision >= since,
+    )
+    return list(connection.execute(query.order_by(diagnosis.c.diagnosis_key)).scalars())
 
 
 def finish(connection: Connection, diagnosis_id: str, at: str, report: Json, extension: Json | None) -> bool:
     """Store the report of a running diagnosis; False where it is no longer running."""
-    ended = _rows.columns(status=FINISHED, finished_at=at, report=report, extension=extension)
-    return connection.execute(_end, {"wanted": diagnosis_id} | ended).rowcount == 1
+    return _end(connection, diagnosis_id, status=FINISHED, finished_at=at, report=report, extension=extension)
 
 
 def fail(connection: Connection, diagnosis_id: str, at: str, problem: str) -> bool:
     """Store why a running diagnosis has no report; False where it is no longer running."""
-    ended = {"status": FAILED, "finished_at": at, "problem": problem}
-    return connection.execute(_end, {"wanted": diagnosis_id} | ended).rowcount == 1
+    return _end(connection, diagnosis_id, status=FAILED, finished_at=at, problem=problem)
+
+
+def _end(connection: Connection, diagnosis_id: str, **fields: object) -> bool:
+    this = update(diagnosis).where(diagnosis.c.diagnosis_id == diagnosis_id, diagnosis.c.status == RUNNING)
+    return connection.execute(this.values(_rows.columns(**fields))).rowcount == 1
 
 
 def last_run_key(connection: Connection, clutch_id: str) -> int:
     """The key of the clutch's accepted run that was stored last, 0 where there is none."""
-    return connection.execute(_last_run, {"of_clutch": clutch_id}).scalar() or 0
+    accepted = (run.c.clutch_id == clutch_id, run.c.state == ACCEPTED)
+    return connection.execute(select(func.max(run.c.run_key)).where(*accepted)).scalar() or 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +116,7 @@ class VerdictRow:
 
 _later = diagnosis.alias("later")
 _newest_verdicts = (
-    select(sa.func.max(_later.c.diagnosis_key))
+    select(func.max(_later.c.diagnosis_key))
     .where(_later.c.clutch_id == diagnosis.c.clutch_id, _later.c.status == FINISHED)
     .scalar_subquery()
 )
@@ -146,13 +135,13 @@ _verdicts = select(
     _short.label("short"),
     diagnosis.c.extension.is_not(None).label("adoptable"),
     (_in_force == diagnosis.c.diagnosis_id).label("adopted"),
-).where(diagnosis.c.clutch_id.in_(bindparam("wanted", expanding=True)), diagnosis.c.diagnosis_key == _newest_verdicts)
+).where(diagnosis.c.diagnosis_key == _newest_verdicts)
 
 
 def newest(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, VerdictRow]:
     """clutch_id -> its newest finished diagnosis, where it has one."""
     verdicts: dict[str, VerdictRow] = {}
-    for row in connection.execute(_verdicts, {"wanted": list(clutch_ids)}):
+    for row in connection.execute(_verdicts.where(diagnosis.c.clutch_id.in_(clutch_ids))):
         summary = to_object(row.short)
         verdicts[row.clutch_id] = VerdictRow(
             diagnosis_id=row.diagnosis_id,

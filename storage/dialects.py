@@ -5,6 +5,7 @@ JSON is text in both. Text is ordered by its code points in both, numbers are 64
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import sqlalchemy as sa
@@ -13,6 +14,8 @@ from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.compiler import SQLCompiler
 from sqlalchemy.sql.functions import FunctionElement
 from sqlalchemy.types import NullType, TypeEngine
+
+from storage.encoding import to_text
 
 
 class _NumberOrNull(sa.TypeDecorator[float]):
@@ -29,8 +32,6 @@ class _NumberOrNull(sa.TypeDecorator[float]):
 TEXT = sa.Text().with_variant(sa.Text(collation="C"), "postgresql")
 NUMBER: TypeEngine[float] = sa.REAL().with_variant(_NumberOrNull(), "postgresql")
 WHOLE = sa.Integer().with_variant(sa.BigInteger(), "postgresql")
-#: A LIMIT that leaves nothing out: more rows than an answer can hold.
-ALL_ROWS = 2**31 - 1
 
 
 class Pair(FunctionElement[Any]):
@@ -78,9 +79,9 @@ def json_length(column: sa.ColumnElement[str], *path: str) -> sa.ColumnElement[i
     return Pair(sa.func.json_array_length(column, _sqlite_path(path)), of_postgresql)
 
 
-def among(column: sa.ColumnElement[Any], parameter: str) -> sa.ColumnElement[bool]:
-    """Whether a column's value is one of the list that the parameter holds as JSON text, however long that is."""
-    parameter_list = sa.bindparam(parameter, type_=sa.Text)
+def among(column: sa.ColumnElement[Any], wanted: Sequence[str | int]) -> sa.ColumnElement[bool]:
+    """Whether a column's value is one of these, however many: they are one parameter, JSON text."""
+    parameter_list = sa.literal(to_text(list(wanted)), sa.Text)
     of_sqlite = sa.func.json_each(parameter_list).table_valued("value").c.value
     of_postgresql = sa.func.json_array_elements_text(sa.cast(parameter_list, sa.JSON)).table_valued("value").c.value
     return Pair(column.in_(sa.select(of_sqlite)), column.in_(sa.select(sa.cast(of_postgresql, column.type))))
@@ -92,19 +93,27 @@ def now_in_seconds() -> sa.ColumnElement[float]:
     return Pair(of_sqlite, sa.cast(sa.func.extract("epoch", sa.func.clock_timestamp()), sa.Double))
 
 
-def upsert(table: sa.Table) -> dict[str, sa.Insert]:
-    """dialect -> the INSERT that puts a row in the place of the one with the same primary key."""
-    keys = [column.name for column in table.primary_key]
-    value_columns = [column.name for column in table.columns if not column.primary_key]
-    of_sqlite, of_postgresql = sqlite.insert(table), postgresql.insert(table)
-    return {
-        "sqlite": of_sqlite.on_conflict_do_update(
-            index_elements=keys, set_={name: of_sqlite.excluded[name] for name in value_columns}
-        ),
-        "postgresql": of_postgresql.on_conflict_do_update(
-            index_elements=keys, set_={name: of_postgresql.excluded[name] for name in value_columns}
-        ),
-    }
+def newest_first(
+    query: sa.Select[Any], key: sa.ColumnElement[int], *, before: float | None, limit: int | None
+) -> sa.Select[Any]:
+    """At most `limit` rows of a query, the greatest key first; those whose key is less than `before`."""
+    if before is not None:
+        query = query.where(key < sa.literal(before, sa.Double))
+    return query.order_by(key.desc()).limit(limit)
+
+
+def upsert(connection: sa.Connection, table: sa.Table, rows: Sequence[dict[str, Any]]) -> None:
+    """Store rows, each in the place of the one with the same primary key."""
+    if rows:
+        connection.execute(_upsert(table, connection.dialect.name), rows)
+
+
+@cache
+def _upsert(table: sa.Table, dialect: str) -> sa.Insert:
+    insert: sqlite.Insert | postgresql.Insert
+    insert = sqlite.insert(table) if dialect == "sqlite" else postgresql.insert(table)
+    values = {column.name: insert.excluded[column.name] for column in table.columns if not column.primary_key}
+    return insert.on_conflict_do_update(index_elements=list(table.primary_key), set_=values)
 
 
 def _sqlite_path(path: Sequence[str | int]) -> str:

@@ -7,11 +7,10 @@ inspection that was withdrawn stays stored with its photographs.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import sqlalchemy as sa
-from sqlalchemy import Connection, bindparam, select, tuple_, update
+from sqlalchemy import Connection, select, tuple_, update
 
-from storage.dialects import ALL_ROWS, among
-from storage.encoding import Json, Rows, to_text
+from storage.dialects import among
+from storage.encoding import Json, Rows
 from storage.runs import ACCEPTED
 from storage.tables import inspection, inspection_photograph, photograph
 
@@ -49,73 +48,50 @@ class PhotographRow:
     received_by: str
 
 
-_new, _rows = Rows(NewInspection), Rows(InspectionRow)
-_shown = Rows(PhotographRow)
-_insert = sa.insert(inspection)
-_insert_photograph = sa.insert(photograph)
-_attach = sa.insert(inspection_photograph)
-_of_clutch = inspection.c.clutch_id == bindparam("of_clutch")
-_by_id = select(inspection).where(_of_clutch, inspection.c.inspection_id == bindparam("wanted"))
-_in_order = (
-    select(inspection)
-    .where(_of_clutch)
-    .order_by(inspection.c.cycles, inspection.c.inspection_id)
-    .limit(bindparam("most"))
-)
-_after = tuple_(inspection.c.cycles, inspection.c.inspection_id) > tuple_(bindparam("at"), bindparam("after_id"))
-_set_state = update(inspection).where(inspection.c.inspection_key == bindparam("wanted"))
+_new, _rows, _shown = Rows(NewInspection), Rows(InspectionRow), Rows(PhotographRow)
 _photographs = (
-    select(
-        inspection_photograph.c.inspection_key,
-        photograph.c.sha256,
-        photograph.c.media_type,
-        photograph.c.bytes,
-        inspection_photograph.c.received_at,
-        inspection_photograph.c.received_by,
-    )
+    select(inspection_photograph.c.inspection_key, *(photograph.c[name] for name in _shown.names[:3]))
+    .add_columns(inspection_photograph.c.received_at, inspection_photograph.c.received_by)
     .join(photograph, photograph.c.sha256 == inspection_photograph.c.sha256)
-    .where(among(inspection_photograph.c.inspection_key, "of_keys"))
     .order_by(inspection_photograph.c.inspection_key, inspection_photograph.c.position)
-)
-_stored = select(photograph.c.sha256).where(photograph.c.sha256 == bindparam("wanted"))
-_data = (
-    select(photograph.c.data)
-    .join(inspection_photograph, inspection_photograph.c.sha256 == photograph.c.sha256)
-    .where(inspection_photograph.c.inspection_key == bindparam("of_key"), photograph.c.sha256 == bindparam("wanted"))
 )
 
 
 def insert(connection: Connection, row: NewInspection) -> int:
     """Store a new inspection and return its key. Raises IntegrityError where the clutch is unknown or has this id."""
-    inspection_key: int = next(iter(connection.execute(_insert, _new.values(row)).inserted_primary_key or ()))
+    inspection_key: int = next(
+        iter(connection.execute(inspection.insert(), _new.values(row)).inserted_primary_key or ())
+    )
     return inspection_key
 
 
 def get(connection: Connection, clutch_id: str, inspection_id: str) -> InspectionRow | None:
-    return _rows.first(connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": inspection_id}))
+    of_id = (inspection.c.clutch_id == clutch_id, inspection.c.inspection_id == inspection_id)
+    return _rows.first(connection.execute(select(inspection).where(*of_id)))
 
 
 def page(
     connection: Connection, clutch_id: str, *, limit: int | None = None, after: tuple[float, str] | None = None
 ) -> list[InspectionRow]:
     """Inspections of a clutch by cycles, at most `limit`, behind `after`, the (cycles, inspection_id) of another."""
-    values: dict[str, object] = {"of_clutch": clutch_id, "most": ALL_ROWS if limit is None else limit}
-    query = _in_order
+    order = (inspection.c.cycles, inspection.c.inspection_id)
+    query = select(inspection).where(inspection.c.clutch_id == clutch_id).order_by(*order).limit(limit)
     if after is not None:
-        query, values = query.where(_after), values | {"at": after[0], "after_id": after[1]}
-    return _rows.all(connection.execute(query, values))
+        query = query.where(tuple_(*order) > tuple_(*after))
+    return _rows.all(connection.execute(query))
 
 
 def set_state(connection: Connection, inspection_key: int, state: str) -> None:
     """Withdraw an inspection or take that back. Raises LookupError on an unknown one."""
-    if connection.execute(_set_state, {"wanted": inspection_key, "state": state}).rowcount != 1:
+    this = update(inspection).where(inspection.c.inspection_key == inspection_key)
+    if connection.execute(this.values(state=state)).rowcount != 1:
         raise LookupError(f"inspection {inspection_key} is not stored")
 
 
 def photographs(connection: Connection, inspection_keys: Sequence[int]) -> dict[int, list[PhotographRow]]:
     """inspection_key -> the photographs of those inspections in the order in which they came, without their content."""
     of_keys: dict[int, list[PhotographRow]] = {key: [] for key in inspection_keys}
-    rows = connection.execute(_photographs, {"of_keys": to_text(list(inspection_keys))})
+    rows = connection.execute(_photographs.where(among(inspection_photograph.c.inspection_key, inspection_keys)))
     of = _shown.reader(rows)
     for row in rows:
         of_keys[row.inspection_key].append(of(row))
@@ -124,15 +100,20 @@ def photographs(connection: Connection, inspection_keys: Sequence[int]) -> dict[
 
 def data(connection: Connection, inspection_key: int, sha256: str) -> bytes | None:
     """The content of a photograph of that inspection, None where it has no such one."""
-    content: bytes | None = connection.execute(_data, {"of_key": inspection_key, "wanted": sha256}).scalar()
+    of_inspection = select(photograph.c.data).join(
+        inspection_photograph, inspection_photograph.c.sha256 == photograph.c.sha256
+    )
+    wanted = (inspection_photograph.c.inspection_key == inspection_key, photograph.c.sha256 == sha256)
+    content: bytes | None = connection.execute(of_inspection.where(*wanted)).scalar()
     return content
 
 
 def attach(connection: Connection, inspection_key: int, row: PhotographRow, content: bytes, *, position: int) -> None:
     """Add a photograph to an inspection; its content is stored where it is not there yet. Raises IntegrityError where the
     inspection has it already."""
-    if connection.execute(_stored, {"wanted": row.sha256}).first() is None:
+    if connection.execute(select(photograph.c.sha256).where(photograph.c.sha256 == row.sha256)).first() is None:
         stored = {"sha256": row.sha256, "media_type": row.media_type, "bytes": row.bytes, "data": content}
-        connection.execute(_insert_photograph, stored)
+        connection.execute(photograph.insert(), stored)
     attached = {"received_at": row.received_at, "received_by": row.received_by, "position": position}
-    connection.execute(_attach, attached | {"inspection_key": inspection_key, "sha256": row.sha256})
+    attached |= {"inspection_key": inspection_key, "sha256": row.sha256}
+    connection.execute(inspection_photograph.insert(), attached)

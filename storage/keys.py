@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-import sqlalchemy as sa
-from sqlalchemy import Connection, bindparam, exists, or_, select, update
+from sqlalchemy import Connection, exists, or_, select, update
 
 from storage.encoding import Rows
 from storage.tables import access_key
@@ -29,42 +28,35 @@ class KeyRow:
 
 
 _rows = Rows(KeyRow)
-_insert = sa.insert(access_key)
 _active = access_key.c.revoked_at.is_(None)
-_any = select(exists(select(access_key.c.key_id)))
-_any_active = select(
-    exists().where(_active, or_(access_key.c.expires_at.is_(None), access_key.c.expires_at > bindparam("at")))
-)
-_all = select(access_key).order_by(access_key.c.created_at, access_key.c.key_id)
-_of_wanted = access_key.c.key_id == bindparam("wanted")
-_set = update(access_key).where(_of_wanted)
-_revoke = _set.where(_active)
 
 
 def insert(connection: Connection, row: KeyRow) -> None:
     """Store a new key. Raises IntegrityError where its id or its secret is taken."""
-    connection.execute(_insert, _rows.values(row))
+    connection.execute(access_key.insert(), _rows.values(row))
 
 
 def any_ever(connection: Connection) -> bool:
     """Whether a key was ever made: from then on one is always needed."""
-    return bool(connection.execute(_any).scalar_one())
+    return bool(connection.execute(select(exists(select(access_key.c.key_id)))).scalar_one())
 
 
 def any_active(connection: Connection, at: str) -> bool:
     """Whether any key grants something at that time."""
-    return bool(connection.execute(_any_active, {"at": at}).scalar_one())
+    unexpired = or_(access_key.c.expires_at.is_(None), access_key.c.expires_at > at)
+    return bool(connection.execute(select(exists().where(_active, unexpired))).scalar_one())
 
 
 def all_keys(connection: Connection) -> list[KeyRow]:
     """All keys, revoked ones too, oldest first."""
-    return _rows.all(connection.execute(_all))
+    return _rows.all(connection.execute(select(access_key).order_by(access_key.c.created_at, access_key.c.key_id)))
 
 
 def revoke(connection: Connection, key_id: str, revoked_at: str) -> bool:
     """Revoke a key; False where there is no active key of this id."""
-    return connection.execute(_revoke, {"wanted": key_id, "revoked_at": revoked_at}).rowcount == 1
+    of_key = update(access_key).where(access_key.c.key_id == key_id, _active)
+    return connection.execute(of_key.values(revoked_at=revoked_at)).rowcount == 1
 
 
 def note_use(connection: Connection, key_id: str, at: str) -> None:
-    connection.execute(_set, {"wanted": key_id, "last_used_at": at})
+    connection.execute(update(access_key).where(access_key.c.key_id == key_id).values(last_used_at=at))

@@ -7,11 +7,11 @@ a row a clutch, method and pressure.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-import sqlalchemy as sa
 from numpy.typing import NDArray
-from sqlalchemy import Connection, bindparam, delete, select
+from sqlalchemy import Connection, Select, delete, select
 
 from storage.dialects import upsert
 from storage.encoding import Json, Rows
@@ -52,35 +52,20 @@ class FitRow:
 
 _MATRICES = ("covariance", "unbiased_covariance")
 _fits = Rows(FitRow)
-_fit_insert = sa.insert(fit)
-_fit_delete = delete(fit).where(fit.c.run_key == bindparam("of_run"))
-_fit_of_clutch = (
-    select(fit)
-    .join(run, run.c.run_key == fit.c.run_key)
-    .where(run.c.clutch_id == bindparam("of_clutch"))
-    .order_by(run.c.cycles, run.c.run_id, fit.c.pressure)
-)
-
-
-_fit_cofs_of_clutch = (
-    select(fit.c.run_key, fit.c.pressure, fit.c.mean_cof, fit.c.mean_cof_sd)
-    .join(run, run.c.run_key == fit.c.run_key)
-    .where(run.c.clutch_id == bindparam("of_clutch"), fit.c.mean_cof.is_not(None))
-    .order_by(fit.c.run_key, fit.c.pressure)
-)
 
 
 def write_fits(connection: Connection, run_key: int, rows: Sequence[FitRow]) -> None:
     """Store the fits of a run in place of those it had. Raises ValueError unless a covariance has 16 finite numbers."""
-    connection.execute(_fit_delete, {"of_run": run_key})
+    connection.execute(delete(fit).where(fit.c.run_key == run_key))
     if rows:
-        connection.execute(_fit_insert, [_fit_values(run_key, row) for row in rows])
+        connection.execute(fit.insert(), [_fit_values(run_key, row) for row in rows])
 
 
 def fits_of(connection: Connection, clutch_id: str) -> dict[int, list[FitRow]]:
     """The fits of a clutch's runs by run_key, runs in order, pressures ascending; runs without fits are left out."""
     fits: dict[int, list[FitRow]] = {}
-    rows = connection.execute(_fit_of_clutch, {"of_clutch": clutch_id})
+    query = select(fit).join(run, run.c.run_key == fit.c.run_key).where(run.c.clutch_id == clutch_id)
+    rows = connection.execute(query.order_by(run.c.cycles, run.c.run_id, fit.c.pressure))
     of = _fits.reader(rows)
     for row in rows:
         fits.setdefault(row.run_key, []).append(of(row))
@@ -90,7 +75,13 @@ def fits_of(connection: Connection, clutch_id: str) -> dict[int, list[FitRow]]:
 def cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, tuple[float, float]]]:
     """run_key -> pressure -> mean COF and its deviation, of all curves that determine it: as much as tracking needs."""
     cofs: dict[int, dict[float, tuple[float, float]]] = {}
-    for run_key, pressure, mean, deviation in connection.execute(_fit_cofs_of_clutch, {"of_clutch": clutch_id}):
+    query = (
+        select(fit.c.run_key, fit.c.pressure, fit.c.mean_cof, fit.c.mean_cof_sd)
+        .join(run, run.c.run_key == fit.c.run_key)
+        .where(run.c.clutch_id == clutch_id, fit.c.mean_cof.is_not(None))
+        .order_by(fit.c.run_key, fit.c.pressure)
+    )
+    for run_key, pressure, mean, deviation in connection.execute(query):
         cofs.setdefault(run_key, {})[pressure] = (mean, deviation)
     return cofs
 
@@ -118,43 +109,35 @@ class PredictionRow:
 
 
 _predictions = Rows(PredictionRow)
-_prediction_put = upsert(prediction)
-_prediction_of_clutch = prediction.c.clutch_id == bindparam("of_clutch")
-_prediction_series = select(prediction).where(
-    _prediction_of_clutch,
-    prediction.c.method == bindparam("of_method"),
-    prediction.c.pressure == bindparam("of_pressure"),
-)
-_prediction_history = _prediction_series.order_by(prediction.c.cycles)
-_prediction_last = _prediction_series.order_by(prediction.c.cycles.desc()).limit(1)
-_prediction_last_at = _prediction_last.where(prediction.c.cycles <= bindparam("at_most"))
-_prediction_clear = delete(prediction).where(_prediction_of_clutch)
 
 
 def put_predictions(connection: Connection, clutch_id: str, rows: Sequence[PredictionRow]) -> None:
     """Store predictions, each in place of the one of the same method, pressure and cycles."""
-    values = [_predictions.values(row, clutch_id=clutch_id) for row in rows]
-    if values:
-        connection.execute(_prediction_put[connection.dialect.name], values)
+    upsert(connection, prediction, [_predictions.values(row, clutch_id=clutch_id) for row in rows])
 
 
 def prediction_at(
     connection: Connection, clutch_id: str, method: str, pressure: float, at_cycles: float | None = None
 ) -> PredictionRow | None:
     """The last prediction of a series, or the last one not beyond `at_cycles`; None where there is none."""
-    values: dict[str, str | float] = {"of_clutch": clutch_id, "of_method": method, "of_pressure": pressure}
-    if at_cycles is None:
-        return _predictions.first(connection.execute(_prediction_last, values))
-    return _predictions.first(connection.execute(_prediction_last_at, {**values, "at_most": at_cycles}))
+    query = _series(clutch_id, method, pressure).order_by(prediction.c.cycles.desc()).limit(1)
+    if at_cycles is not None:
+        query = query.where(prediction.c.cycles <= at_cycles)
+    return _predictions.first(connection.execute(query))
 
 
 def predictions_of(connection: Connection, clutch_id: str, method: str, pressure: float) -> list[PredictionRow]:
-    values = {"of_clutch": clutch_id, "of_method": method, "of_pressure": pressure}
-    return _predictions.all(connection.execute(_prediction_history, values))
+    query = _series(clutch_id, method, pressure).order_by(prediction.c.cycles)
+    return _predictions.all(connection.execute(query))
+
+
+def _series(clutch_id: str, method: str, pressure: float) -> Select[Any]:
+    series = (prediction.c.clutch_id == clutch_id, prediction.c.method == method, prediction.c.pressure == pressure)
+    return select(prediction).where(*series)
 
 
 def clear_predictions(connection: Connection, clutch_id: str) -> None:
-    connection.execute(_prediction_clear, {"of_clutch": clutch_id})
+    connection.execute(delete(prediction).where(prediction.c.clutch_id == clutch_id))
 
 
 # --- filter states ---
@@ -172,23 +155,18 @@ class FilterStateRow:
 
 
 _states = Rows(FilterStateRow)
-_state_put = upsert(filter_state)
-_state_of_clutch = filter_state.c.clutch_id == bindparam("of_clutch")
-_state_get = select(filter_state).where(_state_of_clutch).order_by(filter_state.c.method, filter_state.c.pressure)
-_state_clear = delete(filter_state).where(_state_of_clutch)
 
 
 def put_filter_states(connection: Connection, clutch_id: str, rows: Sequence[FilterStateRow]) -> None:
     """Store states, each in place of the one of the same method and pressure."""
-    values = [_states.values(row, clutch_id=clutch_id) for row in rows]
-    if values:
-        connection.execute(_state_put[connection.dialect.name], values)
+    upsert(connection, filter_state, [_states.values(row, clutch_id=clutch_id) for row in rows])
 
 
 def filter_states_of(connection: Connection, clutch_id: str) -> dict[tuple[str, float], FilterStateRow]:
     """The states of a clutch by (method, pressure). Raises DamagedData, naming the state."""
     states = {}
-    rows = connection.execute(_state_get, {"of_clutch": clutch_id})
+    query = select(filter_state).where(filter_state.c.clutch_id == clutch_id)
+    rows = connection.execute(query.order_by(filter_state.c.method, filter_state.c.pressure))
     of = _states.reader(rows)
     for row in rows:
         try:
@@ -200,4 +178,4 @@ def filter_states_of(connection: Connection, clutch_id: str) -> dict[tuple[str, 
 
 
 def clear_filter_states(connection: Connection, clutch_id: str) -> None:
-    connection.execute(_state_clear, {"of_clutch": clutch_id})
+    connection.execute(delete(filter_state).where(filter_state.c.clutch_id == clutch_id))

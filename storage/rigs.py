@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import sqlalchemy as sa
-from sqlalchemy import Connection, bindparam, select
+from sqlalchemy import Connection, select
 
 from storage.dialects import upsert
 from storage.encoding import Json, Rows
@@ -26,28 +25,24 @@ class RigRow:
 
 
 _rows = Rows(RigRow)
-_insert = sa.insert(rig)
-_put = upsert(rig)
-_by_name = select(rig).where(rig.c.name == bindparam("wanted"))
-_in_order = select(rig).where(rig.c.name > bindparam("after")).order_by(rig.c.name).limit(bindparam("most"))
 
 
 def insert(connection: Connection, row: RigRow) -> None:
     """Store a new profile. Raises IntegrityError where the name is taken."""
-    connection.execute(_insert, _rows.values(row))
+    connection.execute(rig.insert(), _rows.values(row))
 
 
 def put(connection: Connection, row: RigRow) -> None:
-    connection.execute(_put[connection.dialect.name], _rows.values(row))
+    upsert(connection, rig, [_rows.values(row)])
 
 
 def get(connection: Connection, name: str) -> RigRow | None:
-    return _rows.first(connection.execute(_by_name, {"wanted": name}))
+    return _rows.first(connection.execute(select(rig).where(rig.c.name == name)))
 
 
 def page(connection: Connection, *, limit: int = MAX_AT_ONCE, after: str = "") -> list[RigRow]:
     """Profiles by name, at most `limit`, behind the name `after`."""
-    return _rows.all(connection.execute(_in_order, {"after": after, "most": limit}))
+    return _rows.all(connection.execute(select(rig).where(rig.c.name > after).order_by(rig.c.name).limit(limit)))
 
 
 def every(connection: Connection) -> Iterator[RigRow]:

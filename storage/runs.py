@@ -7,10 +7,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-import sqlalchemy as sa
-from sqlalchemy import Connection, Select, Text, bindparam, exists, func, or_, select, tuple_, update
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Select,
+    TextClause,
+    and_,
+    exists,
+    func,
+    select,
+    tuple_,
+    update,
+)
 
-from storage.dialects import ALL_ROWS, Pair, json_text, json_value
+from storage.dialects import Pair, json_text, json_value
 from storage.encoding import Json, Rows
 from storage.tables import HELD_ONLY, fit, run
 
@@ -85,69 +95,40 @@ class RunInOrder:
 
 
 _new, _stored, _listed = Rows(NewRun), Rows(RunRow), Rows(ReceiptRow)
-_insert = sa.insert(run)
-_of_clutch = run.c.clutch_id == bindparam("of_clutch")
-_by_id = select(run).where(_of_clutch, run.c.run_id == bindparam("wanted"))
-_CHOSEN = (
-    _of_clutch,
-    or_(bindparam("of_kind", type_=Text).is_(None), run.c.kind == bindparam("of_kind")),
-    or_(bindparam("of_state", type_=Text).is_(None), run.c.state == bindparam("of_state")),
-)
-_ordered = select(run).where(*_CHOSEN).order_by(run.c.cycles, run.c.run_id).limit(bindparam("most"))
-_receipts = _ordered.with_only_columns(*(run.c[name] for name in _listed.names))
-_after = tuple_(run.c.cycles, run.c.run_id) > tuple_(bindparam("after_cycles"), bindparam("after_id"))
-_fitted = exists().where(fit.c.run_key == run.c.run_key)
+_ORDER = (run.c.cycles, run.c.run_id)
 _LIGHT = tuple(field.name for field in fields(RunInOrder))
-_light_of_any = (
-    select(
-        *(run.c[name] for name in _LIGHT[:6]),
-        json_value(run.c.details, "speed_range", 0),
-        json_value(run.c.details, "speed_range", 1),
-        json_value(run.c.details, "event"),
-        run.c.doubts != "[]",
-        json_text(run.c.details, "shown"),
-        json_value(run.c.details, "reason"),
-        json_value(run.c.details, "oil_temperature"),
-        json_value(run.c.details, "duty", "cycles"),
-        json_value(run.c.details, "duty", "energy_per_cycle_kj"),
-        json_value(run.c.details, "duty", "initial_speed_rpm"),
-        json_value(run.c.details, "duty", "engagement_duration_s"),
-    )
-    .where(_of_clutch)
-    .order_by(run.c.cycles, run.c.run_id)
-)
-_light = _light_of_any.where(run.c.state == ACCEPTED)
-_rebuilds = _light.where(json_text(run.c.details, "event") == "rebuild")
-_set_aside = _light_of_any.where(run.c.state != ACCEPTED)
-_held_of = _light_of_any.where(HELD_ONLY)
-_held = (
-    select(run.c.clutch_id, func.count())
-    .where(HELD_ONLY, run.c.clutch_id.in_(bindparam("wanted", expanding=True)))
-    .group_by(run.c.clutch_id)
-)
-_held_of_all = select(func.count()).select_from(run).where(HELD_ONLY)
-#: Of SQLite's keys none is left out: the greatest one counts the runs, for none is ever deleted.
-_number = select(Pair(func.coalesce(func.max(run.c.run_key), 0), func.count(run.c.run_key)))
-_read_again_as = select(run).where(
-    _of_clutch, json_text(run.c.details, "file", "content_sha256") == bindparam("of_content")
-)
-_keys = select(run.c.run_id, run.c.run_key).where(_of_clutch)
-_set = update(run).where(run.c.run_key == bindparam("wanted"))
+_light = select(
+    *(run.c[name] for name in _LIGHT[:6]),
+    json_value(run.c.details, "speed_range", 0),
+    json_value(run.c.details, "speed_range", 1),
+    json_value(run.c.details, "event"),
+    run.c.doubts != "[]",
+    json_text(run.c.details, "shown"),
+    json_value(run.c.details, "reason"),
+    json_value(run.c.details, "oil_temperature"),
+    json_value(run.c.details, "duty", "cycles"),
+    json_value(run.c.details, "duty", "energy_per_cycle_kj"),
+    json_value(run.c.details, "duty", "initial_speed_rpm"),
+    json_value(run.c.details, "duty", "engagement_duration_s"),
+).order_by(*_ORDER)
+_held = select(run.c.clutch_id, func.count()).where(HELD_ONLY).group_by(run.c.clutch_id)
 
 
 def insert(connection: Connection, row: NewRun) -> int:
     """Store a new run and return its key. Raises IntegrityError where the clutch is unknown or has this run_id."""
-    run_key: int = next(iter(connection.execute(_insert, _new.values(row)).inserted_primary_key or ()))
+    run_key: int = next(iter(connection.execute(run.insert(), _new.values(row)).inserted_primary_key or ()))
     return run_key
 
 
 def get(connection: Connection, clutch_id: str, run_id: str) -> RunRow | None:
-    return _stored.first(connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": run_id}))
+    query = select(run).where(run.c.clutch_id == clutch_id, run.c.run_id == run_id)
+    return _stored.first(connection.execute(query))
 
 
 def read_again_as(connection: Connection, clutch_id: str, content_sha256: str) -> RunRow | None:
     """The run whose file was read again since it was sent, with that content; or None."""
-    return _stored.first(connection.execute(_read_again_as, {"of_clutch": clutch_id, "of_content": content_sha256}))
+    content = json_text(run.c.details, "file", "content_sha256") == content_sha256
+    return _stored.first(connection.execute(select(run).where(run.c.clutch_id == clutch_id, content)))
 
 
 def page(
@@ -164,9 +145,10 @@ def page(
 
     Of one kind or all, in one state or any; `fitted`: only runs through which a curve was fitted.
     """
-    query, values = _behind(_ordered.where(_fitted) if fitted else _ordered, after)
-    values |= {"of_clutch": clutch_id, "of_kind": kind, "of_state": state, "most": ALL_ROWS if limit is None else limit}
-    return _stored.all(connection.execute(query, values))
+    query = _chosen(select(run), clutch_id, after, kind, state).limit(limit)
+    if fitted:
+        query = query.where(exists().where(fit.c.run_key == run.c.run_key))
+    return _stored.all(connection.execute(query))
 
 
 def receipts(
@@ -179,50 +161,66 @@ def receipts(
     kind: str | None = None,
 ) -> list[ReceiptRow]:
     """Receipts with only the fields that a list shows."""
-    query, values = _behind(_receipts, after)
-    values |= {"of_clutch": clutch_id, "of_kind": kind, "of_state": state, "most": limit}
-    return _listed.all(connection.execute(query, values))
+    shown = select(*(run.c[name] for name in _listed.names))
+    return _listed.all(connection.execute(_chosen(shown, clutch_id, after, kind, state).limit(limit)))
 
 
-def _behind(query: Select[Any], after: tuple[float, str] | None) -> tuple[Select[Any], dict[str, object]]:
-    if after is None:
-        return query, {}
-    return query.where(_after), {"after_cycles": after[0], "after_id": after[1]}
+def _chosen(
+    query: Select[Any], clutch_id: str, after: tuple[float, str] | None, kind: str | None, state: str | None
+) -> Select[Any]:
+    query = query.where(run.c.clutch_id == clutch_id).order_by(*_ORDER)
+    if after is not None:
+        query = query.where(tuple_(*_ORDER) > tuple_(*after))
+    if kind is not None:
+        query = query.where(run.c.kind == kind)
+    if state is not None:
+        query = query.where(run.c.state == state)
+    return query
 
 
 def in_order(connection: Connection, clutch_id: str) -> list[RunInOrder]:
     """The accepted runs of a clutch in order, without their receipts."""
-    return _in_order(connection, _light, clutch_id)
+    return _in_order(connection, clutch_id, run.c.state == ACCEPTED)
 
 
 def rebuilds(connection: Connection, clutch_id: str) -> list[RunInOrder]:
-    return _in_order(connection, _rebuilds, clutch_id)
+    rebuild = json_text(run.c.details, "event") == "rebuild"
+    return _in_order(connection, clutch_id, and_(run.c.state == ACCEPTED, rebuild))
 
 
 def set_aside(connection: Connection, clutch_id: str) -> list[RunInOrder]:
     """The runs of a clutch that are held or were withdrawn, in order."""
-    return _in_order(connection, _set_aside, clutch_id)
+    return _in_order(connection, clutch_id, run.c.state != ACCEPTED)
 
 
 def held_of(connection: Connection, clutch_id: str) -> list[RunInOrder]:
-    return _in_order(connection, _held_of, clutch_id)
+    return _in_order(connection, clutch_id, HELD_ONLY)
+
+
+def _in_order(connection: Connection, clutch_id: str, chosen: ColumnElement[bool] | TextClause) -> list[RunInOrder]:
+    rows = connection.execute(_light.where(run.c.clutch_id == clutch_id, chosen))
+    return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in rows]
 
 
 def held(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, int]:
     """clutch_id -> the number of its runs that are held, for those of these clutches that have any."""
-    return {clutch_id: int(count) for clutch_id, count in connection.execute(_held, {"wanted": list(clutch_ids)})}
+    rows = connection.execute(_held.where(run.c.clutch_id.in_(clutch_ids)))
+    return {clutch_id: int(count) for clutch_id, count in rows}
 
 
 def count(connection: Connection) -> int:
-    return int(connection.execute(_number).scalar_one())
+    # of SQLite's keys none is left out: the greatest one counts the runs, for none is ever deleted
+    number = Pair(func.coalesce(func.max(run.c.run_key), 0), func.count(run.c.run_key))
+    return int(connection.execute(select(number)).scalar_one())
 
 
 def count_held(connection: Connection) -> int:
-    return connection.execute(_held_of_all).scalar_one()
+    return connection.execute(select(func.count()).select_from(run).where(HELD_ONLY)).scalar_one()
 
 
 def keys(connection: Connection, clutch_id: str) -> dict[str, int]:
-    return {row.run_id: row.run_key for row in connection.execute(_keys, {"of_clutch": clutch_id})}
+    rows = connection.execute(select(run.c.run_id, run.c.run_key).where(run.c.clutch_id == clutch_id))
+    return {row.run_id: row.run_key for row in rows}
 
 
 def set_results(connection: Connection, run_key: int, details: Json, receipt: Json, code_version: str) -> None:
@@ -243,10 +241,6 @@ def set_state(
 
 
 def _change(connection: Connection, run_key: int, **fields: object) -> None:
-    if connection.execute(_set, {"wanted": run_key} | _stored.columns(**fields)).rowcount != 1:
+    this = update(run).where(run.c.run_key == run_key)
+    if connection.execute(this.values(_stored.columns(**fields))).rowcount != 1:
         raise LookupError(f"run {run_key} is not stored")
-
-
-def _in_order(connection: Connection, query: Select[Any], clutch_id: str) -> list[RunInOrder]:
-    rows = connection.execute(query, {"of_clutch": clutch_id})
-    return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in rows]

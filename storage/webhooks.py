@@ -7,10 +7,9 @@ it is due again when the lease has run out. So each is sent at least once.
 from collections.abc import Collection
 from dataclasses import dataclass
 
-import sqlalchemy as sa
-from sqlalchemy import Connection, Double, bindparam, delete, func, select, update
+from sqlalchemy import Connection, delete, exists, func, select, update
 
-from storage.dialects import now_in_seconds
+from storage.dialects import newest_first, now_in_seconds
 from storage.encoding import Json, Rows
 from storage.tables import WAITING_ONLY, delivery, webhook
 
@@ -55,19 +54,6 @@ class DeliveryRow(NewDelivery):
 
 
 _receivers, _new, _deliveries = Rows(WebhookRow), Rows(NewDelivery), Rows(DeliveryRow)
-_insert = sa.insert(webhook)
-_by_id = select(webhook).where(webhook.c.webhook_id == bindparam("wanted"))
-_in_order = select(webhook).where(webhook.c.webhook_id > bindparam("after")).order_by(webhook.c.webhook_id)
-_delete = delete(webhook).where(webhook.c.webhook_id == bindparam("wanted"))
-_delete_deliveries = delete(delivery).where(delivery.c.webhook_id == bindparam("wanted"))
-_insert_delivery = sa.insert(delivery)
-_delivery = select(delivery).where(delivery.c.delivery_id == bindparam("wanted"))
-_newest = (
-    select(delivery)
-    .where(delivery.c.webhook_id == bindparam("wanted"), delivery.c.delivery_key < bindparam("before", type_=Double))
-    .order_by(delivery.c.delivery_key.desc())
-    .limit(bindparam("most"))
-)
 _of_same = delivery.alias("of_same")
 _oldest_of_each = (
     select(func.min(_of_same.c.delivery_key))
@@ -76,79 +62,67 @@ _oldest_of_each = (
 )
 _due = (
     select(delivery.c.delivery_key)
-    .where(
-        WAITING_ONLY,
-        delivery.c.delivery_key.in_(_oldest_of_each),
-        delivery.c.webhook_id.not_in(bindparam("passing", expanding=True)),
-    )
+    .where(WAITING_ONLY, delivery.c.delivery_key.in_(_oldest_of_each))
     .order_by(delivery.c.due)
-    .limit(bindparam("most"))
     .with_for_update(skip_locked=True, of=delivery)
 )
-_any_due = select(sa.exists(select(delivery.c.delivery_key).where(WAITING_ONLY, delivery.c.due <= now_in_seconds())))
-_number = delivery.c.delivery_key == bindparam("wanted")
-_claim = (
-    update(delivery)
-    .where(_number)
-    .values(due=now_in_seconds() + bindparam("lease", type_=Double), attempts=delivery.c.attempts + 1)
-)
-_claimed = select(delivery).where(_number)
-_paused = now_in_seconds() + bindparam("pause", type_=Double)
-_end = update(delivery).where(_number, WAITING_ONLY).values(due=_paused)
-_release_all = update(delivery).where(WAITING_ONLY, delivery.c.last_attempt_at.is_(None)).values(due=0.0)
-_waiting = select(func.count()).select_from(delivery).where(WAITING_ONLY)
 
 
 def insert(connection: Connection, row: WebhookRow) -> None:
     """Store a receiver. Raises IntegrityError where its name is taken."""
-    connection.execute(_insert, _receivers.values(row))
+    connection.execute(webhook.insert(), _receivers.values(row))
 
 
 def get(connection: Connection, webhook_id: str) -> WebhookRow | None:
-    return _receivers.first(connection.execute(_by_id, {"wanted": webhook_id}))
+    return _receivers.first(connection.execute(select(webhook).where(webhook.c.webhook_id == webhook_id)))
 
 
 def page(connection: Connection, *, limit: int | None = None, after: str = "") -> list[WebhookRow]:
     """Receivers by name, behind the name `after`."""
-    query = _in_order if limit is None else _in_order.limit(limit)
-    return _receivers.all(connection.execute(query, {"after": after}))
+    query = select(webhook).where(webhook.c.webhook_id > after).order_by(webhook.c.webhook_id).limit(limit)
+    return _receivers.all(connection.execute(query))
 
 
 def remove(connection: Connection, webhook_id: str) -> None:
     """Delete a receiver with its secret, and all that was sent or is to be sent to it."""
-    connection.execute(_delete_deliveries, {"wanted": webhook_id})
-    connection.execute(_delete, {"wanted": webhook_id})
+    connection.execute(delete(delivery).where(delivery.c.webhook_id == webhook_id))
+    connection.execute(delete(webhook).where(webhook.c.webhook_id == webhook_id))
 
 
 def insert_delivery(connection: Connection, row: NewDelivery) -> None:
     """Put what is to be sent into the outbox, due at once."""
-    connection.execute(_insert_delivery, _new.values(row, state=WAITING, due=0.0, attempts=0))
+    connection.execute(delivery.insert(), _new.values(row, state=WAITING, due=0.0, attempts=0))
 
 
 def find_delivery(connection: Connection, delivery_id: str) -> DeliveryRow | None:
-    return _deliveries.first(connection.execute(_delivery, {"wanted": delivery_id}))
+    return _deliveries.first(connection.execute(select(delivery).where(delivery.c.delivery_id == delivery_id)))
 
 
 def deliveries(
     connection: Connection, webhook_id: str, *, limit: int, before: float | None = None
 ) -> list[DeliveryRow]:
     """What was sent or is to be sent to a receiver, newest first; `before` is the key of the last of the page before."""
-    values = {"wanted": webhook_id, "most": limit, "before": 2.0**62 if before is None else before}
-    return _deliveries.all(connection.execute(_newest, values))
+    of_receiver = select(delivery).where(delivery.c.webhook_id == webhook_id)
+    query = newest_first(of_receiver, delivery.c.delivery_key, before=before, limit=limit)
+    return _deliveries.all(connection.execute(query))
 
 
 def any_due(connection: Connection) -> bool:
-    return bool(connection.execute(_any_due).scalar_one())
+    due = select(delivery.c.delivery_key).where(WAITING_ONLY, delivery.c.due <= now_in_seconds())
+    return bool(connection.execute(select(exists(due))).scalar_one())
 
 
 def claim(connection: Connection, *, lease: float, most: int, passing: Collection[str] = ()) -> list[DeliveryRow]:
     """At most so many that are due, the oldest of each receiver but of those `passing` over: the caller's for `lease`
     [s]."""
-    keys = list(connection.execute(_due, {"most": most, "passing": sorted(passing)}).scalars())
-    if keys:
-        connection.execute(_claim, [{"wanted": key, "lease": lease} for key in keys])
-    rows = [_deliveries.first(connection.execute(_claimed, {"wanted": key})) for key in keys]
-    return [row for row in rows if row is not None]
+    due = _due.where(delivery.c.webhook_id.not_in(sorted(passing))).limit(most)
+    rows = []
+    for key in connection.execute(due).scalars().all():
+        this = delivery.c.delivery_key == key
+        claimed = {"due": now_in_seconds() + lease, "attempts": delivery.c.attempts + 1}
+        connection.execute(update(delivery).where(this).values(claimed))
+        rows += _deliveries.all(connection.execute(select(delivery).where(this)))
+    return rows
 
 
 def end(
@@ -163,14 +137,16 @@ def end(
 ) -> None:
     """Store how an attempt ended: delivered, given up, or (`waiting`) to be tried again after `pause` [s]."""
     ended = {"state": state, "last_attempt_at": at, "status": status, "problem": problem}
-    delivered = {"delivered_at": at if state == DELIVERED else None}
-    connection.execute(_end, {"wanted": delivery_key, "pause": pause} | ended | delivered)
+    delivered = {"delivered_at": at if state == DELIVERED else None, "due": now_in_seconds() + pause}
+    this = update(delivery).where(delivery.c.delivery_key == delivery_key, WAITING_ONLY)
+    connection.execute(this.values(ended | delivered))
 
 
 def release_all(connection: Connection) -> None:
     """Have what was claimed for its first attempt be due now: no process runs that could be sending it."""
-    connection.execute(_release_all)
+    unsent = (WAITING_ONLY, delivery.c.last_attempt_at.is_(None))
+    connection.execute(update(delivery).where(*unsent).values(due=0.0))
 
 
 def count_waiting(connection: Connection) -> int:
-    return int(connection.execute(_waiting).scalar_one())
+    return int(connection.execute(select(func.count()).select_from(delivery).where(WAITING_ONLY)).scalar_one())

@@ -17,7 +17,6 @@ from service.alarms.receivers import Attempt
 from service.schemas.clutch import ClutchIn
 from service.settings import Settings
 from storage import alarms, clutches, keys, webhooks
-from storage.dialects import ALL_ROWS
 from storage.engine.database import Database
 from storage.engine.errors import StorageError
 from storage.webhooks import DeliveryRow, WebhookRow
@@ -136,7 +135,7 @@ class Outbox:
             if not rules:
                 self._judged.clear()
                 return
-            rows = clutches.page(connection, limit=ALL_ROWS, by_name=True)
+            rows = clutches.page(connection, limit=None, by_name=True)
             heard = alarms.last_heard(connection, [row.clutch_id for row in rows])
         now, judged = datetime.now(UTC), set()
         for row in rows:

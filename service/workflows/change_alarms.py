@@ -12,7 +12,6 @@ from service.schemas.alarm import AlarmIn, WebhookIn
 from service.schemas.base import MAX_RULES
 from storage import alarms, clutches, keys, webhooks
 from storage.alarms import AlarmRow
-from storage.dialects import ALL_ROWS
 from storage.engine.database import Database
 from storage.webhooks import WebhookRow
 
@@ -27,7 +26,7 @@ def save(database: Database, rule: AlarmIn, *, by: str, at: str, alarm_id: str |
     with database.writing() as connection:
         if rule.clutch_id is not None:
             records.clutch(connection, rule.clutch_id)
-        same_clutch = [row for row in alarms.page(connection, limit=ALL_ROWS) if row.clutch_id == rule.clutch_id]
+        same_clutch = [row for row in alarms.page(connection) if row.clutch_id == rule.clutch_id]
         if alarm_id is None:
             same = [row for row in same_clutch if row.content == content]
             if same:

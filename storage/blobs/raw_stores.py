@@ -8,12 +8,11 @@ for a removal of that name since before it was put (`are_kept`).
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-import sqlalchemy as sa
-from sqlalchemy import Connection, bindparam, func, select, update
+from sqlalchemy import ColumnElement, Connection, and_, delete, func, or_, select, update
 
-from storage.dialects import WHOLE, among, upsert
-from storage.encoding import Rows, to_text
-from storage.tables import channel, raw_removal, raw_store
+from storage.dialects import among, upsert
+from storage.encoding import Rows
+from storage.tables import IN_A_STORE, channel, raw_removal, raw_store
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,22 +27,6 @@ class RawStore:
 
 
 _rows = Rows(RawStore)
-_all = select(raw_store).order_by(raw_store.c.store_key)
-_in_use = select(raw_store).where(raw_store.c.in_use == 1)
-_insert = sa.insert(raw_store)
-_of_store = bindparam("of_store", type_=WHOLE)
-_named = (
-    select(channel.c.blob)
-    .where(channel.c.store_key == _of_store, channel.c.blob.is_not(None), among(channel.c.blob, "of_names"))
-    .distinct()
-)
-_all_named = (
-    select(channel.c.blob)
-    .where(channel.c.store_key == _of_store, channel.c.blob.is_not(None), channel.c.blob > bindparam("after"))
-    .distinct()
-    .order_by(channel.c.blob)
-    .limit(bindparam("most"))
-)
 _numbers = (
     select(raw_store.c.address, func.count(), func.count(channel.c.blob.distinct()))
     .join(channel, channel.c.store_key == raw_store.c.store_key)
@@ -51,45 +34,26 @@ _numbers = (
     .group_by(raw_store.c.address)
     .order_by(raw_store.c.address)
 )
-_one_more = update(raw_store).where(raw_store.c.store_key == _of_store).values(removals=raw_store.c.removals + 1)
-_removals = select(raw_store.c.removals).where(raw_store.c.store_key == _of_store)
-_address = select(raw_store.c.address).where(raw_store.c.store_key == _of_store)
-_mark = upsert(raw_removal)
-_finish = (
-    update(raw_removal)
-    .where(raw_removal.c.store_key == _of_store, among(raw_removal.c.blob, "of_names"))
-    .values(finished=1)
-)
-_interrupted = select(raw_removal.c.blob).where(
-    raw_removal.c.store_key == _of_store, raw_removal.c.finished == 0, raw_removal.c.at < bindparam("before")
-)
-_forget = sa.delete(raw_removal).where(
-    raw_removal.c.store_key == _of_store, raw_removal.c.finished == 1, raw_removal.c.at < bindparam("before")
-)
-_removed_since = (
-    select(func.count())
-    .select_from(raw_removal)
-    .where(
-        raw_removal.c.store_key == _of_store,
-        among(raw_removal.c.blob, "of_names"),
-        sa.or_(raw_removal.c.finished == 0, raw_removal.c.number > bindparam("since")),
-    )
-)
+
+
+def _of_names(store_key: int, names: Iterable[str]) -> ColumnElement[bool]:
+    """Whether a removal is of one of the names in the store."""
+    return and_(raw_removal.c.store_key == store_key, among(raw_removal.c.blob, list(names)))
 
 
 def all_of(connection: Connection) -> list[RawStore]:
     """All stores that ever were in use, the first first."""
-    return _rows.all(connection.execute(_all))
+    return _rows.all(connection.execute(select(raw_store).order_by(raw_store.c.store_key)))
 
 
 def in_use(connection: Connection) -> RawStore | None:
     """The store that long columns of new runs go to, None where they go into the database."""
-    return _rows.first(connection.execute(_in_use))
+    return _rows.first(connection.execute(select(raw_store).where(raw_store.c.in_use == 1)))
 
 
 def add(connection: Connection, address: str, mark: str) -> None:
     """A store that is not in use yet. Raises IntegrityError where its address is known."""
-    connection.execute(_insert, {"address": address, "mark": mark})
+    connection.execute(raw_store.insert(), {"address": address, "mark": mark})
 
 
 def use(connection: Connection, address: str | None) -> None:
@@ -111,13 +75,14 @@ def numbers(connection: Connection) -> dict[str, tuple[int, int]]:
 
 def named(connection: Connection, store_key: int, names: Iterable[str]) -> set[str]:
     """The subset of the names that rows use in the store."""
-    return set(connection.execute(_named, {"of_store": store_key, "of_names": to_text(list(names))}).scalars())
+    query = select(channel.c.blob).where(channel.c.store_key == store_key, among(channel.c.blob, list(names)))
+    return set(connection.execute(query.where(IN_A_STORE).distinct()).scalars())
 
 
 def names_in_store(connection: Connection, store_key: int, *, after: str, most: int) -> list[str]:
     """The names that rows have in the store, in order, at most so many behind `after`."""
-    values = {"of_store": store_key, "after": after, "most": most}
-    return list(connection.execute(_all_named, values).scalars())
+    query = select(channel.c.blob).where(channel.c.store_key == store_key, IN_A_STORE, channel.c.blob > after)
+    return list(connection.execute(query.distinct().order_by(channel.c.blob).limit(most)).scalars())
 
 
 def mark_removed(connection: Connection, store_key: int, names: Sequence[str], *, at: float) -> list[str]:
@@ -125,31 +90,34 @@ def mark_removed(connection: Connection, store_key: int, names: Sequence[str], *
     still_named = named(connection, store_key, names)
     unnamed = [name for name in names if name not in still_named]
     if unnamed:
-        connection.execute(_one_more, {"of_store": store_key})
-        number = connection.execute(_removals, {"of_store": store_key}).scalar_one()
+        store = raw_store.c.store_key == store_key
+        connection.execute(update(raw_store).where(store).values(removals=raw_store.c.removals + 1))
+        number = connection.execute(select(raw_store.c.removals).where(store)).scalar_one()
         row = {"store_key": store_key, "number": number, "at": at, "finished": 0}
-        connection.execute(_mark[connection.dialect.name], [row | {"blob": name} for name in unnamed])
+        upsert(connection, raw_removal, [row | {"blob": name} for name in unnamed])
     return unnamed
 
 
 def finish_removal(connection: Connection, store_key: int, names: Sequence[str]) -> None:
     """Note that these have been removed."""
-    connection.execute(_finish, {"of_store": store_key, "of_names": to_text(list(names))})
+    connection.execute(update(raw_removal).where(_of_names(store_key, names)).values(finished=1))
 
 
 def interrupted_removals(connection: Connection, store_key: int, *, before: float) -> list[str]:
     """Names whose removal began before that time [s since 1970] and was not finished."""
-    return list(connection.execute(_interrupted, {"of_store": store_key, "before": before}).scalars())
+    begun = (raw_removal.c.store_key == store_key, raw_removal.c.finished == 0, raw_removal.c.at < before)
+    return list(connection.execute(select(raw_removal.c.blob).where(*begun)).scalars())
 
 
 def forget_removals(connection: Connection, store_key: int, *, before: float) -> None:
     """Forget finished removals from before that time [s since 1970], which no run on its way can be hit by any more."""
-    connection.execute(_forget, {"of_store": store_key, "before": before})
+    ended = (raw_removal.c.store_key == store_key, raw_removal.c.finished == 1, raw_removal.c.at < before)
+    connection.execute(delete(raw_removal).where(*ended))
 
 
 def are_kept(connection: Connection, store: RawStore, names: Iterable[str]) -> bool:
     """Whether what was put into the store since `store` was read is there: not removed, nor the store at another address."""
-    values = {"of_store": store.store_key, "of_names": to_text(list(names)), "since": store.removals}
-    removed = connection.execute(_removed_since, values).scalar_one()
-    address = connection.execute(_address, {"of_store": store.store_key}).scalar_one()
-    return not removed and address == store.address
+    since = or_(raw_removal.c.finished == 0, raw_removal.c.number > store.removals)
+    removed = select(func.count()).select_from(raw_removal).where(_of_names(store.store_key, names), since)
+    address = select(raw_store.c.address).where(raw_store.c.store_key == store.store_key)
+    return not connection.execute(removed).scalar_one() and connection.execute(address).scalar_one() == store.address

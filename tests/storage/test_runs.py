@@ -8,6 +8,7 @@ from sqlalchemy.exc import IntegrityError
 
 from storage import runs
 from storage.engine.database import Database
+from storage.tables import run
 from tests.storage.samples import CLUTCH, new_run
 
 
@@ -109,7 +110,7 @@ def test_held_runs_are_counted_by_clutch_and_in_all(connection: Connection) -> N
 
 
 def test_held_runs_are_counted_from_an_index_of_their_own(in_file: Database) -> None:
-    held = runs._held.params(wanted=[CLUTCH]).compile(compile_kwargs={"literal_binds": True})
+    held = runs._held.where(run.c.clutch_id.in_([CLUTCH])).compile(compile_kwargs={"literal_binds": True})
     with in_file.reading() as connection:
         (step,) = [row.detail for row in connection.execute(text(f"EXPLAIN QUERY PLAN {held}"))]
     assert "INDEX run_held" in step
