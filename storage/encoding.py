@@ -61,11 +61,10 @@ def encode(column: NDArray[np.float64]) -> bytearray:
     """The column [n] as bytes, to be read back by `decode`. Raises ValueError unless it is one row of 64-bit floats."""
     if column.dtype != np.float64 or column.ndim != 1:
         raise ValueError(f"a column must be one row of float64, got {column.dtype} of shape {column.shape}")
-    shuffled = _little_endian(column).view(np.uint8).reshape(-1, _PLANES).T
-    body = _NUMBER.size + _PLANE_SIZES.size
-    data = bytearray(body)
-    _PLANE_SIZES.pack_into(data, _NUMBER.size, *append_planes(data, shuffled))
-    seal(data)
+    shuffled = np.ascontiguousarray(column, dtype="<f8").view(np.uint8).reshape(-1, _PLANES).T
+    data = bytearray(_NUMBER.size + _PLANE_SIZES.size)
+    _PLANE_SIZES.pack_into(data, _NUMBER.size, *_append_planes(data, shuffled))
+    _seal(data)
     return data
 
 
@@ -73,13 +72,13 @@ def decode(data: bytes | bytearray, codec: str, length: int) -> NDArray[np.float
     """The column [length] that `encode` was given. Raises DamagedData where the bytes are not what was stored."""
     if codec != CODEC:
         raise DamagedData(f"a column is stored with the codec {codec!r}, this release knows {CODEC!r}")
-    body = unsealed(data, at_least=_PLANE_SIZES.size)
+    body = _unsealed(data, at_least=_PLANE_SIZES.size)
     sizes = _PLANE_SIZES.unpack_from(body)
     if sum(sizes) + _PLANE_SIZES.size != len(body) or max(sizes) > length:
         raise DamagedData(
             f"a stored column of {length} values has parts of {sizes} bytes, but {len(body)} bytes in all"
         )
-    shuffled = read_planes(body[_PLANE_SIZES.size :], sizes, length)
+    shuffled = _read_planes(body[_PLANE_SIZES.size :], sizes, length)
     return np.ascontiguousarray(shuffled.T).view("<f8").reshape(length).astype(np.float64, copy=False)
 
 
@@ -99,21 +98,22 @@ def pack(arrays: Mapping[str, NDArray[np.float64]]) -> bytes:
             parts.append(np.packbits(flags).tobytes())
         else:
             index.append((name, array.shape))
-            parts.append(_little_endian(array).tobytes())
+            parts.append(array.astype("<f8", copy=False).tobytes())
     names = json.dumps(index, separators=(",", ":")).encode()
-    return _sealed(_NUMBER.pack(len(names)), names, *parts)
+    data = bytearray(_NUMBER.size) + _NUMBER.pack(len(names)) + names + b"".join(parts)
+    _seal(data)
+    return bytes(data)
 
 
 def unpack(data: bytes) -> dict[str, NDArray[np.float64]]:
     """The arrays that `pack` was given. Raises DamagedData where the bytes are not what was stored."""
-    body = unsealed(data, at_least=_NUMBER.size)
+    body = _unsealed(data, at_least=_NUMBER.size)
     start = _NUMBER.size + _NUMBER.unpack_from(body)[0]
     try:
         index = json.loads(bytes(body[_NUMBER.size : start]))
         arrays = {}
         for name, shape, *form in index:
-            arrays[name], length = _unpacked(body, start, shape, form)
-            start += length
+            arrays[name], start = _unpacked(body, start, shape, form)
     except (ValueError, TypeError) as error:
         raise DamagedData(f"packed arrays do not unpack: {error}") from error
     if start != len(body):
@@ -122,22 +122,18 @@ def unpack(data: bytes) -> dict[str, NDArray[np.float64]]:
 
 
 def _unpacked(body: memoryview, start: int, shape: list[int], form: list[str]) -> tuple[NDArray[np.float64], int]:
-    """An array from `start` on, and how many bytes it takes."""
+    """The array from `start` on, and where it ends."""
     size = math.prod(shape)
     if not form:
         values = np.frombuffer(body, dtype="<f8", count=size, offset=start)
-        return values.reshape(shape).astype(np.float64), values.nbytes
+        return values.reshape(shape).astype(np.float64), start + values.nbytes
     if form != [_BITS] or size < 0:
         raise ValueError(f"{size} values in the form {form}")
     bits = np.frombuffer(body, dtype=np.uint8, count=math.ceil(size / 8), offset=start)
-    return np.unpackbits(bits, count=size).reshape(shape).astype(np.float64), bits.nbytes
+    return np.unpackbits(bits, count=size).reshape(shape).astype(np.float64), start + bits.nbytes
 
 
-def _little_endian(array: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.ascontiguousarray(array, dtype="<f8")
-
-
-def append_planes(data: bytearray, planes: NDArray[np.uint8]) -> list[int]:
+def _append_planes(data: bytearray, planes: NDArray[np.uint8]) -> list[int]:
     """Append planes [k, n] to `data`, deflated where that is worth it; returns the bytes that each plane takes."""
     sizes = []
     for plane in planes:
@@ -147,8 +143,8 @@ def append_planes(data: bytearray, planes: NDArray[np.uint8]) -> list[int]:
     return sizes
 
 
-def read_planes(body: memoryview, sizes: Sequence[int], length: int) -> NDArray[np.uint8]:
-    """The planes [k, length] that `append_planes` wrote, of the given sizes. Raises DamagedData."""
+def _read_planes(body: memoryview, sizes: Sequence[int], length: int) -> NDArray[np.uint8]:
+    """The planes [k, length] that `_append_planes` wrote, of the given sizes. Raises DamagedData."""
     planes = np.empty((len(sizes), length), dtype=np.uint8)
     start = 0
     for row, size in zip(planes, sizes, strict=True):
@@ -157,7 +153,7 @@ def read_planes(body: memoryview, sizes: Sequence[int], length: int) -> NDArray[
     return planes
 
 
-def seal(data: bytearray) -> None:
+def _seal(data: bytearray) -> None:
     """Write the checksum of all bytes from the fifth on into the first four."""
     _NUMBER.pack_into(data, 0, zlib.crc32(memoryview(data)[_NUMBER.size :]))
 
@@ -193,14 +189,7 @@ def _inflate(stored: memoryview, length: int) -> NDArray[np.uint8]:
     return np.frombuffer(plane, dtype=np.uint8)
 
 
-def _sealed(*parts: bytes) -> bytes:
-    check = 0
-    for part in parts:
-        check = zlib.crc32(part, check)
-    return b"".join((_NUMBER.pack(check), *parts))
-
-
-def unsealed(data: bytes | bytearray, *, at_least: int) -> memoryview:
+def _unsealed(data: bytes | bytearray, *, at_least: int) -> memoryview:
     """The bytes from the fifth on, checked against the checksum in the first four. Raises DamagedData."""
     if len(data) < _NUMBER.size + at_least:
         raise DamagedData(f"stored numbers are cut off after {len(data)} bytes")
@@ -218,7 +207,6 @@ _MAX_DECIMALS = 15
 _LARGEST_STEP = 1 << 30
 #: Values probed first, and encoded at a time.
 _PROBED, _PIECE = 64, 1 << 14
-_CHECKSUM_SIZE = 4
 _HEAD = struct.Struct("<Bq4I")
 _STEP_PLANES = 4
 
@@ -241,11 +229,11 @@ def encode_decimals(column: NDArray[np.float64]) -> bytearray | None:
         folded[start : start + _PIECE] = (steps << 1) ^ (steps >> 63)
         last = integers[-1:]
     minus = np.flatnonzero((column == 0) & np.signbit(column))
-    data = bytearray(_CHECKSUM_SIZE + _HEAD.size)
-    sizes = append_planes(data, folded.view(np.uint8).reshape(-1, _STEP_PLANES).T)
+    data = bytearray(_NUMBER.size + _HEAD.size)
+    sizes = _append_planes(data, folded.view(np.uint8).reshape(-1, _STEP_PLANES).T)
     data += minus.astype("<u4").tobytes()
-    _HEAD.pack_into(data, _CHECKSUM_SIZE, decimals, int(head[0]), *sizes)
-    seal(data)
+    _HEAD.pack_into(data, _NUMBER.size, decimals, int(head[0]), *sizes)
+    _seal(data)
     return data
 
 
@@ -263,7 +251,7 @@ def _whole(column: NDArray[np.float64], decimals: int) -> NDArray[np.int64] | No
 
 def decode_decimals(data: bytes | bytearray, length: int) -> NDArray[np.float64]:
     """The column [length] that `encode_decimals` was given. Raises DamagedData where the bytes are not what was stored."""
-    body = unsealed(data, at_least=_HEAD.size)
+    body = _unsealed(data, at_least=_HEAD.size)
     decimals, first, *sizes = _HEAD.unpack_from(body)
     end = sum(sizes) + _HEAD.size
     minus = np.frombuffer(body[end:], dtype="<u4") if end <= len(body) and (len(body) - end) % 4 == 0 else None
@@ -271,7 +259,7 @@ def decode_decimals(data: bytes | bytearray, length: int) -> NDArray[np.float64]
         raise DamagedData(
             f"a stored column of {length} decimals has parts of {sizes} bytes, but {len(body)} bytes in all"
         )
-    planes = read_planes(body[_HEAD.size :], sizes, length)
+    planes = _read_planes(body[_HEAD.size :], sizes, length)
     folded = np.ascontiguousarray(planes.T).view("<u4").reshape(length).astype(np.int64)
     folded = (folded >> 1) ^ -(folded & 1)
     folded[:1] += first
@@ -292,6 +280,14 @@ to_list: Callable[[str], list[Any]] = json.loads
 
 Value = TypeVar("Value")
 _Coding = tuple[Callable[[Any], Any], Callable[[Any], Any]]
+_of_list: _Coding = (to_text, lambda text: tuple(to_list(text)))
+_CODINGS: dict[Any, _Coding] = {
+    dict: (to_text, to_object),
+    tuple: _of_list,
+    Sequence: _of_list,
+    Mapping: (pack, unpack),
+    bool: (int, bool),
+}
 
 
 class Rows(Generic[Value]):
@@ -335,18 +331,7 @@ class Rows(Generic[Value]):
         return None if row is None else of(row)
 
 
-def _tuple(text: str) -> tuple[Any, ...]:
-    return tuple(to_list(text))
-
-
 def _coding(hint: Any) -> _Coding | None:
     """To what is stored and back; None where a field is stored as it is."""
     kinds = get_args(hint) if get_origin(hint) is UnionType else (hint,)
-    codings: dict[Any, _Coding] = {
-        dict: (to_text, to_object),
-        tuple: (to_text, _tuple),
-        Sequence: (to_text, _tuple),
-        Mapping: (pack, unpack),
-        bool: (int, bool),
-    }
-    return next((codings[plain] for kind in kinds if (plain := get_origin(kind) or kind) in codings), None)
+    return next((_CODINGS[plain] for kind in kinds if (plain := get_origin(kind) or kind) in _CODINGS), None)

@@ -203,7 +203,6 @@ def _sync(folder: Path) -> None:
 #: failed is repeated, so that a post is answered within some ten seconds. Chosen; no table.
 _CONNECT_SECONDS, _REQUEST_SECONDS = 3, 110
 _RETRIES, _RETRY_SECONDS = 2, 6
-_EXTRA = "objects"
 
 _log = logging.getLogger("clutchlife")
 _Answer = TypeVar("_Answer")
@@ -217,17 +216,17 @@ class ObjectStore(BlobStore):
     def __init__(self, bucket: str, prefix: str) -> None:
         if find_spec("obstore") is None:
             raise RawStoreUnavailable(
-                f"raw records in s3://{bucket} need a client that is not installed: install clutchlife[{_EXTRA}]"
+                f"raw records in s3://{bucket} need a client that is not installed: install clutchlife[objects]"
             )
         from obstore.store import S3Store  # start-up time, optional package
 
         self.address = f"s3://{bucket}/{prefix}".rstrip("/")
-        plain = os.environ.get("AWS_ENDPOINT_URL_S3", os.environ.get("AWS_ENDPOINT_URL", "")).startswith("http://")
+        endpoint = os.environ.get("AWS_ENDPOINT_URL_S3", os.environ.get("AWS_ENDPOINT_URL", ""))
         self._store = S3Store(
             bucket,
             prefix=prefix or None,
             client_options={
-                "allow_http": plain,
+                "allow_http": endpoint.startswith("http://"),
                 "connect_timeout": f"{_CONNECT_SECONDS}s",
                 "timeout": f"{_REQUEST_SECONDS}s",
             },
@@ -235,41 +234,31 @@ class ObjectStore(BlobStore):
         )
 
     def put(self, name: str, data: bytes | bytearray) -> None:
-        import obstore  # start-up time, optional package
-
-        self._request(lambda: obstore.put(self._store, name, bytes(data), use_multipart=False))
+        self._request(lambda: self._store.put(name, bytes(data), use_multipart=False))
 
     def read(self, name: str) -> bytes | None:
-        import obstore  # start-up time, optional package
-
         try:
-            return bytes(self._request(lambda: obstore.get(self._store, name).bytes(), absent=True))
+            return bytes(self._request(lambda: self._store.get(name).bytes(), absent=True))
         except FileNotFoundError:
             return None
 
     def exists(self, name: str) -> bool:
-        import obstore  # start-up time, optional package
-
         try:
-            self._request(lambda: obstore.head(self._store, name), absent=True)
+            self._request(lambda: self._store.head(name), absent=True)
         except FileNotFoundError:
             self.require_mark()
             return False
         return True
 
     def names(self) -> Iterator[tuple[str, float]]:
-        import obstore  # start-up time, optional package
-
-        pages = iter(obstore.list(self._store))
+        pages = iter(self._store.list())
         while (page := self._request(lambda: next(pages, None))) is not None:
             for item in page:
                 if item["path"] != MARK:
                     yield item["path"], item["last_modified"].timestamp()
 
     def delete(self, name: str) -> None:
-        import obstore  # start-up time, optional package
-
-        self._request(lambda: obstore.delete(self._store, name))
+        self._request(lambda: self._store.delete(name))
 
     def set_mark(self, mark: str) -> None:
         """Put the mark's object; the bucket must be there."""

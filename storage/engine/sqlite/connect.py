@@ -83,7 +83,6 @@ def _store_error(path: Path, error: Exception) -> StorageError | None:
 
 #: Write-ahead logging: readers and a commit do not wait for each other.
 JOURNAL_MODE = "wal"
-_DIALECT = "sqlite+pysqlite://"
 #: Seconds between two attempts to change the journal mode.
 _MODE_RETRY = 0.02
 
@@ -125,7 +124,10 @@ def set_journal_mode(path: Path, lock_timeout: float) -> str:
     # SQLite does not wait where others use the file while its mode is changed: so try again here.
     for attempts_left in reversed(range(math.ceil(lock_timeout / _MODE_RETRY) + 1)):
         try:
-            mode = _try_journal_mode(path)
+            with closing(sqlite3.connect(path, timeout=0.0, isolation_level=None)) as connection:
+                mode = _mode(connection)
+                if mode != JOURNAL_MODE:
+                    mode = str(connection.execute(f"PRAGMA journal_mode={JOURNAL_MODE}").fetchone()[0])
             break
         except sqlite3.OperationalError as error:
             if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or not attempts_left:
@@ -133,14 +135,6 @@ def set_journal_mode(path: Path, lock_timeout: float) -> str:
             time.sleep(_MODE_RETRY)
     if mode not in {"wal", "delete"}:
         raise StorageUnavailable(f"{path} is in journal mode {mode} and cannot leave it")
-    return mode
-
-
-def _try_journal_mode(path: Path) -> str:
-    with closing(sqlite3.connect(path, timeout=0.0, isolation_level=None)) as connection:
-        mode = _mode(connection)
-        if mode != JOURNAL_MODE:
-            mode = str(connection.execute(f"PRAGMA journal_mode={JOURNAL_MODE}").fetchone()[0])
     return mode
 
 
@@ -155,10 +149,8 @@ def read_only(path: Path) -> str:
 
 def connect_shared(path: Path, lock_timeout: float, *, writable: bool) -> sqlite3.Connection:
     """A connection of the driver that threads may share. Its transactions begin by statements alone."""
-    address = str(path) if writable else read_only(path)
-    return sqlite3.connect(
-        address, uri=not writable, timeout=lock_timeout, isolation_level=None, check_same_thread=False
-    )
+    address, uri = (str(path), False) if writable else (read_only(path), True)
+    return sqlite3.connect(address, uri=uri, timeout=lock_timeout, isolation_level=None, check_same_thread=False)
 
 
 def make_engine(
@@ -166,11 +158,9 @@ def make_engine(
 ) -> Engine:
     """An engine on the file, with the settings of every connection. Its user begins each transaction by a statement."""
     connect = partial(connect_shared, path, lock_timeout, writable=writable)
-    if pooled:
-        # No upper bound: a connection is cheap, and the threads that use one are bounded elsewhere.
-        engine = create_engine(_DIALECT, creator=connect, poolclass=QueuePool, pool_size=8, max_overflow=-1)
-    else:
-        engine = create_engine(_DIALECT, creator=connect, poolclass=NullPool)
+    # No upper bound: a connection is cheap, and the threads that use one are bounded elsewhere.
+    pool = {"poolclass": QueuePool, "pool_size": 8, "max_overflow": -1} if pooled else {"poolclass": NullPool}
+    engine = create_engine("sqlite+pysqlite://", creator=connect, **pool)
 
     @event.listens_for(engine, "connect")
     def prepare(connection: sqlite3.Connection, _: ConnectionPoolEntry) -> None:
@@ -205,7 +195,9 @@ class WriteLock:
         if not self._thread_lock.acquire(timeout=self._timeout):
             raise DatabaseBusy(f"another request held the database for more than {self._timeout:g} s")
         try:
-            file = self._opened()
+            if self._file is None:
+                self._file = _lock_file(self._path)
+            file = self._file
             self._take(file, deadline)
             try:
                 yield
@@ -220,11 +212,6 @@ class WriteLock:
             if self._file is not None:
                 os.close(self._file)
                 self._file = None
-
-    def _opened(self) -> int:
-        if self._file is None:
-            self._file = _lock_file(self._path)
-        return self._file
 
     def _take(self, file: int, deadline: float) -> None:
         pause = _FIRST_RETRY
