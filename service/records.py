@@ -409,7 +409,7 @@ def _level_fit(row: FitRow) -> LevelFit:
         **{name: getattr(row, name) for name in _FIT_COLUMNS},
         parameters=StribeckParameters(**{name: getattr(row, name) for name in PARAMETER_NAMES}),
         covariance=np.reshape(row.covariance, (4, 4)),
-        unbiased_covariance=np.reshape(row.unbiased_covariance or row.covariance, (4, 4)),
+        unbiased_covariance=np.reshape(row.unbiased_covariance, (4, 4)),
         status=FitStatus(row.status),
         acceptable=row.mse_percent is not None and row.mse_percent < ACCEPTABLE_MSE,
     )

@@ -3,6 +3,7 @@
 JSON is text in both. Text is ordered by its code points in both, numbers are 64-bit floats, whole numbers have 64 bits.
 """
 
+import json
 import math
 from collections.abc import Sequence
 from functools import cache
@@ -14,8 +15,6 @@ from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.compiler import SQLCompiler
 from sqlalchemy.sql.functions import FunctionElement
 from sqlalchemy.types import NullType, TypeEngine
-
-from storage.encoding import to_text
 
 
 class _NumberOrNull(sa.TypeDecorator[float]):
@@ -81,7 +80,7 @@ def json_length(column: sa.ColumnElement[str], *path: str) -> sa.ColumnElement[i
 
 def among(column: sa.ColumnElement[Any], wanted: Sequence[str | int]) -> sa.ColumnElement[bool]:
     """Whether a column's value is one of these, however many: they are one parameter, JSON text."""
-    parameter_list = sa.literal(to_text(list(wanted)), sa.Text)
+    parameter_list = sa.literal(json.dumps(list(wanted), ensure_ascii=False), sa.Text)
     of_sqlite = sa.func.json_each(parameter_list).table_valued("value").c.value
     of_postgresql = sa.func.json_array_elements_text(sa.cast(parameter_list, sa.JSON)).table_valued("value").c.value
     return Pair(column.in_(sa.select(of_sqlite)), column.in_(sa.select(sa.cast(of_postgresql, column.type))))

@@ -23,8 +23,8 @@ from storage.tables import filter_state, fit, prediction, run
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitRow:
-    """One curve's fit. `covariance` is the 4 x 4 matrix, row by row, 16 numbers, and so is `unbiased_covariance`, None of a
-    fit by a release that had none; `mse_percent` None on a flat curve.
+    """One curve's fit. `covariance` is the 4 x 4 matrix, row by row, 16 numbers, and so is `unbiased_covariance`;
+    `mse_percent` None on a flat curve.
 
     `mean_cof` and its deviation, None where the curve does not determine them, are over the protocol of the first test.
     """
@@ -36,7 +36,7 @@ class FitRow:
     stribeck_velocity: float
     viscous_coefficient: float
     covariance: tuple[float, ...]
-    unbiased_covariance: tuple[float, ...] | None
+    unbiased_covariance: tuple[float, ...]
     status: str
     undetermined: tuple[str, ...]
     noise: float
@@ -89,7 +89,7 @@ def cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, tup
 def _fit_values(run_key: int, row: FitRow) -> dict[str, object]:
     for name in _MATRICES:
         matrix = getattr(row, name)
-        if matrix is not None and len(matrix) != 16:
+        if len(matrix) != 16:
             raise ValueError(f"{name} must hold 16 numbers, got {len(matrix)}")
     return _fits.values(row, run_key=run_key)
 

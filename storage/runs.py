@@ -7,18 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from sqlalchemy import (
-    ColumnElement,
-    Connection,
-    Select,
-    TextClause,
-    and_,
-    exists,
-    func,
-    select,
-    tuple_,
-    update,
-)
+from sqlalchemy import ColumnElement, Connection, Select, TextClause, and_, exists, func, select, tuple_, update
 
 from storage.dialects import Pair, json_text, json_value
 from storage.encoding import Json, Rows

@@ -127,7 +127,7 @@ fit = Table(
     *_required(WHOLE, "points", "speeds"),
     *_optional(NUMBER, "mean_cof", "mean_cof_sd"),
     *_required(TEXT, "message", "code_version"),
-    Column("unbiased_covariance", TEXT),  # none of a fit by a release that had none
+    Column("unbiased_covariance", TEXT),
 )
 
 prediction = Table(

@@ -1,4 +1,4 @@
-"""Eq. 6: how a friction quantity drifts with use, its inverse, its sensitivities and the kinetics behind it.
+"""Eq. 6: how a friction quantity drifts with use, its inverse and the kinetics behind it.
 
     ξ(ζ) = ξ0 + Δ [1 - (1 + ζ/φ)^-ε]
 
@@ -65,20 +65,6 @@ def value(zeta: Number, degradation: Degradation) -> FloatArray:
     """Eq. 6, ξ(ζ) in the unit of ξ0; ζ >= 0 broadcasts against the coefficients."""
     d = degradation
     return np.asarray(d.initial + d.change * progress_fraction(zeta, d.scale, d.exponent))
-
-
-def sensitivities(zeta: Number, degradation: Degradation) -> FloatArray:
-    """∂ξ/∂(ξ0, Δ, log φ, log ε) [..., 4] at ζ >= 0, broadcast.
-
-    Of eq. 6, φ > 0 and ε > 0. With x = ζ/φ and D = (1 + x)^-ε: 1, 1 - D, -Δ ε D x/(1 + x), Δ ε D log(1 + x).
-    """
-    d = degradation
-    ratio = np.asarray(zeta) / d.scale
-    stretched = np.log1p(ratio)
-    left = np.exp(-np.asarray(d.exponent) * stretched)
-    pull = d.change * d.exponent * left
-    columns = (1.0, progress_fraction(zeta, d.scale, d.exponent), -pull * ratio / (1.0 + ratio), pull * stretched)
-    return np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=np.float64) for c in columns)), axis=-1)
 
 
 def first_passage(level: Number, degradation: Degradation) -> FloatArray:

@@ -18,7 +18,7 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.stribeck import torque as stationary_torque
 from models.loops.criteria import FEWEST_SAMPLES
-from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
+from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, StationaryCurve, fit_lag
 from models.loops.loop_area import Area, Direction, Samples, area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
 from models.records.pressure_levels import level_width, levels_of, pressure_stretches
@@ -42,9 +42,8 @@ class Loop:
     """One pressure of a dynamic test. `pressure` [Pa] names the level, `mean_pressure` [Pa] was measured.
 
     frequency [Hz], periods, area and area_sd [Nm m/s] are None, 0, None and None where there is no whole period. attractor
-    C [Nm/s] with its deviation and 90 % interval (an end None: no bound) and film_time τ_1 [s] with its deviation are None
-    where the record does not determine them; `better_law` is "attractor", "squeeze film" or None where neither is clearly
-    better. `message` is a sentence.
+    C [Nm/s] and film_time τ_1 [s] with their deviations are None where the record does not determine them; `better_law` is
+    "attractor", "squeeze film" or None where neither is clearly better. `message` is a sentence.
     """
 
     pressure: float
@@ -56,7 +55,6 @@ class Loop:
     direction: Direction = Direction.NONE
     attractor: float | None = None
     attractor_sd: float | None = None
-    attractor_interval: tuple[float, float | None] | None = None
     film_time: float | None = None
     film_time_sd: float | None = None
     better_law: str | None = None
@@ -125,7 +123,6 @@ def _loop(
         direction=area.direction,
         attractor=None if attractor is None or attractor.lag is None else 1 / attractor.lag,
         attractor_sd=None if attractor is None or attractor.lag is None else attractor.lag_sd / attractor.lag**2,
-        attractor_interval=None if attractor is None else _inverted(attractor),
         film_time=None if film is None else film.lag,
         film_time_sd=None if film is None or film.lag is None else film.lag_sd,
         better_law=better,
@@ -148,14 +145,6 @@ def _lags(
     attractor = fit_lag(ATTRACTOR, cycle, samples.phase, samples.torque, curve)
     film = fit_lag(SQUEEZE_FILM, cycle, samples.phase, samples.torque, curve)
     return LoopStatus(attractor.status.value), (attractor, film)
-
-
-def _inverted(fit: LagFit) -> tuple[float, float | None] | None:
-    """The interval of C from that of 1/C; None where no C > 0 is in it."""
-    low, high = fit.interval
-    if high <= 0 or fit.status is LagStatus.AGAINST_THE_LAW:
-        return None
-    return 1 / high, 1 / low if low > 0 else None
 
 
 def _better(attractor: LagFit, film: LagFit, telling: float = 5.0) -> str | None:

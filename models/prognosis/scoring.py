@@ -23,18 +23,6 @@ import numpy as np
 from models.arrays import FloatArray
 
 
-def crps_of_sample(sample: FloatArray, weight: FloatArray, truth: float) -> float:
-    """E|x - truth| - E|x - x'|/2 of a finite sample [n] with weights [n] >= 0, in the unit of the sample.
-
-    >>> crps_of_sample(np.array([0.0, 2.0]), np.array([1.0, 1.0]), 1.0)
-    0.5
-    """
-    order = np.argsort(sample)
-    x, w = sample[order], weight[order] / weight.sum()
-    spread = 2.0 * float(np.sum(w * x * (np.cumsum(w) - 0.5 * w - 0.5)))
-    return float(w @ np.abs(x - truth) - spread)
-
-
 def crps_of_quantiles(levels: Sequence[float], quantiles: Sequence[float], truth: float) -> float:
     """Twice the pinball loss, integrated over the levels: CRPS of a distribution known by its quantiles.
 
@@ -54,20 +42,6 @@ def covered(low: float | None, high: float | None, truth: float | None) -> bool:
     """Whether an interval holds the outcome; None is beyond the horizon, for a bound as for the truth."""
     lower, upper, outcome = (np.inf if bound is None else bound for bound in (low, high, truth))
     return bool(lower <= outcome <= upper)
-
-
-def coverage(held: Sequence[bool]) -> tuple[float, float]:
-    """The share of intervals that held, and its standard error; at least one."""
-    if not held:
-        raise ValueError("coverage needs at least one interval")
-    share = float(np.mean(held))
-    return share, float(np.sqrt(share * (1.0 - share) / len(held)))
-
-
-def pit_of_sample(sample: FloatArray, weight: FloatArray, truth: float) -> float:
-    """P(x < truth) + P(x = truth)/2 under a weighted sample [n]."""
-    share = weight / weight.sum()
-    return min(1.0, float(share[sample < truth].sum() + 0.5 * share[sample == truth].sum()))
 
 
 def pit_of_quantiles(levels: Sequence[float], quantiles: Sequence[float], truth: float) -> float:

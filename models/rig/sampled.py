@@ -79,11 +79,6 @@ class Recorder:
         return Record(time=at, pressure=p, speed=w, torque=m, oil_temperature=oil)
 
 
-EXACT = Recorder(
-    torque_noise=0.0, speed_noise=0.0, pressure_noise=0.0, torque_counts=0.0, speed_counts=0.0, pressure_counts=0.0
-)
-
-
 def _coloured(white: FloatArray, memory: float, step: float) -> FloatArray:
     """Noise [n] of unit deviation whose correlation falls by e in `memory` s, from white noise [n]."""
     correlation = math.exp(-step / memory) if memory > 0 else 0.0

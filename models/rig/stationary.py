@@ -48,7 +48,6 @@ class Sensor:
 #: drawn clutches, where fig. 8's is 1.74 %. It grows as the noise squared over the curve's own variance, so that the nearly
 #: flat curves at 4 and 4.5 bar have most of it. A raw record's plateaus are as exact. Chosen among noises of 0.2 to 1 %.
 SHARP = Sensor(noise=0.002, floor=0.01)
-NOISELESS = Sensor(noise=0.0, floor=0.0, gain_scatter=0.0, torque_counts=0.0, temperature_counts=0.0)
 
 
 def stationary_test(

@@ -103,7 +103,7 @@ def slope_quantile(rule: AlarmIn, fit: FitRow, geometry: Geometry) -> float | No
     parameters = StribeckParameters(**{name: getattr(fit, name) for name in PARAMETER_NAMES})
     velocity = geometry.sliding_velocity(np.array(rule.speed_rpm * RADIANS_PER_SECOND_PER_RPM))
     gradient = slope_gradient(float(velocity), parameters)
-    variance = float(gradient @ np.reshape(fit.unbiased_covariance or fit.covariance, (4, 4)) @ gradient)
+    variance = float(gradient @ np.reshape(fit.unbiased_covariance, (4, 4)) @ gradient)
     if not variance > 0.0:
         return None
     margin = float(slope(velocity, parameters)) + float(ndtri(rule.probability)) * math.sqrt(variance)

@@ -97,11 +97,11 @@ def revision_and_json(
     if shared is not None and shared[0] >= revision:
         return shared
     body = to_json(query(database, clutch_id, *arguments))
-    if database.answers is not None and not arguments:
+    if not arguments:
         name = name_of(query)
         new_answer = SharedAnswer(clutch_id=clutch_id, name=name, release=BUILD, revision=revision, body=body)
         try:
-            database.answers.keep(new_answer)
+            database.share(new_answer)
         except StorageError as error:  # as after a restart of the server: it is an answer all the same
             _log.warning("an answer could not be shared: %s", error)
     return revision, body
@@ -109,10 +109,8 @@ def revision_and_json(
 
 def shared_answer(database: Database, query: Callable[..., object], clutch_id: str) -> tuple[int, bytes] | None:
     """What a service on this database computed last without arguments, and its revision; None where it cannot be read."""
-    if database.answers is None:
-        return None
     try:
-        newest = database.answers.newest(clutch_id, name_of(query), BUILD)
+        newest = database.shared_answer(clutch_id, name_of(query), BUILD)
     except StorageError as error:
         _log.warning("a shared answer could not be read: %s", error)
         return None

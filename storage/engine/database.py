@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self
 
 from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError, ProgrammingError
@@ -96,31 +96,18 @@ class SharedAnswer:
     body: bytes
 
 
-class SharedAnswers(ABC):
-    """The last answer of each name about each clutch; threads share it."""
-
-    @abstractmethod
-    def newest(self, clutch_id: str, name: str, release: str) -> SharedAnswer | None:
-        """The last one that a service of that build computed, None where there is none."""
-
-    @abstractmethod
-    def keep(self, answer: SharedAnswer) -> None:
-        """Keep an answer, unless one of a later revision is kept."""
-
-
 class Database(ABC):
     """An open database: its transactions, what is asked of it outside them, and its health. Threads share it.
 
     `name` is what messages call it; `found`: it is only read, at the revision that it was found at. `url` is the address by
     which another process opens it, which may hold a password; `path` its file, None where it is on a server; `journal_mode`
-    is SQLite's. `answers` are those that its services share, None where it has one service.
+    is SQLite's.
     """
 
     url: str
     path: Path | None
     journal_mode: str | None
     watch: Watch
-    answers: SharedAnswers | None = None
 
     def __init__(self, name: str, *, found: bool) -> None:
         self.name = name
@@ -157,7 +144,7 @@ class Database(ABC):
         if self._closed:
             raise StorageUnavailable(f"{self.name} has been closed")
 
-    def where(self: "Opened", check: Callable[[Connection], object]) -> "Opened":
+    def where(self, check: Callable[[Connection], object]) -> Self:
         """The database itself; closed where the check of what is read of it raises an error."""
         try:
             with self.reading() as connection:
@@ -177,6 +164,14 @@ class Database(ABC):
         Raises DatabaseBusy where another writes for too long, StorageUnavailable where the database cannot be written.
         """
 
+    def shared_answer(self, clutch_id: str, name: str, release: str) -> SharedAnswer | None:  # noqa: ARG002
+        """The last answer of that name that a service of that build computed; None where there is none, and of a file, which
+        has one service."""
+        return None
+
+    def share(self, answer: SharedAnswer) -> None:  # noqa: B027  (a file's service keeps its own)
+        """Keep an answer for all services on the database, unless one of a later revision is kept."""
+
     @abstractmethod
     def faults(self, *, least_free: int) -> dict[str, str]:
         """What keeps the database (`database`) or its disk (`disk`) from being used, in words; empty where nothing does.
@@ -191,9 +186,6 @@ class Database(ABC):
     @abstractmethod
     def close(self) -> None:
         """Close all connections; any later use raises StorageUnavailable. May be called twice."""
-
-
-Opened = TypeVar("Opened", bound=Database)
 
 
 @contextmanager

@@ -36,15 +36,15 @@ def _opened(url: str, *, lock_timeout: float, serving: bool) -> Database:
     return open_file(path_of(url), lock_timeout=lock_timeout, serving=serving)
 
 
-def find_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> Database:
+def find_database(url: str) -> Database:
     """Open a database to read it as it is, whatever its revision up to this code's; nothing is made or migrated.
 
     Raises ValueError, DatabaseTooNew and UnfinishedMigration as `open_database` does, and StorageUnavailable where there is
     none.
     """
     if is_on_server(url):
-        return find_server(address_of(url), lock_timeout=lock_timeout).where(refuse_pending)
-    return find_file(path_of(url), lock_timeout=lock_timeout).where(refuse_pending)
+        return find_server(address_of(url)).where(refuse_pending)
+    return find_file(path_of(url)).where(refuse_pending)
 
 
 def database_exists(url: str) -> bool:
@@ -53,7 +53,7 @@ def database_exists(url: str) -> bool:
     Raises ValueError on an address of no kind, StorageUnavailable where a server does not answer or has none of that name.
     """
     if is_on_server(url):
-        return server_has_tables(address_of(url), lock_timeout=LOCK_TIMEOUT)
+        return server_has_tables(address_of(url))
     return path_of(url).exists()
 
 

@@ -20,11 +20,11 @@ import numpy as np
 from models.arrays import FloatArray
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
 from models.prognosis.fleet import FleetPrior, population, taught
-from models.prognosis.scoring import crps_of_sample
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
+from tests.models.prognosis.sample_scores import crps_of_sample
 from tests.real import loaders
 from tests.real.lag import Row, table
 from tests.statistical.lives import series

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from models.prognosis.scoring import crps_of_sample
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.prior import weak
 from tests.measuring import APPENDIX, Asked, fill, table
+from tests.models.prognosis.sample_scores import crps_of_sample
 from tests.rivals.others import CAP, DRAWS, PlainUkf, Progpy, Sample, Surpyval, fitted
 from tests.statistical.lives import STAGES, ends, typical
 

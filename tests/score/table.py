@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from models.prognosis.first_passage import weighted_quantiles
-from models.prognosis.scoring import crps_of_sample, pit_histogram, pit_of_sample
+from models.prognosis.scoring import pit_histogram
 from models.tracking.posterior import Posterior
 from tests.measuring import table
+from tests.models.prognosis.sample_scores import crps_of_sample, pit_of_sample
 from tests.statistical.lives import STAGES, ends
 
 #: All stages together, then each alone.

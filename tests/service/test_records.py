@@ -1,7 +1,6 @@
 """Fits as rows and back."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -40,10 +39,3 @@ def test_fits_come_back_with_both_covariances(database: Database) -> None:
     determined = [each.fit for each in found if not each.fit.undetermined]
     assert len(determined) >= 3
     assert all((fit.unbiased_covariance.diagonal() < fit.covariance.diagonal()).all() for fit in determined)
-
-
-def test_the_wide_covariance_stands_for_the_one_that_an_earlier_release_had_not(database: Database) -> None:
-    levels = fitted()
-    found = stored(database, [replace(row, unbiased_covariance=None) for row in records.fit_rows(levels, {})])
-    for sent, back in zip(levels, found, strict=True):
-        np.testing.assert_array_equal(back.fit.unbiased_covariance, sent.fit.covariance)

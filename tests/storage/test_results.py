@@ -49,7 +49,7 @@ def test_predictions_are_replaced_and_cleared_for_one_clutch(connection: Connect
 
 def test_fits_come_back_and_are_replaced(connection: Connection) -> None:
     late, early, bare = (runs.insert(connection, new_run(number)) for number in (2, 1, 3))
-    without = fit_row(1e5, mse_percent=None, unbiased_covariance=None)  # as of releases that did not compute it
+    without = fit_row(1e5, mse_percent=None)
     results.write_fits(connection, late, [fit_row(5e5), without])
     results.write_fits(connection, early, [fit_row(9e5), fit_row(3e5)])
     results.write_fits(connection, early, (fit_row(4e5),))

@@ -19,7 +19,7 @@ import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.exc import SQLAlchemyError
 
-from storage.engine.database import Database, Question, SharedAnswer, SharedAnswers, Snapshot, Watch, granted
+from storage.engine.database import LOCK_TIMEOUT, Database, Question, SharedAnswer, Snapshot, Watch, granted
 from storage.engine.errors import ServiceRuns, StorageError, StorageUnavailable
 from storage.engine.integrity import refuse_newer
 from storage.engine.postgresql.connect import (
@@ -62,20 +62,6 @@ _keep = _new.on_conflict_do_update(
         shared_answer.c.release != _new.excluded["release"], shared_answer.c.revision <= _new.excluded["revision"]
     ),
 )
-
-
-class ServerAnswers(SharedAnswers):
-    """Shared answers in PostgreSQL, each read and written by one statement outside transactions."""
-
-    def __init__(self, statements: SingleStatements) -> None:
-        self._statements = statements
-
-    def newest(self, clutch_id: str, name: str, release: str) -> SharedAnswer | None:
-        rows = self._statements.rows(_newest, {"clutch": clutch_id, "asked": name, "by": release})
-        return SharedAnswer(**rows[0]) if rows else None
-
-    def keep(self, answer: SharedAnswer) -> None:
-        self._statements.rows(_keep, {column.name: getattr(answer, column.name) for column in shared_answer.columns})
 
 
 _SNAPSHOT = sa.text("""
@@ -188,7 +174,6 @@ class ServerDatabase(Database):
                 hold_service_lock(engine, self.name)
         self._watching, self._sharing = SingleStatements(watching, self.name), SingleStatements(sharing, self.name)
         self.watch = ServerWatch(self._watching)
-        self.answers = ServerAnswers(self._sharing)
 
     @contextmanager
     def _read(self) -> Iterator[sa.Connection]:
@@ -202,6 +187,13 @@ class ServerDatabase(Database):
             write_lock(connection, of)
             yield connection
             connection.execute(_COUNT)
+
+    def shared_answer(self, clutch_id: str, name: str, release: str) -> SharedAnswer | None:
+        rows = self._sharing.rows(_newest, {"clutch": clutch_id, "asked": name, "by": release})
+        return SharedAnswer(**rows[0]) if rows else None
+
+    def share(self, answer: SharedAnswer) -> None:
+        self._sharing.rows(_keep, {column.name: getattr(answer, column.name) for column in shared_answer.columns})
 
     def faults(self, *, least_free: int) -> dict[str, str]:  # noqa: ARG002  (the server's disk is its operator's)
         if self._closed:
@@ -280,9 +272,9 @@ def open_server(address: sa.URL, *, lock_timeout: float, serving: bool = False) 
     return database.where(check)
 
 
-def find_server(address: sa.URL, *, lock_timeout: float) -> ServerDatabase:
+def find_server(address: sa.URL) -> ServerDatabase:
     """Open a database on a server to read it as it is. Raises DatabaseTooNew, StorageUnavailable where it has no tables."""
-    database = ServerDatabase(address, lock_timeout=lock_timeout, found=True)
+    database = ServerDatabase(address, lock_timeout=LOCK_TIMEOUT, found=True)
 
     def check(connection: sa.Connection) -> None:
         revision = current(connection)
@@ -293,10 +285,10 @@ def find_server(address: sa.URL, *, lock_timeout: float) -> ServerDatabase:
     return database.where(check)
 
 
-def server_has_tables(address: sa.URL, *, lock_timeout: float) -> bool:
+def server_has_tables(address: sa.URL) -> bool:
     """Whether the database holds this program's tables. Raises StorageUnavailable where there is no such database."""
     with (
-        closing(ServerDatabase(address, lock_timeout=lock_timeout, found=True)) as database,
+        closing(ServerDatabase(address, lock_timeout=LOCK_TIMEOUT, found=True)) as database,
         database.reading() as connection,
     ):
         return current(connection) is not None

@@ -38,31 +38,12 @@ from storage.engine.sqlite.connect import (
 from storage.migrations.upgrade import current, head, upgrade
 
 
-def faults(path: Path, *, journal_mode: str, least_free: int) -> dict[str, str]:
-    """What is wrong with the file (`database`) and with the space on its disk (`disk`), in words; empty where nothing is.
-
-    `least_free` [byte] is the space that must be free. Who writes now holds nothing up: a reader of the write-ahead log
-    waits for no writer, and where there is none a commit in progress shows that the file is in use.
-    """
-    wrong = {}
-    try:
-        fault = _fault_of_file(path, journal_mode)
-    except OSError as error:
-        fault = f"the file cannot be read: {error.strerror}"
-    if fault is not None:
-        wrong["database"] = fault
-    try:
-        free = shutil.disk_usage(path.parent).free
-    except OSError as error:
-        wrong["disk"] = f"the disk does not answer: {error.strerror}"
-    else:
-        if free < least_free:
-            wrong["disk"] = f"{free >> 20} MiB are free on the database's disk, {least_free >> 20} are needed"
-    return wrong
-
-
 def _fault_of_file(path: Path, journal_mode: str) -> str | None:
-    """What is wrong with the file: it is not there, does not answer at the code's revision, or may not be written."""
+    """What is wrong with the file: it is not there, does not answer at the code's revision, or may not be written.
+
+    Who writes now holds nothing up: a reader of the write-ahead log waits for no writer, and where there is none a commit
+    in progress shows that the file is in use.
+    """
     if not path.exists():
         return "the file is not there"
     try:
@@ -184,20 +165,34 @@ class FileDatabase(Database):
     def faults(self, *, least_free: int) -> dict[str, str]:
         if self._closed:
             return {"database": "it has been closed"}
-        return faults(self.path, journal_mode=self.journal_mode, least_free=least_free)
+        wrong = {}
+        try:
+            fault = _fault_of_file(self.path, self.journal_mode)
+        except OSError as error:
+            fault = f"the file cannot be read: {error.strerror}"
+        if fault is not None:
+            wrong["database"] = fault
+        try:
+            free = shutil.disk_usage(self.path.parent).free
+        except OSError as error:
+            wrong["disk"] = f"the disk does not answer: {error.strerror}"
+        else:
+            if free < least_free:
+                wrong["disk"] = f"{free >> 20} MiB are free on the database's disk, {least_free >> 20} are needed"
+        return wrong
 
     def damage(self, connection: Connection) -> list[str]:
         return damage(connection)
 
 
-def find_file(path: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> FileDatabase:
+def find_file(path: Path) -> FileDatabase:
     """Open a file to read it as it is, whatever its revision up to this code's; nothing is made or migrated.
 
     Raises DatabaseTooNew as `open_file` does, StorageUnavailable where there is no such file.
     """
     with translated(path):
-        journal_mode = found_journal_mode(path, lock_timeout)
-    database = FileDatabase(path, journal_mode=journal_mode, lock_timeout=lock_timeout, found=True)
+        journal_mode = found_journal_mode(path, LOCK_TIMEOUT)
+    database = FileDatabase(path, journal_mode=journal_mode, lock_timeout=LOCK_TIMEOUT, found=True)
     return database.where(lambda connection: refuse_newer(current(connection)))
 
 

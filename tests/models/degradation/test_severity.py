@@ -20,7 +20,7 @@ from models.degradation.severity import (
     uncertain_work,
 )
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
-from models.prognosis.scoring import crps_of_sample
+from tests.models.prognosis.sample_scores import crps_of_sample
 from tests.models.tracking.tracked_series import on_grid, sent
 
 ENERGY = Severity(basis=SeverityBasis.DISSIPATED_ENERGY)

@@ -14,8 +14,8 @@ from models.engagements.slip import Estimate
 from models.records.runs import Record
 from models.rig.campaign import simulated_clutch
 from models.rig.sampled import Recorder
-from models.rig.stationary import NOISELESS
 from tests.models.engagements.closed_forms import FORMS, INERTIA, PER_PASCAL, constant, record
+from tests.models.rig.exact import NOISELESS
 
 # --- The three indicators of the sliding speed: nothing for the same engagement, known values for a longer one.
 

@@ -20,8 +20,9 @@ from models.friction.pressure_laws import (
 from models.friction.stribeck import PARAMETER_NAMES
 from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulated_clutch
-from models.rig.stationary import NOISELESS, stationary_test
+from models.rig.stationary import stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES
+from tests.models.rig.exact import NOISELESS
 
 
 def fits_of_fresh_clutch() -> tuple[StribeckFit, ...]:

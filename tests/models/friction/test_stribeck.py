@@ -6,9 +6,10 @@ import pytest
 from models.friction.identification import cof_slope, fit_curves
 from models.friction.stribeck import GAMMA, PARAMETER_NAMES, StribeckParameters, gradient, slope, slope_gradient, torque
 from models.records.runs import curves_by_pressure
-from models.rig.stationary import NOISELESS, stationary_test
+from models.rig.stationary import stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 from tests.models.friction.stribeck_curves import VELOCITY, eq3, parameters
+from tests.models.rig.exact import NOISELESS
 
 FRESH = np.array([25.0, 0.57, 4.5, 2.5])
 CASES = [FRESH, np.array([12.0, 0.4, 2.7, 3.2]), np.array([3.0, 4.0, 0.3, 0.0]), np.array([0.0, 1.0, 1.0, 2.0])]

@@ -17,11 +17,11 @@ from models.prognosis import ended_lives
 from models.prognosis.criteria import COURSE_DISCREPANCIES, COURSE_SCATTERS, COURSE_SIZE_SD, OTHER_KIND, VAGUE
 from models.prognosis.ended_lives import EndedLife, Kin, as_its_kind, declared_end, ended_life, representative
 from models.prognosis.first_passage import weighted_quantiles
-from models.prognosis.scoring import crps_of_sample
 from models.prognosis.stated_end import stated_end
 from models.tracking.courses import FORM_SIZE, Course
 from models.tracking.criteria import LEVEL_SIZE, STEP_SIZE
 from models.tracking.measurement import Measurement
+from tests.models.prognosis.sample_scores import crps_of_sample
 from tests.models.tracking.tracked_series import on_grid, sent
 from tests.statistical.lives import taught
 

@@ -11,12 +11,12 @@ from models.degradation.general_order import Degradation, first_passage, value
 from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
 from models.prognosis.first_passage import ends_of_life
 from models.prognosis.fleet import FleetPrior, pooled, population, taught
-from models.prognosis.scoring import crps_of_sample
 from models.tracking.courses import Course, basis
 from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
+from tests.models.prognosis.sample_scores import crps_of_sample
 from tests.models.tracking.tracked_series import draws_of, followed, on_grid, sent
 
 UKF = Ukf()

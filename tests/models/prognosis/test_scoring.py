@@ -11,17 +11,15 @@ from scipy.stats import norm
 from models.prognosis.back_cast import BackCast, kept_after
 from models.prognosis.scoring import (
     alpha_lambda,
-    coverage,
     covered,
     crps_of_quantiles,
-    crps_of_sample,
     pit_histogram,
     pit_of_quantiles,
-    pit_of_sample,
     prognostic_horizon,
 )
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
+from tests.models.prognosis.sample_scores import crps_of_sample, pit_of_sample
 from tests.models.tracking.tracked_series import PRIOR, draws_of
 
 # --- Scores against closed forms and hand-worked cases.
@@ -70,13 +68,6 @@ def test_a_bound_beyond_the_horizon_holds_what_never_came() -> None:
     assert not covered(5.0, 8.0, None)
     assert covered(None, None, None)
     assert not covered(None, None, 9.0)
-
-
-def test_coverage_and_its_error() -> None:
-    share, error = coverage([True] * 90 + [False] * 10)
-    assert (share, error) == (pytest.approx(0.9), pytest.approx(0.03))
-    with pytest.raises(ValueError, match="at least one"):
-        coverage([])
 
 
 def test_the_pit_of_calibrated_predictions_is_uniform_and_of_sure_ones_is_not() -> None:

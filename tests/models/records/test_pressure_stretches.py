@@ -13,9 +13,10 @@ from models.loops.loops import evaluate_loops
 from models.records.criteria import LEVEL_GAP
 from models.records.pressure_levels import level_width, levels_of, pressure_stretches
 from models.records.runs import Plateaus, Record, curves_by_pressure
-from models.rig.sampled import EXACT, DynamicTest, Recorder
+from models.rig.sampled import DynamicTest, Recorder
 from models.rig.stationary import Sensor
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
+from tests.models.rig.exact import EXACT
 
 CLUTCH = SimulatedClutch()
 NO_SCATTER = Sensor(gain_scatter=0.0)

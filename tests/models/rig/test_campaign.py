@@ -13,8 +13,9 @@ from models.rig.campaign import end_of_life, simulate, simulated_clutch
 from models.rig.programme import CYCLE_ENERGY, WHOLE, Ageing, Programme
 from models.rig.sampled import RawTest
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
-from models.rig.stationary import NOISELESS, stationary_test
+from models.rig.stationary import stationary_test
 from models.rig.truth import SimulatedClutch
+from tests.models.rig.exact import NOISELESS
 
 BAR = 1e5
 

@@ -18,9 +18,10 @@ from models.records.plateaus import cut_plateaus
 from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulated_clutch
 from models.rig.hysteresis import ATTRACTOR, NO_LAG, FrictionLag
-from models.rig.sampled import EXACT, DynamicTest, RawTest, Recorder, sampled_test
-from models.rig.stationary import NOISELESS, SHARP, Sensor, stationary_test
+from models.rig.sampled import DynamicTest, RawTest, Recorder, sampled_test
+from models.rig.stationary import SHARP, Sensor, stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
+from tests.models.rig.exact import EXACT, NOISELESS
 
 # --- The simulated stationary test: rows, noise and counts.
 

@@ -13,8 +13,9 @@ from models.friction.speed_protocol import RPM
 from models.friction.stribeck import torque
 from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulated_clutch
-from models.rig.stationary import NOISELESS, stationary_test
+from models.rig.stationary import stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, draw, surface
+from tests.models.rig.exact import NOISELESS
 
 SPEEDS = np.arange(20, 1971, 50) * RPM
 BAR = 1e5

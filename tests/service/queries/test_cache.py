@@ -4,7 +4,6 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -190,7 +189,8 @@ def test_an_answer_that_cannot_be_shared_is_an_answer_all_the_same(
         raise StorageUnavailable("the connection is gone")
 
     # as of a server that has just been restarted
-    monkeypatch.setattr(in_file, "answers", SimpleNamespace(newest=gone, keep=gone))
+    monkeypatch.setattr(in_file, "shared_answer", gone)
+    monkeypatch.setattr(in_file, "share", gone)
     assert shared_answer(in_file, query, "c1") is None
     assert revision_and_json(in_file, query, "c1", ()) == (0, b'{"clutch_id":"c1"}')
     assert [record.levelname for record in caplog.records] == ["WARNING"] * 3

@@ -12,7 +12,7 @@ import pytest
 from sqlalchemy import create_engine, make_url, text
 
 from storage import clutches
-from storage.engine.database import Database, Question, SharedAnswer, SharedAnswers, Snapshot
+from storage.engine.database import Database, Question, SharedAnswer, Snapshot
 from storage.engine.errors import ServiceRuns, StorageUnavailable
 from storage.engine.opening import open_database
 from storage.engine.postgresql.connect import SERVICE_KEY, SingleStatements, migration_lock
@@ -31,8 +31,7 @@ WHERE datname = current_database() AND locktype = 'advisory' AND mode = 'ShareLo
 def test_every_connection_of_a_service_says_that_it_runs(on_server: Database) -> None:
     """Those for single statements too."""
     with closing(open_database(on_server.url, serving=True)) as service, service.reading():
-        assert service.answers is not None
-        assert service.answers.newest("c1", "degradation", "1.0") is None
+        assert service.shared_answer("c1", "degradation", "1.0") is None
         with on_server.reading() as connection:
             assert connection.execute(_HELD).scalar_one() == 3
 
@@ -65,11 +64,9 @@ def waits_for_the_lock(database: Database) -> bool:
 def test_answers_that_cannot_be_read_hold_up_no_request(on_server: Database) -> None:
     """They are kept to save work: the question that every request asks has a connection of its own."""
     with closing(open_database(on_server.url, lock_timeout=20)) as service, ThreadPoolExecutor(8) as pool:
-        answers = service.answers
-        assert answers is not None
         with on_server.writing() as connection:
             connection.execute(text("LOCK TABLE shared_answer IN ACCESS EXCLUSIVE MODE"))
-            reading = [pool.submit(answers.newest, "c1", "degradation", "1.0") for _ in range(8)]
+            reading = [pool.submit(service.shared_answer, "c1", "degradation", "1.0") for _ in range(8)]
             for _ in range(50):
                 assert not service.watch.snapshot().keys_are_needed
             assert not any(each.done() for each in reading)
@@ -89,20 +86,18 @@ def test_libpq_is_told_when_a_lost_machine_counts_as_gone_unless_the_address_say
 def test_a_statement_finds_the_server_that_was_started_again() -> None:
     """Each on a connection of before, which the server has ended."""
     with postgresql_server() as server, closing(open_database(server.fresh())) as database:
-        answers = database.answers
-        assert answers is not None
         with database.writing() as connection:
             clutches.insert(connection, clutch_row("c1"))
-        answers.keep(ANSWER)
+        database.share(ANSWER)
 
         def snapshot() -> None:
             assert database.watch.snapshot("c1").revision == 0
 
         def keep_and_read() -> None:
-            answers.keep(ANSWER)
-            assert answers.newest("c1", "degradation", "1.0") == ANSWER
+            database.share(ANSWER)
+            assert database.shared_answer("c1", "degradation", "1.0") == ANSWER
 
-        for ask in (snapshot, keep_and_read, snapshot, lambda: answers.newest("c1", "degradation", "1.0")):
+        for ask in (snapshot, keep_and_read, snapshot, lambda: database.shared_answer("c1", "degradation", "1.0")):
             server.kill()
             server.start()
             ask()
@@ -110,14 +105,12 @@ def test_a_statement_finds_the_server_that_was_started_again() -> None:
 
 def test_who_asks_a_database_that_was_closed_is_told_so(on_server: Database) -> None:
     opened = open_database(on_server.url)
-    answers = opened.answers
-    assert answers is not None
     opened.close()
     opened.close()
     for ask in (
         opened.watch.snapshot,
         lambda: asyncio.run(opened.watch.look(Question("a"))),
-        lambda: answers.newest("a", "degradation", "1.0"),
+        lambda: opened.shared_answer("a", "degradation", "1.0"),
     ):
         with pytest.raises(StorageUnavailable, match="has been closed"):
             ask()
@@ -223,29 +216,23 @@ def test_a_database_answers_each_what_it_asked(database: Database) -> None:
 FIRST = replace(ANSWER, revision=3, body=b"\x00first")
 
 
-@pytest.fixture
-def shared(on_server: Database) -> SharedAnswers:
-    assert on_server.answers is not None
-    return on_server.answers
-
-
-def test_the_last_of_each_clutch_and_name_is_kept(shared: SharedAnswers) -> None:
-    assert shared.newest("c1", "degradation", "1.0") is None
+def test_the_last_of_each_clutch_and_name_is_kept(on_server: Database) -> None:
+    assert on_server.shared_answer("c1", "degradation", "1.0") is None
     for kept in (FIRST, replace(FIRST, clutch_id="c2"), replace(FIRST, name="surface", body=b"other")):
-        shared.keep(kept)
-        assert shared.newest(kept.clutch_id, kept.name, "1.0") == kept
+        on_server.share(kept)
+        assert on_server.shared_answer(kept.clutch_id, kept.name, "1.0") == kept
     later = replace(FIRST, revision=4, body=b"later")
-    shared.keep(later)
-    shared.keep(FIRST)  # of one that was slower
-    assert shared.newest("c1", "degradation", "1.0") == later
+    on_server.share(later)
+    on_server.share(FIRST)  # of one that was slower
+    assert on_server.shared_answer("c1", "degradation", "1.0") == later
 
 
-def test_another_release_computes_its_own_and_replaces_it(shared: SharedAnswers) -> None:
-    shared.keep(FIRST)
-    assert shared.newest("c1", "degradation", "2.0") is None
-    shared.keep(replace(FIRST, release="2.0", revision=2))
-    assert shared.newest("c1", "degradation", "1.0") is None
-    assert shared.newest("c1", "degradation", "2.0") == replace(FIRST, release="2.0", revision=2)
+def test_another_release_computes_its_own_and_replaces_it(on_server: Database) -> None:
+    on_server.share(FIRST)
+    assert on_server.shared_answer("c1", "degradation", "2.0") is None
+    on_server.share(replace(FIRST, release="2.0", revision=2))
+    assert on_server.shared_answer("c1", "degradation", "1.0") is None
+    assert on_server.shared_answer("c1", "degradation", "2.0") == replace(FIRST, release="2.0", revision=2)
 
 
 def test_a_database_of_before_gets_the_table_and_counts_its_commits_on(on_server: Database) -> None:
@@ -255,6 +242,5 @@ def test_a_database_of_before_gets_the_table_and_counts_its_commits_on(on_server
         connection.execute(text("DROP TABLE shared_answer"))
     counted = on_server.watch.snapshot().version
     with closing(open_database(on_server.url)) as opened:
-        assert opened.answers is not None
-        opened.answers.keep(FIRST)
+        opened.share(FIRST)
         assert opened.watch.snapshot().version == counted + 1  # of the commit that made the table
