@@ -103,7 +103,7 @@ def facts_of(campaign: Campaign) -> Facts:
 
 def _plate_warming(campaign: Campaign) -> tuple[float, float] | None:
     """The line of the plate's rise [K] over the flux |M| ω/A of friction [W/m²]: by plateaus, which have time to warm, or by
-    loops where no plateau has the channel. Its slope has a least value."""
+    loops where no plateau has the channel. Its rise at no flux, and its slope or the least that counts as warming."""
     plateaus, records = [run.plateaus for run in campaign.stationary], [run.record for run in campaign.dynamic]
     area = campaign.geometry.friction_faces * campaign.geometry.lining_area
     for tables in (plateaus, records):
@@ -113,8 +113,8 @@ def _plate_warming(campaign: Campaign) -> tuple[float, float] | None:
             rise = np.concatenate([rise for _, rise in measured])
             off = flux - flux.mean()
             # 1 K at 0.32 W/mm² at least, above what thermometers drift with speed; friction heats by tens of K
-            slope = max(float(off @ rise) / max(float(off @ off), 1e-300), (1.0 / 0.32e6))
-            return float(rise.mean() - slope * flux.mean()), slope
+            slope = float(off @ rise) / max(float(off @ off), 1e-300)
+            return float(rise.mean() - slope * flux.mean()), max(slope, 1.0 / 0.32e6)
     return None
 
 

@@ -119,9 +119,9 @@ _MOST_WARMTH = 30.0
 
 def _interface_heating_grid(facts: Facts) -> tuple[Tried, ...]:
     if facts.plate_in_all_tests:  # settling and saturation are in what was measured
-        return tuple(Tried(shape=(0.0, part, 0.0)) for part in (WHOLE, VISCOUS))
+        return tuple(Tried(shape=(0.0, part, 0.0, lags)) for part in (WHOLE, VISCOUS) for lags in (0.0, 1.0))
     return tuple(
-        Tried(shape=(float(np.log(settling)), part, saturation))
+        Tried(shape=(float(np.log(settling)), part, saturation, 1.0))
         for settling in (0.03, 0.3, 1.5, 6.0, 30.0)
         for part in (WHOLE, VISCOUS)
         for saturation in (0.0, 1.5)
@@ -129,7 +129,7 @@ def _interface_heating_grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _interface_heating_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    log_settling, part, saturation = shape
+    log_settling, part, saturation, _ = shape
     warmth = _measured(scene, _computed(scene, float(np.exp(log_settling)), saturation))
     carried = scene.curve if part == WHOLE else scene.viscous
     return np.asarray(-carried * -np.expm1(-amplitude * warmth), dtype=np.float64)
@@ -176,10 +176,11 @@ INTERFACE_HEATING = Effect(
         ShapeParameter(name="log of the settling time τ", unit="ln s", lowest=-5.0, highest=6.0, smooth=True),
         ShapeParameter(name="what weakens", unit="-"),
         ShapeParameter(name="saturation s", unit="-"),
+        ShapeParameter(name="whether friction lags behind it", unit="-", lags=True),
     ),
     grid=_interface_heating_grid,
     change=_interface_heating_change,
-    before_lag=True,
+    before_lag=None,
     discrepancies=(Discrepancy.SPEED, Discrepancy.MOTION),
 )
 

@@ -75,3 +75,4 @@ def test_heating_is_named_by_a_warm_plate_only(slug: str, rise: float, named: bo
     given = campaign_of(with_plate(run, geometry, rise) for run in runs({slug: effect_of(slug).size}, 9))
     report = look(replace(given, duty=()), 1)
     assert ("interface_heating" in report.causes) is named, (report.verdict, report.causes, report.summary)
+    assert not named or report.causes == (slug,)

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from models.arrays import FloatArray
+from models.diagnosis.baseline.laws import BLOCK
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import FROM_THE_START, amplitude_cost
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
-from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus, fit, prior_gram
+from models.diagnosis.pooled_fit.gauss_newton import REFIT_STEPS, Fit, FitStatus, fit, prior_gram, refit
 from models.diagnosis.pooled_fit.projection import RunScatter, gram_of, projections_of, run_scatter
+from tests.blind.rig.hide import hide
+from tests.blind.rig.sent import campaign as sent
 from tests.models.diagnosis.campaigns import Study, campaign, of_size, rehearsal, start_of, study
 
 # --- A fit says how it ended: converged, without a step that lowers the cost, out of steps, without a finite cost.
@@ -46,6 +49,16 @@ def test_numbers_that_cannot_be_fitted_are_a_status(given: Study) -> None:
     assert np.isinf(broken.cost)
 
 
+def test_a_refit_comes_back_from_a_baseline_whose_viscous_torque_is_negative() -> None:
+    """Heating by a third of the torque bends the curves so far that the baseline alone follows with C_v < 0."""
+    bent = study(sent(hide((404, 3245693708, 1), ("interface_heating",), 300.0, loops=False)))
+    laws, heat = bent.baseline.fit.laws, of_size("interface_heating", 0.2, (-5.0, 0.0, 0.0, 1.0))
+    assert laws.theta[3 * BLOCK] < -1.0
+    found = refit(bent.problem, laws, (heat,))
+    assert found is not None
+    assert found.cost < fit(bent.problem, laws, (heat,), steps=REFIT_STEPS).cost - 100.0
+
+
 # --- Priors: their part of the gradient is the slope of their cost, and the projection holds them as the fit does.
 
 
@@ -54,7 +67,7 @@ def beside_heat(given: Study) -> Fit:
     """The laws off their priors' means, and an effect of some size."""
     laws = given.baseline.fit.laws
     off = replace(laws, theta=laws.theta + 0.1)
-    return fit(given.problem, off, (of_size("interface_heating", 0.3, (2.0, 0.0, 1.0)),), steps=0)
+    return fit(given.problem, off, (of_size("interface_heating", 0.3, (2.0, 0.0, 1.0, 1.0)),), steps=0)
 
 
 def test_the_gradient_of_the_priors_is_the_slope_of_their_cost(given: Study, beside_heat: Fit) -> None:
