@@ -155,14 +155,9 @@ def log_gain_prior(run_gain: float) -> float:
 
 
 def _factor(correlation: FloatArray) -> FloatArray:
-    """The Cholesky factor of a correlation matrix that may be singular to rounding."""
-    for jitter in (1e-11, 1e-8, 1e-5):
-        try:
-            return np.asarray(np.linalg.cholesky(correlation + jitter * np.eye(correlation.shape[0])))
-        except np.linalg.LinAlgError:
-            continue
-    values, vectors = np.linalg.eigh(correlation)
-    return np.asarray(np.linalg.cholesky((vectors * np.maximum(values, 1e-5)) @ vectors.T + 1e-7 * np.eye(values.size)))
+    """The Cholesky factor of a correlation matrix that may be singular to rounding. Raises LinAlgError where it is no such
+    matrix: more than that added to its diagonal would change determinants unseen."""
+    return np.asarray(np.linalg.cholesky(correlation + 1e-11 * np.eye(correlation.shape[0])))
 
 
 def amplitude_deviations(problem: FitProblem, fitted: Fit) -> list[float]:
