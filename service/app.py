@@ -24,19 +24,7 @@ from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Edge, Encodings, Heads, Polls, RootPath, Shares
 from service.web.readiness import Readiness
 from service.web.revalidation import Revalidation
-from service.web.routes import (
-    alarms,
-    clutches,
-    diagnoses,
-    exports,
-    fleet,
-    health,
-    inspections,
-    jobs,
-    life,
-    rigs,
-    runs,
-)
+from service.web.routes import alarms, clutches, diagnoses, exports, health, inspections, jobs, life, rigs, runs
 from service.work.queue import JobQueue, Kind, diagnosis_work, workflow_work
 from service.work.workers import CHANGE_SECONDS, Lane, Workers, in_processes, in_threads
 from service.workflows import adopt_model, ask_job, raw_records, run_diagnosis
@@ -136,10 +124,11 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
     )
     problems.install(app)
-    parts = [part.router for part in (health, clutches, runs, inspections, life, diagnoses, jobs, fleet, rigs, alarms)]
-    beside = [clutches.fleet_router, exports.router, exports.fleet_router, health.description_router]
-    beside += [rigs.import_router, alarms.webhook_router, dashboard.router(assets.load()), site.router()]
-    for router in parts + beside:
+    routers = [part.router for part in (health, clutches, runs, inspections, life, diagnoses, jobs)]
+    routers += [clutches.fleet_router, rigs.router, alarms.router, clutches.totals_router, exports.router]
+    routers += [exports.fleet_router, health.description_router, rigs.import_router, alarms.webhook_router]
+    routers += [dashboard.router(assets.load()), site.router()]
+    for router in routers:
         app.include_router(router)
     openapi.install(app, settings.root_path)
     app.add_middleware(Polls)

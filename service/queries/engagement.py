@@ -18,9 +18,9 @@ from service.errors import NotFoundError
 from service.lives.assumptions import Assumptions
 from service.lives.condition import held_runs_left_out
 from service.lives.engagements import evaluated, public_channels
-from service.lives.history import Life, Series, lives_of
+from service.lives.history import Life, lives_of
 from service.lives.incoming_run import IncomingRun
-from service.lives.quantities.measured import chosen_life, parameter_series, posterior_of, tests_of
+from service.lives.quantities.measured import Track, chosen_life, parameter_tracks, tests_of
 from service.lives.run_analysis import LevelFit
 from storage.engine.database import Database
 
@@ -124,32 +124,29 @@ def _parameters(
     life: Life, assumptions: Assumptions, fits: Mapping[str, Sequence[LevelFit]], moments: Sequence[float]
 ) -> list[dict[float, StribeckParameters]]:
     """At each of several cycles since new, the parameters by pressure [Pa], each the median of its own track."""
-    tests = tests_of(life, fits)
-    at: dict[float, dict[str, list[float]]] = {}
-    for name in PARAMETER_NAMES:
-        for series in parameter_series(life, assumptions, tests, name):
-            if series.measurements:
-                at.setdefault(series.pressure, {})[name] = _medians(series, assumptions, moments)
-    complete = {level: values for level, values in at.items() if len(values) == len(PARAMETER_NAMES)}
-    if not complete:
+    tracks = parameter_tracks(life, assumptions, tests_of(life, fits))
+    known = dict.fromkeys(level for _, level in tracks)
+    levels = [level for level in known if all((name, level) in tracks for name in PARAMETER_NAMES)]
+    if not levels:
         raise NotFoundError(
             "no engagement can be simulated: no test up to these cycles determines all four Stribeck parameters. Send "
             "one over more speeds"
         )
     return [
         {
-            level: StribeckParameters(**{name: max(median[place], 0.0) for name, median in values.items()})
-            for level, values in complete.items()
+            level: StribeckParameters(
+                **{name: max(_median(tracks[name, level], cycles), 0.0) for name in PARAMETER_NAMES}
+            )
+            for level in levels
         }
-        for place in range(len(moments))
+        for cycles in moments
     ]
 
 
-def _medians(series: Series, assumptions: Assumptions, moments: Sequence[float]) -> list[float]:
-    posterior = posterior_of(series, assumptions)
-    progress = [float(series.scale.progress(cycles)) for cycles in moments]
-    values = (posterior.values(np.array([zeta]))[0] for zeta in progress)
-    return [float(weighted_quantiles(value, posterior.weight, (0.5,))[0]) for value in values]
+def _median(track: Track, cycles: float) -> float:
+    series, posterior = track
+    values = posterior.values(np.array([float(series.scale.progress(cycles))]))[0]
+    return float(weighted_quantiles(values, posterior.weight, (0.5,))[0])
 
 
 def _course(trace: Engagement, contact: float = 0.0) -> dict[str, list[float]]:

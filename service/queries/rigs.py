@@ -57,12 +57,12 @@ def preview(
     path: Path,
     *,
     filename: str,
-    rig: str | None = None,
-    profile: RigProfile | None = None,
-    kind: str | None = None,
-    cycles: float | None = None,
-    clutch_id: str | None = None,
-    reading: Reading | None = None,
+    rig: str | None,
+    profile: RigProfile | None,
+    kind: str | None,
+    cycles: float | None,
+    clutch_id: str | None,
+    reading: Reading,
 ) -> dict[str, Any]:
     """What would be made of a file by `profile`, by that of `rig`, or by the one whose columns it has; else by its titles.
     What `reading` says of columns, decimal sign and missing values comes before either.
@@ -72,9 +72,7 @@ def preview(
     """
     geometry, torque_filter = _clutch(database, clutch_id)
     if profile is None and rig is not None:
-        with database.reading() as connection:
-            profile = records.rig(connection, rig)
-    reading = reading or Reading()
+        profile = rig_profile(database, rig)
     shown = preview_file(path, filename=filename, reading=reading_with(profile, reading))
     if profile is None:
         rig, profile = _fitting(database, shown, filename)
@@ -101,7 +99,7 @@ def preview(
         "first_rows": [[row[index] if index < len(row) else "" for index in usable] for row in shown["head"]],
         "units": {name: spellings(name).split(", ") for name in CHANNELS},
         "rig": rig,
-        "profile": _saveable(shown, used, kind, filename, cycles),
+        "profile": _saveable([column["title"] for column in columns], used, kind, filename, cycles),
         "kind": kind,
         "cycles": cycles,
         "run_id": from_profile.run_id,
@@ -177,10 +175,9 @@ def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, 
 
 
 def _saveable(
-    shown: Mapping[str, Any], used: RigProfile | None, kind: str | None, filename: str, cycles: float | None
+    titles: Sequence[str], used: RigProfile | None, kind: str | None, filename: str, cycles: float | None
 ) -> dict[str, Any]:
     """The profile as it could be saved: with all columns, and a pattern of the file's name where the cycles are in that."""
-    titles = dict.fromkeys(_title(column) for column in shown["columns"] if column["name"])
     profile_columns = {column.title: column.model_dump(mode="json") for column in used.columns} if used else {}
     profile_fields = {} if used is None else used.model_dump(mode="json")
     suggested = {
@@ -214,7 +211,7 @@ def _evaluated(
         kind = kind or (answer["kinds"][0] if len(answer["kinds"]) == 1 else None)
         if kind is None or answer["missing"]:
             return answer
-        run = run_of(read, IncomingRun(kind=kind, cycles=0.0, run_id=""))
+        run = run_of(read, kind=kind, cycles=0.0)
         analysis = analyse(run, geometry, torque_filter)
         return answer | {
             "pieces": _pieces(run, torque_filter),

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.columns import LineOf, place
 from service.errors import InvalidError, Notice
 from service.readers.numerals import NUMBER, plain
-from service.readers.table import NO_MISSING, Reading, Table, marks
+from service.readers.table import NO_MISSING, LineOf, Reading, Table, marks, place
 
 #: A value that is so many times as large as all others stands for none, a common one (more than a tenth of the rows) only
 #: farther off. Chosen: between neighbours of a test's values lie ten (speeds 1, 10, 100), and from an idle valve's 0.02 to
@@ -157,8 +156,12 @@ def drop_totals(
     """Columns [n] by index and their table without the rows at its end that are the means, sums, maxima of those above."""
     measured_columns = [columns[index] for index in measured]
     sizes = {column.size for column in measured_columns}
-    numeric = all(column.dtype.kind in "iuf" for column in measured_columns)
-    if len(sizes) != 1 or max(sizes) > _LONGEST or not numeric:
+    if (
+        not measured_columns
+        or len(sizes) > 1
+        or max(sizes) > _LONGEST
+        or any(column.dtype.kind not in "iuf" for column in measured_columns)
+    ):
         return dict(columns), table
     starts = [0, *table.breaks, *sizes]
     keep = np.ones(max(sizes), dtype=np.bool_)
@@ -194,8 +197,9 @@ def _totals(columns: list[FloatArray]) -> list[str]:
             chance, name = min((_chance(above, values, name), name) for name in _STATISTICS)
             if not np.isfinite(chance):
                 break
-            same = [column == value for column, value in zip(above, values, strict=True)]
-            repeated = name in _OWN and np.logical_and.reduce(same).any()
+            repeated = (
+                name in _OWN and np.logical_and.reduce([a == v for a, v in zip(above, values, strict=True)]).any()
+            )
             made_of.append(name)
             by_chance *= 1.0 if repeated else chance
         limit = _BY_CHANCE_OWN if set(made_of) <= _OWN else _BY_CHANCE

@@ -64,13 +64,13 @@ class CriterionIn(Schema):
     @classmethod
     def _has_a_limit(cls, given: Any) -> Any:
         """A slope's limit is 0, where friction begins to fall with speed, and mean COF's half of what it was."""
-        if isinstance(given, dict) and isinstance(given.get("quantity"), str):
-            given = given | {"quantity": ALIASES.get(given["quantity"], given["quantity"])}
-        if not isinstance(given, dict) or any(given.get(name) is not None for name in ("fraction", "below", "above")):
+        if not isinstance(given, dict) or not isinstance(given.get("quantity"), str):
             return given
-        usual = {"slope": {"below": 0.0}, "mean_cof": {"fraction": 0.5}}
-        quantity = given.get("quantity")
-        return given | usual.get(quantity, {}) if isinstance(quantity, str) else given
+        named: str = given["quantity"]
+        quantity = ALIASES.get(named, named)
+        limits = [given.get(name) for name in ("fraction", "below", "above")]
+        usual = {"slope": {"below": 0.0}, "mean_cof": {"fraction": 0.5}} if limits == [None] * 3 else {}
+        return given | {"quantity": quantity} | usual.get(quantity, {})
 
     @model_validator(mode="after")
     def _is_one_limit_at_one_place(self) -> Self:

@@ -15,7 +15,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ParamSpec, TypeVar
 
 from fastapi import Depends, Request
 from fastapi.concurrency import run_in_threadpool
@@ -39,6 +39,7 @@ from storage import clutches
 from storage.encoding import to_text
 from storage.engine.database import Database
 
+Given = ParamSpec("Given")
 Body = TypeVar("Body", bound=BaseModel)
 Rows = Iterable[Mapping[str, Any]]
 #: What computes an answer of a database, a clutch's name and further arguments.
@@ -89,9 +90,11 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-async def answer(request: Request, make: Callable[[], object]) -> Response:
+async def answer(
+    request: Request, query: Callable[Given, object], *given: Given.args, **more: Given.kwargs
+) -> Response:
     """A GET's answer that is made again each time; its ETag is that of the bytes: it changes when and only when they do."""
-    return tagged(request, Answer.of(await run_in_threadpool(lambda: to_json(make()))), JSON_TYPE)
+    return tagged(request, Answer.of(await run_in_threadpool(lambda: to_json(query(*given, **more)))), JSON_TYPE)
 
 
 async def cached_answer(context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> Answer:

@@ -168,16 +168,13 @@ def _require_direct(request: Request) -> None:
 
 def _require_own_host(request: Request) -> None:
     host, origin = request.headers.get("host", "").strip(), request.headers.get("origin")
-    if not is_loopback(_name(host)):
+    name = host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
+    if not is_loopback(name):
         raise ForbiddenError(
             f"no key exists, so the service answers at localhost only, not at {host[:80]!r}: {_MAKE_ONE}"
         )
     if origin is not None and origin.partition("://")[2] != host:
         raise ForbiddenError(f"no key exists, so a page of {origin[:80]!r} has no access: {_MAKE_ONE}")
-
-
-def _name(host: str) -> str:
-    return host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
 
 
 @lru_cache(maxsize=256)

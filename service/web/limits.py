@@ -53,5 +53,5 @@ LONGEST_LOOK_SECONDS = 2.0
 RAW_LOOK_SECONDS, LONGEST_RAW_LOOK_SECONDS = 10.0, 1.0
 #: Clutches that the metrics read at once.
 METRICS_PAGE = 1000
-#: What may always be asked, whatever a caller has used of its share.
+#: What may always be asked, without a key and whatever a caller has used of its share.
 UNLIMITED = ("/livez", "/readyz")

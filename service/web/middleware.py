@@ -241,7 +241,7 @@ _SAFE = {
     "object-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'; script-src 'self'",
 }
 #: Asked again and again by machines: logged from `debug` on, like what is still as it was (304).
-_PROBES = ("/livez", "/readyz", "/metrics")
+_PROBES = (*limits.UNLIMITED, "/metrics")
 
 
 class Edge(_OfRequests):
@@ -366,42 +366,35 @@ _PIECE = 1 << 18
 _GZIP = 16 + zlib.MAX_WBITS
 
 
-class Unpacked:
-    """Receives in place of `receive`. Raises InvalidError where it is no gzip, is cut off or goes on after its end."""
+def _unpacked(receive: Receive) -> Receive:
+    """What receives a packed body unpacked. Raises InvalidError where it is no gzip, is cut off or goes on after its end."""
+    unpacker = zlib.decompressobj(_GZIP)
+    packed, more, ended = b"", True, False
 
-    def __init__(self, receive: Receive) -> None:
-        self._receive = receive
-        self._unpacker = zlib.decompressobj(_GZIP)
-        self._packed = b""
-        self._more = True
-        self._ended = False
-
-    async def __call__(self) -> Message:
+    async def receive_unpacked() -> Message:
         """The next piece of the body, unpacked; then what follows a body."""
-        while not self._ended:
-            if not self._packed and self._more:
-                message = await self._receive()
+        nonlocal packed, more, ended
+        while not ended:
+            if not packed and more:
+                message = await receive()
                 if message["type"] != "http.request":
                     return message
-                self._packed, self._more = message.get("body", b""), message.get("more_body", False)
-            piece = self._piece()
-            if piece or self._ended:
-                return {"type": "http.request", "body": piece, "more_body": not self._ended}
-        return await self._receive()
-
-    def _piece(self) -> bytes:
-        try:
-            piece = self._unpacker.decompress(self._packed, _PIECE)
-        except zlib.error as error:
-            raise InvalidError(f"the body is not the gzip data that Content-Encoding announces: {error}") from error
-        self._packed = self._unpacker.unconsumed_tail
-        if self._unpacker.unused_data:
-            raise InvalidError("the body has more bytes after the end of its gzip data")
-        if not piece and not self._packed and not self._more:
-            if not self._unpacker.eof:
+                packed, more = message.get("body", b""), message.get("more_body", False)
+            try:
+                piece = unpacker.decompress(packed, _PIECE)
+            except zlib.error as error:
+                raise InvalidError(f"the body is not the gzip data that Content-Encoding announces: {error}") from error
+            packed = unpacker.unconsumed_tail
+            if unpacker.unused_data:
+                raise InvalidError("the body has more bytes after the end of its gzip data")
+            ended = not piece and not packed and not more
+            if ended and not unpacker.eof:
                 raise InvalidError("the gzip data of the body is cut off")
-            self._ended = True
-        return piece
+            if piece or ended:
+                return {"type": "http.request", "body": piece, "more_body": not ended}
+        return await receive()
+
+    return receive_unpacked
 
 
 class Encodings(_OfRequests):
@@ -425,7 +418,7 @@ class Encodings(_OfRequests):
             return
         if encoding == "gzip":
             del headers["content-encoding"], headers["content-length"]
-            receive = Unpacked(receive)
+            receive = _unpacked(receive)
         wanted_tags = headers.get("if-none-match", "")
         if _PACKED in wanted_tags:
             headers["if-none-match"] = wanted_tags.replace(_PACKED, '"')

@@ -11,6 +11,7 @@ from typing import Any
 from fastapi import FastAPI
 
 from service.schemas.examples import example_of
+from service.web.limits import UNLIMITED
 
 Json = dict[str, Any]
 
@@ -20,8 +21,6 @@ _SECURITY = {
     "description": "A key, made by `clutchlife key create`. Where no key exists none is needed, and only this "
     "machine may ask.",
 }
-#: Addresses that answer without a key.
-_OPEN = ("/livez", "/readyz")
 #: Ends the name of what is sent where what is answered has the name already.
 _SENT = "Sent"
 
@@ -70,7 +69,7 @@ def completed(api: Json) -> Json:
         for place in [operation.get("requestBody", {}), *operation["responses"].values()]:
             for content in place.get("content", {}).values():
                 content["schema"] = _named(content.get("schema", {}), schemas)
-        if path in _OPEN:
+        if path in UNLIMITED:
             operation["security"] = []
         _complete(path, method, operation)
     for owner, schema in schemas.items():

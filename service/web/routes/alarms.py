@@ -42,7 +42,7 @@ OfClutch = Annotated[
 @router.get("", response_model=schemas.AlarmPage, responses=READING)
 async def list_alarms(request: Request, context: auth.OwnReader, part: Paged) -> Response:
     """Rules by name. A key that is bound to clutches gets the rules of these clutches."""
-    return await answer(request, partial(alarms.page, context.database, part, only=auth.grant_of(request).clutches))
+    return await answer(request, alarms.page, context.database, part, only=auth.grant_of(request).clutches)
 
 
 @router.post(
@@ -69,16 +69,13 @@ async def list_events(
     if clutch_id is not None:
         auth.require_clutch(auth.grant_of(request), clutch_id)
         clutches = frozenset({clutch_id})
-    return await answer(
-        request, partial(alarms.events, context.database, part, state=state, alarm_id=alarm_id, only=clutches)
-    )
+    return await answer(request, alarms.events, context.database, part, state=state, alarm_id=alarm_id, only=clutches)
 
 
 @router.get("/events/{event_id}", response_model=schemas.EventOut, responses=READING)
 async def read_event(request: Request, context: auth.OwnReader, event_id: EventId) -> Response:
     """One alarm."""
-    clutches = auth.grant_of(request).clutches
-    return await answer(request, lambda: alarms.event(context.database, event_id, only=clutches))
+    return await answer(request, alarms.event, context.database, event_id, only=auth.grant_of(request).clutches)
 
 
 @router.post(
@@ -88,16 +85,16 @@ async def read_event(request: Request, context: auth.OwnReader, event_id: EventI
 async def acknowledge_event(request: Request, context: auth.OwnIngester, event_id: EventId) -> Response:
     """Acknowledge an alarm: somebody has seen it. The body is optional."""
     remark = await sent(request, schemas.AcknowledgeIn) if await request.body() else schemas.AcknowledgeIn()
-    await run_in_threadpool(alarms.event, context.database, event_id, only=auth.grant_of(request).clutches)
-    acknowledge = partial(change_alarms.acknowledge, note=remark.note, by=auth.grant_of(request).name, at=now())
+    grant = auth.grant_of(request)
+    await run_in_threadpool(alarms.event, context.database, event_id, only=grant.clutches)
+    acknowledge = partial(change_alarms.acknowledge, note=remark.note, by=grant.name, at=now())
     return json_answer(await run_in_threadpool(acknowledge, context.database, event_id))
 
 
 @router.get("/{alarm_id}", response_model=schemas.AlarmOut, responses=READING)
 async def read_alarm(request: Request, context: auth.OwnReader, alarm_id: AlarmId) -> Response:
     """A rule in force."""
-    clutches = auth.grant_of(request).clutches
-    return await answer(request, lambda: alarms.look_up(context.database, alarm_id, only=clutches))
+    return await answer(request, alarms.look_up, context.database, alarm_id, only=auth.grant_of(request).clutches)
 
 
 @router.put("/{alarm_id}", **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE))
@@ -126,7 +123,7 @@ async def test_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId
 @webhook_router.get("", response_model=schemas.WebhookPage, responses=READING)
 async def list_webhooks(request: Request, context: auth.Reader, part: Paged) -> Response:
     """Receivers; the addresses are shown without secrets."""
-    return await answer(request, partial(alarms.receivers_by_name, context.database, part))
+    return await answer(request, alarms.receivers_by_name, context.database, part)
 
 
 @webhook_router.post(
@@ -143,8 +140,8 @@ async def post_webhook(request: Request, context: auth.Admin) -> Response:
         change_alarms.inside_allowed, context.database, context.settings.private_receivers
     )
     await run_in_threadpool(require_address, receiver.url, private=private)
-    add = partial(change_alarms.add_receiver, by=auth.grant_of(request).name, at=now())
-    row = await run_in_threadpool(add, context.database, receiver)
+    by = auth.grant_of(request).name
+    row = await run_in_threadpool(change_alarms.add_receiver, context.database, receiver, by=by, at=now())
     new_secret = None if receiver.secret else row.secret
     return json_answer(alarms.receiver_out(row, secret=new_secret), 201, Location=f"/v1/webhooks/{row.webhook_id}")
 
@@ -152,7 +149,7 @@ async def post_webhook(request: Request, context: auth.Admin) -> Response:
 @webhook_router.get("/{webhook_id}", response_model=schemas.WebhookOut, responses=READING)
 async def read_webhook(request: Request, context: auth.Reader, webhook_id: WebhookId) -> Response:
     """A receiver; its address is shown without secrets."""
-    return await answer(request, lambda: alarms.receiver(context.database, webhook_id))
+    return await answer(request, alarms.receiver, context.database, webhook_id)
 
 
 @webhook_router.delete("/{webhook_id}", status_code=204, response_class=Response, responses=READING)
@@ -165,7 +162,7 @@ async def delete_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response
 @webhook_router.get("/{webhook_id}/deliveries", response_model=schemas.DeliveryPage, responses=READING)
 async def list_deliveries(request: Request, context: auth.Reader, webhook_id: WebhookId, part: Paged) -> Response:
     """The deliveries of a receiver, sent or waiting, newest first."""
-    return await answer(request, partial(alarms.deliveries, context.database, webhook_id, part))
+    return await answer(request, alarms.deliveries, context.database, webhook_id, part)
 
 
 @webhook_router.post("/{webhook_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
@@ -178,8 +175,8 @@ async def test_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
 async def _saved(request: Request, context: Context, alarm_id: str | None) -> Response:
     rule = await sent(request, schemas.AlarmIn)
     auth.require_clutch(auth.grant_of(request), rule.clutch_id)
-    save = partial(change_alarms.save, by=auth.grant_of(request).name, at=now(), alarm_id=alarm_id)
-    row, new = await run_in_threadpool(save, context.database, rule)
+    by, save = auth.grant_of(request).name, change_alarms.save
+    row, new = await run_in_threadpool(save, context.database, rule, by=by, at=now(), alarm_id=alarm_id)
     context.outbox.wake()
     return json_answer(alarms.rule_out(row), 201 if new else 200, Location=f"/v1/alarms/{row.alarm_id}")
 

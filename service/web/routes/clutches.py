@@ -1,4 +1,5 @@
-"""Clutches: register, list, count, look up, edit and archive, and the audit trail."""
+"""Clutches: register, list, count, look up, edit and archive, and the audit trail; and what the clutches show together: the
+fleet's priors, and how right the predictions of all were."""
 
 from collections.abc import Callable, Hashable
 from functools import partial
@@ -7,11 +8,12 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.queries import clutch_list, runs
+from service.queries import clutch_list, fleet_priors, runs, scores
 from service.queries.cache import to_json
 from service.queries.degradation import degradation
 from service.schemas.clutch import ClutchEdit, ClutchIn, ClutchOut, ClutchPage
-from service.schemas.fleet import FleetTotals
+from service.schemas.fleet import FleetPriorPage, FleetScores, FleetTotals
+from service.schemas.life import Method
 from service.schemas.parameters import Archived, ClutchId, ClutchStateName, Find, Held, Offset, Sort
 from service.schemas.run import ChangePage
 from service.web import answers, auth
@@ -25,6 +27,7 @@ from storage.clutches import Choice
 router = APIRouter(prefix="/v1/clutches", tags=["clutches"])
 #: Beside the clutches: below them, `totals` would be a clutch's name.
 fleet_router = APIRouter(prefix="/v1/fleet", tags=["fleet"])
+totals_router = APIRouter(prefix="/v1/fleet", tags=["fleet"])
 
 EXAMPLE = {
     "clutch_id": "bench3-017",
@@ -77,7 +80,7 @@ async def list_clutches(
     return await _answer_about_all_clutches(request, context, ("clutches", choice, part, offset, sort), make)
 
 
-@fleet_router.get("/totals", response_model=FleetTotals, responses=READING)
+@totals_router.get("/totals", response_model=FleetTotals, responses=READING)
 async def totals(request: Request, context: auth.OwnReader, archived: Archived = False, find: Find = "") -> Response:
     """The number of the key's clutches, by state."""
     choice = Choice(archived=archived, only=auth.grant_of(request).clutches, find=find)
@@ -100,7 +103,7 @@ async def _answer_about_all_clutches(
 @router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)
 async def read_clutch(request: Request, context: auth.Reader, clutch_id: ClutchId) -> Response:
     """One clutch."""
-    return await answers.answer(request, lambda: clutch_list.look_up(context.database, clutch_id))
+    return await answers.answer(request, clutch_list.look_up, context.database, clutch_id)
 
 
 @router.patch(
@@ -125,3 +128,16 @@ async def edit_clutch(of: answers.ChangeOf) -> Response:
 async def list_changes(of: answers.PageOf) -> Response:
     """The audit trail of the clutch and its runs: who changed what, when and why, newest first."""
     return await answers.clutch_answer(of, runs.trail, of.part)
+
+
+@fleet_router.get("/priors", response_model=FleetPriorPage, responses=READING)
+async def priors(request: Request, context: auth.Reader, part: answers.WholePaged) -> Response:
+    """The priors learned from the clutches of each kind."""
+    return await answers.answer(request, lambda: part.sliced(fleet_priors.newest(context.database)))
+
+
+@fleet_router.get("/scores", response_model=FleetScores, responses=READING)
+async def fleet_scores(request: Request, context: auth.Reader, method: Method = "particle") -> Response:
+    """Scores of the predictions of all ended lives."""
+    scored = await answers.computed_of_each(request, context, scores.scores_of_clutch, method)
+    return await answers.answer(request, scores.scores_of_fleet, scored, method=method)

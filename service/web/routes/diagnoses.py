@@ -37,8 +37,10 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
     question = await answers.sent(request, DiagnosisIn)
     if question.adopt:
         require_scope(grant_of(request), "admin")
-    ask = partial(
+    diagnosis_id, _ = await run_in_threadpool(
         run_diagnosis.ask,
+        context.database,
+        clutch_id,
         by=grant_of(request).name,
         adopt=question.adopt,
         isolability=question.isolability,
@@ -46,7 +48,6 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
         most=context.settings.most_diagnoses,
         created_at=answers.now(),
     )
-    diagnosis_id, _ = await run_in_threadpool(ask, context.database, clutch_id)
     context.jobs.wake()
     preferred = answers.preferred_wait(prefer)
     wait = WAIT_SECONDS if preferred is None else preferred
@@ -62,25 +63,25 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
 @router.get("/diagnoses", response_model=DiagnosisPage, responses=READING)
 async def list_diagnoses(of: answers.PageOf) -> Response:
     """Diagnoses without their maps and loops, newest first."""
-    return await answers.answer(of.request, partial(diagnoses.page, of.database, of.clutch_id, of.part))
+    return await answers.answer(of.request, diagnoses.page, of.database, of.clutch_id, of.part)
 
 
 @router.get("/diagnoses/{diagnosis_id}", response_model=DiagnosisOut, responses=READING)
 async def read_diagnosis(of: answers.Of, diagnosis_id: DiagnosisId) -> Response:
     """One diagnosis with its maps and loops."""
-    return await answers.answer(of.request, partial(diagnoses.diagnosis, of.database, of.clutch_id, diagnosis_id))
+    return await answers.answer(of.request, diagnoses.diagnosis, of.database, of.clutch_id, diagnosis_id)
 
 
 @router.get("/diagnoses/{diagnosis_id}/plan", response_model=PlanOut, responses=READING)
 async def read_plan(of: answers.Of, diagnosis_id: DiagnosisId) -> Response:
     """The tests that a diagnosis advises as a protocol that a rig can run."""
-    return await answers.answer(of.request, partial(diagnoses.plan, of.database, of.clutch_id, diagnosis_id))
+    return await answers.answer(of.request, diagnoses.plan, of.database, of.clutch_id, diagnosis_id)
 
 
 @router.get("/model", response_model=ModelOut, responses=READING)
 async def read_model(of: answers.Of) -> Response:
     """The current model of tracking and remaining life, and all adopted versions."""
-    return await answers.answer(of.request, partial(diagnoses.model, of.database, of.clutch_id))
+    return await answers.answer(of.request, diagnoses.model, of.database, of.clutch_id)
 
 
 @router.put("/model", **answers.taking(ModelIn, ModelOut, {"diagnosis_id": "3f9a1c0b7d2e4f56"}, SENDING))

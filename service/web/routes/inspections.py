@@ -71,13 +71,13 @@ async def post_inspection(request: Request, context: Ingester, clutch_id: Clutch
 @router.get("", response_model=InspectionPage, responses=READING)
 async def list_inspections(of: answers.PageOf) -> Response:
     """Inspections by cycles."""
-    return await answers.answer(of.request, partial(inspections.page, of.database, of.clutch_id, of.part))
+    return await answers.answer(of.request, inspections.page, of.database, of.clutch_id, of.part)
 
 
 @router.get("/{inspection_id}", response_model=InspectionOut, responses=READING)
 async def read_inspection(of: answers.Of, inspection_id: InspectionId) -> Response:
     """One inspection."""
-    return await answers.answer(of.request, partial(inspections.look_up, of.database, of.clutch_id, inspection_id))
+    return await answers.answer(of.request, inspections.look_up, of.database, of.clutch_id, inspection_id)
 
 
 @router.post(

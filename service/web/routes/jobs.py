@@ -40,14 +40,16 @@ async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -
     """Start a replay or a fleet refresh. If the same job already waits or runs, the answer is that job."""
     job_in = await sent(request, JobIn)
     require_clutch(grant_of(request), job_in.clutch_id)
-    ask = partial(
+    new_or_open = await run_in_threadpool(
         ask_job.ask,
+        context.database,
+        job_in.kind,
+        job_in.clutch_id,
         by=grant_of(request).name,
         request=request_id.get(),
         most=context.settings.most_replays,
         asked_at=now(),
     )
-    new_or_open = await run_in_threadpool(ask, context.database, job_in.kind, job_in.clutch_id)
     context.jobs.wake()
     wait = preferred_wait(prefer)
     look = partial(jobs.find, context.database, new_or_open.job_id, only=None)
@@ -62,21 +64,19 @@ async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -
 @router.get("", response_model=JobPage, responses=READING)
 async def list_jobs(request: Request, context: OwnReader, part: Paged, state: OfState = None) -> Response:
     """Jobs of the key's clutches, newest first."""
-    return await answer(
-        request, partial(jobs.page, context.database, part, state=state, only=grant_of(request).clutches)
-    )
+    return await answer(request, jobs.page, context.database, part, state=state, only=grant_of(request).clutches)
 
 
 @router.get("/{job_id}", response_model=JobOut, responses=READING)
 async def read_job(request: Request, context: OwnReader, job_id: JobId) -> Response:
     """One job, with its progress and result."""
-    clutches = grant_of(request).clutches
-    return await answer(request, lambda: jobs.shown(jobs.find(context.database, job_id, only=clutches)))
+    row = await run_in_threadpool(jobs.find, context.database, job_id, only=grant_of(request).clutches)
+    return await answer(request, jobs.shown, row)
 
 
 @router.delete("/{job_id}", response_model=JobOut, responses=READING)
 async def delete_job(request: Request, context: OwnAdmin, job_id: JobId) -> Response:
     """Cancel a job. A waiting job does not start, a running job ends within seconds, an ended job stays unchanged."""
     row = await run_in_threadpool(jobs.find, context.database, job_id, only=grant_of(request).clutches)
-    cancel = partial(ask_job.cancel, context.database, row, by=grant_of(request).name, at=now())
-    return json_answer(jobs.shown(await run_in_threadpool(cancel)))
+    cancelled = await run_in_threadpool(ask_job.cancel, context.database, row, by=grant_of(request).name, at=now())
+    return json_answer(jobs.shown(cancelled))

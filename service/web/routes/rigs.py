@@ -44,13 +44,13 @@ EXAMPLE = {
 @router.get("", response_model=RigPage, responses=READING)
 async def list_rigs(request: Request, context: OwnReader, part: Paged) -> Response:
     """Rig profiles by name."""
-    return await answer(request, partial(rigs.page, context.database, part))
+    return await answer(request, rigs.page, context.database, part)
 
 
 @router.get("/{name}", response_model=RigOut, responses=READING)
 async def read_rig(request: Request, context: OwnReader, name: parameters.RigName) -> Response:
     """A saved rig profile."""
-    return await answer(request, lambda: rigs.look_up(context.database, name))
+    return await answer(request, rigs.look_up, context.database, name)
 
 
 @router.post("", status_code=201, **taking(RigIn, RigOut, EXAMPLE, SENDING, {200: "The profile existed before"}))
@@ -72,8 +72,8 @@ async def _saved(request: Request, context: Context, name: str | None) -> Respon
     if name not in (None, rig.name):
         message = f"name must be that of the address, {name!r}, got {rig.name!r}"
         raise InvalidError.of(message, code="other_name", pointer="/name")
-    saving = partial(save, context.database, rig, by=grant_of(request).name, at=now(), replacing=name is not None)
-    saved, new = await run_in_threadpool(saving)
+    by, replacing = grant_of(request).name, name is not None
+    saved, new = await run_in_threadpool(save, context.database, rig, by=by, at=now(), replacing=replacing)
     return json_answer(saved.model_dump(mode="json"), 201 if new else 200, Location=f"/v1/rigs/{saved.name}")
 
 

@@ -91,6 +91,9 @@ def test_a_dynamic_test_gets_its_loop(client: TestClient) -> None:
     items = client.get("/v1/clutches/c1/loops").json()["items"]
     assert [(item["cycles"], item["loop_area_nm_m_s"]) for item in items] == [(0, loop["loop_area_nm_m_s"])]
     assert len(client.get("/v1/clutches/c1/loops.csv").text.splitlines()) == 2
+    post_run(client, {"kind": "dynamic_stribeck", "cycles": 500, "channels": dynamic_record()})
+    first = client.get("/v1/clutches/c1/loops?limit=1").json()
+    assert (first["items"], first["next"] is None) == (items, False)
 
 
 def test_a_stationary_test_that_comes_later_gives_the_loops_their_curve(client: TestClient) -> None:

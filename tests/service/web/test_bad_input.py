@@ -170,14 +170,17 @@ def test_only_a_run_may_be_large(client: TestClient, method: str, path: str) -> 
 
 def test_a_form_is_not_taken(client: TestClient) -> None:
     """A page in a browser can send forms and plain text across sites unasked, JSON it cannot."""
-    answer = client.post(RUNS, content=json.dumps(stationary(0)), headers={"Content-Type": "text/plain"})
-    assert answer.status_code == 415
+    for address, body in ((RUNS, stationary(0)), ("/v1/clutches", {"clutch_id": "new"})):
+        answer = client.post(address, content=json.dumps(body), headers={"Content-Type": "text/plain"})
+        assert answer.status_code == 415, address
 
 
 def test_bad_questions_are_422(client: TestClient) -> None:
     numbers = ("pressure_bar=nan", "pressure_bar=-1", "at_cycles=x", "at_cycles=inf", "at_cycles=-1")
     for query in ("presure_bar=5", "method=magic", *numbers):
         assert client.get(f"/v1/clutches/c1/remaining-useful-life?{query}").status_code == 422, query
+    both = client.get("/v1/clutches/c1/remaining-useful-life?method=magic&at_cycles=x").json()
+    assert (len(both["errors"]), both["total_errors"], both["detail"].partition("; ")[2]) == (2, 2, "2 errors in all")
     for cursor in ("%ff", "e30", "WzFd", "!!!!", "WzEsIlx1ZDgwMCJd", "W05hTiwiYSJd", "WzFlOTk5LCJhIl0"):
         assert client.get(f"{RUNS}?cursor={cursor}").status_code == 422
 
