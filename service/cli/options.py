@@ -80,9 +80,13 @@ DATABASE, URL = DEFAULT_DATABASE, DEFAULT_URL
 
 @contextmanager
 def errors_in_a_line() -> Iterator[None]:
-    """Errors of files, databases and addresses are printed in one line, not as a traceback."""
+    """Errors of files, databases, addresses and the service are printed in one line, not as a traceback."""
     try:
         yield
+    except ServiceAwayError as error:
+        fail(str(error), EX_TEMPFAIL)
+    except RefusedError as error:
+        fail(str(error), EX_DATAERR)
     except (StorageError, NotFoundError, FileExistsError) as error:
         fail(str(error))
     except httpx2.InvalidURL as error:
@@ -169,12 +173,7 @@ def asking(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def with_service(*, url: str, key: str | None, patience: float, **given: Any) -> None:
         with errors_in_a_line(), connect(url, key=key) as http:
-            try:
-                command(Service(http=http, patience=patience), **given)
-            except ServiceAwayError as error:
-                fail(str(error), EX_TEMPFAIL)
-            except RefusedError as error:
-                fail(str(error), EX_DATAERR)
+            command(Service(http=http, patience=patience), **given)
 
     with_service.__signature__ = inspect.Signature([*parameters, *shared])  # type: ignore[attr-defined]
     with_service.__annotations__ = {parameter.name: parameter.annotation for parameter in [*parameters, *shared]}

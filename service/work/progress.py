@@ -1,9 +1,8 @@
 """How far work has come: a bar on a terminal, a line now and then elsewhere."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Protocol
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -12,16 +11,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 LINE_SECONDS = 20.0
 
 
-class Advance(Protocol):
-    """Called as an input is done with; a `total` is given once it is known."""
-
-    def __call__(self, count: int = 1, *, total: int | None = None) -> None:
-        """Report `count` more items as done."""
-
-
 @contextmanager
-def progress(console: Console, title: str) -> Iterator[Advance]:
-    """What is to be called as work goes on, shown on the console."""
+def progress(console: Console, title: str) -> Iterator[Callable[..., None]]:
+    """What to call as `count` (1) more inputs are done with, or with a `total` once that is known; shown on the console."""
     if console.is_terminal:
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         with Progress(*columns, console=console, transient=True) as shown:

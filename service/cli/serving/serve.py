@@ -57,10 +57,11 @@ def serve(
     # what a stop finds before the server listens for it, and what the server leaves it to once all is finished
     signal.signal(signal.SIGTERM, _end)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # whoever has started it may be deaf to it
-    from service.settings import Settings  # start-up time
+    from service.settings import Settings, redacted  # start-up time
     from service.web.auth import is_loopback  # start-up time
     from storage.engine.opening import database_exists  # start-up time
     from storage.engine.postgresql.connect import is_on_server  # start-up time
+    from storage.engine.sqlite.connect import path_of  # start-up time
 
     named = {"insecure_local": insecure_local, "log_level": log_level, "raw": raw, "root_path": root_path}
     with errors_in_a_line(), ExitStack() as resources:
@@ -83,12 +84,15 @@ def serve(
         if host != first:
             resources.close()
             sockets = [resources.enter_context(at_address) for at_address in bound(host, port)]
-        shown = (page(host, port_of(sockets), settings.root_path), _place(settings.database))
+        # the file's whole path, or the server's address without its password
+        on_server = is_on_server(settings.database)
+        place = redacted(settings.database) if on_server else str(path_of(settings.database).absolute())
+        address = page(host, port_of(sockets), settings.root_path)
         resources.pop_all()
     from service.cli.serving import services  # start-up time
 
     def announce() -> None:
-        start.info("the page is at %s, the database at %s", *shown)
+        start.info("the page is at %s, the database at %s", address, place)
 
     options: dict[str, Any] = {
         "log_config": None,
@@ -103,15 +107,6 @@ def serve(
             fail("a process could not start: see the log")
     elif not services.serve_one(settings, sockets, options, announce):
         fail("the service could not start: see the log")
-
-
-def _place(database: str) -> str:
-    """The database as an operator finds it: the file's whole path, or the server's address without its password."""
-    from service.settings import redacted  # start-up time
-    from storage.engine.postgresql.connect import is_on_server  # start-up time
-    from storage.engine.sqlite.connect import path_of  # start-up time
-
-    return redacted(database) if is_on_server(database) else str(path_of(database).absolute())
 
 
 def _allowed(host: str, settings: "Settings") -> str:
