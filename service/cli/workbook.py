@@ -22,39 +22,27 @@ _HEAD = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
 
 def write_workbook(path: Path, sheets: Mapping[str, Iterable[Sequence[str]]]) -> None:
     """Write rows of texts by sheet, the same bytes for the same rows; a text that is a finite number becomes one."""
-    names = [name[:_MAX_NAME] for name in sheets]
-    numbers = range(1, len(names) + 1)
-    parts = "".join(
-        f'<Override PartName="/xl/worksheets/sheet{n}.xml" ContentType="{_TYPES}.worksheet+xml"/>' for n in numbers
+    names = dict(enumerate((name[:_MAX_NAME] for name in sheets), start=1))
+    types = "".join(
+        f'<Override PartName="/xl/worksheets/sheet{n}.xml" ContentType="{_TYPES}.worksheet+xml"/>' for n in names
     )
-    listed = "".join(
-        f'<sheet name={quoteattr(name)} sheetId="{n}" r:id="r{n}"/>' for n, name in zip(numbers, names, strict=True)
-    )
+    listed = "".join(f'<sheet name={quoteattr(name)} sheetId="{n}" r:id="r{n}"/>' for n, name in names.items())
     linked = "".join(
-        f'<Relationship Id="r{n}" Type="{_DOCUMENT}/worksheet" Target="worksheets/sheet{n}.xml"/>' for n in numbers
+        f'<Relationship Id="r{n}" Type="{_DOCUMENT}/worksheet" Target="worksheets/sheet{n}.xml"/>' for n in names
     )
+    parts = {
+        "[Content_Types].xml": f'<Types xmlns="{_PACKAGE}/content-types"><Default Extension="rels" '
+        'ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+        f'<Override PartName="/xl/workbook.xml" ContentType="{_TYPES}.sheet.main+xml"/>{types}</Types>',
+        "_rels/.rels": f'<Relationships xmlns="{_PACKAGE}/relationships"><Relationship Id="r1" '
+        f'Type="{_DOCUMENT}/officeDocument" Target="xl/workbook.xml"/></Relationships>',
+        "xl/workbook.xml": f'<workbook xmlns="{_MAIN}" xmlns:r="{_DOCUMENT}"><sheets>{listed}</sheets></workbook>',
+        "xl/_rels/workbook.xml.rels": f'<Relationships xmlns="{_PACKAGE}/relationships">{linked}</Relationships>',
+    }
     with zipfile.ZipFile(path, "w") as book:
-        book.writestr(
-            _entry("[Content_Types].xml"),
-            f'{_HEAD}<Types xmlns="{_PACKAGE}/content-types"><Default Extension="rels" '
-            f'ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Override '
-            f'PartName="/xl/workbook.xml" ContentType="{_TYPES}.sheet.main+xml"/>{parts}</Types>',
-        )
-        book.writestr(
-            _entry("_rels/.rels"),
-            f'{_HEAD}<Relationships xmlns="{_PACKAGE}/relationships"><Relationship Id="r1" '
-            f'Type="{_DOCUMENT}/officeDocument" '
-            'Target="xl/workbook.xml"/></Relationships>',
-        )
-        book.writestr(
-            _entry("xl/workbook.xml"),
-            f'{_HEAD}<workbook xmlns="{_MAIN}" xmlns:r="{_DOCUMENT}"><sheets>{listed}</sheets></workbook>',
-        )
-        book.writestr(
-            _entry("xl/_rels/workbook.xml.rels"),
-            f'{_HEAD}<Relationships xmlns="{_PACKAGE}/relationships">{linked}</Relationships>',
-        )
-        for n, rows in zip(numbers, sheets.values(), strict=True):
+        for part, content in parts.items():
+            book.writestr(_entry(part), _HEAD + content)
+        for n, rows in enumerate(sheets.values(), start=1):
             with book.open(_entry(f"xl/worksheets/sheet{n}.xml"), "w") as sheet:
                 sheet.write(f'{_HEAD}<worksheet xmlns="{_MAIN}"><sheetData>'.encode())
                 for row in rows:
