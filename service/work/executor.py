@@ -3,7 +3,7 @@ on a Dask cluster, reached by its scheduler's address, whose workers need this p
 
 Results and errors are values, equal whichever executor made them. Futures are made of so many inputs as workers need, and no
 more: as one ends, the next input is taken. The processes of a pool have one thread for linear algebra each, and yield to all
-other work. `in_rounds` loads, computes and stores each of many names; one that no longer holds is taken up in the next round.
+other work. `in_rounds` loads, computes and stores each of many names; one that no longer holds is taken up once more.
 Source: https://distributed.dask.org/en/stable/api.html (Client, wait), .../resilience.html (tasks of workers that end).
 """
 

@@ -51,6 +51,7 @@ def test_remaining_life_is_a_table_of_quantiles(aged: Terminal, client: TestClie
     shown, answer = aged("life", "c1"), client.get(LIFE).json()
     assert "c1 at 3,000 cycles: " in shown
     assert "4 tests, method particle, model baseline" in shown
+    assert " % of new; the end of life is at 50 %\n" in shown
     row = next(line for line in shown.splitlines() if line.startswith("remaining cycles"))
     median = answer["remaining_cycles"]["0.5"]
     assert ("over 1,000,000" if median is None else f"{median:,.0f}") in row
@@ -104,6 +105,7 @@ def test_an_end_by_other_criteria_shows_how_probably_each_is_first(aged: Termina
     rows = [line.split() for line in lines[heading + 1 : heading + 3]]
     assert [row[0] for row in rows] == ["mean_cof", "slope"]
     assert rows[1][1:3] == ["5", "100"]
+    assert lines[heading + 2].index("100") == lines[heading].index("rpm")
     reached = client.get(LIFE).json()["probability_of_reaching"]  # one of them is the first where any is reached
     assert sum(float(row[-2]) for row in rows) == pytest.approx(100.0 * reached, abs=1.1)
     alone = aged("life", "c1", "--quantity", "slope", "--pressure", "5")
