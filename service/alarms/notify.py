@@ -23,11 +23,11 @@ from service.alarms.receivers import (
     allowed,
     has_controls,
     post,
+    require_web_address,
     scheme_of,
     why_not,
     wrong_address,
 )
-from service.alarms.receivers import require_web_address as require_web
 
 _WEB = ("http", "https")
 #: Addresses of Apprise that stay on this machine, or that say where else to read.
@@ -51,9 +51,9 @@ def require_address(url: str, *, private: bool) -> None:
     if scheme not in _WEB:
         _require_apprise(url, scheme)
         return
-    parts = require_web(url)
+    parts = require_web_address(url)
     try:
-        allowed(parts.hostname or "", parts.port or (443 if scheme == "https" else 80), private=private)
+        allowed(parts, private=private)
     except NotAllowedError as error:
         raise wrong_address(f"url is not allowed: {error}") from error
     except OSError:
@@ -113,17 +113,14 @@ def confine(private: bool) -> None:
             _require_connectable(arguments[-1], private=private)
         elif event == "open":
             path = arguments[0]
-            if isinstance(path, (str, bytes)) and not _opened(path).startswith(places):
+            if isinstance(path, (str, bytes)) and not os.path.normpath(Path.cwd() / os.fsdecode(path)).startswith(
+                places
+            ):
                 raise PermissionError("the sender tried to read a file that it does not need")
         elif event.startswith(_FORBIDDEN):
             raise PermissionError(event)
 
     sys.addaudithook(watch)
-
-
-def _opened(path: str | bytes) -> str:
-    """The absolute path of what is to be opened."""
-    return os.path.normpath(Path.cwd() / os.fsdecode(path))
 
 
 def _require_connectable(address: Any, *, private: bool) -> None:

@@ -115,7 +115,8 @@ class Outbox:
 
     def _attempt(self, row: DeliveryRow, receiver: WebhookRow, *, private: bool) -> None:
         try:
-            ended = attempt(row, receiver, private=private)
+            secret, name = receiver.secret, row.delivery_id
+            ended = notify.send(receiver.address, row.body.encode(), secret=secret, delivery_id=name, private=private)
             with self._database.writing(of="outbox") as connection:
                 _store(connection, row, ended)
         except StorageError as error:
@@ -164,9 +165,3 @@ def _store(connection: Connection, row: DeliveryRow, ended: Attempt) -> None:
         _log.warning("delivery %s, attempt %d: %s", row.delivery_id, row.attempts, ended.problem)
     at = now.isoformat(timespec="milliseconds")
     webhooks.end(connection, row.delivery_key, state, at=at, status=ended.status, problem=ended.problem, pause=pause)
-
-
-def attempt(row: DeliveryRow, receiver: WebhookRow, *, private: bool) -> Attempt:
-    return notify.send(
-        receiver.address, row.body.encode(), secret=receiver.secret, delivery_id=row.delivery_id, private=private
-    )

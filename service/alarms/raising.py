@@ -1,9 +1,7 @@
-"""Raises and clears alarms, in the transaction that stores a clutch's results. The outbox gets what receivers are to learn
-in the same transaction.
+"""Raises and clears alarms, and fills the outbox, in the transaction that stores a clutch's results.
 
-An alarm is raised once: while it is not cleared, its rule raises no other of the clutch. It is cleared when its value has
-come back by the hysteresis, or when nothing can be said any more: after a rebuild, where the rule is gone. One that ended
-with its life is as before where that end is taken back.
+While an alarm is not cleared, its rule raises no other of the clutch. It is cleared when its value has come back by the
+hysteresis, or when nothing can be said any more: after a rebuild, where the rule is gone.
 """
 
 import json
@@ -11,26 +9,20 @@ import secrets
 from collections.abc import Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import partial
 from typing import Any
 
 from sqlalchemy import Connection
 
 from service.alarms import rules
 from service.alarms.rules import Facts, Finding
-from service.lives.assumptions import ALL_PRESSURES
-from service.lives.condition import SHOWN, state_of
-from service.lives.history import STATIONARY
-from service.lives.payloads import OFF_TRACK
-from service.lives.plausibility.doubts import OFF_COURSE
+from service.lives.condition import state_of
 from service.schemas.alarm import AlarmIn, EventOut
 from service.schemas.base import schema_fields
 from service.schemas.clutch import ClutchIn
-from storage import alarms, clutches, diagnoses, results, runs, webhooks
+from storage import alarms, clutches, webhooks
 from storage.alarms import AlarmRow, EventRow, NewEvent
 from storage.clutches import ClutchRow
 from storage.encoding import Json
-from storage.results import FitRow
 from storage.webhooks import NewDelivery, WebhookRow
 
 SILENT = "silent_hours"
@@ -49,12 +41,11 @@ def evaluate(connection: Connection, clutch_id: str) -> None:
     if row is None:
         raise LookupError(f"clutch {clutch_id!r} is not stored")
     record, at = ClutchIn.model_validate(row.record), _now()
-    clutch_rules = (
-        [] if row.archived else [(rule_row, rule) for rule_row, rule in _rules(in_use) if concerns(rule, record)]
-    )
+    clutch_rules = [] if row.archived else [(rule_row, rule_of(rule_row)) for rule_row in in_use]
+    clutch_rules = [(rule_row, rule) for rule_row, rule in clutch_rules if concerns(rule, record)]
     still_raised: set[str] = set()
     for of_silence in (True, False):  # a silent rig is a state, which other rules look at
-        facts = _facts(connection, row, record, at)
+        facts = Facts(connection=connection, clutch=row, geometry=record.geometry.to_model(), now=at)
         for rule_row, rule in clutch_rules:
             if (rule.quantity == SILENT) is of_silence:
                 still_raised |= _judged(connection, rule_row, rule, facts, before.get(rule_row.alarm_id))
@@ -106,8 +97,8 @@ def receivers_of(connection: Connection, clutch_id: str | None) -> list[WebhookR
 
 def test_event(row: AlarmRow) -> EventRow:
     """An alarm as the rule would raise it, for a test; it is stored nowhere."""
-    rule = rule_of(row)
-    content = {"name": rule.name, "value": None, "limit": rule.limit, "message": _TEST, "as_of_cycles": None}
+    rule, message = rule_of(row), "This is a test of the alarm: nothing is wrong."
+    content = {"name": rule.name, "value": None, "limit": rule.limit, "message": message, "as_of_cycles": None}
     return EventRow(
         event_id="test",
         alarm_id=row.alarm_id,
@@ -124,25 +115,20 @@ def test_event(row: AlarmRow) -> EventRow:
     )
 
 
-_TEST = "This is a test of the alarm: nothing is wrong."
-
-
-def _rules(rows: Iterable[AlarmRow]) -> list[tuple[AlarmRow, AlarmIn]]:
-    return [(row, rule_of(row)) for row in rows]
-
-
 def _judged(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, before: EventRow | None) -> set[str]:
     """Raise an alarm where its rule does; the rule's name where an alarm that was there stays."""
     finding = rules.finding(rule, facts)
-    if before is not None and finding is not None and rules.keeps(rule, finding) and _is_of(before, rule, finding):
+    if finding is None:
+        return set()
+    if before is not None and rules.passes(rule, finding, rule.hysteresis) and _is_of(before, rule, finding):
         return {row.alarm_id}
-    if finding is not None and rules.raises(rule, finding):
-        if before is not None:
-            _clear(connection, before, facts)
-        if not _reopened(connection, row, rule, facts, finding):
-            _raise(connection, row, rule, facts, finding)
-        return {row.alarm_id}
-    return set()
+    if not rules.passes(rule, finding):
+        return set()
+    if before is not None:
+        _clear(connection, before, facts)
+    if not _reopened(connection, row, rule, facts, finding):
+        _raise(connection, row, rule, facts, finding)
+    return {row.alarm_id}
 
 
 def _is_of(event: EventRow, rule: AlarmIn, finding: Finding) -> bool:
@@ -168,7 +154,7 @@ def _raise(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, f
         raised_at=facts.now,
     )
     alarms.insert_event(connection, new)
-    _tell(connection, RAISED, new.event_id, receivers_of(connection, facts.clutch_id))
+    _tell(connection, RAISED, new.event_id, facts.clutch_id, of_cleared=False)
 
 
 def _reopened(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> bool:
@@ -181,8 +167,7 @@ def _reopened(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts
         ended = event.content.get(_ENDED_LIFE)
         if ended is not None and ended == facts.summary.get("life", "") and _is_of(event, rule, finding):
             alarms.reopen(connection, event.event_id)
-            informed = [row for row in receivers_of(connection, facts.clutch_id) if row.content["cleared"]]
-            _tell(connection, RAISED, event.event_id, informed)
+            _tell(connection, RAISED, event.event_id, facts.clutch_id, of_cleared=True)
             return True
     return False
 
@@ -191,60 +176,25 @@ def _clear(connection: Connection, event: EventRow, facts: Facts) -> None:
     ended = {} if facts.summary.get("ended") is None else {_ENDED_LIFE: facts.summary.get("life", "")}
     content = {name: value for name, value in event.content.items() if name != _ENDED_LIFE}
     alarms.clear(connection, event.event_id, facts.now, content | ended)
-    receivers = [row for row in receivers_of(connection, event.clutch_id) if row.content["cleared"]]
-    _tell(connection, CLEARED, event.event_id, receivers)
+    _tell(connection, CLEARED, event.event_id, event.clutch_id, of_cleared=True)
 
 
-def _tell(connection: Connection, kind: str, event_id: str, receivers: list[WebhookRow]) -> None:
+def _tell(connection: Connection, kind: str, event_id: str, clutch_id: str, *, of_cleared: bool) -> None:
+    """Send an alarm to the clutch's receivers, or (`of_cleared`) to those that learn of cleared ones."""
+    receivers = [row for row in receivers_of(connection, clutch_id) if row.content["cleared"] or not of_cleared]
     event = alarms.event(connection, event_id)
     if event is not None and receivers:
         to_receivers(connection, kind, event, receivers)
 
 
 def _with_silence(connection: Connection, row: ClutchRow, kept: set[str], facts: Facts) -> ClutchRow:
-    """The clutch with since when its rig is silent: none but rules of silence were judged so far, `kept` are their
-    alarms."""
+    """The clutch with since when its rig is silent; `kept` are the alarms of silence, which were judged alone so far."""
     silent = facts.heard() if kept else None
     if silent is None and row.silent is None:
         return row
-    state = state_of(row.summary, disputed=row.is_disputed, silent=silent)
-    clutches.set_silent(connection, row.clutch_id, silent, state=state["name"])
-    return replace(row, silent=silent, state=state["name"])
-
-
-def _facts(connection: Connection, row: ClutchRow, record: ClutchIn, at: str) -> Facts:
-    return Facts(
-        clutch_id=row.clutch_id,
-        summary=row.summary,
-        state=state_of(row.summary, disputed=row.is_disputed, silent=row.silent),
-        geometry=record.geometry.to_model(),
-        verdict=diagnoses.newest(connection, [row.clutch_id]).get(row.clutch_id),
-        now=at,
-        newest_fits=partial(_newest_fits, connection, row.clutch_id),
-        off_course=partial(_off_course, connection, row.clutch_id),
-        heard=partial(_heard, connection, row.clutch_id),
-    )
-
-
-def _newest_fits(connection: Connection, clutch_id: str) -> list[FitRow]:
-    """Fits of the latest stationary test (by cycles), if it counts and has curves."""
-    fits = results.fits_of(connection, clutch_id)
-    tests = [row for row in runs.in_order(connection, clutch_id) if row.kind == STATIONARY and row.run_key in fits]
-    return fits[tests[-1].run_key] if tests else []
-
-
-def _off_course(connection: Connection, clutch_id: str) -> str | None:
-    """Why the newest test is off the course of those before it: the warning of the prediction, or the doubt of a held
-    run."""
-    newest = results.prediction_at(connection, clutch_id, SHOWN, ALL_PRESSURES)
-    notices = [] if newest is None else [notice for notice in newest.payload["warnings"] if notice["code"] == OFF_TRACK]
-    for row in runs.page(connection, clutch_id, state=runs.HELD):
-        notices += [doubt for doubt in row.doubts if doubt["code"] == OFF_COURSE]
-    return notices[0]["message"] if notices else None
-
-
-def _heard(connection: Connection, clutch_id: str) -> str | None:
-    return alarms.last_heard(connection, [clutch_id]).get(clutch_id)
+    state = state_of(row.summary, disputed=row.is_disputed, silent=silent)["name"]
+    clutches.set_silent(connection, row.clutch_id, silent, state=state)
+    return replace(row, silent=silent, state=state)
 
 
 def _now() -> str:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import SplitResult, unquote, urlsplit
 
-from service.errors import FieldError, InvalidError
+from service.errors import InvalidError
 from service.settings import CODE_VERSION
 
 #: [s] An attempt may take in all. Chosen: a receiver answers in a second; one that does not is tried again.
@@ -72,7 +72,7 @@ def scheme_of(url: str) -> str:
 
 def wrong_address(message: str) -> InvalidError:
     """What is answered where a receiver's address cannot be used; the address is not quoted, for it may hold a password."""
-    return InvalidError(message, errors=[FieldError(pointer="/url", code="address", message=message)])
+    return InvalidError.of(message, code="address", pointer="/url")
 
 
 def shown(url: str) -> str:
@@ -87,11 +87,13 @@ def shown(url: str) -> str:
     return f"{parts.scheme}://{user}{host}{port}{_TOKEN.sub('***', parts.path)}{query}"
 
 
-def allowed(host: str, port: int, *, private: bool) -> tuple[Any, ...]:
-    """The socket address of a host that may be asked, resolved now. Raises NotAllowedError where none of its addresses may,
-    and OSError where the name is not known; `private`: addresses of this machine and of private networks may be asked
-    too."""
-    resolved = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+def allowed(parts: SplitResult, *, private: bool) -> tuple[Any, ...]:
+    """The socket address of a web address's host, resolved now; `private`: it may be of this machine or a private network.
+
+    Raises NotAllowedError where none of its addresses may be asked, and OSError where the name is not known.
+    """
+    port = parts.port or _PORTS[parts.scheme]
+    resolved = socket.getaddrinfo(parts.hostname or "", port, type=socket.SOCK_STREAM)
     reasons = []
     for *_, address in resolved:
         reason = why_not(ipaddress.ip_address(str(address[0]).partition("%")[0]), private=private)
@@ -143,7 +145,7 @@ def post(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
     deadline = time.monotonic() + ATTEMPT_SECONDS
     try:
         parts = require_web_address(url)
-        address = allowed(parts.hostname or "", parts.port or _PORTS[parts.scheme], private=private)
+        address = allowed(parts, private=private)
         headers = {
             "Content-Type": "application/json",
             "User-Agent": f"clutchlife/{CODE_VERSION}",
@@ -164,11 +166,8 @@ def post(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
         return Attempt(problem=_TIMED_OUT if late else _in_words(error))
     if 200 <= status < 300:
         return Attempt(status=status)
-    if 300 <= status < 400:
-        return Attempt(
-            status=status, problem=f"the receiver answered {status}, a redirect: give the address that it leads to"
-        )
-    return Attempt(status=status, problem=f"the receiver answered {status}")
+    redirect = ", a redirect: give the address that it leads to" if 300 <= status < 400 else ""
+    return Attempt(status=status, problem=f"the receiver answered {status}{redirect}")
 
 
 def _status(parts: SplitResult, address: tuple[Any, ...], body: bytes, headers: dict[str, str], deadline: float) -> int:
@@ -182,10 +181,8 @@ def _status(parts: SplitResult, address: tuple[Any, ...], body: bytes, headers: 
         cut.daemon = True
         cut.start()
         try:
-            opened = (
-                ssl.create_default_context().wrap_socket(raw, server_hostname=host) if parts.scheme == "https" else raw
-            )
-            with closing(opened):
+            context = ssl.create_default_context() if parts.scheme == "https" else None
+            with closing(raw if context is None else context.wrap_socket(raw, server_hostname=host)) as opened:
                 connection.sock = opened
                 connection.request("POST", path, body, headers)
                 with closing(connection.getresponse()) as answer:

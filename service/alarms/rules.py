@@ -8,27 +8,33 @@ from typing import Any
 
 import numpy as np
 from scipy.special import ndtri
+from sqlalchemy import Connection
 
 from models.clutch import Geometry
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, slope, slope_gradient
 from models.prognosis.first_passage import PassageStatus
 from service.columns import RADIANS_PER_SECOND_PER_RPM, bar
+from service.lives.assumptions import ALL_PRESSURES
 from service.lives.condition import (
     DISAGREES,
     NORMAL,
     SHOWN,
     STATE_WORDS,
     bound_in_words,
+    bound_of,
     chance_in_words,
     held_in_words,
-    lower_bound,
     pace_in_words,
     silence_in_words,
+    state_of,
     stated,
 )
-from service.lives.payloads import ENDED, INSUFFICIENT
+from service.lives.history import STATIONARY
+from service.lives.payloads import ENDED, INSUFFICIENT, OFF_TRACK
+from service.lives.plausibility.doubts import OFF_COURSE
 from service.schemas.alarm import AlarmIn
-from storage.diagnoses import VerdictRow
+from storage import alarms, diagnoses, results, runs
+from storage.clutches import ClutchRow
 from storage.results import FitRow
 
 _SECONDS_PER_HOUR, _SECONDS_PER_DAY = 3600.0, 86400.0
@@ -38,19 +44,24 @@ _SAFE = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """What is stored of a clutch, as rules look at it. What few rules need is asked for when one does: `newest_fits`, those
-    of the newest stationary test, `off_course`, why its last test is off its course, `heard`, when its last run arrived.
-    """
+    """What is stored of a clutch now, as rules look at it; what few rules need is read when one does."""
 
-    clutch_id: str
-    summary: Mapping[str, Any]
-    state: Mapping[str, str]
+    connection: Connection
+    clutch: ClutchRow
     geometry: Geometry
-    verdict: VerdictRow | None
     now: str
-    newest_fits: Callable[[], list[FitRow]]
-    off_course: Callable[[], str | None]
-    heard: Callable[[], str | None]
+
+    @property
+    def clutch_id(self) -> str:
+        return self.clutch.clutch_id
+
+    @property
+    def summary(self) -> Mapping[str, Any]:
+        return self.clutch.summary
+
+    def heard(self) -> str | None:
+        """When the clutch's last run arrived."""
+        return alarms.last_heard(self.connection, [self.clutch_id]).get(self.clutch_id)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,13 +79,13 @@ def finding(rule: AlarmIn, facts: Facts) -> Finding | None:
     return _QUANTITIES[rule.quantity](rule, facts)
 
 
-def raises(rule: AlarmIn, result: Finding | None) -> bool:
-    return result is not None and _passes(rule, result, 0.0)
-
-
-def keeps(rule: AlarmIn, result: Finding | None) -> bool:
-    """Whether an alarm that is raised stays: until the value has come back by the hysteresis."""
-    return result is not None and _passes(rule, result, rule.hysteresis)
+def passes(rule: AlarmIn, result: Finding, hysteresis: float = 0.0) -> bool:
+    """Whether a rule raises an alarm; by its hysteresis, whether one that is raised stays."""
+    if result.value is None:
+        return True
+    if rule.below is not None:
+        return result.value < rule.below + hysteresis * abs(rule.below)
+    return rule.above is not None and result.value > rule.above - hysteresis * abs(rule.above)
 
 
 def message(rule: AlarmIn, facts: Facts, result: Finding) -> str:
@@ -85,20 +96,10 @@ def message(rule: AlarmIn, facts: Facts, result: Finding) -> str:
     return f"{facts.clutch_id}: {result.words}{limit}{waiting}"
 
 
-def _passes(rule: AlarmIn, result: Finding, hysteresis: float) -> bool:
-    if result.value is None:
-        return True
-    if rule.below is not None:
-        return result.value < rule.below + hysteresis * abs(rule.below)
-    return rule.above is not None and result.value > rule.above - hysteresis * abs(rule.above)
-
-
 def slope_quantile(rule: AlarmIn, fit: FitRow, geometry: Geometry) -> float | None:
-    """dμ/dv [s/m] of a fitted curve at the rule's speed, at the quantile of its standard error; None of one without
-    friction.
+    """dμ/dv [s/m] of a fitted curve at the rule's speed, at the quantile of its standard error; None without friction.
 
-    dμ/dv = (dS/dv) / (torque of a unit COF), sd = √(gᵀ Σ g) / (torque of a unit COF), as
-    `models.friction.identification.cof_slope` has them.
+    Value and sd as `models.friction.identification.cof_slope` has them, Σ by the unbiased noise.
     """
     parameters = StribeckParameters(**{name: getattr(fit, name) for name in PARAMETER_NAMES})
     velocity = geometry.sliding_velocity(np.array(rule.speed_rpm * RADIANS_PER_SECOND_PER_RPM))
@@ -111,25 +112,19 @@ def slope_quantile(rule: AlarmIn, fit: FitRow, geometry: Geometry) -> float | No
 
 
 def _remaining(rule: AlarmIn, facts: Facts) -> float | None:
-    """The remaining cycles at the rule's quantile; inf where they are beyond the horizon, None where nothing is known."""
+    """The remaining cycles at the rule's quantile; None where nothing is known, or they are beyond the horizon."""
     summary = facts.summary
     if summary.get("status", INSUFFICIENT) in (INSUFFICIENT, ENDED):
         return None
     if summary["status"] == PassageStatus.REACHED.value:
         return 0.0
-    if rule.probability == _SAFE:
-        with_held = summary.get("with_held")
-        bound = lower_bound(summary["at_least"], with_held and with_held[SHOWN])
-        return math.inf if bound is None else float(bound)
-    quantile = summary["remaining_cycles"][f"{rule.probability:g}"]
-    return math.inf if quantile is None else float(quantile)
+    cycles = bound_of(summary) if rule.probability == _SAFE else summary["remaining_cycles"][f"{rule.probability:g}"]
+    return None if cycles is None else float(cycles)
 
 
 def _remaining_cycles(rule: AlarmIn, facts: Facts) -> Finding | None:
     value = _remaining(rule, facts)
-    if value is None or math.isinf(value):
-        return None
-    return Finding(value=value, words=_left(rule, value))
+    return None if value is None else Finding(value=value, words=_left(rule, value))
 
 
 def _left(rule: AlarmIn, cycles: float) -> str:
@@ -140,7 +135,7 @@ def _left(rule: AlarmIn, cycles: float) -> str:
 
 def _remaining_days(rule: AlarmIn, facts: Facts) -> Finding | None:
     value, pace = _remaining(rule, facts), facts.summary.get("pace")
-    if value is None or math.isinf(value) or pace is None:
+    if value is None or pace is None:
         return None
     days = value / pace["cycles_per_second"] / _SECONDS_PER_DAY
     return Finding(value=days, words=f"{_left(rule, value)}: {pace_in_words(pace, value)}")
@@ -154,10 +149,15 @@ def _health(_rule: AlarmIn, facts: Facts) -> Finding | None:
 
 
 def _shudder_margin(rule: AlarmIn, facts: Facts) -> Finding | None:
-    """The least slope dμ/dv over the pressures of the newest test, at the quantile of its standard error."""
-    fits = facts.newest_fits()
+    """The least slope dμ/dv over the pressures of the newest stationary test (by cycles), if it counts and has curves, at
+    the quantile of its standard error."""
+    by_run = results.fits_of(facts.connection, facts.clutch_id)
+    rows = runs.in_order(facts.connection, facts.clutch_id)
+    tests = [by_run[row.run_key] for row in rows if row.kind == STATIONARY and row.run_key in by_run]
     margins = [
-        (margin, fit.pressure) for fit in fits if (margin := slope_quantile(rule, fit, facts.geometry)) is not None
+        (margin, fit.pressure)
+        for fit in (tests[-1] if tests else [])
+        if (margin := slope_quantile(rule, fit, facts.geometry)) is not None
     ]
     if not margins:
         return None
@@ -176,19 +176,20 @@ def _held_runs(_rule: AlarmIn, facts: Facts) -> Finding | None:
 
 
 def _off_course(_rule: AlarmIn, facts: Facts) -> Finding | None:
-    why = facts.off_course()
-    return None if why is None else Finding(value=None, words=f"off course: {why}")
+    """Why the newest test is off its course: the warning of the prediction, or the doubt of a held run."""
+    newest = results.prediction_at(facts.connection, facts.clutch_id, SHOWN, ALL_PRESSURES)
+    notices = [] if newest is None else [notice for notice in newest.payload["warnings"] if notice["code"] == OFF_TRACK]
+    for row in runs.page(facts.connection, facts.clutch_id, state=runs.HELD):
+        notices += [doubt for doubt in row.doubts if doubt["code"] == OFF_COURSE]
+    return Finding(value=None, words=f"off course: {notices[0]['message']}") if notices else None
 
 
 def _verdict(rule: AlarmIn, facts: Facts) -> Finding | None:
-    newest = facts.verdict
+    newest = diagnoses.newest(facts.connection, [facts.clutch_id]).get(facts.clutch_id)
     verdicts = tuple(DISAGREES) if rule.any_of is None else rule.any_of
-    if (
-        newest is None
-        or newest.adopted
-        or newest.verdict not in verdicts
-        or newest.life != facts.summary.get("life", "")
-    ):
+    if newest is None or newest.adopted or newest.verdict not in verdicts:
+        return None
+    if newest.life != facts.summary.get("life", ""):
         return None
     causes = ", ".join(cause.replace("_", " ") for cause in newest.causes)
     words = str(newest.verdict).replace("_", " ") + (f" ({causes})" if causes else "")
@@ -196,11 +197,12 @@ def _verdict(rule: AlarmIn, facts: Facts) -> Finding | None:
 
 
 def _state(rule: AlarmIn, facts: Facts) -> Finding | None:
-    name = facts.state["name"]
+    state = state_of(facts.summary, disputed=facts.clutch.is_disputed, silent=facts.clutch.silent)
+    name = state["name"]
     if name not in (rule.any_of or [other for other in STATE_WORDS if other != NORMAL]):
         return None
     known = stated(facts.summary)
-    clauses = dict.fromkeys([facts.state["why"], *([known["statement"]] if known else [])])
+    clauses = dict.fromkeys([state["why"], *([known["statement"]] if known else [])])
     return Finding(value=None, words=f"{STATE_WORDS[name].lower()}: {'; '.join(clauses)}", mark=name)
 
 
