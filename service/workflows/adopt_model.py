@@ -30,8 +30,11 @@ def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, adopted_
         records.clutch(connection, clutch_id)
         diagnosed = None if diagnosis_id is None else records.diagnosis(connection, clutch_id, diagnosis_id)
         in_force = _in_force(connection, clutch_id, diagnosis_id)
+        present_life = records.present_life(connection, clutch_id)
     adoption = None if diagnosed is None else _adoptable(diagnosed)
-    if in_force and (adoption is None or _of_present_life(database, clutch_id, adoption)):
+    if in_force:
+        if adoption is not None:
+            _require_present(adoption, present_life)
         return
     _change(database, clutch_id, adoption, adopted_at=adopted_at, by=by)
 
@@ -58,10 +61,8 @@ def finish_and_adopt(
     adoption = Adoption(diagnosis_id=diagnosis_id, life=life, extension=extension_of(ended["extension"]))
 
     def finish(connection: Connection) -> None:
-        if (
-            changes.last_of_history(connection, clutch_id)
-            > records.diagnosis(connection, clutch_id, diagnosis_id).revision
-        ):
+        diagnosed = records.diagnosis(connection, clutch_id, diagnosis_id)
+        if changes.last_of_history(connection, clutch_id) > diagnosed.revision:
             raise NothingToAdoptError(f"runs have changed since diagnosis {diagnosis_id!r}: run a new diagnosis")
         if not jobs.end(connection, diagnosis_id, jobs.FINISHED, at, claimer=claimer):
             raise NothingToAdoptError(f"diagnosis {diagnosis_id!r} was cancelled: run a new diagnosis")
@@ -69,9 +70,7 @@ def finish_and_adopt(
 
     try:
         _change(database, clutch_id, adoption, adopted_at=at, by=by, before=finish)
-    except (
-        NothingToAdoptError
-    ):  # a rebuild or a correction came meanwhile, or the diagnosis was cancelled or is made by another service
+    except NothingToAdoptError:  # a rebuild or a correction came meanwhile, or the diagnosis is no longer the claimer's
         return False
     return True
 
@@ -87,9 +86,7 @@ def _change(
 ) -> None:
     """Compute under the new model and store, again where the clutch has changed meanwhile."""
     diagnosis_id = None if adoption is None else adoption.diagnosis_id
-    attempts = records.attempts(clutch_id)
-    while True:
-        next(attempts)
+    for _ in records.attempts(clutch_id):
         state, results = _computed(database, clutch_id, adoption)
         with database.writing(of=clutch_id) as connection:
             if not records.unchanged(connection, clutch_id, state.revision):
@@ -137,12 +134,6 @@ def _adoptable(row: DiagnosisRow) -> Adoption:
         why = "has no report yet: wait for it" if row.report is None else "has no extended model that could be adopted"
         raise NothingToAdoptError(f"diagnosis {row.diagnosis_id!r} {why}")
     return Adoption(diagnosis_id=row.diagnosis_id, life=row.life, extension=extension_of(row.extension))
-
-
-def _of_present_life(database: Database, clutch_id: str, adoption: Adoption) -> bool:
-    with database.reading() as connection:
-        _require_present(adoption, records.present_life(connection, clutch_id))
-    return True
 
 
 def _require_present(adoption: Adoption, life: str) -> None:

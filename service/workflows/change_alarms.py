@@ -1,6 +1,4 @@
-"""Rules of alarms are made, replaced and deleted; what they raise is raised and cleared with it, and acknowledged. Their
-receivers are added and removed, and sent a test.
-"""
+"""Rules of alarms and their receivers are saved and deleted; alarms are raised and cleared with that, and acknowledged."""
 
 import secrets
 from typing import Any

@@ -1,16 +1,15 @@
-"""A run is withdrawn, restored, confirmed (or several at once), corrected or read again: the history of its clutch and all
-that follows change.
+"""A run is withdrawn, restored, confirmed, corrected or read again: its clutch's history and all that follows change.
 
-Nothing is deleted: what was sent and its hash stay, and the audit trail keeps who changed what and why. Of a run that was
-sent as a file this is the file: its channels are replaced where it is read again by another profile. What
-is as it should be already is not changed. Everything is computed before the database is locked, and again where the clutch
-has changed meanwhile.
+Nothing is deleted: what was sent (of a file that is read again, the file) and its hash stay, and the audit trail keeps who
+changed what and why. What is as it should be already is not changed. Everything is computed before the database is locked,
+and again where the clutch has changed meanwhile.
 """
 
 import tempfile
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -91,14 +90,13 @@ class _Loaded:
         (event,) = self.events
         return event
 
-    def without(self, rows: Collection[RunRow]) -> "_Loaded":
-        """What was loaded, without these runs."""
-        gone = {row.run_id for row in rows}
-        return replace(
-            self,
-            rows=tuple(row for row in self.rows if row.run_id not in gone),
-            events=tuple(event for event in self.events if event.run_id not in gone),
-        )
+    @property
+    def others(self) -> ClutchState:
+        """The clutch's state without the runs that are being changed, whether they were accepted or held."""
+        names = {event.run_id for event in self.events}
+        events = tuple(event for event in self.state.events if event.run_id not in names)
+        held = tuple(event for event in self.state.held if event.run_id not in names)
+        return replace(self.state, events=events, held=held)
 
     def reader(self, database: Database) -> RunReader:
         """The clutch's runs, this one as its file is read again."""
@@ -211,17 +209,17 @@ def _change(
         loaded = _load(database, request)
         if again is not None:
             loaded = _with(loaded, again)
-        asked_rows = {row.run_id: row for row in _as_asked(database, loaded, request)}
-        same = [
-            row
-            for row in loaded.rows
-            if again is None
-            and (row.state, row.cycles) == (asked_rows[row.run_id].state, asked_rows[row.run_id].cycles)
+        wanted = _as_asked(database, loaded, request)
+        differs = [
+            again is not None or (row.state, row.cycles) != (new.state, new.cycles)
+            for row, new in zip(loaded.rows, wanted, strict=True)
         ]
-        if len(same) == len(loaded.rows):
+        same = [row for row, is_other in zip(loaded.rows, differs, strict=True) if not is_other]
+        if not any(differs):
             return [records.receipt(row) for row in same]
-        loaded = loaded.without(same)
-        changed = _computed(database, loaded, [asked_rows[row.run_id] for row in loaded.rows])
+        rows, events = tuple(compress(loaded.rows, differs)), tuple(compress(loaded.events, differs))
+        loaded = replace(loaded, rows=rows, events=events)
+        changed = _computed(database, loaded, list(compress(wanted, differs)))
         with database.writing(of=request.clutch_id) as connection:
             if records.unchanged(connection, request.clutch_id, loaded.state.revision):
                 if columns is not None:
@@ -236,18 +234,14 @@ def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
     run_id, received_at = run.run_id, loaded.row.received_at
     answer = receipt(loaded.row.clutch_id, run, analysis, received_at=received_at)
     shown, odd = doubts_alone(run, analysis, loaded.state.geometry)
+    sampled, oil = "time_s" in run.channels, analysis.oil_temperature
+    event = replace(loaded.event, speed_range=analysis.speed_range, oil_temperature=oil, shown=shown)
     return replace(
         loaded,
-        events=(
-            replace(
-                loaded.event, speed_range=analysis.speed_range, oil_temperature=analysis.oil_temperature, shown=shown
-            ),
-        ),
+        events=(event,),
         levels={**loaded.levels, run_id: analysis.fits},
         receipts={**loaded.receipts, run_id: answer},
-        again=Arrival(
-            run=run, sampled="time_s" in run.channels, analysis=analysis, shown=shown, odd=odd, received_at=received_at
-        ),
+        again=Arrival(run=run, sampled=sampled, analysis=analysis, shown=shown, odd=odd, received_at=received_at),
     )
 
 
@@ -278,37 +272,28 @@ def _as_asked(database: Database, loaded: _Loaded, request: _Request) -> tuple[R
     """The runs as they are asked for; each as it is where that changes nothing."""
     if request.action == changes.CONFIRM:
         return tuple(replace(row, state=runs.ACCEPTED) if row.state == runs.HELD else row for row in loaded.rows)
-    return (_one_as_asked(database, loaded, request),)
-
-
-def _one_as_asked(database: Database, loaded: _Loaded, request: _Request) -> RunRow:
     row = loaded.row
     if request.action == changes.WITHDRAW:
-        return replace(row, state=runs.WITHDRAWN)
+        return (replace(row, state=runs.WITHDRAWN),)
     if request.action == changes.RESTORE:
-        return replace(row, state=loaded.withdrawn_from) if row.state == runs.WITHDRAWN else row
+        return (replace(row, state=loaded.withdrawn_from) if row.state == runs.WITHDRAWN else row,)
     if row.state == runs.WITHDRAWN:
         raise NotPossibleNowError(f"run {row.run_id!r} is withdrawn: restore it before it is changed")
-    if loaded.again is not None:
-        return _judged(database, loaded, row.cycles)
-    if request.cycles is None or request.cycles == row.cycles:
-        return row
-    return _judged(database, loaded, request.cycles)
+    cycles = row.cycles if request.cycles is None else request.cycles
+    return (row if loaded.again is None and cycles == row.cycles else _judged(database, loaded, cycles),)
 
 
 def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     """The run at other cycles: accepted where it is plausible there, else held."""
-    row, sent_cycles = loaded.row, loaded.row.cycles if loaded.row.sent_cycles is None else loaded.row.sent_cycles
-    other_runs = _state_without_changed_runs(loaded)
+    row, other_runs = loaded.row, loaded.others
+    sent_cycles = row.cycles if row.sent_cycles is None else row.sent_cycles
     sent = replace(loaded.reader(database).read(row.run_id), cycles=cycles)
     event = loaded.event.at(cycles)
     event = replace(event, cofs=cofs_among(other_runs, event, loaded.levels.get(row.run_id, ())))
-    read_again = loaded.again
-    analysis = (
-        analyse(sent, other_runs.geometry, other_runs.record.torque_filter)
-        if read_again is None
-        else read_again.analysis
-    )
+    if loaded.again is None:
+        analysis = analyse(sent, other_runs.geometry, other_runs.record.torque_filter)
+    else:
+        analysis = loaded.again.analysis
     if "time_s" in sent.channels and sent.kind == STATIONARY:  # as on arrival: its plateaus stand for a long record
         sent = replace(sent, channels={})
     shown, doubtful = doubts_alone(sent, analysis, other_runs.geometry)
@@ -323,15 +308,6 @@ def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     )
 
 
-def _state_without_changed_runs(loaded: _Loaded) -> ClutchState:
-    """The clutch's state without the runs that are being changed, whether they were accepted or held."""
-    return replace(
-        loaded.state,
-        events=_remaining_events(loaded.state.events, loaded.events),
-        held=_remaining_events(loaded.state.held, loaded.events),
-    )
-
-
 def _together(others: ClutchState, incoming: Event | None, changed: Sequence[Event] = ()) -> Judged:
     corrected = others.extension is not None
     return doubts_together(others.events, others.held, incoming, others.geometry, corrected=corrected, changed=changed)
@@ -339,7 +315,7 @@ def _together(others: ClutchState, incoming: Event | None, changed: Sequence[Eve
 
 def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
     """What becomes of the other runs; the runs themselves are as they were asked for, these of them `accepted`."""
-    other_runs = _state_without_changed_runs(loaded)
+    other_runs = loaded.others
     for event in accepted:
         cofs = cofs_among(other_runs, event, loaded.levels.get(event.run_id, ()))
         other_runs = replace(other_runs, events=order([*other_runs.events, replace(event, cofs=cofs, confirmed=True)]))
@@ -348,7 +324,7 @@ def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
 
 def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _Changed:
     """All that follows from the runs as they are to be."""
-    before, other_runs = loaded.state, _state_without_changed_runs(loaded)
+    before, other_runs = loaded.state, loaded.others
     pairs = [(row, event.at(row.cycles)) for row, event in zip(rows, loaded.events, strict=True)]
     accepted = [event for row, event in pairs if row.state == runs.ACCEPTED]
     out = [event for row, event in pairs if row.state != runs.ACCEPTED]
@@ -394,11 +370,6 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _C
     )
 
 
-def _remaining_events(events: Iterable[Event], others: Iterable[Event]) -> tuple[Event, ...]:
-    names = {event.run_id for event in others}
-    return tuple(event for event in events if event.run_id not in names)
-
-
 def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: _Request) -> None:
     """The runs as they are to be and what follows, and the entries of the audit trail; the revision moves on."""
     clutch_id = request.clutch_id
@@ -427,10 +398,8 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
             after |= _read_as(loaded.again.run.file or {})
         if before["doubts"] == after["doubts"]:
             del before["doubts"], after["doubts"]
-        request_fields = {"at": request.at, "by": request.by, "reason": request.reason}
-        changes.insert(
-            connection, clutch_id, request.action, before, after, run_id=row.run_id, revision=revision, **request_fields
-        )
+        entry = {"run_id": row.run_id, "at": request.at, "by": request.by, "reason": request.reason}
+        changes.insert(connection, clutch_id, request.action, before, after, revision=revision, **entry)
 
 
 def _read_as(file: Mapping[str, Any]) -> dict[str, Any]:

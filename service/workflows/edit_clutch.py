@@ -1,5 +1,4 @@
-"""A clutch is registered, and what is known already is not changed by posting; its record is edited, or the clutch archived:
-what depends on the record is computed again before it is stored.
+"""A clutch is registered, its record edited, or it is archived: what depends on the record is computed again.
 
 Curves depend on the geometry and on the torque channel's filter alone: where these change, every run is fitted again. The
 record that was registered stays stored.
@@ -48,9 +47,7 @@ def edit(
 
     What is so already is not changed. Raises NotFoundError.
     """
-    attempts = records.attempts(clutch_id)
-    while True:
-        next(attempts)
+    for _ in records.attempts(clutch_id):
         edited = _computed(database, clutch_id, fields, archived)
         if not _entries(edited):
             return
@@ -143,10 +140,8 @@ def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:
                 )
                 clutches.insert(connection, row)
                 return True
-    stored_records = [stored.record] if stored.registered is None else [stored.record, stored.registered]
+    known = [stored.record] if stored.registered is None else [stored.record, stored.registered]
     # with the defaults of fields that came after a record was stored
-    if content not in [
-        content_of(ClutchIn.model_validate(record).model_dump(mode="json")) for record in stored_records
-    ]:
+    if content not in [content_of(ClutchIn.model_validate(old).model_dump(mode="json")) for old in known]:
         raise ConflictError(f"clutch {stored.clutch_id!r} has another record: change it with PATCH or clutchlife edit")
     return False

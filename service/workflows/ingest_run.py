@@ -13,6 +13,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from models.clutch import Geometry
+from models.loops.loops import Loop
 from service import records, stored_runs
 from service.errors import ArchivedError, BusyError, ConflictError, Notice, TooLargeError
 from service.lives.engagements import stored_engagement
@@ -183,97 +184,79 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
     state = replace(before, events=order([*before.events, event]))
     require_within_ends(state.events)
     levels = _levels(database, state, event, arrival)
+    evaluated = stationary_tests_of(before.events)  # what loops were evaluated against, those of the run too
+    loops: Sequence[Loop] = ()
+    if event.kind == DYNAMIC:
+        test = evaluated[event.run_id] = stationary_tests_of(state.events)[event.run_id]
+        curves = [] if test is None else levels.get(test, [])
+        loops = loops_of(arrival.run.channels, state.geometry, state.record.torque_filter, curves)
     answer = receipt(
         before.clutch_id,
         arrival.run,
         arrival.analysis,
         received_at=arrival.received_at,
         cofs=event.cofs,
-        loops=_loops_of_run(state, event, levels, arrival.run),
+        loops=loops,
     )
     judged = Judged()
     if not arrival.odd:
         corrected = before.extension is not None
         judged = doubts_together(before.events, before.held, event, before.geometry, corrected=corrected)
     doubtful = arrival.odd or judged.doubts.get(event.run_id, ())
-    if judged.changes:
-        return _with_others(database, before, event, answer, arrival, judged)
-    if doubtful:
-        state_with_held = replace(before, held=(*before.held, event))
-        part = held_summary(
-            state_with_held, before.filters or {}, _evidence(database, state_with_held, arrival, answer)
+    if judged.changes:  # the run is evidence for or against others: these are accepted or held
+        state = replace(
+            before,
+            events=judged.settled(before.events, [] if doubtful else [event]),
+            held=judged.aside(before.held, [event] if doubtful else []),
         )
-        results_of_others = Results(summary={**before.summary, **part})
-        return _Outcome(
-            revision=before.revision, receipt=answer, cofs=event.cofs, results=results_of_others, doubts=doubtful
-        )
-    computed = _among(database, before, state, event, levels, answer, arrival)
-    answer = computed.receipts.get(event.run_id, answer)
-    other_receipts = {run_id: other for run_id, other in computed.receipts.items() if run_id != event.run_id}
+    elif doubtful:
+        with_held = replace(before, held=(*before.held, event))
+        part = held_summary(with_held, before.filters or {}, _evidence(database, with_held, arrival, answer))
+        summary = Results(summary={**before.summary, **part})
+        return _Outcome(revision=before.revision, receipt=answer, cofs=event.cofs, results=summary, doubts=doubtful)
+    aside: dict[str, ByPressure] = {}
+    if judged.changes or _changes_the_past(before, state.events, event):
+        with database.reading() as connection:
+            receipts = records.receipts(connection, before.clutch_id) | {event.run_id: answer}
+            levels = records.levels(connection, before.clutch_id) | _own_levels(arrival)
+        reader = reader_with(stored_runs.run_reader(database, before.clutch_id), arrival)
+        final, computed = computed_again(state, levels, receipts, reader, evaluated=evaluated)
+        changed = dict(computed.receipts)
+        for other in judged.held:
+            aside[other.run_id], changed[other.run_id] = set_aside(final, other, levels, receipts[other.run_id], reader)
+    else:
+        final, computed = _one_step(database, state, event, levels, answer, arrival, evaluated)
+        changed = dict(computed.receipts)
+    evidence = _evidence(database, final, arrival, answer) if needs_evidence(final) else None
+    own_receipt = changed.pop(event.run_id, answer)
     return _Outcome(
         revision=before.revision,
-        receipt=answer,
-        cofs=event.cofs,
-        results=replace(computed, receipts=other_receipts),
-        teaches=state.kind if life_with(state.events, event).end is not None else None,
-    )
-
-
-def _with_others(
-    database: Database, before: ClutchState, event: Event, answer: dict[str, Any], arrival: Arrival, judged: Judged
-) -> _Outcome:
-    """Outcome of a run that is evidence for or against others: these are accepted or held, and everything is recomputed."""
-    doubtful = judged.doubts.get(event.run_id, ())
-    state = replace(
-        before,
-        events=judged.settled(before.events, [] if doubtful else [event]),
-        held=judged.aside(before.held, [event] if doubtful else []),
-    )
-    own_fits = {event.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
-    with database.reading() as connection:
-        receipts = records.receipts(connection, before.clutch_id) | {event.run_id: answer}
-        levels = records.levels(connection, before.clutch_id) | own_fits
-    reader = reader_with(stored_runs.run_reader(database, before.clutch_id), arrival)
-    evaluated = stationary_tests_of(before.events)
-    final, computed = computed_again(state, levels, receipts, reader, evaluated=evaluated)
-    computed = _summarised(database, final, computed, arrival, answer)
-    aside, changed = {}, dict(computed.receipts)
-    for other in judged.held:
-        aside[other.run_id], changed[other.run_id] = set_aside(final, other, levels, receipts[other.run_id], reader)
-    return _Outcome(
-        revision=before.revision,
-        receipt=changed.pop(event.run_id, answer),
+        receipt=own_receipt,
         cofs=computed.cofs.get(event.run_id, event.cofs),
-        teaches=state.kind if not doubtful and life_with(state.events, event).end is not None else None,
         results=replace(
             computed,
             receipts=changed,
             levels={run_id: fits for run_id, fits in computed.levels.items() if run_id != event.run_id},
+            summary=summarised(final, computed.tracking or Tracking(), evidence),
         ),
         doubts=doubtful,
         judged=judged,
         aside=aside,
         levels=levels,
+        teaches=state.kind if not doubtful and life_with(state.events, event).end is not None else None,
     )
 
 
-def _among(
+def _one_step(
     database: Database,
-    before: ClutchState,
     state: ClutchState,
     event: Event,
-    levels: Mapping[str, Sequence[LevelFit]],
+    levels: Levels,
     answer: dict[str, Any],
     arrival: Arrival,
-) -> Results:
-    """What changes with the run among the others: the filters carried one step on, or everything again."""
-    if _changes_the_past(before, state.events, event):
-        with database.reading() as connection:
-            receipts = records.receipts(connection, state.clutch_id) | {event.run_id: answer}
-        reader = reader_with(stored_runs.run_reader(database, state.clutch_id), arrival)
-        evaluated = _evaluated(before, state, event)
-        state, computed = computed_again(state, levels, receipts, reader, evaluated=evaluated)
-        return _summarised(database, state, computed, arrival, answer)
+    evaluated: Mapping[str, str | None],
+) -> tuple[ClutchState, Results]:
+    """What changes with a run that leaves what was measured before as it is: the filters carried on, if they may be."""
     corrected: dict[str, Corrected] = {}
     if state.extension is not None and event is state.events[-1]:
         runs_before = stored_runs.run_reader(database, state.clutch_id)
@@ -284,7 +267,6 @@ def _among(
     tracking = track(state, newest=event)
     noticed = history_warnings(state.lives, tracking.warnings, run_id=event.run_id)[event.run_id]
     changed = {event.run_id: answer | {"warnings": answer["warnings"] + noticed}}
-    evaluated = _evaluated(before, state, event)
     outdated = evaluated != stationary_tests_of(state.events)
     if tracking.again or outdated:
         with database.reading() as connection:
@@ -295,17 +277,7 @@ def _among(
             changed |= {run_id: receipts[run_id] | {"loops": items} for run_id, items in loops.items()}
         if tracking.again:
             changed |= warned_again(state.lives, tracking.warnings, receipts | changed)
-    computed = Results(corrected=corrected, receipts=changed, tracking=tracking)
-    return _summarised(database, state, computed, arrival, answer)
-
-
-def _summarised(
-    database: Database, state: ClutchState, computed: Results, arrival: Arrival, answer: dict[str, Any]
-) -> Results:
-    """The results with the summary of the clutch that was tracked."""
-    tracking = computed.tracking or Tracking()
-    evidence = _evidence(database, state, arrival, answer) if needs_evidence(state) else None
-    return replace(computed, summary=summarised(state, tracking, evidence))
+    return state, Results(corrected=corrected, receipts=changed, tracking=tracking)
 
 
 def _evidence(database: Database, state: ClutchState, arrival: Arrival, answer: dict[str, Any]) -> Evidence:
@@ -322,19 +294,16 @@ def _evidence(database: Database, state: ClutchState, arrival: Arrival, answer: 
     )
 
 
-def _evaluated(before: ClutchState, state: ClutchState, event: Event) -> dict[str, str | None]:
-    """What the loops of dynamic tests were evaluated against; the run that comes in already is as it should be."""
-    now = stationary_tests_of(state.events)
-    return stationary_tests_of(before.events) | ({event.run_id: now[event.run_id]} if event.kind == DYNAMIC else {})
+def _own_levels(arrival: Arrival) -> dict[str, Sequence[LevelFit]]:
+    return {arrival.run.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
 
 
-def _levels(database: Database, state: ClutchState, event: Event, arrival: Arrival) -> Mapping[str, Sequence[LevelFit]]:
+def _levels(database: Database, state: ClutchState, event: Event, arrival: Arrival) -> Levels:
     """The levels of all tests where they are needed, else those of the run alone."""
-    own_fits = {event.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
     if event.kind != DYNAMIC and event is state.events[-1] and not event.rebuild and state.adoption is None:
-        return own_fits
+        return _own_levels(arrival)
     with database.reading() as connection:
-        return records.levels(connection, state.clutch_id) | own_fits
+        return records.levels(connection, state.clutch_id) | _own_levels(arrival)
 
 
 def _store(
@@ -390,17 +359,6 @@ def _event_of(arrival: Arrival) -> Event:
         duty=duty_block(run.cycles, *(duty.get(name) for name in names)),
         dated=run.started_at is not None,
         shown=arrival.shown,
-    )
-
-
-def _loops_of_run(
-    state: ClutchState, event: Event, levels: Mapping[str, Sequence[LevelFit]], run: IncomingRun
-) -> Sequence[Any]:
-    if run.kind != DYNAMIC:
-        return ()
-    test = stationary_tests_of(state.events)[event.run_id]
-    return loops_of(
-        run.channels, state.geometry, state.record.torque_filter, [] if test is None else levels.get(test, [])
     )
 
 

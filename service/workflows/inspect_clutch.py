@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import records
-from service.errors import FieldError, InvalidError, NotPossibleNowError
+from service.errors import InvalidError, NotPossibleNowError
 from service.records import inspection, inspection_answers, inspection_hash, photograph_answer
 from service.schemas.base import MAX_PHOTOGRAPHS
 from service.schemas.inspection import InspectionIn, MediaType
@@ -86,7 +86,7 @@ def _require_type(content: bytes, media_type: MediaType) -> None:
     if not begins[media_type]:
         shown = content[:12].hex(" ") or "nothing"
         message = f"the file is not of type {media_type}: its first bytes are {shown}"
-        raise InvalidError(message, errors=[FieldError(pointer="", code="media_type", message=message, value=shown)])
+        raise InvalidError.of(message, code="media_type", value=shown)
 
 
 def withdraw(

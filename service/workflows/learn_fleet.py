@@ -6,6 +6,7 @@ large fleet, there is the same version learned from the others.
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -53,18 +54,16 @@ class Fleet:
     version: int
     lessons: dict[str, list[Lesson]] = field(default_factory=dict)
 
-    def without(self, left_out: Collection[str] = ()) -> Json | None:
+    def without(self, left_out: Collection[str]) -> Json | None:
         """What all other clutches have taught, as it is stored; None where too few are left."""
         left = [lessons for name, lessons in sorted(self.lessons.items()) if name not in left_out]
         if len(left) < FEWEST_CLUTCHES:
             return None
         lessons = [lesson for own in left for lesson in own]
         ended = [lesson.ended for lesson in lessons if lesson.ended is not None]
-        parts = {
-            name: [life for life in ended if life.censored is (name == "censored")] for name in ("ended", "censored")
-        }
         return population([lesson.taught for lesson in lessons]).to_dict() | {
-            name: [life.to_dict() for life in representative(lives)] for name, lives in parts.items()
+            name: [life.to_dict() for life in representative([life for life in ended if life.censored is censored])]
+            for name, censored in (("ended", False), ("censored", True))
         }
 
 
@@ -78,13 +77,8 @@ class Refreshed:
     left: Mapping[str, str]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Tracked:
-    """What a clutch's tracks are computed again from."""
-
-    state: ClutchState
-    receipts: Mapping[str, Receipt]
-    evidence: Evidence | None
+#: What a clutch's tracks are computed again from: its state, its receipts, and what else its summary follows from.
+_Tracked: TypeAlias = tuple[ClutchState, Mapping[str, Receipt], Evidence | None]
 
 
 def refresh(
@@ -182,15 +176,16 @@ def as_job(
     """Refresh a fleet's prior, or all of them, in this process, saying how far it has come.
 
     Once a clutch is tracked, another fleet that is to learn goes first; the rest of the clutches becomes a job of its own.
-
     How many kinds have a new version and of how many clutches the answers have changed, and why others are left.
     """
     number, learned = len(_names(database, task.of)), task.arguments.get("learned", False)
     advanced = number if learned else 0
 
     def say_so() -> None:
-        learning = advanced <= number and not learned
-        say({"step": _LEARNS if learning else _UPDATES, "done": advanced - (0 if learning else number), "of": number})
+        if advanced <= number and not learned:
+            say({"step": "learns from the clutches", "done": advanced, "of": number})
+        else:
+            say({"step": "updates their predictions", "done": advanced - number, "of": number})
 
     def advance() -> None:
         nonlocal advanced
@@ -215,9 +210,6 @@ def _ask_for_the_rest(database: Database, task: Task) -> None:
     kind = None if task.of is None else to_object(task.of)
     with database.writing(of=jobs.FLEET_REFRESH) as connection:
         records.ask_fleet_refresh(connection, kind, by=task.by, at=task.at, learned=True)
-
-
-_LEARNS, _UPDATES = "learns from the clutches", "updates their predictions"
 
 
 def _state(database: Database, clutch_id: str) -> ClutchState:
@@ -253,9 +245,7 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
         end, censored = float(series.scale.progress(life.end.cycles)), life.end.end != WORN
         if not censored and end > 0.0:
             end, deviation = declared_end(measurements, end, fraction=fraction, horizon=horizon, offset=offset)
-    if not end:
-        return Lesson(taught=lesson, ended=None)
-    ended = ended_life(progress, values, end, initial=initial, fraction=fraction, laws=laws)
+    ended = ended_life(progress, values, end, initial=initial, fraction=fraction, laws=laws) if end else None
     if ended is None:
         return Lesson(taught=lesson, ended=None)
     ended = replace(ended, deviation=deviation, censored=censored)
@@ -283,9 +273,8 @@ def _stored_again(database: Database, fleet: Fleet, now: str, at_once: AtOnce, e
                 return Ending.LEFT
             for row in rows:
                 assumptions.insert_fleet_prior(connection, row)
-            assumptions.forget_left_out(
-                connection, fleet.kind, before=fleet.version
-            )  # clutches are still under the last
+            # clutches are still under the last
+            assumptions.forget_left_out(connection, fleet.kind, before=fleet.version)
         return Ending.STORED
 
     return at_once(store)
@@ -334,20 +323,21 @@ def _brought_up(
         if needs_evidence(state):
             reader = stored_runs.recorded(database, state, whole=executor.elsewhere).reader
             evidence = stored_runs.evidence_for(database, state, reader)
-        return _Tracked(state=state, receipts=receipts, evidence=evidence)
+        return state, receipts, evidence
 
     def store(tracked: _Tracked, retracked: Results) -> bool:
-        return at_once(_replaced, database, tracked.state, retracked)
+        return at_once(_replaced, database, tracked[0], retracked)
 
     return in_rounds(executor, names, load=load, compute=_retracked, store=store, rounds=MAX_ATTEMPTS)
 
 
 def _retracked(tracked: _Tracked) -> Results:
-    state, tracking = tracked.state, track(tracked.state)
+    state, receipts, evidence = tracked
+    tracking = track(state)
     return Results(
         tracking=tracking,
-        receipts=warned_again(state.lives, tracking.warnings, tracked.receipts),
-        summary=summarised(state, tracking, tracked.evidence),
+        receipts=warned_again(state.lives, tracking.warnings, receipts),
+        summary=summarised(state, tracking, evidence),
     )
 
 

@@ -51,7 +51,13 @@ def relocate(database: Database, address: str, to: str) -> int:
     Nothing changes, and ValueError is raised, where the store is unknown, a blob is missing at the new address, the copy is
     another database's, or a run came meanwhile.
     """
-    store = _store_at(database, normal_address(address))
+    with database.reading() as connection:
+        stores = {store.address: store for store in raw_stores.all_of(connection)}
+    address = normal_address(address)
+    if address not in stores:
+        addresses = ", ".join(stores) or "none"
+        raise ValueError(f"no raw records were ever kept in {address}; known are: {addresses}")
+    store = stores[address]
     target = open_store(normal_address(to))
     count = 0
     for name in _named(database, store):
@@ -167,15 +173,6 @@ def _claim(database: Database, address: str) -> None:
 def _require_mark(store: BlobStore, mark: str) -> None:
     if store.mark() != mark:
         raise ValueError(f"{store.address} is not marked as this database's: nothing in it was changed")
-
-
-def _store_at(database: Database, address: str) -> RawStore:
-    with database.reading() as connection:
-        stores = {store.address: store for store in raw_stores.all_of(connection)}
-    if address not in stores:
-        addresses = ", ".join(stores) or "none"
-        raise ValueError(f"no raw records were ever kept in {address}; known are: {addresses}")
-    return stores[address]
 
 
 def _named(database: Database, store: RawStore) -> Iterator[str]:

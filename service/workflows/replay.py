@@ -77,15 +77,15 @@ def as_job(
     """
     names = clutch_ids(database) if task.of is None else [task.of]
     left: dict[str, str] = {}
-    say({"step": _STEP, "done": 0, "of": len(names)})
+    step = "replays the clutches"
+    say({"step": step, "done": 0, "of": len(names)})
     for done, replayed in enumerate(replay(database, names, InProcess(), at_once=at_once), start=1):
         if replayed.error is not None:
             left[replayed.clutch_id] = str(replayed.error)
-        say({"step": _STEP, "done": done, "of": len(names)})
+        say({"step": step, "done": done, "of": len(names)})
     return {"replayed": len(names) - len(left)}, left
 
 
-_STEP = "replays the clutches"
 _LEFT = f"unchanged: runs arrived during each of {MAX_ATTEMPTS} attempts; replay it when fewer runs arrive"
 
 

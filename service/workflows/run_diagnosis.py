@@ -28,8 +28,8 @@ def ask(
     """Ask for a diagnosis of all runs that are there now; returns its id, and whether it is new.
 
     Where the very same runs are being diagnosed already it is that one. `adopt`: what it finds is adopted in the name of
-    `by`; `isolability`: it says which causes its tests could tell apart; `request` is
-    the id of the request that asks. Raises NotFoundError, BusyError where `most` wait or run already.
+    `by`; `isolability`: it says which causes its tests could tell apart; `request`: the id of the request that asks.
+    Raises NotFoundError, BusyError where `most` wait or run already.
     """
     with database.writing(of=clutch_id) as connection:
         clutch = records.clutch(connection, clutch_id)
@@ -90,9 +90,7 @@ def finish(
     Where somebody wants what it found adopted, `adopt` does both at once; it returns False where there is nothing to adopt.
     A job that is no longer the claimer's was cancelled, or is made by another: then nothing is stored.
     """
-    attempts = records.attempts(job.clutch_id or "")
-    while True:
-        next(attempts)
+    for _ in records.attempts(job.clutch_id or ""):
         with database.reading() as connection:
             newest = jobs.get(connection, job.job_id)
         if newest is None or newest.clutch_id is None:
