@@ -24,8 +24,6 @@ ALL_PRESSURES = 0.0
 
 #: The priors of a series, by name: always the first, the second where a fleet has taught one.
 WEAK, FLEET = "weak", "fleet"
-#: The effect whose adoption frees mean COF of the oil's temperature.
-_OIL_TEMPERATURE = "oil_temperature"
 BASELINE: Mapping[str, Any] = {"name": "baseline", "effects": []}
 
 #: Mean COF [d, m] that an adopted model's effects add under each of its draws at cycles since new [m], at a pressure [Pa] or
@@ -112,7 +110,7 @@ class Assumptions:
 
     def corrects_oil(self, quantity: str) -> bool:
         """Whether the model in force frees a quantity of the temperature of the oil that it was measured in."""
-        return quantity == MEAN_COF and _OIL_TEMPERATURE in self.model.name["effects"]
+        return quantity == MEAN_COF and "oil_temperature" in self.model.name["effects"]
 
     def offsets(self, quantity: str, pressure: float, cycles: FloatArray) -> FloatArray:
         """What the model in force adds to a quantity under each of its draws at cycles since new [m]; [d, m], [1, m] where
@@ -153,11 +151,10 @@ def kind_of(record: ClutchIn, severity: Severity) -> dict[str, Any]:
         "reaction_plate": record.reaction_plate,
         "fluid": record.fluid,
         "origin": record.origin,
-        "severity": {"basis": severity.basis.value, "exponent": severity.exponent},
+        "severity": severity_name(severity),
     }
 
 
 def may_be_of(record: ClutchIn, kind: Mapping[str, Any]) -> bool:
     """Whether a clutch is of that kind but for its severity, which follows from what was adopted, too."""
-    kind_fields = kind_of(record, Severity()) | {"severity": kind["severity"]}
-    return kind_fields == kind
+    return kind_of(record, Severity()) | {"severity": kind["severity"]} == kind

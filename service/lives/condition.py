@@ -52,7 +52,7 @@ def rank_of(summary: Mapping[str, Any]) -> float:
     """Where a clutch comes in a list: the fewer cycles it is safe for, held runs considered, the earlier."""
     if summary.get("status", INSUFFICIENT) == INSUFFICIENT:
         return RANK_UNKNOWN
-    bound = lower_bound(summary["at_least"], (summary.get("with_held") or {}).get(SHOWN))
+    bound = bound_of(summary)
     return HORIZON if bound is None else min(bound, HORIZON)
 
 
@@ -96,8 +96,7 @@ def stated(summary: Mapping[str, Any]) -> dict[str, Any] | None:
     """A clutch's summary as lists show it; None before the first run that counts."""
     if "status" not in summary:
         return None
-    among = (summary.get("with_held") or {}).get(SHOWN)
-    beside = with_held_runs({**summary, "warnings": ()}, summary, among, summary.get("held", 0))
+    beside = with_held_runs({**summary, "warnings": ()}, summary, _with_held(summary), summary.get("held", 0))
     return {name: summary[name] for name in SUMMARY} | {name: beside[name] for name in BESIDE}
 
 
@@ -105,6 +104,16 @@ def lower_bound(at_least: float | None, among: Mapping[str, Any] | None) -> floa
     """The lower of a safe bound and that with the held runs, None where neither is known."""
     bounds = [at_least, None if among is None else among["at_least"]]
     return min((bound for bound in bounds if bound is not None), default=None)
+
+
+def _with_held(summary: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The shown prediction with the held runs; None where none is held."""
+    return (summary.get("with_held") or {}).get(SHOWN)
+
+
+def bound_of(summary: Mapping[str, Any]) -> float | None:
+    """The safe bound of a summary, held runs considered; None where it is not known."""
+    return lower_bound(summary["at_least"], _with_held(summary))
 
 
 def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> dict[str, str]:
@@ -138,13 +147,11 @@ def held_in_words(count: int) -> str:
 
 def state_of(summary: Mapping[str, Any], *, disputed: bool, silent: str | None = None) -> dict[str, str]:
     """A clutch's state after NAMUR NE 107 by its summary, and why; `disputed`: its newest diagnosis found that data and
-    model disagree, and nobody has acted on it; `silent`: since when its rig has sent nothing, where that is an alarm. The
-    name is stored with the clutch whenever the summary is."""
+    model disagree, and nobody has acted on it; `silent`: since when its rig has sent nothing, where that is an alarm."""
     name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
     if reason or "status" not in summary:
         return {"name": name, "why": reason}
-    among = summary.get("with_held")
-    return {"name": name, "why": statement_of(summary, lower_bound(summary["at_least"], among and among[SHOWN]))}
+    return {"name": name, "why": statement_of(summary, bound_of(summary))}
 
 
 def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str | None) -> tuple[str, str]:
@@ -176,31 +183,25 @@ def top_line(
     summary: Mapping[str, Any], *, disputed: bool, diagnosis: Mapping[str, Any] | None = None, silent: str | None = None
 ) -> dict[str, str]:
     """What stands first on a clutch's page and in `clutchlife status`: `headline`, its state in words, the safe bound in
-    cycles and days, and the median; `action`, one sentence of what to do. `diagnosis`: the newest one as it goes out.
-    """
+    cycles and days, and the median; `action`, what to do. `diagnosis`: the newest one as it goes out."""
     name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
     words = STATE_WORDS[name]
     if "status" not in summary:
         return {"headline": f"{words}: {reason}", "action": _action(name, summary, "soon", diagnosis)}
-    among = (summary.get("with_held") or {}).get(SHOWN)
-    at_least = lower_bound(summary["at_least"], among)
+    at_least = bound_of(summary)
     paced = pace_in_words(summary.get("pace"), at_least)
     soon = "now" if at_least is not None and at_least < 1.0 else "soon" if paced is None else f"within {paced}"
-    says = _numbers_in_words(summary, among, at_least, paced)
+    says = _numbers_in_words(summary, at_least, paced)
     return {
         "headline": f"{words}: {reason}; {says}" if reason else f"{words}: {says}",
         "action": _action(name, summary, soon, diagnosis),
     }
 
 
-def _numbers_in_words(
-    summary: Mapping[str, Any], among: Mapping[str, Any] | None, at_least: float | None, paced: str | None
-) -> str:
-    """The safe bound, its days and the median; else the statement, where there is no number to give.
-
-    `among`: the prediction with the held runs; where they lower the bound, both are said."""
+def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, paced: str | None) -> str:
+    """The safe bound (both, where held runs lower it), its days and the median; the statement where there is no number."""
     own = summary["at_least"]
-    if own is not None and own >= 1.0 and among is not None and at_least is not None and at_least < own:
+    if own is not None and own >= 1.0 and at_least is not None and at_least < own:
         runs = "the held run counts" if summary.get("held") == 1 else "the held runs count"
         if at_least < 1.0:
             return f"no further cycle is safe if {runs}; {bound_in_words(own)} if not"
@@ -210,7 +211,9 @@ def _numbers_in_words(
     bound = bound_in_words(at_least) + ("" if paced is None else f": {paced}")
     if summary["status"] == PassageStatus.MAY_NEVER_REACH.value:
         return _left_open(bound, summary)
-    return f"{bound}; 50 % chance of {_two_digits(summary['remaining_cycles']['0.5'])} or more"
+    median = summary["remaining_cycles"]["0.5"]
+    unit = _second_digit(max(1.0, median))
+    return f"{bound}; 50 % chance of {round(median / unit) * unit:,.0f} or more"
 
 
 def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping[str, Any] | None) -> str:
@@ -228,10 +231,8 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping
     if name == CHECK:
         missing = FEWEST_TESTS - _distinct_test_cycles(summary)
         tests = "one more stationary test" if missing == 1 else f"{missing} more stationary tests, at different cycles"
-        like_the_first = (
-            ", with the pressures and oil of this life's first test" if _tests_unlike_first(summary) else ""
-        )
-        return f"Run {tests}{like_the_first}: then the remaining life is predicted."
+        alike = ", with the pressures and oil of this life's first test" if _tests_unlike_first(summary) else ""
+        return f"Run {tests}{alike}: then the remaining life is predicted."
     if name == NORMAL or diagnosis is None:
         return "Its life has ended: nothing to do." if summary.get("ended") else "Nothing to do: carry on testing."
     causes = [_cause_in_words(cause) for cause in diagnosis["causes"]]
@@ -244,8 +245,7 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping
 
 
 def _test_in_words(test: str) -> str:
-    """An advised test; of a long protocol, which the diagnosis shows whole, its first test. Tests after further use are said
-    with their number and pauses."""
+    """An advised test; of a long protocol, which the diagnosis shows whole, its first test."""
     test = test.removeprefix("the ")
     if not test.startswith(("stationary", "dynamic")):
         return test
@@ -265,12 +265,10 @@ def _cause_in_words(slug: str) -> str:
 
 def _tests(summary: Mapping[str, Any]) -> str:
     """How many of the tests that a prediction needs there are, as a clause."""
-    known = f"{_distinct_test_cycles(summary)} of the {FEWEST_TESTS} tests that a prediction needs"
-    if _distinct_test_cycles(summary) < summary["runs_used"]:
-        known = (
-            f"tests at {_distinct_test_cycles(summary)} of the {FEWEST_TESTS} different cycles that a prediction needs"
-        )
-    left_out = _tests_unlike_first(summary)
+    places, left_out = _distinct_test_cycles(summary), _tests_unlike_first(summary)
+    known = f"{places} of the {FEWEST_TESTS} tests that a prediction needs"
+    if places < summary["runs_used"]:
+        known = f"tests at {places} of the {FEWEST_TESTS} different cycles that a prediction needs"
     return f"{known} ({left_out} more cannot be compared with the first)" if left_out else known
 
 
@@ -285,8 +283,7 @@ def _tests_unlike_first(summary: Mapping[str, Any]) -> int:
 
 
 def _near_end(summary: Mapping[str, Any]) -> str | None:
-    """Why a predicted end of life is near, None where it is not: by the share of the life that is left, at its safe bound,
-    or by how near a quantity is to its limit."""
+    """Why a predicted end is near, by the share of life left at the safe bound or by a quantity's limit; None: it is not."""
     age = summary["as_of_cycles"] - summary["from_cycles"]
     if summary["at_least"] < SOON * (age + summary["at_least"]):
         return f"less than {100 * SOON:.0f} % of its life may be left"
@@ -303,9 +300,8 @@ def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
     if own is not None and bound != bound_in_words(own):
         bound += ", if held runs count"
     if (end := payload.get("ended")) is not None:
-        return f"ended at {end['cycles']:,.0f} cycles" + (
-            "" if end["reason"] == WORN else ", taken out before it was worn"
-        )
+        early = "" if end["reason"] == WORN else ", taken out before it was worn"
+        return f"ended at {end['cycles']:,.0f} cycles{early}"
     if payload["status"] == REACHED:
         tested = untested_since(payload)
         since = "reached" if tested is None else f"probably reached since the last test at {tested:,.0f} cycles"
@@ -339,11 +335,6 @@ def rounded_down(cycles: float) -> str:
     """Cycles, at least 1, rounded down to two digits."""
     unit = _second_digit(cycles)
     return f"{math.floor(cycles / unit) * unit:,.0f}"
-
-
-def _two_digits(cycles: float) -> str:
-    unit = _second_digit(max(1.0, cycles))
-    return f"{round(cycles / unit) * unit:,.0f}"
 
 
 def _second_digit(cycles: float) -> float:

@@ -16,6 +16,7 @@ from models.engagements.comparison import Comparison, SpeedCourse, compared, ref
 from models.engagements.measured import MeasuredEngagement, measured_engagement
 from models.engagements.slip import Estimate, Refusal
 from service.columns import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
+from service.errors import Notice
 from service.lives.incoming_run import IncomingRun, sampled_record
 
 #: The indicators of a run's engagement, or why it has none.
@@ -25,36 +26,39 @@ Engagement: TypeAlias = MeasuredEngagement | Refusal
 DUTY_KINDS = ("duty_cycles", "run_in")
 #: Where a run's own comparison course stands among what is kept beside its channels.
 COURSE = "engagement_course"
-DETERMINED = "determined"
-NO_ENGAGEMENT = "no_engagement"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Indicator:
-    """An indicator at the edge: public value = SI value / factor."""
+    """An indicator at the edge: public value = SI value / factor; its `field` in the models."""
 
-    unit: str
+    field: str
+    unit: str = "1"
     factor: float = 1.0
 
 
-#: The indicators of one engagement by public name; `models.engagements.measured` has them under the names beside.
+#: The indicators of one engagement by public name.
 INDICATORS: Mapping[str, Indicator] = {
-    "stop_time_s": Indicator(unit="s"),
-    "engagement_energy_kj": Indicator(unit="kJ", factor=1000.0),
-    "peak_power_kw": Indicator(unit="kW", factor=1000.0),
-    "initial_cof": Indicator(unit="1"),
-    "midpoint_cof": Indicator(unit="1"),
-    "endpoint_cof": Indicator(unit="1"),
-    "breakaway_cof": Indicator(unit="1"),
-    "initial_cof_ratio": Indicator(unit="1"),
-    "endpoint_cof_ratio": Indicator(unit="1"),
-    "breakaway_cof_ratio": Indicator(unit="1"),
-    "torque_rise": Indicator(unit="1"),
+    "stop_time_s": Indicator(field="stop_time", unit="s"),
+    "engagement_energy_kj": Indicator(field="energy", unit="kJ", factor=1000.0),
+    "peak_power_kw": Indicator(field="peak_power", unit="kW", factor=1000.0),
+    "initial_cof": Indicator(field="initial_cof"),
+    "midpoint_cof": Indicator(field="midpoint_cof"),
+    "endpoint_cof": Indicator(field="endpoint_cof"),
+    "breakaway_cof": Indicator(field="breakaway_cof"),
+    "initial_cof_ratio": Indicator(field="initial_ratio"),
+    "endpoint_cof_ratio": Indicator(field="endpoint_ratio"),
+    "breakaway_cof_ratio": Indicator(field="breakaway_ratio"),
+    "torque_rise": Indicator(field="torque_rise"),
 }
-_FIELDS = (
-    "stop_time", "energy", "peak_power", "initial_cof", "midpoint_cof", "endpoint_cof", "breakaway_cof",
-    "initial_ratio", "endpoint_ratio", "breakaway_ratio", "torque_rise",
-)  # fmt: skip
+#: The indicators of an engagement against the first ones of its life.
+COMPARED: Mapping[str, Indicator] = {
+    "normalised_duration": Indicator(field="normalised_duration"),
+    "euclidean_distance": Indicator(field="euclidean_distance"),
+    "spectral_angle_rad": Indicator(field="spectral_angle", unit="rad"),
+}
+#: All indicators by public name, in the order in which answers have them.
+ALL_INDICATORS: Mapping[str, Indicator] = {**INDICATORS, **COMPARED}
 
 
 def evaluated(run: IncomingRun, geometry: Geometry) -> Engagement | None:
@@ -64,11 +68,12 @@ def evaluated(run: IncomingRun, geometry: Geometry) -> Engagement | None:
     return measured_engagement(sampled_record(run.channels), geometry)
 
 
-def engagement_notes(engagement: Engagement) -> list[tuple[str, str]]:
-    """A code and a sentence where a record that was sent holds no engagement."""
+def engagement_notices(engagement: Engagement | None) -> list[Notice]:
+    """The warning of a record that was sent and holds no engagement."""
     if not isinstance(engagement, Refusal):
         return []
-    return [(NO_ENGAGEMENT, f"the engagement is stored but not evaluated: {engagement.message}")]
+    message = f"the engagement is stored but not evaluated: {engagement.message}"
+    return [Notice(code="no_engagement", message=message)]
 
 
 def engagement_item(engagement: Engagement) -> dict[str, Any]:
@@ -81,25 +86,28 @@ def engagement_item(engagement: Engagement) -> dict[str, Any]:
             **dict.fromkeys(nothing),
             "indicators": dict.fromkeys(INDICATORS),
         }
-    values = (getattr(engagement, field) for field in _FIELDS)
     slip = engagement.slip
     return {
-        "status": DETERMINED,
+        "status": "determined",
         "message": f"The clutch slipped for {engagement.stop_time.value:.3g} s.",
         "start_s": slip.start.value,
         "end_s": slip.end.value,
         "initial_speed_rpm": engagement.initial_speed.value / RADIANS_PER_SECOND_PER_RPM,
         "maximum_pressure_bar": engagement.maximum_pressure / PASCALS_PER_BAR,
-        "indicators": {
-            name: estimate_item(value, indicator.factor)
-            for (name, indicator), value in zip(INDICATORS.items(), values, strict=True)
-        },
+        "indicators": _indicator_items(engagement, INDICATORS),
     }
 
 
-def estimate_item(estimate: Estimate | None, factor: float = 1.0) -> dict[str, float] | None:
-    """A value with its standard error in the public unit."""
-    return None if estimate is None else {"value": estimate.value / factor, "sd": estimate.sd / factor}
+def _indicator_items(
+    found: MeasuredEngagement | Comparison, indicators: Mapping[str, Indicator]
+) -> dict[str, dict[str, float] | None]:
+    """Each indicator with its standard error in the public unit; null where it is not determined."""
+    items: dict[str, dict[str, float] | None] = {}
+    for name, indicator in indicators.items():
+        estimate: Estimate | None = getattr(found, indicator.field)
+        factor = indicator.factor
+        items[name] = None if estimate is None else {"value": estimate.value / factor, "sd": estimate.sd / factor}
+    return items
 
 
 def course_item(engagement: Engagement | None) -> dict[str, Any]:
@@ -117,31 +125,12 @@ def course_item(engagement: Engagement | None) -> dict[str, Any]:
     }
 
 
-def speed_course_of(item: Mapping[str, Any]) -> SpeedCourse:
-    """The kept course as the models take it."""
-    return SpeedCourse(
-        duration=Estimate(value=item["duration_s"], sd=item["duration_sd_s"]),
-        speed=np.array(item["speed_rpm"]) * RADIANS_PER_SECOND_PER_RPM,
-        noise=item["noise_rpm"] * RADIANS_PER_SECOND_PER_RPM,
-    )
-
-
 def public_channels(columns: Mapping[str, FloatArray]) -> dict[str, list[float]]:
     """Channels of a trace [n] in SI by public name -> in their public units."""
     return {
         name: ((column - CHANNELS[name].offset) / CHANNELS[name].factor).round(6).tolist()
         for name, column in columns.items()
     }
-
-
-#: The indicators of an engagement against the first ones of its life, by public name.
-COMPARED: Mapping[str, Indicator] = {
-    "normalised_duration": Indicator(unit="1"),
-    "euclidean_distance": Indicator(unit="1"),
-    "spectral_angle_rad": Indicator(unit="rad"),
-}
-#: All indicators by public name, in the order in which answers have them.
-ALL_INDICATORS: Mapping[str, Indicator] = {**INDICATORS, **COMPARED}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,7 +160,15 @@ def stored_engagement(receipt: Mapping[str, Any], details: Mapping[str, Any]) ->
     """A stored run's engagement; None where it has none, or was evaluated by a release that knew of none."""
     if receipt.get("engagement") is None:
         return None
-    return StoredEngagement(receipt=receipt, course=speed_course_of(details[COURSE]) if COURSE in details else None)
+    if COURSE not in details:
+        return StoredEngagement(receipt=receipt, course=None)
+    kept = details[COURSE]
+    course = SpeedCourse(
+        duration=Estimate(value=kept["duration_s"], sd=kept["duration_sd_s"]),
+        speed=np.array(kept["speed_rpm"]) * RADIANS_PER_SECOND_PER_RPM,
+        noise=kept["noise_rpm"] * RADIANS_PER_SECOND_PER_RPM,
+    )
+    return StoredEngagement(receipt=receipt, course=course)
 
 
 def engagements_over_life(stored: Sequence[StoredEngagement], lives: Sequence[Collection[str]]) -> list[dict[str, Any]]:
@@ -193,12 +190,8 @@ def _row(engagement: StoredEngagement, reference: SpeedCourse | None) -> dict[st
     head = {name: engagement.receipt[name] for name in ("run_id", "cycles", "kind")}
     item = {name: engagement.item[name] for name in ("initial_speed_rpm", "maximum_pressure_bar")}
     time = {"time": engagement.receipt["started_at"] or engagement.receipt["received_at"]}
-    difference = None if reference is None or engagement.course is None else compared(engagement.course, reference)
-    return head | time | item | {"indicators": engagement.item["indicators"] | _comparison_items(difference)}
-
-
-def _comparison_items(comparison: Comparison | None) -> dict[str, dict[str, float] | None]:
-    if comparison is None:
-        return dict.fromkeys(COMPARED)
-    values = (comparison.normalised_duration, comparison.euclidean_distance, comparison.spectral_angle)
-    return {name: estimate_item(value) for name, value in zip(COMPARED, values, strict=True)}
+    if reference is None or engagement.course is None:
+        comparison: dict[str, dict[str, float] | None] = dict.fromkeys(COMPARED)
+    else:
+        comparison = _indicator_items(compared(engagement.course, reference), COMPARED)
+    return head | time | item | {"indicators": engagement.item["indicators"] | comparison}

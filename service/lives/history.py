@@ -1,9 +1,8 @@
 """A clutch's history as series over duty cycles, for the filters.
 
-Runs may have arrived in any order; the history is ordered by cycles, and at equal cycles by when the runs were started
-(or received, where the rig did not say; a clock that was set back meanwhile does not exchange them). A rebuild starts a
-new life: cycles count from it, and the first stationary test after it is the new reference. Any other maintenance begins an
-epoch: it may have shifted the level of what is measured.
+Runs may have arrived in any order; the history is ordered by cycles (see `order`). A rebuild starts a new life: cycles
+count from it, and the first stationary test after it is the new reference. Any other maintenance begins an epoch: it may
+have shifted the level of what is measured.
 """
 
 import bisect
@@ -243,16 +242,12 @@ class Life:
             own_reference = first.cofs_under(draw)
             cofs = [value(own_reference, self.events[index].cofs_under(draw)) for index in series.events]
             offsets = off[min(draw, len(off) - 1)].tolist()
-            draws.append(
-                (
-                    weight,
-                    tuple(
-                        replace(measured, value=at[0] - added)
-                        for measured, at, added in zip(series.measurements, cofs, offsets, strict=True)
-                        if at is not None
-                    ),
-                )
+            measurements = tuple(
+                replace(measured, value=cof[0] - added)
+                for measured, cof, added in zip(series.measurements, cofs, offsets, strict=True)
+                if cof is not None
             )
+            draws.append((weight, measurements))
         return replace(series, draws=tuple(draws))
 
     def series(
@@ -273,16 +268,15 @@ class Life:
         course = assumptions.offset(quantity, pressure, cycles)
         epochs = list(itertools.accumulate(int(event.shift or event.new_level) for event in self.events))
         levels = list(itertools.accumulate(int(event.new_level) for event in self.events))
+        places = zip(measured, scale.progress(cycles).tolist(), course.tolist(), strict=True)
         return Series(
             quantity=quantity,
             pressure=pressure,
             measurements=tuple(
                 Measurement(
-                    progress=zeta, value=value - off, variance=sd**2, epoch=epochs[index], new_levels=levels[index]
+                    progress=at, value=value - off, variance=sd**2, epoch=epochs[index], new_levels=levels[index]
                 )
-                for (index, (value, sd)), zeta, off in zip(
-                    measured, scale.progress(cycles).tolist(), course.tolist(), strict=True
-                )
+                for (index, (value, sd)), at, off in places
             ),
             events=tuple(index for index, _ in measured),
             scale=scale,

@@ -12,7 +12,7 @@ from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
 from service.columns import CHANNELS, PLATE_TEMPERATURES, content_with_columns, instant
-from service.errors import FieldError, InvalidError
+from service.errors import InvalidError
 from service.lives.criteria import MAX_LEVELS, MIN_TORQUE_SD
 
 
@@ -143,18 +143,13 @@ def _require_forward(time: FloatArray) -> None:
     back = np.flatnonzero(np.diff(time) < 0)
     if back.size:
         row = int(back[0]) + 1
+        value = f"{time[row]:.9g}"
         message = (
-            f"time_s[{row}] must not step back, got {time[row]:.9g} s after {time[row - 1]:.9g} s: the recorder's clock "
+            f"time_s[{row}] must not step back, got {value} s after {time[row - 1]:.9g} s: the recorder's clock "
             "restarted or wrapped around, or two records stand in one; send each by itself"
         )
-        error = FieldError(
-            pointer=f"/channels/time_s/{row}",
-            row=row + 1,
-            value=f"{time[row]:.9g}",
-            code="time_backwards",
-            message=message,
-        )
-        raise InvalidError(message, errors=[error])
+        pointer = f"/channels/time_s/{row}"
+        raise InvalidError.of(message, code="time_backwards", pointer=pointer, value=value, row=row + 1)
 
 
 def _require_readings(channels: Mapping[str, FloatArray]) -> None:
@@ -187,8 +182,4 @@ def _refuse_all(name: str, column: FloatArray, code: str, rule: str) -> None:
 
 
 def _refuse(name: str, column: FloatArray, code: str, rule: str) -> None:
-    message = f"{name}: {rule}"
-    raise InvalidError(
-        message,
-        errors=[FieldError(pointer=f"/channels/{name}/0", row=1, value=f"{column[0]:g}", code=code, message=message)],
-    )
+    raise InvalidError.of(f"{name}: {rule}", code=code, pointer=f"/channels/{name}/0", value=f"{column[0]:g}", row=1)

@@ -1,11 +1,9 @@
 """An adopted extension (`models.diagnosis.extension`) applied to a clutch's runs: corrected mean COFs, and the course.
 
 Artefacts are taken off the plateaus of a test and its curves fitted again, with what was known when it was made: the runs
-before it in the order of the history. The fit is to the mean over the model's draws; each draw's own mean COF differs
-from it by the mean of what it takes off less. So the same history gives the same corrections, in whatever order its runs
-arrived.
-Of a sampled record before it only the moment and one point stand in, for to cut all of them at every new run would cost
-more than the run. The fits and receipts of the baseline stay as they are.
+before it in the history, whenever they arrived. The fit is to the mean over the model's draws; each draw's own mean COF
+differs from it by the mean of what it takes off less. Of a sampled record before it only the moment and one point stand
+in, for to cut all of them at every new run would cost more than the run.
 """
 
 from __future__ import annotations
@@ -55,9 +53,9 @@ class RunReader:
     def campaign_runs(self, events: Sequence[Event], *, origin: float) -> list[CampaignRun]:
         """The runs of a life in order, sampled records left out."""
         return [
-            without_record(_placed(self.describe(event.run_id), event), origin=origin)
+            without_record(replace(self.describe(event.run_id), cycles=event.cycles), origin=origin)
             if event.run_id in self.sampled
-            else run_of(_placed(self.read(event.run_id), event), origin=origin)
+            else run_of(replace(self.read(event.run_id), cycles=event.cycles), origin=origin)
             for event in events
         ]
 
@@ -75,11 +73,8 @@ class RunReader:
                 yield run
 
     def _cut(self, event: Event, life: Life) -> CampaignRun:
-        return run_of(_placed(self.read(event.run_id), event), origin=life.origin, torque_filter=self.torque_filter)
-
-
-def _placed(run: IncomingRun, event: Event) -> IncomingRun:
-    return replace(run, cycles=event.cycles)
+        run = replace(self.read(event.run_id), cycles=event.cycles)
+        return run_of(run, origin=life.origin, torque_filter=self.torque_filter)
 
 
 def extension_of(content: Mapping[str, Any]) -> Extension:
@@ -172,7 +167,7 @@ def added_course(extension: Extension, life: Life, geometry: Geometry) -> Course
     velocities = reference_velocities(life.speed_range, geometry)[2::5]
     reference = np.array(sorted(life.reference))
 
-    @cache
+    @cache  # asked for the same cycles at every run
     def added(cycles: tuple[float, ...], pressure: float) -> FloatArray:
         levels = np.array([pressure]) if pressure else reference
         per_cof = np.array([geometry.torque_per_cof(float(level)) for level in levels])
@@ -188,4 +183,4 @@ def added_course(extension: Extension, life: Life, geometry: Geometry) -> Course
         return None
     if not adds:
         return None
-    return lambda cycles, pressure: added(tuple(cycles.tolist()), pressure)  # asked for the same cycles at every run
+    return lambda cycles, pressure: added(tuple(cycles.tolist()), pressure)

@@ -17,7 +17,6 @@ from service.lives.quantities.ends import CriterionEnd, criteria_answer, criteri
 from service.lives.quantities.measured import ChosenLife, MeasuredLife, chosen_life
 from service.lives.recomputation import ClutchState, Levels, Receipt, Tracking, with_cofs
 from service.lives.tracks import CARRIED, States, predict_at
-from service.schemas.life import CriterionIn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,16 +94,14 @@ def by_own_criteria(
     measured = measured_life(state, chosen_life(state), evidence, filters) if criteria else None
     if measured is None:
         return {}
-    ends = [_end_where_measured(measured, criterion, method) for criterion in criteria]
+    ends = []
+    for criterion in criteria:
+        try:
+            ends.append(criterion_end(measured, criterion, method))
+        except NotFoundError:  # measured, but not at the criterion's place: who asks for the remaining life is told so
+            ends.append(CriterionEnd(criterion=criterion, tests=0))
     by_criteria = criteria_answer(measured, ends, payload["current"])
     return ended({"current": payload["current"], **by_criteria}, measured.life.end)
-
-
-def _end_where_measured(measured: MeasuredLife, criterion: CriterionIn, method: str) -> CriterionEnd:
-    try:
-        return criterion_end(measured, criterion, method)
-    except NotFoundError:  # measured, but not at the criterion's place: who asks for the remaining life is told so
-        return CriterionEnd(criterion=criterion, tests=0)
 
 
 def measured_life(
@@ -114,7 +111,6 @@ def measured_life(
     if chosen.life is None:
         return None
     return MeasuredLife(
-        clutch_id=state.clutch_id,
         life=chosen.life,
         assumptions=chosen.assumptions,
         geometry=state.geometry,

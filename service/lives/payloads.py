@@ -9,7 +9,7 @@ from models.loops.loops import Loop
 from models.prognosis.back_cast import BackCast
 from models.prognosis.course_shares import CourseName, CourseShare
 from models.prognosis.criteria import HORIZON, QUANTILES
-from models.prognosis.first_passage import FirstPassage, horizon_at
+from models.prognosis.first_passage import horizon_at
 from models.prognosis.stated_end import NewLater
 from models.tracking.innovation import last_innovation
 from models.tracking.measurement import Measurement
@@ -27,20 +27,9 @@ from service.settings import CODE_VERSION
 
 #: The warning of a last test that lies far off what the tests before it predict.
 OFF_TRACK = "off_track"
-#: The warning of a prediction whose course is none of eq. 6's.
-NOT_EQ_6 = "not_eq6"
-#: The warning of a prediction by a value when new that lies far above the first test's.
-NEW_EXTRAPOLATED = "new_extrapolated"
-#: The warning of a prediction whose forerunners held too few of the tests since.
-MISSED_FORECASTS = "missed_forecasts"
-#: The warning of an answer that another filter's median lies outside of.
-FILTERS_DISAGREE = "filters_disagree"
-#: The warning of a level of COF that begins with a test and no event explains.
-NEW_LEVEL = "new_level"
 #: Warnings of a run in its clutch's history, written again where the history changes: it arrived after a run of more cycles,
 #: its pressures or its oil temperature are not those of the first test, its mean COF is not what those before it predict.
 LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE = "late_arrival", "other_pressures", "other_oil_temperature"
-TESTS_LEFT_OUT = "tests_left_out"
 OF_HISTORY = LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE, OFF_TRACK
 
 
@@ -54,7 +43,7 @@ def not_eq_6(courses: Sequence[CourseShare]) -> list[Notice]:
         f"the clutch does not age by the usual law ({shares}). The forecast follows the trend of the tests and allows for "
         "further changes"
     )
-    return [Notice(code=NOT_EQ_6, message=message)]
+    return [Notice(code="not_eq6", message=message)]
 
 
 def new_extrapolated(series: Series, assumptions: Assumptions, late: NewLater | None, fraction: float) -> list[Notice]:
@@ -71,7 +60,7 @@ def new_extrapolated(series: Series, assumptions: Assumptions, late: NewLater | 
         "this clutch was new at its first test. The forecast averages over both cases. If the clutch was new, send "
         f"maintenance with the event rebuild at {cycles:,.0f} cycles: its life then begins there"
     )
-    return [Notice(code=NEW_EXTRAPOLATED, message=message)]
+    return [Notice(code="new_extrapolated", message=message)]
 
 
 def missed(back_cast: BackCast) -> list[Notice]:
@@ -82,7 +71,7 @@ def missed(back_cast: BackCast) -> list[Notice]:
         f"the 90 % intervals of earlier forecasts contained only {back_cast.held} of {back_cast.misses.size} later tests. "
         f"The interval of the remaining life is therefore {back_cast.widening:.2g} times as wide, on a logarithmic scale"
     )
-    return [Notice(code=MISSED_FORECASTS, message=message)]
+    return [Notice(code="missed_forecasts", message=message)]
 
 
 def filters_disagree(answers: Mapping[str, Mapping[str, Any]]) -> list[Notice]:
@@ -96,7 +85,7 @@ def filters_disagree(answers: Mapping[str, Mapping[str, Any]]) -> list[Notice]:
         return []
     intervals = "; ".join(f"{interval_in_words(prediction)} by {method}" for method, prediction in predictions.items())
     message = f"the methods disagree about the remaining cycles: {intervals}. Plan with the lowest, and test again soon"
-    return [Notice(code=FILTERS_DISAGREE, message=message)]
+    return [Notice(code="filters_disagree", message=message)]
 
 
 def interval_in_words(remaining: Mapping[str, float | None]) -> str:
@@ -131,7 +120,7 @@ def new_level(cycles: Sequence[float]) -> list[Notice]:
         f"mean COF has a new level since the test at {' and at '.join(f'{at:,.0f}' for at in cycles)} cycles, and no "
         "event explains it. Look at the lining and the sensors; if something was changed, send it as maintenance"
     )
-    return [Notice(code=NEW_LEVEL, message=message)]
+    return [Notice(code="new_level", message=message)]
 
 
 def late_arrival(cycles: float, latest: float) -> list[Notice]:
@@ -164,7 +153,7 @@ def left_out(tests: int, runs: int) -> list[Notice]:
         f"{tests - runs} of {tests} tests {verb} not count: the pressures differ from those of the first test, or the "
         f"oil temperature by more than {OTHER_OIL:g} °C. The warnings of each run say which"
     )
-    return [Notice(code=TESTS_LEFT_OUT, message=message)]
+    return [Notice(code="tests_left_out", message=message)]
 
 
 def other_oil_notice(life: Life, event: Event) -> list[Notice]:
@@ -187,14 +176,8 @@ PARAMETER_UNITS = {
     "viscous_coefficient": ("viscous_coefficient", "Nm/(m/s)^0.3"),
 }
 INSUFFICIENT, ENDED = "insufficient_data", "ended"
-#: What is said of the present of a life.
-CURRENT = ("mean_cof", "mean_cof_sd", "measured_at_cycles", "fraction_of_initial", "health")
 #: The quantile of the end of life that is the safe bound.
 SAFE = min(QUANTILES)
-
-
-#: What a receipt says of the file that a run was read from.
-_OF_A_FILE = ("filename", "sha256", "bytes", "rig")
 
 
 def receipt(
@@ -217,7 +200,7 @@ def receipt(
         "received_at": received_at,
         "content_sha256": run.content_sha256,
         "duplicate": False,
-        "file": None if run.file is None else {name: run.file[name] for name in _OF_A_FILE},
+        "file": None if run.file is None else {name: run.file[name] for name in ("filename", "sha256", "bytes", "rig")},
         "warnings": [*(run.file or {}).get("warnings", ()), *notice_items(analysis.warnings)],
         "fits": fit_items(analysis.fits, cofs or {}),
         "loops": loop_items(loops),
@@ -232,11 +215,7 @@ def receipt(
 
 def fit_items(levels: Sequence[LevelFit], cofs: ByPressure) -> list[dict[str, Any]]:
     """The fits of a test as a receipt shows them, each with its mean COF where it determines one."""
-    return [_fit_item(level.fit, cofs.get(level.fit.pressure)) for level in levels]
-
-
-def loop_items(loops: Sequence[Loop]) -> list[dict[str, Any]]:
-    return [_loop_item(loop) for loop in loops]
+    return [_fit_item(level.fit, cofs.get(level.fit.pressure, (None, None))) for level in levels]
 
 
 def notice_items(notices: Sequence[Notice]) -> list[dict[str, Any]]:
@@ -247,7 +226,7 @@ def notice_items(notices: Sequence[Notice]) -> list[dict[str, Any]]:
     ]
 
 
-def _fit_item(fit: StribeckFit, cof: Value | None) -> dict[str, Any]:
+def _fit_item(fit: StribeckFit, cof: Value | tuple[None, None]) -> dict[str, Any]:
     names = [public for public, _ in PARAMETER_UNITS.values()]
     return {
         "pressure_bar": bar(fit.pressure),
@@ -257,8 +236,8 @@ def _fit_item(fit: StribeckFit, cof: Value | None) -> dict[str, Any]:
         "rmse_nm": fit.rmse,
         "noise_nm": fit.noise,
         "acceptable": fit.acceptable,
-        "mean_cof": None if cof is None else cof[0],
-        "mean_cof_sd": None if cof is None else cof[1],
+        "mean_cof": cof[0],
+        "mean_cof_sd": cof[1],
         "points": fit.points,
         "status": fit.status.value,
         "undetermined": [PARAMETER_UNITS[name][0] for name in fit.undetermined],
@@ -266,22 +245,25 @@ def _fit_item(fit: StribeckFit, cof: Value | None) -> dict[str, Any]:
     }
 
 
-def _loop_item(loop: Loop) -> dict[str, Any]:
-    return {
-        "pressure_bar": bar(loop.pressure),
-        "loop_area_nm_m_s": loop.area,
-        "loop_area_sd_nm_m_s": loop.area_sd,
-        "attractor_nm_s": loop.attractor,
-        "attractor_sd_nm_s": loop.attractor_sd,
-        "film_time_s": loop.film_time,
-        "film_time_sd_s": loop.film_time_sd,
-        "frequency_hz": loop.frequency,
-        "periods": loop.periods,
-        "direction": str(loop.direction.value),
-        "better_law": loop.better_law,
-        "status": loop.status.value,
-        "message": loop.message,
-    }
+def loop_items(loops: Sequence[Loop]) -> list[dict[str, Any]]:
+    return [
+        {
+            "pressure_bar": bar(loop.pressure),
+            "loop_area_nm_m_s": loop.area,
+            "loop_area_sd_nm_m_s": loop.area_sd,
+            "attractor_nm_s": loop.attractor,
+            "attractor_sd_nm_s": loop.attractor_sd,
+            "film_time_s": loop.film_time,
+            "film_time_sd_s": loop.film_time_sd,
+            "frequency_hz": loop.frequency,
+            "periods": loop.periods,
+            "direction": str(loop.direction.value),
+            "better_law": loop.better_law,
+            "status": loop.status.value,
+            "message": loop.message,
+        }
+        for loop in loops
+    ]
 
 
 def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float, fraction: float) -> dict[str, Any]:
@@ -290,8 +272,8 @@ def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float
         "as_of_cycles": None if cycles is None else whole(cycles),
         "runs_used": 0,
         "status": INSUFFICIENT,
-        "criterion": _criterion(fraction, pressure, None, None),
-        "current": dict.fromkeys(CURRENT),
+        "criterion": criterion_item(fraction, pressure, None, None),
+        "current": dict.fromkeys(("mean_cof", "mean_cof_sd", "measured_at_cycles", "fraction_of_initial", "health")),
         "remaining_cycles": by_quantile({}),
         "end_of_life_cycles": by_quantile({}),
         "at_least": None,
@@ -304,62 +286,6 @@ def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float
         "horizon_cycles": whole(HORIZON),
         "warnings": [],
     } | assumptions.named()
-
-
-def predicted(
-    passage: FirstPassage,
-    assumptions: Assumptions,
-    series: Series,
-    cycles: float,
-    fraction: float,
-    *,
-    runs: int,
-    enough: bool,
-    courses: Sequence[CourseShare],
-    back_cast: BackCast,
-    ended_lives: int,
-    of_new: Sequence[Notice],
-    sample: Mapping[str, Any],
-    warnings: Sequence[Notice],
-) -> dict[str, Any]:
-    """A first passage in ζ, led back to cycles. Without `enough` tests only the last of them and the safe bound are stated:
-    what else the prior makes of them is no finding."""
-    ends = {q: None if zeta is None else float(series.scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
-    of_course = (*not_eq_6(courses), *of_new, *missed(back_cast))
-    present = {
-        "runs_used": runs,
-        "current": _measured_last(series, assumptions, runs),
-        "horizon_cycles": whole(horizon_at(cycles - series.scale.origin)),
-        "at_least": safe_bound(ends[SAFE], cycles, series.scale.origin),
-        "warnings": notice_items([*warnings, *(of_course if enough else ())]),
-    }
-    answer = insufficient(assumptions, cycles, series.pressure, fraction) | present
-    if not enough:
-        return answer
-    mean = passage.current[0]
-    left = mean / passage.initial if passage.initial > 0 else None
-    now = {"mean_cof": mean, "mean_cof_sd": passage.current[1], "fraction_of_initial": left}
-    return answer | {
-        "status": passage.status.value,
-        "criterion": _criterion(fraction, series.pressure, passage.initial, passage.threshold),
-        "current": answer["current"] | now | {"health": None if left is None else share_of_way(left, 1.0, fraction)},
-        "remaining_cycles": by_quantile(
-            {q: None if end is None else max(0.0, end - cycles) for q, end in ends.items()}
-        ),
-        "end_of_life_cycles": by_quantile(ends),
-        "probability_of_reaching": passage.probability_of_reaching,
-        "back_cast": {"held": back_cast.held, "of": back_cast.misses.size, "widening": back_cast.widening},
-        "ended_lives": ended_lives,
-        "sample": sample,
-        "course": _course_item(courses[0]) | {"alternatives": [_course_item(share) for share in courses[1:]]},
-    }
-
-
-def _measured_last(series: Series, assumptions: Assumptions, runs: int) -> dict[str, Any]:
-    """The last of the first `runs` measurements of a series as the present mean COF, without health."""
-    cycles, (value, sd) = series.as_measured(assumptions, runs - 1)
-    measured = {"mean_cof": value, "mean_cof_sd": sd, "measured_at_cycles": whole(round(cycles, 3))}
-    return dict.fromkeys(CURRENT) | measured
 
 
 def share_of_way(value: float, initial: float, limit: float, *, rises: bool = False) -> float | None:
@@ -397,10 +323,6 @@ def ended(payload: Mapping[str, Any], end: Event | None) -> dict[str, Any]:
     }
 
 
-def _course_item(share: CourseShare) -> dict[str, Any]:
-    return {"name": share.name.value, "probability": share.probability, "order": share.order}
-
-
 def history_warnings(
     lives: Sequence[Life], off_track: Mapping[str, list[dict[str, str]]], *, run_id: str | None = None
 ) -> dict[str, list[dict[str, str]]]:
@@ -432,7 +354,7 @@ def warned_again(
     return changed
 
 
-def _criterion(fraction: float, pressure: float, initial: float | None, threshold: float | None) -> dict[str, Any]:
+def criterion_item(fraction: float, pressure: float, initial: float | None, threshold: float | None) -> dict[str, Any]:
     return {
         "quantity": MEAN_COF,
         "fraction": fraction,

@@ -15,9 +15,9 @@ from models.clutch import Geometry
 from models.degradation.severity import Severity
 from models.diagnosis.campaign import StationaryRun
 from service.errors import Notice
-from service.lives.assumptions import Assumptions, LearnedPrior, ModelInForce, kind_of, severity_under
+from service.lives.assumptions import Assumptions, LearnedPrior, kind_of, severity_under
 from service.lives.condition import SHOWN
-from service.lives.diagnosis.campaign import tested
+from service.lives.diagnosis.campaign import head_of
 from service.lives.history import (
     ByPressure,
     Corrected,
@@ -121,8 +121,7 @@ class ClutchState:
 
     def assumptions_under(self, extension: Extension | None, life: Life | None) -> Assumptions:
         """What a life would be tracked under, were this extension in force."""
-        adopted = extension is not None and life is not None
-        model = model_in_force(extension, life, self.geometry) if adopted else ModelInForce()
+        model = model_in_force(extension, life, self.geometry)
         severity = severity_under(self.record, model.severity_exponent)
         return Assumptions(severity=severity, prior=self.priors[severity], model=model)
 
@@ -189,7 +188,11 @@ def with_cofs(
     cofs = _cofs_of_tests(state.lives, levels, state.geometry)
     events = tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in state.events)
     plain = replace(state, events=events)
-    corrected = _corrected(plain, reader)
+    corrected: dict[str, Corrected] = {}
+    if plain.extension is not None and plain.events:
+        life = plain.lives[-1]
+        runs = reader.campaign_runs(life.events, origin=life.origin)
+        corrected = corrected_cofs(plain.extension, plain.record, life, runs, reader.stationary_tests(life))
     freed = [event.corrected(corrected.get(event.run_id)) for event in plain.events]
     events = levelled(freed, state.held, state.geometry, corrected=state.extension is not None)
     return replace(plain, events=events), cofs, corrected
@@ -198,12 +201,8 @@ def with_cofs(
 def cofs_among(state: ClutchState, event: Event, levels: Sequence[LevelFit]) -> ByPressure:
     """A run's mean COFs as they are, or would be, in the history: over the protocol of its life's first stationary test,
     which may be itself."""
-    speed_range = life_with(order([*state.events, event]), event).speed_range
-    return (
-        {}
-        if speed_range is None
-        else mean_cofs(levels, reference_velocities(speed_range, state.geometry), state.geometry)
-    )
+    life = life_with(order([*state.events, event]), event)
+    return _cofs_of_tests([life], {event.run_id: levels}, state.geometry).get(event.run_id, {})
 
 
 def computed_aside(state: ClutchState, event: Event, levels: Levels, reader: RunReader) -> tuple[ByPressure, Receipt]:
@@ -236,14 +235,6 @@ def _cofs_of_tests(lives: Sequence[Life], levels: Levels, geometry: Geometry) ->
                 fits = levels[event.run_id]
                 cofs[event.run_id] = {} if velocities is None else mean_cofs(fits, velocities, geometry)
     return cofs
-
-
-def _corrected(state: ClutchState, reader: RunReader) -> dict[str, Corrected]:
-    if state.extension is None or not state.events:
-        return {}
-    life = state.lives[-1]
-    runs = reader.campaign_runs(life.events, origin=life.origin)
-    return corrected_cofs(state.extension, state.record, life, runs, reader.stationary_tests(life))
 
 
 def corrected_newest(
@@ -335,10 +326,10 @@ class Arrival:
 
 def test_of(arrival: Arrival, life: Life) -> StationaryRun | None:
     """The run as a stationary test of a life, by the plateaus that were cut already."""
-    plateaus = arrival.analysis.plateaus
+    plateaus, times = arrival.analysis.plateaus, arrival.analysis.times
     if plateaus is None:
         return None
-    return tested(arrival.run, plateaus, arrival.analysis.times, origin=life.origin)
+    return StationaryRun(**head_of(arrival.run, life.origin), plateaus=plateaus, time=times)
 
 
 def reader_with(stored: RunReader, arrival: Arrival) -> RunReader:

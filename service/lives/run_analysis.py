@@ -21,9 +21,9 @@ from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, curves_by_pressure, loaded
 from models.records.torque_filter import filtered_as_torque
 from service.columns import PASCALS_PER_BAR
-from service.errors import FieldError, InvalidError, Notice
+from service.errors import InvalidError, Notice
 from service.lives.criteria import FEWEST_SPEEDS, POOR_FIT, WIDE_LEVEL
-from service.lives.engagements import Engagement, course_item, engagement_notes, evaluated
+from service.lives.engagements import Engagement, course_item, engagement_notices, evaluated
 from service.lives.incoming_run import IncomingRun, SampledChannels, sampled_record, stationary_plateaus
 
 #: A value and its deviation.
@@ -43,10 +43,9 @@ class LevelFit:
 class Analysis:
     """The results of one run by itself.
 
-    `speed_range` [rad/s] is None for a run that holds no stationary test under pressure; `plateaus` and the `times` [s] of
-    their middles (None where each row was sent as a plateau) are those of a stationary test, and so is
-    `oil_temperature` [K], its mean under pressure (None: not measured); `engagement` is that of a block of duty that carries
-    one.
+    Of a stationary test: `speed_range` [rad/s] under pressure, `oil_temperature` [K], its mean under pressure (None: not
+    measured), `plateaus`, and the `times` [s] of their middles (None where each row was sent as a plateau). Of a block of
+    duty that carries one: `engagement`.
     """
 
     fits: tuple[LevelFit, ...] = ()
@@ -80,20 +79,20 @@ def analyse(run: IncomingRun, geometry: Geometry, torque_filter: float) -> Analy
     Raises InvalidError where a sampled record holds no steady plateau.
     """
     if run.kind != "stationary_stribeck":
-        engagement = evaluated(run, geometry) if run.channels else None
-        notes = [] if engagement is None else engagement_notes(engagement)
-        return Analysis(engagement=engagement, warnings=tuple(Notice(code=code, message=text) for code, text in notes))
+        engagement = evaluated(run, geometry)
+        return Analysis(engagement=engagement, warnings=tuple(engagement_notices(engagement)))
     if "time_s" not in run.channels:
-        plateaus = stationary_plateaus(run.channels)
-        return _analyse_stationary(plateaus, None, geometry, _row_warnings(run, plateaus))
+        plateaus, notices = stationary_plateaus(run.channels), []
+        if "torque_sd_nm" in run.channels and plateaus.torque_sd is None:
+            message = "torque_sd_nm contains zeros, although every sensor has noise, so the fits do not use it"
+            notices = [Notice(code="torque_sd_ignored", message=message)]
+        return _analyse_stationary(plateaus, None, geometry, notices)
     try:
         cut = cut_plateaus(SampledChannels(run.channels), torque_filter)
     except ValueError as error:
-        message = (
-            f"time_s, pressure_bar, speed_rpm, torque_nm: {error} If each row of the file is a plateau, add time=none."
-        )
-        errors = [FieldError(pointer="/channels/torque_nm", code="no_plateau", message=message)]
-        raise InvalidError(message, errors=errors) from None
+        columns = "time_s, pressure_bar, speed_rpm, torque_nm"
+        message = f"{columns}: {error} If each row of the file is a plateau, add time=none."
+        raise InvalidError.of(message, code="no_plateau", pointer="/channels/torque_nm") from None
     notices = [Notice(code=code, message=message) for code, message in cut.notes]
     times = tuple((0.5 * (cut.start + cut.stop)).tolist())
     return _analyse_stationary(cut.plateaus, times, geometry, notices)
@@ -112,10 +111,7 @@ def loops_of(
     channels: Mapping[str, FloatArray], geometry: Geometry, torque_filter: float, levels: Sequence[LevelFit]
 ) -> tuple[Loop, ...]:
     """The friction loops of a dynamic test, with the lag behind the curves of its stationary test and beyond the torque
-    channel's own, of `torque_filter` [s].
-
-    A curve of which some parameter is undetermined counts all the same: what its covariance leaves open makes the lag less
-    certain, or unresolved.
+    channel's own, of `torque_filter` [s]. What a curve's covariance leaves open makes the lag less certain, or unresolved.
     """
     curves = {level.fit.pressure: StationaryCurve.of(level.fit) for level in levels if level.speeds >= FEWEST_SPEEDS}
     return evaluate_loops(filtered_as_torque(sampled_record(channels), torque_filter), geometry, curves or None)
@@ -190,13 +186,6 @@ def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:
     noun = "plateau" if left_out == 1 else "plateaus"
     message = f"left out of the fits: {left_out} {noun} {below}"
     return [Notice(code="unloaded_plateaus", message=message)] if left_out else []
-
-
-def _row_warnings(run: IncomingRun, plateaus: Plateaus) -> list[Notice]:
-    if "torque_sd_nm" not in run.channels or plateaus.torque_sd is not None:
-        return []
-    message = "torque_sd_nm contains zeros, although every sensor has noise, so the fits do not use it"
-    return [Notice(code="torque_sd_ignored", message=message)]
 
 
 def _fit_warnings(fit: StribeckFit) -> list[Notice]:

@@ -6,13 +6,12 @@ all else summed out: coefficients, courses, discrepancy, scatter, outlying runs.
 discrepancy may take a bend for its own, so nothing is concluded from a bend that is within it.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.arrays import FloatArray
-from models.degradation.severity import Block, Severity, SeverityBasis
+from models.degradation.severity import Severity, SeverityBasis
 from models.prognosis.criteria import FEWEST_TESTS
 from models.tracking.filters.grid import Grid
 from service.errors import Notice
@@ -67,7 +66,8 @@ def severity_estimate(life: Life, assumptions: Assumptions) -> SeverityEstimate 
     basis = assumptions.severity.basis
     if basis is SeverityBasis.CYCLES:
         basis = SeverityBasis.DISSIPATED_ENERGY
-    if not _varies([event.duty for event in life.events if event.duty is not None], basis):
+    works = [work for event in life.events if event.duty is not None and (work := event.duty.work(basis))]
+    if not works or max(works) <= VARIED_WORK * min(works):
         return None
     log_evidence = []
     for exponent in SEVERITY_EXPONENTS:
@@ -79,8 +79,3 @@ def severity_estimate(life: Life, assumptions: Assumptions) -> SeverityEstimate 
         log_evidence.append(_GRID.laid(_GRID.from_history(prior, series.measurements)).log_evidence)
     share = np.exp(np.array(log_evidence) - max(log_evidence))
     return SeverityEstimate(basis=basis, probability=share / share.sum())
-
-
-def _varies(blocks: Sequence[Block], basis: SeverityBasis) -> bool:
-    works = [work for block in blocks if (work := block.work(basis))]
-    return bool(works) and max(works) > VARIED_WORK * min(works)

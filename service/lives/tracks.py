@@ -1,10 +1,9 @@
-"""Tracks a life: runs the three filters over a series, and predicts after every event. Also makes predictions that are not
-stored.
+"""Tracks a life: runs the three filters over a series, and predicts after every event and whenever it is asked.
 
 A run that comes last in order of cycles carries the stored filter states one step on; any other run makes the life be
 tracked again from its first test. Both ways give the same answer: the random numbers of a step depend on series and step
-alone, so that the same runs under another clutch name give the same answer. Where a fleet's prior stands beside the weak
-one a filter runs under both, and its draws are put together by their evidence (`models.prognosis.fleet`).
+alone. Where a fleet's prior stands beside the weak one a filter runs under both, and its draws are put together by their
+evidence (`models.prognosis.fleet`).
 """
 
 import zlib
@@ -26,12 +25,27 @@ from models.tracking.filters.ukf import Ukf, UkfState
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior, Tracker, mixture
 from models.tracking.prior import Prior
-from service.columns import PASCALS_PER_BAR, bar
+from service.columns import PASCALS_PER_BAR, bar, whole
 from service.errors import NotFoundError, Notice
 from service.lives.assumptions import ALL_PRESSURES, WEAK, Assumptions
 from service.lives.criteria import FEWEST_PARTICLES, PREDICTION_DRAWS
 from service.lives.history import Event, Life, Series, lives_of, nearest_pressure
-from service.lives.payloads import ended, insufficient, left_out, new_extrapolated, new_level, off_track, predicted
+from service.lives.payloads import (
+    SAFE,
+    by_quantile,
+    criterion_item,
+    ended,
+    insufficient,
+    left_out,
+    missed,
+    new_extrapolated,
+    new_level,
+    not_eq_6,
+    notice_items,
+    off_track,
+    safe_bound,
+    share_of_way,
+)
 
 FilterState = ParticleState | UkfState | GridState
 
@@ -100,24 +114,16 @@ def follow(
     `insufficient_data`.
     """
     for index in range(first_event, len(life.events)):
-        series = whole if assumptions.counts_cycles else life.until(index).pooled(assumptions)
-        runs = series.until(index)
-        cycles, end, tests = life.events[index].cycles, life.until(index).end, life.until(index).tests
+        so_far, cycles = life.until(index), life.events[index].cycles
+        series = whole if assumptions.counts_cycles else so_far.pooled(assumptions)
+        runs, tests = series.until(index), so_far.tests
         if runs:
             states = {method: advance(method, series, assumptions, states.get(method), runs) for method in CARRIED}
-        yield (
-            states,
-            [
-                Prediction(
-                    cycles=cycles,
-                    method=method,
-                    payload=ended(
-                        predict(method, series, assumptions, states.get(method), cycles, fraction, tests=tests), end
-                    ),
-                )
-                for method in CARRIED
-            ],
-        )
+        predictions = []
+        for method in CARRIED:
+            payload = predict(method, series, assumptions, states.get(method), cycles, fraction, tests=tests)
+            predictions.append(Prediction(cycles=cycles, method=method, payload=ended(payload, so_far.end)))
+        yield states, predictions
 
 
 def advance(
@@ -237,55 +243,78 @@ def predict(
     *,
     tests: int,
 ) -> dict[str, Any]:
-    """The prediction at `cycles` of a series, in the public shape; the life has so many `tests`."""
+    """The prediction at `cycles` of a series, in the public shape; the life has so many `tests`.
+
+    With too few of them only the last and the safe bound are stated.
+    """
+    answer = insufficient(assumptions, cycles, series.pressure, fraction)
     if tracked is None:
-        return insufficient(assumptions, cycles, series.pressure, fraction)
+        return answer
+    runs, scale = tracked.runs, series.scale
     sample = drawn(method, series, assumptions, tracked)
-    origin = series.scale.origin
-    horizon = float(series.scale.progress(origin + horizon_at(cycles - origin)))
+    horizon_cycles = horizon_at(cycles - scale.origin)
+    horizon = float(scale.progress(scale.origin + horizon_cycles))
     end = end_of_life(sample, series, assumptions, tracked, cycles, fraction, horizon)
     passage = predict_first_passage(
         sample,
         fraction=fraction,
-        as_of=float(series.scale.progress(cycles)),
+        as_of=float(scale.progress(cycles)),
         horizon=horizon,
         offset=offset_of(series, assumptions),
         stated=(end.ends, end.weight),
         initial=None if end.late is None else end.late.initial,
     )
-    measurements = series.measurements[: tracked.runs]
-    return predicted(
-        passage,
-        assumptions,
-        series,
-        cycles,
-        fraction,
-        runs=tracked.runs,
-        enough=len({measurement.progress for measurement in measurements}) >= FEWEST_TESTS,
-        courses=course_shares(sample),
-        back_cast=tracked.back_cast,
-        ended_lives=end.lives,
-        of_new=new_extrapolated(series, assumptions, end.late, fraction),
-        sample={"effective_draws": sample.effective_draws, "status": sample.status.value},
-        warnings=[
-            *left_out(tests, tracked.runs),
-            *new_level([at for at in series.new_levels if at <= cycles]),
-            *_off_track(sample, series, assumptions, tracked.runs),
-        ],
+    ends = {q: None if zeta is None else float(scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
+    measured_at, (value, sd) = series.as_measured(assumptions, runs - 1)
+    measured = {"mean_cof": value, "mean_cof_sd": sd, "measured_at_cycles": whole(round(measured_at, 3))}
+    notices = [
+        *left_out(tests, runs),
+        *new_level([at for at in series.new_levels if at <= cycles]),
+        *_off_track(sample, series, assumptions, runs),
+    ]
+    answer |= {
+        "runs_used": runs,
+        "current": answer["current"] | measured,
+        "horizon_cycles": whole(horizon_cycles),
+        "at_least": safe_bound(ends[SAFE], cycles, scale.origin),
+        "warnings": notice_items(notices),
+    }
+    if len({measurement.progress for measurement in series.measurements[:runs]}) < FEWEST_TESTS:
+        return answer  # what else the prior makes of the tests is no finding
+    courses, back_cast = course_shares(sample), tracked.back_cast
+    notices += [*not_eq_6(courses), *new_extrapolated(series, assumptions, end.late, fraction), *missed(back_cast)]
+    course, *alternatives = (
+        {"name": share.name.value, "probability": share.probability, "order": share.order} for share in courses
     )
+    mean, deviation = passage.current
+    left = mean / passage.initial if passage.initial > 0 else None
+    health = None if left is None else share_of_way(left, 1.0, fraction)
+    now = {"mean_cof": mean, "mean_cof_sd": deviation, "fraction_of_initial": left, "health": health}
+    return answer | {
+        "status": passage.status.value,
+        "criterion": criterion_item(fraction, series.pressure, passage.initial, passage.threshold),
+        "current": answer["current"] | now,
+        "remaining_cycles": by_quantile({q: None if at is None else max(0.0, at - cycles) for q, at in ends.items()}),
+        "end_of_life_cycles": by_quantile(ends),
+        "probability_of_reaching": passage.probability_of_reaching,
+        "back_cast": {"held": back_cast.held, "of": back_cast.misses.size, "widening": back_cast.widening},
+        "ended_lives": end.lives,
+        "sample": {"effective_draws": sample.effective_draws, "status": sample.status.value},
+        "course": {**course, "alternatives": alternatives},
+        "warnings": notice_items(notices),
+    }
 
 
 def _off_track(sample: Posterior, series: Series, assumptions: Assumptions, runs: int) -> list[Notice]:
-    """The warning of a last test that lies far off under every draw of the model in force; that of the draw under which it
-    is nearest."""
-    notices_by_draw: list[list[Notice]] = []
+    """The warning of a last test that lies far off under every draw of the model in force, by the first of them."""
+    first: list[Notice] = []
     for draw, (_, measurements) in enumerate(series.weighted):
         prior = assumptions.priors(series.quantity, measurements[0], series.scale)[WEAK]
         notices = off_track(sample.of_branch(draw), measurements[:runs], prior)
         if not notices:
             return []
-        notices_by_draw.append(notices)
-    return notices_by_draw[0]
+        first = first or notices
+    return first
 
 
 def end_of_life(
@@ -339,8 +368,7 @@ def predict_at(
     """The prediction at one pressure of the reference test, or over all, as it would have been made at `at_cycles`.
 
     A `back_cast` that is known is not made again: of the exact filter it takes most of the time. A filter that was `carried`
-    through the first of the measurements is carried on. Raises NotFoundError where
-    the reference test did not measure that pressure.
+    through the first measurements goes on. Raises NotFoundError where the reference test did not measure that pressure.
     """
     lives = lives_of(events)
     level = ALL_PRESSURES if pressure_bar is None else _level(lives[-1] if lives else None, pressure_bar)

@@ -57,7 +57,6 @@ def measured_life(
             receipts[f"loops-{index}"] = {"loops": loop_items(loops)}
             events.append(Event(run_id=f"loops-{index}", kind=DYNAMIC, cycles=at, moment=2.0 * index + 1.0))
     return MeasuredLife(
-        clutch_id="scored",
         life=Life(origin=0.0, events=tuple(events)),
         assumptions=Assumptions(),
         geometry=clutch.geometry,

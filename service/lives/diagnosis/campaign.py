@@ -81,12 +81,12 @@ def run_of(run: IncomingRun, *, origin: float, torque_filter: float = 0.0, keep_
         return _stationary(run, origin, torque_filter, keep_record)
     if run.kind == DYNAMIC:
         record = filtered_as_torque(sampled_record(run.channels), torque_filter)
-        return DynamicRun(**_head(run, origin), record=thinned(record))
+        return DynamicRun(**head_of(run, origin), record=thinned(record))
     if run.kind == MAINTENANCE:
-        return MaintenanceEvent(**_head(run, origin), event=EventKind(run.details["event"]))
+        return MaintenanceEvent(**head_of(run, origin), event=EventKind(run.details["event"]))
     duty = run.details["duty"]
     return DutyRun(
-        **_head(run, origin),
+        **head_of(run, origin),
         engagements=duty["cycles"],
         energy=_si(duty["energy_per_cycle_kj"], 1000.0),
         initial_speed=_si(duty["initial_speed_rpm"], CHANNELS["speed_rpm"].factor),
@@ -99,32 +99,26 @@ def without_record(run: IncomingRun, *, origin: float) -> CampaignRun:
     """A run whose sampled record is not read: one point of 1 bar, 1 rad/s and 1 Nm stands in for what it measured."""
     point = np.ones(1)
     if run.kind == STATIONARY:
-        return StationaryRun(**_head(run, origin), plateaus=Plateaus(pressure=1e5 * point, speed=point, torque=point))
+        return StationaryRun(**head_of(run, origin), plateaus=Plateaus(pressure=1e5 * point, speed=point, torque=point))
     if run.kind == DYNAMIC:
-        return DynamicRun(
-            **_head(run, origin), record=Record(time=point, pressure=1e5 * point, speed=point, torque=point)
-        )
+        record = Record(time=point, pressure=1e5 * point, speed=point, torque=point)
+        return DynamicRun(**head_of(run, origin), record=record)
     return run_of(run, origin=origin)
 
 
-def tested(run: IncomingRun, plateaus: Plateaus, times: tuple[float, ...] | None, *, origin: float) -> StationaryRun:
-    """A stationary test by its plateaus, which were cut already."""
-    return StationaryRun(**_head(run, origin), plateaus=plateaus, time=times)
-
-
-def _head(run: IncomingRun, origin: float) -> dict[str, Any]:
-    """`moment` is when the run was started [s since 1970], None where the rig did not say."""
+def head_of(run: IncomingRun, origin: float) -> dict[str, Any]:
+    """What every run has; `moment` is when it was started [s since 1970], None where the rig did not say."""
     moment = None if run.started_at is None else datetime.fromisoformat(run.started_at).timestamp()
     return {"run_id": run.run_id, "cycles": run.cycles - origin, "moment": moment}
 
 
 def _stationary(run: IncomingRun, origin: float, torque_filter: float, keep_record: bool) -> StationaryRun:
     if "time_s" not in run.channels:
-        return StationaryRun(**_head(run, origin), plateaus=stationary_plateaus(run.channels))
+        return StationaryRun(**head_of(run, origin), plateaus=stationary_plateaus(run.channels))
     record = sampled_record(run.channels)
     cut = cut_plateaus(record, torque_filter)
     return StationaryRun(
-        **_head(run, origin),
+        **head_of(run, origin),
         plateaus=cut.plateaus,
         time=tuple((0.5 * (cut.start + cut.stop)).tolist()),
         record=record if keep_record else None,

@@ -1,10 +1,7 @@
 """The doubts about runs, in words: what is odd, the value, the expected value, the likely mistake, and what to do.
 
-Some doubts concern a run by itself, the others come from a joint judgement over all runs. A file whose columns state no
-unit, or one that is not known, is refused before: `service.readers.column_names`.
-
-Dead channels are found in a run by itself, and nothing that other runs show takes them back. All else is one question,
-`models.plausibility.judgement`, asked again whenever a run comes in or is changed.
+Dead channels are found in a run by itself, and nothing that other runs show takes them back. All else is one question
+over all runs, `models.plausibility.judgement`, asked again whenever a run comes in or is changed.
 """
 
 import bisect
@@ -62,9 +59,9 @@ def _cycles_notice(verdict: Verdict, sent: Reading) -> Notice:
         if not low <= cof <= high:
             sentences.append(f"Its mean COF is {cof:.3g}; {low:.3g} to {high:.3g} is expected at these cycles.")
     guessed = verdict.slip.name != OTHER_CYCLES and verdict.latest is not None
-    ask = f"Is it {_number(verdict.slip.likely.cycles)}? " if guessed else ""
-    message = " ".join([*sentences, f"{ask}Confirm or correct it."])
     likely = verdict.slip.likely.cycles if guessed else None
+    ask = "" if likely is None else f"Is it {_number(likely)}? "
+    message = " ".join([*sentences, f"{ask}Confirm or correct it."])
     return Notice(code=AGAINST_TIME if verdict.against_time else OFF_PACE, message=message, likely_cycles=likely)
 
 
@@ -86,21 +83,18 @@ def _unit_notice(verdict: Verdict, shown: Shown) -> Notice:
         oil = (shown.oil or 0.0) - ZERO_CELSIUS
         message = f"oil temperature is {oil:.4g} °C: was it sent in {slip.unit}?"
     else:
-        channel, ours, scale = {
-            "pressure": ("pressure", "bar", (shown.pressure or 0.0) / PASCALS_PER_BAR),
-            "torque": ("torque", "Nm", None),
-            "speed": ("speed", "rpm", (shown.speed or 0.0) / RADIANS_PER_SECOND_PER_RPM),
+        gives = {
+            "pressure": f"pressure is up to {(shown.pressure or 0.0) / PASCALS_PER_BAR:.4g} bar and gives",
+            "torque": "torque gives",
+            "speed": f"speed is up to {(shown.speed or 0.0) / RADIANS_PER_SECOND_PER_RPM:.4g} rpm and gives",
         }[slip.name]
-        size = "" if scale is None else f" is up to {scale:.4g} {ours}"
         cof = f" a COF of {shown.cof:.3g}" if shown.cof is not None else ""
-        gives = f"{channel}{size or ' gives'}{' and gives' if size else ''}{cof}"
-        message = f"{gives}, {_expected(verdict)}: was it sent in {slip.unit}?"
+        message = f"{gives}{cof}, {_expected(verdict)}: was it sent in {slip.unit}?"
     return Notice(code=UNIT, message=f"{message} Withdraw the run and send it in the channel's unit, or confirm it.")
 
 
 def _expected_then(verdict: Verdict) -> bool:
-    """Whether COF without the slip is one that is expected: else no unit of torque or pressure is asked for, though it
-    explains a part."""
+    """Whether COF without the slip is as expected: else no unit is asked for, though it explains a part."""
     likely = verdict.slip.likely
     if verdict.expected_then is None or likely.log_cof is None:
         return True
@@ -108,9 +102,9 @@ def _expected_then(verdict: Verdict) -> bool:
 
 
 def _expected(verdict: Verdict) -> str:
-    return (
-        "" if verdict.expected is None else f"where {verdict.expected[0]:.3g} to {verdict.expected[1]:.3g} is expected"
-    )
+    if verdict.expected is None:
+        return ""
+    return f"where {verdict.expected[0]:.3g} to {verdict.expected[1]:.3g} is expected"
 
 
 def _cof_notice(verdict: Verdict, sent: Reading) -> Notice:
@@ -124,10 +118,6 @@ def _cof_notice(verdict: Verdict, sent: Reading) -> Notice:
 
 def _number(value: float) -> str:
     return f"{value:.0f}" if float(value).is_integer() else f"{value:g}"
-
-
-#: So many runs are named as the evidence of a change.
-_NAMED = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,7 +143,7 @@ class Judged:
         settled = order([*(event for event in events if event.run_id not in gone), *self.accepted, *further])
         return tuple(replace(event, new_level=self.levels.get(event.run_id, event.new_level)) for event in settled)
 
-    def aside(self, held: Sequence[Event], further: Sequence[Event] = ()) -> tuple[Event, ...]:
+    def aside(self, held: Sequence[Event], further: Sequence[Event]) -> tuple[Event, ...]:
         """The held runs as they are from now on: `held` were before, `further` come in held."""
         back = {event.run_id for event in self.accepted}
         return order([*(event for event in held if event.run_id not in back), *self.held, *further])
@@ -183,10 +173,9 @@ def doubts_together(
 ) -> Judged:
     """Which runs are to be held, all of them weighed together.
 
-    `accepted` and `held` are the runs as they stand, `incoming` one that comes in or was changed (None: none is new). Held
-    runs with a dead channel are no part of the question, nor are those after the declared end of their life. `corrected`:
-    a model in force corrects the mean COFs of tests. `changed` are runs that were changed or taken out: what lies about
-    them is looked at.
+    `accepted` and `held` are the runs as they stand, `incoming` one that comes in or was changed (None: none is new),
+    `changed` those that were changed or taken out: what lies about them is looked at. `corrected`: a model in force
+    corrects the mean COFs of tests.
     """
     new = [] if incoming is None else [incoming]
     doubted = _doubted(accepted, held, new)
@@ -219,13 +208,12 @@ def levelled(
     events = order([*accepted, *doubted])
     names = {event.run_id for event in doubted}
     about = [index for index, event in enumerate(events) if event.run_id in names]
-    return Judged(levels=_levels(events, judge(runs_of(events, geometry, corrected=corrected), about))).settled(
-        accepted
-    )
+    judgement = judge(runs_of(events, geometry, corrected=corrected), about)
+    return Judged(levels=_levels(events, judgement)).settled(accepted)
 
 
 def _doubted(accepted: Sequence[Event], held: Sequence[Event], new: Sequence[Event] = ()) -> list[Event]:
-    """The held runs that are part of the question."""
+    """The held runs that are part of the question: without a dead channel, and not after the declared end of their life."""
     return [event for event in held if event.shown is not None and beyond_end(order([*accepted, *new, event])) is None]
 
 
@@ -242,5 +230,5 @@ def _names_of_nearest_runs(event: Event, counted: Sequence[Event]) -> str:
     """The runs nearest to one in the history, of its kind where there are any, by their names."""
     other_runs = [other for other in counted if other.run_id != event.run_id]
     alike = [other for other in other_runs if other.kind == event.kind] or other_runs
-    nearest = sorted(alike, key=lambda other: (abs(other.cycles - event.cycles), other.run_id))[:_NAMED]
+    nearest = sorted(alike, key=lambda other: (abs(other.cycles - event.cycles), other.run_id))[:3]
     return ", ".join(other.run_id for other in nearest) or "no other run"

@@ -1,9 +1,7 @@
 """Prepares runs for the plausibility judgement: each run as sent, and with each possible mistake corrected.
 
-Finds dead channels too (unplugged, railed, frozen), which a run shows by itself.
-
-What a run shows of friction is taken from its rows when it comes in (`shown_by`) and stored beside it; all else follows from
-the history.
+Finds dead channels too (unplugged, railed, frozen). What a run shows of friction is taken from its rows when it comes in
+(`shown_by`) and stored beside it; all else follows from the history.
 """
 
 import math
@@ -79,7 +77,7 @@ _LEAST = -600.0
 _BINS = 16
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Columns:
     """The rows of a run in SI units: pressure [n] Pa, speed [n] rad/s, torque [n] Nm, oil temperature [n] K or None."""
 
@@ -95,9 +93,7 @@ class Columns:
             np.abs(self.speed) >= 0.02 * fastest
         )
         oil = None if self.oil_temperature is None else self.oil_temperature[rows]
-        return Columns(
-            pressure=self.pressure[rows], speed=self.speed[rows], torque=self.torque[rows], oil_temperature=oil
-        )
+        return Columns(self.pressure[rows], self.speed[rows], self.torque[rows], oil)
 
     def cof_by_speed(self, geometry: Geometry) -> tuple[FloatArray, FloatArray]:
         """Mean COF [b] in equal bins of speed that hold rows, positive where torque brakes, and its scatter [b] there."""
@@ -113,17 +109,8 @@ class Columns:
 
 def columns_of(run: IncomingRun, analysis: Analysis) -> Columns | None:
     """The rows of a run: the plateaus of a stationary test, the samples of another; None for a run without channels."""
-    rows = analysis.plateaus
-    if rows is not None:
-        return Columns(
-            pressure=rows.pressure, speed=rows.speed, torque=rows.torque, oil_temperature=rows.oil_temperature
-        )
-    if not run.channels:
-        return None
-    samples = SampledChannels(run.channels)
-    return Columns(
-        pressure=samples.pressure, speed=samples.speed, torque=samples.torque, oil_temperature=samples.oil_temperature
-    )
+    rows = analysis.plateaus or (SampledChannels(run.channels) if run.channels else None)
+    return None if rows is None else Columns(rows.pressure, rows.speed, rows.torque, rows.oil_temperature)
 
 
 def shown_by(columns: Columns | None, geometry: Geometry) -> Shown:
@@ -173,16 +160,15 @@ class _Comparison:
 
     def in_other_oil(self, event: Event) -> bool:
         """Whether a test was made at another oil temperature than is usual: its COF is none of the course."""
-        both_known = self.oil is not None and event.oil_temperature is not None
-        return both_known and abs((event.oil_temperature or 0.0) - (self.oil or 0.0)) > OTHER_OIL
+        if self.oil is None or event.oil_temperature is None:
+            return False
+        return abs(event.oil_temperature - self.oil) > OTHER_OIL
 
     def reading(self, event: Event, shown: Shown, cofs: Mapping[float, tuple[float, float]] | None) -> Reading:
         """The reading of a run that shows this."""
-        compared = self._compared(event, shown, cofs)
-        log_cof, spread = (None, 0.0) if compared is None else compared
-        return Reading(
-            cycles=event.cycles, log_cof=log_cof, spread=spread, log_protocol=self._log_protocol(event, shown)
-        )
+        log_cof, spread = self._compared(event, shown, cofs) or (None, 0.0)
+        protocol = self._log_protocol(event, shown)
+        return Reading(cycles=event.cycles, log_cof=log_cof, spread=spread, log_protocol=protocol)
 
     def _compared(
         self, event: Event, shown: Shown, mean_cof: Mapping[float, tuple[float, float]] | None
@@ -246,7 +232,7 @@ class _Comparison:
         """The slips of a run's channels: another unit, a pressure that is dead."""
         share = math.log(odds.OTHER_UNIT / len(UNITS))
         if shown.cof is not None:
-            for channel, _, unit, factor in UNITS:
+            for channel, unit, factor in UNITS:
                 cofs = None if channel == "speed" else _scaled(event.cofs, channel, factor)
                 likely = self.reading(event, _in_unit(shown, channel, factor), cofs)
                 yield Slip(name=channel, log_prior=share, likely=likely, unit=unit)
@@ -263,18 +249,18 @@ class _Comparison:
 
 #: A pressure that says the clutch is open while it is pressed.
 DEAD_PRESSURE = "dead_pressure"
-#: Units in which a channel may have been sent: channel, its unit here, the unit, and how many of it are one of ours.
+#: Units in which a channel may have been sent: channel, the unit, and how many of it are one of ours.
 UNITS = (
-    ("pressure", "bar", "psi", 14.503_774),
-    ("pressure", "bar", "kPa", 100.0),
-    ("pressure", "bar", "MPa", 0.1),
-    ("torque", "Nm", "lbf ft", 0.737_562),
-    ("torque", "Nm", "lbf in", 8.850_746),
-    ("torque", "Nm", "kNm", 1e-3),
-    ("torque", "Nm", "kgf m", 0.101_972),
-    ("torque", "Nm", "Nmm", 1e3),
-    ("speed", "rpm", "rad/s", RADIANS_PER_SECOND_PER_RPM),
-    ("speed", "rpm", "1/s", 1 / 60),
+    ("pressure", "psi", 14.503_774),
+    ("pressure", "kPa", 100.0),
+    ("pressure", "MPa", 0.1),
+    ("torque", "lbf ft", 0.737_562),
+    ("torque", "lbf in", 8.850_746),
+    ("torque", "kNm", 1e-3),
+    ("torque", "kgf m", 0.101_972),
+    ("torque", "Nmm", 1e3),
+    ("speed", "rad/s", RADIANS_PER_SECOND_PER_RPM),
+    ("speed", "1/s", 1 / 60),
 )
 
 
@@ -374,56 +360,53 @@ DEAD = "dead_channel"
 
 def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notice]:
     """What is odd about the channels of a run."""
-    doubts = list(_oil(columns.oil_temperature))
-    pressed = columns.pressure >= UNLOADED
+    return [Notice(code=DEAD, message=message) for message in _oddities(kind, columns, geometry)]
+
+
+def _oddities(kind: str, columns: Columns, geometry: Geometry) -> Iterator[str]:
+    yield from _oil(columns.oil_temperature)
     if columns.torque.size < FEWEST_ROWS:
-        return doubts
+        return
     if kind == DYNAMIC:
-        doubts += _speed_stands(columns.speed)
-    if not pressed.any():
-        return doubts
-    torque = columns.torque[pressed]
+        yield from _speed_stands(columns.speed)
+    torque = columns.torque[columns.pressure >= UNLOADED]
+    if torque.size == 0:
+        return
+    level = float(np.median(torque))
+    if torque.size >= FEWEST_ROWS and _spread(torque) <= STILL * abs(level):
+        yield f"torque stays at {level:.4g} Nm although pressure or speed change: is the sensor connected?"
+        return
     rows = columns.loaded()
-    if torque.size >= FEWEST_ROWS and _spread(torque) <= STILL * float(np.abs(np.median(torque))):
-        level = float(np.median(torque))
-        message = f"torque stays at {level:.4g} Nm although pressure or speed change: is the sensor connected?"
-        return [*doubts, Notice(code=DEAD, message=message)]
     if rows.torque.size < FEWEST_ROWS:
-        return doubts
+        return
     cof = float(np.abs(rows.cof_by_speed(geometry)[0]).mean())
-    if cof < NO_FRICTION and float(rows.torque.std()) > 0.5 * float(np.abs(rows.torque.mean())):
-        message = (
-            f"torque is only noise ({rows.torque.mean():.3g} ± {rows.torque.std():.3g} Nm) under pressure: is the torque "
-            "sensor connected?"
-        )
-        return [*doubts, Notice(code=DEAD, message=message)]
-    if kind in (STATIONARY, DYNAMIC):
-        doubts += _not_following(rows, geometry)
-    return doubts
+    mean, deviation = rows.torque.mean(), rows.torque.std()
+    if cof < NO_FRICTION and deviation > 0.5 * abs(mean):
+        noise = f"{mean:.3g} ± {deviation:.3g} Nm"
+        yield f"torque is only noise ({noise}) under pressure: is the torque sensor connected?"
+    elif kind in (STATIONARY, DYNAMIC):
+        yield from _not_following(rows, geometry)
 
 
-def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
+def _not_following(rows: Columns, geometry: Geometry) -> Iterator[str]:
     """Torque that does not go with pressure, or scatters at one pressure as if that had varied."""
     low, high = np.quantile(rows.pressure, [0.02, 0.98]).tolist()
     span = f"{low / PASCALS_PER_BAR:.3g} to {high / PASCALS_PER_BAR:.3g} bar"
     if high > PRESSURE_SPAN * low:
         exponent, error = _exponent(rows)
         if exponent + 3 * error < MIN_EXPONENT:
-            message = (
+            yield (
                 f"torque grows as pressure to the power of {exponent:.2f} (from {span}), but about 1 is expected. "
                 "Is a sensor disconnected, or does a column hold another channel?"
             )
-            return [Notice(code=DEAD, message=message)]
-        return []
+        return
     cofs, spreads = rows.cof_by_speed(geometry)
     scatter = float(np.median(spreads / np.maximum(np.abs(cofs), 1e-12)))
     if scatter > SINGLE_LEVEL_SPREAD:
-        message = (
+        yield (
             f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque at one speed scatters by {100 * scatter:.0f} "
             "%, as if pressure had varied: is the pressure sensor connected?"
         )
-        return [Notice(code=DEAD, message=message)]
-    return []
 
 
 def _exponent(rows: Columns) -> tuple[float, float]:
@@ -438,26 +421,21 @@ def _exponent(rows: Columns) -> tuple[float, float]:
     return exponent, float(np.sqrt(left @ left / x.size * x.size / (square * independent)))
 
 
-def _speed_stands(speed: FloatArray) -> list[Notice]:
+def _speed_stands(speed: FloatArray) -> Iterator[str]:
     fastest = float(np.abs(speed).max())
-    if fastest > 1.0 and _spread(speed) > SPEED_STILL * fastest:
-        return []
-    rpm = float(np.median(speed)) / RADIANS_PER_SECOND_PER_RPM
-    message = f"speed stays at {rpm:.4g} rpm in a dynamic test: is the speed sensor connected?"
-    return [Notice(code=DEAD, message=message)]
+    if not (fastest > 1.0 and _spread(speed) > SPEED_STILL * fastest):
+        rpm = float(np.median(speed)) / RADIANS_PER_SECOND_PER_RPM
+        yield f"speed stays at {rpm:.4g} rpm in a dynamic test: is the speed sensor connected?"
 
 
-def _oil(temperature: FloatArray | None) -> list[Notice]:
+def _oil(temperature: FloatArray | None) -> Iterator[str]:
     if temperature is None:
-        return []
+        return
     median = float(np.median(temperature))
     still_at_zero = temperature.size >= FEWEST_ROWS and bool((np.abs(temperature - ZERO_CELSIUS) < 1e-6).all())
-    if COLDEST <= median <= HOTTEST and not still_at_zero:
-        return []
-    message = (
-        f"oil temperature is {median - ZERO_CELSIUS:.4g} °C, which is not possible in a test: is the sensor connected?"
-    )
-    return [Notice(code=DEAD, message=message)]
+    if still_at_zero or not COLDEST <= median <= HOTTEST:
+        shown = f"{median - ZERO_CELSIUS:.4g} °C"
+        yield f"oil temperature is {shown}, which is not possible in a test: is the sensor connected?"
 
 
 def _spread(values: FloatArray) -> float:

@@ -1,6 +1,4 @@
-"""The end of a life by criteria on any quantity: each as a weighted sample of cycles, which of them is first and when, and
-the least health by any.
-"""
+"""The end of a life by criteria on any quantity, each a weighted sample of cycles; which is first; the least health."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -47,13 +45,6 @@ class CriterionEnd:
     current: tuple[float, float] | None = None
     initial: float | None = None
 
-    def probability_by(self, cycles: float) -> float:
-        """The probability that the limit is reached by so many cycles since new."""
-        if self.ends is None:
-            return 0.0
-        passages, weight = self.ends
-        return float(min(1.0, weight[passages <= cycles].sum()))
-
 
 def criterion_end(measured: MeasuredLife, criterion: CriterionIn, method: str) -> CriterionEnd:
     """The end of a life by a criterion; a share of mean COF by a filter, all else by the exact posterior on a lattice.
@@ -65,9 +56,8 @@ def criterion_end(measured: MeasuredLife, criterion: CriterionIn, method: str) -
     if series is None:
         return CriterionEnd(criterion=criterion, tests=0)
     count = len(series.measurements)
-    too_few = CriterionEnd(
-        criterion=criterion, tests=count, current=series.as_measured(measured.assumptions, count - 1)[1]
-    )
+    _, last = series.as_measured(measured.assumptions, count - 1)
+    too_few = CriterionEnd(criterion=criterion, tests=count, current=last)
     if len({measurement.progress for measurement in series.measurements}) < FEWEST_TESTS:
         return too_few
     cycles, origin = measured.life.events[-1].cycles, series.scale.origin
@@ -173,11 +163,16 @@ def criteria_answer(measured: MeasuredLife, ends: Sequence[CriterionEnd], curren
     return stated | {
         "status": (PassageStatus.REACHED if passed >= 0.5 else ahead).value,
         "at_least": safe_bound(stated["end_of_life_cycles"][f"{SAFE:g}"], now, measured.life.origin),
-        "probability_of_reaching": float(min(1.0, first[1][np.isfinite(first[0])].sum())),
+        "probability_of_reaching": _probability_of_reaching(first),
         "current": {**current, "health": min(health, default=None)},
         "criterion": _criterion(ends[leading]),
         "criteria": items,
     }
+
+
+def _probability_of_reaching(sample: Sample) -> float:
+    ends, weight = sample
+    return float(min(1.0, weight[np.isfinite(ends)].sum()))
 
 
 def _health(end: CriterionEnd) -> float | None:
@@ -202,7 +197,7 @@ def _quantiles(sample: Sample | None, now: float) -> dict[str, dict[str, float |
 def _item(end: CriterionEnd, now: float, first: float) -> dict[str, Any]:
     """One criterion, with its own end, and how probably it is the first."""
     value, sd = end.current or (None, None)
-    reaching = None if end.ends is None else end.probability_by(np.nextafter(np.inf, 0.0))
+    reaching = None if end.ends is None else _probability_of_reaching(end.ends)
     fields = {"current": {"value": value, "sd": sd}, "probability_of_reaching": reaching, "probability_first": first}
     return _criterion_item(end) | _quantiles(end.ends, now) | fields | {"tests": end.tests}
 
@@ -216,9 +211,8 @@ def _limit(end: CriterionEnd) -> float | None:
     criterion = end.criterion
     if criterion.fraction is not None and end.initial is None:
         return None
-    return float(
-        Limit(fraction=criterion.fraction, below=criterion.below, above=criterion.above).level(end.initial or 0.0)
-    )
+    limit = Limit(fraction=criterion.fraction, below=criterion.below, above=criterion.above)
+    return float(limit.level(end.initial or 0.0))
 
 
 def _criterion(end: CriterionEnd) -> dict[str, Any]:

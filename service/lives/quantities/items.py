@@ -1,6 +1,6 @@
 """A quantity at one place as `/degradation` shows it: what was measured, its course, and the coefficients of eq. 6."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,11 +18,13 @@ from service.lives.quantities.measured import Quantity, place_of
 
 #: The coefficients of eq. 6 by their public names.
 COEFFICIENTS = ("initial", "change", "scale_cycles", "exponent")
+#: What an item says of eq. 6.
+_OF_EQ_6 = ("coefficients", "correlations", "eq6_probability", "draws")
 #: Points of a trajectory, and how far past the last test it goes.
 _POINTS, _AHEAD = 40, 1.5
 
 
-def trajectory_cycles(series: Series, until: float | None = None) -> FloatArray:
+def trajectory_cycles(series: Series, until: float | None) -> FloatArray:
     """The cycles since new [k] at which a trajectory is shown, up to `until` where that is asked for."""
     origin, last = series.scale.origin, float(series.scale.cycles(series.measurements[-1].progress))
     length = max(1.0, last - origin) * _AHEAD if until is None else max(1.0, until - origin)
@@ -45,14 +47,17 @@ def track_item(
     course = assumptions.offsets(series.quantity, series.pressure, cycles)
     values = posterior.values(series.scale.progress(cycles)) + posterior.beside(course)
     band = np.array([weighted_quantiles(row, posterior.weight, BAND) for row in values])
-    home = _following_eq_6(posterior)
-    item = {
-        "coefficients": None if home is None else _coefficients(home),
-        "correlations": None if home is None else _correlations(home),
-        "eq6_probability": float(posterior.weight[posterior.course == Course.EQ_6].sum()),
-        "draws": None if home is None or draws == 0 else _draws(home, draws),
-    }
-    return _head(quantity, series) | item | _measured(series, assumptions) | _trajectory(cycles, band)
+    home = np.flatnonzero(posterior.course == Course.EQ_6)
+    share = float(posterior.weight[home].sum())
+    coefficients: dict[str, Any] = dict.fromkeys(_OF_EQ_6) | {"eq6_probability": share}
+    if share > 0.0:
+        following = posterior.taken(home, posterior.weight[home] / share)
+        coefficients["coefficients"] = _coefficients(following)
+        coefficients["correlations"] = _correlations(following)
+        if draws:  # of equal weight, a row of the columns a draw
+            samples = _samples(thinned(following, draws, 0.5))
+            coefficients["draws"] = {name: own.tolist() for name, own in zip(COEFFICIENTS, samples, strict=True)}
+    return _item(quantity, series, assumptions, coefficients, cycles, band)
 
 
 def paths_item(
@@ -64,39 +69,34 @@ def paths_item(
 ) -> dict[str, Any]:
     """A quantity that follows from others' tracks, whose `paths` [k, n] over `trajectory_cycles` are equal draws (None: too
     few tests): it has no coefficients of its own. `assumptions` where the model in force has a course of it."""
-    item = {"coefficients": None, "correlations": None, "eq6_probability": None, "draws": None}
     band = np.zeros((0, len(BAND))) if paths is None else np.quantile(paths, BAND, axis=1).T
     cycles = trajectory_cycles(series, until)[: band.shape[0]]
-    return _head(quantity, series) | item | _measured(series, assumptions or Assumptions()) | _trajectory(cycles, band)
+    return _item(quantity, series, assumptions or Assumptions(), dict.fromkeys(_OF_EQ_6), cycles, band)
 
 
-def _head(quantity: Quantity, series: Series) -> dict[str, Any]:
-    return {"quantity": quantity.name, "unit": quantity.unit} | place_of(series)
-
-
-def _measured(series: Series, assumptions: Assumptions) -> dict[str, Any]:
+def _item(
+    quantity: Quantity,
+    series: Series,
+    assumptions: Assumptions,
+    coefficients: Mapping[str, Any],
+    cycles: FloatArray,
+    band: FloatArray,
+) -> dict[str, Any]:
     tested = series.scale.cycles(np.array([measurement.progress for measurement in series.measurements]))
     off = assumptions.offset(series.quantity, series.pressure, tested)
     measured = zip(series.measurements, off.tolist(), strict=True)
+    lower, median, upper = band.T.tolist()
+    head = {"quantity": quantity.name, "unit": quantity.unit} | place_of(series)
     return {
+        **head,
+        **coefficients,
         "measured": {
             "cycles": [whole(count) for count in tested.tolist()],
             "value": [measurement.value + added for measurement, added in measured],
             "sd": [measurement.variance**0.5 for measurement in series.measurements],
-        }
+        },
+        "trajectory": {"cycles": cycles.tolist(), "lower": lower, "median": median, "upper": upper},
     }
-
-
-def _trajectory(cycles: FloatArray, band: FloatArray) -> dict[str, Any]:
-    lower, median, upper = band.T.tolist()
-    return {"trajectory": {"cycles": cycles.tolist(), "lower": lower, "median": median, "upper": upper}}
-
-
-def _following_eq_6(posterior: Posterior) -> Posterior | None:
-    """The draws that follow eq. 6, None where none does."""
-    home = np.flatnonzero(posterior.course == Course.EQ_6)
-    share = float(posterior.weight[home].sum())
-    return None if share == 0.0 else posterior.taken(home, posterior.weight[home] / share)
 
 
 def _samples(draws: Posterior) -> Sequence[FloatArray]:
@@ -126,9 +126,3 @@ def _correlations(draws: Posterior) -> list[list[float]]:
     np.fill_diagonal(correlation, 1.0)
     rows: list[list[float]] = correlation.tolist()
     return rows
-
-
-def _draws(draws: Posterior, size: int) -> dict[str, list[float]]:
-    """Joint draws of equal weight, a row of the columns a draw."""
-    equal = thinned(draws, size, 0.5)
-    return {name: sample.tolist() for name, sample in zip(COEFFICIENTS, _samples(equal), strict=True)}

@@ -1,8 +1,4 @@
-"""The quantities that are followed along a life, and a life with all that was measured in it.
-
-Public names, units and places; the series of any quantity at each pressure, speed or frequency; the eq. 6 of a series by any
-filter, and of every Stribeck parameter; and what is known of all four parameters together at one pressure.
-"""
+"""The quantities that are followed along a life: names, units, places, series of what was measured, and their eq. 6."""
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -22,7 +18,7 @@ from models.prognosis.from_parameters import PressureLevel, slope_paths
 from models.tracking.filters.grid import Grid
 from models.tracking.posterior import Posterior, mixture
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, bar, whole
-from service.errors import FieldError, InvalidError, NotFoundError
+from service.errors import InvalidError, NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
 from service.lives.criteria import FEWEST_SPEEDS, TRAJECTORY_DRAWS, TRAJECTORY_LATTICE
 from service.lives.engagements import ALL_INDICATORS
@@ -87,7 +83,7 @@ def quantity_named(name: str) -> Quantity:
     quantity = QUANTITIES.get(ALIASES.get(name, name)) or _BY_INTERNAL.get(name)
     if quantity is None:
         message = f"quantity must be one of {', '.join(QUANTITIES)}, got {name!r}"
-        raise InvalidError(message, errors=[FieldError(pointer="/query/quantity", code="unknown", message=message)])
+        raise InvalidError.of(message, code="unknown", pointer="/query/quantity")
     return quantity
 
 
@@ -132,19 +128,13 @@ def chosen_life(state: ClutchState, number: int | None = None, at_cycles: float 
     index = len(until) if number is None else number
     held_runs = _held_runs_of_life(state, index, at_cycles)
     if not 1 <= index <= len(until):
-        return ChosenLife(
-            life=None, assumptions=state.assumptions(), number=max(index, 1), of=len(lives), held=held_runs
-        )
-    life = until[index - 1]
-    adopted = next((a for a in state.adoptions if a is not None and a.life == lives[index - 1].name), None)
-    under = state.extension if index == len(lives) else None if adopted is None else adopted.extension
-    return ChosenLife(
-        life=life,
-        assumptions=state.assumptions_under(under, lives[index - 1]),
-        number=index,
-        of=len(lives),
-        held=held_runs,
-    )
+        life, assumptions = None, state.assumptions()
+    else:
+        life, whole_life = until[index - 1], lives[index - 1]
+        adopted = next((a for a in state.adoptions if a is not None and a.life == whole_life.name), None)
+        under = state.extension if index == len(lives) else None if adopted is None else adopted.extension
+        assumptions = state.assumptions_under(under, whole_life)
+    return ChosenLife(life=life, assumptions=assumptions, number=max(index, 1), of=len(lives), held=held_runs)
 
 
 def _held_runs_of_life(state: ClutchState, number: int, at_cycles: float | None) -> tuple[Event, ...]:
@@ -197,7 +187,14 @@ def parameter_series(
 ) -> list[Series]:
     """One Stribeck parameter at every reference pressure, by the fits that determine it."""
     column = PARAMETER_NAMES.index(name)
-    values = [_parameter(levels, name, column) for levels in tests]
+    values = [
+        {
+            fit.pressure: (float(fit.parameters.as_array()[column]), float(fit.covariance[column, column] ** 0.5))
+            for fit in (level.fit for level in levels)
+            if name not in fit.undetermined
+        }
+        for levels in tests
+    ]
     return [
         life.series(assumptions, name, level, [nearest(level, of_test) for of_test in values])
         for level in life.reference
@@ -220,17 +217,6 @@ def parameter_tracks(
     }
 
 
-def _parameter(levels: Sequence[LevelFit], name: str, column: int) -> dict[float, Value]:
-    return {
-        level.fit.pressure: (
-            float(level.fit.parameters.as_array()[column]),
-            float(level.fit.covariance[column, column] ** 0.5),
-        )
-        for level in levels
-        if name not in level.fit.undetermined
-    }
-
-
 #: What a receipt's loop calls the quantities of the lag and their deviations.
 LOOP_COLUMNS = {
     "attractor": ("attractor_nm_s", "attractor_sd_nm_s"),
@@ -248,7 +234,6 @@ class MeasuredLife:
     its engagements (`engagements.over_life`); `fraction` of the initial mean COF ends it where nothing else is said.
     `filters` are those of mean COF over all pressures where they were carried along the life already."""
 
-    clutch_id: str
     life: Life
     assumptions: Assumptions
     geometry: Geometry
@@ -357,12 +342,16 @@ def pressure_level(measured: MeasuredLife, tracks: ParameterTracks, direct: Trac
     """
     series, posterior = direct
     progress, fits = [], []
-    for event, levels in zip(measured.life.events, measured.tests, strict=True):
+    tests = list(zip(measured.life.events, measured.tests, strict=True))
+    for event, levels in tests:
         determined = {level.fit.pressure: level.fit for level in levels if not level.fit.undetermined}
         near = nearest_pressure(pressure, list(determined))
         if near is not None:
             progress.append(float(series.scale.progress(event.cycles)))
             fits.append(determined[near])
+    reference = next((levels for event, levels in tests if event.cofs and levels), ())
+    mean_pressure = {level.fit.pressure: (level.mean_pressure, 0.0) for level in reference}
+    tested, _ = nearest(pressure, mean_pressure) or (pressure, 0.0)
     return PressureLevel(
         progress=np.array(progress),
         parameters=np.array([fit.parameters.as_array() for fit in fits]),
@@ -372,7 +361,7 @@ def pressure_level(measured: MeasuredLife, tracks: ParameterTracks, direct: Trac
         cof_progress=np.array([measurement.progress for measurement in series.measurements]),
         cof=np.array([measurement.value for measurement in series.measurements]),
         cof_track=posterior,
-        torque_per_cof=_torque_per_cof(measured, pressure),
+        torque_per_cof=measured.geometry.torque_per_cof(tested),
         reference_cof=measured.life.reference[pressure][0],
     )
 
@@ -391,11 +380,3 @@ def slopes_along(
     velocity = float(measured.geometry.sliding_velocity(np.array(speed_rpm * RADIANS_PER_SECOND_PER_RPM)))
     rng = step_rng(f"slope@{speed_rpm:g}rpm", series, level.progress.size)
     return slope_paths(level, velocity, progress, rng)
-
-
-def _torque_per_cof(measured: MeasuredLife, pressure: float) -> float:
-    """Torque [Nm] of a COF of one at a level, by the pressure that the reference test measured there."""
-    tests = zip(measured.life.events, measured.tests, strict=True)
-    reference = next((levels for event, levels in tests if event.cofs and levels), ())
-    means = {level.fit.pressure: (level.mean_pressure, 0.0) for level in reference}
-    return measured.geometry.torque_per_cof((nearest(pressure, means) or (pressure, 0.0))[0])
