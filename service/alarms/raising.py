@@ -48,12 +48,12 @@ def evaluate(connection: Connection, clutch_id: str) -> None:
         facts = Facts(connection=connection, clutch=row, geometry=record.geometry.to_model(), now=at)
         for rule_row, rule in clutch_rules:
             if (rule.quantity == SILENT) is of_silence:
-                still_raised |= _judged(connection, rule_row, rule, facts, before.get(rule_row.alarm_id))
+                still_raised |= _judged(rule_row, rule, facts, before.get(rule_row.alarm_id))
         if of_silence:
-            row = _with_silence(connection, row, still_raised, facts)
+            row = _with_silence(facts, still_raised)
     for alarm_id, event in before.items():
         if alarm_id not in still_raised:
-            _clear(connection, event, facts)
+            _clear(event, facts)
 
 
 def concerns(rule: AlarmIn, record: ClutchIn) -> bool:
@@ -115,7 +115,7 @@ def test_event(row: AlarmRow) -> EventRow:
     )
 
 
-def _judged(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, before: EventRow | None) -> set[str]:
+def _judged(row: AlarmRow, rule: AlarmIn, facts: Facts, before: EventRow | None) -> set[str]:
     """Raise an alarm where its rule does; the rule's name where an alarm that was there stays."""
     finding = rules.finding(rule, facts)
     if finding is None:
@@ -125,9 +125,9 @@ def _judged(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, 
     if not rules.passes(rule, finding):
         return set()
     if before is not None:
-        _clear(connection, before, facts)
-    if not _reopened(connection, row, rule, facts, finding):
-        _raise(connection, row, rule, facts, finding)
+        _clear(before, facts)
+    if not _reopened(row, rule, facts, finding):
+        _raise(row, rule, facts, finding)
     return {row.alarm_id}
 
 
@@ -136,7 +136,7 @@ def _is_of(event: EventRow, rule: AlarmIn, finding: Finding) -> bool:
     return (event.quantity, event.mark) == (rule.quantity, finding.mark)
 
 
-def _raise(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> None:
+def _raise(row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> None:
     content: Json = {
         "name": rule.name,
         "value": finding.value,
@@ -153,13 +153,14 @@ def _raise(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, f
         content=content,
         raised_at=facts.now,
     )
-    alarms.insert_event(connection, new)
-    _tell(connection, RAISED, new.event_id, facts.clutch_id, of_cleared=False)
+    alarms.insert_event(facts.connection, new)
+    _tell(facts.connection, RAISED, new.event_id, of_cleared=False)
 
 
-def _reopened(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> bool:
+def _reopened(row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> bool:
     """Whether the alarm is one that the declared end of this life has cleared, and the end was taken back: it goes on, and
     only receivers that were sent that it was over are sent it again."""
+    connection = facts.connection
     if facts.summary.get("ended") is not None:
         return False
     of_clutch = alarms.events(connection, alarm_id=row.alarm_id, only=[facts.clutch_id], state=alarms.CLEARED)
@@ -167,33 +168,32 @@ def _reopened(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts
         ended = event.content.get(_ENDED_LIFE)
         if ended is not None and ended == facts.summary.get("life", "") and _is_of(event, rule, finding):
             alarms.reopen(connection, event.event_id)
-            _tell(connection, RAISED, event.event_id, facts.clutch_id, of_cleared=True)
+            _tell(connection, RAISED, event.event_id, of_cleared=True)
             return True
     return False
 
 
-def _clear(connection: Connection, event: EventRow, facts: Facts) -> None:
+def _clear(event: EventRow, facts: Facts) -> None:
     ended = {} if facts.summary.get("ended") is None else {_ENDED_LIFE: facts.summary.get("life", "")}
     content = {name: value for name, value in event.content.items() if name != _ENDED_LIFE}
-    alarms.clear(connection, event.event_id, facts.now, content | ended)
-    _tell(connection, CLEARED, event.event_id, event.clutch_id, of_cleared=True)
+    alarms.clear(facts.connection, event.event_id, facts.now, content | ended)
+    _tell(facts.connection, CLEARED, event.event_id, of_cleared=True)
 
 
-def _tell(connection: Connection, kind: str, event_id: str, clutch_id: str, *, of_cleared: bool) -> None:
-    """Send an alarm to the clutch's receivers, or (`of_cleared`) to those that learn of cleared ones."""
-    receivers = [row for row in receivers_of(connection, clutch_id) if row.content["cleared"] or not of_cleared]
-    event = alarms.event(connection, event_id)
-    if event is not None and receivers:
-        to_receivers(connection, kind, event, receivers)
+def _tell(connection: Connection, kind: str, event_id: str, *, of_cleared: bool) -> None:
+    """Send an alarm to its clutch's receivers, or (`of_cleared`) to those that learn of cleared ones."""
+    if (event := alarms.event(connection, event_id)) is not None:
+        receivers = receivers_of(connection, event.clutch_id)
+        to_receivers(connection, kind, event, [row for row in receivers if row.content["cleared"] or not of_cleared])
 
 
-def _with_silence(connection: Connection, row: ClutchRow, kept: set[str], facts: Facts) -> ClutchRow:
+def _with_silence(facts: Facts, kept: set[str]) -> ClutchRow:
     """The clutch with since when its rig is silent; `kept` are the alarms of silence, which were judged alone so far."""
-    silent = facts.heard() if kept else None
+    row, silent = facts.clutch, facts.heard() if kept else None
     if silent is None and row.silent is None:
         return row
     state = state_of(row.summary, disputed=row.is_disputed, silent=silent)["name"]
-    clutches.set_silent(connection, row.clutch_id, silent, state=state)
+    clutches.set_silent(facts.connection, row.clutch_id, silent, state=state)
     return replace(row, silent=silent, state=state)
 
 
