@@ -56,7 +56,7 @@ def test_torque_agrees_with_the_equations_written_out_by_hand(cycles):
 def test_mean_cof_is_the_mean_over_all_plateaus():
     # Pressure levels hold equally many rows, so the mean over rows is the mean over pressures of the means over speeds.
     places = itertools.product(PROTOCOL_PRESSURES, SPEEDS)
-    rows = [Geometry().cof(by_hand(CLUTCH, p, 7000, w * Geometry().mean_radius), p) for p, w in places]
+    rows = [by_hand(CLUTCH, p, 7000, w * Geometry().mean_radius) / Geometry().torque_per_cof(p) for p, w in places]
     assert CLUTCH.mean_cof(7000) == pytest.approx(math.fsum(rows) / 280, rel=1e-9)
 
 
