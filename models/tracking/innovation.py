@@ -15,38 +15,26 @@ Source: A. E. Gelfand, D. K. Dey, H. Chang, Bayesian Statistics 4 (1992) 147-167
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import log_ndtr, ndtri_exp
 
 from models.gaussian_evidence import log_normal
-from models.tracking.criteria import FAR, FEWEST_BEFORE
+from models.tracking.criteria import FEWEST_BEFORE
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Innovation:
-    """How far the last test is off its prediction, in deviations with its sign; infinite beyond what a float can express."""
-
-    value: float
-
-    @property
-    def off_track(self) -> bool:
-        """Whether that is farther than FAR deviations."""
-        return abs(self.value) > FAR
-
-
-def last_innovation(posterior: Posterior, measurements: Sequence[Measurement], prior: Prior) -> Innovation | None:
-    """The innovation of the last of `measurements`, all of which `posterior` is conditioned on.
+def last_innovation(posterior: Posterior, measurements: Sequence[Measurement], prior: Prior) -> float | None:
+    """The innovation of the last of `measurements`, all of which `posterior` is conditioned on; infinite beyond what a float
+    can express.
 
     None where fewer than FEWEST_BEFORE come before it, or where an event that may shift the level lies between.
     """
     if len(measurements) <= FEWEST_BEFORE or measurements[-1].epoch != measurements[-2].epoch:
         return None
-    return Innovation(value=innovation(posterior, measurements[-1], prior))
+    return innovation(posterior, measurements[-1], prior)
 
 
 def innovation(posterior: Posterior, last: Measurement, prior: Prior) -> float:

@@ -11,6 +11,7 @@ from models.prognosis.course_shares import CourseName, CourseShare
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import horizon_at
 from models.prognosis.stated_end import NewLater
+from models.tracking.criteria import FAR
 from models.tracking.innovation import last_innovation
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -99,10 +100,9 @@ def interval_in_words(remaining: Mapping[str, float | None]) -> str:
 
 def off_track(posterior: Posterior, measurements: Sequence[Measurement], prior: Prior) -> list[Notice]:
     """The warning of a last test that lies far off what the tests before it predict, and no event lies between."""
-    innovation = last_innovation(posterior, measurements, prior)
-    if innovation is None or not innovation.off_track:
+    deviations = last_innovation(posterior, measurements, prior)
+    if deviations is None or abs(deviations) <= FAR:
         return []
-    deviations = innovation.value
     side = "below" if deviations < 0 else "above"
     size = f"{abs(deviations):.1f}" if math.isfinite(deviations) else "very many"
     message = (
