@@ -98,7 +98,7 @@ def stored(path: Path | str) -> Acknowledged:
     with closing(find_database(address_of(path))) as database, database.reading() as connection:
         for name in clutches.all_ids(connection):
             for row in runs.page(connection, name):
-                columns = channels.read(connection, row.run_key)
+                columns = channels.values_of(channels.stored_of_run(connection, row.run_key))
                 content[name, row.run_id] = {channel: column.tobytes() for channel, column in columns.items()}
     return content
 
