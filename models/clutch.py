@@ -58,10 +58,6 @@ class Geometry:
             raise ValueError(f"pressure must be finite and positive, got {pressure}")
         return self.friction_faces * pressure * self.pressure_factor * self.lining_area * self.mean_radius
 
-    def cof(self, torque: float, pressure: float) -> float:
-        """Coefficient of friction [-] from torque [Nm] at line pressure [Pa]."""
-        return torque / self.torque_per_cof(pressure)
-
     def torque(self, cof: float, pressure: float) -> float:
-        """Torque [Nm] from coefficient of friction [-] at line pressure [Pa]: the inverse of `cof`."""
+        """Torque [Nm] from coefficient of friction [-] at line pressure [Pa]."""
         return cof * self.torque_per_cof(pressure)

@@ -257,11 +257,6 @@ def values_of(columns: Sequence[Stored]) -> dict[str, NDArray[np.float64]]:
     return {column.name: column.values() for column in columns}
 
 
-def read(connection: Connection, run_key: int) -> dict[str, NDArray[np.float64]]:
-    """Read all channels of a run inside the transaction. Raises as `Stored.values` does."""
-    return values_of(stored_of_run(connection, run_key))
-
-
 def lengths(connection: Connection, run_key: int) -> dict[str, int]:
     """How many values each channel of a run has, in the order they were sent; no values are read."""
     query = select(channel.c.name, channel.c.length).where(channel.c.run_key == run_key, channel.c.name != FILE)

@@ -443,21 +443,13 @@ def _message(folded: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str,
     return " ".join(parts)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Slope:
-    """dμ/dv [s/m] at a sliding speed, its standard error, and the size of its terms; sd and size are positive."""
-
-    value: float
-    sd: float
-    size: float
-
-
-def cof_slope(fit: StribeckFit, velocity: float, torque_per_cof: float) -> Slope | None:
-    """dμ/dv at velocity > 0 [m/s] where a COF of one is `torque_per_cof` > 0 [Nm]; None of a curve without friction.
+def cof_slope(fit: StribeckFit, velocity: float, torque_per_cof: float) -> tuple[float, float] | None:
+    """dμ/dv [s/m] and its standard error at velocity > 0 [m/s] where a COF of one is `torque_per_cof` > 0 [Nm]; None of a
+    curve without friction.
 
     Its variance is gᵀ Σ g, with g the `slope_gradient`. Its two terms have opposite signs, so that it passes through 0 as a
-    clutch ages: it is tracked additively, and its `size` is that of the terms, not of their difference. A fit that leaves
-    V_S open still has a slope: its covariance is as wide as that. Raises ValueError where an argument is not positive.
+    clutch ages: it is tracked additively. A fit that leaves V_S open still has a slope: its covariance is as wide as that.
+    Raises ValueError where an argument is not positive.
     """
     if not velocity > 0.0:
         raise ValueError(f"velocity must be positive, got {velocity}")
@@ -467,5 +459,4 @@ def cof_slope(fit: StribeckFit, velocity: float, torque_per_cof: float) -> Slope
     sd = math.sqrt(max(0.0, float(gradient @ fit.covariance @ gradient))) / torque_per_cof
     value = float(slope(np.array(velocity), fit.parameters)) / torque_per_cof
     viscous = float(fit.parameters.viscous_coefficient) * float(gradient[3]) / torque_per_cof
-    size = abs(value - viscous) + viscous
-    return Slope(value=value, sd=sd, size=size) if sd > 0.0 and size > 0.0 else None
+    return (value, sd) if sd > 0.0 and (value != viscous or viscous > 0.0) else None

@@ -218,14 +218,12 @@ SQUEEZE_FILM = Law(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LagFit:
-    """u of one law: lag > 0 or None, its deviation, the 90 % interval (its ends may be <= 0 or infinite), the gain, `noise`
-    [Nm] the residual's deviation, log_likelihood up to a constant that laws on one record share."""
+    """u of one law: lag > 0 or None, its deviation, the 90 % interval (its ends may be <= 0 or infinite), log_likelihood up
+    to a constant that laws on one record share."""
 
     lag: float | None
     lag_sd: float
     interval: tuple[float, float]
-    gain: float
-    noise: float
     log_likelihood: float
     status: LagStatus
 
@@ -392,15 +390,12 @@ def _result(
     problem: LagProblem, course: FloatArray, lag: float | None, estimate: _Estimate, status: LagStatus
 ) -> LagFit:
     left = problem.without(course)
-    gain = problem.gain(left)
-    miss = float(np.square(problem.left - gain * left).sum())
+    miss = float(np.square(problem.left - problem.gain(left) * left).sum())
     size = problem.measured.size
     return LagFit(
         lag=lag,
         lag_sd=estimate.sd,
         interval=estimate.interval(),
-        gain=gain,
-        noise=math.sqrt(miss / max(size - problem.absorbed.shape[1] - 2, 1)),
         log_likelihood=-0.5 * size * math.log(max(miss, 1e-300) / size),
         status=status,
     )

@@ -20,7 +20,7 @@ elastohydrodynamic films have 0.67 to 0.7) the two terms of eq. 3 are just these
     M = sign v [ M_s (1 + (M̄_c - 1) e^{-V_S/w}) + C_v |v|/w^n ]
 
 is S(v) where w = v. Accelerating, w < v: more contact *and* a thinner film, so torque is higher also where S rises
-(M̄_c <= 1). At one lining τ_1 ∝ η_e^{1-2n} W^{2n-1}: it grows with pressure^0.4, see `film_time_at`.
+(M̄_c <= 1). At one lining τ_1 ∝ η_e^{1-2n} W^{2n-1}: it grows with pressure^0.4.
 
 Both need sliding; sticking and presliding are not in them. Velocities that swing through zero are followed with |v| in the
 film and sign v in the torque.
@@ -39,8 +39,6 @@ from models.relaxation import relax
 
 #: The exponent n of film thickness over speed [-].
 FILM_EXPONENT = 1 - GAMMA
-#: The pressure [Pa] at which film times are compared.
-FILM_PRESSURE = 5e5
 _POWER = 2 * FILM_EXPONENT - 1  # z = w^-0.4 makes the film's equation convex
 
 
@@ -104,8 +102,3 @@ def film_speed(time: FloatArray, velocity: FloatArray, film_time: float | FloatA
         if done:
             break
     return np.asarray(course ** (-1 / _POWER), dtype=np.float64)
-
-
-def film_time_at(pressure: float, film_time: float) -> float:
-    """τ_1 [s] at pressure > 0 [Pa] of a lining that has `film_time` [s] at FILM_PRESSURE: ∝ pressure^(2n - 1)."""
-    return float(film_time * (pressure / FILM_PRESSURE) ** _POWER)

@@ -40,12 +40,10 @@ class Direction(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Area:
-    """Eq. 8 [Nm m/s] of a period and its deviation; `noise` [Nm] of a sample's torque; samples used and left out."""
+    """Eq. 8 [Nm m/s] of a period and its deviation; how many samples were left out."""
 
     area: float
     area_sd: float
-    noise: float
-    samples: int
     outliers: int
 
     @property
@@ -94,15 +92,13 @@ def area_of(cycle: Cycle, samples: Samples) -> Area:
     inverse, solution = _solve(design, measured, np.ones(phase.size, dtype=np.bool_))
     along, by_speed = _area_gradients(cycle, solution, count)
     away = np.abs(cycle.value(phase)) > NEAR_ZERO * cycle.amplitude  # a cusp that harmonics miss is not noise
-    noise, raised = _noise(cycle, (measured - design @ solution)[away], design.shape[1])
-    variance = raised**2 * float(along @ inverse @ along) + float(by_speed @ cycle.covariance @ by_speed)
+    noise = _noise(cycle, (measured - design @ solution)[away], design.shape[1])
+    variance = noise**2 * float(along @ inverse @ along) + float(by_speed @ cycle.covariance @ by_speed)
     if cycle.periods >= 3:
         variance = max(variance, _between_periods(cycle, phase, measured, count))
     return Area(
         area=float(along @ solution),
         area_sd=math.sqrt(max(variance, 0.0)),
-        noise=noise,
-        samples=phase.size,
         outliers=samples.outliers,
     )
 
@@ -148,18 +144,18 @@ def _area_gradients(cycle: Cycle, solution: FloatArray, count: int) -> tuple[Flo
     return along, by_speed
 
 
-def _noise(cycle: Cycle, residual: FloatArray, parameters: int) -> tuple[float, float]:
-    """Deviation of a sample, and that raised where block means scatter more than white noise would make them."""
+def _noise(cycle: Cycle, residual: FloatArray, parameters: int) -> float:
+    """Deviation of a sample, raised where block means scatter more than white noise would make them."""
     variance = float(residual @ residual) / max(residual.size - parameters, 1)
     blocks = min(64, residual.size // cycle.periods // 4) * cycle.periods
     freedom = blocks * (1 - parameters / max(residual.size, 1)) - parameters
     if freedom < 8:
-        return math.sqrt(variance), math.sqrt(variance)
+        return math.sqrt(variance)
     edges = np.linspace(0, residual.size, blocks + 1).astype(np.int64)[:-1]
     size = np.diff(np.append(edges, residual.size))
     ratio = float((np.add.reduceat(residual, edges) ** 2 / size).sum()) / freedom / max(variance, 1e-300)
     factor = ratio if ratio > 1 + NOT_WHITE * math.sqrt(2 / freedom) else 1.0
-    return math.sqrt(variance), math.sqrt(variance * factor)
+    return math.sqrt(variance * factor)
 
 
 def _between_periods(cycle: Cycle, phase: FloatArray, measured: FloatArray, count: int) -> float:

@@ -39,7 +39,7 @@ class LoopStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loop:
-    """One pressure of a dynamic test. `pressure` [Pa] names the level, `mean_pressure` [Pa] was measured.
+    """One pressure of a dynamic test; `pressure` [Pa] names the level.
 
     frequency [Hz], periods, area and area_sd [Nm m/s] are None, 0, None and None where there is no whole period. attractor
     C [Nm/s] and film_time τ_1 [s] with their deviations are None where the record does not determine them; `better_law` is
@@ -47,7 +47,6 @@ class Loop:
     """
 
     pressure: float
-    mean_pressure: float
     frequency: float | None = None
     periods: int = 0
     area: float | None = None
@@ -79,7 +78,7 @@ def evaluate_loops(
         rows = slice(stretch.start, stretch.stop)
         level = float(levels_of(np.array([stretch.pressure]))[0])
         mean = float(pressure[rows].mean())
-        loops.append(_loop(level, mean, time[rows], velocity[rows], torque[rows], _nearest(stationary, mean)))
+        loops.append(_loop(level, time[rows], velocity[rows], torque[rows], _nearest(stationary, mean)))
     return tuple(loops)
 
 
@@ -92,7 +91,6 @@ def _nearest(stationary: Mapping[float, StationaryCurve] | None, pressure: float
 
 def _loop(
     level: float,
-    mean_pressure: float,
     time: FloatArray,
     velocity: FloatArray,
     torque: FloatArray,
@@ -105,7 +103,6 @@ def _loop(
     if isinstance(cycle, str) or samples is None or samples.phase.size < FEWEST_SAMPLES:
         return Loop(
             pressure=level,
-            mean_pressure=mean_pressure,
             status=LoopStatus.NO_PERIOD,
             message=cycle if isinstance(cycle, str) else "Too few samples lie in whole periods.",
         )
@@ -115,7 +112,6 @@ def _loop(
     better = None if attractor is None or film is None else _better(attractor, film)
     return Loop(
         pressure=level,
-        mean_pressure=mean_pressure,
         frequency=cycle.frequency,
         periods=cycle.periods,
         area=area.area,

@@ -51,10 +51,9 @@ class Belief:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """Of a run: the odds that it slipped, the most probable slip, COF where the others put it [-, -] (None: it shows none)
+    """Of a run that probably slipped: the most probable slip, COF where the others put it [-, -] (None: it shows none)
     at the cycles as sent, and whether its date is out of order with theirs."""
 
-    log_odds: float
     slip: Slip
     expected: tuple[float, float] | None
     expected_then: tuple[float, float] | None
@@ -104,7 +103,7 @@ def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> 
         log_share = min(float(np.logaddexp.reduce(with_it) - total), -1e-12)
         log_odds = log_share - math.log(-math.expm1(log_share))
         if log_odds >= math.log(criteria.HELD) and not clutch.runs[index].fixed:
-            verdicts[index] = best.verdict(index, log_odds)
+            verdicts[index] = best.verdict(index)
     return verdicts
 
 
@@ -509,7 +508,7 @@ class _Weighed:
             if i in belief.outlying | belief.levels:
                 yield belief.turned(i)
 
-    def verdict(self, index: int, log_odds: float) -> Verdict:
+    def verdict(self, index: int) -> Verdict:
         """What is said of a run that is doubted."""
         sent = self.clutch.runs[index].sent
         weighed = self.weigh(index)
@@ -520,7 +519,6 @@ class _Weighed:
         before = other_cycles[other_cycles < sent.cycles - 0.5]
         gaps = np.diff(other_cycles)
         return Verdict(
-            log_odds=log_odds,
             slip=slip,
             expected=self._interval(index, sent),
             expected_then=self._interval(index, slip.likely),

@@ -120,12 +120,10 @@ class FleetPrior:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Taught:
-    """What one clutch says about x: a sample [n, 4] of its posterior, with the weak prior divided out of the weights; and
-    the mean of its ξ0."""
+    """What one clutch says about x: a sample [n, 4] of its posterior, with the weak prior divided out of the weights."""
 
     x: FloatArray
     log_weight: FloatArray
-    initial: float
 
 
 def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
@@ -139,8 +137,7 @@ def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
     sound = drawn.initial > 0.0
     with np.errstate(divide="ignore"):
         log_weight = np.log(drawn.weight) - np.log(np.abs(drawn.initial)) - _log_prior(drawn, prior)
-    initial = float(drawn.weight @ drawn.initial)
-    return Taught(x=_coordinates(drawn)[sound], log_weight=log_weight[sound], initial=initial)
+    return Taught(x=_coordinates(drawn)[sound], log_weight=log_weight[sound])
 
 
 def population(fleet: Sequence[Taught], rounds: int = 40) -> FleetPrior:

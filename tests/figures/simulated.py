@@ -7,13 +7,13 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.friction.stribeck import torque
-from models.loops.lag_laws import attractor_torque, film_time_at, squeeze_film_torque
+from models.loops.lag_laws import attractor_torque, squeeze_film_torque
 from models.loops.loops import Loop, evaluate_loops
 from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.stationary import Sensor
 from models.rig.truth import SimulatedClutch
 from tests.figures.svg import COLOURS, Chart
-from tests.real.lag import ATTRACTOR, FILM_TIME, FREQUENCY, loop_signs
+from tests.real.lag import ATTRACTOR, FREQUENCY, film_time_at, loop_signs
 
 SEED = 20131113
 LIFE = (0, 250, 500, 1000, 2000, 3000, 4500, 6000, 8000, 10_000, 13_000)
@@ -30,7 +30,7 @@ def signs() -> str:
     chart = Chart(3)
     for title, course in (
         ("attractor: S rises, loop negative", attractor_torque(fine, v, curve, ATTRACTOR)),
-        ("squeezed film: S rises, loop positive", squeeze_film_torque(fine, v, curve, film_time_at(4e5, FILM_TIME))),
+        ("squeezed film: S rises, loop positive", squeeze_film_torque(fine, v, curve, film_time_at(4e5))),
     ):
         off, last = course - torque(v, curve), (fine >= 0) & (v > 0.2)
         panel = chart.panel(title, "velocity [m/s], 4 bar", "M - S(v) [Nm]", zero=True)

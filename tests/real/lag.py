@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from models.arrays import FloatArray
 from models.friction.stribeck import StribeckParameters
-from models.loops.lag_laws import attractor_torque, film_time_at, squeeze_film_torque
+from models.loops.lag_laws import FILM_EXPONENT, attractor_torque, squeeze_film_torque
 from models.loops.loop_area import area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
@@ -38,6 +38,11 @@ def table(rows: Iterable[Row]) -> str:
     return "\n".join(measuring.table(list(rows[0]), cells))
 
 
+def film_time_at(pressure: float) -> float:
+    """τ_1 [s] at a pressure [Pa]: that of one lining grows with the pressure's power 2n - 1 (`models.loops.lag_laws`)."""
+    return float(FILM_TIME * (pressure / 5e5) ** (2 * FILM_EXPONENT - 1))
+
+
 def loop_signs() -> list[Row]:
     """The figure "GMS loops are negative where the curve rises, positive with the squeeze film"; simulated.
 
@@ -55,7 +60,7 @@ def loop_signs() -> list[Row]:
         nominal = clutch.parameters(pressure, 0.0)
         for name, curve in (("nominal", nominal), ("rising", replace(nominal, coulomb_ratio=1.0))):
             law = attractor_torque(fine, v, curve, ATTRACTOR)
-            film = squeeze_film_torque(fine, v, curve, film_time_at(pressure, FILM_TIME))
+            film = squeeze_film_torque(fine, v, curve, film_time_at(pressure))
             rows.append(
                 {
                     "pressure [bar]": pressure / 1e5,

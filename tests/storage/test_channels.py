@@ -22,10 +22,10 @@ def test_channels_keep_their_order_and_their_bits_and_are_written_once(connectio
     key, bare = (runs.insert(connection, new_run(number)) for number in range(2))
     channels.write(connection, key, channels.encoded(sent))
     channels.write(connection, bare, channels.encoded({}))
-    back = channels.read(connection, key)
+    back = channels.values_of(channels.stored_of_run(connection, key))
     assert list(back) == list(sent) == list(channels.lengths(connection, key))
     assert all(back[name].tobytes() == column.tobytes() for name, column in sent.items())
-    assert channels.read(connection, bare) == channels.lengths(connection, bare) == {}
+    assert channels.values_of(channels.stored_of_run(connection, bare)) == channels.lengths(connection, bare) == {}
     with pytest.raises(LookupError, match="has no channel torque_nm"):
         channels.stored(connection, bare, "torque_nm")
     with pytest.raises(IntegrityError, match=r"(?i)unique"), connection.begin_nested():
@@ -45,7 +45,7 @@ def test_a_damaged_channel_is_named(connection: Connection) -> None:
     channels.write(connection, key, channels.encoded(columns(1)))
     connection.exec_driver_sql("UPDATE channel SET data = substr(data, 1, 50) WHERE name = 'speed_rpm'")
     with pytest.raises(DamagedData, match="channel speed_rpm: "):
-        channels.read(connection, key)
+        channels.values_of(channels.stored_of_run(connection, key))
     with pytest.raises(DamagedData, match="channel speed_rpm: "):
         channels.stored(connection, key, "speed_rpm").values()
 

@@ -44,6 +44,8 @@ def test_pages_and_the_one_that_runs(connection: Connection) -> None:
     assert [row.diagnosis_id for row in (*first, *rest)] == ["d3", "d2", "d1", "d0"]
     assert diagnoses.running(connection, CLUTCH, 1) == ["d0", "d1", "d2", "d3"]
     assert diagnoses.running(connection, CLUTCH, 2) == diagnoses.running(connection, "nobody", 1) == []
+    asked_since = [diagnoses.running(connection, CLUTCH, 1, since=revision) for revision in (3, 4)]
+    assert asked_since == [["d0", "d1", "d2", "d3"], []]
     assert diagnoses.get(connection, "other", "d0") is None
     key = store_run(connection, 1)
     assert (diagnoses.last_run_key(connection, CLUTCH), diagnoses.last_run_key(connection, "other")) == (key, 0)

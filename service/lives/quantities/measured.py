@@ -309,8 +309,7 @@ def curves_of(levels: Sequence[LevelFit]) -> list[LevelFit]:
 def slope_of(curve: LevelFit, geometry: Geometry, speed_rpm: float) -> Value | None:
     """dμ/dv of a fitted curve at a speed > 0 and its standard error [s/m]; None of a curve without friction."""
     velocity = float(geometry.sliding_velocity(np.array(speed_rpm * RADIANS_PER_SECOND_PER_RPM)))
-    slope = cof_slope(curve.fit, velocity, geometry.torque_per_cof(curve.mean_pressure))
-    return None if slope is None else (slope.value, slope.sd)
+    return cof_slope(curve.fit, velocity, geometry.torque_per_cof(curve.mean_pressure))
 
 
 def _values(loops: Sequence[Mapping[str, Any]], columns: tuple[str, str], frequency: float) -> dict[float, Value]:

@@ -48,7 +48,7 @@ def test_threads_take_turns_and_readers_never_see_half_a_run(database: Database)
                 assert clutch is not None
                 keys = [row.run_key for row in runs.in_order(connection, CLUTCH)]
                 assert clutch.revision == len(keys)
-                assert all(len(channels.read(connection, key)) == 3 for key in keys[-3:])
+                assert all(len(channels.values_of(channels.stored_of_run(connection, key))) == 3 for key in keys[-3:])
             looks += 1
             time.sleep(0.002)
         return looks

@@ -61,7 +61,7 @@ def test_a_copy_while_the_service_writes_is_one_state(busy: Database, tmp_path: 
             clutch = clutches.get(connection, CLUTCH)
             assert clutch is not None
             assert clutch.revision == len(rows)
-            assert all(len(channels.read(connection, row.run_key)) == 3 for row in rows)
+            assert all(len(channels.values_of(channels.stored_of_run(connection, row.run_key))) == 3 for row in rows)
 
 
 def test_a_copy_during_an_open_transaction_is_the_state_before_it(busy: Database, tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ with database.writing() as connection:
     if mode == "delete":  # what a rollback journal must undo: pages that have reached the file already
         connection.exec_driver_sql("PRAGMA cache_spill=ON")
         connection.exec_driver_sql("PRAGMA cache_size=2")
-        channels.read(connection, key)
+        channels.values_of(channels.stored_of_run(connection, key))
         connection.exec_driver_sql("UPDATE channel SET data = zeroblob(200000)")
     reached("all written")
 """
@@ -73,7 +73,7 @@ def assert_whole(database: Database) -> int:
         rows = runs.in_order(connection, CLUTCH)
         assert [row.run_id for row in rows] == [f"run-{number:04d}" for number in range(len(rows))]
         for number, row in enumerate(rows):
-            stored = channels.read(connection, row.run_key)
+            stored = channels.values_of(channels.stored_of_run(connection, row.run_key))
             expected = columns(number, stored["torque_nm"].size)
             assert {name: each.tobytes() for name, each in stored.items()} == {
                 name: each.tobytes() for name, each in expected.items()
