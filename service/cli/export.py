@@ -21,6 +21,7 @@ from rich.progress import Progress
 
 from service.cli.options import ClutchId, asking, err, print_line
 from service.cli.workbook import write_workbook
+from service.client.clutchlife.answers import RefusedError
 from service.client.clutchlife.transport import Service
 from service.run_files import manifest
 
@@ -90,8 +91,15 @@ def _export(service: Service, clutch: str, out_folder: Path) -> None:
 
 
 def _tables(service: Service, clutch: str, folder: Path) -> None:
-    """Every table of the API as CSV, all of them as sheets of a workbook, and as Parquet where its library is installed."""
-    tables = {name: service.table(f"/v1/clutches/{clutch}/{name}.csv") for name in TABLES}
+    """Every table of the API as CSV, all of them as sheets of a workbook, and as Parquet where its library is installed.
+    What a clutch does not have yet, as surfaces before its first stationary test, is left out."""
+    tables = dict[str, str]()
+    for name in TABLES:
+        try:
+            tables[name] = service.table(f"/v1/clutches/{clutch}/{name}.csv")
+        except RefusedError as refused:
+            if not refused.unknown:
+                raise
     (folder / "tables").mkdir(exist_ok=True)
     for name, text in tables.items():
         path = folder / "tables" / f"{name}.csv"

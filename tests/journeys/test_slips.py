@@ -98,6 +98,15 @@ def test_all_that_are_held_of_one_cause_are_confirmed_in_one_line(server: Server
     assert life(server, "c2")["held_runs"] is None
 
 
+def test_a_clutch_without_tests_is_exported(server: Server, tmp_path: Path) -> None:
+    server.http.post("/v1/clutches", json={"clutch_id": "new"})
+    clutchlife("export", "new", "--out", tmp_path, "--url", server.url)
+    tables = {path.stem for path in (tmp_path / "results" / "tables").iterdir()}
+    assert {"runs", "degradation"} <= tables
+    assert "surfaces" not in tables
+    assert (tmp_path / "results" / "about.json").exists()
+
+
 def exported_and_pushed_elsewhere(server: Server, tmp_path: Path) -> None:
     """An export holds what counts; what was sent and does not is beside it, and the audit trail."""
     folder = tmp_path / "export"
