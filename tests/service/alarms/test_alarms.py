@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from service.alarms import outbox
+from service.alarms import outbox, rules
 from service.schemas.alarm import AlarmIn
 from service.workflows import change_alarms
 from tests.service.alarms.receiving import SECRET, Receiver, once, receiving, signed_rightly
@@ -140,6 +140,26 @@ def test_it_is_cleared_by_the_hysteresis_and_raised_again(life: TestClient) -> N
     assert events(life, state="open") == []
     life.put(address, json=body | {"below": value + 1})
     assert [event["state"] for event in events(life)] == ["raised", "cleared"]
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "raised", "kept"),
+    [
+        ({"quantity": "health", "below": 0.5}, 0.49, True, True),
+        ({"quantity": "health", "below": 0.5}, 0.54, False, True),
+        ({"quantity": "health", "below": 0.5}, 0.56, False, False),
+        ({"quantity": "silent_hours", "above": 10.0}, 10.1, True, True),
+        ({"quantity": "silent_hours", "above": 10.0}, 9.1, False, True),
+        ({"quantity": "silent_hours", "above": 10.0}, 8.9, False, False),
+    ],
+)
+def test_an_alarm_stays_within_the_hysteresis_of_either_limit(
+    limit: dict[str, Any], value: float, raised: bool, kept: bool
+) -> None:
+    rule_in_force = AlarmIn.model_validate(limit | {"hysteresis": 0.1})
+    finding = rules.Finding(value=value, words="")
+    assert rules.passes(rule_in_force, finding) is raised
+    assert rules.passes(rule_in_force, finding, rule_in_force.hysteresis) is kept
 
 
 @pytest.mark.parametrize(

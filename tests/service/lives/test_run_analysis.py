@@ -149,6 +149,9 @@ def test_a_receipt_holds_the_engagement_in_public_units(client: TestClient) -> N
     assert found["peak_power_kw"]["value"] == pytest.approx(expected["peak_power"] / 1000, rel=0.02)
     assert found["midpoint_cof"]["value"] == pytest.approx(COF, rel=0.01)
     assert found["breakaway_cof"] is None
+    for end in ("initial_cof", "endpoint_cof"):
+        ratio = found[end]["value"] / found["midpoint_cof"]["value"]
+        assert found[f"{end}_ratio"]["value"] == pytest.approx(ratio, rel=1e-9)
     assert all(estimate["sd"] > 0 for estimate in found.values() if estimate is not None)
     assert sent(client, {"kind": "duty_cycles", "cycles": 700, "duty": {"cycles": 200}})["engagement"] is None
 
