@@ -1,9 +1,8 @@
-"""The channels of a run: names, units, valid ranges, the check of their values, and when two contents are the same. Contents
-are compared by value, whatever notation they were sent in.
+"""The channels of a run: names, units, valid ranges, the check of their values, and when two contents are the same.
 
 Channels are converted to SI here and nowhere else; what units a file states are brought to the channels' own before
-(`readers.unit_table`). A column that is wrong gives errors that name channel, row and value. 7000, 7000.0 and 7e3 are one
-number; an instant is the same in every time zone; texts are compared in Unicode's normal form C.
+(`readers.unit_table`). Contents are compared by value: 7000, 7000.0 and 7e3 are one number, an instant is the same in every
+time zone, and texts are compared in Unicode's normal form C.
 """
 
 import hashlib
@@ -83,92 +82,60 @@ def bar(pressure: float) -> float:
 LineOf = Callable[[int], int]
 
 
+def place(name: str, row: int, line_of: LineOf | None) -> str:
+    """A value of a channel, for a message."""
+    return f"{name}[{row}]" + (f" (line {line_of(row)})" if line_of else "")
+
+
 class _Errors:
-    """Collects errors; keeps the first MAX_ERRORS and counts the rest. Rows of a file are given with their line."""
+    """The first MAX_ERRORS errors, and how many there are in all. Rows of a file are given with their line."""
 
-    def __init__(self, line_of: LineOf | None = None) -> None:
-        self.kept: list[FieldError] = []
-        self.total = 0
-        self._line_of = line_of
-
-    def add(self, error: FieldError) -> None:
-        self.total += 1
-        if len(self.kept) < MAX_ERRORS:
-            self.kept.append(error)
+    def __init__(self, kept: list[FieldError], line_of: LineOf | None) -> None:
+        self.kept, self.total, self._line_of = kept, len(kept), line_of
 
     def add_row(self, name: str, index: int, value: object, code: str, rule: str) -> None:
+        self.total += 1
         if len(self.kept) >= MAX_ERRORS:
-            self.total += 1
             return
         shown = repr(value)[:MAX_QUOTED] if isinstance(value, str | list | dict) else str(value)[:MAX_QUOTED]
-        place = f"{name}[{index}]" + (f" (line {self._line_of(index)})" if self._line_of else "")
-        self.add(
-            FieldError(
-                pointer=f"/channels/{name}/{index}",
-                row=index + 1,
-                value=shown,
-                code=code,
-                message=f"{place} {rule}, got {shown}",
-            )
-        )
+        message = f"{place(name, index, self._line_of)} {rule}, got {shown}"
+        pointer = f"/channels/{name}/{index}"
+        self.kept.append(FieldError(pointer=pointer, row=index + 1, value=shown, code=code, message=message))
 
 
-def check_columns(columns: Mapping[str, Sequence[Any]]) -> dict[str, FloatArray]:
-    """Columns by public channel name, as parsed -> the same as float64 [n], bit for bit.
+def check_columns(
+    columns: Mapping[str, Sequence[Any] | FloatArray], *, line_of: LineOf | None = None
+) -> dict[str, FloatArray]:
+    """Columns by public channel name, as parsed or as arrays in the channels' units -> float64 [n], bit for bit.
 
     Raises InvalidError where a column is empty, lengths differ, or a value is not a finite number within its channel's
-    range. The error lists at most 50 places and says how many there are in all.
+    range. The error lists at most 50 places and says how many there are in all; with `line_of` it names the lines of the
+    file too.
     """
-    errors = _Errors()
-    _check_lengths(columns, errors)
+    errors = _Errors(_wrong_lengths(columns), line_of)
     checked = {}
     for name, values in columns.items():
-        column = _numbers(name, values, errors)
+        column = values if isinstance(values, np.ndarray) else _numbers(name, values, errors)
         if column is not None:
             _check_range(name, column, errors, sampled="time_s" in columns)
             checked[name] = column
-    _raise_any(errors)
+    if errors.total:
+        more = "" if errors.total == 1 else f"; {errors.total} errors in all"
+        raise InvalidError(errors.kept[0].message + more, errors=errors.kept, total=errors.total)
     return checked
 
 
-def check_arrays(columns: Mapping[str, FloatArray], *, line_of: LineOf | None = None) -> None:
-    """Columns [n] by public channel name, in the channels' units, checked by the rules of `check_columns`.
-
-    Raises InvalidError as `check_columns` does; with `line_of` the messages name the line of the file too.
-    """
-    errors = _Errors(line_of)
-    _check_lengths(columns, errors)
-    for name, column in columns.items():
-        _check_range(name, column, errors, sampled="time_s" in columns)
-    _raise_any(errors)
-
-
-def _check_lengths(columns: Mapping[str, Sequence[Any] | FloatArray], errors: _Errors) -> None:
+def _wrong_lengths(columns: Mapping[str, Sequence[Any] | FloatArray]) -> list[FieldError]:
+    errors = []
     rows = max((len(values) for values in columns.values()), default=0)
     for name, values in columns.items():
-        if len(values) == 0:
-            errors.add(FieldError(pointer=f"/channels/{name}", code="empty", message=f"{name} must not be empty"))
-        elif len(values) != rows:
-            rule = f"must be as long as the longest channel ({rows} rows), got {len(values)} rows"
-            errors.add(
-                FieldError(
-                    pointer=f"/channels/{name}",
-                    row=len(values) + 1,
-                    value=str(len(values)),
-                    code="ragged",
-                    message=f"{name} {rule}",
-                )
-            )
-
-
-def _raise_any(errors: _Errors) -> None:
-    if errors.total:
-        raise InvalidError(_summary(errors), errors=errors.kept, total=errors.total)
-
-
-def _summary(errors: _Errors) -> str:
-    first = errors.kept[0].message
-    return first if errors.total == 1 else f"{first}; {errors.total} errors in all"
+        size, pointer = len(values), f"/channels/{name}"
+        if size == 0:
+            errors.append(FieldError(pointer=pointer, code="empty", message=f"{name} must not be empty"))
+        elif size != rows:
+            message = f"{name} must be as long as the longest channel ({rows} rows), got {size} rows"
+            errors.append(FieldError(pointer=pointer, row=size + 1, value=str(size), code="ragged", message=message))
+    return errors
 
 
 def _numbers(name: str, values: Sequence[Any], errors: _Errors) -> FloatArray | None:

@@ -30,7 +30,7 @@ from service.lives.model_correction import extension_of
 from service.lives.payloads import notice_items
 from service.lives.plausibility.doubts import Judged
 from service.lives.recomputation import Adoption, ClutchState, Levels, Results, Tracking, newest_adoption
-from service.lives.run_analysis import LevelFit, Value
+from service.lives.run_analysis import LevelFit
 from service.lives.tracks import CARRIED, States, Tracked
 from service.logging import request_id
 from service.schemas.base import schema_fields
@@ -306,32 +306,18 @@ def ask_fleet_refresh(connection: Connection, kind: Json | None, *, by: str, at:
 def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) -> None:
     if tracking.again:
         results.clear_predictions(connection, clutch_id)
-    rows = [
-        PredictionRow(
-            cycles=prediction.cycles,
-            method=prediction.method,
-            pressure=ALL_PRESSURES,
-            payload=prediction.payload,
-            code_version=CODE_VERSION,
-        )
+    made: dict[str, Any] = {"pressure": ALL_PRESSURES, "code_version": CODE_VERSION}
+    predictions = [
+        PredictionRow(cycles=prediction.cycles, method=prediction.method, payload=prediction.payload, **made)
         for prediction in tracking.predictions
     ]
-    results.put_predictions(connection, clutch_id, rows)
-    results.clear_filter_states(connection, clutch_id)
-    results.put_filter_states(connection, clutch_id, _filter_rows(tracking.filters))
-
-
-def _filter_rows(filters: States) -> list[FilterStateRow]:
-    return [
-        FilterStateRow(
-            method=method,
-            pressure=ALL_PRESSURES,
-            runs=tracked.runs,
-            arrays=tracked.to_arrays(),
-            code_version=CODE_VERSION,
-        )
-        for method, tracked in filters.items()
+    filters = [
+        FilterStateRow(method=method, runs=tracked.runs, arrays=tracked.to_arrays(), **made)
+        for method, tracked in tracking.filters.items()
     ]
+    results.put_predictions(connection, clutch_id, predictions)
+    results.clear_filter_states(connection, clutch_id)
+    results.put_filter_states(connection, clutch_id, filters)
 
 
 def _filters(connection: Connection, clutch_id: str) -> States | None:
@@ -379,32 +365,29 @@ def _event(row: RunInOrder, cofs: ByPressure) -> Event:
 
 def fit_rows(own: Sequence[LevelFit], cofs: ByPressure) -> list[FitRow]:
     """Fits as they are stored, with mean COF by pressure where a level determines it."""
-    return [_fit_row(level, cofs.get(level.fit.pressure)) for level in own]
-
-
-def _fit_row(level: LevelFit, cof: Value | None) -> FitRow:
-    fit = level.fit
-    mean_cof, mean_cof_sd = (None, None) if cof is None else cof
-    return FitRow(
-        **{name: getattr(fit, name) for name in _FIT_COLUMNS},
-        **_parameters(fit.parameters),
-        mean_pressure=level.mean_pressure,
-        covariance=tuple(fit.covariance.ravel().tolist()),
-        unbiased_covariance=tuple(fit.unbiased_covariance.ravel().tolist()),
-        status=fit.status.value,
-        speeds=level.speeds,
-        mean_cof=mean_cof,
-        mean_cof_sd=mean_cof_sd,
-        code_version=CODE_VERSION,
-    )
-
-
-def _parameters(parameters: StribeckParameters) -> dict[str, Any]:
-    return {name: float(getattr(parameters, name)) for name in PARAMETER_NAMES}
+    rows = []
+    for level in own:
+        fit = level.fit
+        parameters: dict[str, Any] = {name: float(getattr(fit.parameters, name)) for name in PARAMETER_NAMES}
+        mean_cof, mean_cof_sd = cofs.get(fit.pressure, (None, None))
+        row = FitRow(
+            **{name: getattr(fit, name) for name in _FIT_COLUMNS},
+            **parameters,
+            mean_pressure=level.mean_pressure,
+            covariance=tuple(fit.covariance.ravel().tolist()),
+            unbiased_covariance=tuple(fit.unbiased_covariance.ravel().tolist()),
+            status=fit.status.value,
+            speeds=level.speeds,
+            mean_cof=mean_cof,
+            mean_cof_sd=mean_cof_sd,
+            code_version=CODE_VERSION,
+        )
+        rows.append(row)
+    return rows
 
 
 def _level_fit(row: FitRow) -> LevelFit:
-    """The inverse of `_fit_row`, exactly."""
+    """The inverse of `fit_rows`, exactly."""
     fit = StribeckFit(
         **{name: getattr(row, name) for name in _FIT_COLUMNS},
         parameters=StribeckParameters(**{name: getattr(row, name) for name in PARAMETER_NAMES}),

@@ -4,6 +4,7 @@ and all results of a clutch computed again from its runs.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -80,14 +81,10 @@ def run(connection: Connection, clutch_id: str, run_id: str) -> RunRow:
 def run_reader(database: Database, clutch_id: str) -> RunReader:
     """The clutch's stored runs, each read in a transaction of its own when it is asked for: none stays open meanwhile."""
 
-    def described(run_id: str) -> IncomingRun:
-        with database.reading() as connection:
-            return incoming(run(connection, clutch_id, run_id), {})
-
-    def with_channels(run_id: str) -> IncomingRun:
+    def read(run_id: str, *, whole: bool = True) -> IncomingRun:
         with database.reading() as connection:
             row = run(connection, clutch_id, run_id)
-            columns = channels.stored_of_run(connection, row.run_key)
+            columns = channels.stored_of_run(connection, row.run_key) if whole else ()
         return decoded(row, columns)
 
     with database.reading() as connection:
@@ -95,8 +92,8 @@ def run_reader(database: Database, clutch_id: str) -> RunReader:
         sampled = channels.samples(connection, clutch_id)
         names = runs.keys(connection, clutch_id)
     return RunReader(
-        read=with_channels,
-        describe=described,
+        read=read,
+        describe=partial(read, whole=False),
         sampled=frozenset(run_id for run_id, run_key in names.items() if run_key in sampled),
         torque_filter=record.torque_filter,
     )
@@ -116,28 +113,20 @@ def _loaded_reader(database: Database, record: ClutchIn, rows: Sequence[RunRow])
         with database.reading() as connection:
             columns = channels.stored_of_run(connection, row.run_key)
         loaded[row.run_id] = tuple(column.loaded() for column in columns)
-    runs_loaded = _LoadedRuns(rows={row.run_id: row for row in rows}, channels=loaded)
+    by_name = {row.run_id: row for row in rows}
     return RunReader(
-        read=runs_loaded.read,
-        describe=runs_loaded.describe,
+        read=partial(_read_loaded, by_name, loaded),
+        describe=partial(_read_loaded, by_name, {}),
         sampled=frozenset(run_id for run_id, own in loaded.items() if any(column.name == "time_s" for column in own)),
         torque_filter=record.torque_filter,
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _LoadedRuns:
-    """Runs of a clutch by run_id, with their channels not yet decoded."""
-
-    rows: Mapping[str, RunRow]
-    channels: Mapping[str, tuple[channels.Stored, ...]]
-
-    def read(self, run_id: str) -> IncomingRun:
-        """A run with its channels. Raises DamagedData."""
-        return decoded(self.rows[run_id], self.channels[run_id])
-
-    def describe(self, run_id: str) -> IncomingRun:
-        return incoming(self.rows[run_id], {})
+def _read_loaded(
+    rows: Mapping[str, RunRow], loaded: Mapping[str, tuple[channels.Stored, ...]], run_id: str
+) -> IncomingRun:
+    """A run with the channels that are loaded of it; a function of the module, which can be pickled."""
+    return decoded(rows[run_id], loaded.get(run_id, ()))
 
 
 def decoded(row: RunRow, columns: Sequence[channels.Stored]) -> IncomingRun:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.records.cleaning import stands
-from service.columns import LineOf, check_arrays
+from service.columns import LineOf, check_columns
 from service.errors import MAX_QUOTED, InvalidError, Notice, TooLargeError
 from service.readers.column_names import (
     Taken,
@@ -91,7 +91,7 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     line_in_file = table.line_of
     line_of = None if line_in_file is None else lambda row: line_in_file(first + row)
     try:
-        check_arrays(columns, line_of=line_of)
+        check_columns(columns, line_of=line_of)
     except InvalidError as error:
         if not error.errors or error.errors[0].value != "nan":
             raise

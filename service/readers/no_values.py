@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from service.columns import LineOf, place
 from service.errors import InvalidError, Notice
 from service.readers.numerals import NUMBER, plain
-from service.readers.table import NO_MISSING, LineOf, Reading, Table, marks, place
+from service.readers.table import NO_MISSING, Reading, Table, marks
 
 #: A value that is so many times as large as all others stands for none, a common one (more than a tenth of the rows) only
 #: farther off. Chosen: between neighbours of a test's values lie ten (speeds 1, 10, 100), and from an idle valve's 0.02 to

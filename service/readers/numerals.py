@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from service.columns import LineOf, place
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
-from service.readers.table import LineOf, Reading, Table, marks, place
+from service.readers.table import Reading, Table, marks
 from service.readers.unit_table import is_unit
 
-#: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_arrays` refuses with their row. Digits
+#: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_columns` refuses with their row. Digits
 #: are never given back, or a long run of them with a letter behind it would be tried from every digit to every other.
 NUMBER = re.compile(r"[+-]?(\d++(\.\d*+)?|\.\d++)([eE][+-]?\d{1,4})?|[+-]?(nan|inf|infinity)", re.IGNORECASE | re.ASCII)
 #: Thousands apart by an apostrophe or a blank, at the beginning of a cell.

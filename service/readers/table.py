@@ -11,10 +11,9 @@ from typing import Any
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from service.columns import LineOf
 from service.errors import MAX_QUOTED, InvalidError, Notice
 
-#: Row of a table, from 0 -> its line in the file, from 1.
-LineOf = Callable[[int], int]
 #: The time option that takes no clock: each row is a plateau.
 NO_TIME = "none"
 #: The option of missing values by which every number is a measurement.
@@ -113,11 +112,6 @@ class Table:
 def marks(missing: str) -> list[str]:
     """The marks in a list such as `-9999,n/a`, in small letters."""
     return [] if missing == NO_MISSING else [mark.strip().casefold() for mark in missing.split(",") if mark.strip()]
-
-
-def place(name: str, row: int, line_of: LineOf | None) -> str:
-    """A value of a channel, for a message."""
-    return f"{name}[{row}]" + (f" (line {line_of(row)})" if line_of else "")
 
 
 def labels(above: Sequence[Sequence[str]]) -> dict[str, str]:

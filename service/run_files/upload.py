@@ -8,7 +8,7 @@ from pathlib import Path
 from models.arrays import FloatArray
 from models.records.cleaning import UnusableRecordError
 from models.records.plateaus import cut_plateaus
-from service.columns import PLATE_TEMPERATURES, check_arrays
+from service.columns import PLATE_TEMPERATURES, check_columns
 from service.errors import FieldError, InvalidError, Notice
 from service.lives.incoming_run import IncomingRun, SampledChannels, name_run
 from service.readers.channels import LEFT_OUT, Channels
@@ -99,7 +99,7 @@ def run_of(
         )
         notices.append(Notice(code="counting_clock", message=message))
         columns = {name: column for name, column in columns.items() if name != "time_s"}
-        check_arrays(columns)  # a plateau has no negative pressure, which a sample may have
+        check_columns(columns)  # a plateau has no negative pressure, which a sample may have
     accepted = (*NEEDED[kind], *_ALLOWED[kind])
     run = IncomingRun(
         kind=kind,

@@ -15,7 +15,7 @@ import pandas as pd  # type: ignore[import-untyped]
 import pytest
 import scipy.io
 
-from service.columns import check_arrays
+from service.columns import check_columns
 from service.errors import InvalidError, ServiceError, TooLargeError
 from service.readers.limits import LIMITS
 from service.readers.read_file import read_file
@@ -90,7 +90,7 @@ def changed(content: bytes, rng: np.random.Generator, *, one_bit: bool) -> bytes
 def refusal_of(path: Path, name: str) -> ServiceError | None:
     """Why a changed file is refused, if it is."""
     try:
-        check_arrays(read_file(path, filename=name, limits=SOON).columns)
+        check_columns(read_file(path, filename=name, limits=SOON).columns)
     except (InvalidError, TooLargeError) as error:
         return error
     return None
