@@ -187,9 +187,8 @@ def _add_parts(times: FloatArray, parts: Mapping[str, tuple[FloatArray, float]])
         seconds = factor * values
         if ((seconds >= 0) & (seconds < 1)).all() and (np.diff(times + seconds) > 0).all():
             times += seconds - seconds[0]
-            return Notice(
-                code="parts_of_seconds", message=f"time_s has whole seconds: the fractions in {name} were added"
-            )
+            message = f"time_s has whole seconds: the fractions in {name} were added"
+            return Notice(code="parts_of_seconds", message=message)
     return None
 
 
@@ -204,10 +203,10 @@ def _read(
         raise TooLargeError(f"a file must not hold more than {limits.most_values} values, got {stated}")
     channels = {column.index: column.channel for column in chosen}
     says = [] if reading.missing == NO_MISSING else [i for i, own in enumerate(table.columns) if says_valid(own)]
-    parts = {
-        at: factor for at, own in enumerate(table.columns) if at not in indices and (factor := part_of_second(own))
-    }
-    parts = {} if reading.time == NO_TIME or "time_s" not in channels.values() else parts
+    parts = {}
+    if reading.time != NO_TIME and "time_s" in channels.values():
+        unused = {at: own for at, own in enumerate(table.columns) if at not in indices}
+        parts = {at: factor for at, own in unused.items() if (factor := part_of_second(own))}
     read = read_cells(table, dict.fromkeys(says, "") | dict.fromkeys(parts, "time_s") | channels, reading)
     read, table = drop_totals(read, [column.index for column in chosen if column.channel != "time_s"], table)
     for column in chosen:
@@ -236,10 +235,9 @@ def _read(
         if column.channel != "time_s":
             clock = clocks.get(column.index)
             key = None if clock is None else clock.key
-            whole_series = _Series(values[column.index], valid[column.index], key, times.get(key))
-            own = series[column.channel] = _drop_empty_rows(
-                column.channel, whole_series, table, bool(marks(reading.missing))
-            )
+            whole = _Series(values[column.index], valid[column.index], key, times.get(key))
+            own = _drop_empty_rows(column.channel, whole, table, bool(marks(reading.missing)))
+            series[column.channel] = own
             for good in marked:
                 if good is not None and good.size == own.values.size:
                     own.valid = good if own.valid is None else own.valid & good
@@ -306,9 +304,8 @@ def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> Notice |
         if times.size and times.min() / factor > first and times.max() / factor < last:
             times -= times[0]
             times /= factor
-            return Notice(
-                code="unit_found", message=f"{column.shown()} states no unit; its values were read as times in {unit}"
-            )
+            message = f"{column.shown()} states no unit; its values were read as times in {unit}"
+            return Notice(code="unit_found", message=message)
     name = column.title or column.name
     if "time_s" not in choices_of(reading):
         raise no_unit([("time_s", column)], reading)
@@ -328,32 +325,20 @@ def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> Notice |
 
 def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Reading) -> list[Notice]:
     """Notices about columns of the table that are not used."""
+    notices = []
+    if part := [f"{column.channel} from {columns[column.index].shown()}" for column in taken if column.in_part]:
+        message = f"only a part of these titles was recognised, so check them: {', '.join(part)}"
+        notices.append(Notice(code="name_in_part", message=message))
     used = {column.index for column in taken}
-    other_columns = [
-        column.shown()
-        for index, column in enumerate(columns)
-        if index not in used and (column.title or column.name) and not (reading.time == NO_TIME and _is_time(column))
-    ]
-    part = [f"{column.channel} from {columns[column.index].shown()}" for column in taken if column.in_part]
-    notices = (
-        [
-            Notice(
-                code="name_in_part",
-                message=f"only a part of these titles was recognised, so check them: {', '.join(part)}",
-            )
-        ]
-        if part
-        else []
-    )
-    if not other_columns:
-        return notices
-    more = f" and {len(other_columns) - _MAX_NAMED} more" if len(other_columns) > _MAX_NAMED else ""
-    message = f"columns left out, because their titles name no channel: {', '.join(other_columns[:_MAX_NAMED])}{more}"
-    return [*notices, Notice(code=LEFT_OUT, message=message)]
-
-
-def _is_time(column: Column) -> bool:
-    return known_channel(column.name) == "time_s"
+    others = [column for index, column in enumerate(columns) if index not in used and (column.title or column.name)]
+    if reading.time == NO_TIME:
+        others = [column for column in others if known_channel(column.name) != "time_s"]
+    if others:
+        names = ", ".join(column.shown() for column in others[:_MAX_NAMED])
+        more = f" and {len(others) - _MAX_NAMED} more" if len(others) > _MAX_NAMED else ""
+        message = f"columns left out, because their titles name no channel: {names}{more}"
+        notices.append(Notice(code=LEFT_OUT, message=message))
+    return notices
 
 
 def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[str, FloatArray]:
@@ -362,28 +347,22 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
         return {"time_s": series["time_s"].values}
     leading = next((name for name in _LEADING if name in series), next(iter(series)))
     lead = series[leading]
-    same = all(_same_clock(channel_series, lead) for channel_series in series.values())
-    sizes = {channel_series.values.size for channel_series in series.values()}
-    ragged = any(
-        channel_series.times is not None and channel_series.times.size != channel_series.values.size
-        for channel_series in series.values()
-    )
-    if ragged or (len(sizes) > 1 if same else any(channel_series.times is None for channel_series in series.values())):
-        rows = [
-            f"{name} has {channel_series.values.size}{' without times' * (channel_series.times is None)}"
-            for name, channel_series in series.items()
-        ]
+    same = all(_same_clock(own, lead) for own in series.values())
+    sizes = {own.values.size for own in series.values()}
+    ragged = any(own.times is not None and own.times.size != own.values.size for own in series.values())
+    if ragged or (len(sizes) > 1 if same else any(own.times is None for own in series.values())):
+        rows = [f"{name} has {own.values.size}{' without times' * (own.times is None)}" for name, own in series.items()]
         message = f"channels without times of their own must have the same number of rows, got: {', '.join(rows)}"
         raise InvalidError.of(message, code="ragged")
     columns: dict[str, FloatArray] = {} if lead.times is None else {"time_s": lead.times}
     keep = np.ones(lead.values.size, dtype=np.bool_)
     invalid: dict[str, int] = {}
-    for name, channel_series in series.items():
-        valid = channel_series.valid
-        if channel_series is lead or _same_clock(channel_series, lead):
-            columns[name] = channel_series.values
+    for name, own in series.items():
+        valid = own.valid
+        if _same_clock(own, lead):
+            columns[name] = own.values
         else:
-            columns[name], valid, inside = _resampled(name, channel_series, lead)
+            columns[name], valid, inside = _resampled(name, own, lead)
             keep &= inside
         if valid is not None:
             invalid[name] = int(np.count_nonzero(~valid))
@@ -435,20 +414,14 @@ def _step(times: FloatArray) -> float:
 
 
 def _brought(series: Mapping[str, _Series], leading: str, kept: NDArray[np.bool_]) -> Notice:
-    lead = series[leading]
     rates = []
-    for name, channel_series in series.items():
-        if name != leading and not _same_clock(channel_series, lead) and channel_series.times is not None:
-            step = _step(channel_series.times)
-            rates.append(
-                f"{name} ({channel_series.values.size} samples, {step:.6g} s apart, from {channel_series.times[0]:.9g} s)"
-            )
-    shown = ", ".join(rates)[: 5 * MAX_QUOTED]
-    cut = int(np.count_nonzero(~kept))
-    more = (
-        f". {cut} of {kept.size} samples were left out, because not all channels were recorded at their times"
-        if cut
-        else ""
-    )
-    message = f"interpolated to the times of {leading}: {shown}{more}"
+    for name, own in series.items():
+        if own.times is not None and not _same_clock(own, series[leading]):
+            step = _step(own.times)
+            rates.append(f"{name} ({own.values.size} samples, {step:.6g} s apart, from {own.times[0]:.9g} s)")
+    message = f"interpolated to the times of {leading}: {', '.join(rates)[: 5 * MAX_QUOTED]}"
+    if cut := int(np.count_nonzero(~kept)):
+        message += (
+            f". {cut} of {kept.size} samples were left out, because not all channels were recorded at their times"
+        )
     return Notice(code="brought_to_one_clock", message=message)

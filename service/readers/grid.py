@@ -81,7 +81,7 @@ class DataRows:
     """Which rows under a table's titles are its data: none that is blank, is one of those above again, or a footer."""
 
     def __init__(self, rows: Sequence[Row], layout: Layout) -> None:
-        above = rows[: layout.start]
+        self.rows, self.layout, above = rows, layout, rows[: layout.start]
         self.titles, self.first = rows[layout.titles], rows[layout.start] if layout.start < len(rows) else []
         self._above = {tuple(row) for row in above if not all(map(is_value, row))}
         #: The first row of data of each further table under the same titles.
@@ -132,17 +132,17 @@ def _is_summary(row: Row) -> bool:
     return any(isinstance(cell, str) and _SUMMARY.fullmatch(cell) is not None for cell in row)
 
 
-def table_in(
-    rows: Sequence[Row], layout: Layout, data: DataRows, *, first_line: int, rows_read: Callable[[], int], **others: Any
-) -> Table:
+def table_in(data: DataRows, *, first_line: int, rows_read: Callable[[], int], **others: Any) -> Table:
     """The table of a grid, each column with the clock that the rows above it state, or its own cell in them.
 
     LabVIEW's column of times may be empty: then it is none. Raises InvalidError where a row above holds factors.
     """
+    rows, layout = data.rows, data.layout
     above = [shown(row) for row in rows[max(layout.start - MAX_ROWS, 0) : layout.start]]
     refuse_factors(above)
     head = [shown(row) for row in rows[layout.start : layout.start + _MAX_SHOWN]]
-    columns, counted = [], _counted(layout.columns(), head)
+    columns: list[Column] = []
+    counted = _counted(layout.columns(), head)
     for place, column in enumerate(layout.columns()):
         if is_counter(column) and shown(data.first)[place : place + 1] == ("",):
             columns.append(Column("", title=column.title))
@@ -186,27 +186,20 @@ def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[st
     """
     runs = list(_runs(rows, comments)) or [(len(rows), 0)]
     rows = [*rows, ()]
-    layouts = [_layout(rows, comments, start, length, named) for start, length in runs]
-    # titles without data are a table too, where they are known and nothing but units is under them
-    candidates = [
-        layout
-        for layout in layouts
-        if layout
-        and (
-            layout.score[3]
-            or (layout.score[0] and all(is_blank(row) or _are_units(row) for row in rows[layout.titles + 1 :]))
-        )
-    ]
+    candidates = []
+    for start, length in runs:
+        layout = _layout(rows, comments, start, length, named)
+        # titles without data are a table too, where they are known and nothing but units is under them
+        if layout and not layout.score[3]:
+            bare = all(is_blank(row) or _are_units(row) for row in rows[layout.titles + 1 :])
+            layout = layout if layout.score[0] and bare else None
+        candidates += [layout] if layout else []
     best = max(candidates, key=lambda layout: layout.score, default=None)
     # titles that are repeated within the data do not begin another table, nor do numbers with a label above them
-    return next(
-        (
-            layout
-            for layout in candidates
-            if best and layout.texts() == best.texts() and not is_footer(rows[layout.start], rows[best.start])
-        ),
-        None,
-    )
+    for layout in candidates:
+        if best and layout.texts() == best.texts() and not is_footer(rows[layout.start], rows[best.start]):
+            return layout
+    return None
 
 
 def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, int]]:
@@ -254,9 +247,8 @@ def refuse_factors(above: Sequence[Sequence[str]]) -> None:
     """Raise InvalidError where a line above the data has factors of the columns, which may be applied to them or not."""
     for index, row in enumerate(above):
         for place, cell in enumerate(row[1:], 1):
-            under = [
-                other[place] for other in above[index + 1 :] if len(other) > place and NUMBER.fullmatch(other[place])
-            ]
+            below = [other[place] for other in above[index + 1 :] if len(other) > place]
+            under = [number for number in below if NUMBER.fullmatch(number)]
             if _FACTORS.match(cell) and len(under) > 1 and {*map(float, under)} != {1.0}:
                 row = (cell, *under)
         numbers = [cell for cell in row[1:] if NUMBER.fullmatch(cell.replace(",", "."))]
@@ -363,9 +355,8 @@ def _have_names(rows: Sequence[Row], titles: Sequence[str]) -> bool:
     first = [_text(row[0]) for row in rows]
     if len(first) < 2 or not any(map(is_value, first)):
         return len(first) > 1 and all(first)
-    timed = [
-        place for place, title in enumerate(titles) if known_channel(column_of(title[:LONGEST_TITLE]).name) == "time_s"
-    ]
+    names = [column_of(title[:LONGEST_TITLE]).name for title in titles]
+    timed = [place for place, name in enumerate(names) if known_channel(name) == "time_s"]
     if not timed or not all(cell.isdecimal() and len(cell) < LONGEST_UNIT for cell in first):
         return False
     numbers = [_text(row[timed[0] + 1]).replace(",", ".") for row in rows if len(row) == len(titles) + 1]
@@ -375,10 +366,10 @@ def _have_names(rows: Sequence[Row], titles: Sequence[str]) -> bool:
 
 def _filled(texts: Sequence[str], size: int) -> list[str]:
     """The texts of merged cells, each over the empty ones after it."""
-    filled: list[str] = []
-    for text in texts[:size]:
-        filled.append(text or (filled[-1] if filled else ""))
-    return filled + [filled[-1] if filled else ""] * (size - len(filled))
+    filled = [*texts, *[""] * size][:size]
+    for place in range(1, size):
+        filled[place] = filled[place] or filled[place - 1]
+    return filled
 
 
 def _text(cell: Any) -> str:
@@ -403,11 +394,8 @@ def _units(
     best: Sequence[str] = []
     for index in (*below, *over, *labelled):
         if index != at and texts[index] != texts[at]:
-            best = max(
-                best,
-                *_placements_of_units(texts[index], titles, width),
-                key=lambda units: sum(map(_fits, titles, units)),
-            )
+            placements = _placements_of_units(texts[index], titles, width)
+            best = max(best, *placements, key=lambda units: sum(map(_fits, titles, units)))
     return ["" if _UNIT_LABELS.fullmatch(unit) else unit for unit in best]
 
 
@@ -417,16 +405,11 @@ def _placements_of_units(units: Sequence[str], titles: Sequence[str], width: int
     yield units
     stated = [unit for unit in units if unit and not _UNIT_LABELS.fullmatch(unit)]
     channels = [known_channel(column_of(title).name) if len(title) <= LONGEST_TITLE else None for title in titles]
-    for places in (
-        [place for place, channel in enumerate(channels) if channel],
-        [place for place, channel in enumerate(channels) if channel not in (None, "time_s")],
-    ):
+    for unitless in (None,), (None, "time_s"):
+        places = [place for place, channel in enumerate(channels) if channel not in unitless]
         in_order = dict(zip(places, stated, strict=False))
-        if (
-            len(places) == len(stated)
-            and places[-1:] < [width]
-            and all(_fits(titles[place], unit) for place, unit in in_order.items())
-        ):
+        fits = all(_fits(titles[place], unit) for place, unit in in_order.items())
+        if fits and len(places) == len(stated) and places[-1:] < [width]:
             yield [in_order.get(place, "") for place in range(len(titles))]
 
 

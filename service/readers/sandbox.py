@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
@@ -72,10 +72,9 @@ def read_isolated(kind: Format, path: Path, answer: Answer, *, reading: Reading,
         raise BusyError(missing, errors=[FieldError(pointer="", code="format_not_installed", message=missing)])
     if not is_packed(path):
         return _run(kind, path, answer, reading, limits)
-    with tempfile.NamedTemporaryFile(dir=path.parent) as plain:
-        with opened(path, limits) as source:
-            while block := source.read(_BLOCK):
-                plain.write(block)
+    with opened(path, limits) as source, tempfile.NamedTemporaryFile(dir=path.parent) as plain:
+        while block := source.read(_BLOCK):
+            plain.write(block)
         plain.flush()
         return _run(kind, Path(plain.name), answer, reading, limits)
 
@@ -191,16 +190,12 @@ def _error(answer: Mapping[str, Any]) -> ServiceError:
 def main() -> None:
     """Read the file that standard input names; write the answer to the open file whose number is the first argument."""
     request = json.load(sys.stdin)
-    kind, limits = Format(request["kind"]), Limits(**request["limits"])
-    reading = Reading(**request["reading"])
-    reading = replace(
-        reading, mapping={name: Choice(**choice) for name, choice in request["reading"]["mapping"].items()}
-    )
+    kind, path, limits = Format(request["kind"]), Path(request["path"]), Limits(**request["limits"])
+    mapping = {name: Choice(**choice) for name, choice in request["reading"]["mapping"].items()}
+    reading = Reading(**request["reading"] | {"mapping": mapping})
     with os.fdopen(int(sys.argv[1]), "wb") as result:
-        reader = importlib.import_module(
-            READERS[kind][0]
-        )  # whatever it loads, and asks of the system, before the doors close
-        path = Path(request["path"])
+        # whatever it loads, and asks of the system, before the doors close
+        reader = importlib.import_module(READERS[kind][0])
         close_files(readable=[path], writable=[Path(tempfile.gettempdir())])
         close_network_and_processes()
         _limit(limits)
@@ -210,48 +205,43 @@ def main() -> None:
             table = reader.read_table(path, reading, limits)
             if request["answer"] == "preview":
                 _write(result, {"preview": preview(table, reading)})
-                return
-            channels = to_channels(table, reading, limits)
-            _write(result, _described(channels))
-            for column in channels.columns.values():
-                result.write(np.ascontiguousarray(column, dtype="<f8").data)
+            else:
+                _write_channels(result, to_channels(table, reading, limits))
         except ServiceError as error:
             _write_error(result, error)
         except MemoryError:
             _write_error(result, _too_much(kind))
         except BaseException as error:  # noqa: BLE001 (whatever a foreign library raises on a foreign file, Rust's panics too)
-            _write_error(result, _unreadable(kind, f"{type(error).__name__}: {_strip_paths(str(error))}"))
+            message = re.sub(r"(/[\w.~+-]+)+/", "", str(error))  # without the places of this machine
+            _write_error(result, _unreadable(kind, f"{type(error).__name__}: {message[:_MAX_QUOTED]}"))
 
 
-def _described(channels: Channels) -> dict[str, Any]:
-    return {
+def _write_channels(result: BinaryIO, channels: Channels) -> None:
+    answer = {
         "channels": {name: column.size for name, column in channels.columns.items()},
         "notices": [asdict(notice) for notice in channels.notices],
         "counts": channels.counts,
         "labels": dict(channels.labels),
     }
-
-
-def _strip_paths(message: str) -> str:
-    """A foreign message without the places of this machine."""
-    return re.sub(r"(/[\w.~+-]+)+/", "", message)[:_MAX_QUOTED]
+    _write(result, answer)
+    for column in channels.columns.values():
+        result.write(np.ascontiguousarray(column, dtype="<f8").data)
 
 
 def _limit(limits: Limits) -> None:
     spent = resource.getrusage(resource.RUSAGE_SELF)
     loaded = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
-    for which, most, over in (
-        (resource.RLIMIT_AS, loaded + limits.memory_bytes, 0),
-        (
-            resource.RLIMIT_CPU,
-            math.ceil(limits.seconds + spent.ru_utime + spent.ru_stime),
-            1,
-        ),  # first SIGXCPU, which names the cause, then SIGKILL
-        (resource.RLIMIT_FSIZE, 8 * limits.most_values + _LONGEST_ANSWER, 0),
-        (resource.RLIMIT_CORE, 0, 0),
-        (resource.RLIMIT_NOFILE, _MAX_OPEN_FILES, 0),
+    seconds = math.ceil(limits.seconds + spent.ru_utime + spent.ru_stime)
+    resource.setrlimit(
+        resource.RLIMIT_CPU, (seconds, seconds + 1)
+    )  # first SIGXCPU, which names the cause, then SIGKILL
+    for which, most in (
+        (resource.RLIMIT_AS, loaded + limits.memory_bytes),
+        (resource.RLIMIT_FSIZE, 8 * limits.most_values + _LONGEST_ANSWER),
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_NOFILE, _MAX_OPEN_FILES),
     ):
-        resource.setrlimit(which, (most, most + over))
+        resource.setrlimit(which, (most, most))
 
 
 def _write(result: BinaryIO, answer: Mapping[str, Any]) -> None:

@@ -72,9 +72,8 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
     if len(first) == _BLOCK and b"\n" in first and b"\0" not in first:
         first = first[: first.rindex(b"\n") + 1]
     if not first.strip():
-        raise wrong_line(
-            1, "is empty, and so is the rest of the file: send a file with a header and rows of numbers", "no_header"
-        )
+        rule = "is empty, and so is the rest of the file: send a file with a header and rows of numbers"
+        raise wrong_line(1, rule, "no_header")
     try:
         form = _form(first, reading, limits)
     except InvalidError:
@@ -84,9 +83,8 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
         return replace(table, notices=[*table.notices, was_turned()])
     body = _Body(opened, form, reading, limits)
     return table_in(
-        form.rows, form.layout, body.data, first_line=form.first_line, read=body.read, rows_read=body.rows,
-        line_of=body.line_of,
-    )  # fmt: skip
+        body.data, first_line=form.first_line, read=body.read, rows_read=lambda: body.rows, line_of=body.line_of
+    )
 
 
 # --- bytes -> lines ---
@@ -120,11 +118,8 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[tuple[str, bool]]:
             end = len(text)
         complete, unfinished = text[:end], text[end:]
         if (nul := complete.find("\0")) >= 0:
-            raise wrong_line(
-                line + complete.count("\n", 0, nul),
-                "has a NUL byte, which is no text: save the file as UTF-8",
-                "not_text",
-            )
+            rule = "has a NUL byte, which is no text: save the file as UTF-8"
+            raise wrong_line(line + complete.count("\n", 0, nul), rule, "not_text")
         if complete:
             yield complete, last
         line += complete.count("\n")
@@ -135,13 +130,9 @@ def _encodings(head: bytes) -> list[str]:
     """The encodings that a text may be in, likeliest first."""
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return ["utf-16"]
-    sample = head[:512]
-    half = len(sample) // 2
-    for name, zeros, other_bytes in (
-        ("utf-16-le", sample[1::2], sample[::2]),
-        ("utf-16-be", sample[::2], sample[1::2]),
-    ):
-        if half and zeros.count(0) > 0.9 * half and other_bytes.count(0) == 0:
+    even, odd = head[:512:2], head[1:512:2]
+    for name, zeros, letters in (("utf-16-le", odd, even), ("utf-16-be", even, odd)):
+        if odd and zeros.count(0) > 0.9 * len(odd) and letters.count(0) == 0:
             return [name]
     if _decodes(head, "utf-8"):
         return ["utf-8"]
@@ -194,9 +185,8 @@ def _turned(first: bytes, reading: Reading) -> bytes | None:
     """A whole text whose lines are channels with its lines as columns, by the separator by which it is a table then."""
     text = _lines(first, _encodings(first)[0])[reading.skip_rows :]
     for separator in _separators(text):
-        if on_its_side := turned(
-            [cells for _, cells, _ in _rows(text, separator) if any(cells)], named_columns(reading)
-        ):
+        rows = [cells for _, cells, _ in _rows(text, separator) if any(cells)]
+        if on_its_side := turned(rows, named_columns(reading)):
             return "\n".join("\t".join(row) for row in on_its_side[0]).encode()
     return None
 
@@ -277,11 +267,8 @@ class _Body:
         #: Of each block its first row, and the lines of its rows from 1; the line that comes next.
         self._lines: list[tuple[int, Sequence[int]]] = []
         self._line = form.first_line
-        self._rows = 0
-
-    def rows(self) -> int:
-        """How many rows were read."""
-        return self._rows
+        #: How many rows were read.
+        self.rows = 0
 
     def line_of(self, row: int) -> int:
         """The line of a row that was read: rows count from 0, lines from 1."""
@@ -291,9 +278,8 @@ class _Body:
     def read(self, channels: Mapping[int, str]) -> list[NDArray[Any]]:
         """The columns [n] by index. Raises InvalidError naming line and value, TooLargeError past the limits."""
         self._settle(channels)
-        dated = any(
-            name == "time_s" and is_stamp("".join(self.data.first[at : at + 1])) for at, name in channels.items()
-        )
+        times = [at for at, name in channels.items() if name == "time_s"]
+        dated = any(is_stamp("".join(self.data.first[at : at + 1])) for at in times)
         parts: list[list[NDArray[Any]]] = [[] for _ in channels]
         most = self._limits.most_values // len(channels)
         end, late = time.thread_time() + self._limits.seconds, time.monotonic() + self._limits.wall_seconds
@@ -306,16 +292,15 @@ class _Body:
             if numbers is None:
                 columns = self._careful(block, channels, last)
             else:
-                self._lines.append((self._rows, range(self._line, self._line + len(numbers))))
+                self._lines.append((self.rows, range(self._line, self._line + len(numbers))))
                 columns = [numbers[:, index].copy() for index in channels]
             self._line += block.count("\n")
             for part, column in zip(parts, columns, strict=True):
                 part.append(column)
-            self._rows += columns[0].size
-            if self._rows > most:
-                raise TooLargeError(
-                    f"a file of {len(channels)} channels must not have more than {most} rows: send it in parts"
-                )
+            self.rows += columns[0].size
+            if self.rows > most:
+                rule = f"must not have more than {most} rows"
+                raise TooLargeError(f"a file of {len(channels)} channels {rule}: send it in parts")
         self.data.end()
         joined = []
         while parts:
@@ -389,17 +374,15 @@ class _Body:
         """
         if (cells := self._even(block)) is not None:
             rows_read = range(self._line, self._line + block.count("\n"))
-            self._lines.append((self._rows, rows_read))
+            self._lines.append((self.rows, rows_read))
             even = [cells[index : -1 : self._width + 1] for index in channels]
-            return self._numerals.values(channels, even, self.line_of, self._rows)
-        titles = self.data.titles
-        readings = (
-            (self._line + at, cells) for at, cells, comment in self._parsed(block) if not comment or cells == titles
-        )
-        lines, rows = self.data.of(readings, self._rows, last=last)
-        self._lines.append((self._rows, lines))
+            return self._numerals.values(channels, even, self.line_of, self.rows)
+        parsed, titles = self._parsed(block), self.data.titles
+        readings = ((self._line + at, cells) for at, cells, comment in parsed if not comment or cells == titles)
+        lines, rows = self.data.of(readings, self.rows, last=last)
+        self._lines.append((self.rows, lines))
         errors = [
-            self._ragged(self._rows + row, cells)
+            self._ragged(self.rows + row, cells)
             for row, cells in enumerate(rows)
             if len(cells) != self._width and not self._fit(cells, channels)
         ]
@@ -407,7 +390,7 @@ class _Body:
             more = "" if len(errors) == 1 else f"; {len(errors)} errors up to line {lines[-1]}"
             raise InvalidError(errors[0].message + more, errors=errors[:MAX_ERRORS], total=len(errors))
         columns = [[cells[index] for cells in rows] for index in channels]
-        return self._numerals.values(channels, columns, self.line_of, self._rows)
+        return self._numerals.values(channels, columns, self.line_of, self.rows)
 
     def _fit(self, cells: list[str], channels: Mapping[int, str]) -> bool:
         """Whether a row is one with empty cells at its end, or none of those that are not taken; they are added."""

@@ -78,7 +78,5 @@ def _table(name: str, rows: list[Sequence[Any]], layout: Layout, sheets: tuple[s
             columns[-1][:] = [row[index] if index < len(row) else "" for row in cells]
         return columns
 
-    return table_in(
-        rows, layout, data, first_line=layout.start + 1, rows_read=lambda: len(cells), read=read, line_of=lines.__getitem__,
-        name=name, others=sheets,
-    )  # fmt: skip
+    where = {"name": name, "others": sheets, "line_of": lines.__getitem__}
+    return table_in(data, first_line=layout.start + 1, read=read, rows_read=lambda: len(cells), **where)
