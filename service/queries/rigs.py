@@ -211,7 +211,7 @@ def _evaluated(
         kind = kind or (answer["kinds"][0] if len(answer["kinds"]) == 1 else None)
         if kind is None or answer["missing"]:
             return answer
-        run = run_of(read, kind=kind, cycles=0.0)
+        run = run_of(read, IncomingRun(kind=kind, cycles=0.0, run_id=""))
         analysis = analyse(run, geometry, torque_filter)
         return answer | {
             "pieces": _pieces(run, torque_filter),

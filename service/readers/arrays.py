@@ -18,7 +18,7 @@ from service.errors import InvalidError, Notice
 from service.readers.clocks import UNITS, stated_clock
 from service.readers.column_names import column_of, known_channel, recognised
 from service.readers.limits import Limits
-from service.readers.table import Clock, Column, Reading, Table, index_of_wanted
+from service.readers.table import Column, Reading, Table, index_of_wanted
 from service.readers.unit_table import is_unit
 
 _DATA = ("data", "values", "value", "y", "samples")
@@ -67,9 +67,10 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
         sources = [source for source in sources if source.column.group == chosen]
     elif len(knowing := _complete(sources)) > 1:
         index_of_wanted(knowing, "", "group")
+    left_out = ", ".join(unread[:10])
     if not sources:
         hint = (
-            f": only MATLAB can read {', '.join(unread[:10])}. Save the channels as arrays, or as a struct of arrays"
+            f": only MATLAB can read {left_out}. Save the channels as arrays, or as a struct of arrays"
             if unread
             else ""
         )
@@ -82,18 +83,9 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
         return [_values(sources[index]) for index in taken]
 
-    notices = (
-        (Notice(code="not_read", message=f"left out, because only MATLAB can read it: {', '.join(unread[:10])}"),)
-        if unread
-        else ()
-    )
-    return Table(
-        columns=tuple(source.column for source in sources),
-        read=read,
-        name=reading.table,
-        others=groups,
-        notices=notices,
-    )
+    notice = Notice(code="not_read", message=f"left out, because only MATLAB can read it: {left_out}")
+    columns, notices = tuple(source.column for source in sources), (notice,) if unread else ()
+    return Table(columns=columns, read=read, name=reading.table, others=groups, notices=notices)
 
 
 def _paired(tree: Tree) -> Tree:
@@ -124,9 +116,8 @@ def _sources(tree: Tree, group: str, depth: int, above: Tree) -> Iterator[_Sourc
         if isinstance(node, Mapping):
             lowered = {key.lower(): value for key, value in node.items()}
             data = next((lowered[key] for key in _DATA if isinstance(lowered.get(key), Leaf)), None)
-            remaining = [
-                key for key, value in node.items() if isinstance(value, Leaf) and value is not data and _rows(value)
-            ]
+            leaves = {key: leaf for key, leaf in node.items() if isinstance(leaf, Leaf) and leaf is not data}
+            remaining = [key for key, leaf in leaves.items() if _rows(leaf)]
             if data is not None and all(known_channel(key) == "time_s" for key in remaining):
                 label = next((_text(lowered[key]) for key in _LABELS if _text(lowered.get(key))), name)
                 data = replace(data, attributes={**node, **data.attributes})
@@ -156,10 +147,9 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
     units = max(lists, key=_count_units, default=[])
     units = units if 2 * _count_units(units) > size else [""] * size
     matrix = size > 1 and not dtype.names
-    names = max(
-        (texts for texts in lists if matrix and texts is not units), key=lambda own: recognised(own, ()), default=[]
-    )
-    clock = _clock(leaf, beside, rows)
+    titles = [texts for texts in lists if matrix and texts is not units]
+    names = max(titles, key=lambda own: recognised(own, ()), default=[])
+    clock = stated_clock({**_scalars(beside), **_scalars(leaf.attributes)}, lambda: rows)
     for at, (part, place) in enumerate(parts):
         title = names[at] if names else part
         stated_as = [title, f"field_{at}"] if dtype.names else [title]
@@ -228,16 +218,13 @@ def _scalars(tree: Tree) -> dict[str, float | str]:
     return scalars
 
 
-def _clock(leaf: Leaf, beside: Tree, rows: int) -> Clock | None:
-    """The clock that is stated at the array, beside it or in a folder above."""
-    return stated_clock({**_scalars(beside), **_scalars(leaf.attributes)}, lambda: rows)
-
-
 def _number(value: Any) -> float | None:
     """A single number."""
-    array = np.asarray(
-        value.data[()] if isinstance(value, Leaf) and value.data.size == 1 else value if np.isscalar(value) else ()
-    )
+    if isinstance(value, Leaf) and value.data.size == 1:
+        value = value.data[()]
+    elif not np.isscalar(value):
+        return None
+    array = np.asarray(value)
     return float(array.reshape(-1)[0]) if array.size == 1 and array.dtype.kind in "iuf" else None
 
 

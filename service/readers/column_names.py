@@ -164,18 +164,17 @@ def meaning(name: str, unit: str | None = None) -> tuple[str | None, Sense]:
         symbol = next((word for word in words if word in _SYMBOLS), "")
         quantities = {q for q in _SYMBOLS.get(symbol, ()) if (len(words) > 1 and unit is None) or _measures(q, unit)}
         if len(quantities) > 1:
-            quantities = (
-                {"temperature"} & quantities if unknown_words & (_OIL | _PLATE) else quantities - {"temperature"}
-            )
+            hot = bool(unknown_words & (_OIL | _PLATE))
+            quantities = {quantity for quantity in quantities if (quantity == "temperature") == hot}
     if len(quantities) != 1:
         return None, Sense.UNKNOWN
     (quantity,) = quantities
     unknown_words -= {word for word, of in _SYMBOLS.items() if quantity in of} | _NEUTRAL[quantity]
     channel = quantity
     if quantity == "temperature":
-        hot = unknown_words | set(words)
-        channel = "oil_temperature_c" if hot & _OIL else "plate_temperature_" + ("rear_c" if hot & _REAR else "front_c")
-        if not hot & (_OIL | _PLATE):
+        of = unknown_words | set(words)
+        channel = "oil_temperature_c" if of & _OIL else "plate_temperature_" + ("rear_c" if of & _REAR else "front_c")
+        if not of & (_OIL | _PLATE):
             return None, Sense.UNKNOWN
         unknown_words -= _OIL | _PLATE | _REAR | {"front", "vorn", "vorne"}
     elif quantity == "torque_nm" and unknown_words & _SPREAD:
@@ -191,10 +190,9 @@ def meaning(name: str, unit: str | None = None) -> tuple[str | None, Sense]:
 
 def _words(name: str) -> list[str]:
     """The words of a name in small letters, without labels that end in a number."""
-    split_words = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name)
-    return re.findall(
-        r"[^\W\d_]+", re.sub(r"(?<![^\W_])(?:ch|ai|cnt|kanal|max_?|[a-z])?\d+(?![^\W_])", " ", _key(split_words))
-    )
+    key = _key(re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name))
+    key = re.sub(r"(?<![^\W_])(?:ch|ai|cnt|kanal|max_?|[a-z])?\d+(?![^\W_])", " ", key)
+    return re.findall(r"[^\W\d_]+", key)
 
 
 def _measures(quantity: str, unit: str | None) -> bool:
@@ -237,19 +235,16 @@ def column_of(text: str, unit: str | None = None, group: str = "", *, moments: b
     title = text.strip()
     if len(title) > LONGEST_TITLE:
         shown = title[:MAX_QUOTED]
-        message = (
-            f"a column's title must not be longer than {LONGEST_TITLE} characters, got {len(title)}: {shown!r} ..."
-        )
-        raise InvalidError.of(message, code="title_too_long", value=shown)
+        rule = f"must not be longer than {LONGEST_TITLE} characters, got {len(title)}: {shown!r} ..."
+        raise InvalidError.of(f"a column's title {rule}", code="title_too_long", value=shown)
     name, title_unit = _taken_apart(" ".join(title.translate(_WIDE).split()))
     column = Column(name, "s" if moments else title_unit, group, title)
     return column if unit is None or moments else with_unit(column, unit)
 
 
 def _taken_apart(title: str) -> tuple[str, str | None]:
-    units = [
-        bracket for bracket in _BRACKET.finditer(title) if bracket.start() and is_unit(bare_unit(bracket[1]) or "")
-    ]
+    within = [bracket for bracket in _BRACKET.finditer(title) if bracket.start()]
+    units = [bracket for bracket in within if is_unit(bare_unit(bracket[1]) or "")]
     if len(units) == 1:
         name = f"{title[: units[0].start()].rstrip(' /')} {title[units[0].end() :].strip(' :.')}".strip()
         return name, bare_unit(units[0][1])
@@ -356,7 +351,9 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
     if errors:
         raise errors[0]
     if not chosen:
-        raise InvalidError(f"the file holds no known channel: it has {_list(columns)}; {remedy(columns)}")
+        example = columns[0].shown() if columns else "NAME"
+        way = f"name the columns of channels, as in map=torque_nm:{example}; the channels are {', '.join(CHANNELS)}"
+        raise InvalidError(f"the file holds no known channel: it has {_list(columns)}; {way}")
     return chosen
 
 
@@ -381,26 +378,20 @@ def understood(columns: Sequence[Column], reading: Reading) -> tuple[list[Taken]
     for channel in CHANNELS:
         if channel in named or (channel == "time_s" and reading.time == NO_TIME):
             continue
-        whole_seconds, part = (
-            [index for index in free if senses[index] == (channel, sense)] for sense in (Sense.WHOLE, Sense.PART)
-        )
+        whole, part = ([at for at in free if senses[at] == (channel, sense)] for sense in (Sense.WHOLE, Sense.PART))
         # neither a mean beside the signal itself nor what stands in a group of set points
-        plain = [
-            at for at in whole_seconds if not (_MEANS & {*_words(columns[at].name)} or _is_another(columns[at].group))
-        ]
-        candidates, rivals = (
-            plain or whole_seconds or part,
-            [index for index in free if senses[index][1] is Sense.UNKNOWN],
-        )
-        rivals = [] if whole_seconds else [index for index in rivals if _measures(channel, columns[index].unit)]
+        plain = [at for at in whole if not (_MEANS & {*_words(columns[at].name)} or _is_another(columns[at].group))]
+        candidates = plain or whole or part
+        unknown = [] if whole else [at for at in free if senses[at][1] is Sense.UNKNOWN]
+        rivals = [at for at in unknown if _measures(channel, columns[at].unit)]
         if channel == "time_s":
             candidates = candidates or ([] if by_map else rivals)
-            guessed = set() if whole_seconds else {*candidates}
+            guessed = set() if whole else {*candidates}
             chosen |= dict.fromkeys(candidates, channel)
         elif len(candidates) == 1 and not (rivals and channel in _MEASURED):
             chosen[candidates[0]] = channel
-            in_part |= set() if whole_seconds else {*candidates}
-        elif candidates and (whole_seconds or channel in _MEASURED):
+            in_part |= set() if whole else {*candidates}
+        elif candidates and (whole or channel in _MEASURED):
             errors.append(_twice(channel, *(columns[index] for index in candidates + rivals)))
     if not {*chosen} - guessed:
         return [], errors
@@ -447,19 +438,11 @@ def no_unit(columns: Sequence[tuple[str, Column]], reading: Reading) -> InvalidE
     )
 
 
-def remedy(columns: Sequence[Column]) -> str:
-    """How to name the columns of channels."""
-    example = columns[0].shown() if columns else "NAME"
-    return f"name the columns of channels, as in map=torque_nm:{example}; the channels are {', '.join(CHANNELS)}"
-
-
 def _find(columns: Sequence[Column], channel: str, name: str) -> int:
     """The index of the column that a map names: by its exact title or name, else whatever its case, blanks and unit."""
-    asked_column = column_of(name)
-    exact = [
-        i for i, column in enumerate(columns) if name in (column.title, column.name, f"{column.group}/{column.name}")
-    ]
-    alike = [i for i, column in enumerate(columns) if _key(asked_column.name) == _key(column.name)]
+    key, forms = _key(column_of(name).name), [(own.title, own.name, f"{own.group}/{own.name}") for own in columns]
+    exact = [index for index, names in enumerate(forms) if name in names]
+    alike = [index for index, column in enumerate(columns) if _key(column.name) == key]
     for matches in (exact, alike):
         if len(matches) == 1:
             return matches[0]
@@ -525,13 +508,10 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
     if scaled and asked_unit is None and (choice is None or choice.factor == 1):
         number = float(re.findall(r"-?\d+(?:[.,]\d+)?", scaled[0])[-1].replace(",", "."))
         number = 10**number if "^" in scaled[0] else number
-        assumed_unit = column.unit or CHANNELS[channel].unit
+        assumed = column.unit or CHANNELS[channel].unit
         factor = number if "/" in scaled[0] else 1 / number
-        mapped, alternatives = (
-            f"map={channel}:{column.name}",
-            f"[x{1 / factor:g} {assumed_unit}] or [x1 {assumed_unit}]",
-        )
-        rule = f"may contain a factor: state it with {mapped} [x{factor:g} {assumed_unit}], {alternatives}"
+        ways = f"[x{factor:g} {assumed}], [x{1 / factor:g} {assumed}] or [x1 {assumed}]"
+        rule = f"may contain a factor: state it with map={channel}:{column.name} {ways}"
         raise _wrong_unit(channel, column, "missing_unit", rule, "no clear one")
     if choice is None:
         return "s" if column.unit is None and _key(column.name) in _SECONDS else column.unit

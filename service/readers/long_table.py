@@ -50,7 +50,7 @@ def says_valid(column: Column) -> bool:
 
 def valid_rows(column: Column, cells: NDArray[Any]) -> NDArray[np.bool_] | None:
     """Which rows a column says to be valid [n]; None where it does not say so in words or flags that are known."""
-    words = np.array([str(cell).strip().casefold() for cell in cells.tolist()], dtype=object)
+    words = np.array([word.casefold() for word in _stripped(cells)], dtype=object)
     flags = _ON | _OFF if _QUALITY.search(column.name) else set()
     good = _GOOD | (flags & (_OFF if re.search("invalid|ungültig", column.name, re.IGNORECASE) else _ON))
     return np.isin(words, list(good)) if set(words) <= good | _BAD | flags else None
@@ -74,16 +74,13 @@ def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
         return table, reading
     unit = next((index for index in words if index != best and all(map(is_unit, head[index]))), None)
     timed = _time(columns, reading)
-    value = _value(
-        columns, [index for index, cells in head.items() if cells and all(map(is_value, cells))], best, reading
-    )
+    numeric = [index for index, cells in head.items() if cells and all(map(is_value, cells))]
+    value = _value(columns, numeric, best, reading)
     marked = next((index for index, column in enumerate(columns) if says_valid(column)), None)
     index_titles = {index: "" for index in (best, unit, marked) if index is not None} | {value: columns[value].shown()}
     cells = read_cells(table, index_titles | ({} if timed is None else {timed[0]: "time_s"}), reading)
-    names = np.array([str(cell).strip() for cell in cells[best].tolist()], dtype=object)
-    units = np.array(
-        [str(cell).strip() for cell in cells[unit].tolist()] if unit is not None else [""] * names.size, dtype=object
-    )
+    names = _stripped(cells[best])
+    units = np.full(names.size, "", dtype=object) if unit is None else _stripped(cells[unit])
     if marked is not None:
         good = valid_rows(columns[marked], cells[marked])
         good = cells[marked] == cells[marked][0] if good is None else good
@@ -95,28 +92,24 @@ def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
         return [cells[value][list(rows.values())[index]] for index in taken]
 
-    message = (
-        f"each row holds one value: the {len(rows)} channels named in {columns[best].shown()} were read as columns"
-    )
+    named_in = f"the {len(rows)} channels named in {columns[best].shown()}"
+    message = f"each row holds one value: {named_in} were read as columns"
+    first_rows = [map(str, cells[value][own[:_MAX_LOOKED_AT]]) for own in rows.values()]
     wide = replace(
         table,
-        columns=tuple(
-            _column(name, set(units[rows_of_channel].tolist()), rows_of_channel, times)
-            for name, rows_of_channel in rows.items()
-        ),
+        columns=tuple(_column(name, set(units[own].tolist()), own, times) for name, own in rows.items()),
         read=read,
-        head=tuple(
-            zip(
-                *(map(str, cells[value][rows_of_channel[:_MAX_LOOKED_AT]]) for rows_of_channel in rows.values()),
-                strict=False,
-            )
-        ),
+        head=tuple(zip(*first_rows, strict=False)),
         line_of=None,
         breaks=(),
         notices=[*table.notices, Notice(code="long_table", message=message)],
     )
     untimed = {channel: choice for channel, choice in reading.mapping.items() if channel != "time_s"}
     return wide, replace(reading, mapping=untimed, time=NO_TIME if reading.time == NO_TIME else "")
+
+
+def _stripped(cells: NDArray[Any]) -> NDArray[Any]:
+    return np.array([str(cell).strip() for cell in cells.tolist()], dtype=object)
 
 
 def _head(table: Table) -> dict[int, list[Any]]:
@@ -143,24 +136,17 @@ def _time(columns: Sequence[Column], reading: Reading) -> tuple[int, Any] | None
         raise several_times(shown)
     if not places:
         return None
-    mapping = {} if named is None else {"time_s": named}
-    (chosen, *_) = [
-        chosen
-        for chosen in choose([columns[index] for index in places], Reading(mapping=mapping))
-        if chosen.channel == "time_s"
-    ]
+    taken = choose([columns[index] for index in places], Reading(mapping={"time_s": named} if named else {}))
+    chosen, *_ = (column for column in taken if column.channel == "time_s")
     return places[chosen.index], chosen.conversion
 
 
 def _value(columns: Sequence[Column], numeric: Sequence[int], names: int, reading: Reading) -> int:
     """The column of values: the only one of numbers that is no time, or the one that is called so."""
     timed = choices_of(reading).get("time_s")
-    candidates = [
-        index
-        for index in numeric
-        if not is_time(columns[index])
-        and (timed is None or timed.column not in (columns[index].title, columns[index].name))
-    ]
+    candidates = [index for index in numeric if not is_time(columns[index])]
+    if timed is not None:
+        candidates = [at for at in candidates if timed.column not in (columns[at].title, columns[at].name)]
     called = [index for index in candidates if _VALUES.search(columns[index].name)]
     for places in (called, candidates):
         if len(places) == 1:

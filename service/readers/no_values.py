@@ -157,12 +157,8 @@ def drop_totals(
     """Columns [n] by index and their table without the rows at its end that are the means, sums, maxima of those above."""
     measured_columns = [columns[index] for index in measured]
     sizes = {column.size for column in measured_columns}
-    if (
-        not measured_columns
-        or len(sizes) > 1
-        or max(sizes) > _LONGEST
-        or any(column.dtype.kind not in "iuf" for column in measured_columns)
-    ):
+    numeric = all(column.dtype.kind in "iuf" for column in measured_columns)
+    if len(sizes) != 1 or max(sizes) > _LONGEST or not numeric:
         return dict(columns), table
     starts = [0, *table.breaks, *sizes]
     keep = np.ones(max(sizes), dtype=np.bool_)
@@ -198,9 +194,8 @@ def _totals(columns: list[FloatArray]) -> list[str]:
             chance, name = min((_chance(above, values, name), name) for name in _STATISTICS)
             if not np.isfinite(chance):
                 break
-            repeated = (
-                name in _OWN and np.logical_and.reduce([a == v for a, v in zip(above, values, strict=True)]).any()
-            )
+            same = [column == value for column, value in zip(above, values, strict=True)]
+            repeated = name in _OWN and np.logical_and.reduce(same).any()
             made_of.append(name)
             by_chance *= 1.0 if repeated else chance
         limit = _BY_CHANCE_OWN if set(made_of) <= _OWN else _BY_CHANCE

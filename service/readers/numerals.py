@@ -290,8 +290,6 @@ _ORDERS = ["%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y年%m月%d日", "%d.%m.%Y", "%
 #: The day from which days are counted, so that nanoseconds fit 64 bits.
 _EPOCH = datetime(2000, 1, 1)
 _DAY = 86_400 * 10**9
-
-
 #: The time before the date, as LabVIEW writes both in some languages.
 _TIME_FIRST = re.compile(r"(\d{1,2}:\d\d:[\d:.,]+) (\d{1,4}[-./]\d{1,2}[-./]\d{2,4})$")
 #: The order of C's ctime: `Fri Nov 27 07:00:00 2026`.
@@ -312,16 +310,15 @@ def _in_numbers(cell: str) -> str:
 
 def is_stamp(cell: str) -> bool:
     """Whether a text has the form of a point in time or of a duration with colons."""
-    match = _STAMP.fullmatch(_in_numbers(cell.strip()))
-    return (match is not None and bool(match["date"] or match["first"])) or _DURATION.fullmatch(
-        cell.strip()
-    ) is not None
+    cell = cell.strip()
+    match = _STAMP.fullmatch(_in_numbers(cell))
+    return (match is not None and bool(match["date"] or match["first"])) or _DURATION.fullmatch(cell) is not None
 
 
 class Stamps:
     """Points in time as text -> nanoseconds since `origin`, the first moment of a file's columns with a date, or of those
-    without one: dates of every usual
-    order, times of day, durations. A zone's name (`CET`) is one for all `zones` of the file, and shifts nothing."""
+    without one: dates of every usual order, times of day, durations. A zone's name (`CET`) is one for all `zones` of the
+    file, and shifts nothing."""
 
     def __init__(self, origin: dict[bool, int], zones: set[str]) -> None:
         self._origin, self._zones = origin, zones
@@ -375,11 +372,10 @@ class Stamps:
             return _duration(cell.strip())
         first, second, third = (int(match[name] or 0) for name in ("first", "second", "third"))
         if match["first"] and not match["third"]:
-            if not match["fraction"]:
-                if not match["date"]:
-                    return None  # 07:30 may be hours or minutes
-            else:
+            if match["fraction"]:
                 first, second, third = 0, first, second
+            elif not match["date"]:
+                return None  # 07:30 may be hours or minutes
         if match["half"]:
             first = first % 12 + 12 * (match["half"][0].lower() == "p")
         total = ((first * 60 + second) * 60 + third) * 10**9 + int((match["fraction"] or "").ljust(9, "0"))
@@ -406,10 +402,8 @@ class Stamps:
         for written in dates:
             self._orders = {order for order in self._orders if _day_by(written, order) is not None} or self._orders
         if len(self._orders) > 1 and len(dates | {written for written in self._dates if "/" in written}) > 1:
-            shown = min(dates)[:MAX_QUOTED]
-            message = (
-                f"the dates of the time column may be day/month or month/day, got {shown!r}: write them as 2026-11-02"
-            )
+            got = f"got {min(dates)[:MAX_QUOTED]!r}: write them as 2026-11-02"
+            message = f"the dates of the time column may be day/month or month/day, {got}"
             raise InvalidError.of(message, code="ambiguous_date", pointer="/channels/time_s")
 
     def _day(self, written: str) -> int | None:

@@ -46,9 +46,9 @@ def _stated(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
     stated: dict[str, Any] = {}
     for key, value in (metadata or {}).items():
         decoded = parsed(value.decode("utf-8", "replace"))
-        stated |= {key.decode("utf-8", "replace"): decoded} | (
-            decoded if key == b"PANDAS_ATTRS" and isinstance(decoded, dict) else {}
-        )
+        stated[key.decode("utf-8", "replace")] = decoded
+        if key == b"PANDAS_ATTRS" and isinstance(decoded, dict):
+            stated |= decoded
     return stated
 
 

@@ -40,9 +40,12 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     limits.require_columns(len(channels))
     scales = [_scales(channel) for channel in channels]
     group_properties = {group.name: _stated({**file.properties, **group.properties}) for group in groups}
+    starts = [channel.properties.get("wf_start_time") for channel in channels]
+    earliest = min((start for start in starts if start is not None), default=None)
     clocks = [
-        clock or stated_clock(group_properties[channel.group_name] | _stated(channel.properties), partial(len, channel))
-        for channel, clock in zip(channels, _clocks(channels), strict=True)
+        _waveform(channel, earliest)
+        or stated_clock(group_properties[channel.group_name] | _stated(channel.properties), partial(len, channel))
+        for channel in channels
     ]
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
@@ -51,14 +54,8 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
             refuse_counts(channels[index].name[:MAX_QUOTED], values, _stated(channels[index].properties))
         return list(values_by_index.values())
 
-    return Table(
-        columns=tuple(
-            _column(channel, len(groups) > 1, clock) for channel, clock in zip(channels, clocks, strict=True)
-        ),
-        read=read,
-        name=reading.table,
-        others=tuple(group.name for group in file.groups()),
-    )
+    columns = tuple(_column(channel, len(groups) > 1, clock) for channel, clock in zip(channels, clocks, strict=True))
+    return Table(columns=columns, read=read, name=reading.table, others=tuple(group.name for group in file.groups()))
 
 
 def _scales(channel: Any) -> dict[str, str]:
@@ -102,18 +99,12 @@ def _column(channel: Any, grouped: bool, clock: Clock | None) -> Column:
     return replace(column, rows=len(channel), clock=clock)
 
 
-def _clocks(channels: list[Any]) -> list[Clock | None]:
-    """The clock of each waveform: wf_start_time + wf_start_offset + k · wf_increment, in s after the earliest start.
+def _waveform(channel: Any, earliest: Any) -> Clock | None:
+    """A waveform's clock: wf_start_time + wf_start_offset + k · wf_increment, in s after the earliest start of all.
 
     One whose properties say that it has a single sample a waveform (wf_samples 1), or whose axis is no time, has none.
     """
-    starts = [channel.properties.get("wf_start_time") for channel in channels]
-    earliest = min((start for start in starts if start is not None), default=None)
-    return [_clock(channel, start, earliest) for channel, start in zip(channels, starts, strict=True)]
-
-
-def _clock(channel: Any, start: Any, earliest: Any) -> Clock | None:
-    properties = channel.properties
+    properties, start = channel.properties, channel.properties.get("wf_start_time")
     step, offset = (float(properties.get(name, 0.0)) for name in ("wf_increment", "wf_start_offset"))
     if not step > 0 or (properties.get("wf_samples") == 1 and step == 1.0) or channel.dtype is None:
         return None
@@ -126,6 +117,5 @@ def _clock(channel: Any, start: Any, earliest: Any) -> Clock | None:
     rows = len(channel)
     # a waveform without a start cannot be told from the others' start: its own key keeps it from passing for theirs
     key = (None if start is None and earliest is not None else shift, offset * factor, step * factor, rows)
-    return Clock(
-        key, partial(evenly, shift + offset * factor, step * factor, rows), counts=step == 1.0 and offset == 0.0
-    )
+    read = partial(evenly, shift + offset * factor, step * factor, rows)
+    return Clock(key, read, counts=step == 1.0 and offset == 0.0)

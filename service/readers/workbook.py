@@ -32,9 +32,8 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     named = named_columns(reading)
     if reading.table or len(sheets) == 1:
         sheet, _, number = reading.table.rpartition("/")  # of tables below each other on a sheet
-        sheets = [
-            sheets[index_of_wanted(sheets, sheet if sheet in sheets and number.isdecimal() else reading.table, "sheet")]
-        ]
+        wanted = sheet if sheet in sheets and number.isdecimal() else reading.table
+        sheets = [sheets[index_of_wanted(sheets, wanted, "sheet")]]
     tables: dict[str, tuple[list[Sequence[Any]], Layout]] = {}
     refused: list[InvalidError] = []
     on_side: set[str] = set()
@@ -43,7 +42,8 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         rows[: reading.skip_rows] = [()] * len(rows[: reading.skip_rows])
         layout = find_table(rows[: reading.skip_rows + MAX_ROWS], frozenset(), named)
         if layout is None and len(rows) <= MAX_ROWS and (on_its_side := turned(rows, named)):
-            (rows, layout), on_side = on_its_side, {*on_side, name}
+            rows, layout = on_its_side
+            on_side.add(name)
         if layout is None:
             refused.append(no_table(rows[: reading.skip_rows + MAX_ROWS], named))
         elif len(sheets) == 1 or recognised([heading[0] for heading in layout.headings], named):
@@ -78,5 +78,5 @@ def _table(name: str, rows: list[Sequence[Any]], layout: Layout, sheets: tuple[s
             columns[-1][:] = [row[index] if index < len(row) else "" for row in cells]
         return columns
 
-    where = {"name": name, "others": sheets, "line_of": lines.__getitem__}
-    return table_in(data, first_line=layout.start + 1, read=read, rows_read=lambda: len(cells), **where)
+    others = {"line_of": lines.__getitem__, "name": name, "others": sheets}
+    return table_in(data, first_line=layout.start + 1, rows_read=lambda: len(cells), read=read, **others)

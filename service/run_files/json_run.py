@@ -152,10 +152,9 @@ def _require_utf8(body: bytes) -> None:
     try:
         body.decode()
     except UnicodeDecodeError as error:
-        wrong = body[error.start]
-        raise _encoding_error(
-            f"byte {error.start + 1} is 0x{wrong:02x}, which is {bytes([wrong]).decode('latin-1')!r} in Latin-1"
-        ) from None
+        wrong = body[error.start : error.start + 1]
+        shown = f"0x{wrong.hex()}, which is {wrong.decode('latin-1')!r} in Latin-1"
+        raise _encoding_error(f"byte {error.start + 1} is {shown}") from None
 
 
 def _encoding_error(why: str) -> InvalidError:

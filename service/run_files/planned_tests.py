@@ -53,9 +53,8 @@ def _planned(place: str, given: Mapping[str, Any]) -> PlannedTest:
         step = PlanStep.model_validate(given)
     except ValidationError as error:
         wrong = error.errors()[0]
-        raise ValueError(
-            f"{place}: {'.'.join(map(str, wrong['loc']))}: {rule_in_words(wrong['type'], wrong['msg'])}"
-        ) from None
+        rule = rule_in_words(wrong["type"], wrong["msg"])
+        raise ValueError(f"{place}: {'.'.join(map(str, wrong['loc']))}: {rule}") from None
     if not step.pressures_bar or not step.speeds_rpm or step.cycles is None:
         raise ValueError(f"{place}: pressures_bar, speeds_rpm and cycles must be given")
     warm = step.oil_temperature_c

@@ -39,19 +39,15 @@ _NEEDING = {RecordFormat.TDMS: Format.TDMS, RecordFormat.MDF4: Format.MDF4}
 
 def require_writer(kind: RecordFormat) -> None:
     """Raises ValueError where the package that writes a format is not installed; names the extra that installs it."""
-    if kind not in _NEEDING:
-        return
-    if missing := not_installed(_NEEDING[kind], f"{_NEEDING[kind]} files cannot be written"):
+    needed = _NEEDING.get(kind)
+    if needed and (missing := not_installed(needed, f"{needed} files cannot be written")):
         raise ValueError(missing)
 
 
 def write_record(path: Path, kind: RecordFormat, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
-    """Channels [n] by public name into one file, whole or not at all; `head` goes in as comment or properties.
-
-    Raises ValueError where the format is JSON, or its package is not installed.
+    """Channels [n] by public name into one file, CSV, TDMS or MDF4, whole or not at all; `head` goes in as comment or
+    properties. Raises ValueError where the package of the format is not installed.
     """
-    if kind is RecordFormat.JSON:
-        raise ValueError("a record file must be CSV, TDMS or MDF4, got JSON")
     require_writer(kind)
     partial = path.with_name(f".{path.stem}.part{path.suffix}")
     _WRITERS[kind](partial, channels, head)

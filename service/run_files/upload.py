@@ -1,6 +1,6 @@
 """A run posted as a file -> `IncomingRun`: the file holds the channels, the request or the rig's profile everything else."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
@@ -51,47 +51,35 @@ def read_file_run(
     kind, cycles = kind or stated.kind, stated.cycles if cycles is None else cycles
     if kind is None or cycles is None:
         name = "kind" if kind is None else "cycles"
-        where = (
-            "no rig profile was named, which could find it"
-            if profile is None
-            else f"the rig profile finds no {name} for {filename!r}"
-        )
-        message = f"{name} must be given: {where}"
-        raise InvalidError.of(message, code="missing", pointer=f"/query/{name}")
-    run = run_of(
-        read,
+        where = f"the rig profile finds no {name} for {filename!r}"
+        if profile is None:
+            where = "no rig profile was named, which could find it"
+        raise InvalidError.of(f"{name} must be given: {where}", code="missing", pointer=f"/query/{name}")
+    head = IncomingRun(
         kind=kind,
         cycles=cycles,
-        run_id=run_id or stated.run_id,
+        run_id=run_id or stated.run_id or "",
         started_at=None if started_at is None else started_at.isoformat(),
         origin=origin,
+        file={"filename": filename, "rig": rig, "reading": asdict(reading)},
     )
-    file = {"filename": filename, "rig": rig, "reading": asdict(reading)}
-    return replace(run, file=file | dict(run.file or {}))
+    return run_of(read, head)
 
 
-def run_of(
-    read: Channels,
-    *,
-    kind: str,
-    cycles: float,
-    run_id: str | None = None,
-    started_at: str | None = None,
-    origin: str = "measured",
-) -> IncomingRun:
-    """The run of that kind in channels as they were read. Raises InvalidError where they do not make one."""
-    columns, notices = read.columns, list(read.notices)
+def run_of(read: Channels, head: IncomingRun) -> IncomingRun:
+    """The run with the channels that were read. Raises InvalidError where they do not make one of its kind."""
+    kind, columns, notices = head.kind, read.columns, list(read.notices)
     missing = [name for name in NEEDED[kind] if name not in columns]
     if missing:
         errors = [
             FieldError(pointer=f"/channels/{name}", code="missing", message=f"the file has no channel {name}")
             for name in missing
         ]
-        present = ", ".join(columns) or "none"
-        raise InvalidError(
-            f"a {kind} run needs {', '.join(missing)}; channels found: {present}{_way_out(missing[0], notices)}",
-            errors=errors,
-        )
+        message = f"a {kind} run needs {', '.join(missing)}; channels found: {', '.join(columns) or 'none'}"
+        # a column that was left out may be the missing channel
+        if left_out := next((notice.message for notice in notices if notice.code == LEFT_OUT), ""):
+            message += f"; {left_out}; choose one of them with map={missing[0]}:NAME"
+        raise InvalidError(message, errors=errors)
     if kind == "stationary_stribeck" and read.counts and _holds_no_dwell(columns):
         message = (
             "the times in the file only count the rows, so each row was read as a plateau. If the rows are samples, send "
@@ -101,16 +89,9 @@ def run_of(
         columns = {name: column for name, column in columns.items() if name != "time_s"}
         check_columns(columns)  # a plateau has no negative pressure, which a sample may have
     accepted = (*NEEDED[kind], *_ALLOWED[kind])
-    run = IncomingRun(
-        kind=kind,
-        cycles=cycles,
-        run_id=run_id or "",
-        started_at=started_at,
-        origin=origin,
-        channels={name: column for name, column in columns.items() if name in accepted},
-        file={"warnings": [asdict(notice) for notice in notices]},
-    )
-    return name_run(run)
+    channels = {name: column for name, column in columns.items() if name in accepted}
+    file = {**(head.file or {}), "warnings": [asdict(notice) for notice in notices]}
+    return name_run(replace(head, channels=channels, file=file))
 
 
 def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:
@@ -118,11 +99,9 @@ def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:
     if profile is None:
         return reading
     choices: dict[str, Choice] = {
-        column.channel: Choice(
-            column=column.title, unit=column.unit, stated=column.stated, factor=column.scale, offset=column.offset
-        )
-        for column in profile.columns
-        if column.channel
+        own.channel: Choice(column=own.title, unit=own.unit, stated=own.stated, factor=own.scale, offset=own.offset)
+        for own in profile.columns
+        if own.channel
     }
     return replace(
         reading,
@@ -133,12 +112,6 @@ def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:
         skip_rows=reading.skip_rows or profile.skip_rows,
         missing=reading.missing or profile.missing or "",
     )
-
-
-def _way_out(channel: str, notices: Sequence[Notice]) -> str:
-    """What helps where a column that was left out may be the missing channel."""
-    left_out = next((notice.message for notice in notices if notice.code == LEFT_OUT), "")
-    return f"; {left_out}; choose one of them with map={channel}:NAME" if left_out else ""
 
 
 def _holds_no_dwell(columns: Mapping[str, FloatArray]) -> bool:
