@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.records.cleaning import stands
-from service.columns import LineOf, check_columns
+from service.columns import check_columns
 from service.errors import MAX_QUOTED, InvalidError, Notice, TooLargeError
 from service.readers.column_names import (
     Taken,
@@ -62,7 +62,6 @@ class Channels:
     columns: dict[str, FloatArray]
     notices: tuple[Notice, ...] = ()
     counts: bool = False
-    line_of: LineOf | None = None
     labels: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -98,7 +97,7 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
         detail = f"{error.detail}: add missing=nan to leave such rows out"
         raise InvalidError(detail, errors=error.errors, total=error.total) from None
     _refuse_standing(columns)
-    return Channels(columns=columns, notices=tuple(notices), counts=counts, line_of=line_of, labels=labels(table.above))
+    return Channels(columns=columns, notices=tuple(notices), counts=counts, labels=labels(table.above))
 
 
 def _refuse_standing(columns: Mapping[str, FloatArray]) -> None:
@@ -181,15 +180,15 @@ def _runs_on(times: FloatArray) -> bool:
     return bool(steps.size > 0 and np.count_nonzero(steps > 0) >= _MOST_OF * steps.size)
 
 
-def _add_parts(times: FloatArray, parts: Mapping[str, tuple[FloatArray, float]]) -> Notice | None:
+def _add_parts(times: FloatArray, parts: Mapping[str, tuple[FloatArray, float]]) -> list[Notice]:
     """Add to times in whole seconds, in place, the part of the second that stands in a column of its own, and say so."""
     for name, (values, factor) in parts.items() if stands(times) else ():
         seconds = factor * values
         if ((seconds >= 0) & (seconds < 1)).all() and (np.diff(times + seconds) > 0).all():
             times += seconds - seconds[0]
             message = f"time_s has whole seconds: the fractions in {name} were added"
-            return Notice(code="parts_of_seconds", message=message)
-    return None
+            return [Notice(code="parts_of_seconds", message=message)]
+    return []
 
 
 def _read(
@@ -216,15 +215,16 @@ def _read(
     valid: dict[int, NDArray[np.bool_] | None] = {}
     dated = [read[column.index] for column in chosen if read[column.index].dtype.kind == "M"]
     start = min((moments[~np.isnat(moments)].min() for moments in dated if not np.isnat(moments).all()), default=None)
+    notices = list(table.notices)
     for column in chosen:
         values[column.index], valid[column.index] = _numbers(column, read.pop(column.index), start)
         if column.channel == "time_s" and column.unit is None:
-            seconds = _in_seconds(table.columns[column.index], values[column.index], reading)
-            table = table if seconds is None else replace(table, notices=[*table.notices, seconds])
+            notices += _in_seconds(table.columns[column.index], values[column.index], reading)
     second_parts = {table.columns[at].shown(): (plain(read.pop(at)), factor) for at, factor in parts.items()}
     for column in chosen:
-        if column.channel == "time_s" and (seconds := _add_parts(values[column.index], second_parts)):
-            table = replace(table, notices=[*table.notices, seconds])
+        if column.channel == "time_s":
+            notices += _add_parts(values[column.index], second_parts)
+    table = replace(table, notices=notices)
     chosen = [column for column in chosen if not column.guessed or _runs_on(values[column.index])]
     clocks = {} if reading.time == NO_TIME else _clocks(table.columns, chosen, values)
     used = {clock.key: clock for clock in clocks.values() if clock is not None}
@@ -292,7 +292,7 @@ def _numbers(column: Taken, values: NDArray[Any], start: Any) -> tuple[FloatArra
     return numbers, valid
 
 
-def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> Notice | None:
+def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> list[Notice]:
     """Scale times without a unit that only as one of a computer's counts are of our time, in place, from the first on, and
     say so.
 
@@ -305,17 +305,17 @@ def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> Notice |
             times -= times[0]
             times /= factor
             message = f"{column.shown()} states no unit; its values were read as times in {unit}"
-            return Notice(code="unit_found", message=message)
+            return [Notice(code="unit_found", message=message)]
     name = column.title or column.name
     if "time_s" not in choices_of(reading):
         raise no_unit([("time_s", column)], reading)
     if times.size < 2:
-        return None
+        return []
     days = ((times > 20_000) & (times < 80_000)) | ((times > 700_000) & (times < 800_000))
     step = np.median(np.diff(times))
     fractions = times.min() >= 0 and times.max() <= 1 and 0 < step < _SECOND_OF_DAY
     if not fractions and not (days.all() and np.ptp(times) < 5 and step < 1e-3):
-        return None
+        return []
     message = (
         f"{column.shown()} states no unit: it begins at {times[0]:.9g} in steps of {step:.3g}, in seconds or days. "
         f"State the unit with map=time_s:{name} [s], or [d]"
@@ -376,10 +376,8 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
     if keep.all():
         return columns
     if not keep.any():
-        message = (
-            "no sample is left: at each time at least one channel has no valid value. Send channels recorded together"
-        )
-        raise InvalidError.of(message, code="empty", pointer="/channels")
+        message = "no sample is left: at each time at least one channel has no valid value"
+        raise InvalidError.of(f"{message}. Send channels recorded together", code="empty", pointer="/channels")
     return {name: column[keep] for name, column in columns.items()}
 
 
@@ -421,7 +419,6 @@ def _brought(series: Mapping[str, _Series], leading: str, kept: NDArray[np.bool_
             rates.append(f"{name} ({own.values.size} samples, {step:.6g} s apart, from {own.times[0]:.9g} s)")
     message = f"interpolated to the times of {leading}: {', '.join(rates)[: 5 * MAX_QUOTED]}"
     if cut := int(np.count_nonzero(~kept)):
-        message += (
-            f". {cut} of {kept.size} samples were left out, because not all channels were recorded at their times"
-        )
+        why = "because not all channels were recorded at their times"
+        message += f". {cut} of {kept.size} samples were left out, {why}"
     return Notice(code="brought_to_one_clock", message=message)

@@ -21,6 +21,9 @@ from service.readers.unit_table import conversion, is_unit
 
 Row = Sequence[Any]
 
+#: The notice of a table that lies on its side.
+TURNED = Notice(code="turned", message="the table has a line for each channel: its columns were read as rows")
+
 #: Rows that are looked at for the table's beginning. Chosen: no recorder writes as many lines above it.
 MAX_ROWS = 500
 #: Rows of data that a person is shown.
@@ -141,16 +144,16 @@ def table_in(data: DataRows, *, first_line: int, rows_read: Callable[[], int], *
     above = [shown(row) for row in rows[max(layout.start - MAX_ROWS, 0) : layout.start]]
     refuse_factors(above)
     head = [shown(row) for row in rows[layout.start : layout.start + _MAX_SHOWN]]
-    columns: list[Column] = []
-    counted = _counted(layout.columns(), head)
-    for place, column in enumerate(layout.columns()):
+    columns = list(layout.columns())
+    counted = _counted(columns, head)
+    for place, column in enumerate(columns):
         if is_counter(column) and shown(data.first)[place : place + 1] == ("",):
-            columns.append(Column("", title=column.title))
+            columns[place] = Column("", title=column.title)
             continue
         own_rows = [row for row in above if len(row) > place and row[place]]
         labelled = [(row[0], row[place]) if place and row in own_rows else row for row in above]
         clock = stated_clock(labels([*labelled, *((row[place],) for row in own_rows)]), rows_read, counted)
-        columns.append(replace(column, clock=clock))
+        columns[place] = replace(column, clock=clock)
     return Table(
         columns=tuple(columns),
         above=tuple(above[: layout.titles - layout.start]),
@@ -425,12 +428,6 @@ def turned(rows: Sequence[Row], named: Sequence[str]) -> tuple[list[Row], Layout
     layout = find_table(on_its_side[:MAX_ROWS], frozenset(), named) if len(on_its_side) > 2 else None
     upright = max((recognised(list(map(_text, row)), named) for row in rows[:MAX_ROWS]), default=0)
     return None if layout is None or layout.score[0] < upright else (on_its_side, layout)
-
-
-def was_turned() -> Notice:
-    """The notice of such a table."""
-    message = "the table has a line for each channel: its columns were read as rows"
-    return Notice(code="turned", message=message)
 
 
 def no_table(rows: Sequence[Row], named: Sequence[str]) -> InvalidError:

@@ -24,6 +24,7 @@ from service.readers.table import Clock, Column, Reading, Table, cut_short
 
 #: Conversions that refer to each other, at most. Chosen: recorders refer once.
 _DEEPEST_CONVERSION = 8
+#: What a group's master may be instead of a time.
 _NO_TIMES = (v4c.SYNC_TYPE_ANGLE, v4c.SYNC_TYPE_DISTANCE, v4c.SYNC_TYPE_INDEX)
 
 
@@ -70,14 +71,10 @@ def _column(file: Any, group: int, index: int, several: bool) -> Column:
     rows = int(file.groups[group].channel_group.cycles_nr)
     name = _name(file, group) if several else ""
     unit = file.get_channel_unit(group=group, index=index)
-    column = column_of(file.groups[group].channels[index].name, unit, name)
-    clock = Clock(group, partial(_times, file, group)) if group in file.masters_db and _is_time(file, group) else None
-    return replace(column, rows=rows, clock=clock)
-
-
-def _is_time(file: Any, group: int) -> bool:
-    """Whether a group's master is a time: it may also be an angle, a distance or an index."""
-    return file.groups[group].channels[file.masters_db[group]].sync_type not in _NO_TIMES
+    channels = file.groups[group].channels
+    column, master = column_of(channels[index].name, unit, name), file.masters_db.get(group)
+    timed = master is not None and channels[master].sync_type not in _NO_TIMES
+    return replace(column, rows=rows, clock=Clock(group, partial(_times, file, group)) if timed else None)
 
 
 def _times(file: Any, group: int) -> FloatArray:

@@ -278,6 +278,8 @@ _STAMP = re.compile(
     r"(?: ?\[?(?P<named>[A-Z]{2,5}|[A-Z][A-Za-z]{1,14}/[A-Z][A-Za-z_]{1,20})\]?)?",
     re.ASCII,
 )
+#: Dates that numpy may read: two dashes, and no zone behind them.
+_ISO = re.compile(r"(?:19|20)[^-+]*-[^-+]*-[^-+]*\d")
 #: Durations by ISO 8601 (`PT0.01S`), as polars writes them.
 _DURATION = re.compile(
     r"(?P<sign>[+-]?)P(?:(?P<days>\d{1,6})D)?T(?=\d)(?:(?P<hours>\d{1,6})H)?(?:(?P<minutes>\d{1,6})M)?"
@@ -352,14 +354,7 @@ class Stamps:
 
     def _iso(self, cells: Sequence[str]) -> NDArray[np.int64] | None:
         """Times parsed by numpy if all are ISO 8601 without a time zone; else None."""
-        if any(
-            cell[:2] not in ("19", "20")
-            or len(cell) < 16
-            or cell.count("-") != 2
-            or "+" in cell
-            or not cell[-1].isdigit()
-            for cell in cells
-        ):
+        if not all(len(cell) >= 16 and _ISO.fullmatch(cell) for cell in cells):
             return None
         try:
             return np.array(cells, dtype="datetime64[ns]").astype(np.int64)

@@ -23,7 +23,7 @@ from models.arrays import FloatArray
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, TooLargeError
 from service.readers.column_names import named_columns, recognised
 from service.readers.detect import ByteSource, Format, overdue, too_slow
-from service.readers.grid import MAX_ROWS, DataRows, Layout, find_table, no_table, table_in, turned, was_turned
+from service.readers.grid import MAX_ROWS, TURNED, DataRows, Layout, find_table, no_table, table_in, turned
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
 from service.readers.numerals import Numerals, is_stamp
 from service.readers.table import Reading, Table
@@ -80,7 +80,7 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
         if len(first) == _BLOCK or (on_its_side := _turned(first, reading)) is None:
             raise
         table = read_text(lambda: nullcontext(io.BytesIO(on_its_side)), reading, limits)
-        return replace(table, notices=[*table.notices, was_turned()])
+        return replace(table, notices=[*table.notices, TURNED])
     body = _Body(opened, form, reading, limits)
     return table_in(
         body.data, first_line=form.first_line, read=body.read, rows_read=lambda: body.rows, line_of=body.line_of

@@ -2,6 +2,7 @@
 
 import re
 import unicodedata
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from models.arrays import FloatArray
@@ -33,67 +34,61 @@ _NEWTONS_PER_KILOPOND = 9.80665
 _NEWTON_METRES_PER_POUND_FOOT = 1.3558179483314004
 
 
-def _spelled(factor: float, spellings: str, offset: float = 0.0) -> dict[str, Conversion]:
-    """Spellings apart by blanks, all of one conversion. Capitals, dots and dashes need no spelling of their own."""
-    return dict.fromkeys(spellings.split(), Conversion(factor, offset))
+def _spelled(by_factor: Mapping[float, str], offset: float = 0.0) -> dict[str, Conversion]:
+    """Factor -> its spellings apart by blanks. Capitals, dots and dashes need no spelling of their own."""
+    return {unit: Conversion(factor, offset) for factor, units in by_factor.items() for unit in units.split()}
 
 
-_TIME = (
-    _spelled(
-        1.0, "s S sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondi с сек 秒 초"
-    )
-    | _spelled(
-        1e-3, "ms msec millisecond milliseconds millisekunden millisecondes milisegundos millisecondi мс 毫秒 ミリ秒"
-    )
-    | _spelled(1e-6, "us µs usec µsec microsecond microseconds mikrosekunden microsecondes мкс 微秒 マイクロ秒")
-    | _spelled(1e-9, "ns nsec nanosecond nanoseconds nanosekunden")
-    | _spelled(60.0, "min mins minute minutes minuten minutos minuti мин 分 分钟 分鐘")
-    | _spelled(3600.0, "h hr hrs hour hours std stunde stunden heures horas ore ч 小时 小時 時間")
-    | _spelled(86400.0, "d day days tag tage jours días giorni 天")
-)
-_PRESSURE = (
-    _spelled(1.0, "bar barg barrel barü daN/cm2 бар 巴")
-    | _spelled(1e-3, "mbar hPa")
-    | _spelled(1 / PASCALS_PER_BAR, "Pa N/m2 pascal")
-    | _spelled(1e3 / PASCALS_PER_BAR, "kPa кПа 千帕 kN/m2")
-    | _spelled(1e4 / PASCALS_PER_BAR, "N/cm2")
-    | _spelled(1e6 / PASCALS_PER_BAR, "MPa N/mm2 MN/m2 МПа 兆帕")
-    | _spelled(_PASCALS_PER_PSI / PASCALS_PER_BAR, "psi psig lbf/in2 lb/in2")
-    | _spelled(1e3 * _PASCALS_PER_PSI / PASCALS_PER_BAR, "ksi")
-    | _spelled(101_325 / 760 / PASCALS_PER_BAR, "Torr mmHg")
-    | _spelled(_NEWTONS_PER_KILOPOND * 1e4 / PASCALS_PER_BAR, "kgf/cm2 kg/cm2 kp/cm2 кгс/см2")
-)
-_SPEED = (
-    _spelled(
-        1.0,
-        "rpm 1/min min-1 /min U/min r/min rmin-1 rev/min revmin-1 Upm Umdr/min revolutions/min tr/min trs/min tr/mn "
-        "giri/min obr/min ot/min varv/min omw/min dev/dak dev/dk d/dak d/dk",
-    )
-    | _spelled(1.0, "об/мин мин-1 转/分 转/分钟 轉/分 回転/分 回/分")
-    | _spelled(1e3, "krpm 1000/min")
-    | _spelled(60.0, "U/s r/s rev/s revs/sec rps tr/s об/с 转/秒 Hz")
-    | _spelled(1 / RADIANS_PER_SECOND_PER_RPM, "rad/s rad/sec rads rads-1 radps рад/с 弧度/秒")
-    | _spelled(1 / 6, "deg/s °/s")
-)
-_TORQUE = (
-    _spelled(1.0, "Nm newtonmeter newtonmeters newtonmetre newtonmetres Нм 牛米")
-    | _spelled(1e3, "kNm кНм 千牛米")
-    | _spelled(1e-3, "mNm Nmm")
-    | _spelled(1e-2, "Ncm cNm")
-    | _spelled(10.0, "daNm")
-    | _spelled(_NEWTONS_PER_KILOPOND, "kgfm kpm кгсм")
-    | _spelled(_NEWTONS_PER_KILOPOND / 100, "kgfcm kpcm")
-    | _spelled(_NEWTON_METRES_PER_POUND_FOOT, "lbfft lbft ftlbf ftlb ftlbs")
-    | _spelled(_NEWTON_METRES_PER_POUND_FOOT / 12, "lbfin lbin inlbf inlb inlbs")
-    | _spelled(_NEWTON_METRES_PER_POUND_FOOT / 192, "ozfin ozin inoz inozf")
-)
+_TIME = {
+    1.0: "s S sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondi с сек 秒 초",
+    1e-3: "ms msec millisecond milliseconds millisekunden millisecondes milisegundos millisecondi мс 毫秒 ミリ秒",
+    1e-6: "us µs usec µsec microsecond microseconds mikrosekunden microsecondes мкс 微秒 マイクロ秒",
+    1e-9: "ns nsec nanosecond nanoseconds nanosekunden",
+    60.0: "min mins minute minutes minuten minutos minuti мин 分 分钟 分鐘",
+    3600.0: "h hr hrs hour hours std stunde stunden heures horas ore ч 小时 小時 時間",
+    86400.0: "d day days tag tage jours días giorni 天",
+}
+_PRESSURE = {
+    1.0: "bar barg barrel barü daN/cm2 бар 巴",
+    1e-3: "mbar hPa",
+    1 / PASCALS_PER_BAR: "Pa N/m2 pascal",
+    1e3 / PASCALS_PER_BAR: "kPa кПа 千帕 kN/m2",
+    1e4 / PASCALS_PER_BAR: "N/cm2",
+    1e6 / PASCALS_PER_BAR: "MPa N/mm2 MN/m2 МПа 兆帕",
+    _PASCALS_PER_PSI / PASCALS_PER_BAR: "psi psig lbf/in2 lb/in2",
+    1e3 * _PASCALS_PER_PSI / PASCALS_PER_BAR: "ksi",
+    101_325 / 760 / PASCALS_PER_BAR: "Torr mmHg",
+    _NEWTONS_PER_KILOPOND * 1e4 / PASCALS_PER_BAR: "kgf/cm2 kg/cm2 kp/cm2 кгс/см2",
+}
+_SPEED = {
+    1.0: "rpm 1/min min-1 /min U/min r/min rmin-1 rev/min revmin-1 Upm Umdr/min revolutions/min tr/min trs/min tr/mn "
+    "giri/min obr/min ot/min varv/min omw/min dev/dak dev/dk d/dak d/dk об/мин мин-1 转/分 转/分钟 轉/分 回転/分 回/分",
+    1e3: "krpm 1000/min",
+    60.0: "U/s r/s rev/s revs/sec rps tr/s об/с 转/秒 Hz",
+    1 / RADIANS_PER_SECOND_PER_RPM: "rad/s rad/sec rads rads-1 radps рад/с 弧度/秒",
+    1 / 6: "deg/s °/s",
+}
+_TORQUE = {
+    1.0: "Nm newtonmeter newtonmeters newtonmetre newtonmetres Нм 牛米",
+    1e3: "kNm кНм 千牛米",
+    1e-3: "mNm Nmm",
+    1e-2: "Ncm cNm",
+    10.0: "daNm",
+    _NEWTONS_PER_KILOPOND: "kgfm kpm кгсм",
+    _NEWTONS_PER_KILOPOND / 100: "kgfcm kpcm",
+    _NEWTON_METRES_PER_POUND_FOOT: "lbfft lbft ftlbf ftlb ftlbs",
+    _NEWTON_METRES_PER_POUND_FOOT / 12: "lbfin lbin inlbf inlb inlbs",
+    _NEWTON_METRES_PER_POUND_FOOT / 192: "ozfin ozin inoz inozf",
+}
 _TEMPERATURE = (
-    _spelled(1.0, "°C degC degreeC degreesC gradC C celsius cel 摄氏度")
-    | _spelled(1.0, "K degK kelvin", -ZERO_CELSIUS)
-    | _spelled(5 / 9, "°F degF F fahrenheit", -160 / 9)
+    _spelled({1.0: "°C degC degreeC degreesC gradC C celsius cel 摄氏度"})
+    | _spelled({1.0: "K degK kelvin"}, -ZERO_CELSIUS)
+    | _spelled({5 / 9: "°F degF F fahrenheit"}, -160 / 9)
 )
 #: By the channel's unit: the spellings that may be stated.
-UNITS = {"s": _TIME, "bar": _PRESSURE, "rpm": _SPEED, "Nm": _TORQUE, "°C": _TEMPERATURE}
+UNITS = {
+    "s": _spelled(_TIME), "bar": _spelled(_PRESSURE), "rpm": _spelled(_SPEED), "Nm": _spelled(_TORQUE), "°C": _TEMPERATURE,
+}  # fmt: skip
 _OF_EACH = ("time_s", "pressure_bar", "speed_rpm", "torque_nm")
 #: Units of no channel, and 1/s, which may be turns or radians: a title that ends in one is not taken for another.
 _FOREIGN = (

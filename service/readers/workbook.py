@@ -16,7 +16,7 @@ from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
 from service.errors import InvalidError
 from service.readers.column_names import named_columns, recognised
 from service.readers.detect import check_archive
-from service.readers.grid import MAX_ROWS, DataRows, Layout, find_table, no_table, table_in, turned, was_turned
+from service.readers.grid import MAX_ROWS, TURNED, DataRows, Layout, find_table, no_table, table_in, turned
 from service.readers.limits import Limits
 from service.readers.table import Reading, Table, index_of_wanted
 
@@ -54,7 +54,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     tables = {name: cells for name, cells in tables.items() if name in visible} or tables
     name = list(tables)[index_of_wanted(list(tables) or sheets, "", "sheet")]
     table = _table(name, *tables[name], tuple(sheets), limits)
-    return replace(table, notices=[*table.notices, was_turned()]) if name in on_side else table
+    return replace(table, notices=[*table.notices, TURNED]) if name in on_side else table
 
 
 def _trimmed(row: Sequence[Any]) -> Sequence[Any]:

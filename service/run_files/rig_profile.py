@@ -84,17 +84,15 @@ def pattern_for(filename: str, cycles: float | None) -> str | None:
         return None
     digits, thousands = str(int(cycles)), f"{int(cycles) // 1000}k" if cycles and cycles % 1000 == 0 else None
     parts = re.split(r"(\d+k?(?![^\W\d_]))", PurePath(filename).name, flags=re.IGNORECASE)
-    places = [place for place, part in enumerate(parts) if place % 2 and _is(part, digits, thousands)]
+    numbers = range(1, len(parts), 2)
+    as_digits = [place for place in numbers if parts[place].lstrip("0") == digits.lstrip("0")]
+    places = as_digits + [place for place in numbers if parts[place].casefold() == thousands]
     if len(places) != 1:
         return None
-    for place in range(1, len(parts), 2):
+    for place in numbers:
         parts[place] = "{cycles}" if place == places[0] else "*"
     pattern = re.sub(r"\*[-_.: ]*(?=\*)", "", "".join(parts))
     return pattern if len(_WILD.findall(pattern)) <= _MAX_WILD else None
-
-
-def _is(part: str, whole: str, thousands: str | None) -> bool:
-    return part.lstrip("0") == whole.lstrip("0") or part.casefold() == thousands
 
 
 def _regex(pattern: str) -> re.Pattern[str]:

@@ -554,8 +554,8 @@ def test_a_unit_in_the_map_is_used_and_must_not_contradict_the_file(tmp_path: Pa
 def test_one_of_tables_below_each_other_is_read_by_its_number(tmp_path: Path, number: int) -> None:
     channels = read_content(tmp_path, TWO_TABLES, table=str(number))
     assert channels.columns["torque_nm"].tolist() == [number]
-    assert channels.line_of is not None
-    assert channels.line_of(0) == (2, 6)[number - 1]
+    with pytest.raises(InvalidError, match=rf"torque_nm\[0\] \(line {(2, 6)[number - 1]}\)"):
+        read_content(tmp_path, TWO_TABLES.replace(f"5,{number}", "5,1e9"), table=str(number))
 
 
 @pytest.mark.parametrize(("decimal", "speed"), [(",", 1100.0), (".", 1.1)])
