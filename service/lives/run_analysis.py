@@ -90,8 +90,9 @@ def analyse(run: IncomingRun, geometry: Geometry, torque_filter: float) -> Analy
     try:
         cut = cut_plateaus(SampledChannels(run.channels), torque_filter)
     except ValueError as error:
-        columns = "time_s, pressure_bar, speed_rpm, torque_nm"
-        message = f"{columns}: {error} If each row of the file is a plateau, add time=none."
+        message = (
+            f"time_s, pressure_bar, speed_rpm, torque_nm: {error} If each row of the file is a plateau, add time=none."
+        )
         raise InvalidError.of(message, code="no_plateau", pointer="/channels/torque_nm") from None
     notices = [Notice(code=code, message=message) for code, message in cut.notes]
     times = tuple((0.5 * (cut.start + cut.stop)).tolist())
