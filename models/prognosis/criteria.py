@@ -1,4 +1,5 @@
-"""The numbers that decide what a prognosis states and what a fleet teaches."""
+"""The numbers that decide what a prognosis states and what a fleet teaches. What ends a life is a setting of its clutch, and
+`first_passage.py` finds when that is reached."""
 
 import numpy as np
 

@@ -470,22 +470,26 @@ class _Predictive:
 
 
 def _predictive(
-    values: FloatArray, variance: FloatArray, exact: NDArray[np.bool_], deviation: float, worth: tuple[float, float]
+    values: FloatArray,
+    variance: FloatArray,
+    exact: NDArray[np.bool_],
+    mean_sd: float,
+    variance_prior: tuple[float, float],
 ) -> _Predictive:
-    """Of values [n] that are normal with unknown mean and variance: the mean normal about 0 with so many of their
-    deviations, the variance inverse gamma, worth so much: (shape, scale).
+    """Of values [n] that are normal with unknown mean and variance. A priori the mean is normal about 0, its deviation
+    `mean_sd` of the values' own, and the variance inverse gamma with (shape, rate) `variance_prior`.
 
-    Each value is known up to its own `variance` [n], or not `exact` [n]: greater than that.
+    A value is known with a variance [n] of its own, or where it is not `exact` [n], only as a lower bound.
     """
     exact_values = values[exact]
-    precision = exact_values.size + deviation**-2
+    precision = exact_values.size + mean_sd**-2
     mean = float(exact_values.sum()) / precision
     squares = float(exact_values @ exact_values + variance[exact].sum())
     return _Predictive(
         mean=mean,
         precision=precision,
-        shape=worth[0] + 0.5 * exact_values.size,
-        rate=worth[1] + 0.5 * (squares - precision * mean**2),
+        shape=variance_prior[0] + 0.5 * exact_values.size,
+        rate=variance_prior[1] + 0.5 * (squares - precision * mean**2),
         beyond=values[~exact],
     )
 

@@ -117,7 +117,8 @@ class SampledChannels:
 
 
 def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
-    """The plateaus of a stationary test in SI units, rows in the order they were sent."""
+    """The plateaus of a stationary test in SI units, rows in the order they were sent. Deviations of torque have a least
+    value, and are ignored where one of them is 0: then no noise was measured."""
     si = {name: CHANNELS[name].to_si(values) for name, values in channels.items()}
     deviation = si.get("torque_sd_nm")
     if deviation is not None:

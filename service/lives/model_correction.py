@@ -105,17 +105,18 @@ def corrected_cofs(
         freed = loaded(replace(test.plateaus, torque=test.plateaus.torque - mean))
         cofs = {} if freed is None else mean_cofs(levels_of(freed, geometry), velocities, geometry)
         if cofs:
-            off = _means_over(mean - artefact, test.plateaus, list(cofs), velocities, geometry)
+            off = _mean_cof_changes(mean - artefact, test.plateaus, list(cofs), velocities, geometry)
             corrected[test.run_id] = {
                 level: (value, sd, tuple((value + off[level]).tolist())) for level, (value, sd) in cofs.items()
             }
     return corrected
 
 
-def _means_over(
-    torque: FloatArray, plateaus: Plateaus, levels: Sequence[float], velocities: FloatArray, geometry: Geometry
+def _mean_cof_changes(
+    torque_change: FloatArray, plateaus: Plateaus, levels: Sequence[float], velocities: FloatArray, geometry: Geometry
 ) -> dict[float, FloatArray]:
-    """pressure [Pa] -> mean over the protocol's velocities of a change of COF [d], known at plateaus [d, n] Nm."""
+    """pressure [Pa] -> change [d] of the mean COF over the protocol's velocities, from the change of torque [d, n] Nm at the
+    plateaus."""
     means = {}
     level_of = np.abs(plateaus.pressure[:, None] - np.array(levels)).argmin(axis=1)
     speed = geometry.sliding_velocity(np.abs(plateaus.speed))
@@ -123,7 +124,7 @@ def _means_over(
         rows = np.flatnonzero((level_of == place) & (plateaus.speed != 0))
         rows = rows[np.argsort(speed[rows], kind="stable")]
         sign = np.sign(plateaus.speed[rows])
-        over = [np.interp(velocities, speed[rows], sign * torques_here[rows]).mean() for torques_here in torque]
+        over = [np.interp(velocities, speed[rows], sign * change[rows]).mean() for change in torque_change]
         means[level] = np.array(over) / geometry.torque_per_cof(level)
     return means
 

@@ -54,15 +54,16 @@ def _item(row: FleetPriorRow) -> dict[str, Any]:
 
 
 def _severity_exponent(row: FleetPriorRow) -> dict[str, float] | None:
-    """The power of a cycle's energy with which ended lives were shorter; None if they do not determine it."""
+    """The exponent q of life ∝ energy^-q by ended lives, with its deviation; None if they do not determine it."""
     lives = [EndedLife.from_dict(stored) for stored in row.content.get("ended", ())]
     by_energy = [(life.end, life.energy) for life in lives if life.energy]
     if len(by_energy) < FEWEST_SEVERITIES or len({energy for _, energy in by_energy}) == 1:
         return None
     value, deviation = severity_exponent(*np.array(by_energy).T)
     severity = row.fleet["severity"]
-    counted = severity["exponent"] if severity["basis"] == SeverityBasis.DISSIPATED_ENERGY else 0.0
-    return {"value": value + counted, "sd": deviation}
+    # ends are in cycles that are weighted by energy to this power already: the fit gives what is missing to q
+    already_counted = severity["exponent"] if severity["basis"] == SeverityBasis.DISSIPATED_ENERGY else 0.0
+    return {"value": value + already_counted, "sd": deviation}
 
 
 def _population(prior: FleetPrior) -> Mapping[str, Any]:

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.errors import InvalidError, Notice
-from service.readers.clocks import UNITS, stated_clock
 from service.readers.column_names import column_of, known_channel, recognised
 from service.readers.limits import Limits
+from service.readers.stated_clocks import UNITS, stated_clock
 from service.readers.table import Column, Reading, Table, index_of_wanted
 from service.readers.unit_table import is_unit
 
@@ -130,7 +130,10 @@ def _sources(tree: Tree, group: str, depth: int, above: Tree) -> Iterator[_Sourc
 
 
 def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Source]:
-    """The columns of one array: a vector, the fields of a compound one, or those of a matrix; none of any other."""
+    """The columns of one array: a vector, the fields of a compound one, or those of a matrix; none of any other.
+
+    A list of texts that stands beside it, one for each column, gives their units if most of them are units, else names. A
+    column of a matrix without a name has no channel."""
     shape, dtype = tuple(size for size in leaf.data.shape if size > 1), leaf.data.dtype
     parts: list[tuple[str, Any]] = []
     if dtype.names:

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from service.errors import MAX_QUOTED, InvalidError, Notice
-from service.readers.clocks import in_seconds
 from service.readers.column_names import choices_of, column_of
 from service.readers.limits import Limits
+from service.readers.stated_clocks import in_seconds
 from service.readers.table import Clock, Column, Reading, Table, cut_short
 
 #: Conversions that refer to each other, at most. Chosen: recorders refer once.

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from service.errors import MAX_QUOTED, InvalidError
 from service.readers.arrays import refuse_counts, unit_of_array
-from service.readers.clocks import evenly, in_seconds, stated_clock
 from service.readers.column_names import column_of
 from service.readers.limits import Limits
 from service.readers.numerals import is_stamp
+from service.readers.stated_clocks import evenly, in_seconds, stated_clock
 from service.readers.table import Clock, Column, Reading, Table, cut_short
 from service.readers.unit_table import conversion
 

@@ -102,7 +102,8 @@ def read_life(
     for number, event in enumerate(life.events):
         say({"step": "reads the runs", "done": number, "of": len(life.events)})
         try:
-            sent = replace(reader.read(event.run_id), cycles=event.cycles)  # corrected meanwhile: the history's hold
+            # its cycles may have been corrected since it was sent: those of the history hold
+            sent = replace(reader.read(event.run_id), cycles=event.cycles)
             keep = event.run_id in with_records
             campaign.append(run_of(sent, origin=life.origin, torque_filter=record.torque_filter, keep_record=keep))
         except ValueError as error:

@@ -148,7 +148,7 @@ class _Elsewhere(Executor):
         """Wait until at least one has ended; those that have."""
 
     @abstractmethod
-    def ended(self, future: Any) -> tuple[Any, Exception | None]:
+    def outcome(self, future: Any) -> tuple[Any, Exception | None]:
         """What `called` returned; raises WorkerLostError where its process has ended."""
 
     def map(
@@ -178,7 +178,7 @@ class _Elsewhere(Executor):
                 for future in self.first(list(running)):
                     task = running.pop(future)
                     try:
-                        result, error = self.ended(future)
+                        result, error = self.outcome(future)
                     except WorkerLostError as lost:
                         task.lost += 1
                         if task.lost < MAX_LOST:
@@ -232,7 +232,7 @@ class Processes(_Elsewhere):
     def first(self, futures: Sequence["Future[Any]"]) -> set["Future[Any]"]:
         return wait(futures, return_when=FIRST_COMPLETED).done
 
-    def ended(self, future: "Future[Any]") -> tuple[Any, Exception | None]:
+    def outcome(self, future: "Future[Any]") -> tuple[Any, Exception | None]:
         try:
             answer: tuple[Any, Exception | None] = future.result()
         except BrokenExecutor as error:
@@ -327,9 +327,10 @@ class Cluster(_Elsewhere):
             if future in futures:  # another was dropped by who stopped iterating
                 return {future}
 
-    def ended(self, future: Any) -> tuple[Any, Exception | None]:
-        """What `called` returned; raises ExecutorUnavailableError where the scheduler has ended or has no worker any more,
-        or as `_called` does. What ended with a worker before it was read is computed again by another."""
+    def outcome(self, future: Any) -> tuple[Any, Exception | None]:
+        """What `called` returned: a result, or the error of the function. The scheduler has what a worker took down with it
+        computed again by another. Raises ExecutorUnavailableError where the scheduler has ended, has no worker any more or
+        they are of another release, WorkerLostError where those that computed it have ended."""
         from distributed import KilledWorker  # optional, and start-up time
 
         while True:

@@ -14,7 +14,8 @@ from storage.rigs import RigRow
 
 
 def save(database: Database, rig: RigIn, *, by: str, at: str, replacing: bool = False) -> tuple[RigOut, bool]:
-    """Save a profile; returns it as it is in force, and whether its name is new. What is so already is not changed.
+    """Save a profile; returns it as it is in force, and whether its name is new. Saving the same profile again changes
+    nothing.
 
     Raises ConflictError where the name has another profile and is not to be replaced.
     """

@@ -248,11 +248,12 @@ def _period_differences(
 
 
 def _chains(rows: Points) -> tuple[IntArray, ...]:
-    """Rows [b, n] that follow each other in runs of plateaus, then in loops, those of one length together."""
+    """Rows [b, n] that follow each other in runs of plateaus, then in loops, for the correlation of neighbours; those of one
+    length are whitened together."""
     owner = np.where(rows.steady, rows.run, rows.loop + int(rows.run.max(initial=0)) + 1)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1, [owner.size]])
     starts, lengths = edges[:-1], np.diff(edges)
-    steady = np.append(rows.steady, False)[starts]
+    steady = np.append(rows.steady, False)[starts]  # there may be no rows
     chains = []
     for kind in (steady, ~steady):
         for length in np.unique(lengths[kind & (lengths > 0)]):

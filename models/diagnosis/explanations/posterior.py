@@ -200,17 +200,17 @@ class Search:
         return self.nodes[NOTHING][0]
 
     def run(self) -> None:
-        """Up and down until neither changes what leads."""
-        fallen = set[Alternative]()
+        """Add to what leads, then try it without each of its parts, until what leads was tried so already."""
+        reduced = set[Alternative]()
         self._single()
         while True:
             self._up()
             weights = self.weights()
             leader = max(self.nodes, key=lambda alternative: weights[alternative])
             self._screen({leader} & self._unscreened)  # it may have come to lead by the last refit
-            if leader in fallen:
+            if leader in reduced:
                 return
-            fallen.add(leader)
+            reduced.add(leader)
             self._down(leader)
 
     def weights(self) -> dict[Alternative, float]:

@@ -27,7 +27,7 @@ from models.diagnosis.effects.fitted_effect import (
     effect_rows,
     smooth_places,
 )
-from models.diagnosis.explanations.amplitudes import Proportional
+from models.diagnosis.explanations.amplitude_posterior import Proportional
 from models.diagnosis.explanations.evidence import evidence_of, off_by, projections_beside, template_errors
 from models.diagnosis.explanations.verdict import Judgement
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit

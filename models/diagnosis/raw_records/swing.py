@@ -133,9 +133,9 @@ def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> L
 
 
 def _stretches(records: Sequence[WhitenedRecord]) -> tuple[list[IntArray], dict[int, IntArray]]:
-    """The first samples of each record's stretches, and for each number of stretches over which the phase is kept the first
-    stretches of the groups, which stay within a piece."""
-    starts, groups, before = [], {kept: list[IntArray]() for kept in _COHERENT}, 0
+    """The first samples of each record's stretches; and for each number of stretches over which a swing keeps its phase,
+    where its groups begin, as indices of the stretches of all records. No group goes on over a gap in a record."""
+    starts, groups, stretches_before = [], {kept: list[IntArray]() for kept in _COHERENT}, 0
     for record in records:
         own = []
         for first, stop in itertools.pairwise(record.starts):
@@ -143,14 +143,15 @@ def _stretches(records: Sequence[WhitenedRecord]) -> tuple[list[IntArray], dict[
             own.append(np.linspace(first, stop, count + 1)[:-1].astype(np.intp))
             for kept in _COHERENT:
                 parts = max(1, round(count / kept))
-                groups[kept].append(before + np.linspace(0, count, parts + 1)[:-1].astype(np.intp))
-            before += count
+                groups[kept].append(stretches_before + np.linspace(0, count, parts + 1)[:-1].astype(np.intp))
+            stretches_before += count
         starts.append(np.concatenate(own))
     return starts, {kept: np.concatenate(firsts) for kept, firsts in groups.items()}
 
 
 def _relative_sizes(records: Sequence[WhitenedRecord], stretches: list[IntArray]) -> dict[str, FloatArray]:
-    """Each law's relative size [b] in the stretches, 1 on average."""
+    """What a swing's size [b] in the stretches is in proportion to, by law: speed, or the root of the load; both relative to
+    their root mean square."""
     sizes = {}
     for law, name in (("load", "torque"), ("speed", "speed")):
         channels = [getattr(record, name) for record in records]

@@ -157,7 +157,7 @@ def _adequate(report: Report) -> list[Sentence]:
     if report.scatter is not None and report.scatter.lower > criteria.USUAL_GAIN:
         after = "The runs scatter more than usual. A zero that drifts between runs would also cause this: "
         after += "repeat a test at once."
-    sentences += [Sentence(after), *_unseen(report)]
+    sentences += [Sentence(after), *_detection_limits(report)]
     if report.states < 3:
         say = "says" if report.states == 1 else "say"
         sentences.append(Sentence(f"{_points_of_life(report.states)} {say} little about its course.", SHOULD))
@@ -169,9 +169,10 @@ _HARDEST_FORM = " in its least visible form"
 _ASKED_FIRST = ("torque_zero_shift", "pressure_offset")
 
 
-def _unseen(report: Report) -> list[Sentence]:
-    """From which size on these data would have shown an effect, in the form that shows best and in the hardest one: a zero
-    and a pressure first, then effects that must be largest against what is usual, those with a unit before the others."""
+def _detection_limits(report: Report) -> list[Sentence]:
+    """From which size on these data would have shown an effect, in the form that shows best and in the hardest one: the
+    torque's zero and the pressure's offset first, then effects that must be largest against what is usual, those with a unit
+    before the others."""
     order = sorted(report.visible, key=lambda v: (v.unit == "-", -v.least / v.usual, -v.amplitude / v.usual))
     first = [v for slug in _ASKED_FIRST for v in order if v.effect == slug]
     first = [*first, *(v for v in order if v not in first)][: criteria.VISIBLE_MENTIONED]

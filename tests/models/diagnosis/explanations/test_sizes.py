@@ -9,7 +9,7 @@ from models.diagnosis import criteria
 from models.diagnosis.criteria import DRAWS, SIGN_UNDETERMINED, SIZES_SAMPLED
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.fitted_effect import FittedEffect
-from models.diagnosis.explanations.amplitudes import Proportional
+from models.diagnosis.explanations.amplitude_posterior import Proportional
 from models.diagnosis.explanations.sizes import _size
 from models.diagnosis.report.report import Report
 from tests.models.diagnosis.campaigns import Where, campaign, look, rehearsal
