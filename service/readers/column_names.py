@@ -235,8 +235,10 @@ def column_of(text: str, unit: str | None = None, group: str = "", *, moments: b
     title = text.strip()
     if len(title) > LONGEST_TITLE:
         shown = title[:MAX_QUOTED]
-        rule = f"must not be longer than {LONGEST_TITLE} characters, got {len(title)}: {shown!r} ..."
-        raise InvalidError.of(f"a column's title {rule}", code="title_too_long", value=shown)
+        message = (
+            f"a column's title must not be longer than {LONGEST_TITLE} characters, got {len(title)}: {shown!r} ..."
+        )
+        raise InvalidError.of(message, code="title_too_long", value=shown)
     name, title_unit = _taken_apart(" ".join(title.translate(_WIDE).split()))
     column = Column(name, "s" if moments else title_unit, group, title)
     return column if unit is None or moments else with_unit(column, unit)

@@ -92,8 +92,8 @@ def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
         return [cells[value][list(rows.values())[index]] for index in taken]
 
-    named_in = f"the {len(rows)} channels named in {columns[best].shown()}"
-    message = f"each row holds one value: {named_in} were read as columns"
+    title = columns[best].shown()
+    message = f"each row holds one value: the {len(rows)} channels named in {title} were read as columns"
     first_rows = [map(str, cells[value][own[:_MAX_LOOKED_AT]]) for own in rows.values()]
     wide = replace(
         table,

@@ -267,6 +267,7 @@ def messages() -> Iterator[tuple[str, str, str]]:
         for function in ast.walk(tree):
             if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
                 yield from _of_function(function, constants)
+        yield from _of_function(tree, constants)  # what stands outside of functions; of the others the first stands
 
 
 def _constants(tree: ast.Module) -> Iterator[tuple[str, str]]:
