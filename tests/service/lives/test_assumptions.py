@@ -1,5 +1,6 @@
 """What a clutch is tracked under shows in every answer: severity, events that shift the level, tests off the track."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -115,6 +116,14 @@ def test_rebuilt_mean_cof_agrees_with_its_direct_track(client: TestClient) -> No
     middle = again["trajectory"]["median"][0]
     assert middle == pytest.approx(direct["trajectory"]["median"][0], rel=0.02)
     assert abs(again["disagreement"]["now_sd"]) < 3
+    # medians in logarithms of cycles, over the root mean square of the deviations that the 90 % intervals have
+    both = (again["end_of_life_cycles"], said(client, "c1", method="grid")["end_of_life_cycles"])
+    ends = [{level: math.log(cycles) for level, cycles in each.items()} for each in both]
+    spread = math.sqrt(0.5 * sum(((end["0.95"] - end["0.05"]) / 3.29) ** 2 for end in ends))
+    apart = (ends[0]["0.5"] - ends[1]["0.5"]) / spread
+    assert apart > 0.2, "else an end that is held against itself would agree as well"
+    # the prediction has the courses that are not eq. 6's too, with 1 %
+    assert again["disagreement"]["end_of_life_sd"] == pytest.approx(apart, abs=0.05)
     assert found["warnings"] == [] or found["warnings"][0]["code"] == "tracks_disagree"
     surfaces = client.get("/v1/clutches/c1/surfaces").json()
     shape = [len(surfaces[name]) for name in ("cycles", "pressure_bar", "speed_rpm")]

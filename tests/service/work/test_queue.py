@@ -1,5 +1,6 @@
 """How the process of a job is started, and which jobs wait for which."""
 
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,35 @@ def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
         queue.close()
     assert not queue.is_working()
     assert states(in_file) == {"r": "cancelled", "f": "waiting", "d": "failed", "other": "waiting"}, "given back"
+
+
+def test_a_queue_that_is_woken_looks_at_once(in_file: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has looked before there was anything to do, and would look again after six minutes."""
+
+    def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
+        with in_file.writing() as connection:
+            jobs.end(connection, job.job_id, jobs.FAILED, AT, problem=str(ended), claimer=job.claimed_by)
+
+    def work(_: JobRow, __: Settings) -> Work:
+        raise StartedError
+
+    any_free, looked = jobs.any_free, threading.Event()
+
+    def watched(*arguments: Any) -> bool:
+        free = any_free(*arguments)
+        looked.set()
+        return free
+
+    monkeypatch.setattr(jobs, "any_free", watched)
+    queue = JobQueue(in_file, Settings(job_lease_seconds=3600), [{jobs.REPLAY: Kind(work, finish)}])
+    queue.start()
+    try:
+        assert looked.wait(60.0)
+        ask(in_file, "r", jobs.REPLAY)
+        queue.wake()
+        until(lambda: states(in_file) == {"r": "failed"}, within=20.0)
+    finally:
+        queue.close()
 
 
 RARE = [pytest.param(how, marks=pytest.mark.slow) for how in ("raises", "writes garbage", "says nothing")]

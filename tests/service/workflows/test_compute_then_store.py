@@ -1,10 +1,12 @@
 """Workflows compute outside the write lock, and compute again where the clutch has changed before they store."""
 
+import pickle
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ import pytest
 from sqlalchemy import text
 from typer.testing import CliRunner
 
-from service import stored_runs
+from service import records, stored_runs
 from service.cli.main import app
 from service.lives import model_correction, recomputation, run_analysis, tracks
 from service.lives.criteria import MAX_ATTEMPTS
@@ -258,3 +260,20 @@ def test_a_run_that_another_process_stores_after_it_was_not_found_is_a_repeat(
     assert (receipt["duplicate"], new, calls[:2]) == (True, False, [None, None])
     with database.reading() as connection:
         assert clutches.revision(connection, "c1") == 1
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_stored_run_is_read_with_its_channels_and_described_without(database: Database, *, whole: bool) -> None:
+    """What was loaded whole goes to another process, which has no database."""
+    sent = read_run(to_json(stationary(0, run_id="r0")))
+    ingest(database, "c1", sent, received_at=AT)
+    with database.reading() as connection:
+        state = records.state(connection, "c1")
+    recorded = stored_runs.recorded(database, state, whole=whole)
+    if whole:
+        recorded = pickle.loads(pickle.dumps(recorded))  # noqa: S301 - its own
+    read = recorded.reader.read("r0")
+    assert {name: column.tolist() for name, column in read.channels.items()} == {
+        name: column.tolist() for name, column in sent.channels.items()
+    }
+    assert recorded.reader.describe("r0") == replace(read, channels={})
