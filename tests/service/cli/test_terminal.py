@@ -274,6 +274,22 @@ def test_an_export_holds_inspections_and_photographs(terminal: Terminal, client:
     assert (file.name, file.read_bytes()) == (f"{sha256(png())}.png", png())
 
 
+def test_an_export_holds_what_counts_and_beside_it_what_was_sent(
+    terminal: Terminal, client: TestClient, tmp_path: Path
+) -> None:
+    for cycles, name in ((0, "right"), (1001, "typo"), (2000, "slip")):
+        post_run(client, stationary(cycles, run_id=name, pressures=(5.0,)))
+    client.patch("/v1/clutches/c1/runs/typo", json={"cycles": 1000, "reason": "a typing error"})
+    client.post("/v1/clutches/c1/runs/slip/withdraw", json={"reason": "another clutch's"})
+    terminal("export", "c1", "--out", tmp_path / "export")
+    counting, sent = (
+        {path.name.partition("-")[2]: json.loads(path.read_bytes())["cycles"] for path in folder.glob("0*.json")}
+        for folder in (tmp_path / "export", tmp_path / "export" / "as-sent")
+    )
+    assert counting == {"right.json": 0, "typo.json": 1000}
+    assert sent == {"typo.json": 1001, "slip.json": 2000}
+
+
 # --- An export says what it is of, has every table as spreadsheets take it, and may be one archive.
 
 
