@@ -184,6 +184,16 @@ def test_each_quantity_raises(life: TestClient, fields: dict[str, Any], words: s
     assert raised["quantity"] == fields["quantity"]
 
 
+def test_the_margin_to_shudder_is_that_of_the_newest_test(life: TestClient) -> None:
+    """As of a clutch that has no other, though an older one comes in last."""
+    life.post("/v1/clutches", json={"clutch_id": "f"})
+    for name, cycles in (("e", 2500.0), ("f", CYCLES[-1])):
+        rule(life, clutch_id=name, quantity="shudder_margin", below=100.0)
+        post_run(life, stationary(cycles), name)
+    one, other = (event["value"] for event in events(life))
+    assert one == other
+
+
 def test_a_confirmed_run_clears_the_alarm_of_held_runs(life: TestClient) -> None:
     rule(life, quantity="held_runs")
     receipt = life.post("/v1/clutches/e/runs", json=stationary(4000.0, wear=0.0)).json()

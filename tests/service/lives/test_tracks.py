@@ -8,6 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.loops.lag_fit import StationaryCurve
+from models.prognosis.ended_lives import EndedLife
 from models.prognosis.fleet import FleetPrior
 from models.rig.truth import draw
 from models.tracking.filters.grid import Grid
@@ -164,6 +165,24 @@ def test_a_clutch_whose_counter_began_elsewhere_is_predicted_and_told_where(
     assert "new_extrapolated" not in {warning["code"] for warning in answer["warnings"]}
     assert before["status"] == answer["status"] == "predicted"
     assert before["at_least"] == pytest.approx(answer["at_least"], rel=0.3)
+
+
+def test_a_prediction_says_how_many_lives_it_draws_on_and_that_its_forecasts_missed() -> None:
+    """Two lives that ended as this one goes; of ten later tests two lay within the intervals that were forecast."""
+    of, course = life(0.0), np.array([0.0, 6e3, 20e3])
+    damage = (1 - (1 + course / 6000.0) ** -0.8) / (1 - (1 + 20e3 / 6000.0) ** -0.8)
+    ended = [EndedLife(end=end, fraction=0.5, progress=tuple(course), damage=tuple(damage)) for end in (21e3, 22e3)]
+    said = []
+    for lives, misses in (((), [0.5] * 10), (tuple(ended), [0.5] * 2 + [2.0] * 8)):
+        under = replace(assumptions(1.0), prior=LearnedPrior(ended=lives))
+        series = of.pooled(under)
+        tracked = advance("particle", series, under, None, len(CYCLES))
+        tracked = replace(tracked, back_cast=replace(tracked.back_cast, misses=np.array(misses)))
+        said.append(predict("particle", series, under, tracked, CYCLES[-1], 0.5, tests=of.tests))
+    assert [answer["ended_lives"] for answer in said] == [0, 2]
+    warned = [[w["message"] for w in answer["warnings"] if w["code"] == "missed_forecasts"] for answer in said]
+    assert warned[0] == []
+    assert "only 2 of 10 later tests" in warned[1][0]
 
 
 # --- What follows from the fits of a life is weighed by their unbiased covariance; coefficients are those of eq. 6.

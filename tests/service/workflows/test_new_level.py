@@ -1,12 +1,15 @@
 """Friction that steps at once: the second test that shows it makes it the present, whatever is known of why."""
 
 from collections.abc import Iterable
+from contextlib import closing
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
 from models.plausibility import criteria
+from service.queries.verification import check_results
+from storage.engine.opening import open_database
 from tests.support import stationary
 
 CLUTCH = "/v1/clutches/c1"
@@ -103,6 +106,21 @@ def test_a_level_begins_with_the_next_test_where_its_first_is_withdrawn(client: 
         assert withdrawn.status_code == 200
         found = warned(life(client))
         assert (f"since the test at {begins:,} cycles" in found[0]) if begins else found == []
+
+
+def test_a_run_that_another_sets_aside_is_stored_as_if_it_had_never_counted(
+    client: TestClient, database_url: str
+) -> None:
+    """It came late, of which its receipt warns only while it is one of the history."""
+    sent(client, [1000])
+    assert sent(client, [0], 0.5) == ["accepted"]
+    assert "late_arrival" in {warning["code"] for warning in client.get(f"{CLUTCH}/runs/s0").json()["warnings"]}
+    sent(client, [2000])
+    aside = client.get(f"{CLUTCH}/runs/s0").json()
+    assert (aside["state"], aside["warnings"]) == ("held", [])
+    client.__exit__(None, None, None)
+    with closing(open_database(database_url)) as database:
+        assert check_results(database, "c1").findings == ()
 
 
 def test_nothing_is_stepped_where_new_levels_are_never_believed(
