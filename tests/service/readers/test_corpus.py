@@ -996,3 +996,26 @@ def _grouped(cell: str, decimal: str, thousands: str) -> str:
     if thousands and "e" not in cell:
         whole = f"{int(whole):,}".replace(",", thousands)
     return whole + (decimal + fraction if point else "")
+
+
+def test_fractions_of_the_second_that_were_added_are_said_to_have_been(tmp_path: Path) -> None:
+    lines = [f"08:00:0{k // 4};{k % 4 * 250};{line}" for k, line in enumerate(rows(";", names=PLATEAUS).splitlines())]
+    got = read_content(tmp_path, "\n".join(["Time;ms;p [bar];n [rpm];M [Nm]", *lines]))
+    np.testing.assert_allclose(got.columns["time_s"], 0.25 * np.arange(ROWS))
+    (notice,) = [notice for notice in got.notices if notice.code == "parts_of_seconds"]
+    assert "the fractions in ms were added" in notice.message
+
+
+def test_a_time_that_is_not_wanted_is_not_said_to_be_left_out(tmp_path: Path) -> None:
+    content = "\n".join(["Zeit [s],p [bar],n [rpm],M [Nm]", rows()])
+    got = read_content(tmp_path, content, time="none")
+    assert (got.columns.keys(), got.notices) == (set(PLATEAUS), ())
+
+
+def test_a_title_over_merged_cells_is_that_of_each_column_below(tmp_path: Path) -> None:
+    """Only of the oil is a temperature known."""
+    names = ["time_s", "speed_rpm", "torque_nm", "pressure_bar"]
+    lines = [f"{line},{60 + k}" for k, line in enumerate(rows(names=names).splitlines())]
+    titles = ["Messwerte,,,Öl,", ",".join([*(NAMES[name] for name in names), "Temperatur [°C]"])]
+    got = read_content(tmp_path, "\n".join([*titles, *lines]))
+    assert got.columns["oil_temperature_c"].tolist() == list(range(60, 60 + ROWS))

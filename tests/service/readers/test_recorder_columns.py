@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from nptdms import ChannelObject, TdmsWriter  # type: ignore[import-untyped]
 
 from models.arrays import FloatArray
 from service.errors import InvalidError, TooLargeError
@@ -76,6 +77,20 @@ def test_a_waveform_has_its_time_from_its_clock(tmp_path: Path) -> None:
     columns = {name: column for name, column in record(100).items() if name != "time_s"}
     got = read(write_tdms(tmp_path / "a.tdms", columns, properties={"wf_increment": 1e-3, "wf_start_offset": 2.0}))
     np.testing.assert_allclose(got["time_s"], 2 + np.arange(100) * 1e-3, rtol=1e-15)
+
+
+def test_waveforms_are_timed_from_the_earliest_start_of_all(tmp_path: Path) -> None:
+    starts = {"speed_rpm": 20, "pressure_bar": 0, "torque_nm": 50}
+    with TdmsWriter(tmp_path / "a.tdms") as writer:
+        channels = []
+        for name, milliseconds in starts.items():
+            start = np.datetime64("2026-11-02T08:00:00") + np.timedelta64(milliseconds, "ms")
+            properties = {"unit_string": UNITS[name], "wf_increment": 0.01, "wf_start_time": start}
+            channels.append(ChannelObject("Rig", name, np.arange(1.0, 101.0), properties=properties))
+        writer.write_segment(channels)
+    got = read(tmp_path / "a.tdms")
+    np.testing.assert_allclose(got["time_s"], 0.05 + 0.01 * np.arange(94), rtol=1e-12)
+    assert [got[name][0] for name in starts] == pytest.approx([4.0, 6.0, 1.0])
 
 
 def test_two_lengths_without_times_are_refused_by_name(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.queries.verification import check_results, check_runs
-from service.run_files.rig_profile import Named, _regex, named
+from service.run_files.rig_profile import Named, _regex, named, pattern_for
 from service.schemas.rig import RigProfile
 from storage.channels import FILE
 from storage.engine.opening import open_database
@@ -127,6 +127,25 @@ def test_no_name_of_a_file_takes_long_by_any_pattern() -> None:
     for _ in range(500):
         pattern, name = ("".join(rng.choices(of, k=rng.randint(1, 7))) for of in ("*ab", "ab"))
         assert bool(_regex(pattern).fullmatch(name)) == fnmatch.fnmatchcase(name, pattern), (pattern, name)
+
+
+def test_a_name_that_holds_the_cycles_twice_is_no_pattern() -> None:
+    assert pattern_for("test_7000_3.csv", 7000.0) == "test_{cycles}_*.csv"
+    assert pattern_for("test_7000_7000.csv", 7000.0) is None
+    assert pattern_for("test_7000_7k.csv", 7000.0) is None
+
+
+@pytest.mark.parametrize(
+    ("filename", "rig"),
+    [("test_7000_x.csv", "bench-3"), ("probe_7000_y.csv", "bench-4"), ("test_7000_y.csv", None), ("other.csv", None)],
+)
+def test_of_several_profiles_that_fit_the_name_of_the_file_says_which(
+    client: TestClient, filename: str, rig: str | None
+) -> None:
+    for profile in (RIG, RIG | {"name": "bench-4", "file_name": "*_{cycles}_y.csv"}):
+        client.post("/v1/rigs", json=profile)
+    shown = client.post("/v1/import/preview", params={"filename": filename}, content=table(7000)).json()
+    assert (shown["rig"], shown["cycles"]) == (rig, None if rig is None else 7000)
 
 
 def test_many_large_profiles_come_in_small_pages(client: TestClient) -> None:
