@@ -101,7 +101,7 @@ def interval_in_words(remaining: Mapping[str, float | None]) -> str:
 def off_track(posterior: Posterior, measurements: Sequence[Measurement], prior: Prior) -> list[Notice]:
     """The warning of a last test that lies far off what the tests before it predict, and no event lies between."""
     deviations = last_innovation(posterior, measurements, prior)
-    if deviations is None or abs(deviations) <= FAR:
+    if deviations is None or not abs(deviations) > FAR:
         return []
     side = "below" if deviations < 0 else "above"
     size = f"{abs(deviations):.1f}" if math.isfinite(deviations) else "very many"

@@ -106,16 +106,16 @@ States = Mapping[str, Tracked]
 
 
 def follow(
-    life: Life, whole: Series, assumptions: Assumptions, fraction: float, states: States, *, first_event: int = 0
+    life: Life, whole_series: Series, assumptions: Assumptions, fraction: float, states: States, *, first_event: int = 0
 ) -> Iterator[tuple[States, list[Prediction]]]:
     """Walk a life's events from `first_event` on; after each, the states by method and the predictions of the series.
 
-    `whole` is the series of all its events, `states` are those before `first_event`. A life with too few tests yields
+    `whole_series` is that of all its events, `states` are those before `first_event`. A life with too few tests yields
     `insufficient_data`.
     """
     for index in range(first_event, len(life.events)):
         so_far, cycles = life.until(index), life.events[index].cycles
-        series = whole if assumptions.counts_cycles else so_far.pooled(assumptions)
+        series = whole_series if assumptions.counts_cycles else so_far.pooled(assumptions)
         runs, tests = series.until(index), so_far.tests
         if runs:
             states = {method: advance(method, series, assumptions, states.get(method), runs) for method in CARRIED}

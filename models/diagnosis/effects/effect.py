@@ -78,7 +78,7 @@ class ShapeParameter:
     highest: float = math.inf
     smooth: bool = False  # the change may be differentiated in it: it is refined between grid values, within its bounds
     held: bool = False  # a smooth one that stays at the values of `Effect.courses` while a size is averaged over them
-    lags: bool = False  # it says (1 or 0) whether friction in loops lags behind the change
+    lags_from: float = math.inf  # friction in loops lags behind the change where the value is this or more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,7 +154,7 @@ class Effect:
         """Whether friction in loops lags behind what the effect changes."""
         if self.before_lag is not None:
             return self.before_lag
-        return any(value > 0.5 for value, parameter in zip(shape, self.shapes, strict=False) if parameter.lags)
+        return any(value >= parameter.lags_from for value, parameter in zip(shape, self.shapes, strict=False))
 
 
 def begins(effect: Effect) -> Effect:

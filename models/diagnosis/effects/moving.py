@@ -179,7 +179,7 @@ SQUEEZE_FILM = Effect(
         ShapeParameter(name="least film f", unit="-", lowest=0.003, highest=0.3, smooth=True),
         ShapeParameter(name="power of shear s, or log10 of τ/0.15 s", unit="-", lowest=0.0, highest=1.2, smooth=True),
         ShapeParameter(name="how the film is followed", unit="-"),
-        ShapeParameter(name="whether friction lags behind it", unit="-", lags=True),
+        ShapeParameter(name="whether friction lags behind it", unit="-", lags_from=1.0),
     ),
     grid=_squeeze_film_grid,
     several=_squeeze_film_changes,

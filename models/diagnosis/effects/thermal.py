@@ -111,17 +111,17 @@ OIL_TEMPERATURE = Effect(
 
 #: The heat flux to which the amplitude refers [W/m²]: the reference's 20 Nm at 1970 rpm and some, on two faces.
 REFERENCE_FLUX = 0.32e6
-#: What weakens: all of the friction, or the oil's shear.
-WHOLE, VISCOUS = 0.0, 1.0
+#: What weakens: all of the friction or the oil's shear, and friction lags behind that; or so much of the torque at once.
+WHOLE, VISCOUS, WHOLE_AT_ONCE, VISCOUS_AT_ONCE = 0.0, 1.0, -1.0, -2.0
 #: The most that a measured rise counts for, of that at the reference's flux: a faulty thermometer must not overflow.
 _MOST_WARMTH = 30.0
 
 
 def _interface_heating_grid(facts: Facts) -> tuple[Tried, ...]:
     if facts.plate_in_all_tests:  # settling and saturation are in what was measured
-        return tuple(Tried(shape=(0.0, part, 0.0, lags)) for part in (WHOLE, VISCOUS) for lags in (0.0, 1.0))
+        return tuple(Tried(shape=(0.0, part, 0.0)) for part in (WHOLE, VISCOUS, WHOLE_AT_ONCE, VISCOUS_AT_ONCE))
     return tuple(
-        Tried(shape=(float(np.log(settling)), part, saturation, 1.0))
+        Tried(shape=(float(np.log(settling)), part, saturation))
         for settling in (0.03, 0.3, 1.5, 6.0, 30.0)
         for part in (WHOLE, VISCOUS)
         for saturation in (0.0, 1.5)
@@ -129,9 +129,9 @@ def _interface_heating_grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _interface_heating_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    log_settling, part, saturation, _ = shape
+    log_settling, part, saturation = shape
     warmth = _measured(scene, _computed(scene, float(np.exp(log_settling)), saturation))
-    carried = scene.curve if part == WHOLE else scene.viscous
+    carried = scene.curve if part in {WHOLE, WHOLE_AT_ONCE} else scene.viscous
     return np.asarray(-carried * -np.expm1(-amplitude * warmth), dtype=np.float64)
 
 
@@ -174,9 +174,8 @@ INTERFACE_HEATING = Effect(
     scale=100.0,
     shapes=(
         ShapeParameter(name="log of the settling time τ", unit="ln s", lowest=-5.0, highest=6.0, smooth=True),
-        ShapeParameter(name="what weakens", unit="-"),
+        ShapeParameter(name="what weakens", unit="-", lags_from=WHOLE),
         ShapeParameter(name="saturation s", unit="-"),
-        ShapeParameter(name="whether friction lags behind it", unit="-", lags=True),
     ),
     grid=_interface_heating_grid,
     change=_interface_heating_change,
@@ -245,7 +244,7 @@ HYDRODYNAMIC_DRAG = Effect(
         ShapeParameter(name="power m", unit="-", lowest=0.5, highest=1.8, smooth=True),
         ShapeParameter(name="rupture of the film r", unit="-"),
         ShapeParameter(name="viscosity's exponent t", unit="-"),
-        ShapeParameter(name="whether friction lags behind it", unit="-", lags=True),
+        ShapeParameter(name="whether friction lags behind it", unit="-", lags_from=1.0),
     ),
     grid=_hydrodynamic_drag_grid,
     change=_hydrodynamic_drag_change,

@@ -6,7 +6,8 @@ Effects may be fitted along: each brings its amplitude and its smooth shapes as 
 A refit is a fit that is followed to its end, with effects or beside a pattern that has no name.
 """
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TypeAlias
@@ -17,7 +18,8 @@ from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import BLOCK, BLOCKS, COURSE, ENDS, LOG_CURVATURE, LOG_DECAY, POWERS, SHARES, Laws
 from models.diagnosis.baseline.prediction import Prediction, predict
-from models.diagnosis.effects.effect import amplitude_cost
+from models.diagnosis.design.design import Design
+from models.diagnosis.effects.effect import SCALES, amplitude_cost
 from models.diagnosis.effects.fitted_effect import (
     FittedEffect,
     effect_columns,
@@ -215,10 +217,27 @@ def refit(problem: FitProblem, laws: Laws, effects: tuple[FittedEffect, ...]) ->
     """The fit from laws and effects; None where a one-sided effect is negative or nothing finite fits."""
     if any(effect.wrong_sign for effect in effects):
         return None
-    starts = [laws] if np.all(_ends(laws) > 0.0) else [laws, _upright(laws)]
-    fits = [fit(problem, start, effects, steps=REFIT_STEPS) for start in starts]
+    fits = [fit(problem, *start, steps=REFIT_STEPS) for start in _starts(problem.design, laws, effects)]
     possible = [fitted for fitted in fits if not (fitted.wrong_sign or fitted.status is FitStatus.NOT_FINITE)]
     return min(possible, key=lambda fitted: fitted.cost, default=None)
+
+
+def _starts(
+    design: Design, laws: Laws, effects: tuple[FittedEffect, ...]
+) -> Iterator[tuple[Laws, tuple[FittedEffect, ...]]]:
+    """Where a refit begins: as given; and where a fresh value is below 0, with all of them above it as well, the last effect
+    then large and with each smooth shape of its grid, for what was screened about bent curves says little of its size."""
+    yield laws, effects
+    if np.all(_ends(laws) >= 0.0):  # one that is not free is 0
+        return
+    upright = _upright(laws)
+    yield upright, effects
+    if effects:
+        *others, last = effects
+        large = math.copysign(SCALES[-1] * last.effect.prior_sd, last.amplitude)
+        for tried in last.effect.grid(design.facts):
+            if last.effect.stiff(tried.shape) == last.effect.stiff(last.shape):
+                yield upright, (*others, replace(last, amplitude=large, shape=tried.shape))
 
 
 def _ends(laws: Laws) -> FloatArray:
@@ -232,8 +251,8 @@ def _upright(laws: Laws) -> Laws:
     its prior is a wall. A heating of 15 % beside a measured plate ended 558 nats above its least cost."""
     turned = Laws(theta=laws.theta.copy(), frame=laws.frame)
     for block, ends in zip(turned.theta[:LOG_DECAY].reshape(BLOCKS, BLOCK), _ends(turned), strict=True):
-        if np.any(ends <= 0.0):
-            ends[:] = np.maximum(ends, 0.25 * np.abs(ends).max())
+        if np.any(ends < 0.0):
+            ends[ends < 0.0] = 0.25 * np.abs(ends).max()
             block[SHARES] = np.clip(block[SHARES], -1.0, 1.0)
     return turned
 

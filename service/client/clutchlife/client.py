@@ -141,8 +141,8 @@ class Client:
         self, clutch_id: str, *, adopt: bool = False, isolability: bool = False, wait: float = 600.0
     ) -> Answer:
         """Have a clutch diagnosed and wait for the report. Raises DiagnosisFailedError where it failed, TimeoutError where
-        it has not ended after `wait` [s]. `adopt`: the extended model is adopted if there
-        is one; `isolability`: the report says which causes these tests could tell apart."""
+        it has not ended after `wait` [s]. `adopt`: the extended model is adopted if there is one; `isolability`: the report
+        says which causes these tests could tell apart."""
         report = diagnosed(self.service, clutch_id, adopt=adopt, isolability=isolability, wait=wait)
         if report["status"] != "finished":
             raise DiagnosisFailedError(f"the diagnosis failed: {report['problem']}", {"detail": report["problem"]})

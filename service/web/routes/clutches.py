@@ -25,8 +25,8 @@ from service.workflows.edit_clutch import edit
 from storage.clutches import Choice
 
 router = APIRouter(prefix="/v1/clutches", tags=["clutches"])
-#: Beside the clutches: below them, `totals` would be a clutch's name.
 fleet_router = APIRouter(prefix="/v1/fleet", tags=["fleet"])
+#: Of the fleet: below `/v1/clutches`, `totals` would be a clutch's name.
 totals_router = APIRouter(prefix="/v1/fleet", tags=["fleet"])
 
 EXAMPLE = {

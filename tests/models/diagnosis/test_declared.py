@@ -125,7 +125,7 @@ def test_with_the_channel_it_goes_with_the_plate_and_a_thermometers_offset_is_no
     for offset in (0.0, -4.0):
         scene = scene_of(with_plate(campaign(1), RISE, offset))
         assert len(INTERFACE_HEATING.grid(scene.facts)) == 4
-        change = INTERFACE_HEATING.change(scene, 0.1, (0.0, WHOLE, 0.0, 1.0))
+        change = INTERFACE_HEATING.change(scene, 0.1, (0.0, WHOLE, 0.0))
         lost = -np.log1p(change / scene.curve) / 0.1
         area = GEOMETRY.friction_faces * GEOMETRY.lining_area
         at_rest, per_flux = scene.facts.plate_warming
@@ -142,7 +142,7 @@ def test_a_plate_that_stays_at_the_oils_temperature_is_nowhere_warm() -> None:
         return {"plate_temperature": np.asarray(table.oil_temperature)}
 
     scene = scene_of(altered(campaign(1), lambda run: cool(run.plateaus), lambda run: cool(run.record)))
-    assert not INTERFACE_HEATING.change(scene, 0.1, (0.0, WHOLE, 0.0, 1.0)).any()
+    assert not INTERFACE_HEATING.change(scene, 0.1, (0.0, WHOLE, 0.0)).any()
 
 
 def test_where_some_tests_have_it_the_others_are_computed() -> None:

@@ -49,14 +49,16 @@ def test_numbers_that_cannot_be_fitted_are_a_status(given: Study) -> None:
     assert np.isinf(broken.cost)
 
 
-def test_a_refit_comes_back_from_a_baseline_whose_viscous_torque_is_negative() -> None:
-    """Heating by a third of the torque bends the curves so far that the baseline alone follows with C_v < 0."""
-    bent = study(sent(hide((404, 3245693708, 1), ("interface_heating",), 300.0, loops=False)))
-    laws, heat = bent.baseline.fit.laws, of_size("interface_heating", 0.2, (-5.0, 0.0, 0.0, 1.0))
-    assert laws.theta[3 * BLOCK] < -1.0
+@pytest.mark.parametrize(("seed", "log_settling"), [(404, -5.0), (502, 1.7)])
+def test_a_refit_comes_back_from_a_baseline_whose_viscous_torque_is_negative(seed: int, log_settling: float) -> None:
+    """Heating by more than a third of the torque bends the curves so far that the baseline alone follows with C_v < 0; about
+    such curves the screen may take it for slow."""
+    bent = study(sent(hide((seed, 3245693708, 1), ("interface_heating",), 300.0, loops=False)))
+    laws, heat = bent.baseline.fit.laws, of_size("interface_heating", 0.2, (log_settling, 0.0, 0.0))
+    assert laws.theta[3 * BLOCK] < 0.0
     found = refit(bent.problem, laws, (heat,))
     assert found is not None
-    assert found.cost < fit(bent.problem, laws, (heat,), steps=REFIT_STEPS).cost - 100.0
+    assert found.cost < fit(bent.problem, laws, (heat,), steps=REFIT_STEPS).cost - 50.0
 
 
 # --- Priors: their part of the gradient is the slope of their cost, and the projection holds them as the fit does.
@@ -67,7 +69,7 @@ def beside_heat(given: Study) -> Fit:
     """The laws off their priors' means, and an effect of some size."""
     laws = given.baseline.fit.laws
     off = replace(laws, theta=laws.theta + 0.1)
-    return fit(given.problem, off, (of_size("interface_heating", 0.3, (2.0, 0.0, 1.0, 1.0)),), steps=0)
+    return fit(given.problem, off, (of_size("interface_heating", 0.3, (2.0, 0.0, 1.0)),), steps=0)
 
 
 def test_the_gradient_of_the_priors_is_the_slope_of_their_cost(given: Study, beside_heat: Fit) -> None:
