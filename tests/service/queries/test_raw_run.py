@@ -132,8 +132,8 @@ def test_parquet_needs_its_extra(database: Database, tmp_path: Path, monkeypatch
 
 
 def test_the_tag_follows_from_receipt_and_request_alone(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(channels, "stored", None)  # no channel can be read
-    monkeypatch.setattr(channels, "read", None)
+    for name in ("stored", "stored_of_run"):
+        monkeypatch.setattr(channels, name, None)  # no channel can be read
     asked: list[dict[str, Any]] = [{}, {"points": 500}, {"points": 500, "compressed": True}, {"kind": "parquet"}]
 
     def tags() -> list[str]:

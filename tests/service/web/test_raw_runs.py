@@ -112,7 +112,7 @@ def test_lists_hold_no_channels(client: TestClient, raw: dict[str, Any], monkeyp
     """Neither in what is answered nor in what is read for it."""
     assert raw
     client.post(RUNS, json=stationary(1000)).raise_for_status()
-    for name in ("read", "stored", "lengths"):
+    for name in ("stored", "stored_of_run", "lengths"):
         monkeypatch.setattr(channels, name, None)
     names = ("runs", "runs.csv", "loops", "stribeck", "series", "degradation", "remaining-useful-life", "diagnoses")
     for address in ("/v1/clutches", *(f"/v1/clutches/c1/{name}" for name in names)):
