@@ -6,6 +6,7 @@ import math
 import secrets
 import time
 import zlib
+from abc import ABC, abstractmethod
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
@@ -39,7 +40,7 @@ from service.web.problems import refused, unexpected
 from storage.engine.errors import StorageError
 
 
-class _OfRequests:
+class _OfRequests(ABC):
     """Middleware whose `handle` is given requests; what else the server sends passes by."""
 
     def __init__(self, app: ASGIApp) -> None:
@@ -48,8 +49,9 @@ class _OfRequests:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         await (self.handle if scope["type"] == "http" else self.app)(scope, receive, send)
 
+    @abstractmethod
     async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
-        raise NotImplementedError
+        """Answer a request."""
 
 
 class Shares(_OfRequests):
