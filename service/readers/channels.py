@@ -83,8 +83,8 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     """
     table, reading = widened(table, reading)
     chosen = choose(table.columns, reading)
-    series, table, chosen, counts = _read(table, chosen, reading, limits)
-    notices = [*table.notices, *_left_out(table.columns, chosen, reading)]
+    series, table, counts = _read(table, chosen, reading, limits)
+    notices = list(table.notices)
     columns = _on_one_clock(series, notices)
     columns, first = _chosen_table(columns, table, reading)
     line_in_file = table.line_of
@@ -180,22 +180,20 @@ def _runs_on(times: FloatArray) -> bool:
     return bool(steps.size > 0 and np.count_nonzero(steps > 0) >= _MOST_OF * steps.size)
 
 
-def _add_parts(times: FloatArray, parts: Mapping[str, tuple[FloatArray, float]]) -> list[Notice]:
-    """Add to times in whole seconds, in place, the part of the second that stands in a column of its own, and say so."""
-    for name, (values, factor) in parts.items() if stands(times) else ():
-        seconds = factor * values
+def _add_part(times: FloatArray, parts: Mapping[int, FloatArray]) -> int | None:
+    """Add to times in whole seconds, in place, the part of the second that stands in a column of its own: which one."""
+    for at, seconds in parts.items() if stands(times) else ():
         if ((seconds >= 0) & (seconds < 1)).all() and (np.diff(times + seconds) > 0).all():
             times += seconds - seconds[0]
-            message = f"time_s has whole seconds: the fractions in {name} were added"
-            return [Notice(code="parts_of_seconds", message=message)]
-    return []
+            return at
+    return None
 
 
 def _read(
     table: Table, chosen: Sequence[Taken], reading: Reading, limits: Limits
-) -> tuple[dict[str, _Series], Table, list[Taken], bool]:
-    """The channels' values and times, the table without totals at its end, the columns that they are from, and whether their
-    one clock may only count."""
+) -> tuple[dict[str, _Series], Table, bool]:
+    """The channels' values and times, the table without totals at its end, with notices, and whether their one clock may
+    only count."""
     indices = [column.index for column in chosen]
     stated = sum(table.columns[index].rows or 0 for index in indices)
     if stated > limits.most_values:
@@ -220,11 +218,11 @@ def _read(
         values[column.index], valid[column.index] = _numbers(column, read.pop(column.index), start)
         if column.channel == "time_s" and column.unit is None:
             notices += _in_seconds(table.columns[column.index], values[column.index], reading)
-    second_parts = {table.columns[at].shown(): (plain(read.pop(at)), factor) for at, factor in parts.items()}
-    for column in chosen:
-        if column.channel == "time_s":
-            notices += _add_parts(values[column.index], second_parts)
-    table = replace(table, notices=notices)
+    part_seconds = {at: factor * plain(read.pop(at)) for at, factor in parts.items()}
+    added = [_add_part(values[column.index], part_seconds) for column in chosen if column.channel == "time_s"]
+    for name in (table.columns[at].shown() for at in added if at is not None):
+        message = f"time_s has whole seconds: the fractions in {name} were added"
+        notices.append(Notice(code="parts_of_seconds", message=message))
     chosen = [column for column in chosen if not column.guessed or _runs_on(values[column.index])]
     clocks = {} if reading.time == NO_TIME else _clocks(table.columns, chosen, values)
     used = {clock.key: clock for clock in clocks.values() if clock is not None}
@@ -243,7 +241,9 @@ def _read(
                     own.valid = good if own.valid is None else own.valid & good
     if not series:  # a time alone: shown as such, and refused for what it lacks
         series = {"time_s": _Series(values[indices[0]], None, None, None)}
-    return series, table, chosen, len(used) == 1 and all(clock.counts for clock in used.values())
+    unread = {index: own for index, own in enumerate(table.columns) if index not in added}
+    table = replace(table, notices=[*notices, *_left_out(unread, chosen, reading)])
+    return series, table, len(used) == 1 and all(clock.counts for clock in used.values())
 
 
 def _drop_empty_rows(name: str, own: _Series, table: Table, leave_out: bool) -> _Series:
@@ -323,14 +323,14 @@ def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> list[Not
     raise InvalidError.of(message, code="missing_unit", pointer="/map")
 
 
-def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Reading) -> list[Notice]:
+def _left_out(columns: Mapping[int, Column], taken: Sequence[Taken], reading: Reading) -> list[Notice]:
     """Notices about columns of the table that are not used."""
     notices = []
     if part := [f"{column.channel} from {columns[column.index].shown()}" for column in taken if column.in_part]:
         message = f"only a part of these titles was recognised, so check them: {', '.join(part)}"
         notices.append(Notice(code="name_in_part", message=message))
     used = {column.index for column in taken}
-    others = [column for index, column in enumerate(columns) if index not in used and (column.title or column.name)]
+    others = [column for index, column in columns.items() if index not in used and (column.title or column.name)]
     if reading.time == NO_TIME:
         others = [column for column in others if known_channel(column.name) != "time_s"]
     if others:

@@ -1002,8 +1002,8 @@ def test_fractions_of_the_second_that_were_added_are_said_to_have_been(tmp_path:
     lines = [f"08:00:0{k // 4};{k % 4 * 250};{line}" for k, line in enumerate(rows(";", names=PLATEAUS).splitlines())]
     got = read_content(tmp_path, "\n".join(["Time;ms;p [bar];n [rpm];M [Nm]", *lines]))
     np.testing.assert_allclose(got.columns["time_s"], 0.25 * np.arange(ROWS))
-    (notice,) = [notice for notice in got.notices if notice.code == "parts_of_seconds"]
-    assert "the fractions in ms were added" in notice.message
+    (notice,) = got.notices
+    assert (notice.code, "the fractions in ms were added" in notice.message) == ("parts_of_seconds", True)
 
 
 def test_a_time_that_is_not_wanted_is_not_said_to_be_left_out(tmp_path: Path) -> None:
