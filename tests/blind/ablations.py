@@ -7,11 +7,12 @@ Verdicts are stored in .blind/ablations, a file a campaign and what was tried: t
 After a change of code remove them.
 """
 
-import json
 import os
+import pickle
 from ast import literal_eval
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from time import process_time
 
 from models.diagnosis import criteria
@@ -22,8 +23,8 @@ from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.diagnosis.raw_records.evidence import raw_evidence
 from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.sent import campaign
-from tests.blind.subset import STORE, Judged, trials
-from tests.blind.trials import Trial
+from tests.blind.subset import trials
+from tests.blind.trials import Outcome, Trial, file_of, nothing
 from tests.measuring import Asked, kept
 from tests.measuring import table as markdown
 
@@ -67,16 +68,16 @@ def taken_for(number: str, value: object) -> Iterator[None]:
         setattr(criteria, number, before)
 
 
-def verdicts(trial: Trial, numbers: Mapping[str, Sequence[object]]) -> dict[str, Judged]:
+def verdicts(trial: Trial, numbers: Mapping[str, Sequence[object]]) -> dict[str, Outcome]:
     """What is said as it is, and with each value of each number; what a number does not act on is computed once."""
     seen = campaign(trial.hidden())
     design = build_design(seen)
     raw = raw_evidence(seen, trial.without)
 
-    def said(search: Search, began: float) -> Judged:
+    def said(search: Search, began: float) -> Outcome:
         judgement = judge(search.posterior(raw, trial.without))
         seconds = process_time() - began
-        return Judged(trial.row, frozenset(trial.slugs), str(judgement.verdict), frozenset(judgement.causes), seconds)
+        return replace(nothing(trial, str(judgement.verdict), ""), causes=frozenset(judgement.causes), seconds=seconds)
 
     began = process_time()
     baseline = fit_baseline(design)
@@ -94,35 +95,29 @@ def verdicts(trial: Trial, numbers: Mapping[str, Sequence[object]]) -> dict[str,
     return out
 
 
-def stored(name: str, trial: Trial, ablate: str) -> dict[str, Judged]:
+def stored(trial: Trial, ablate: str) -> dict[str, Outcome]:
     """The verdicts on a trial, computed or read; none where no such campaign could be made."""
-    path = STORE / "ablations" / ablate / f"{name}.json"
 
     def judged() -> bytes:
         try:
-            said = verdicts(trial, asked(ablate))
+            return pickle.dumps(verdicts(trial, asked(ablate)))
         except UnreachableError:
-            said = {}
-        rows = {variant: [one.verdict, sorted(one.causes), one.seconds] for variant, one in said.items()}
-        return json.dumps(rows).encode()
+            return pickle.dumps({})
 
-    truth, rows = frozenset(trial.slugs), json.loads(kept(path, judged))
-    return {
-        variant: Judged(trial.row, truth, verdict, frozenset(causes), seconds)
-        for variant, (verdict, causes, seconds) in rows.items()
-    }
+    known: dict[str, Outcome] = pickle.loads(kept(file_of(trial, f"ablations/{ablate}"), judged))  # noqa: S301 -- of this program
+    return known
 
 
-def good(one: Judged) -> bool:
+def good(one: Outcome) -> bool:
     """Nothing called adequate, an effect named right, what is left out or uncatalogued neither named nor overlooked."""
-    if not one.truth or one.row.startswith("none"):
+    if not one.truth or one.trial.row.startswith("none"):
         return one.verdict == "model_adequate"
-    if one.row.startswith(("left/", "outside/")):
+    if one.trial.row.startswith(("left/", "outside/")):
         return not one.named and one.verdict != "model_adequate"
     return one.right
 
 
-def table(found: Sequence[dict[str, Judged]]) -> list[str]:
+def table(found: Sequence[dict[str, Outcome]]) -> list[str]:
     """A row a value: how many verdicts changed, became good or ceased to be, and of those named wrong."""
     titles = (
         f"{len(found)} campaigns",
@@ -148,10 +143,9 @@ def main() -> None:
     ablate = os.environ["ABLATE"]
     asked(ablate)  # what is not there is said at once
     wanted = Asked.here("full")
-    chosen = {name: one for name, one in trials(wanted.seed).items() if one.row.startswith(wanted.only)}
-    places = [int(place / wanted.size) for place in range(round(len(chosen) * wanted.size))]
-    names = [list(chosen)[place] for place in places]
-    found = [said for name in names if (said := stored(name, chosen[name], ablate))]
+    chosen = [one for one in trials(wanted.seed) if one.row.startswith(wanted.only)]
+    sample = [chosen[int(place / wanted.size)] for place in range(round(len(chosen) * wanted.size))]
+    found = [said for one in sample if (said := stored(one, ablate))]
     print("\n".join(table(found)))
 
 

@@ -53,7 +53,7 @@ def falls_short(one: Outcome) -> bool:
         return False
     if one.trial.without:
         return one.named
-    return one.wrong or (one.trial.lam >= 80 and not (one.named and one.causes == one.truth))
+    return one.wrong or (one.trial.lam >= 80 and not one.right)
 
 
 def look(outcome: Outcome) -> Seen:

@@ -133,112 +133,81 @@ def _special(seed: int, count: int) -> list[Trial]:
     return made
 
 
+def _alarm(one: Outcome) -> bool:
+    return one.verdict != "model_adequate"
+
+
+def _hidden(one: Outcome) -> bool:
+    return bool(one.truth)
+
+
 def _is(family: bool) -> Test:
     return lambda one: one.detected and ((one.trial.slugs[0] in HISTORY) is family)
 
 
+def _resolved(tests: int | None = None) -> Test:
+    return lambda one: any(after.right for after in one.advised[:tests])
+
+
 def counts() -> list[Count]:
     """The lines of the table in its order."""
+    alarm, few = "any verdict but `model_adequate`", "one to three speeds"
     lines = [
         *(
-            Count(
-                f"no effect, noise of {noise:g} %: any verdict but `model_adequate`",
-                f"none/{noise:g}",
-                lambda one: one.verdict != "model_adequate",
-                most=0.015,
-            )
+            Count(f"no effect, noise of {noise:g} %: {alarm}", f"none/{noise:g}", _alarm, most=0.015)
             for noise in NOISES
         ),
-        Count("one effect, λ = 20: detected", "one/", lambda one: one.detected, least=0.90),
+        Count("one effect, λ = 20: detected", "one/", lambda o: o.detected, 0.90),
         Count(
-            "… true cause in the set, of those detected",
-            "one/",
-            lambda one: one.in_set,
-            0.97,
-            among=lambda o: o.detected,
+            "… true cause in the set, of those detected", "one/", lambda o: o.in_set, 0.97, among=lambda o: o.detected
         ),
-        Count("… top candidate, outside the history family", "one/", lambda one: one.top, 0.95, among=_is(False)),
-        Count("… top candidate, history family", "one/", lambda one: one.top, 0.60, among=_is(True)),
-        Count("… named and wrong", "one/", lambda one: one.wrong, most=0.02),
-        Count("… ambiguous, and named rightly after the first advised test", "one/", _resolved(1), among=_ambiguous),
-        Count(
-            f"… ambiguous, and named rightly after {MOST_ADVISED} advised tests at most, one by one",
-            "one/",
-            _resolved(),
-            0.80,
-            among=_ambiguous,
+        Count("… top candidate, outside the history family", "one/", lambda o: o.top, 0.95, among=_is(False)),
+        Count("… top candidate, history family", "one/", lambda o: o.top, 0.60, among=_is(True)),
+        Count("… named and wrong", "one/", lambda o: o.wrong, most=0.02),
+    ]
+    ambiguous = (
+        ("and named rightly after the first advised test", _resolved(1), None),
+        (f"and named rightly after {MOST_ADVISED} advised tests at most, one by one", _resolved(), 0.80),
+        ("and named wrongly after one of them", lambda o: any(after.wrong for after in o.advised), None),
+    )
+    lines += [
+        *(
+            Count(f"… ambiguous, {what}", "one/", met, least, among=lambda o: o.ambiguous)
+            for what, met, least in ambiguous
         ),
-        Count(
-            "… ambiguous, and named wrongly after one of them",
-            "one/",
-            lambda o: any(a.wrong for a in o.advised),
-            among=_ambiguous,
-        ),
-        Count("… ambiguous without any advice", "one/", lambda one: not one.advice, among=_ambiguous),
-        Count("λ = 50, 12 states: top candidate", "twelve/", lambda one: one.top, 0.95),
-        Count("… named and wrong", "twelve/", lambda one: one.wrong, most=0.02),
+        Count("… ambiguous without any advice", "one/", lambda o: not o.advice, among=lambda o: o.ambiguous),
+        Count("λ = 50, 12 states: top candidate", "twelve/", lambda o: o.top, 0.95),
+        Count("… named and wrong", "twelve/", lambda o: o.wrong, most=0.02),
     ]
     for lam in LOUDNESSES:
-        row = f"loud/{lam:.0f}/"
+        title, row = f"λ = {lam:.0f}", f"loud/{lam:.0f}/"
         lines += [
-            Count(f"λ = {lam:.0f}: detected", row, lambda one: one.detected),
-            Count(f"λ = {lam:.0f}: true cause in the set", row, lambda one: one.in_set, 0.97 if lam >= 50 else None),
-            Count(f"λ = {lam:.0f}: named rightly", row, _right, 0.90 if lam >= 80 else None),
-            Count(f"λ = {lam:.0f}: named and wrong", row, lambda one: one.wrong, most=0.015),
+            Count(f"{title}: detected", row, lambda o: o.detected),
+            Count(f"{title}: true cause in the set", row, lambda o: o.in_set, 0.97 if lam >= 50 else None),
+            Count(f"{title}: named rightly", row, lambda o: o.right, 0.90 if lam >= 80 else None),
+            Count(f"{title}: named and wrong", row, lambda o: o.wrong, most=0.015),
         ]
     lines += [
-        Count("outside the catalogue, λ = 50: `unexplained_structure`", "outside/", _unexplained, 0.80),
-        Count("… with the right axis first", "outside/", _right_axis, 0.80, among=_unexplained),
-        Count("… named", "outside/", lambda one: one.named, most=0.02),
+        Count("outside the catalogue, λ = 50: `unexplained_structure`", "outside/", lambda o: o.unexplained, 0.80),
+        Count("… with the right axis first", "outside/", lambda o: o.right_axis, 0.80, among=lambda o: o.unexplained),
+        Count("… named", "outside/", lambda o: o.named, most=0.02),
         Count("left out of the catalogue, λ = 50: named as something else", "left/", lambda o: o.named, most=0.10),
-        Count("… unexplained or ambiguous", "left/", lambda o: _unexplained(o) or _ambiguous(o), 0.80),
+        Count("… unexplained or ambiguous", "left/", lambda o: o.unexplained or o.ambiguous, 0.80),
         Count("two effects, λ = 50 each: both in the set", "two", lambda o: o.in_set, 0.85),
-        Count("… the exact pair named", "two", _right, 0.75),
-        Count("… a wrong name", "two", lambda one: one.wrong, most=0.05),
+        Count("… the exact pair named", "two", lambda o: o.right, 0.75),
+        Count("… a wrong name", "two", lambda o: o.wrong, most=0.05),
         Count("temperature effect without oil temperature: `torque_zero_shift` named", "blindfold/", _zero, most=0.0),
-        Count("… anything but `oil_temperature` named", "blindfold/", lambda one: one.wrong, most=0.02),
-        Count("squeeze film against the GMS baseline: named", "film", _right, 0.95),
-        Count(
-            "raw stationary records, λ = 20: detected", "raw/", lambda o: o.detected, 0.9, among=lambda o: bool(o.truth)
-        ),
-        Count("… named and wrong", "raw/", lambda one: one.wrong, most=0.02, among=lambda o: bool(o.truth)),
-        Count(
-            "… nothing hidden: any verdict but `model_adequate`",
-            "raw/none",
-            lambda o: o.verdict != "model_adequate",
-            most=0.02,
-        ),
-        Count(
-            "one to three speeds, nothing hidden: any verdict but `model_adequate`",
-            "few/none",
-            lambda o: o.verdict != "model_adequate",
-            most=0.02,
-        ),
-        Count("one to three speeds, λ = 80: in the set", "few/", lambda o: o.in_set, among=lambda o: bool(o.truth)),
-        Count("… named and wrong", "few/", lambda o: o.wrong, most=0.02, among=lambda o: bool(o.truth)),
-        Count("crashed", "", lambda one: one.verdict == "crashed", most=0.0),
+        Count("… anything but `oil_temperature` named", "blindfold/", lambda o: o.wrong, most=0.02),
+        Count("squeeze film against the GMS baseline: named", "film", lambda o: o.right, 0.95),
+        Count("raw stationary records, λ = 20: detected", "raw/", lambda o: o.detected, 0.9, among=_hidden),
+        Count("… named and wrong", "raw/", lambda o: o.wrong, most=0.02, among=_hidden),
+        Count(f"… nothing hidden: {alarm}", "raw/none", _alarm, most=0.02),
+        Count(f"{few}, nothing hidden: {alarm}", "few/none", _alarm, most=0.02),
+        Count(f"{few}, λ = 80: in the set", "few/", lambda o: o.in_set, among=_hidden),
+        Count("… named and wrong", "few/", lambda o: o.wrong, most=0.02, among=_hidden),
+        Count("crashed", "", lambda o: o.verdict == "crashed", most=0.0),
     ]
     return lines
-
-
-def _right(one: Outcome) -> bool:
-    return one.named and one.causes == one.truth
-
-
-def _unexplained(one: Outcome) -> bool:
-    return one.verdict == "unexplained_structure"
-
-
-def _right_axis(one: Outcome) -> bool:
-    return bool(one.where) and one.where[0] in one.axes
-
-
-def _ambiguous(one: Outcome) -> bool:
-    return one.verdict == "cause_ambiguous"
-
-
-def _resolved(tests: int | None = None) -> Test:
-    return lambda one: any(_right(after) for after in one.advised[:tests])
 
 
 def _zero(one: Outcome) -> bool:

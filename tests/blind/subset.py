@@ -5,60 +5,27 @@ SEED=    other campaigns (1)                         ONLY=    rows whose names b
 ARGS="--against OTHER": the rows of both beside each other, campaign by campaign the same ones
 """
 
-import json
 import math
 import os
 import sys
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from models.diagnosis.diagnose import diagnose
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
 from tests.blind.rows import LOOPS, RECORDS, drawn_pairs
-from tests.blind.trials import Diagnose, Trial, judge
-from tests.measuring import ROOT, Asked, kept
+from tests.blind.trials import Outcome, Trial, file_of, stored
+from tests.measuring import Asked
 from tests.measuring import table as markdown
 
-STORE = ROOT / ".blind"
 
-
-@dataclass(frozen=True)
-class Judged:
-    """What is kept of a trial."""
-
-    row: str
-    truth: frozenset[str]
-    verdict: str
-    causes: frozenset[str]
-    seconds: float
-
-    @property
-    def named(self) -> bool:
-        return self.verdict == "cause_named"
-
-    @property
-    def right(self) -> bool:
-        return self.named and self.causes == self.truth
-
-    @property
-    def wrong(self) -> bool:
-        return self.named and not self.causes <= self.truth
-
-    @property
-    def in_set(self) -> bool:
-        return self.verdict in {"cause_named", "cause_ambiguous"} and self.truth <= self.causes
-
-
-def trials(seed: int) -> dict[str, Trial]:
-    """The campaigns by name, in an order in which any part of them is a fair sample."""
-    made: dict[str, Trial] = {}
+def trials(seed: int) -> list[Trial]:
+    """The campaigns, in an order in which any part of them is a fair sample."""
+    made: list[Trial] = []
 
     def add(row: str, number: int, *slugs: str, lam: float = 0.0, left: bool = False, **wanted: Any) -> None:
         out = frozenset(slugs) if left else frozenset[str]()
-        trial = Trial(row, (seed, zlib.crc32(row.encode()), number), slugs, lam, out, wanted=wanted)
-        made[f"{row}-{seed}-{number}".replace("/", "_")] = trial
+        made.append(Trial(row, (seed, zlib.crc32(row.encode()), number), slugs, lam, out, wanted=wanted))
 
     for k in range(3):
         for j in range(5):
@@ -89,22 +56,8 @@ def trials(seed: int) -> dict[str, Trial]:
     return made
 
 
-def judged(name: str, trial: Trial, label: str, look: Diagnose = diagnose) -> Judged | None:
-    """The verdict on a trial, computed or read; None where no such campaign could be made."""
-
-    def stored() -> bytes:
-        outcome = judge(trial, look)
-        found = {name: getattr(outcome, name) for name in ("verdict", "seconds", "candidates")}
-        return json.dumps(found | {"causes": sorted(outcome.causes)}).encode()
-
-    said = json.loads(kept(STORE / label / f"{name}.json", stored))
-    if said["verdict"] == "unreachable":
-        return None
-    return Judged(trial.row, frozenset(trial.slugs), said["verdict"], frozenset(said["causes"]), said["seconds"])
-
-
 #: What is counted: title, beginnings of the rows, what counts, whether more is better.
-Row = tuple[str, tuple[str, ...], Callable[[Judged], bool], bool]
+Row = tuple[str, tuple[str, ...], Callable[[Outcome], bool], bool]
 ROWS: tuple[Row, ...] = (
     ("nothing hidden: adequate", ("none", "raw/none"), lambda o: o.verdict == "model_adequate", True),
     ("one effect, λ = 50, loops: named right", ("fifty/",), lambda o: o.right, True),
@@ -131,18 +84,19 @@ ROWS: tuple[Row, ...] = (
 )
 
 
-def table(first: dict[str, Judged], second: dict[str, Judged], labels: tuple[str, str]) -> list[str]:
+def table(first: Sequence[Outcome], second: Sequence[Outcome], labels: tuple[str, str]) -> list[str]:
     """Both beside each other on the campaigns that both have; worse where the difference of the pairs is beyond two of its
     standard errors."""
-    both = sorted(first.keys() & second.keys())
+    theirs = {one.trial.seed: one for one in second}
+    both = [(one, theirs[one.trial.seed]) for one in first if one.trial.seed in theirs]
     lines: list[tuple[object, ...]] = []
     for title, rows, counts, more in ROWS:
-        pairs = [(counts(first[name]), counts(second[name])) for name in both if first[name].row.startswith(rows)]
+        pairs = [(counts(a), counts(b)) for a, b in both if a.trial.row.startswith(rows)]
         lost, won = sum(a and not b for a, b in pairs), sum(b and not a for a, b in pairs)
         worse = (lost - won if more else won - lost) > 2 * math.sqrt(max(lost + won, 1))
         counted = (sum(a for a, _ in pairs), sum(b for _, b in pairs), f"{lost} / {won}", "worse" if worse else "")
         lines.append((title, len(pairs), *counted))
-    seconds = [sum(each[name].seconds for name in both) / max(len(both), 1) for each in (first, second)]
+    seconds = [sum(pair[k].seconds for pair in both) / max(len(both), 1) for k in (0, 1)]
     lines.append(("seconds a campaign", len(both), *(f"{mean:.2f}" for mean in seconds), "", ""))
     return markdown(("on the same campaigns", "n", *labels, "only {} / only {}".format(*labels), ""), lines)
 
@@ -150,13 +104,13 @@ def table(first: dict[str, Judged], second: dict[str, Judged], labels: tuple[str
 def main(arguments: Sequence[str]) -> None:
     """Judge, and print the rows."""
     label, asked = os.environ["SUBSET"], Asked.here()
-    chosen = {name: trial for name, trial in trials(asked.seed).items() if trial.row.startswith(asked.only)}
-    mine = {name: found for name, trial in chosen.items() if (found := judged(name, trial, label)) is not None}
+    chosen = [trial for trial in trials(asked.seed) if trial.row.startswith(asked.only)]
+    mine = [one for trial in chosen if (one := stored(trial, label)).made]
     other, against = mine, label
     if "--against" in arguments:
         against = arguments[arguments.index("--against") + 1]
-        stored = {name: trial for name, trial in chosen.items() if (STORE / against / f"{name}.json").exists()}
-        other = {name: found for name, trial in stored.items() if (found := judged(name, trial, against)) is not None}
+        there = [trial for trial in chosen if file_of(trial, against).exists()]
+        other = [one for trial in there if (one := stored(trial, against)).made]
     print("\n".join(table(other, mine, (against, label))))
 
 

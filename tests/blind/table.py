@@ -8,7 +8,7 @@ from tests.blind.rig.hide import DRAWS
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
 from tests.blind.rows import HALVED, LOUDNESSES, calibration, counts
 from tests.blind.trials import Outcome
-from tests.measuring import wilson
+from tests.measuring import table, wilson
 
 
 def _share(hits: int, count: int) -> str:
@@ -18,71 +18,72 @@ def _share(hits: int, count: int) -> str:
 
 def summary(outcomes: Sequence[Outcome]) -> list[str]:
     """What the targets are about, line by line."""
-    lines = ["| what | found, with 95 % interval | target | |", "|---|---|---|---|"]
+    rows = []
     for line in counts():
         hits, count = line.of(outcomes)
         if count:
             mark = {True: "met", False: "missed", None: ""}[line.holds(hits, count)]
-            lines.append(f"| {line.title} | {_share(hits, count)} | {line.target} | {mark} |")
-    return lines
+            rows.append((line.title, _share(hits, count), line.target, mark))
+    return table(("what", "found, with 95 % interval", "target", ""), rows)
 
 
-def by_effect(outcomes: Sequence[Outcome], row: str = "one") -> list[str]:
+def _of(outcomes: Sequence[Outcome], row: str) -> list[Outcome]:
+    return [one for one in outcomes if one.trial.row == row]
+
+
+def by_effect(outcomes: Sequence[Outcome]) -> list[str]:
     """Each of the seventeen by itself, at λ = 20 and 6 states."""
-    lines = [
-        "| effect, λ = 20 | campaigns | detected | truth in set | top candidate | named | named and wrong | unexplained |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    rows = []
     for slug in CATALOGUED:
-        mine = [one for one in outcomes if one.trial.row == f"{row}/{slug}"]
+        mine = _of(outcomes, f"one/{slug}")
         seen = [one for one in mine if one.detected]
         if mine:
             cells = (
-                f"{sum(one.detected for one in mine)}/{len(mine)}",
+                f"{len(seen)}/{len(mine)}",
                 f"{sum(one.in_set for one in seen)}/{len(seen)}",
                 f"{sum(one.top for one in seen)}/{len(seen)}",
-                f"{sum(one.named and one.causes == one.truth for one in mine)}/{len(mine)}",
+                f"{sum(one.right for one in mine)}/{len(mine)}",
                 f"{sum(one.wrong for one in mine)}/{len(mine)}",
-                f"{sum(one.verdict == 'unexplained_structure' for one in mine)}/{len(mine)}",
+                f"{sum(one.unexplained for one in mine)}/{len(mine)}",
             )
-            lines.append(f"| `{slug}` | {len(mine)} | " + " | ".join(cells) + " |")
-    return lines
+            rows.append((f"`{slug}`", len(mine), *cells))
+    titles = "campaigns", "detected", "truth in set", "top candidate", "named", "named and wrong", "unexplained"
+    return table(("effect, λ = 20", *titles), rows)
 
 
 def by_loudness(outcomes: Sequence[Outcome]) -> list[str]:
     """The same at every loudness: named rightly, and named wrongly, of how many."""
-    titles = [f"λ = {lam:.0f}: named rightly, wrongly" for lam in LOUDNESSES]
-    lines = ["| effect | " + " | ".join(titles) + " |", "|---|" + len(titles) * "---|"]
+    rows = []
     for slug in CATALOGUED:
-        cells = []
-        for lam in LOUDNESSES:
-            mine = [one for one in outcomes if one.trial.row == f"loud/{lam:.0f}/{slug}"]
-            right = sum(one.named and one.causes == one.truth for one in mine)
-            cells.append(f"{right}, {sum(one.wrong for one in mine)} of {len(mine)}" if mine else "–")
-        lines += [f"| `{slug}` | " + " | ".join(cells) + " |"] if set(cells) != {"–"} else []
-    return lines
+        each = [_of(outcomes, f"loud/{lam:.0f}/{slug}") for lam in LOUDNESSES]
+        cells = (f"{sum(o.right for o in mine)}, {sum(o.wrong for o in mine)} of {len(mine)}" for mine in each)
+        if any(each):
+            rows.append((f"`{slug}`", *cells))
+    return table(("effect", *(f"λ = {lam:.0f}: named rightly, wrongly" for lam in LOUDNESSES)), rows)
 
 
 def outside(outcomes: Sequence[Outcome]) -> list[str]:
     """Each effect from outside the catalogue by itself."""
-    lines = [
-        "| outside the catalogue | campaigns | detected | `unexplained_structure` | right axis first | named |",
-        "|---|---|---|---|---|---|",
-    ]
+    rows = []
     for slug in OUTSIDE:
-        mine = [one for one in outcomes if one.trial.row == f"outside/{slug}"]
+        mine = _of(outcomes, f"outside/{slug}")
+        open_ = [one for one in mine if one.unexplained]
+        counted = (
+            sum(one.detected for one in mine),
+            len(open_),
+            sum(o.right_axis for o in open_),
+            sum(o.named for o in mine),
+        )
         if mine:
-            open_ = [one for one in mine if one.verdict == "unexplained_structure"]
-            right = sum(bool(one.where) and one.where[0] in one.axes for one in open_)
-            cells = f"{sum(o.detected for o in mine)} | {len(open_)} | {right} | {sum(o.named for o in mine)}"
-            lines.append(f"| {slug.replace('_', ' ')} | {len(mine)} | {cells} |")
-    return lines
+            rows.append((slug.replace("_", " "), len(mine), *counted))
+    titles = "campaigns", "detected", "`unexplained_structure`", "right axis first", "named"
+    return table(("outside the catalogue", *titles), rows)
 
 
 def reliability(outcomes: Sequence[Outcome]) -> list[str]:
     """Of the candidates given a probability, how many were true."""
-    lines = ["| probability given | true, with 95 % interval |", "|---|---|"]
-    return lines + [f"| {label} | {_share(hits, count)} |" for label, hits, count in calibration(outcomes) if count]
+    rows = ((label, _share(hits, count)) for label, hits, count in calibration(outcomes) if count)
+    return table(("probability given", "true, with 95 % interval"), rows)
 
 
 #: Beyond noise, an error before that is below this share of the whole error is none that could be halved.
@@ -102,23 +103,21 @@ def beyond(one: Outcome) -> float | None:
 
 def gains(outcomes: Sequence[Outcome]) -> list[str]:
     """Held-out error after over before, where an extension is proposed, effect by effect: as measured, and beyond noise."""
-    lines = [
-        "| held-out error after/before | campaigns | median | worst | target | | median beyond noise | target | |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
-    rows = [(f"`{slug}`, λ = 20", f"one/{slug}", False) for slug in CATALOGUED]
-    rows += [(f"`{slug}`, λ = 50, 12 states", f"twelve/{slug}", False) for slug in CATALOGUED]
-    rows += [(f"`{slug}`, λ = 60", f"gain/{slug}", True) for slug in HALVED]
-    for title, row, halved in rows:
-        mine = [one for one in outcomes if one.gain and one.trial.row == row]
+    cases = [(f"`{slug}`, λ = 20", f"one/{slug}", False) for slug in CATALOGUED]
+    cases += [(f"`{slug}`, λ = 50, 12 states", f"twelve/{slug}", False) for slug in CATALOGUED]
+    cases += [(f"`{slug}`, λ = 60", f"gain/{slug}", True) for slug in HALVED]
+    rows = []
+    for title, row, halved in cases:
+        mine = [one for one in _of(outcomes, row) if one.gain]
         ratio = [one.gain.rmse_after / one.gain.rmse_before for one in mine if one.gain]
         if ratio:
             middle, left = statistics.median(ratio), [found for one in mine if (found := beyond(one)) is not None]
-            cells = [str(len(ratio)), f"{middle:.3f}", f"{max(ratio):.3f}", "≤ 1.02", _mark(middle <= 1.02)]
-            cells += [f"{statistics.median(left):.2f} of {len(left)}" if left else "–"]
-            cells += ["≤ 0.5", _mark(bool(left) and statistics.median(left) <= 0.5)] if halved else ["", ""]
-            lines.append(f"| {title} | " + " | ".join(cells) + " |")
-    return lines
+            rest = statistics.median(left) if left else None
+            cells = (len(ratio), f"{middle:.3f}", f"{max(ratio):.3f}", "≤ 1.02", _mark(middle <= 1.02))
+            target = ("≤ 0.5", _mark(rest is not None and rest <= 0.5)) if halved else ("", "")
+            rows.append((title, *cells, "–" if rest is None else f"{rest:.2f} of {len(left)}", *target))
+    titles = "campaigns", "median", "worst", "target", "", "median beyond noise", "target", ""
+    return table(("held-out error after/before", *titles), rows)
 
 
 def of_gains() -> list[str]:
@@ -161,20 +160,17 @@ def speed(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def failures(outcomes: Sequence[Outcome], most: int = 60) -> list[str]:
-    """How to make again what went wrong: named and wrong, false alarms, crashes, the truth not in the set, missed."""
+    """How to make again what went wrong: crashes, wrong names, false alarms, the truth not in the set, what was missed."""
     lines = []
     for one in outcomes:
-        reason = ""
-        if one.verdict == "crashed":
-            reason = f"crashed: {one.error[:120]}"
-        elif one.wrong:
-            reason = "named and wrong"
-        elif not one.truth and one.verdict != "model_adequate":
-            reason = "false alarm"
-        elif one.trial.row.startswith("one/") and one.detected and not one.in_set:
-            reason = "truth not in set"
-        elif one.made and one.truth and not one.detected and one.trial.lam >= 20:
-            reason = "missed"
+        reasons = {
+            f"crashed: {one.error[:120]}": one.verdict == "crashed",
+            "named and wrong": one.wrong,
+            "false alarm": not one.truth and one.verdict != "model_adequate",
+            "truth not in set": one.trial.row.startswith("one/") and one.detected and not one.in_set,
+            "missed": one.made and bool(one.truth) and not one.detected and one.trial.lam >= 20,
+        }
+        reason = next((reason for reason, holds in reasons.items() if holds), "")
         if reason:
             candidates = ", ".join(f"{slug} {share:.2f}" for slug, share in one.candidates[:3])
             lines.append(f"{reason:16} {one.trial}  -> {one.verdict} {sorted(one.causes)} [{candidates}]")

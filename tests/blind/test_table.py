@@ -25,7 +25,7 @@ def all_knowing(trial: Trial) -> Outcome:
     candidates = tuple((slug, 0.9) for slug in sorted(causes, reverse=verdict == "cause_ambiguous"))
     if verdict == "cause_ambiguous":
         candidates = ((trial.slugs[0], 0.9), ("torque_zero_shift", 0.1))
-    return Outcome(trial, verdict, causes, candidates, where, frozenset(where), None, (), 0.5, {})
+    return Outcome(trial, verdict, causes, candidates, where, frozenset(where), None, (), 0.5)
 
 
 def missed(outcomes: list[Outcome]) -> list[str]:

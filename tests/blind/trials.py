@@ -3,6 +3,7 @@
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from time import process_time
 from typing import Any
 
@@ -21,8 +22,8 @@ from tests.measuring import ROOT, kept
 Diagnose = Callable[..., Report]
 #: The verdict on a campaign that could not be made: no draw in which the effect was as loud as it should be.
 UNREACHABLE = "unreachable"
-#: Outcomes of `make blind`, a file each.
-STORE = ROOT / ".blind" / "table"
+#: Outcomes, a file each: of `make blind` those in `table`, of its fixed set in a folder of the name that was given.
+STORE = ROOT / ".blind"
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,6 @@ class Outcome:
     gain: Gain | None
     advice: tuple[str, ...]  # keys of the advised tests, best first
     seconds: float  # of one core
-    statistics: dict[str, float]
     error: str = ""
     advised: tuple["Outcome", ...] = ()  # what was said after each advised test that was made
 
@@ -81,6 +81,10 @@ class Outcome:
         return self.verdict == "cause_named"
 
     @property
+    def right(self) -> bool:
+        return self.named and self.causes == self.truth
+
+    @property
     def wrong(self) -> bool:
         """Named, and something named that is not there."""
         return self.named and not self.causes <= self.truth
@@ -93,6 +97,18 @@ class Outcome:
     @property
     def top(self) -> bool:
         return bool(self.candidates) and self.candidates[0][0] in self.truth
+
+    @property
+    def ambiguous(self) -> bool:
+        return self.verdict == "cause_ambiguous"
+
+    @property
+    def unexplained(self) -> bool:
+        return self.verdict == "unexplained_structure"
+
+    @property
+    def right_axis(self) -> bool:
+        return bool(self.where) and self.where[0] in self.axes
 
 
 def judge(trial: Trial, look: Diagnose = diagnose) -> Outcome:
@@ -110,17 +126,21 @@ def judge(trial: Trial, look: Diagnose = diagnose) -> Outcome:
     return replace(first, advised=tuple(advised))
 
 
-def stored(trial: Trial) -> Outcome:
-    """The outcome of a trial, judged or read from where an earlier run left it."""
+def file_of(trial: Trial, folder: str = "table") -> Path:
     seed = "-".join(str(part) for part in trial.seed)
-    path = STORE / f"{trial.row.replace('/', '-')}-{seed}.pickle"
-    outcome: Outcome = pickle.loads(kept(path, lambda: pickle.dumps(judge(trial))))  # noqa: S301 -- of this program
+    return STORE / folder / f"{trial.row.replace('/', '-')}-{seed}.pickle"
+
+
+def stored(trial: Trial, folder: str = "table") -> Outcome:
+    """The outcome of a trial, judged or read from where an earlier run left it."""
+    known = kept(file_of(trial, folder), lambda: pickle.dumps(judge(trial)))
+    outcome: Outcome = pickle.loads(known)  # noqa: S301 -- of this program
     return outcome
 
 
 def nothing(trial: Trial, verdict: str, error: str, axes: frozenset[str] = frozenset()) -> Outcome:
     """The outcome where no report came."""
-    return Outcome(trial, verdict, frozenset(), (), (), axes, None, (), 0.0, {}, error)
+    return Outcome(trial, verdict, frozenset(), (), (), axes, None, (), 0.0, error)
 
 
 def judged(trial: Trial, hidden: Hidden, seen: Campaign, look: Diagnose = diagnose) -> Outcome:
@@ -143,5 +163,4 @@ def judged(trial: Trial, hidden: Hidden, seen: Campaign, look: Diagnose = diagno
         gain=report.gain,
         advice=tuple(one.key for one in report.advice),
         seconds=seconds,
-        statistics=dict(report.statistics),
     )
