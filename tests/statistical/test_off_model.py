@@ -3,19 +3,13 @@
 Seeds are fixed and printed; `make score` gives the table for more lives.
 """
 
-import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from models.prognosis.first_passage import predict_first_passage
-from models.tracking.filters.grid import Grid
-from models.tracking.prior import weak
 from tests.score.off_prior import rig_lives
 from tests.statistical.forecasts import LAWS, STAGES, followed
-from tests.statistical.lives import series
 
 pytestmark = pytest.mark.slow
 
@@ -39,20 +33,6 @@ def test_from_60_percent_of_life_on_the_truth_is_held(name: str) -> None:
     print(f"seed 900, {name}: held {held}, begins after the truth {late}")
     assert min(held[2:]) > 0.75
     assert max(late[2:]) < 0.25
-
-
-def test_a_filter_sure_of_eq_6_is_wrong_about_a_line() -> None:
-    """The negative control: the same lives, without a discrepancy."""
-    held = []
-    for life in range(10):
-        rng = np.random.default_rng([900, life])
-        x = np.linspace(0.0, 0.6, 19)
-        seen = series(1e4 * x, 0.1 * (1 - 0.5 * x) * (1 + 0.003 * rng.standard_normal(19)), 1e-8)
-        prior = replace(weak(seen[0], falling=True), law_share=1.0, eq_6_share=1.0)
-        posterior = Grid().posterior(Grid().from_history(prior, seen), 1_000, rng)
-        found = predict_first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life
-        held.append((found[0.05] or math.inf) <= 10_000.0)
-    assert np.mean(held) < 0.2
 
 
 def test_the_rigs_own_lives_are_held_though_they_are_not_one_eq_6() -> None:

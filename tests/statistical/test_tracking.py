@@ -109,18 +109,6 @@ def test_no_draw_of_the_grid_outweighs_the_others(monkeypatch: pytest.MonkeyPatc
     assert least[max(least)] > 700
 
 
-def test_particles_are_distinct_after_sixty_updates_and_starve_without_moves() -> None:
-    share = {}
-    for life, rng in typical(1, 400):
-        measurements = life.measured(0.9, 60, rng)
-        for moves in (8, 0):
-            cloud = followed(Particle(moves=moves), weak(measurements[0], falling=True), measurements, rng).cloud
-            share[moves] = np.unique(cloud.points, axis=0).shape[0] / cloud.points.shape[0]
-    print(f"distinct with moves {share[8]:.3f}, without {share[0]:.3f}")
-    assert share[8] >= 0.9
-    assert share[0] < 0.2
-
-
 def weird(rng: np.random.Generator) -> list[Measurement]:
     """A life that need not obey eq. 6: noise-free, jumping, constant, rising, repeated, gapped, in any unit."""
     runs = int(rng.integers(1, 25))

@@ -94,7 +94,6 @@ class Wish:
     event: str | None = None
     both_ways: bool = False
     rate: float = 100.0
-    frequencies: tuple[float, ...] = (0.1,)
     full: bool = False  # the reference's 7 x 40
     speeds: int | None = None  # so few of them, from a third of the highest up
     noise: float = 1.0  # of the sensor, in percent of the torque
@@ -114,7 +113,7 @@ def draw_plan(rng: np.random.Generator, wish: Wish) -> Plan:
     order = _order(rng, pressures, speeds, wish)
     sites = [_stationary(rng, life, order, wish)]
     if wish.loops:
-        sites += [_loops(rng, life, pressures, frequency, wish.rate) for frequency in wish.frequencies]
+        sites.append(_loops(rng, life, pressures, 0.1, wish.rate))
     return Plan(
         life=life,
         sites=tuple(sites),

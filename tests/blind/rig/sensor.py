@@ -46,7 +46,7 @@ class Sensor:
         return self.memory if site.kind == "stationary" else self.sample_memory
 
 
-def draw_sensor(rng: np.random.Generator, percent: float = 1.0, *, misjudged: float | None = None) -> Sensor:
+def draw_sensor(rng: np.random.Generator, percent: float = 1.0) -> Sensor:
     """A sensor of about so much noise; on quieter ones the scatter of gains and the count stay as they are."""
     factor = float(rng.uniform(0.9, 1.1)) if rng.random() < 0.5 else None
     return Sensor(
@@ -57,7 +57,7 @@ def draw_sensor(rng: np.random.Generator, percent: float = 1.0, *, misjudged: fl
         sample_memory=0.9 if rng.spawn(1)[0].random() < 0.2 else float(rng.choice([0.0, 0.4, 0.7])),
         gain=rng.uniform(0.0, 0.005),
         count=float(rng.choice([0.001, 0.01])),
-        misjudged=misjudged if misjudged is not None else factor,
+        misjudged=factor,
         curve=float(rng.uniform(0.0, 0.003)) if rng.random() < 0.4 else 0.0,
     )
 

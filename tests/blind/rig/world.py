@@ -65,15 +65,12 @@ def read(
     plan: Plan,
     clutch: Clutch,
     effects: Sequence[tuple[Effect, float]] = (),
-    only: Sequence[str] | None = None,
     drag: Drag | None = None,
 ) -> list[FloatArray]:
-    """Torque [Nm] at every site of the plan, without noise; `only` names the kinds of sites that are wanted. Where there is
-    no pressure no lining touches: what there is of torque is `drag` at v [m/s], and what is added to the reading."""
+    """Torque [Nm] at every site of the plan, without noise. Where there is no pressure no lining touches: what there is of
+    torque is `drag` at v [m/s], and what is added to the reading."""
     readings = []
     for site in plan.sites:
-        if only is not None and site.kind not in only:
-            continue
         torque = np.zeros_like(site.v) if drag is None else drag(site.v)
         if site.bar.any():
             torque = _rubbed(site, clutch, effects)

@@ -1,4 +1,4 @@
-"""Eq. 6 against its inverse, finite differences, its series and the kinetics it solves."""
+"""Eq. 6 against its inverse, finite differences, its series and the kinetics that it obeys."""
 
 import math
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 
 from models.degradation.general_order import (
     Degradation,
@@ -73,18 +72,34 @@ def test_small_progress_keeps_its_digits() -> None:
     assert abs((1.0 - (1.0 + x) ** -exponent) / series - 1.0) > 1e-6
 
 
-@pytest.mark.parametrize("exponent", [0.3, 0.8, 1.5, 4.0])
-def test_general_order_kinetics_integrate_to_eq_6(exponent: float) -> None:
-    """dD/dζ = -k Dⁿ with n = 1 + 1/ε and k = ε/φ; the integrator's tolerance is 1e-10."""
-    d = Degradation(initial=0.0, change=1.0, scale=5_000.0, exponent=exponent)
-    rate, order = d.exponent / d.scale, 1.0 + 1.0 / d.exponent
-    zeta = np.linspace(0.0, 40_000.0, 9)
-    solved = solve_ivp(
-        lambda _, left: -rate * left**order, (0.0, 40_000.0), [1.0], "DOP853", zeta, rtol=1e-10, atol=1e-12
-    )
-    np.testing.assert_allclose(1.0 - solved.y[0], value(zeta, d), atol=1e-8)
-    wrong = solve_ivp(lambda _, left: -rate * left, (0.0, 40_000.0), [1.0], "DOP853", zeta, rtol=1e-10, atol=1e-12)
-    assert np.abs(1.0 - wrong.y[0] - value(zeta, d)).max() > 0.01
+#: φ and ε of either sign.
+SIGNED = pytest.mark.parametrize(
+    ("scale", "exponent"),
+    [(3_000.0, 0.7), (5_000.0, 4.0), (-9_000.0, -0.5), (-9_000.0, -2.0), (3_000.0, -2.0), (-9_000.0, 0.8)],
+)
+
+
+@SIGNED
+def test_each_course_is_kinetics_of_its_order(scale: float, exponent: float) -> None:
+    """dD/dζ = -k Dⁿ with n = 1 + 1/ε and k = ε/φ, and with both signs turned dD/dζ = k Dⁿ, by differences over half a
+    cycle."""
+    zeta, step, sign = np.linspace(10.0, 8_000.0, 40), 0.25, np.sign(scale) * np.sign(exponent)
+
+    def left(at: np.ndarray) -> np.ndarray:
+        return 1.0 - sign * progress_fraction(at, scale, exponent)
+
+    rate = (left(zeta + step) - left(zeta - step)) / (2.0 * step)
+    expected, first_order = (-sign * abs(exponent / scale) * left(zeta) ** n for n in (1.0 + 1.0 / exponent, 1.0))
+    np.testing.assert_allclose(rate, expected, rtol=1e-5)
+    assert np.abs(rate / first_order - 1.0).max() > 0.1  # the control
+
+
+@SIGNED
+def test_the_first_passage_is_where_the_course_has_that_value(scale: float, exponent: float) -> None:
+    degradation = Degradation(initial=0.13, change=-0.1, scale=scale, exponent=exponent)
+    for zeta in (1.0, 500.0, 8_500.0):
+        assert first_passage(float(value(zeta, degradation)), degradation) == pytest.approx(zeta, rel=1e-9)
+    assert first_passage(0.2, degradation) == math.inf
 
 
 @pytest.mark.parametrize(

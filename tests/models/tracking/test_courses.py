@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from models.degradation.general_order import Degradation, first_passage, progress_fraction, value
+from models.degradation.general_order import first_passage, progress_fraction
 from models.prognosis.first_passage import ends_of_life, predict_first_passage, weighted_quantiles
 from models.tracking import courses, linear_model, sampling
 from models.tracking.courses import Course
@@ -34,31 +34,7 @@ from tests.models.tracking.tracked_series import (
     series,
 )
 
-# --- Courses of either sign of φ and ε: the kinetics that they obey, their coordinates, and their prior
-# probabilities.
-
-SIGNED = [(3_000.0, 0.7), (-9_000.0, -0.5), (-9_000.0, -2.0), (3_000.0, -2.0), (-9_000.0, 0.8)]
-
-
-@pytest.mark.parametrize(("scale", "exponent"), SIGNED)
-def test_each_course_is_kinetics_of_its_order(scale: float, exponent: float) -> None:
-    """dD/dζ = -k Dⁿ, and with both signs turned dD/dζ = k Dⁿ, by differences over half a cycle."""
-    zeta, step, sign = np.linspace(10.0, 8_000.0, 40), 0.25, np.sign(scale) * np.sign(exponent)
-
-    def left(at: np.ndarray) -> np.ndarray:
-        return 1.0 - sign * progress_fraction(at, scale, exponent)
-
-    rate = (left(zeta + step) - left(zeta - step)) / (2.0 * step)
-    expected = -sign * abs(exponent / scale) * left(zeta) ** (1.0 + 1.0 / exponent)
-    np.testing.assert_allclose(rate, expected, rtol=1e-5)
-
-
-@pytest.mark.parametrize(("scale", "exponent"), SIGNED)
-def test_the_first_passage_is_where_the_course_has_that_value(scale: float, exponent: float) -> None:
-    degradation = Degradation(initial=0.13, change=-0.1, scale=scale, exponent=exponent)
-    for zeta in (1.0, 500.0, 8_500.0):
-        assert first_passage(float(value(zeta, degradation)), degradation) == pytest.approx(zeta, rel=1e-9)
-    assert first_passage(0.2, degradation) == math.inf
+# --- Courses: their coordinates and their prior probabilities.
 
 
 @pytest.mark.parametrize("course", list(Course))

@@ -70,15 +70,9 @@ def test_no_amplitude_no_change_and_all_changes_are_finite(effect: Effect, scene
         )
         np.testing.assert_allclose(column, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())  # many at once, or each alone
         assert np.abs(column).max() > 0
+        assert effect.kind is not Kind.LAG or np.abs(column[scene.points.steady]).max() == 0
         # small amplitudes act in proportion
         assert np.abs(two - column)[moving].max() < 0.05 * np.abs(column[moving]).max()
-
-
-def test_effects_of_loops_leave_plateaus_alone(scene: Scene) -> None:
-    for effect in CATALOGUE:
-        if effect.kind is Kind.LAG:
-            for tried in effect.grid(scene.facts):
-                assert np.abs(effect.change(scene, effect.prior_sd, tried.shape)[scene.points.steady]).max() == 0
 
 
 def test_units_of_a_few(scene: Scene) -> None:
@@ -311,11 +305,28 @@ def rested(*hours: float) -> Campaign:
     return replace(given, maintenance=tuple(events))
 
 
-def test_a_rest_lasts_from_its_own_moment_to_the_next_test() -> None:
-    facts = facts_of(rested(2.0, 10.0))
+def test_friction_recovers_with_the_rest_before_a_test() -> None:
+    given = rested(2.0, 10.0)
+    facts, scene = facts_of(given), scene_of(given)
     assert facts.rests == (1000.0, 3000.0)
     np.testing.assert_allclose(facts.rest_lengths, [2 * HOUR, 10 * HOUR])
     np.testing.assert_allclose(facts.rest_moments, [1e9 + DAY, 1e9 + 2 * DAY])
+    effect, first = BY_SLUG["rest_recovery"], scene.points.clock == scene.points.clock[0]
+    shares = {}
+    for power in (0.0, 1.0):  # of the logarithm of the rest
+        change = effect.change(scene, 0.01, (10.0, BY_USE, 6.0, power, WHOLE)) / scene.curve
+        shares[power] = [float(change[first & (scene.points.cycles == at)].max()) for at in (1000.0, 3000.0)]
+    kept = shares[0.0][0]  # of the cycles and the clock, the same for both
+    assert shares[0.0] == pytest.approx([kept, kept])
+    assert shares[1.0] == pytest.approx([kept * np.log(3.0) / np.log(11.0), kept])
+    # friction as a whole, or its static torque
+    whole, static = (effect.change(scene, 0.01, (10.0, BY_USE, 6.0, 0.0, part)) for part in (WHOLE, STATIC))
+    some = whole > 0
+    sheared = np.where(np.arange(4) == 3, 0.0, scene.parameters)  # without C_v the curve is that of the asperities
+    share = curve(scene.points.velocity, sheared) / scene.curve
+    np.testing.assert_allclose(static[some], (whole * share)[some], rtol=1e-12)
+    assert np.ptp(share[some]) > 0.1
+    assert {one.shape[-1] for one in effect.grid(scene.facts)} == {WHOLE, STATIC}
 
 
 @pytest.mark.parametrize("told", ["at the beginning", "at the end", "not at all"])
@@ -337,30 +348,6 @@ def test_a_pause_is_what_the_engagements_between_two_tests_leave(told: str) -> N
     facts = facts_of(replace(given, stationary=tuple(tests), duty=tuple(blocks)))
     assert facts.rests == (3000.0, 10000.0)
     np.testing.assert_allclose(facts.rest_lengths, [12 * HOUR, 30 * HOUR], atol=1.2 * HOUR)
-
-
-def test_friction_recovers_with_the_logarithm_of_the_rest_where_the_power_is_one() -> None:
-    scene = scene_of(rested(2.0, 10.0))
-    effect, first = BY_SLUG["rest_recovery"], scene.points.clock == scene.points.clock[0]
-    shares = {}
-    for power in (0.0, 1.0):
-        change = effect.change(scene, 0.01, (10.0, BY_USE, 6.0, power, WHOLE)) / scene.curve
-        shares[power] = [float(change[first & (scene.points.cycles == at)].max()) for at in (1000.0, 3000.0)]
-    kept = shares[0.0][0]  # of the cycles and the clock, the same for both
-    assert shares[0.0] == pytest.approx([kept, kept])
-    assert shares[1.0] == pytest.approx([kept * np.log(3.0) / np.log(11.0), kept])
-
-
-def test_what_recovers_is_friction_as_a_whole_or_its_static_torque() -> None:
-    scene = scene_of(rested(2.0, 10.0))
-    effect = BY_SLUG["rest_recovery"]
-    whole, static = (effect.change(scene, 0.01, (10.0, BY_USE, 6.0, 0.0, part)) for part in (WHOLE, STATIC))
-    some = whole > 0
-    sheared = np.where(np.arange(4) == 3, 0.0, scene.parameters)  # without C_v the curve is that of the asperities
-    share = curve(scene.points.velocity, sheared) / scene.curve
-    np.testing.assert_allclose(static[some], (whole * share)[some], rtol=1e-12)
-    assert np.ptp(share[some]) > 0.1
-    assert {one.shape[-1] for one in effect.grid(scene.facts)} == {WHOLE, STATIC}
 
 
 def test_a_test_before_the_pause_at_the_same_cycles_has_not_rested() -> None:

@@ -163,8 +163,6 @@ def test_a_spike_weighs_nothing_wherever_it_stands_on_its_curve(order: str, plac
 
 # --- Autocorrelation of samples, and of bins as it follows from that: against noise that was made so.
 
-SEED = 20
-
 
 def autocorrelated(share: float, step: float, size: int, seed: int = SEED) -> FloatArray:
     """Noise of unit variance, partly white."""

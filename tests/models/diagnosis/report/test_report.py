@@ -195,6 +195,7 @@ def test_nothing_measured_is_not_a_number():
     assert missing.any()
     assert missing[:-1].sum() == 0
     assert np.array_equal(missing[-1], found.speed * 0.058 > 5)
+    assert loop_traces(thinned.problem, thinned.baseline.fit, None) == ()
 
 
 def test_many_speeds_and_states_are_gathered(bumped):
@@ -223,8 +224,3 @@ def test_loops_are_shown_as_measured_and_as_models_have_them(bumped):
     assert any(not np.allclose(each.baseline, each.extended) for each in found)
     # the control: without an extension both models are one
     assert all(np.array_equal(t.baseline, t.extended) for t in loop_traces(bumped.problem, bumped.baseline.fit, None))
-
-
-def test_without_loops_no_traces():
-    given = study(campaign(32, loops=False, cycles=(0.0, 2000.0, 9000.0)))
-    assert loop_traces(given.problem, given.baseline.fit, None) == ()
