@@ -59,15 +59,17 @@ def service() -> None:
             "the same, the last ten": statistics.median(posts[-10:]),
             "the same, 95 % of them": statistics.quantiles(posts, n=20)[-1],
         }
+        life = f"{address}/remaining-useful-life"
+        known = {"If-None-Match": http.get(life).headers["etag"]}
         asked = {
-            "GET remaining-useful-life": ("/remaining-useful-life", 200),
-            "GET livez, the floor of the transport": ("/livez", 200),
-            "GET remaining-useful-life?pressure_bar=5, cached": ("/remaining-useful-life?pressure_bar=5", 50),
-            "GET degradation, cached": ("/degradation", 20),
-            "GET stribeck": ("/stribeck", 10),
+            "GET remaining-useful-life": (partial(http.get, life), 200),
+            "GET remaining-useful-life, 304": (partial(http.get, life, headers=known), 200),
+            "GET livez, the floor of the transport": (partial(http.get, "/livez"), 200),
+            "GET remaining-useful-life?pressure_bar=5, cached": (partial(http.get, f"{life}?pressure_bar=5"), 50),
+            "GET degradation, cached": (partial(http.get, f"{address}/degradation"), 20),
+            "GET stribeck": (partial(http.get, f"{address}/stribeck"), 10),
         }
-        for name, (path, repeats) in asked.items():
-            rows[name] = milliseconds(partial(http.get, path if path == "/livez" else address + path), repeats)
+        rows |= {name: milliseconds(ask, repeats) for name, (ask, repeats) in asked.items()}
     show("The service, over a socket", "what | ms", ((name, f"{taken:.1f}") for name, taken in rows.items()))
 
 

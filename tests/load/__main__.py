@@ -22,11 +22,11 @@ from pathlib import Path
 import httpx2
 
 from models.rig.programme import WHOLE
+from service.client.clutchlife import ClutchlifeError
 from tests.benchmarks.diagnosis import post_life
 from tests.load import beside, checks
 from tests.load.beside import Beside, Processor
 from tests.load.bodies import SAMPLES, TESTS, SentLife, life
-from tests.load.exchange import LostError
 from tests.load.field import ALONE, Field
 from tests.load.report import Loaded, demands, markdown, paces
 from tests.storage.engine.postgresql.server import postgresql_server
@@ -131,7 +131,7 @@ def _wrong(field: Field, server: Server, folder: Path) -> list[str]:
     alone = dict(list(posted.items())[-field.alone :])
     taught = [clutch_id for clutch_id in posted if clutch_id not in alone][:_REPLAYED]
     asked_for: tuple[Callable[[], list[str]], ...] = (
-        lambda: checks.losses(server.port, counts),
+        lambda: checks.losses(server, counts),
         lambda: checks.calm_differences(folder, server, alone, counts.acknowledged),
         lambda: checks.replay_differences(server, taught),
     )
@@ -140,7 +140,7 @@ def _wrong(field: Field, server: Server, folder: Path) -> list[str]:
     for check in asked_for:
         try:
             wrong += check()
-        except (LostError, OSError) as error:
+        except (httpx2.HTTPError, ClutchlifeError) as error:
             wrong.append(f"a check could not be made: {error}")
     return wrong
 

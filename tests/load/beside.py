@@ -1,20 +1,17 @@
 """What goes on beside the rigs and clients: a diagnosis after the other, fleets refreshed, memory watched."""
 
 import asyncio
-import json
 import os
 import resource
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.benchmarks.memory import family, family_seconds, resident
-from tests.load.bodies import JSON_TYPE, asked, posted
-from tests.load.exchange import Line
-from tests.load.field import noted
+from tests.load.bodies import posted
+from tests.load.field import line, noted
 
 #: Seconds between two looks at a diagnosis, between two refreshes, and between two looks at the memory.
 LOOK_EVERY, REFRESH_EVERY, WATCH_EVERY = 0.5, 20.0, 1.0
@@ -35,21 +32,21 @@ class Beside:
 async def diagnose(port: int, clutch_id: str, end: float, beside: Beside) -> None:
     """Have a clutch diagnosed, again and again, until the end."""
     loop = asyncio.get_running_loop()
-    with closing(Line(port)) as line:
-        question = posted(f"/v1/clutches/{clutch_id}/diagnoses", b"{}", JSON_TYPE, "Prefer: wait=0")
+    async with line(port) as http:
+        question = posted(f"/v1/clutches/{clutch_id}/diagnoses", b"{}", Prefer="wait=0")
         while loop.time() < end:
             started = loop.time()
-            answer = await noted(line, question, "POST diagnoses", beside.problems)
-            if answer is None or answer.status not in (201, 202):
+            answer = await noted(http, question, "POST diagnoses", beside.problems)
+            if answer is None or answer.status_code not in (201, 202):
                 await asyncio.sleep(LOOK_EVERY)
                 continue
-            report = json.loads(answer.body)
-            look = asked(f"/v1/clutches/{clutch_id}/diagnoses/{report['diagnosis_id']}")
+            report = answer.json()
+            look = {"method": "GET", "url": answer.headers["location"]}
             while report["status"] == "running" and loop.time() < end:
                 await asyncio.sleep(LOOK_EVERY)
-                answer = await noted(line, look, "GET diagnoses", beside.problems)
-                if answer is not None and answer.status == 200:
-                    report = json.loads(answer.body)
+                answer = await noted(http, look, "GET diagnoses", beside.problems)
+                if answer is not None and answer.status_code == 200:
+                    report = answer.json()
             if report["status"] == "finished":
                 beside.diagnoses.append(loop.time() - started)
             elif report["status"] == "failed":

@@ -1,12 +1,11 @@
-"""What the rigs post: whole simulated lives as bytes, made before the clock starts."""
+"""What the rigs post: whole simulated lives, their bodies made before the clock starts."""
 
 import gzip
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from importlib.util import find_spec
 from pathlib import Path
-from urllib.parse import urlencode
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from models.rig.stationary import PLATEAU_DURATION, Sensor
 from models.rig.truth import SimulatedClutch
 from service.run_files.record_writer import RecordFormat, write_record
 from service.run_files.simulated import simulated_body, simulated_channels, simulated_clutch_body, simulated_head
+from tests.service.readers.sample_files import write_parquet
 
 #: Stationary tests in a life. In the variant with sampled records every tenth has a dynamic test after it, and every fifth
 #: is a recorder's file: about one post in ten, since a duty block stands before most tests.
@@ -31,28 +31,41 @@ _RAW_CHANNELS = ("time_s", "pressure_bar", "speed_rpm", "torque_nm")
 _MAINTENANCE = {13: ("oil_change", "new oil"), 26: ("rest", "three days")}
 JSON_TYPE = "application/json"
 
+#: The arguments of a client's `request`.
+Request = dict[str, Any]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Post:
-    """One run as it is sent: the end of its address, and its body or the file that holds it."""
+    """One run as it is sent: its body, or the parameters and the place of a recorder's file."""
 
     run_id: str
     kind: str
-    raw: bool = False
-    query: str = ""
-    content_type: str = JSON_TYPE
     content: bytes = b""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     path: Path | None = None
+
+    @property
+    def raw(self) -> bool:
+        """Whether it is a recorder's file."""
+        return self.path is not None
 
     @property
     def sampled(self) -> bool:
         """Whether it is a sampled record, a recorder's file or a dynamic test, which takes its time."""
         return self.raw or self.kind == RunKind.DYNAMIC_STRIBECK.value
 
-    def request(self, clutch_id: str) -> bytes:
-        """The bytes of the request."""
-        body = self.content if self.path is None else self.path.read_bytes()
-        return posted(f"/v1/clutches/{clutch_id}/runs{self.query}", body, self.content_type)
+    def request(self, clutch_id: str) -> Request:
+        """The request for a clutch."""
+        address = f"/v1/clutches/{clutch_id}/runs"
+        if self.path is None:
+            return posted(address, self.content)
+        return {
+            "method": "POST",
+            "url": f"{address}/file",
+            "params": self.parameters,
+            "content": self.path.read_bytes(),
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,19 +76,13 @@ class SentLife:
     posts: tuple[Post, ...] = field(repr=False)
 
 
-def posted(address: str, body: bytes, content_type: str = JSON_TYPE, *headers: str) -> bytes:
-    """The bytes of a POST."""
-    lines = (f"POST {address} HTTP/1.1", "Host: localhost", f"Content-Type: {content_type}", *headers)
-    return "\r\n".join((*lines, f"Content-Length: {len(body)}", "", "")).encode() + body
+def posted(address: str, content: bytes, **headers: str) -> Request:
+    """A POST of JSON."""
+    return {"method": "POST", "url": address, "content": content, "headers": {"Content-Type": JSON_TYPE} | headers}
 
 
-def asked(address: str, *headers: str) -> bytes:
-    """The bytes of a GET."""
-    return "\r\n".join((f"GET {address} HTTP/1.1", "Host: localhost", *headers, "", "")).encode()
-
-
-def registration(clutch_id: str, fluid: str = "ATF") -> bytes:
-    """The bytes that register a simulated clutch. Clutches of a fluid are a fleet of their own."""
+def registration(clutch_id: str, fluid: str) -> Request:
+    """The registration of a simulated clutch. Clutches of a fluid are a fleet of their own."""
     return posted("/v1/clutches", json.dumps(simulated_clutch_body(clutch_id) | {"fluid": fluid}).encode())
 
 
@@ -126,24 +133,12 @@ def _file_post(
     channels = simulated_channels(replace(run, plateaus=None, record=record))
     channels = {name: channels[name] for name in _RAW_CHANNELS}
     path = folder / f"{seed}-{run.cycles:05d}.csv"
-    if parquet and find_spec("pyarrow") is not None:
-        import pyarrow as pa  # type: ignore[import-untyped]  # optional package
-        import pyarrow.parquet  # type: ignore[import-untyped]  # optional package
-
-        path = path.with_suffix(".parquet")
-        pyarrow.parquet.write_table(pa.table(channels), path)
+    if parquet:
+        path = write_parquet(path.with_suffix(".parquet"), channels)
     else:
         write_record(path, RecordFormat.CSV, channels, simulated_head(run))
-        packed = path.with_suffix(".csv.gz")
-        packed.write_bytes(gzip.compress(path.read_bytes(), compresslevel=1))
-        path.unlink()
-        path = packed
-    query = {"kind": run.kind.value, "cycles": run.cycles, "run_id": run.run_id, "filename": path.name}
-    return Post(
-        run_id=run.run_id,
-        kind=run.kind.value,
-        raw=True,
-        query="/file?" + urlencode(query | {"origin": "simulated"}),
-        content_type="application/octet-stream",
-        path=path,
-    )
+        packed = gzip.compress(path.read_bytes(), compresslevel=1)
+        path = path.rename(path.with_suffix(".csv.gz"))
+        path.write_bytes(packed)
+    stated = {"kind": run.kind.value, "cycles": run.cycles, "run_id": run.run_id, "origin": "simulated"}
+    return Post(run_id=run.run_id, kind=run.kind.value, parameters=stated | {"filename": path.name}, path=path)

@@ -8,15 +8,14 @@ it.
 
 import asyncio
 import itertools
-import json
 import random
 from collections import Counter, defaultdict
 from collections.abc import Awaitable, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field
 
-from tests.load.bodies import Post, SentLife, asked, registration
-from tests.load.exchange import Answer, Line, LostError
+from httpx2 import AsyncClient, Limits, Response, TimeoutException, TransportError
+
+from tests.load.bodies import Post, Request, SentLife, registration
 
 #: What a client asks in each second, a quarter of a second apart.
 ROUTES = ("remaining-useful-life", "degradation", "clutches", "runs")
@@ -96,16 +95,16 @@ class Field:
 
     async def _rig(self, number: int, phase: float) -> None:
         loop = asyncio.get_running_loop()
-        with closing(Line(self._port(number))) as line:
+        async with line(self._port(number)) as http:
             await _until(self.begin + phase * self.interval)  # rigs know nothing of each other
             for turn in itertools.count():
                 clutch_id = f"load-{number}-{turn:03d}"
-                if await self._sent(line, registration(clutch_id, self.fluid(number, turn)), "registration") is None:
+                if await self._sent(http, registration(clutch_id, self.fluid(number, turn)), "registration") is None:
                     return
                 self.on_rigs[number] = clutch_id
                 for post in self.life(number, turn).posts:
                     started = loop.time()
-                    answer = await self._sent(line, post.request(clutch_id), "sampled" if post.sampled else "plain")
+                    answer = await self._sent(http, post.request(clutch_id), "sampled" if post.sampled else "plain")
                     if answer is None:
                         self.counts.unanswered.add((clutch_id, post.run_id))
                         return
@@ -120,21 +119,21 @@ class Field:
         """The fluid of that clutch: the last rigs' clutches have each their own."""
         return f"ATF {number} {turn}" if number >= self.rigs - self.alone else "ATF"
 
-    async def _sent(self, line: Line, request: bytes, what: str) -> Answer | None:
+    async def _sent(self, http: AsyncClient, request: Request, what: str) -> Response | None:
         """The good answer to a POST, which is sent again after an error; None where the time is over before."""
         loop = asyncio.get_running_loop()
         while loop.time() < self.end:
             started = loop.time()
-            answer = await noted(line, request, f"POST {what}", self.counts.problems)
+            answer = await noted(http, request, f"POST {what}", self.counts.problems)
             self.counts.posts[what].append(loop.time() - started)
-            if answer is not None and answer.status in (200, 201):
+            if answer is not None and answer.is_success:
                 return answer
-            pause = _PAUSE if answer is None else float(answer.headers.get(b"retry-after", b"") or _PAUSE)
+            pause = _PAUSE if answer is None else float(answer.headers.get("retry-after") or _PAUSE)
             await asyncio.sleep(pause)
         return None
 
-    def _acknowledge(self, clutch_id: str, post: Post, answer: Answer) -> None:
-        receipt = json.loads(answer.body)
+    def _acknowledge(self, clutch_id: str, post: Post, answer: Response) -> None:
+        receipt = answer.json()
         self.counts.acknowledged[clutch_id].append(Acknowledged(post=post, sha256=receipt["content_sha256"]))
         self.counts.held += receipt.get("state") == "held"
         self.counts.kinds["raw file" if post.raw else post.kind] += 1
@@ -147,7 +146,7 @@ class Field:
         A dashboard names the answer that it has, a script does not.
         """
         tags, route, dashboard = dict[str, str](), ROUTES[part], number % 2 == 0
-        with closing(Line(self._port(number + part))) as line:
+        async with line(self._port(number + part)) as http:
             for tick in itertools.count():
                 planned = self.begin + phase + tick + part / len(ROUTES)
                 if planned >= self.end:
@@ -158,21 +157,19 @@ class Field:
                 if clutch_id is None:
                     continue
                 address = "/v1/clutches" if route == LIST else f"/v1/clutches/{clutch_id}/{route}"
-                known = tags.get(address) if dashboard else None
-                request = asked(address) if known is None else asked(address, f"If-None-Match: {known}")
-                answer = await self._timed(line, request, route, planned)
-                if answer is not None and answer.etag is not None:
-                    tags[address] = answer.etag
+                known = {"If-None-Match": tags[address]} if dashboard and address in tags else {}
+                answer = await self._timed(http, address, route, planned, known)
+                if answer is not None and "etag" in answer.headers:
+                    tags[address] = answer.headers["etag"]
 
     async def _livez(self) -> None:
-        request = asked("/livez")
-        with closing(Line(self._port(0))) as line:
+        async with line(self._port(0)) as http:
             for number in itertools.count():
                 planned = self.begin + number * LIVEZ_EVERY
                 if planned >= self.end:
                     return
                 if await self._due(planned, LIVEZ):
-                    await self._timed(line, request, LIVEZ, planned)
+                    await self._timed(http, "/livez", LIVEZ, planned, {})
 
     async def _due(self, planned: float, route: str) -> bool:
         """Wait for the planned moment; False where the grace is over, the time so far then counts."""
@@ -186,36 +183,36 @@ class Field:
         self.counts.gets[route].append(loop.time() - planned)
         return False
 
-    async def _timed(self, line: Line, request: bytes, route: str, planned: float) -> Answer | None:
-        answer = await noted(line, request, f"GET {route}", self.counts.problems)
+    async def _timed(
+        self, http: AsyncClient, address: str, route: str, planned: float, headers: dict[str, str]
+    ) -> Response | None:
+        request = {"method": "GET", "url": address, "headers": headers}
+        answer = await noted(http, request, f"GET {route}", self.counts.problems)
         self.counts.gets[route].append(asyncio.get_running_loop().time() - planned)
         if answer is not None:
-            self.counts.statuses[route, answer.status] += 1
+            self.counts.statuses[route, answer.status_code] += 1
         return answer
 
 
-async def noted(line: Line, request: bytes, what: str, problems: Counter[str]) -> Answer | None:
-    """An answer; counts what was not 2xx or 304, by status and reason. None where no answer came."""
+def line(port: int) -> AsyncClient:
+    """A connection of one's own, closed before the service would close it, whose answers are not packed."""
+    headers, limits = {"Accept-Encoding": "identity"}, Limits(max_connections=1, keepalive_expiry=2.0)
+    return AsyncClient(base_url=f"http://127.0.0.1:{port}", timeout=60, headers=headers, limits=limits, verify=False)
+
+
+async def noted(http: AsyncClient, request: Request, what: str, problems: Counter[str]) -> Response | None:
+    """An answer; counts what was not 2xx or 304, by status and its first words. None where no answer came."""
     try:
-        answer = await line.ask(request)
-    except TimeoutError:
+        answer = await http.request(**request)
+    except TimeoutException:
         problems[f"{what}: no answer in time"] += 1
-    except LostError as error:
+    except TransportError as error:
         problems[f"{what}: connection lost ({error})"] += 1
     else:
-        if not (200 <= answer.status < 300 or answer.status == 304):
-            problems[f"{what}: {answer.status} {reason(answer)}"] += 1
+        if not (answer.is_success or answer.status_code == 304):
+            problems[f"{what}: {answer.status_code} {answer.text[:120]}"] += 1
         return answer
     return None
-
-
-def reason(answer: Answer) -> str:
-    """The detail of a problem, else its first bytes."""
-    try:
-        problem = json.loads(answer.body)
-        return str(problem.get("detail") or problem.get("title"))[:120]
-    except (ValueError, AttributeError):
-        return answer.body[:80].decode(errors="replace")
 
 
 async def _until(moment: float) -> None:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from tests.load.beside import Beside, Processor
 from tests.load.field import LIVEZ, ROUTES, Counts
+from tests.measuring import table
 
 #: The demands of docs/appendix/benchmarks.md: ms of 99 of 100 GETs and plain POSTs, posts a second without raw files, how
 #: much more memory the last third of the time may take, on average, than the middle third. The first third fills caches.
@@ -99,16 +100,14 @@ def demands(loaded: Loaded) -> list[Demand]:
 def latencies(loaded: Loaded) -> list[str]:
     """Quantiles by route."""
     counts = loaded.counts
-    lines = ["| request | asked | 304 | median, ms | 90 % | 99 % | longest |", "|---|---|---|---|---|---|---|"]
-    lines += [_row(f"GET {route}", counts.gets[route], str(counts.statuses[route, 304])) for route in (*ROUTES, LIVEZ)]
     names = {"plain": "POST a run", "sampled": "POST a sampled record", "registration": "POST a clutch"}
-    lines += [_row(name, counts.posts[what], "") for what, name in names.items() if counts.posts[what]]
-    return lines
-
-
-def _row(name: str, taken: Sequence[float], unchanged: str) -> str:
-    shown = " | ".join(f"{1e3 * quantile(taken, share):.1f}" for share in (0.5, 0.9, 0.99, 1.0))
-    return f"| {name} | {len(taken)} | {unchanged} | {shown} |"
+    asked = [(f"GET {route}", counts.gets[route], str(counts.statuses[route, 304])) for route in (*ROUTES, LIVEZ)]
+    asked += [(name, counts.posts[what], "") for what, name in names.items() if counts.posts[what]]
+    rows = [
+        (name, len(taken), unchanged, *(f"{1e3 * quantile(taken, share):.1f}" for share in (0.5, 0.9, 0.99, 1.0)))
+        for name, taken, unchanged in asked
+    ]
+    return table(("request", "asked", "304", "median, ms", "90 %", "99 %", "longest"), rows)
 
 
 def totals(loaded: Loaded) -> list[str]:
@@ -119,8 +118,8 @@ def totals(loaded: Loaded) -> list[str]:
     rows = {
         "runs acknowledged": f"{loaded.runs} of {len(counts.acknowledged)} clutches: {kinds}",
         "posts a second": f"{loaded.pace:.1f}",
-        "runs held": str(counts.held),
-        "GETs not asked by the end": str(counts.unasked),
+        "runs held": counts.held,
+        "GETs not asked by the end": counts.unasked,
         "diagnoses finished, s": _spread(beside.diagnoses),
         "fleet refreshes, s": _spread(beside.refreshes),
         "memory at half and at the end, MB": (
@@ -133,26 +132,24 @@ def totals(loaded: Loaded) -> list[str]:
         ),
         "the generator's own delay at most, ms": f"{1e3 * counts.late:.0f}",
     }
-    return ["| | |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows.items())]
+    return table(("", ""), rows.items())
 
 
 def paces(loads: Sequence[Loaded]) -> str:
     """Posts a second of one service and of several, beside each other."""
-    lines = ["| services | posts a second | times one service |", "|---|---|---|"]
-    return "\n".join(
-        [*lines, *(f"| {each.services} | {each.pace:.1f} | {each.pace / loads[0].pace:.2f} |" for each in loads)]
-    )
+    rows = [(each.services, f"{each.pace:.1f}", f"{each.pace / loads[0].pace:.2f}") for each in loads]
+    return "\n".join(table(("services", "posts a second", "times one service"), rows))
 
 
 def markdown(loaded: Loaded) -> str:
     """The whole report."""
-    verdicts = [f"| {each.name} | {each.found} | {'yes' if each.met else '**no**'} |" for each in demands(loaded)]
-    parts = [["| demand | found | met |", "|---|---|---|", *verdicts], latencies(loaded), totals(loaded)]
+    verdicts = [(each.name, each.found, "yes" if each.met else "**no**") for each in demands(loaded)]
+    parts = [table(("demand", "found", "met"), verdicts), latencies(loaded), totals(loaded)]
     if loaded.problems:
-        errors = [f"| {count} | {problem} |" for problem, count in loaded.problems.most_common(20)]
-        parts.append(["| errors | |", "|---|---|", *errors])
+        errors = ((count, problem) for problem, count in loaded.problems.most_common(20))
+        parts.append(table(("errors", ""), errors))
     if loaded.losses:
-        parts.append(["| lost or different |", "|---|", *(f"| {loss} |" for loss in loaded.losses[:20])])
+        parts.append(table(("lost or different",), ((loss,) for loss in loaded.losses[:20])))
     return "\n\n".join("\n".join(part) for part in parts)
 
 
