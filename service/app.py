@@ -13,7 +13,7 @@ from fastapi_offline import FastAPIOffline
 from service.alarms.outbox import Outbox
 from service.dashboard import assets, site
 from service.dashboard import pages as dashboard
-from service.queries.cache import AnswerCache
+from service.queries.cache import AnswerCache, Revalidation
 from service.settings import CODE_VERSION, MIB, Settings
 from service.web import openapi, problems
 from service.web.answers import now
@@ -23,7 +23,6 @@ from service.web.limits import MAX_CACHED_BYTES
 from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Edge, Encodings, Heads, Polls, RootPath, Shares
 from service.web.readiness import Readiness
-from service.web.revalidation import Revalidation
 from service.web.routes import alarms, clutches, diagnoses, exports, health, inspections, jobs, life, rigs, runs
 from service.work.queue import JobQueue, Kind, diagnosis_work, workflow_work
 from service.work.workers import CHANGE_SECONDS, Lane, Workers, in_processes, in_threads

@@ -29,7 +29,7 @@ from service.lives.history import ByPressure, Event, Shown, duty_block, maintena
 from service.lives.model_correction import extension_of
 from service.lives.payloads import notice_items
 from service.lives.plausibility.doubts import Judged
-from service.lives.recomputation import Adoption, ClutchState, Levels, Results, Tracking, newest_adoption
+from service.lives.recomputation import Adoption, ClutchState, Results, Tracking, newest_adoption
 from service.lives.run_analysis import LevelFit
 from service.lives.tracks import CARRIED, States, Tracked
 from service.logging import request_id
@@ -216,18 +216,19 @@ def answers(connection: Connection, clutch_id: str) -> list[Any]:
     return [receipts(connection, clutch_id), tracks, clutch(connection, clutch_id).summary]
 
 
-def store_judged(
-    connection: Connection,
-    clutch_id: str,
-    judged: Judged,
-    aside: Mapping[str, ByPressure],
-    levels: Levels,
-    *,
-    at: str,
-    revision: int,
-) -> None:
-    """The states of runs that the evidence of others has changed, with the audit trail's entries; the mean COFs of those
-    that are held now stand `aside` the history."""
+def store_change(connection: Connection, clutch_id: str, computed: Results, *, by: str, at: str) -> int:
+    """Store the results of a run that came in or was changed, and what it changes in others. Returns the clutch's revision,
+    which moves on."""
+    store(connection, clutch_id, computed)
+    revision = clutches.bump_revision(connection, clutch_id)
+    _store_judged(connection, clutch_id, computed.judged, at=at, revision=revision)
+    if computed.teaches is not None:
+        ask_fleet_refresh(connection, computed.teaches, by=by, at=at)
+    return revision
+
+
+def _store_judged(connection: Connection, clutch_id: str, judged: Judged, *, at: str, revision: int) -> None:
+    """The states of runs that the evidence of others has changed, with the audit trail's entries."""
     states = [(event, runs.ACCEPTED, changes.ACCEPT) for event in judged.accepted]
     states += [(event, runs.HELD, changes.DOUBT) for event in judged.held]
     for event, new_state, action in states:
@@ -239,8 +240,6 @@ def store_judged(
         runs.set_state(
             connection, row.run_key, state=new_state, cycles=row.cycles, sent_cycles=row.sent_cycles, doubts=doubts
         )
-        if event.run_id in aside:
-            results.write_fits(connection, row.run_key, fit_rows(levels.get(event.run_id, ()), aside[event.run_id]))
         entry = {"run_id": event.run_id, "at": at, "by": BY_EVIDENCE, "reason": judged.reasons[event.run_id]}
         changes.insert(connection, clutch_id, action, summary(row), summary(after), revision=revision, **entry)
 

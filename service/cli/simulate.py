@@ -148,7 +148,7 @@ def _run_plan(folder: Path, plan: Path, alternative: int) -> None:
     """One test of a plan on the clutch of a campaign that was simulated into the folder, as its `answer.json` has it."""
     from models.rig import campaign, hidden, stationary, temperatures  # start-up time
     from models.rig.programme import Ageing  # start-up time
-    from service.run_files import planned_tests, simulated  # start-up time
+    from service.run_files import simulated  # start-up time
 
     if not (folder / manifest.ANSWER).is_file():
         fail(f"{folder} holds no simulated campaign: give the folder in which you simulated the clutch", EX_USAGE)
@@ -157,7 +157,7 @@ def _run_plan(folder: Path, plan: Path, alternative: int) -> None:
     clutch = hidden.clutch_for(campaign.simulated_clutch(answer["seed"]), sizes)
     runs = campaign.planned(
         answer["seed"],
-        planned_tests.planned_tests(plan, alternative),
+        simulated.planned_tests(plan, alternative),
         clutch=clutch,
         sensor=replace(stationary.SHARP, noise=answer["noise"]),
         ageing=Ageing(answer["ageing"]),

@@ -34,7 +34,7 @@ from service.lives.history import (
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
 from service.lives.payloads import OF_HISTORY, OFF_TRACK, fit_items, loop_items, warned_again
-from service.lives.plausibility.doubts import levelled
+from service.lives.plausibility.doubts import Judged, levelled
 from service.lives.run_analysis import Analysis, LevelFit, loops_of, mean_cofs
 from service.lives.tracks import CARRIED, Prediction, States, follow
 from service.schemas.clutch import ClutchIn
@@ -140,7 +140,8 @@ class Tracking:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
     """What is to be stored of a clutch: mean COFs by run_id beside their levels, receipts that change, corrected mean COFs
-    (in place of all where `corrected_again`), the tracking and the summary (None: it stays)."""
+    (in place of all where `corrected_again`), the tracking and the summary (None: it stays); what changes in the doubts
+    about other runs; and, where it changes what an ended life teaches, the kind of clutches that it `teaches`."""
 
     levels: Levels = field(default_factory=dict)
     cofs: Mapping[str, ByPressure] = field(default_factory=dict)
@@ -149,6 +150,8 @@ class Results:
     corrected_again: bool = False
     tracking: Tracking | None = None
     summary: dict[str, Any] | None = None
+    judged: Judged = field(default_factory=Judged)
+    teaches: dict[str, Any] | None = None
 
 
 def computed_again(
@@ -216,13 +219,24 @@ def computed_aside(state: ClutchState, event: Event, levels: Levels, reader: Run
     return cofs, {"fits": fit_items(fits, cofs), "loops": loops.get(event.run_id, [])}
 
 
-def set_aside(
-    state: ClutchState, event: Event, levels: Levels, receipt: Receipt, reader: RunReader
-) -> tuple[ByPressure, Receipt]:
-    """The complete receipt of a run that is taken out of the history, without the warnings that came from the history."""
-    cofs, parts = computed_aside(state, event, levels, reader)
-    warnings = [warning for warning in receipt["warnings"] if warning["code"] not in OF_HISTORY]
-    return cofs, receipt | parts | {"warnings": warnings}
+def with_set_aside(
+    computed: Results,
+    state: ClutchState,
+    events: Iterable[Event],
+    levels: Levels,
+    receipts: Mapping[str, Receipt],
+    reader: RunReader,
+) -> Results:
+    """The results with those of runs that are taken out of the history, whose receipts lose the warnings of the history."""
+    cofs, fresh = {**computed.cofs}, {**computed.receipts}
+    own_levels = {**computed.levels}
+    for event in events:
+        name, receipt = event.run_id, receipts[event.run_id]
+        cofs[name], parts = computed_aside(state, event, levels, reader)
+        own_levels[name] = levels.get(name, ())
+        warnings = [warning for warning in receipt["warnings"] if warning["code"] not in OF_HISTORY]
+        fresh[name] = receipt | parts | {"warnings": warnings}
+    return replace(computed, cofs=cofs, levels=own_levels, receipts=fresh)
 
 
 def _cofs_of_tests(lives: Sequence[Life], levels: Levels, geometry: Geometry) -> dict[str, ByPressure]:

@@ -25,7 +25,7 @@ from starlette.requests import ClientDisconnect
 
 from service.errors import UnsupportedMediaTypeError, unknown_clutch
 from service.lists import ALL_ITEMS, WHOLE, Part, from_cursor
-from service.queries.cache import Answer, Page, name_of, revision_and_json, shared_answer, to_json
+from service.queries.cache import Answer, Made, Page, name_of, revision_and_json, shared_answer, to_json
 from service.run_files.json_run import checked
 from service.schemas.parameters import ClutchId
 from service.web.auth import Admin, Reader, grant_of, snapshot_of
@@ -33,7 +33,6 @@ from service.web.context import Context, Cursor, Limit, Whole
 from service.web.limits import LONGEST_WAIT_SECONDS, USUAL_ITEMS, WAIT_SECONDS
 from service.web.middleware import Again, remember
 from service.web.problems import CHANGING
-from service.web.revalidation import Made
 from service.work.workers import CHANGE_SECONDS, Lane
 from storage import clutches
 from storage.encoding import to_text

@@ -14,13 +14,12 @@ from fastapi.concurrency import run_in_threadpool
 from models.prognosis.criteria import HORIZON
 from service.alarms.outbox import Outbox
 from service.lists import ALL_ITEMS, LONGEST_CURSOR
-from service.queries.cache import AnswerCache
+from service.queries.cache import AnswerCache, Revalidation
 from service.schemas.parameters import SHORT
 from service.settings import Settings
 from service.web.limits import MAX_HORIZONS, MAX_ITEMS, MAX_PRESSURE_BAR, USE_NOTED_SECONDS
 from service.web.metrics import Metrics
 from service.web.readiness import Readiness
-from service.web.revalidation import Revalidation
 from service.work.queue import JobQueue
 from service.work.workers import Workers
 from storage import keys

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 from importlib.metadata import version
+from itertools import count
 from typing import Any, Generic, Self, TypeVar, cast
 
 from service.defaults import SCHEDULERS
@@ -134,22 +135,19 @@ class _Elsewhere(Executor):
     """An executor whose processes get inputs one by one."""
 
     elsewhere = True
+    #: What a future raises whose process has ended, and what is said of it then.
+    lost: tuple[type[Exception], str]
 
     @abstractmethod
     def width(self) -> int:
         """How many inputs are to be on their way at once."""
 
     @abstractmethod
-    def submit(self, function: Callable[[Any], Any], item: Any) -> Any:
+    def submit(self, function: Callable[[Any], Any], item: Any) -> "Future[Any]":
         """A future of `called(function, item)`."""
 
-    @abstractmethod
-    def first(self, futures: Sequence[Any]) -> set[Any]:
-        """Wait until at least one has ended; those that have."""
-
-    @abstractmethod
-    def outcome(self, future: Any) -> tuple[Any, Exception | None]:
-        """What `called` returned; raises WorkerLostError where its process has ended."""
+    def require_any_worker(self) -> None:
+        """Raise ExecutorUnavailableError where nobody computes any more."""
 
     def map(
         self, function: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool = True
@@ -160,7 +158,7 @@ class _Elsewhere(Executor):
         one to blame if it ends so again.
         """
         inputs = (_Task(index, item) for index, item in enumerate(items))
-        running: dict[Any, _Task] = {}
+        running: dict[Future[Any], _Task] = {}
         waiting: list[_Task] = []
         done: dict[int, Outcome[Result]] = {}
         following = 0
@@ -175,16 +173,14 @@ class _Elsewhere(Executor):
                     running[self.submit(function, task.item)] = task
                 if not running:
                     return
-                for future in self.first(list(running)):
+                for future in self._first(running):
                     task = running.pop(future)
-                    try:
-                        result, error = self.outcome(future)
-                    except WorkerLostError as lost:
+                    result, error = self._outcome(future)
+                    if isinstance(error, WorkerLostError):
                         task.lost += 1
                         if task.lost < MAX_LOST:
                             waiting.append(task)
                             continue
-                        result, error = None, lost
                     done[task.index] = Outcome(index=task.index, result=result, error=error)
                 for index in sorted(done):
                     if in_order and index != following:
@@ -195,7 +191,32 @@ class _Elsewhere(Executor):
             for future in running:
                 future.cancel()
 
+    def _first(self, futures: Iterable["Future[Any]"]) -> set["Future[Any]"]:
+        """Those that have ended, once one has."""
+        while not (ended := wait(futures, _COUNT_SECONDS, FIRST_COMPLETED).done):
+            self.require_any_worker()
+        return ended
 
+    def _outcome(self, future: "Future[Any]") -> tuple[Any, Exception | None]:
+        """What `called` returned: a result, or the error of the function; a WorkerLostError where its process has ended.
+
+        Raises ExecutorUnavailableError where a worker is of another release.
+        """
+        lost, message = self.lost
+        try:
+            answer: tuple[Any, Exception | None] = future.result()
+        except lost as error:
+            return None, WorkerLostError(message.format(error))
+        except ExecutorUnavailableError:
+            raise
+        except Exception as error:  # noqa: BLE001  (an input or a result that cannot be pickled)
+            return None, error
+        return answer
+
+
+#: [s] How old the count of a cluster's threads may be, and between two looks whether any is left. Chosen: a cluster grows
+#: within minutes.
+_COUNT_SECONDS = 5.0
 #: Inputs on their way for each process or thread. Chosen: one is computed, and one is there when that has ended.
 INPUTS_AHEAD = 2
 
@@ -203,8 +224,10 @@ INPUTS_AHEAD = 2
 class Processes(_Elsewhere):
     """The executor `processes:N`. A process that ends is replaced, and what it did is done again."""
 
-    def __init__(self, count: int) -> None:
-        self.count = count
+    lost = BrokenExecutor, "the process that computed this ended at each attempt"
+
+    def __init__(self, processes: int) -> None:
+        self.processes = processes
         self._pool: _Pool | None = None
         self._closed = False
         self._lock = threading.Lock()
@@ -217,7 +240,7 @@ class Processes(_Elsewhere):
             pool.end()
 
     def width(self) -> int:
-        return INPUTS_AHEAD * self.count
+        return INPUTS_AHEAD * self.processes
 
     def submit(self, function: Callable[[Any], Any], item: Any) -> "Future[Any]":
         with self._lock:
@@ -226,27 +249,15 @@ class Processes(_Elsewhere):
             if self._pool is not None:
                 with suppress(BrokenExecutor):  # one of its processes has ended: it takes no calls any more
                     return self._pool.submit(called, function, item)
-            self._pool = _Pool(self.count)
+            self._pool = _Pool(self.processes)
             return self._pool.submit(called, function, item)
-
-    def first(self, futures: Sequence["Future[Any]"]) -> set["Future[Any]"]:
-        return wait(futures, return_when=FIRST_COMPLETED).done
-
-    def outcome(self, future: "Future[Any]") -> tuple[Any, Exception | None]:
-        try:
-            answer: tuple[Any, Exception | None] = future.result()
-        except BrokenExecutor as error:
-            raise WorkerLostError("the process that computed this ended at each attempt") from error
-        except Exception as error:  # noqa: BLE001  (an input or a result that cannot be pickled)
-            return None, error
-        return answer
 
 
 class _Pool(ProcessPoolExecutor):
     """Processes that end with this one, and leave an interrupt to it."""
 
-    def __init__(self, count: int) -> None:
-        super().__init__(count, mp_context=multiprocessing.get_context("forkserver"), initializer=_begin)
+    def __init__(self, processes: int) -> None:
+        super().__init__(processes, mp_context=multiprocessing.get_context("forkserver"), initializer=_begin)
 
     def end(self) -> None:
         """End the processes at once; by SIGKILL, for they are deaf to SIGTERM where a service's workers began what forks
@@ -264,10 +275,6 @@ def _begin() -> None:
 
 #: [s] How long a scheduler may take to answer, and one without workers to get one. Chosen; no table.
 CONNECT_SECONDS, WORKER_SECONDS = 10.0, 60.0
-#: [s] How old the count of the cluster's threads may be. Chosen: a cluster grows within minutes.
-_COUNT_SECONDS = 5.0
-#: [s] Between two looks for what has ended. Chosen: little beside an input that takes a second.
-_LOOK_SECONDS = 0.02
 #: What must be the same on both sides, for the same results to the last bit.
 _OF_RESULTS = ("clutchlife", "numpy", "scipy")
 
@@ -283,7 +290,7 @@ class Cluster(_Elsewhere):
 
     def __init__(self, address: str) -> None:
         try:
-            from distributed import Client, as_completed  # optional, and start-up time
+            from distributed import Client, KilledWorker  # optional, and start-up time
         except ModuleNotFoundError as error:
             raise ExecutorUnavailableError(
                 f"{address}: a Dask cluster needs its library: pip install -e '.[cluster]' in a checkout"
@@ -293,7 +300,8 @@ class Cluster(_Elsewhere):
             self._client: Any = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, TimeoutError, ValueError) as error:
             raise ExecutorUnavailableError(f"{address}: no Dask scheduler answers there ({error})") from error
-        self._completed: Any = as_completed(loop=self._client.loop)  # type: ignore[no-untyped-call]
+        self._futures: Any = self._client.get_executor(pure=False)  # type: ignore[no-untyped-call]
+        self.lost = KilledWorker, "the processes that computed this have ended ({})"
         self._counted = -_COUNT_SECONDS
         self._threads, self._last_seen = 0, time.monotonic()
         try:
@@ -309,45 +317,17 @@ class Cluster(_Elsewhere):
         self._count()
         return INPUTS_AHEAD * max(1, self._threads)
 
-    def submit(self, function: Callable[[Any], Any], item: Any) -> Any:
+    def submit(self, function: Callable[[Any], Any], item: Any) -> "Future[Any]":
         import dask.config  # optional, and start-up time
 
         with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"}):
-            future = self._client.submit(_called, release(), function, item, pure=False)
-        self._completed.add(future)
+            future: Future[Any] = self._futures.submit(_called, release(), function, item)
         return future
 
-    def first(self, futures: Sequence[Any]) -> set[Any]:
-        """One that has ended, once one has. Raises ExecutorUnavailableError where the last worker has ended."""
-        while True:
-            while not self._completed.has_ready():
-                self._require_any_worker()
-                time.sleep(_LOOK_SECONDS)
-            future = next(self._completed)
-            if future in futures:  # another was dropped by who stopped iterating
-                return {future}
-
-    def outcome(self, future: Any) -> tuple[Any, Exception | None]:
-        """What `called` returned: a result, or the error of the function. The scheduler has what a worker took down with it
-        computed again by another. Raises ExecutorUnavailableError where the scheduler has ended, has no worker any more or
-        they are of another release, WorkerLostError where those that computed it have ended."""
-        from distributed import KilledWorker  # optional, and start-up time
-
-        while True:
-            if future.cancelled():
-                raise ExecutorUnavailableError(f"{self.address}: the Dask scheduler has ended")
-            try:
-                answer: tuple[Any, Exception | None] = future.result(timeout=CONNECT_SECONDS)
-            except TimeoutError:  # it is no error of the function's: those are returned
-                self._require_any_worker()
-            except KilledWorker as error:
-                raise WorkerLostError(f"the processes that computed this have ended ({error})") from error
-            except ExecutorUnavailableError:
-                raise
-            except Exception as error:  # noqa: BLE001  (an input or a result that cannot be pickled)
-                return None, error
-            else:
-                return answer
+    def _outcome(self, future: "Future[Any]") -> tuple[Any, Exception | None]:
+        if future.cancelled():
+            raise ExecutorUnavailableError(f"{self.address}: the Dask scheduler has ended")
+        return super()._outcome(future)
 
     def _count(self) -> None:
         """See how many threads there are, now and then."""
@@ -357,7 +337,7 @@ class Cluster(_Elsewhere):
             self._counted = now
             self._last_seen = now if self._threads else self._last_seen
 
-    def _require_any_worker(self) -> None:
+    def require_any_worker(self) -> None:
         self._count()
         if self._counted - self._last_seen > WORKER_SECONDS:
             raise ExecutorUnavailableError(f"{self.address}: the Dask scheduler has no worker any more")
@@ -412,9 +392,9 @@ def executor_of(scheduler: str) -> Executor:
         return Processes(os.cpu_count() or 1)
     if scheduler.startswith(("tcp://", "tls://")):
         return Cluster(scheduler)
-    kind, _, count = scheduler.partition(":")
-    if kind == "processes" and count.isdecimal() and int(count) > 0:
-        return Processes(int(count))
+    kind, _, number = scheduler.partition(":")
+    if kind == "processes" and number.isdecimal() and int(number) > 0:
+        return Processes(int(number))
     raise ValueError(f"the scheduler must be {SCHEDULERS}, got {scheduler!r}")
 
 
@@ -447,39 +427,47 @@ def in_rounds(
     rounds: int,
 ) -> Iterator[Ended[Result]]:
     """The names as they end. `load` gives None where there is nothing to do, `store` False where the item holds no more."""
-    for number in range(rounds):
-        sent: dict[int, tuple[str, Item]] = {}
-        ended: list[Ended[Result]] = []
-        to_repeat: list[str] = []
-
-        def items(
-            names: Iterable[str] = names, sent: dict[int, tuple[str, Item]] = sent, ended: list[Ended[Result]] = ended
-        ) -> Iterator[Item]:
-            index = 0
-            for name in names:
-                try:
-                    item = load(name)
-                except Exception as error:  # noqa: BLE001  (given to who asked)
-                    ended.append(Ended(name=name, ending=Ending.FAILED, error=error))
-                    continue
-                if item is None:
-                    ended.append(Ended(name=name, ending=Ending.NOTHING))
-                    continue
-                sent[index] = (name, item)
-                index += 1
-                yield item
-
-        for outcome in executor.map(compute, items(), in_order=False):
-            name, item = sent.pop(outcome.index)
-            if outcome.error is not None:
-                ended.append(Ended(name=name, ending=Ending.FAILED, error=outcome.error))
-            elif store(item, outcome.value()):
-                ended.append(Ended(name=name, ending=Ending.STORED, result=outcome.value()))
-            elif number + 1 < rounds:
-                to_repeat.append(name)
+    for left in reversed(range(rounds)):
+        to_repeat = []
+        for ended in _round(executor, names, load, compute, store):
+            if ended.ending is Ending.LEFT and left:
+                to_repeat.append(ended.name)
             else:
-                ended.append(Ended(name=name, ending=Ending.LEFT))
-            yield from ended
-            ended.clear()
-        yield from ended
+                yield ended
         names = to_repeat
+
+
+def _round(
+    executor: Executor,
+    names: Sequence[str],
+    load: Callable[[str], Item | None],
+    compute: Callable[[Item], Result],
+    store: Callable[[Item, Result], bool],
+) -> Iterator[Ended[Result]]:
+    numbers, sent = count(), dict[int, tuple[str, Item]]()
+    not_sent: list[Ended[Result]] = []
+
+    def items() -> Iterator[Item]:
+        for name in names:
+            try:
+                item = load(name)
+            except Exception as error:  # noqa: BLE001  (given to who asked)
+                not_sent.append(Ended(name=name, ending=Ending.FAILED, error=error))
+                continue
+            if item is None:
+                not_sent.append(Ended(name=name, ending=Ending.NOTHING))
+                continue
+            sent[next(numbers)] = name, item
+            yield item
+
+    for outcome in executor.map(compute, items(), in_order=False):
+        name, item = sent.pop(outcome.index)
+        yield from not_sent
+        not_sent.clear()
+        if outcome.error is not None:
+            yield Ended(name=name, ending=Ending.FAILED, error=outcome.error)
+        elif store(item, outcome.value()):
+            yield Ended(name=name, ending=Ending.STORED, result=outcome.value())
+        else:
+            yield Ended(name=name, ending=Ending.LEFT)
+    yield from not_sent

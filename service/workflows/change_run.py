@@ -20,7 +20,6 @@ from service.columns import whole
 from service.errors import NotPossibleNowError
 from service.lives.history import (
     STATIONARY,
-    ByPressure,
     Event,
     life_with,
     order,
@@ -41,14 +40,13 @@ from service.lives.recomputation import (
     cofs_among,
     computed_again,
     reader_with,
-    set_aside,
+    with_set_aside,
 )
 from service.lives.run_analysis import analyse
 from service.run_files.upload import read_file_run
 from service.settings import CODE_VERSION
-from storage import changes, channels, clutches, results, runs
+from storage import changes, channels, results, runs
 from storage.channels import Encoded
-from storage.encoding import Json
 from storage.engine.database import Database
 from storage.runs import RunRow
 
@@ -104,64 +102,32 @@ class _Loaded:
         return stored if self.again is None else reader_with(stored, self.again)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Changed:
-    """The runs as they are to be, what that changes in the doubts about others, the mean COFs of those of them that are then
-    not accepted, by run_id, and the results of the clutch's history; and, where that changes what an ended life
-    teaches, the kind of clutches that it `teaches`."""
-
-    rows: tuple[RunRow, ...]
-    judged: Judged
-    aside: Mapping[str, ByPressure]
-    results: Results
-    teaches: Json | None = None
-
-
-def withdraw(database: Database, clutch_id: str, run_id: str, *, reason: str, by: str, at: str) -> Receipt:
-    """Take a run out of its clutch's history; returns its receipt. Raises NotFoundError."""
-    request = _Request(clutch_id=clutch_id, run_ids=(run_id,), action=changes.WITHDRAW, reason=reason, by=by, at=at)
-    return _change(database, request)[0]
-
-
-def restore(database: Database, clutch_id: str, run_id: str, *, reason: str, by: str, at: str) -> Receipt:
-    """Take a withdrawal back: the run is accepted or held as before; returns its receipt. Raises NotFoundError."""
-    request = _Request(clutch_id=clutch_id, run_ids=(run_id,), action=changes.RESTORE, reason=reason, by=by, at=at)
-    return _change(database, request)[0]
-
-
-def confirm(database: Database, clutch_id: str, run_id: str, *, reason: str, by: str, at: str) -> Receipt:
-    """Accept a held run as it is; returns its receipt. Raises NotFoundError."""
-    return confirm_all(database, clutch_id, (run_id,), reason=reason, by=by, at=at)[0]
-
-
-def confirm_all(
-    database: Database, clutch_id: str, run_ids: Sequence[str], *, reason: str, by: str, at: str
+def change(
+    database: Database,
+    clutch_id: str,
+    run_ids: Sequence[str],
+    *,
+    action: str,
+    reason: str,
+    by: str,
+    at: str,
+    cycles: float | None = None,
 ) -> list[Receipt]:
-    """Accept all of these runs that are held, as they are, in one step; returns their receipts in the order asked for.
+    """Change runs in one step; returns their receipts in the order asked for.
 
-    Raises NotFoundError where one is none of the clutch's, and then changes nothing.
+    `action` of storage.changes: WITHDRAW takes a run out of its clutch's history, RESTORE takes that back (it is accepted or
+    held as before), CONFIRM accepts those that are held as they are, CORRECT puts a run to other `cycles`, where doubts are
+    asked again. Only CONFIRM takes several runs. Raises NotFoundError where one is none of the clutch's, and
+    NotPossibleNowError where one that is withdrawn is to be corrected; then nothing is changed.
     """
     names = tuple(dict.fromkeys(run_ids))
-    request = _Request(clutch_id=clutch_id, run_ids=names, action=changes.CONFIRM, reason=reason, by=by, at=at)
+    request = _Request(clutch_id=clutch_id, run_ids=names, action=action, reason=reason, by=by, at=at, cycles=cycles)
     receipts = {answer["run_id"]: answer for answer in _change(database, request)}
     return [receipts[run_id] for run_id in names]
 
 
-def correct(
-    database: Database, clutch_id: str, run_id: str, *, cycles: float, reason: str, by: str, at: str
-) -> Receipt:
-    """Put a run to other cycles, where doubts are asked again; returns its receipt.
-
-    Raises NotFoundError, and NotPossibleNowError for a run that is withdrawn.
-    """
-    request = _Request(
-        clutch_id=clutch_id, run_ids=(run_id,), action=changes.CORRECT, reason=reason, by=by, at=at, cycles=cycles
-    )
-    return _change(database, request)[0]
-
-
 def read_again(
-    database: Database, clutch_id: str, run_id: str, *, rig: str, reason: str, by: str, at: str, folder: Path
+    database: Database, clutch_id: str, run_id: str, folder: Path, *, rig: str, reason: str, by: str, at: str
 ) -> Receipt:
     """Read a run's file again, by another rig's profile or by one that was mended, where doubts are asked again; returns its
     receipt. The file is unpacked below `folder`.
@@ -219,13 +185,13 @@ def _change(
             return [records.receipt(row) for row in same]
         rows, events = tuple(compress(loaded.rows, differs)), tuple(compress(loaded.events, differs))
         loaded = replace(loaded, rows=rows, events=events)
-        changed = _computed(database, loaded, list(compress(wanted, differs)))
+        changed, computed = _computed(database, loaded, list(compress(wanted, differs)))
         with database.writing(of=request.clutch_id) as connection:
             if records.unchanged(connection, request.clutch_id, loaded.state.revision):
                 if columns is not None:
                     channels.rewrite(connection, loaded.row.run_key, columns)
-                _store(connection, loaded, changed, request)
-                return [records.receipt(row) for row in (*changed.rows, *same)]
+                _store(connection, loaded, changed, computed, request)
+                return [records.receipt(row) for row in (*changed, *same)]
 
 
 def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
@@ -322,8 +288,8 @@ def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
     return _together(other_runs, None, [*loaded.events, *accepted])
 
 
-def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _Changed:
-    """All that follows from the runs as they are to be."""
+def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> tuple[tuple[RunRow, ...], Results]:
+    """The runs as they are to be with their receipts, and all that follows."""
     before, other_runs = loaded.state, loaded.others
     pairs = [(row, event.at(row.cycles)) for row, event in zip(rows, loaded.events, strict=True)]
     accepted = [event for row, event in pairs if row.state == runs.ACCEPTED]
@@ -342,12 +308,9 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _C
             rejudged = loaded.row.run_id
             evaluated = {loop: test for loop, test in evaluated.items() if rejudged not in (loop, test)}
         after, computed = computed_again(after, loaded.levels, receipts, reader, evaluated=evaluated)
-    aside = {}
-    for other in [*judged.held, *out]:
-        name = other.run_id
-        aside[name], receipts[name] = set_aside(after, other, loaded.levels, receipts[name], reader)
+    computed = with_set_aside(computed, after, [*judged.held, *out], loaded.levels, receipts, reader)
     own_names = {row.run_id for row in rows}
-    changed = {name: receipts[name] for name in (*own_names, *aside)} | dict(computed.receipts)
+    changed = {name: receipts[name] for name in own_names} | dict(computed.receipts)
     evidence = stored_runs.evidence_for(database, after, reader)
     if evidence is not None:
         evidence = replace(evidence, levels=loaded.levels, receipts={**receipts, **changed})
@@ -361,19 +324,17 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> _C
         for mended in state.events
         if mended.run_id in own_names
     )
-    return _Changed(
-        rows=tuple(replace(row, receipt=changed[row.run_id]) for row in rows),
-        judged=judged,
-        aside=aside,
-        results=replace(computed, receipts=changed, summary=summary),
-        teaches=after.kind if teaches else None,
-    )
+    kind = after.kind if teaches else None
+    computed = replace(computed, receipts=changed, summary=summary, judged=judged, teaches=kind)
+    return tuple(replace(row, receipt=changed[row.run_id]) for row in rows), computed
 
 
-def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: _Request) -> None:
+def _store(
+    connection: Connection, loaded: _Loaded, changed: Sequence[RunRow], computed: Results, request: _Request
+) -> None:
     """The runs as they are to be and what follows, and the entries of the audit trail; the revision moves on."""
     clutch_id = request.clutch_id
-    for row in changed.rows:
+    for row in changed:
         runs.set_state(
             connection, row.run_key, state=row.state, cycles=row.cycles, sent_cycles=row.sent_cycles, doubts=row.doubts
         )
@@ -381,17 +342,8 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
             analysis = loaded.again.analysis
             runs.set_results(connection, row.run_key, loaded.again.kept, row.receipt, CODE_VERSION)
             results.write_fits(connection, row.run_key, records.fit_rows(analysis.fits, {}))
-        if row.run_id in changed.aside:
-            fits = records.fit_rows(loaded.levels.get(row.run_id, ()), changed.aside[row.run_id])
-            results.write_fits(connection, row.run_key, fits)
-    records.store(connection, clutch_id, changed.results)
-    revision = clutches.bump_revision(connection, clutch_id)
-    records.store_judged(
-        connection, clutch_id, changed.judged, changed.aside, loaded.levels, at=request.at, revision=revision
-    )
-    if changed.teaches is not None:
-        records.ask_fleet_refresh(connection, changed.teaches, by=request.by, at=request.at)
-    for was, row in zip(loaded.rows, changed.rows, strict=True):
+    revision = records.store_change(connection, clutch_id, computed, by=request.by, at=request.at)
+    for was, row in zip(loaded.rows, changed, strict=True):
         before, after = records.summary(was), records.summary(row)
         if loaded.again is not None:
             before |= _read_as(was.details["file"])

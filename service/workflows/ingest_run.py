@@ -6,7 +6,7 @@ the history is computed again. A doubtful run is stored with its curves, held, a
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -46,15 +46,14 @@ from service.lives.recomputation import (
     corrected_newest,
     loops_again,
     reader_with,
-    set_aside,
     test_of,
     track,
+    with_set_aside,
 )
 from service.lives.run_analysis import LevelFit, analyse, loops_of
 from service.settings import CODE_VERSION
-from storage import changes, channels, clutches, results, runs
+from storage import changes, channels, results, runs
 from storage.channels import PackedFile
-from storage.encoding import Json
 from storage.engine.database import Database
 from storage.runs import NewRun, RunRow
 
@@ -64,19 +63,14 @@ MAX_FILE_BYTES = 900_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Outcome:
-    """What a run changes in a clutch at a revision: its receipt and mean COFs, doubts about it and what it changes in the
-    doubts about others (with the mean COFs of those that are held now), and the results of what was there before; and,
-    where it changes what an ended life teaches, the kind of clutches that it `teaches`."""
+    """What a run changes in a clutch at a revision: its receipt and mean COFs, doubts about it, and the results of what was
+    there before."""
 
     revision: int
     receipt: dict[str, Any]
     cofs: ByPressure
     results: Results
     doubts: tuple[Notice, ...] = ()
-    judged: Judged = field(default_factory=Judged)
-    aside: Mapping[str, ByPressure] = field(default_factory=dict)
-    levels: Levels = field(default_factory=dict)
-    teaches: Json | None = None
 
     @property
     def state(self) -> str:
@@ -214,20 +208,17 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
         part = held_summary(with_held, before.filters or {}, _evidence(database, with_held, arrival, answer))
         summary = Results(summary={**before.summary, **part})
         return _Outcome(revision=before.revision, receipt=answer, cofs=event.cofs, results=summary, doubts=doubtful)
-    aside: dict[str, ByPressure] = {}
     if judged.changes or _changes_the_past(before, state.events, event):
         with database.reading() as connection:
             receipts = records.receipts(connection, before.clutch_id) | {event.run_id: answer}
             levels = records.levels(connection, before.clutch_id) | _own_levels(arrival)
         reader = reader_with(stored_runs.run_reader(database, before.clutch_id), arrival)
         final, computed = computed_again(state, levels, receipts, reader, evaluated=evaluated)
-        changed = dict(computed.receipts)
-        for other in judged.held:
-            aside[other.run_id], changed[other.run_id] = set_aside(final, other, levels, receipts[other.run_id], reader)
+        computed = with_set_aside(computed, final, judged.held, levels, receipts, reader)
     else:
         final, computed = _one_step(database, state, event, levels, answer, arrival, evaluated)
-        changed = dict(computed.receipts)
     evidence = _evidence(database, final, arrival, answer) if needs_evidence(final) else None
+    changed = dict(computed.receipts)
     own_receipt = changed.pop(event.run_id, answer)
     return _Outcome(
         revision=before.revision,
@@ -238,12 +229,10 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
             receipts=changed,
             levels={run_id: fits for run_id, fits in computed.levels.items() if run_id != event.run_id},
             summary=summarised(final, computed.tracking or Tracking(), evidence),
+            judged=judged,
+            teaches=state.kind if not doubtful and life_with(state.events, event).end is not None else None,
         ),
         doubts=doubtful,
-        judged=judged,
-        aside=aside,
-        levels=levels,
-        teaches=state.kind if not doubtful and life_with(state.events, event).end is not None else None,
     )
 
 
@@ -329,13 +318,7 @@ def _store(
     run_key = runs.insert(connection, row)
     channels.write(connection, run_key, columns)
     results.write_fits(connection, run_key, records.fit_rows(arrival.analysis.fits, outcome.cofs))
-    records.store(connection, clutch_id, outcome.results)
-    revision = clutches.bump_revision(connection, clutch_id)
-    records.store_judged(
-        connection, clutch_id, outcome.judged, outcome.aside, outcome.levels, at=arrival.received_at, revision=revision
-    )
-    if outcome.teaches is not None:
-        records.ask_fleet_refresh(connection, outcome.teaches, by=by, at=arrival.received_at)
+    revision = records.store_change(connection, clutch_id, outcome.results, by=by, at=arrival.received_at)
     if outcome.doubts:
         held, at = records.summary(row), arrival.received_at
         changes.insert(

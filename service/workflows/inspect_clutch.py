@@ -16,7 +16,7 @@ from service.schemas.inspection import InspectionIn, MediaType
 from storage import changes, clutches, inspections
 from storage.engine.database import Database
 from storage.inspections import InspectionRow, NewInspection, PhotographRow
-from storage.runs import ACCEPTED, WITHDRAWN
+from storage.runs import WITHDRAWN
 
 #: The first characters of the content's hash that name an inspection. Chosen: as a diagnosis' name.
 _ID_CHARACTERS = 16
@@ -89,28 +89,20 @@ def _require_type(content: bytes, media_type: MediaType) -> None:
         raise InvalidError.of(message, code="media_type", value=shown)
 
 
-def withdraw(
-    database: Database, clutch_id: str, inspection_id: str, *, reason: str, by: str, at: str
+def change(
+    database: Database, clutch_id: str, inspection_id: str, state: str, *, reason: str, by: str, at: str
 ) -> dict[str, Any]:
-    """Withdraw an inspection; returns it as it is answered. Raises NotFoundError."""
-    return _change(database, clutch_id, inspection_id, changes.WITHDRAW_INSPECTION, WITHDRAWN, reason, by, at)
+    """Withdraw an inspection (`state` WITHDRAWN) or take that back (ACCEPTED); returns it as it is answered.
 
-
-def restore(database: Database, clutch_id: str, inspection_id: str, *, reason: str, by: str, at: str) -> dict[str, Any]:
-    """Take a withdrawal back; returns the inspection as it is answered. Raises NotFoundError."""
-    return _change(database, clutch_id, inspection_id, changes.RESTORE_INSPECTION, ACCEPTED, reason, by, at)
-
-
-def _change(
-    database: Database, clutch_id: str, inspection_id: str, action: str, state: str, reason: str, by: str, at: str
-) -> dict[str, Any]:
-    """Change an inspection, unless it is so already; the audit trail and the clutch's revision move on with it."""
+    One that is so already is not changed; else the audit trail and the clutch's revision move on. Raises NotFoundError.
+    """
     with database.writing(of=clutch_id) as connection:
         row = inspection(connection, clutch_id, inspection_id)
         if row.state != state:
             inspections.set_state(connection, row.inspection_key, state)
             was, now = _summary(row, row.state), _summary(row, state)
             revision = clutches.bump_revision(connection, clutch_id)
+            action = changes.WITHDRAW_INSPECTION if state == WITHDRAWN else changes.RESTORE_INSPECTION
             changes.insert(connection, clutch_id, action, was, now, at=at, by=by, reason=reason, revision=revision)
         return _answer(connection, clutch_id, inspection_id)
 

@@ -1,8 +1,6 @@
 """Inspections of a clutch's friction surface: posted, listed, withdrawn; and photographs as their files."""
 
-from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
@@ -18,6 +16,7 @@ from service.web import answers
 from service.web.auth import Ingester, Reader, grant_of
 from service.web.problems import CHANGING, READING, SENDING
 from service.workflows import inspect_clutch
+from storage.runs import ACCEPTED, WITHDRAWN
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/inspections", tags=["inspections"])
 
@@ -86,7 +85,7 @@ async def read_inspection(of: answers.Of, inspection_id: InspectionId) -> Respon
 )
 async def withdraw_inspection(of: answers.ChangeOf, inspection_id: InspectionId) -> Response:
     """Withdraw an inspection. It stays stored and listed, with its photographs."""
-    return await _changed(inspect_clutch.withdraw, of, inspection_id)
+    return await _changed(WITHDRAWN, of, inspection_id)
 
 
 @router.post(
@@ -94,7 +93,7 @@ async def withdraw_inspection(of: answers.ChangeOf, inspection_id: InspectionId)
 )
 async def restore_inspection(of: answers.ChangeOf, inspection_id: InspectionId) -> Response:
     """Undo a withdrawal."""
-    return await _changed(inspect_clutch.restore, of, inspection_id)
+    return await _changed(ACCEPTED, of, inspection_id)
 
 
 @router.post(
@@ -147,8 +146,8 @@ async def _file(request: Request) -> bytes:
     return bytes(content)
 
 
-async def _changed(change: Callable[..., dict[str, Any]], of: answers.OfClutch, inspection_id: str) -> Response:
-    """The inspection after a change."""
-    withdrawal = await answers.sent(of.request, Withdrawal)
-    edit = partial(change, reason=withdrawal.reason, by=grant_of(of.request).name, at=answers.now())
-    return answers.json_answer(await run_in_threadpool(edit, of.database, of.clutch_id, inspection_id))
+async def _changed(state: str, of: answers.OfClutch, inspection_id: str) -> Response:
+    """The inspection in its new state."""
+    reason, by = (await answers.sent(of.request, Withdrawal)).reason, grant_of(of.request).name
+    change = partial(inspect_clutch.change, reason=reason, by=by, at=answers.now())
+    return answers.json_answer(await run_in_threadpool(change, of.database, of.clutch_id, inspection_id, state))

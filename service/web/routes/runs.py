@@ -5,7 +5,7 @@ A file is the body itself, or a form with a `file` part; it is kept on disk whil
 
 import asyncio
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from service.web.problems import READING, SENDING, described
 from service.work.workers import Lane
 from service.workflows import change_run
 from service.workflows.ingest_run import ingest_posted
-from storage.engine.database import Database
+from storage import changes
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
 
@@ -195,21 +195,22 @@ async def correct_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Respons
     """
     correction = await answers.sent(of.request, Correction)
     if correction.rig is not None:
-        reread = partial(change_run.read_again, rig=correction.rig, folder=of.context.folder)
-        return await _changed(reread, of, run_id, correction)
-    return await _changed(change_run.correct, of, run_id, correction, cycles=correction.cycles)
+        by, at = grant_of(of.request).name, answers.now()
+        reread = partial(change_run.read_again, rig=correction.rig, reason=correction.reason, by=by, at=at)
+        return answers.json_answer(await answers.changed(of, reread, run_id, of.context.folder))
+    return await _changed(of, changes.CORRECT, run_id, correction, cycles=correction.cycles)
 
 
 @router.post("/{run_id}/withdraw", **answers.taking(Withdrawal, Receipt, {"reason": "the torque sensor was unplugged"}))
 async def withdraw_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Response:
     """Withdraw a run: it no longer counts, but stays stored and listed."""
-    return await _changed(change_run.withdraw, of, run_id, await answers.sent(of.request, Withdrawal))
+    return await _changed(of, changes.WITHDRAW, run_id, await answers.sent(of.request, Withdrawal))
 
 
 @router.post("/{run_id}/restore", **answers.taking(Withdrawal, Receipt, {"reason": "it was the other sensor"}))
 async def restore_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Response:
     """Undo a withdrawal: the run is accepted or held again, as before."""
-    return await _changed(change_run.restore, of, run_id, await answers.sent(of.request, Withdrawal))
+    return await _changed(of, changes.RESTORE, run_id, await answers.sent(of.request, Withdrawal))
 
 
 @router.post(
@@ -223,7 +224,7 @@ async def confirm_runs(of: answers.ChangeOf) -> Response:
     not held stay unchanged.
     """
     confirmations = await answers.sent(of.request, Confirmations)
-    return await _changed(_confirmed, of, confirmations.run_ids, confirmations)
+    return await _changed(of, changes.CONFIRM, confirmations.run_ids, confirmations)
 
 
 @router.post(
@@ -231,20 +232,19 @@ async def confirm_runs(of: answers.ChangeOf) -> Response:
 )
 async def confirm_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Response:
     """Accept a held run as it was sent."""
-    return await _changed(change_run.confirm, of, run_id, await answers.sent(of.request, Confirmation))
-
-
-def _confirmed(database: Database, clutch_id: str, run_ids: Sequence[str], **wanted: Any) -> dict[str, Any]:
-    return {"items": change_run.confirm_all(database, clutch_id, run_ids, **wanted), "next": None}
+    return await _changed(of, changes.CONFIRM, run_id, await answers.sent(of.request, Confirmation))
 
 
 async def _changed(
-    change: Callable[..., dict[str, Any]],
     of: answers.OfClutch,
+    action: str,
     run_id: str | Sequence[str],
     sent: Correction | Withdrawal | Confirmation | Confirmations,
     **more: Any,
 ) -> Response:
-    """The receipt, or receipts, after a change."""
-    edit = partial(change, reason=sent.reason, **more, by=grant_of(of.request).name, at=answers.now())
-    return answers.json_answer(await answers.changed(of, edit, run_id))
+    """The receipt after a change, or a list of them where it is of a list of runs."""
+    by, reason, at = grant_of(of.request).name, sent.reason, answers.now()
+    edit = partial(change_run.change, action=action, reason=reason, by=by, at=at, **more)
+    if isinstance(run_id, str):
+        return answers.json_answer((await answers.changed(of, edit, [run_id]))[0])
+    return answers.json_answer({"items": await answers.changed(of, edit, run_id), "next": None})

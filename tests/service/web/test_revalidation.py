@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from service.queries import cache
-from service.queries.cache import Answer, AnswerCache
-from service.web.revalidation import Made, Revalidation
+from service.queries.cache import Answer, AnswerCache, Made, Revalidation
 
 Asked = tuple[int, Answer]
 

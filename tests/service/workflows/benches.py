@@ -25,7 +25,7 @@ from service.web.answers import to_json
 from service.workflows import change_run, edit_clutch, ingest_run
 from service.workflows.adopt_model import adopt
 from service.workflows.ingest_run import ingest
-from storage import diagnoses, results
+from storage import changes, diagnoses, results
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
 from storage.engine.opening import open_database
@@ -127,16 +127,20 @@ class Bench:
         adopt(self.database, CLUTCH, diagnosis_id, adopted_at=AT)
 
     def withdraw(self, run_id: str) -> dict[str, Any]:
-        return change_run.withdraw(self.database, CLUTCH, run_id, reason="a slip", **WHO)
+        return self._changed(run_id, action=changes.WITHDRAW, reason="a slip")
 
     def restore(self, run_id: str) -> dict[str, Any]:
-        return change_run.restore(self.database, CLUTCH, run_id, reason="no slip", **WHO)
+        return self._changed(run_id, action=changes.RESTORE, reason="no slip")
 
     def confirm(self, run_id: str) -> dict[str, Any]:
-        return change_run.confirm(self.database, CLUTCH, run_id, reason="", **WHO)
+        return self._changed(run_id, action=changes.CONFIRM, reason="")
 
     def correct(self, run_id: str, cycles: float) -> dict[str, Any]:
-        return change_run.correct(self.database, CLUTCH, run_id, cycles=cycles, reason="a slip", **WHO)
+        return self._changed(run_id, action=changes.CORRECT, reason="a slip", cycles=cycles)
+
+    def _changed(self, run_id: str, **wanted: Any) -> dict[str, Any]:
+        (receipt,) = change_run.change(self.database, CLUTCH, [run_id], **wanted, **WHO)
+        return receipt
 
     def receipts(self) -> dict[str, dict[str, Any]]:
         page = json.loads(runs.page_as_json(self.database, CLUTCH, WHOLE))

@@ -21,7 +21,7 @@ from service.queries.raw_run import write_run
 from service.workflows import change_run, ingest_run, run_diagnosis
 from service.workflows.adopt_model import finish_and_adopt
 from service.workflows.replay import replay_clutch
-from storage import assumptions, clutches, jobs
+from storage import assumptions, changes, clutches, jobs
 from tests.service.workflows.benches import (
     AT,
     CLUTCH,
@@ -197,10 +197,11 @@ def test_several_held_runs_are_confirmed_in_one_step_or_none(benches: tuple[Benc
             assert bench.send(body("test", name, cycles, odd=True))["state"] == "held"
     revision = revision_of(together)
     asked = ["odd-2", "b", "odd-1"]
+    confirming = {"action": changes.CONFIRM, "reason": "a new lining", "by": "me", "at": AT}
     with pytest.raises(NotFoundError, match="nobody"):
-        change_run.confirm_all(together.database, CLUTCH, [*asked, "nobody"], reason="", by="me", at=AT)
+        change_run.change(together.database, CLUTCH, [*asked, "nobody"], **confirming)
     assert revision_of(together) == revision
-    receipts = change_run.confirm_all(together.database, CLUTCH, asked, reason="a new lining", by="me", at=AT)
+    receipts = change_run.change(together.database, CLUTCH, asked, **confirming)
     assert [(one["run_id"], one["state"]) for one in receipts] == [(name, "accepted") for name in asked]
     assert revision_of(together) == revision + 1
     confirmed = [each for each in trail_of(together) if each["action"] == "confirm"]
@@ -243,7 +244,8 @@ def test_two_corrections_at_once_end_as_one_after_the_other(
         right.withdraw(name)
 
     def change(other: Any) -> None:
-        change_run.withdraw(other, CLUTCH, "a2000", reason="meanwhile", by="local", at=AT)
+        taking_out = {"action": changes.WITHDRAW, "reason": "meanwhile", "by": "local", "at": AT}
+        change_run.change(other, CLUTCH, ["a2000"], **taking_out)
         send_to(other, body("test", "new", 3000.0))
 
     calls = overtaken(monkeypatch, change_run, "_computed", slipped.database, change)

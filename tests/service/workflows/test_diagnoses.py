@@ -16,8 +16,7 @@ from models.diagnosis.extension import Extension, NotFiniteError
 from models.rig.campaign import planned, simulated_clutch
 from models.rig.programme import Ageing
 from models.rig.stationary import Sensor
-from service.run_files.planned_tests import planned_tests
-from service.run_files.simulated import simulated_body
+from service.run_files.simulated import planned_tests, simulated_body
 from service.schemas.diagnosis import DiagnosisListed, DiagnosisOut, JobPage, ModelOut, PlanOut
 from service.work.queue import MAX_ATTEMPTS
 from service.workflows import adopt_model

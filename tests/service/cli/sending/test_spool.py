@@ -11,8 +11,7 @@ import pytest
 
 from service.cli.sending import spool as entries
 from service.cli.sending.delivery import Sent, deliver
-from service.cli.sending.run_head import RunHead, head_of_body, head_of_file, same_run
-from service.cli.sending.spool import HeldError, Spool
+from service.cli.sending.spool import HeldError, RunHead, Spool, head_of_body, head_of_file, same_run
 from service.client.clutchlife.transport import Service
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body
 
