@@ -5,16 +5,14 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from tests.service.work.waiting import until
 from tests.support import free_port
 
 ROOT = Path(__file__).parents[3]
-#: [s] How long a scheduler may take to start.
-START_SECONDS = 60.0
 
 Process = subprocess.Popen[bytes]
 
@@ -30,7 +28,7 @@ class LocalCluster:
         self.scheduler = self._started(
             "scheduler", "--port", str(self.port), "--no-dashboard", "--no-show", **environment
         )
-        self._wait()
+        until(self._answers)
 
     def add_worker(self, **environment: str) -> Process:
         """One more worker."""
@@ -53,14 +51,11 @@ class LocalCluster:
             stderr=subprocess.DEVNULL,
         )
 
-    def _wait(self) -> None:
-        deadline = time.monotonic() + START_SECONDS
-        while time.monotonic() < deadline:
-            with suppress(OSError), socket.create_connection(("127.0.0.1", self.port), timeout=1):
-                return
-            assert self.scheduler.poll() is None, "the scheduler ended before it was ready"
-            time.sleep(0.05)
-        raise TimeoutError("the scheduler was not ready in time")
+    def _answers(self) -> bool:
+        assert self.scheduler.poll() is None, "the scheduler ended before it was ready"
+        with suppress(OSError), socket.create_connection(("127.0.0.1", self.port), timeout=1):
+            return True
+        return False
 
 
 @contextmanager

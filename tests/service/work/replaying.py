@@ -1,6 +1,5 @@
 """Clutches that are to be replayed by a job, seen and ended midway: what the tests of replays as jobs share."""
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from storage import jobs
 from storage.engine.database import Database
 from storage.tables import filter_state, fit, prediction
 from storage.transfer import digest
+from tests.service.work.waiting import until
 from tests.support import ONCE, Server, stationary
 
 AT = "2026-11-02T10:00:00+00:00"
@@ -69,14 +69,14 @@ def aged(database: Database) -> set[str]:
 
 def midway(get: Callable[[str], httpx2.Response], job_id: str, url: str) -> None:
     """Wait until some of a replay is done, of the database at the address."""
-    deadline = time.monotonic() + 120
-    while True:
+
+    def some_is_done() -> bool:
         job = get(f"/v1/jobs/{job_id}").json()
-        if job["progress"] is not None and job["progress"]["done"] > 0:
-            assert (job["state"], len(processes(url))) == ("running", 1), job
-            return
-        assert time.monotonic() < deadline, job
-        time.sleep(0.02)
+        done = job["progress"] is not None and job["progress"]["done"] > 0
+        assert not done or (job["state"], len(processes(url))) == ("running", 1), job
+        return done
+
+    until(some_is_done, within=120.0)
 
 
 def processes(url: str) -> list[str]:
@@ -93,19 +93,15 @@ def processes(url: str) -> list[str]:
 
 
 def until_none(url: str) -> None:
-    deadline = time.monotonic() + 60
-    while processes(url):
-        assert time.monotonic() < deadline, "its process goes on"
-        time.sleep(0.05)
+    until(lambda: not processes(url))
 
 
 def ended(server: Server, job_id: str) -> dict[str, Any]:
     """The job once it has ended; the database may be away for a while."""
-    deadline = time.monotonic() + 180
-    while True:
+
+    def job() -> dict[str, Any] | None:
         answer = ONCE.get(f"{server.url}/v1/jobs/{job_id}")
-        job: dict[str, Any] = answer.json()
-        if answer.status_code == 200 and job["state"] not in jobs.OPEN:
-            return job
-        assert time.monotonic() < deadline, job
-        time.sleep(0.1)
+        found: dict[str, Any] = answer.json()
+        return found if answer.status_code == 200 and found["state"] not in jobs.OPEN else None
+
+    return until(job, within=180.0)

@@ -17,8 +17,9 @@ from rich.console import Console
 from service.work import executor as executors
 from service.work import progress
 from service.work.executor import Executor, ExecutorUnavailableError, Outcome, Processes, WorkerLostError, executor_of
-from tests.service.work import functions
+from tests.service.work import calls
 from tests.service.work.clusters import ROOT, LocalCluster, local_cluster
+from tests.service.work.waiting import until
 from tests.support import free_port, one_quick
 
 
@@ -55,7 +56,7 @@ def shown(outcome: Outcome[float]) -> tuple[int, float | None, str]:
 
 def test_results_and_errors_are_those_of_the_function(executor: Executor) -> None:
     items = list(range(-2, 30))
-    outcomes = list(executor.map(functions.squared, items))
+    outcomes = list(executor.map(calls.squared, items))
     expected = [
         (index, None, f"ValueError: {item} is negative")
         if item < 0
@@ -71,11 +72,11 @@ def test_results_and_errors_are_those_of_the_function(executor: Executor) -> Non
 
 
 def test_outcomes_come_in_order_or_as_they_are_ready(executor: Executor) -> None:
-    list(executor.map(functions.slow_first, range(1, 9)))  # all processes are up
-    as_they_come = [outcome.index for outcome in executor.map(functions.slow_first, range(12), in_order=False)]
+    list(executor.map(calls.slow_first, range(1, 9)))  # all processes are up
+    as_they_come = [outcome.index for outcome in executor.map(calls.slow_first, range(12), in_order=False)]
     assert sorted(as_they_come) == list(range(12))
     assert (as_they_come[0] == 0) is not executor.elsewhere
-    assert [outcome.result for outcome in executor.map(functions.slow_first, range(12))] == list(range(12))
+    assert [outcome.result for outcome in executor.map(calls.slow_first, range(12))] == list(range(12))
 
 
 def test_inputs_are_taken_as_they_are_needed(executor: Executor) -> None:
@@ -87,7 +88,7 @@ def test_inputs_are_taken_as_they_are_needed(executor: Executor) -> None:
             taken += 1
             yield taken
 
-    outcomes = executor.map(functions.slow_first, items())
+    outcomes = executor.map(calls.slow_first, items())
     for number in range(1, 11):
         assert next(outcomes).result == number
         assert taken <= number + 8  # two for each of at most four threads
@@ -101,45 +102,42 @@ def test_an_error_of_the_inputs_is_raised(executor: Executor) -> None:
         raise LookupError("there are no more")
 
     with pytest.raises(LookupError, match="there are no more"):
-        list(executor.map(functions.squared, items()))
+        list(executor.map(calls.squared, items()))
 
 
 def test_linear_algebra_has_one_thread_in_a_process(executor: Executor) -> None:
     if executor.elsewhere:  # the tests' own process has what it was started with
-        assert [outcome.value() for outcome in executor.map(functions.threads, range(4))] == [{1}] * 4
+        assert [outcome.value() for outcome in executor.map(calls.threads, range(4))] == [{1}] * 4
 
 
 def test_what_a_killed_process_did_is_done_again_and_an_input_that_kills_each_is_an_error(
     killed: Executor, tmp_path: Path
 ) -> None:
     places = [(str(tmp_path), number) for number in range(12)]
-    assert [outcome.value() for outcome in killed.map(functions.killed_once, places)] == list(range(12))
+    assert [outcome.value() for outcome in killed.map(calls.killed_once, places)] == list(range(12))
     assert (tmp_path / "killed").exists()
-    (outcome,) = killed.map(functions.killed_always, [3])
+    (outcome,) = killed.map(calls.killed_always, [3])
     assert isinstance(outcome.error, WorkerLostError)
     if isinstance(killed, Processes):  # Dask takes inputs that wait beside it for guilty too
-        outcomes = list(killed.map(functions.killed_always, range(6)))
+        outcomes = list(killed.map(calls.killed_always, range(6)))
         assert [outcome.result for outcome in outcomes] == [0, 1, 2, None, 4, 5]
 
 
 def test_closing_ends_what_runs_at_once() -> None:
     pool = executor_of("processes:2")
-    outcomes = pool.map(functions.forever, range(8))
+    outcomes = pool.map(calls.forever, range(8))
     threading.Timer(2.0, pool.close).start()
     began = time.monotonic()
     with pytest.raises(RuntimeError, match="the executor is closed"):
         list(outcomes)
     assert time.monotonic() - began < 30
-    deadline = time.monotonic() + 30
-    while multiprocessing.active_children() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert not [child for child in multiprocessing.active_children() if child.is_alive()]
+    until(lambda: not any(child.is_alive() for child in multiprocessing.active_children()), within=30.0)
 
 
 def test_processes_end_with_the_one_that_started_them() -> None:
     source = (
         "from service.work.executor import executor_of\n"
-        "from tests.service.work.functions import pid\n"
+        "from tests.service.work.calls import pid\n"
         "import os, signal\n"
         "pool = executor_of('processes:2')\n"
         "print({outcome.result for outcome in pool.map(pid, range(8))}, flush=True)\n"
@@ -149,10 +147,7 @@ def test_processes_end_with_the_one_that_started_them() -> None:
     assert done.returncode == -signal.SIGKILL, done.stderr
     pids = [int(text) for text in done.stdout.strip().strip("{}").split(",")]
     assert pids
-    deadline = time.monotonic() + 30
-    while any(Path(f"/proc/{each}").exists() for each in pids) and time.monotonic() < deadline:
-        time.sleep(0.1)
-    assert not [each for each in pids if Path(f"/proc/{each}").exists()]
+    until(lambda: not any(Path(f"/proc/{each}").exists() for each in pids), within=30.0)
 
 
 def test_a_cluster_of_another_release_is_refused(dask_cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -170,7 +165,7 @@ def test_a_worker_of_another_release_that_joins_later_is_refused(
         own = executors.release()
         monkeypatch.setattr(executors, "release", lambda: own | {"numpy": "1.0"})
         with pytest.raises(ExecutorUnavailableError, match=r"instead of 1\.0: results could differ"):
-            list(made.map(functions.squared, range(4)))
+            list(made.map(calls.squared, range(4)))
 
 
 def test_what_is_no_cluster_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,7 +185,7 @@ def test_what_is_no_cluster_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow
 def test_a_scheduler_that_ends_is_named() -> None:
     with local_cluster(1) as running, executor_of(running.address) as made:
-        outcomes = made.map(functions.pid, range(10_000))
+        outcomes = made.map(calls.pid, range(10_000))
         assert next(outcomes).error is None
         os.kill(running.scheduler.pid, signal.SIGKILL)
         with pytest.raises(ExecutorUnavailableError, match="the Dask scheduler has ended"):
@@ -202,7 +197,7 @@ def test_a_cluster_whose_last_worker_ends_is_named(monkeypatch: pytest.MonkeyPat
     with local_cluster(1) as running, executor_of(running.address) as made:
         monkeypatch.setattr(executors, "WORKER_SECONDS", 1.0)
         with pytest.raises(ExecutorUnavailableError, match="has no worker any more"):
-            list(made.map(functions.killed_always, range(6)))
+            list(made.map(calls.killed_always, range(6)))
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
 """How the process of a job is started, and which jobs wait for which."""
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,28 @@ def states(database: Database) -> dict[str, str]:
         return {row.job_id: row.state for row in jobs.page(connection, limit=9)}
 
 
+def finish_of(database: Database) -> Callable[[JobRow, Mapping[str, Any]], None]:
+    """What stores a job's end and no more."""
+
+    def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
+        problem = ended.get("problem")
+        state = jobs.FINISHED if problem is None else jobs.FAILED
+        with database.writing() as connection:
+            jobs.end(connection, job.job_id, state, AT, problem=problem, claimer=job.claimed_by)
+
+    return finish
+
+
+@contextmanager
+def started(database: Database, *groups: Mapping[str, Kind], lease: int = 1) -> Iterator[JobQueue]:
+    queue = JobQueue(database, Settings(job_lease_seconds=lease), groups)
+    queue.start()
+    try:
+        yield queue
+    finally:
+        queue.close()
+
+
 @pytest.mark.usefixtures("own_processes")
 def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
     in_file: Database, monkeypatch: pytest.MonkeyPatch
@@ -61,36 +84,23 @@ def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
     """A diagnosis is made while a replay of the whole fleet runs; a fleet refresh waits for its end."""
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
 
-    def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
-        with in_file.writing() as connection:
-            problem = ended.get("problem")
-            jobs.end(connection, job.job_id, jobs.FAILED, AT, problem=problem, claimer=job.claimed_by)
-
-    endless = Kind(lambda _job, _settings: SLEEPS, finish)
-    quick = Kind(lambda _job, _settings: Work(modules=("this",), task={}, longest=0.0), finish)
-    groups = [{jobs.DIAGNOSIS: quick}, {jobs.REPLAY: endless, jobs.FLEET_REFRESH: endless}]
+    endless = Kind(lambda _job, _settings: SLEEPS, finish_of(in_file))
+    quick = Kind(lambda _job, _settings: Work(modules=("this",), task={}, longest=0.0), finish_of(in_file))
     for job_id, kind in (("r", jobs.REPLAY), ("f", jobs.FLEET_REFRESH), ("d", jobs.DIAGNOSIS), ("other", "unheard of")):
         ask(in_file, job_id, kind)
-    queue = JobQueue(in_file, Settings(job_lease_seconds=1), groups)
-    queue.start()
-    try:
+    groups = {jobs.DIAGNOSIS: quick}, {jobs.REPLAY: endless, jobs.FLEET_REFRESH: endless}
+    with started(in_file, *groups) as queue:
         until(lambda: states(in_file) == {"r": "running", "f": "waiting", "d": "failed", "other": "waiting"})
         assert queue.is_working()
         with in_file.writing() as connection:
             assert jobs.end(connection, "r", jobs.CANCELLED, AT)
         until(lambda: states(in_file) == {"r": "cancelled", "f": "running", "d": "failed", "other": "waiting"})
-    finally:
-        queue.close()
     assert not queue.is_working()
     assert states(in_file) == {"r": "cancelled", "f": "waiting", "d": "failed", "other": "waiting"}, "given back"
 
 
 def test_a_queue_that_is_woken_looks_at_once(in_file: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     """It has looked before there was anything to do, and would look again after six minutes."""
-
-    def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
-        with in_file.writing() as connection:
-            jobs.end(connection, job.job_id, jobs.FAILED, AT, problem=str(ended), claimer=job.claimed_by)
 
     def work(_: JobRow, __: Settings) -> Work:
         raise StartedError
@@ -103,15 +113,11 @@ def test_a_queue_that_is_woken_looks_at_once(in_file: Database, monkeypatch: pyt
         return free
 
     monkeypatch.setattr(jobs, "any_free", watched)
-    queue = JobQueue(in_file, Settings(job_lease_seconds=3600), [{jobs.REPLAY: Kind(work, finish)}])
-    queue.start()
-    try:
+    with started(in_file, {jobs.REPLAY: Kind(work, finish_of(in_file))}, lease=3600) as queue:
         assert looked.wait(60.0)
         ask(in_file, "r", jobs.REPLAY)
         queue.wake()
         until(lambda: states(in_file) == {"r": "failed"}, within=20.0)
-    finally:
-        queue.close()
 
 
 RARE = [pytest.param(how, marks=pytest.mark.slow) for how in ("raises", "writes garbage", "says nothing")]
@@ -122,12 +128,9 @@ def test_a_job_that_fails_in_any_way_is_marked_failed_and_the_next_one_runs(
     in_file: Database, caplog: pytest.LogCaptureFixture, how: str
 ) -> None:
     def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
-        problem = ended.get("problem")
-        if job.job_id == "bad" and (how == "cannot end" or (how == "cannot be stored" and problem is None)):
+        if job.job_id == "bad" and (how == "cannot end" or (how == "cannot be stored" and "problem" not in ended)):
             raise KeyError("adopt_by")
-        with in_file.writing() as connection:
-            state = jobs.FINISHED if problem is None else jobs.FAILED
-            jobs.end(connection, job.job_id, state, AT, problem=problem, claimer=job.claimed_by)
+        finish_of(in_file)(job, ended)
 
     def work(job: JobRow, _: Settings) -> Work:
         if job.job_id == "bad" and how == "cannot start":
@@ -137,13 +140,9 @@ def test_a_job_that_fails_in_any_way_is_marked_failed_and_the_next_one_runs(
 
     ask(in_file, "bad", jobs.REPLAY)
     ask(in_file, "next", jobs.REPLAY)
-    queue = JobQueue(in_file, Settings(job_lease_seconds=1), [{jobs.REPLAY: Kind(work, finish)}])
-    queue.start()
-    try:
+    with started(in_file, {jobs.REPLAY: Kind(work, finish)}) as queue:
         until(lambda: states(in_file) == {"bad": "failed", "next": "finished"})
         assert queue.is_working()
-    finally:
-        queue.close()
     with in_file.reading() as connection:
         row = jobs.get(connection, "bad")
     assert row is not None

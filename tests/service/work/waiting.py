@@ -7,7 +7,7 @@ from typing import TypeVar
 Found = TypeVar("Found")
 
 
-def until(look: Callable[[], Found], *, within: float = 60.0) -> Found:
+def until(look: Callable[[], Found | None], *, within: float = 60.0) -> Found:
     """What is found, once it is anything; fails after so many seconds."""
     deadline = time.monotonic() + within
     while not (found := look()):
