@@ -25,6 +25,7 @@ class Sender:
         self.spool = Spool.of(folder / "spool", URL, "c1")
         self.service = StandInService()
         self.lines: list[str] = []
+        self.clock = Clock()
 
     def push(self, content: bytes, name: str = "run.json") -> None:
         """Keep a run."""
@@ -45,16 +46,10 @@ class Sender:
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    found = Clock()
-    monkeypatch.setattr(transport, "time", found)
-    return found
-
-
-@pytest.fixture
-def sender(tmp_path: Path, clock: Clock) -> Sender:
-    del clock
-    return Sender(tmp_path)
+def sender(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Sender:
+    made = Sender(tmp_path)
+    monkeypatch.setattr(transport, "time", made.clock)
+    return made
 
 
 def of_run(name: bytes, answer: Callable[[], httpx2.Response]) -> Answer:
@@ -71,6 +66,7 @@ def test_a_run_that_the_service_refuses_is_set_aside_with_the_reason(sender: Sen
     assert sender.counts == (1, 0, 1)
     assert sender.spool.refused()[0].problem["detail"] == "because"
     assert "because" in sender.lines[0]
+    assert ("other content" in sender.lines[-1]) is (slug[1] == "conflict")
 
 
 @pytest.mark.parametrize(
@@ -152,17 +148,21 @@ def test_a_service_that_answers_nothing_but_looks_is_left_alone_after_two_runs(s
 
 
 @pytest.mark.parametrize(
-    ("state", "words"),
+    ("known", "state", "words"),
     [
-        ({"state": "withdrawn", "cycles": 70000, "sent_cycles": 70000}, "then withdrawn"),
-        ({"state": "accepted", "cycles": 7000.0, "sent_cycles": 70000.0}, "from 70000 to 7000 cycles"),
+        (True, {"state": "withdrawn", "cycles": 70000, "sent_cycles": 70000}, "then withdrawn"),
+        (True, {"state": "accepted", "cycles": 7000.0, "sent_cycles": 70000.0}, "from 70000 to 7000 cycles"),
+        (False, {"state": "held", "doubts": [{"code": "cycles", "message": "is it 7000?"}]}, "r1 is held: is it 7000?"),
     ],
 )
-def test_a_run_that_was_changed_since_waits_no_more(sender: Sender, state: dict[str, object], words: str) -> None:
-    sender.service.stored["r1"] = body(70000, "r1")
+def test_a_run_that_was_changed_since_or_is_held_is_reported_and_waits_no_more(
+    sender: Sender, known: bool, state: dict[str, object], words: str
+) -> None:
+    if known:
+        sender.service.stored["r1"] = body(70000, "r1")
     sender.service.states["r1"] = state
     sender.push(body(70000, "r1"))
-    assert sender.send().duplicates == 1
+    assert str(sender.send()) == f"{1 - known} stored now, {1 * known} stored before, 0 refused"
     assert sender.counts == (1, 0, 0)
     assert [words in line for line in sender.lines] == [True]
 
@@ -184,23 +184,7 @@ def test_an_inspection_waits_while_the_service_is_away_and_is_sent_to_its_own_ad
     assert sender.lines[-1] == f"{name} was stored earlier and then withdrawn: it stays withdrawn and is not sent again"
 
 
-def test_a_run_known_with_other_content_waits_no_more(sender: Sender) -> None:
-    sender.service.stored["r1"] = body(7000, "r1")
-    sender.push(body(70000, "r1"))
-    assert sender.send().refused == 1
-    assert sender.counts == (1, 0, 1)
-    assert "other content" in sender.lines[-1]
-    assert sender.service.stored["r1"] == body(7000, "r1")
-
-
-def test_a_run_that_is_held_is_reported(sender: Sender) -> None:
-    sender.service.states["r1"] = {"state": "held", "doubts": [{"code": "cycles", "message": "is it 7000?"}]}
-    sender.push(body(70000, "r1"))
-    assert sender.send().stored == 1
-    assert sender.lines == ["r1 is held: is it 7000?"]
-
-
-def test_a_run_that_is_corrected_between_two_tries_is_not_tried_again(sender: Sender, clock: Clock) -> None:
+def test_a_run_that_is_corrected_between_two_tries_is_not_tried_again(sender: Sender) -> None:
     """Another process pushes the correction while this one waits for the service."""
     older, newer = body(70000), body(7000)
     posted: list[bytes] = []
@@ -210,11 +194,11 @@ def test_a_run_that_is_corrected_between_two_tries_is_not_tried_again(sender: Se
         return httpx2.Response(503) if len(posted) == 1 else None
 
     def correct(seconds: float) -> None:
-        clock.now += seconds
+        sender.clock.now += seconds
         sender.push(newer)
 
     sender.service.instead = away_at_first
-    clock.sleep = correct  # type: ignore[method-assign]  # what happens meanwhile
+    sender.clock.sleep = correct  # type: ignore[method-assign]  # what happens meanwhile
     sender.push(older)
     assert sender.send().stored == 0
     assert sender.send().stored == 1
@@ -235,15 +219,6 @@ def test_a_run_that_is_corrected_while_the_service_takes_it_is_named(sender: Sen
     assert "stored while you pushed a newer version" in sender.lines[0]
     assert contents(sender.spool) == [newer]
     assert sender.spool.replaced() == []
-
-
-def test_whether_a_replaced_version_may_be_stored_is_known(sender: Sender) -> None:
-    for answer, perhaps in ((httpx2.Response(503), False), (httpx2.Response(504), True), (httpx2.Response(503), True)):
-        sender.service.instead = lambda _request, answer=answer: answer  # type: ignore[misc]
-        sender.push(body(1))
-        with pytest.raises(ServiceAwayError):
-            sender.send()
-        assert sender.spool.waiting()[0].perhaps_stored is perhaps
 
 
 def test_a_full_disk_keeps_no_run_from_being_sent(sender: Sender, monkeypatch: pytest.MonkeyPatch) -> None:

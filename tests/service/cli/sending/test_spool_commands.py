@@ -100,6 +100,8 @@ def test_a_run_that_was_corrected_while_the_service_was_away_is_delivered_correc
 def test_a_replaced_version_that_may_be_stored_is_named(terminal: Terminal) -> None:
     terminal.service.instead = lambda request: None if request.method == "GET" else httpx2.Response(504)
     terminal.push(body(70000), code=75)
+    terminal.service.instead = away  # which stores nothing; a try before it may have
+    terminal("spool", "send", "--url", URL, "--patience", "0", code=75)
     terminal.service.instead = present
     assert "the old version may be stored: if so, withdraw it" in terminal.push(body(7000))
 
