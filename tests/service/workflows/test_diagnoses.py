@@ -5,7 +5,7 @@ import shutil
 import sqlite3
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +22,12 @@ from service.work.queue import MAX_ATTEMPTS
 from service.workflows import adopt_model
 from service.workflows.replay import replay_clutch
 from storage.engine.opening import open_database
-from tests.service.workflows.diagnosing import BASE, diagnosed, post_tests, service, stood_in
-from tests.support import one_quick
+from tests.service.clients import client_on, post_run
+from tests.service.work.waiting import until
+from tests.service.workflows import stand_in_engine
+from tests.support import one_quick, stationary
 
-# --- The diagnosis through the service: asked for, stored, adopted, refused; with an engine that stands in for the
-# real one.
-
+BASE = "/v1/clutches/c1"
 RUL = f"{BASE}/remaining-useful-life"
 EFFECTS = ["torque_zero_shift", "running_in"]
 EXTENDED = {"name": "extended", "effects": EFFECTS}
@@ -36,8 +36,41 @@ BASELINE = {"name": "baseline", "effects": []}
 
 @pytest.fixture(scope="module", autouse=True)
 def _stand_in() -> Iterator[None]:
-    with stood_in():
+    with pytest.MonkeyPatch.context() as patched:
+        stand_in_engine.apply(patched.setattr)
         yield
+
+
+@contextmanager
+def service(folder: Path, engine: str = "diagnose", **settings: Any) -> Iterator[TestClient]:
+    """A service in this process, whose diagnoses the stand-in makes."""
+    engine = f"{stand_in_engine.__name__}:{engine}"
+    with client_on(f"sqlite:///{folder / 'a.db'}", engine=engine, **settings) as client:
+        client.post("/v1/clutches", json={"clutch_id": "c1"})
+        yield client
+
+
+def post_tests(client: TestClient, *cycles: float) -> None:
+    for each in cycles:
+        post_run(client, stationary(each, run_id=f"r{each:g}"))
+
+
+def asked(client: TestClient, wait: int = 0, clutch: str = "c1", **body: Any) -> Any:
+    """The answer to a request for a diagnosis."""
+    return client.post(f"/v1/clutches/{clutch}/diagnoses", json=body, headers={"Prefer": f"wait={wait}"})
+
+
+def diagnosed(client: TestClient, **body: Any) -> dict[str, Any]:
+    answer = asked(client, 120, **body)
+    assert answer.status_code == 201, answer.text
+    found: dict[str, Any] = answer.json()
+    assert found["status"] == "finished", found["problem"]
+    return found
+
+
+def adopt(client: TestClient, diagnosis_id: str | None) -> Any:
+    """The answer to a request that a diagnosis be adopted, or the baseline (None)."""
+    return client.put(f"{BASE}/model", json={"diagnosis_id": diagnosis_id})
 
 
 @pytest.fixture
@@ -79,13 +112,8 @@ def test_a_report_is_answered_stored_and_listed(client: TestClient) -> None:
     assert answer.headers["Location"] == f"{BASE}/diagnoses/{report['diagnosis_id']}"
     assert (report["verdict"], report["causes"], report["as_of_cycles"]) == ("cause_named", EFFECTS, 3000)
     assert (report["adoptable"], report["adopted"], report["stale"]) == (True, False, False)
-    assert report["candidates"][0]["estimate"] == {
-        "name": "zero shift",
-        "value": 1.5,
-        "sd": None,
-        "unit": "Nm",
-        "interval": [None, None],
-    }
+    estimate = {"name": "zero shift", "value": 1.5, "sd": None, "unit": "Nm", "interval": [None, None]}
+    assert report["candidates"][0]["estimate"] == estimate
     assert report["statistics"] == {"alarm": None, "threshold": 11.0}
     assert report["maps"]["axes"]["pressure_bar"] == [4.0, 5.0]
     assert report["maps"]["axes"]["speed_rpm"][0] == pytest.approx(95.493)
@@ -98,10 +126,8 @@ def test_a_report_is_answered_stored_and_listed(client: TestClient) -> None:
     assert (again.status_code, again.content) == (304, b"")
     listed = client.get(f"{BASE}/diagnoses").json()
     DiagnosisListed.model_validate(listed["items"][0])
-    assert listed == {
-        "items": [{k: v for k, v in report.items() if k not in ("maps", "loops", "isolability")}],
-        "next": None,
-    }
+    shown = {k: v for k, v in report.items() if k not in ("maps", "loops", "isolability")}
+    assert listed == {"items": [shown], "next": None}
     post_tests(client, 4000)
     assert client.get(answer.headers["Location"]).json() == report | {"stale": True}
 
@@ -131,15 +157,9 @@ def test_the_plan_of_a_diagnosis_is_a_protocol_that_a_rig_can_run(
     (tmp_path / "plan.json").write_text(plan.text, "utf-8")
     tests = planned_tests(tmp_path / "plan.csv", 1)
     assert tests == planned_tests(tmp_path / "plan.json", 1)
-    made = planned(
-        7, tests, clutch=simulated_clutch(7), sensor=Sensor(), ageing=Ageing.CYCLES, cycles=4000, wear=4000.0
-    )
-    sent = [client.post(f"{BASE}/runs", json=simulated_body(run)) for run in made]
-    assert [answer.status_code for answer in sent] == [201] * len(sent)
-    sent_ids = [answer.json()["run_id"] for answer in sent]
-    confirmed = client.post(
-        f"{BASE}/runs/confirm", json={"run_ids": sent_ids, "reason": "so slow a test was asked for"}
-    )
+    rig = {"clutch": simulated_clutch(7), "sensor": Sensor(), "ageing": Ageing.CYCLES, "cycles": 4000, "wear": 4000.0}
+    sent = [post_run(client, simulated_body(run))["run_id"] for run in planned(7, tests, **rig)]
+    confirmed = client.post(f"{BASE}/runs/confirm", json={"run_ids": sent, "reason": "so slow a test was asked for"})
     assert confirmed.status_code == 200
     assert client.get(at).json()["stale"]
 
@@ -151,7 +171,7 @@ def test_what_is_adopted_moves_every_answer_and_back_again(examined: tuple[TestC
     life = report["gain"]["remaining_useful_life"]
     shown = client.get(RUL).json()
     assert life["before"] == {name: shown[name] for name in life["before"]}
-    adopted = client.put(f"{BASE}/model", json={"diagnosis_id": report["diagnosis_id"]})
+    adopted = adopt(client, diagnosis_id)
     ModelOut.model_validate(adopted.json())
     assert (adopted.status_code, adopted.json()["model"], adopted.json()["version"]) == (200, EXTENDED, 1)
     after = client.get(RUL).json()
@@ -164,10 +184,9 @@ def test_what_is_adopted_moves_every_answer_and_back_again(examined: tuple[TestC
     for at in ("degradation", "engagement", "remaining-useful-life?method=ukf&pressure_bar=5&at_cycles=2500"):
         assert client.get(f"{BASE}/{at}").json()["model"] == EXTENDED, at
     assert client.get(f"{BASE}/runs").json() == receipts
-    same = client.put(f"{BASE}/model", json={"diagnosis_id": report["diagnosis_id"]}).json()
-    assert same == adopted.json() == client.get(f"{BASE}/model").json()
-    assert client.get(f"{BASE}/diagnoses/{report['diagnosis_id']}").json()["adopted"]
-    back = client.put(f"{BASE}/model", json={"diagnosis_id": None}).json()
+    assert adopt(client, diagnosis_id).json() == adopted.json() == client.get(f"{BASE}/model").json()
+    assert client.get(f"{BASE}/diagnoses/{diagnosis_id}").json()["adopted"]
+    back = adopt(client, None).json()
     assert (back["model"], back["version"], [row["version"] for row in back["versions"]]) == (BASELINE, 2, [2, 1])
     assert said(client) == before
 
@@ -176,21 +195,22 @@ def test_what_is_adopted_moves_every_answer_and_back_again(examined: tuple[TestC
 def test_the_order_of_arrival_does_not_matter_under_a_model_and_replay_gives_the_same(tmp_path: Path) -> None:
     oil = {"kind": "maintenance", "event": "oil_change", "cycles": 2500, "run_id": "oil"}
     answers = []
-    for name, rest in (("in-order", ("oil", 3000, 4000)), ("late", (4000, 3000, "oil")), ("before", None)):
+    for name, rest in (
+        ("in-order", ("adopt", "oil", 3000, 4000)),
+        ("late", ("adopt", 4000, 3000, "oil")),
+        ("before", ("oil", 3000, 4000, "adopt")),
+    ):
         (tmp_path / name).mkdir()
         with service(tmp_path / name) as client:
             post_tests(client, 0, 1000, 2000)
             report = diagnosed(client)
-            order = ("oil", 3000, 4000) if rest is None else rest
-            if rest is not None:
-                assert client.put(f"{BASE}/model", json={"diagnosis_id": report["diagnosis_id"]}).status_code == 200
-            for each in order:
+            for each in rest:
                 if each == "oil":
-                    assert client.post(f"{BASE}/runs", json=oil).status_code == 201
+                    post_run(client, oil)
+                elif each == "adopt":
+                    assert adopt(client, report["diagnosis_id"]).status_code == 200
                 else:
                     post_tests(client, float(each))
-            if rest is None:
-                assert client.put(f"{BASE}/model", json={"diagnosis_id": report["diagnosis_id"]}).status_code == 200
             answers.append(said(client))
             with closing(open_database(f"sqlite:///{tmp_path / name / 'a.db'}")) as database:
                 assert replay_clutch(database, "c1") == 6
@@ -208,15 +228,14 @@ def test_a_rebuild_ends_the_model(client: TestClient) -> None:
     report = diagnosed(client, adopt=True)
     assert report["adopted"]
     assert client.get(RUL).json()["model"] == EXTENDED
-    rebuild = {"kind": "maintenance", "event": "rebuild", "cycles": 2000, "run_id": "rebuild"}
-    assert client.post(f"{BASE}/runs", json=rebuild).status_code == 201
+    post_run(client, {"kind": "maintenance", "event": "rebuild", "cycles": 2000, "run_id": "rebuild"})
     assert client.get(RUL).json()["model"] == BASELINE
     assert client.get(f"{BASE}/model").json()["model"] == BASELINE
     kept = client.get(f"{BASE}/diagnoses/{report['diagnosis_id']}").json()
     assert (kept["adoptable"], kept["adopted"], kept["stale"], kept["earlier_life"]) == (False, False, True, True)
     listed = client.get(BASE).json()["diagnosis"]
     assert (listed["adopted"], listed["earlier_life"]) == (False, True)
-    refused = client.put(f"{BASE}/model", json={"diagnosis_id": report["diagnosis_id"]})
+    refused = adopt(client, report["diagnosis_id"])
     assert (refused.status_code, "rebuild" in refused.json()["detail"]) == (409, True)
     post_tests(client, 2500, 3500)
     assert "looked at 2 tests" in diagnosed(client, adopt=True)["summary"]
@@ -225,7 +244,7 @@ def test_a_rebuild_ends_the_model(client: TestClient) -> None:
 
 
 def test_what_is_unknown_or_wrong_is_refused(client: TestClient) -> None:
-    assert client.put(f"{BASE}/model", json={"diagnosis_id": "nothing"}).status_code == 404
+    assert adopt(client, "nothing").status_code == 404
     assert client.get(f"{BASE}/diagnoses/nothing").status_code == 404
     for method, at in (("GET", "diagnoses"), ("POST", "diagnoses"), ("GET", "model"), ("PUT", "model")):
         body = {} if method == "POST" else {"diagnosis_id": None}
@@ -247,7 +266,7 @@ def test_a_run_is_taken_whatever_the_model_makes_of_it(
         raise error("a model that breaks")
 
     client, diagnosis_id = examined
-    assert client.put(f"{BASE}/model", json={"diagnosis_id": diagnosis_id}).status_code == 200
+    assert adopt(client, diagnosis_id).status_code == 200
     monkeypatch.setattr(Extension, "artefact", artefact)
     post_tests(client, 5000)
     assert client.get(RUL).json()["runs_used"] == 6
@@ -272,7 +291,7 @@ def test_a_diagnosis_that_breaks_is_told(
     if engine == "endless":
         monkeypatch.setattr("service.work.queue.CLOCK_PER_PROCESSOR_SECOND", 0.05)
     with service(tmp_path, engine, diagnosis_seconds=4 if engine == "computing" else 120) as client:
-        answer = client.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": "wait=120"})
+        answer = asked(client, 120, adopt=True)
         DiagnosisOut.model_validate(answer.json())
         assert (answer.status_code, answer.json()["status"], answer.json()["verdict"]) == (201, "failed", None)
         assert problem in answer.json()["problem"]
@@ -295,8 +314,7 @@ def test_what_goes_wrong_in_a_diagnosis_is_in_the_log(
 ) -> None:
     """A number that ran over with its line; of one that went well, nothing."""
     with service(tmp_path, engine) as client:
-        answer = client.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=120"})
-        assert answer.json()["status"] == "finished"
+        diagnosed(client)
     assert logged(caplog, "RuntimeWarning: overflow encountered") == levels
 
 
@@ -305,51 +323,42 @@ def test_one_runs_at_a_time_others_join_or_wait_or_are_sent_away(
 ) -> None:
     monkeypatch.setenv("STAND_IN_PID", str(tmp_path / "pid"))
     with service(tmp_path, "endless", most_diagnoses=2) as client:
-        first = client.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=0"})
-        assert (first.status_code, first.json()["status"], first.headers["Preference-Applied"]) == (
-            202,
-            "running",
-            "wait=0",
-        )
+        first = asked(client)
+        assert (first.status_code, first.json()["status"]) == (202, "running")
+        assert first.headers["Preference-Applied"] == "wait=0"
         again = client.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": 'wait="0"'})
         assert (again.status_code, again.headers["Location"]) == (202, first.headers["Location"])
         post_tests(client, 0)
-        other = client.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=0"})
+        other = asked(client)
         assert (other.status_code, other.json()["revision"]) == (202, 1)
         client.post("/v1/clutches", json={"clutch_id": "c2"})
-        away = client.post("/v1/clutches/c2/diagnoses", json={}, headers={"Prefer": "wait=0"})
+        away = asked(client, clutch="c2")
         assert (away.status_code, away.headers["Retry-After"]) == (503, "1")
         assert client.get("/v1/clutches/c2/diagnoses").json()["items"] == []
         pages = client.get(f"{BASE}/diagnoses", params={"limit": 1}).json()
         rest = client.get(f"{BASE}/diagnoses", params={"limit": 1, "cursor": pages["next"]}).json()
-        assert [page["items"][0]["diagnosis_id"] for page in (pages, rest)] == [
-            other.json()["diagnosis_id"],
-            first.json()["diagnosis_id"],
-        ]
+        ids = [answer.json()["diagnosis_id"] for answer in (first, other)]
+        assert [page["items"][0]["diagnosis_id"] for page in (rest, pages)] == ids
         assert rest["next"] is None
-        deadline = time.monotonic() + 60
-        while not (tmp_path / "pid").exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        until((tmp_path / "pid").exists)
         process = int((tmp_path / "pid").read_text())
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)
     monkeypatch.delenv("STAND_IN_PID")
     with service(tmp_path) as client:
-        assert [ended(client, each.json()["diagnosis_id"])["status"] for each in (first, other)] == ["finished"] * 2
+        assert [ended(client, each)["status"] for each in ids] == ["finished"] * 2
         found = client.get("/v1/jobs").json()["items"]
         assert [(each["state"], each["attempts"]) for each in found] == [("finished", 1)] * 2
 
 
 def ended(client: TestClient, diagnosis_id: str) -> dict[str, Any]:
     """The diagnosis once it has ended."""
-    deadline = time.monotonic() + 60
-    while True:
-        found: dict[str, Any] = client.get(f"{BASE}/diagnoses/{diagnosis_id}").json()
-        if found["status"] != "running":
-            return found
-        assert time.monotonic() < deadline, "it has not ended"
-        time.sleep(0.05)
+
+    def found() -> dict[str, Any] | None:
+        answer: dict[str, Any] = client.get(f"{BASE}/diagnoses/{diagnosis_id}").json()
+        return answer if answer["status"] != "running" else None
+
+    return until(found)
 
 
 def left_running(folder: Path, *, attempts: int) -> None:
@@ -362,12 +371,12 @@ def left_running(folder: Path, *, attempts: int) -> None:
         )
 
 
-def test_what_a_dead_service_left_running_is_made_by_the_next(tmp_path: Path) -> None:
+def test_what_a_dead_service_left_running_is_made_by_the_next_and_given_up_at_last(tmp_path: Path) -> None:
     """And of a clutch without a test there is nothing to adopt."""
     with service(tmp_path) as client:
         report = diagnosed(client, adopt=True)
         assert (report["verdict"], report["adopted"], report["as_of_cycles"]) == ("model_adequate", False, None)
-        refused = client.put(f"{BASE}/model", json={"diagnosis_id": report["diagnosis_id"]})
+        refused = adopt(client, report["diagnosis_id"])
         assert (refused.status_code, refused.headers["Content-Type"]) == (409, "application/problem+json")
         assert refused.json()["title"] == "There is nothing to adopt"
         assert client.get(f"{BASE}/model").json()["versions"] == []
@@ -376,12 +385,6 @@ def test_what_a_dead_service_left_running_is_made_by_the_next(tmp_path: Path) ->
         again = ended(client, report["diagnosis_id"])
         assert again | {"finished_at": ""} == report | {"finished_at": ""}
         assert client.get(f"/v1/jobs/{report['diagnosis_id']}").json()["attempts"] == 2
-
-
-@pytest.mark.slow
-def test_what_ends_the_service_again_and_again_is_given_up(tmp_path: Path) -> None:
-    with service(tmp_path) as client:
-        report = diagnosed(client)
     left_running(tmp_path, attempts=MAX_ATTEMPTS)
     with service(tmp_path) as client:
         found = ended(client, report["diagnosis_id"])
@@ -393,8 +396,7 @@ def test_what_ends_the_service_again_and_again_is_given_up(tmp_path: Path) -> No
 def test_who_joins_a_diagnosis_that_runs_has_it_adopted(tmp_path: Path) -> None:
     with service(tmp_path, "slow") as client:
         post_tests(client, 0, 1000, 2000)
-        first = client.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=0"})
-        joined = client.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": "wait=120"})
+        first, joined = asked(client), asked(client, 120, adopt=True)
         assert joined.json()["diagnosis_id"] == first.json()["diagnosis_id"]
         assert (joined.status_code, joined.json()["adopted"]) == (201, True)
         assert client.get(f"{BASE}/model").json()["version"] == 1
@@ -425,21 +427,14 @@ def test_a_job_is_shown_and_cancelled(tmp_path: Path, monkeypatch: pytest.Monkey
         ids = []
         for cycles in (0, 1000):
             post_tests(client, cycles)
-            answer = client.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=0"})
-            ids.append(answer.json()["diagnosis_id"])
-        deadline = time.monotonic() + 60
-        while client.get(f"/v1/jobs/{ids[0]}").json()["progress"] != {"step": "diagnoses"}:
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        while not (tmp_path / "pid").exists():
-            time.sleep(0.05)
+            ids.append(asked(client).json()["diagnosis_id"])
+        until(lambda: client.get(f"/v1/jobs/{ids[0]}").json()["progress"] == {"step": "diagnoses"})
+        until((tmp_path / "pid").exists)
         process = int((tmp_path / "pid").read_text())
         listed = client.get("/v1/jobs").json()
         JobPage.model_validate(listed)
-        assert [(each["job_id"], each["state"]) for each in listed["items"]] == [
-            (ids[1], "waiting"),
-            (ids[0], "running"),
-        ]
+        shown = [(each["job_id"], each["state"]) for each in listed["items"]]
+        assert shown == [(ids[1], "waiting"), (ids[0], "running")]
         assert [each["job_id"] for each in client.get("/v1/jobs?state=waiting").json()["items"]] == [ids[1]]
         page = client.get("/v1/jobs?limit=1").json()
         assert client.get("/v1/jobs", params={"cursor": page["next"]}).json()["items"] == listed["items"][1:]
@@ -449,9 +444,7 @@ def test_a_job_is_shown_and_cancelled(tmp_path: Path, monkeypatch: pytest.Monkey
             assert cancelled.json()["problem"] == "cancelled by local"
             found = ended(client, job_id)
             assert (found["status"], found["problem"]) == ("failed", "cancelled by local")
-        while Path(f"/proc/{process}").exists():
-            assert time.monotonic() < deadline, "its process goes on"
-            time.sleep(0.05)
+        until(lambda: not Path(f"/proc/{process}").exists())
         assert client.delete(f"/v1/jobs/{ids[0]}").json() == client.get(f"/v1/jobs/{ids[0]}").json()
         for method in ("GET", "DELETE"):
             assert client.request(method, "/v1/jobs/nothing").status_code == 404
