@@ -58,19 +58,16 @@ def test_commands_that_read_leave_an_older_file_as_it_is(tmp_path: Path) -> None
     assert (revision(path), kept) == ("s9000_later", ["old.db-before-s9000_later"])
 
 
-def test_verify_is_clean_on_what_a_service_stored(path: Path) -> None:
+def test_verify_is_clean_on_what_a_service_stored_and_names_a_damaged_page(path: Path) -> None:
     url = ("--database", f"sqlite:///{path}")
     said = clutchlife("verify", *url)
     assert "3 runs of 3 clutches were checked, 3 of the clutches computed again: 0 findings" in said
     assert "3 clutches were checked, 1 of the clutches computed again" in clutchlife("verify", "--sample", "1", *url)
     assert clutchlife("key", "list", *url).strip() == "no key exists"
-
-
-def test_verify_names_a_damaged_page(path: Path) -> None:
     whole = path.read_bytes()
     page = len(whole) // 2 // 4096 * 4096
     path.write_bytes(whole[:page] + b"\xff" * 4096 + whole[page + 4096 :])
-    assert "damaged" in clutchlife("verify", "--database", f"sqlite:///{path}", code=1)
+    assert "damaged" in clutchlife("verify", *url, code=1)
 
 
 def test_what_needs_a_file_names_what_does_it_on_a_server(tmp_path: Path) -> None:

@@ -51,31 +51,23 @@ def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
     assert report["maps"]["axes"]["cycles"] == [500.0, 1500.0, 2500.0]
 
 
-def test_the_maps_can_be_read_without_colours(report: dict[str, Any]) -> None:
+def test_the_maps_can_be_read_without_colours_and_a_report_without_them(report: dict[str, Any]) -> None:
     lines = [line for line in printed(report).splitlines() if line.startswith("    5 ")]
     # residuals 3, 4, 5 of at most 5 before, a tenth of it after
     assert lines[0].split() == ["5", "++####", "5", "·", "·", "·"]
     assert "\x1b[" not in printed(report)
     assert "\x1b[30;48;5;160m##" in printed(report, colours=True)
-
-
-def test_a_report_that_says_little_is_shown(report: dict[str, Any]) -> None:
-    little = empty() | {"verdict": "insufficient_data", "summary": "Two tests."} | STATE | {"adopted": False}
-    assert "Too little data" in printed(little)
     report["maps"]["before"] = {"speed_pressure": [[None] * 3] * 2, "pressure_cycles": [[0.0] * 2] * 3}
     assert "·" in printed(report)
+    little = empty() | {"verdict": "insufficient_data", "summary": "Two tests."} | STATE | {"adopted": False}
+    assert "Too little data" in printed(little)
 
 
 def test_what_could_be_told_apart_is_shown_where_it_was_asked_for(report: dict[str, Any]) -> None:
-    pair = {
-        "effects": ["hydrodynamic_drag", "torque_zero_shift"],
-        "probability": 0.78,
-        "apart": False,
-        "with_test": 0.98,
-    }
-    pair |= {"key": "open_sweep", "test": "stationary test with the clutch open"}
-    sure = {"effects": ["oil_change", "running_in"], "probability": 0.98, "apart": True, "with_test": 0.98}
-    pairs = [pair, sure | {"key": None, "test": None}]
+    drag = {"effects": ["hydrodynamic_drag", "torque_zero_shift"], "probability": 0.78, "apart": False}
+    sure = {"effects": ["oil_change", "running_in"], "probability": 0.98, "apart": True, "key": None, "test": None}
+    sweep = {"key": "open_sweep", "test": "stationary test with the clutch open"}
+    pairs = [each | {"with_test": 0.98} for each in (drag | sweep, sure)]
     assert "better by this test" not in printed(report)
     text = printed(report | {"isolability": {"pairs": pairs, "unseen": ["channel_delay"]}})
     row = next(line for line in text.splitlines() if "hydrodynamic drag and torque zero shift" in line)

@@ -6,28 +6,37 @@ import json
 import zipfile
 from collections.abc import Callable
 from contextlib import nullcontext
+from importlib.metadata import version
 from pathlib import Path
 from time import gmtime
 
 import pytest
+import typer
 from fastapi.testclient import TestClient
 from python_calamine import CalamineWorkbook
+from rich.table import Table
 
 from service.cli import answers, options
+from service.cli.clutches import _row
 from service.cli.export import TABLES
-from service.cli.options import EX_DATAERR
+from service.cli.options import EX_DATAERR, fail, out, print_line
+from service.cli.sending import push
 from service.cli.workbook import write_workbook
+from service.client.clutchlife import Client
 from tests.service.clients import clutchlife, post_run
 from tests.service.web.routes.surfaces import png, sha256
 from tests.service.web.test_import_preview import german
-from tests.support import stationary
+from tests.support import free_port, stationary
 
 Terminal = Callable[..., str]
 
 
 @pytest.fixture
 def terminal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> Terminal:
-    monkeypatch.setattr(options, "connect", lambda *_, **__: nullcontext(client))
+    for module in (options, push):
+        monkeypatch.setattr(module, "connect", lambda *_, **__: nullcontext(client))
+    monkeypatch.setattr("service.client.clutchlife.client.connect", lambda *_, **__: client)
+    monkeypatch.setattr(Client, "close", lambda _: None)
     return clutchlife
 
 
@@ -163,11 +172,13 @@ def test_a_pushed_file_is_the_same_run_when_imported(terminal: Terminal, client:
     assert len(client.get("/v1/clutches/c1/runs").json()["items"]) == 1
 
 
-def test_what_is_not_sent_leaves_no_profile(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
+def test_what_is_not_sent_or_not_known_leaves_nothing(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     file = tmp_path / "Stat_7000.csv"
     file.write_bytes(german(7000))
     shown = terminal("import", file, "--clutch", "c1", "--save", "bench-3", answers="1\n1\n7000\nn\n")
     assert "rig profile" not in shown
+    shown = terminal("import", file, "--clutch", "c1", "--yes", "--cycles", "7000", code=EX_DATAERR)
+    assert "still missing: torque_nm, kind" in shown
     assert client.get("/v1/rigs").json()["items"] == client.get("/v1/clutches/c1/runs").json()["items"] == []
 
 
@@ -187,14 +198,6 @@ def test_options_say_what_no_title_does_and_are_kept(terminal: Terminal, client:
     assert "invalid_samples" in [warning["code"] for warning in run["warnings"]]
     saved = client.get("/v1/rigs/odd").json()
     assert (saved["decimal"], saved["missing"], saved["columns"][1]["unit"]) == (",", "-9999", "1/min")
-
-
-def test_what_is_missing_ends_an_import_with_yes(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
-    file = tmp_path / "Stat_7000.csv"
-    file.write_bytes(german(7000))
-    shown = terminal("import", file, "--clutch", "c1", "--yes", "--cycles", "7000", code=EX_DATAERR)
-    assert "still missing: torque_nm, kind" in shown
-    assert client.get("/v1/clutches/c1/runs").json()["items"] == []
 
 
 def test_a_run_read_by_a_wrong_factor_is_read_again(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
@@ -245,38 +248,22 @@ def test_an_inspection_withdrawn_and_sent_again_stays_withdrawn(terminal: Termin
     assert client.get(address).json()["state"] == "withdrawn"
 
 
-def test_a_photograph_alone_is_an_inspection_too(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
-    assert "c1 has no inspections" in terminal("inspections", "c1")
-    (tmp_path / "a.png").write_bytes(png())
-    terminal("inspect", "c1", "--cycles", 0, "--photo", tmp_path / "a.png")
-    (stored,) = client.get(LIST).json()["items"]
-    assert (stored["note"], len(stored["photographs"])) == ("photographs", 1)
-
-
-def test_what_is_no_photograph_is_refused_unsent(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
+def test_what_is_no_photograph_is_refused_unsent(terminal: Terminal, tmp_path: Path) -> None:
     (tmp_path / "a.gif").write_bytes(b"GIF89a")
     inspect = ("inspect", "c1", "--cycles", 0, "--ra", 9.5, "--photo")
     assert "the name of a photograph must end in .png" in terminal(*inspect, tmp_path / "a.gif", code=64)
     assert "does not exist" in terminal(*inspect, tmp_path / "b.png", code=64)
     assert "give roughness_um" in terminal("inspect", "c1", "--cycles", 0, code=65)
-    assert client.get(LIST).json()["items"] == []
+    assert "c1 has no inspections" in terminal("inspections", "c1")
 
 
-def test_an_export_holds_inspections_and_photographs(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
-    (tmp_path / "a.png").write_bytes(png())
-    for cycles in (0, 1000):
-        terminal("inspect", "c1", "--cycles", cycles, "--ra", 9.5, "--photo", tmp_path / "a.png")
-    post_run(client, stationary(0))
-    terminal("export", "c1", "--out", tmp_path / "export")
-    results = tmp_path / "export" / "results"
-    assert json.loads((results / "inspections.json").read_text()) == client.get(LIST).json()["items"]
-    (file,) = (results / "photographs").iterdir()
-    assert (file.name, file.read_bytes()) == (f"{sha256(png())}.png", png())
-
-
-def test_an_export_holds_what_counts_and_beside_it_what_was_sent(
+def test_an_export_holds_what_counts_what_was_sent_inspections_and_photographs(
     terminal: Terminal, client: TestClient, tmp_path: Path
 ) -> None:
+    """The same photograph twice; the later inspection is of that alone."""
+    (tmp_path / "a.png").write_bytes(png())
+    terminal("inspect", "c1", "--cycles", 0, "--ra", 9.5, "--photo", tmp_path / "a.png")
+    terminal("inspect", "c1", "--cycles", 1000, "--photo", tmp_path / "a.png")
     for cycles, name in ((0, "right"), (1001, "typo"), (2000, "slip")):
         post_run(client, stationary(cycles, run_id=name, pressures=(5.0,)))
     client.patch("/v1/clutches/c1/runs/typo", json={"cycles": 1000, "reason": "a typing error"})
@@ -288,6 +275,12 @@ def test_an_export_holds_what_counts_and_beside_it_what_was_sent(
     )
     assert counting == {"right.json": 0, "typo.json": 1000}
     assert sent == {"typo.json": 1001, "slip.json": 2000}
+    results = tmp_path / "export" / "results"
+    inspections = client.get(LIST).json()["items"]
+    assert json.loads((results / "inspections.json").read_text()) == inspections
+    assert {each["note"] for each in inspections} == {"", "photographs"}
+    (file,) = (results / "photographs").iterdir()
+    assert (file.name, file.read_bytes()) == (f"{sha256(png())}.png", png())
 
 
 # --- An export says what it is of, has every table as spreadsheets take it, and may be one archive.
@@ -335,3 +328,92 @@ def test_the_same_tables_are_the_same_workbook_at_any_time(tmp_path: Path, monke
         write_workbook(tmp_path / "a.xlsx", {"x": [["cycles", "mean_cof"], ["1000", ".13"]]})
         written.append((tmp_path / "a.xlsx").read_bytes())
     assert written[0] == written[1]
+
+
+# --- A working day: register, list, status, watch, alarms; what a mistyped name leaves behind.
+
+
+@pytest.fixture
+def day(terminal: Terminal, client: TestClient) -> Terminal:
+    """The terminal, whose service has a clutch that is fine, one that is worn, and `c1` without a run."""
+    for name, end in (("worn", 4000), ("fine", 1e6)):
+        client.post("/v1/clutches", json={"clutch_id": name})
+        for cycles in (0.0, 1000.0, 2000.0, 3000.0):
+            post_run(client, stationary(cycles, wear=cycles / end), name)
+    return terminal
+
+
+def test_status_ends_as_monitoring_plugins_do(day: Terminal) -> None:
+    states = (
+        ("fine", 0, "Normal"),
+        ("c1", 1, "Function check"),
+        ("worn", 2, "Failure"),
+        ("nobody", 3, "register nobody"),
+    )
+    for clutch, code, words in states:
+        assert words in day("status", clutch, code=code)
+    assert day("watch", "fine", "--looks", "3", "--every", "0.1").count("fine: Normal") == 1
+
+
+def test_a_wrong_call_is_one_plain_line_and_status_then_unknown() -> None:
+    away = f"http://127.0.0.1:{free_port()}"
+    assert "unknown" in clutchlife("status", "fine", "--url", away, "--patience", "0", code=3)
+    for wrong in (("status",), ("status", "fine", "--bogus"), ("status", "fine", "--url", "nonsense")):
+        assert len(clutchlife(*wrong, code=3).strip().splitlines()) == 1, wrong
+    for wrong in (("life",), ("bogus",), ("key", "create"), ("list", "--bogus")):
+        (line,) = clutchlife(*wrong, code=64).strip().splitlines()
+        assert "--help" in line
+    assert clutchlife("--version").strip() == f"clutchlife {version('clutchlife')}"
+
+
+def test_clutches_are_registered_and_listed(day: Terminal, client: TestClient, tmp_path: Path) -> None:
+    record = tmp_path / "record.json"
+    record.write_text(json.dumps({"fluid": "other"}), encoding="utf-8")
+    assert "is registered" in day("register", "new", "--record", record, "--set", "geometry.friction_faces=4")
+    made, listed = client.get("/v1/clutches/new").json(), client.get("/v1/clutches").json()["items"]
+    assert (made["fluid"], made["geometry"]["friction_faces"]) == ("other", 4)
+    assert json.loads(day("list", "--json")) == listed
+    assert "failure" in day("list")
+    assert "409" in day("register", "new", code=65)
+
+
+def test_alarms_are_listed_and_acknowledged(day: Terminal, client: TestClient) -> None:
+    assert "no alarm" in day("alarms", "--clutch", "worn")
+    client.post("/v1/alarms", json={"clutch_id": "worn", "quantity": "state"})
+    (event,) = json.loads(day("alarms", "--json"))
+    assert "worn: failure" in day("alarms")
+    assert "acknowledged" in day("alarms", "--acknowledge", event["event_id"], "--note", "seen")
+    assert "state" in day("alarms", "--rules")
+
+
+def test_a_push_to_a_mistyped_clutch_leaves_nothing_in_the_spool(terminal: Terminal, tmp_path: Path) -> None:
+    run, spool = tmp_path / "run.json", tmp_path / "spool"
+    run.write_text(json.dumps(stationary(4000.0)), encoding="utf-8")
+    (tmp_path / "clutch.json").write_text(json.dumps({"clutch_id": "fine"}), encoding="utf-8")
+    for pushed in (run, tmp_path):
+        assert "clutchlife register fien" in terminal("push", pushed, "--clutch", "fien", "--spool", spool, code=65)
+    assert not list(spool.rglob("*.body"))
+
+
+def test_a_list_states_cycles_whole_and_no_remaining_life_after_an_end() -> None:
+    left = {"at_least": 2.9, "status": "predicted", "ended": None, "remaining_cycles": {"0.5": 4.2}}
+    summary = {"as_of_cycles": 1e7} | left
+    item = {"clutch_id": "c", "held": 0, "summary": summary, "state": {"name": "normal"}}
+    assert _row(item) == ["c", "normal", "10,000,000", "2", "4", ""]
+    over = {"at_least": None, "status": "ended", "ended": {"cycles": 1e7}, "remaining_cycles": {"0.5": None}}
+    assert _row(item | {"summary": summary | over}) == ["c", "ended, normal", "10,000,000", "-", "-", ""]
+    assert _row(item | {"summary": summary | over | {"ended": None}})[1] == "normal"
+
+
+def test_no_note_or_name_commands_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    """The title of a window, colours, a line written over: by a line, a table, an error."""
+    evil = "a\x1b]0;b\x07\x1b[2Jc\x9bd\u202e"
+    table = Table("note")
+    table.add_row(evil)
+    print_line(evil)
+    out.print(table)
+    with pytest.raises(typer.Exit):
+        fail(evil)
+    printed = "".join(capsys.readouterr())
+    assert printed.count("a\ufffd]0;b") == 3
+    assert all(sign.isprintable() or sign == "\n" for sign in printed)

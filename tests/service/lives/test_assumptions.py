@@ -13,6 +13,7 @@ from service.lives.assumptions import Assumptions
 from service.lives.criteria import SEVERITY_EXPONENTS
 from service.lives.history import Event, Life
 from service.lives.severity_estimate import severity_estimate
+from service.schemas.base import MAX_TORQUE_FILTER_MS
 from tests.service.clients import client_on, post_run
 from tests.service.queries.test_scores import mean_torque
 from tests.service.workflows.test_learn_fleet import SPEEDS
@@ -100,15 +101,25 @@ def test_a_step_after_an_oil_change_does_not_look_like_wear(client: TestClient) 
 
 
 @pytest.mark.parametrize(
-    "severity", [{"basis": "time"}, {"basis": "cycles", "exponent": -1}, {"exponent": 11}, {"unit": 1}]
+    "record",
+    [
+        *({"severity": wrong} for wrong in ({"basis": "time"}, {"exponent": -1}, {"exponent": 11}, {"unit": 1})),
+        *({"torque_filter_ms": wrong} for wrong in (-1, MAX_TORQUE_FILTER_MS + 1, "20", True)),
+    ],
 )
-def test_a_severity_that_is_none_is_refused(client: TestClient, severity: dict[str, object]) -> None:
-    answer = client.post("/v1/clutches", json={"clutch_id": "wrong", "severity": severity})
+def test_a_severity_or_a_filter_that_is_none_is_refused(client: TestClient, record: dict[str, object]) -> None:
+    answer = client.post("/v1/clutches", json={"clutch_id": "wrong"} | record)
     assert answer.status_code == 422
-    assert answer.json()["errors"][0]["pointer"].startswith("/severity")
+    assert answer.json()["errors"][0]["pointer"].startswith(f"/{next(iter(record))}")
 
 
 def test_rebuilt_mean_cof_agrees_with_its_direct_track(client: TestClient) -> None:
+    before = said(client, "c1")  # the first test
+    assert before["model"] == {"name": "baseline", "effects": []}
+    assert before["prior"] == {"name": "weak", "version": None, "clutches": 0}
+    assert before["warnings"] == []
+    assert client.get("/v1/clutches/c1/surfaces").status_code == 404
+    assert client.get("/v1/clutches/c1/degradation").json()["rebuilt"] is None
     for i in range(8):
         post_run(client, stationary(1000 * i, pressures=(4.0, 5.0, 6.0)))
     found = client.get("/v1/clutches/c1/degradation").json()
@@ -132,15 +143,6 @@ def test_rebuilt_mean_cof_agrees_with_its_direct_track(client: TestClient) -> No
     assert all(last[j][k] < first[j][k] for j in range(13) for k in range(20))
     assert surfaces["torque_nm"][0][12][10] > 1.3 * surfaces["torque_nm"][0][0][10]
     assert len(client.get("/v1/clutches/c1/surfaces.csv").text.splitlines()) == 1 + 15 * 13 * 20
-
-
-def test_answers_before_the_first_test_name_model_and_prior(client: TestClient) -> None:
-    found = said(client, "c1")
-    assert found["model"] == {"name": "baseline", "effects": []}
-    assert found["prior"] == {"name": "weak", "version": None, "clutches": 0}
-    assert found["warnings"] == []
-    assert client.get("/v1/clutches/c1/surfaces").status_code == 404
-    assert client.get("/v1/clutches/c1/degradation").json()["rebuilt"] is None
 
 
 # --- The exponent of severity that the tests of one life speak for, where the energy of its duty steps.

@@ -1,7 +1,6 @@
 """What a filter is given to work with, what its draws depend on, and what is said of a quantity that is tracked."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,7 +32,7 @@ from tests.models.prognosis.test_course_shares import accelerating
 from tests.models.tracking.tracked_series import CAMPAIGN
 from tests.plausibility.bench import Bench
 from tests.score.paper import PLACE, measured_life
-from tests.service.clients import client_on, post_run
+from tests.service.clients import post_run
 from tests.support import stationary
 
 LIFE = "/v1/clutches/{}/remaining-useful-life"
@@ -57,19 +56,6 @@ def test_two_priors_share_particles_and_draws(method: str) -> None:
         sizes[name] = {key: cloud.log_weight.size for key, cloud in clouds.items()}
     if method == "particle":
         assert sizes["taught"] == dict.fromkeys((WEAK, FLEET), sizes["alone"][WEAK] // 2)
-
-
-def test_the_same_runs_under_another_clutch_name_give_the_same_remaining_life(tmp_path: Path) -> None:
-    with client_on(f"sqlite:///{tmp_path / 'named.db'}") as client:
-        said = []
-        for name in ("press-4", "another"):
-            assert client.post("/v1/clutches", json={"clutch_id": name}).status_code == 201
-            for cycles in range(0, 4_001, 1_000):
-                post_run(client, stationary(cycles, run_id=f"{cycles}", pressures=(5.0,)), name)
-            said.append([client.get(LIFE.format(name), params={"method": method}).json() for method in METHODS])
-    for one, other in zip(*said, strict=True):
-        assert one["remaining_cycles"] == other["remaining_cycles"]
-        assert one["current"] == other["current"]
 
 
 # --- A life under an adopted model is tracked under each of its draws, and what is predicted is their mixture.
@@ -152,9 +138,7 @@ def test_a_test_is_odd_only_where_it_is_under_every_draw() -> None:
     assert warned == [False, False, True]
 
 
-def test_a_clutch_whose_counter_began_elsewhere_is_predicted_and_told_where(
-    client: TestClient,
-) -> None:
+def test_a_clutch_whose_counter_began_elsewhere_is_predicted_and_told_where(client: TestClient) -> None:
     for share in range(8):
         post_run(client, stationary(50_000.0 + 1_000.0 * share, wear=0.08 * share))
     before = client.get(LIFE.format("c1")).json()

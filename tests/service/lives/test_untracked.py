@@ -15,6 +15,7 @@ from service.lives.history import Event, Life
 from service.lives.model_correction import corrected_cofs
 from service.workflows.replay import replay_clutch
 from storage.engine.opening import open_database
+from tests.plausibility.bench import with_gain
 from tests.service.clients import client_on, post_run
 from tests.service.lives.diagnosis.test_campaign import campaign, idle_record, post
 from tests.service.run_files.test_upload import dynamic_record
@@ -85,6 +86,13 @@ def test_an_open_sweep_is_taken_in_and_said_to_be_one(client: TestClient, databa
     assert client.get(f"{RUNS}/open").json()["channels"] == sweep(0, "open")["channels"]
     (run,) = campaign(database_url).campaign.stationary
     assert run.plateaus.torque.size == 25
+    post(client, stationary(0, run_id="s0"))
+    known = campaign(database_url)
+    shifted = SimpleNamespace(weights=np.ones(1), artefact=lambda run, _: np.ones((1, run.plateaus.torque.size)))
+    found = corrected_cofs(shifted, known.record, known.life, known.runs, known.campaign.stationary)  # type: ignore[arg-type]
+    assert found.keys() == {"s0"}  # an adopted model corrects no open test
+    one = {"pressure_bar": [0.0], "speed_rpm": [500.0], "torque_nm": [-0.1], "torque_sd_nm": [0.01]}
+    post_run(client, sweep(0, "one", **one))
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01], ids=["exact", "noisy"])
@@ -97,11 +105,6 @@ def test_so_is_its_raw_record(client: TestClient, database_url: str, noise: floa
     assert run.plateaus.speed * 30 / np.pi == pytest.approx(SPEEDS, abs=1)
     assert run.plateaus.torque == pytest.approx(0.1 + 4e-4 * np.array(SPEEDS), abs=0.01)
     assert run.record is not None
-
-
-def test_a_single_plateau_and_a_deviation_do(client: TestClient) -> None:
-    one = {"pressure_bar": [0.0], "speed_rpm": [500.0], "torque_nm": [-0.1], "torque_sd_nm": [0.01]}
-    post_run(client, sweep(0, "one", **one))
 
 
 @pytest.mark.slow
@@ -173,25 +176,14 @@ def test_loops_are_told_against_the_state_s_test_with_load(client: TestClient) -
     assert before["items"][0]["attractor_nm_s"] is not None
 
 
-def test_an_adopted_model_corrects_no_open_test(client: TestClient, database_url: str) -> None:
-    post(client, stationary(0, run_id="s0"), sweep(0, "open"))
-    known = campaign(database_url)
-    assert known.life is not None
-    shifted = SimpleNamespace(weights=np.ones(1), artefact=lambda run, _: np.ones((1, run.plateaus.torque.size)))
-    found = corrected_cofs(shifted, known.record, known.life, known.runs, known.campaign.stationary)  # type: ignore[arg-type]
-    assert found.keys() == {"s0"}
-
-
 # --- A test whose oil is much colder than the first test's is said so, and no track follows it, whenever it arrives.
 
 
 def in_oil(cycles: float, oil_c: float | None, gain: float = 1.0) -> dict[str, Any]:
     """A stationary test with its oil at some temperature, and torque so many times what it would be."""
-    run = stationary(cycles, run_id=f"at-{cycles:g}", pressures=(5.0, 6.0))
-    channels = run["channels"]
-    channels["torque_nm"] = (gain * np.array(channels["torque_nm"])).tolist()
+    run = with_gain(stationary(cycles, run_id=f"at-{cycles:g}", pressures=(5.0, 6.0)), gain)
     if oil_c is not None:
-        channels["oil_temperature_c"] = [oil_c] * len(channels["torque_nm"])
+        run["channels"]["oil_temperature_c"] = [oil_c] * len(run["channels"]["torque_nm"])
     return run
 
 
@@ -208,6 +200,7 @@ COLD = in_oil(2500.0, 40.0, gain=1.08)
 
 
 def test_a_test_in_cold_oil_is_said_so_and_not_tracked(client: TestClient) -> None:
+    """What keeps it out is its oil: tests in usual oil count, and so does one without a measured temperature."""
     for run in USUAL:
         assert post_run(client, run)["warnings"] == []
     before = remaining(client)
@@ -223,11 +216,7 @@ def test_a_test_in_cold_oil_is_said_so_and_not_tracked(client: TestClient) -> No
         assert after[part] == before[part]
     parameters = client.get(f"{CLUTCH}/degradation").json()["items"]
     assert {len(item["measured"]["cycles"]) for item in parameters} == {4}
-
-
-def test_the_same_torque_in_usual_oil_is_tracked(client: TestClient) -> None:
-    """The control: what keeps the cold test out is its oil; one without a measured temperature counts too."""
-    for run in [*USUAL, in_oil(4000.0, 90.0), in_oil(5000.0, None)]:
+    for run in (in_oil(4000.0, 90.0), in_oil(5000.0, None)):
         assert "other_oil_temperature" not in [warning["code"] for warning in post_run(client, run)["warnings"]]
     assert remaining(client)["runs_used"] == 6
 

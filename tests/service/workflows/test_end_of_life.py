@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from service.errors import LifeEndedError
-from service.lives.history import Event, require_within_ends
 from service.workflows.learn_fleet import refresh
 from storage.engine.opening import open_database
 from tests.real import loaders
@@ -39,7 +37,7 @@ def laid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("tested") / "a.db"
     with client_of(path) as client:
         for cycles in (0, 1000, 2000, 3000):
-            post(client, stationary(cycles, run_id=f"test-{cycles}", **FEW))  # type: ignore[arg-type]
+            post(client, stationary(cycles, run_id=f"test-{cycles}", **FEW))
     return path
 
 
@@ -71,6 +69,10 @@ def test_a_worn_clutch_reads_ended_and_nothing_remains(tested: TestClient, metho
     assert (listed["summary"]["status"], listed["summary"]["ended"]["cycles"]) == ("ended", 3000)
     assert listed["state"] == {"name": "failure", "why": "ended at 3,000 cycles"}
     assert life(tested, method=method, at_cycles=2000)["ended"] is None
+    assert life(tested, quantity="static_torque_nm", method=method)["status"] == "ended"
+    plan = {"programme": [{"cycles": 100, "energy_per_cycle_kj": 10}]}
+    planned = tested.post(f"{LIFE}/forecast", json=plan, params={"method": method}).json()
+    assert (planned["status"], set(planned["remaining_cycles"].values())) == ("ended", {0})
 
 
 def test_a_clutch_that_was_taken_out_is_no_failure_and_its_end_lies_ahead(tested: TestClient) -> None:
@@ -84,28 +86,24 @@ def test_a_clutch_that_was_taken_out_is_no_failure_and_its_end_lies_ahead(tested
     assert listed["state"] == {"name": "normal", "why": "ended at 3,000 cycles, taken out before it was worn"}
 
 
-def test_by_any_quantity_and_under_planned_duty_it_has_ended_too(tested: TestClient) -> None:
-    post(tested, END)
-    assert life(tested, quantity="static_torque_nm")["status"] == "ended"
-    plan = {"programme": [{"cycles": 100, "energy_per_cycle_kj": 10}]}
-    planned = tested.post(f"{LIFE}/forecast", json=plan).json()
-    assert (planned["status"], set(planned["remaining_cycles"].values())) == ("ended", {0})
-
-
 def test_nothing_later_is_taken_in_until_a_rebuild_and_what_is_earlier_still_is(tested: TestClient) -> None:
+    assert "'test-3000' at 3000 cycles" in post(tested, END | {"cycles": 2500}, 409)["detail"]
+    assert life(tested)["ended"] is None
     end = post(tested, END)
-    late = stationary(4000, run_id="late", **FEW)  # type: ignore[arg-type]
+    late = stationary(4000, run_id="late", **FEW)
     duty = {"kind": "duty_cycles", "cycles": 4000, "duty": {"cycles": 1000}}
     for body in (late, duty, END | {"cycles": 2500}, END | {"reason": "other"}):
         problem = post(tested, body, 409)
         assert problem["type"].endswith("life-ended")
         declared = 2500 if body.get("cycles") == 2500 else 3000
         assert f"declared end at {declared} cycles" in problem["detail"]
-        if declared == 3000:
-            assert end["run_id"] in problem["detail"]
-    assert post(tested, END, 200)["duplicate"]
+        assert (end["run_id"] in problem["detail"]) is (declared == 3000)
+        assert ("a second end" in problem["detail"]) is (body["cycles"] == 3000)
+    for same in (END, END | {"reason": "worn"}):
+        again = post(tested, same, 200)
+        assert (again["duplicate"], again["run_id"]) == (True, end["run_id"])
     assert tested.patch(f"{RUNS}/test-3000", json={"cycles": 3500, "reason": "typo"}).status_code == 409
-    assert post(tested, stationary(1500, run_id="early", **FEW))["state"] == "accepted"  # type: ignore[arg-type]
+    assert post(tested, stationary(1500, run_id="early", **FEW))["state"] == "accepted"
     assert life(tested)["status"] == "ended"
     post(tested, {"kind": "maintenance", "event": "other", "cycles": 4000})
     assert life(tested)["status"] == "ended"
@@ -117,19 +115,13 @@ def test_nothing_later_is_taken_in_until_a_rebuild_and_what_is_earlier_still_is(
     assert "late" in problem["detail"]
 
 
-def test_an_end_before_runs_that_count_is_refused(tested: TestClient) -> None:
-    problem = post(tested, END | {"cycles": 2500}, 409)
-    assert "'test-3000' at 3000 cycles" in problem["detail"]
-    assert life(tested)["ended"] is None
-
-
 def test_a_declared_end_is_taken_back_and_all_is_as_it_was(tested: TestClient) -> None:
     before = life(tested)
     end = post(tested, END)
     post(tested, {"reason": "the wrong clutch"}, 200, f"{RUNS}/{end['run_id']}/withdraw")
     after = life(tested)
     assert {**after, "revision": 0} == {**before, "revision": 0}
-    later = post(tested, stationary(4000, run_id="later", **FEW))  # type: ignore[arg-type]
+    later = post(tested, stationary(4000, run_id="later", **FEW))
     assert later["state"] == "accepted"
     assert post(tested, {"reason": "ended after all"}, 409, f"{RUNS}/{end['run_id']}/restore")
 
@@ -140,10 +132,6 @@ def test_a_reason_goes_with_an_end_alone(client: TestClient) -> None:
     assert post(client, END | {"reason": "broken"}, 422)["errors"][0]["pointer"] == "/reason"
 
 
-def test_a_worn_end_is_the_same_whether_its_reason_is_said(tested: TestClient) -> None:
-    assert post(tested, END)["run_id"] == post(tested, END | {"reason": "worn"}, 200)["run_id"]
-
-
 @pytest.mark.slow
 def test_declared_ends_teach_the_fleet_by_themselves(client: TestClient, database_url: str) -> None:
     """Stopped at 95 % of the way to the threshold; four ends and one clutch that was taken out."""
@@ -152,7 +140,7 @@ def test_declared_ends_teach_the_fleet_by_themselves(client: TestClient, databas
         post(client, {"clutch_id": f"w{number}"}, path="/v1/clutches")
         end = 4000 + 200 * number
         for part in range(6):
-            body = stationary(end * part / 5, run_id=f"t{part}", wear=0.095 * part, noise=0.001, **FEW)  # type: ignore[arg-type]
+            body = stationary(end * part / 5, run_id=f"t{part}", wear=0.095 * part, noise=0.001, **FEW)
             assert post(client, body, path=f"{path}/runs")["state"] == "accepted"
         stopped = END | {"cycles": end, "reason": "other" if number == 4 else "worn"}
         assert post(client, stopped, path=f"{path}/runs")["state"] == "accepted"
@@ -173,13 +161,6 @@ def test_declared_ends_teach_the_fleet_by_themselves(client: TestClient, databas
 def _declared(client: TestClient, clutch_id: str) -> str:
     """The run that declares the end of a clutch."""
     return str(client.get(f"/v1/clutches/{clutch_id}").json()["summary"]["ended"]["run_id"])
-
-
-def test_a_life_has_one_end() -> None:
-    events = [Event(run_id=str(n), kind="maintenance", cycles=n, moment=n, end="worn") for n in (1.0, 2.0)]
-    require_within_ends(events[:1])
-    with pytest.raises(LifeEndedError, match="a second end"):
-        require_within_ends(events)
 
 
 def _filters(feed: str) -> list[list[tuple[float, float]]]:
@@ -227,7 +208,7 @@ def _send(client: httpx2.Client, lives: list[list[tuple[float, float]]]) -> None
         path = f"/v1/clutches/filter-{number}"
         post(client, {"clutch_id": f"filter-{number}"}, path="/v1/clutches")
         for part, (seconds, share) in enumerate(tests[:6] if number == len(lives) - 1 else tests):
-            body = stationary(seconds, run_id=f"t{part}", wear=0.0, noise=0.002, **FEW)  # type: ignore[arg-type]
+            body = stationary(seconds, run_id=f"t{part}", wear=0.0, noise=0.002, **FEW)
             torque = [share * value for value in body["channels"]["torque_nm"]]
             post(client, body | {"channels": body["channels"] | {"torque_nm": torque}}, path=f"{path}/runs")
         assert client.get(f"{path}/runs?state=held").json()["items"] == []

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -30,7 +31,7 @@ from storage import jobs
 from storage.encoding import Json
 from storage.engine.database import Database
 from storage.engine.opening import open_database
-from tests.service.clients import client_on
+from tests.service.clients import client_on, post_run
 from tests.service.work.replaying import AT, stock
 from tests.support import stationary
 
@@ -42,16 +43,25 @@ def wear(cycles: float, scale: float) -> float:
     return float(0.9 * (1 - (1 + cycles / scale) ** -0.9))
 
 
-def post(client: TestClient, name: str, scale: float, last: int = 9000, step: int = 1000, **record: str) -> None:
-    """A clutch with a test every `step` cycles."""
-    assert client.post("/v1/clutches", json={"clutch_id": name, **record}).status_code in (200, 201)
-    for cycles in range(0, last + 1, step):
+def measured(run_id: str, cycles: float, share: float) -> dict[str, Any]:
+    return stationary(cycles, wear=share, speeds=SPEEDS, pressures=(5.0,), run_id=run_id)
+
+
+def post(client: TestClient, name: str, scale: float, last: int = 9000, **record: str) -> None:
+    """A clutch with a test every 1000 cycles."""
+    assert client.post("/v1/clutches", json={"clutch_id": name, **record}).status_code == 201
+    for cycles in range(0, last + 1, 1000):
         noise = 0.002 * math.sin(37.0 * cycles + scale)
-        body = stationary(
-            cycles, wear=wear(cycles, scale) + noise, speeds=SPEEDS, pressures=(5.0,), run_id=f"{name}-{cycles}"
-        )
-        answer = client.post(f"/v1/clutches/{name}/runs", json=body)
-        assert answer.status_code == 201, answer.text
+        post_run(client, measured(f"{name}-{cycles}", cycles, wear(cycles, scale) + noise), name)
+
+
+def post_fleet(client: TestClient, *scales: float, last: int = 6000) -> None:
+    for number, scale in enumerate(scales or (5000.0, 6000.0, 7000.0)):
+        post(client, f"old-{number}", scale, last=last)
+
+
+def life(client: TestClient, name: str, **query: Any) -> Any:
+    return client.get(LIFE.format(name), params=query).json()
 
 
 @pytest.fixture
@@ -65,25 +75,21 @@ def width(said: dict[str, dict[str, float | None]]) -> float:
 
 
 def refresh(url: str, advance: Callable[[], object] = lambda: None) -> learn_fleet.Refreshed:
-    database = open_database(url)
-    try:
+    with closing(open_database(url)) as database:
         return learn_fleet.refresh(database, now="2026-01-01T00:00:00+00:00", advance=advance)
-    finally:
-        database.close()
 
 
 def test_a_fleet_teaches_the_next_clutch_and_nobody_itself(url: str) -> None:
     with client_on(url) as client:
-        for number, scale in enumerate((5000.0, 6000.0, 7000.0, 6500.0)):
-            post(client, f"old-{number}", scale)
+        post_fleet(client, 5000.0, 6000.0, 7000.0, 6500.0, last=9000)
         post(client, "new", 6000.0, last=2000)
         post(client, "other", 6000.0, last=2000, friction_material="sinter")
-        before = {name: client.get(LIFE.format(name)).json() for name in ("new", "other", "old-0")}
+        before = {name: life(client, name) for name in ("new", "other", "old-0")}
         assert all(said["prior"] == {"name": "weak", "version": None, "clutches": 0} for said in before.values())
         done = refresh(url)
         assert [kind["friction_material"] for kind in done.kinds] == ["paper"]
         assert set(done.changed) == {"old-0", "old-1", "old-2", "old-3", "new"}
-        after = {name: client.get(LIFE.format(name)).json() for name in before}
+        after = {name: life(client, name) for name in before}
         assert after["new"]["prior"] == {"name": "fleet", "version": 1, "clutches": 4}
         assert after["old-0"]["prior"] == {"name": "fleet", "version": 1, "clutches": 3}
         assert after["other"] == before["other"]
@@ -113,13 +119,13 @@ def test_lives_that_ended_calibrate_the_next(url: str, monkeypatch: pytest.Monke
             energy = {"cycles": 750, "energy_per_cycle_kj": 20.0 * 9_000.0 / end}
             for cycles in range(0, last + 1, 750):
                 share = accelerating(cycles, end) + 0.002 * math.sin(37.0 * cycles + end)
-                body = stationary(cycles, wear=share, speeds=SPEEDS, pressures=(5.0,), run_id=f"{name}-{cycles}")
+                body = measured(f"{name}-{cycles}", cycles, share)
                 duty = {"kind": "duty_cycles", "cycles": cycles, "duty": energy, "run_id": f"{name}-d{cycles}"}
                 for run in (body, duty) if cycles else (body,):
                     assert client.post(f"/v1/clutches/{name}/runs", json=run).json()["state"] == "accepted"
-        before = client.get(LIFE.format("new")).json()
+        before = life(client, "new")
         refresh(url)
-        after = client.get(LIFE.format("new")).json()
+        after = life(client, "new")
         assert (before["ended_lives"], after["ended_lives"]) == (0, 4)
         low, middle, high = (after["end_of_life_cycles"][q] for q in ("0.05", "0.5", "0.95"))
         assert low < ends["new"] < high
@@ -128,8 +134,8 @@ def test_lives_that_ended_calibrate_the_next(url: str, monkeypatch: pytest.Monke
         assert 8_000.0 < middle < 9_800.0
         assert width(after) < 0.3 * width(before)
         # of the first no life is known to have ended that is as old as it
-        assert client.get(LIFE.format("old-0")).json()["ended_lives"] == 0
-        assert client.get(LIFE.format("new"), params={"at_cycles": 2_000}).json()["ended_lives"] == 4
+        assert life(client, "old-0")["ended_lives"] == 0
+        assert life(client, "new", at_cycles=2_000)["ended_lives"] == 4
         item = client.get("/v1/fleet/priors").json()["items"][0]
         assert item["ended_lives"] == 4
         assert item["severity_exponent"]["value"] == pytest.approx(1.0, abs=0.15)
@@ -140,14 +146,13 @@ def test_lives_that_ended_calibrate_the_next(url: str, monkeypatch: pytest.Monke
 
 def test_a_refresh_that_learns_nothing_new_changes_nothing(url: str) -> None:
     with client_on(url) as client:
-        for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
-            post(client, f"old-{number}", scale, last=6000)
+        post_fleet(client)
         post(client, "new", 6000.0, last=2000)
         refresh(url)
         said = client.get(LIFE.format("new"))
         assert said.json()["prior"]["clutches"] == 3
         # with three in all, two are left for each of them: no fleet
-        assert client.get(LIFE.format("old-0")).json()["prior"]["name"] == "weak"
+        assert life(client, "old-0")["prior"]["name"] == "weak"
         again = refresh(url)
         assert again.changed == ()
         assert again.kinds == ()
@@ -203,8 +208,7 @@ def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
 @pytest.mark.slow
 def test_a_refresh_that_read_before_another_stored_does_not_undo_it(url: str) -> None:
     with client_on(url) as client:
-        for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
-            post(client, f"old-{number}", scale, last=6000)
+        post_fleet(client)
         read = []
 
         def another_is_quicker() -> None:
@@ -225,18 +229,15 @@ def test_posting_on_and_tracking_anew_agree_under_a_fleets_prior(tmp_path: Path)
     for order in ((0, 1, 2, 3, 4), (0, 4, 2, 1, 3)):
         url = f"sqlite:///{tmp_path / str(order[1])}.db"
         with client_on(url) as client:
-            for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
-                post(client, f"old-{number}", scale, last=6000)
+            post_fleet(client)
             refresh(url)
             client.post("/v1/clutches", json={"clutch_id": "new"})
             for index in order:
-                body = stationary(
-                    1000 * index, wear=wear(1000 * index, 6000.0), speeds=SPEEDS, pressures=(5.0,), run_id=f"t{index}"
-                )
+                body = measured(f"t{index}", 1000 * index, wear(1000 * index, 6000.0))
                 receipt = client.post("/v1/clutches/new/runs", json=body).json()
                 if receipt["state"] == "held":  # a quarter of the COF gone since the only test before
                     assert client.post(f"/v1/clutches/new/runs/t{index}/confirm", json={}).status_code == 200
-            answers.append(client.get(LIFE.format("new"), params={"method": "ukf"}).json())
+            answers.append(life(client, "new", method="ukf"))
             del answers[-1]["revision"]  # that of a confirmed run is one more
     assert answers[0]["prior"]["name"] == "fleet"
     assert answers[0] == answers[1]
@@ -248,17 +249,15 @@ def test_a_run_that_comes_before_its_clutch_is_brought_up_is_tracked_under_the_p
 ) -> None:
     """A fleet has learned, and a run is quicker than the refresh: what is stored is what a replay gives."""
     with client_on(url) as client:
-        for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
-            post(client, f"old-{number}", scale, last=6000)
+        post_fleet(client)
         post(client, "new", 6000.0, last=3000)
         with monkeypatch.context() as slow:
             slow.setattr(learn_fleet, "_replaced", lambda *_: False)
             assert "new" in refresh(url).left
-        body = stationary(4000, wear=wear(4000, 6000.0), speeds=SPEEDS, pressures=(5.0,), run_id="next")
-        assert client.post("/v1/clutches/new/runs", json=body).status_code == 201
-        assert client.get(LIFE.format("new")).json()["prior"]["name"] == "weak"
+        post_run(client, measured("next", 4000, wear(4000, 6000.0)), "new")
+        assert life(client, "new")["prior"]["name"] == "weak"
         assert "new" in refresh(url).changed
-        assert client.get(LIFE.format("new")).json()["prior"]["name"] == "fleet"
+        assert life(client, "new")["prior"]["name"] == "fleet"
     with closing(open_database(url)) as database:
         with database.reading() as connection:
             before = records.answers(connection, "new")
@@ -272,8 +271,7 @@ def test_a_clutch_that_gets_a_run_whenever_it_is_tracked_anew_is_left_to_the_nex
     url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with client_on(url) as client:
-        for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
-            post(client, f"old-{number}", scale, last=5000)
+        post_fleet(client, last=5000)
         post(client, "live", 6000.0, last=1000)
         attempts = []
         track = learn_fleet.track
@@ -281,8 +279,9 @@ def test_a_clutch_that_gets_a_run_whenever_it_is_tracked_anew_is_left_to_the_nex
         def track_while_a_run_comes(state: ClutchState) -> Tracking:
             if state.clutch_id == "live":
                 attempts.append(state.revision)
-                body = stationary(1000 + 100 * len(attempts), speeds=SPEEDS, run_id=f"r{len(attempts)}")
-                assert client.post("/v1/clutches/live/runs", json=body).status_code == 201
+                post_run(
+                    client, stationary(1000 + 100 * len(attempts), speeds=SPEEDS, run_id=f"r{len(attempts)}"), "live"
+                )
                 assert len(attempts) < 10
             return track(state)
 

@@ -10,28 +10,24 @@ from fastapi.testclient import TestClient
 from models.plausibility import criteria
 from service.queries.verification import check_results
 from storage.engine.opening import open_database
+from tests.plausibility.bench import with_gain
+from tests.service.clients import post_run
 from tests.support import stationary
 
 CLUTCH = "/v1/clutches/c1"
 #: The tests before friction falls by a fifth, and after.
 BEFORE, AFTER = range(0, 9000, 1000), (9000, 10_000, 11_000)
+OIL_CHANGE = {"run_id": "m", "kind": "maintenance", "cycles": 8500, "event": "oil_change"}
 
 
 def sent(client: TestClient, cycles: Iterable[int], share: float = 1.0) -> list[str]:
     """Posts tests whose torque is a share of what it was; how each was taken."""
-    states = []
-    for at in cycles:
-        run = stationary(at, run_id=f"s{at}", noise=0.002)
-        run["channels"]["torque_nm"] = [share * torque for torque in run["channels"]["torque_nm"]]
-        answer = client.post(f"{CLUTCH}/runs", json=run)
-        assert answer.status_code == 201
-        states.append(answer.json()["state"])
-    return states
+    runs = (with_gain(stationary(at, run_id=f"s{at}", noise=0.002), share) for at in cycles)
+    return [post_run(client, run)["state"] for run in runs]
 
 
 def life(client: TestClient, method: str = "particle") -> dict[str, Any]:
-    answer: dict[str, Any] = client.get(f"{CLUTCH}/remaining-useful-life", params={"method": method}).json()
-    return answer
+    return client.get(f"{CLUTCH}/remaining-useful-life", params={"method": method}).json()
 
 
 def warned(answer: dict[str, Any]) -> list[str]:
@@ -62,20 +58,25 @@ def test_the_order_of_arrival_does_not_matter_to_a_new_level(client: TestClient)
     assert "since the test at 9,000 cycles" in warned(life(client))[0]
 
 
-def test_a_test_that_comes_in_may_begin_a_level_itself(client: TestClient) -> None:
-    """It lies before those that showed the level first."""
+def test_a_level_begins_with_a_test_that_comes_in_before_it_and_with_the_next_where_that_is_withdrawn(
+    client: TestClient,
+) -> None:
     sent(client, BEFORE)
     sent(client, AFTER[1:], 0.8)
     assert "since the test at 10,000 cycles" in warned(life(client))[0]
     assert sent(client, AFTER[:1], 0.8) == ["accepted"]
     assert "since the test at 9,000 cycles" in warned(life(client))[0]
+    for at, begins in (("s9000", 10_000), ("s10000", None)):
+        withdrawn = client.post(f"{CLUTCH}/runs/{at}/withdraw", json={"reason": "another clutch's"})
+        assert withdrawn.status_code == 200
+        found = warned(life(client))
+        assert (f"since the test at {begins:,} cycles" in found[0]) if begins else found == []
 
 
 def test_the_first_test_after_a_declared_event_is_the_present(client: TestClient) -> None:
     """However far it is from those before: it is accepted, so it counts. The threshold that it has passed is passed."""
     sent(client, BEFORE)
-    event = {"run_id": "m", "kind": "maintenance", "cycles": 8500, "event": "oil_change"}
-    assert client.post(f"{CLUTCH}/runs", json=event).status_code == 201
+    post_run(client, OIL_CHANGE)
     before = life(client)["current"]["fraction_of_initial"]
     assert sent(client, AFTER[:1], 0.6) == ["accepted"]
     for method in ("particle", "ukf", "grid"):
@@ -87,25 +88,14 @@ def test_the_first_test_after_a_declared_event_is_the_present(client: TestClient
 @pytest.mark.parametrize("declared_first", [True, False])
 def test_no_level_is_unexplained_once_an_event_is_declared(client: TestClient, *, declared_first: bool) -> None:
     """The advice of the warning is to send maintenance: then it must end."""
-    event = {"run_id": "m", "kind": "maintenance", "cycles": 8500, "event": "oil_change"}
     sent(client, BEFORE)
     if declared_first:
-        assert client.post(f"{CLUTCH}/runs", json=event).status_code == 201
+        post_run(client, OIL_CHANGE)
     sent(client, AFTER, 0.8)
     assert bool(warned(life(client))) is not declared_first
     if not declared_first:
-        assert client.post(f"{CLUTCH}/runs", json=event).status_code == 201
+        post_run(client, OIL_CHANGE)
     assert warned(life(client)) == []
-
-
-def test_a_level_begins_with_the_next_test_where_its_first_is_withdrawn(client: TestClient) -> None:
-    sent(client, BEFORE)
-    sent(client, AFTER, 0.8)
-    for at, begins in (("s9000", 10_000), ("s10000", None)):
-        withdrawn = client.post(f"{CLUTCH}/runs/{at}/withdraw", json={"reason": "another clutch's"})
-        assert withdrawn.status_code == 200
-        found = warned(life(client))
-        assert (f"since the test at {begins:,} cycles" in found[0]) if begins else found == []
 
 
 def test_a_run_that_another_sets_aside_is_stored_as_if_it_had_never_counted(
@@ -123,18 +113,9 @@ def test_a_run_that_another_sets_aside_is_stored_as_if_it_had_never_counted(
         assert check_results(database, "c1").findings == ()
 
 
-def test_nothing_is_stepped_where_new_levels_are_never_believed(
-    client: TestClient, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What the test above shows is the judgement's doing."""
-    monkeypatch.setattr(criteria, "LEVEL_UNDECLARED", 1e-300)
-    sent(client, BEFORE)
-    sent(client, AFTER, 0.8)
-    assert warned(life(client)) == []
-
-
 def test_what_is_computed_again_is_judged_again(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A clutch stored by a release that knew no levels has them as soon as its history is computed again."""
+    """A clutch stored by a release that knew no levels, so that nothing was stepped, has them as soon as its history is
+    computed again: what the tests above show is the judgement's doing."""
     with monkeypatch.context() as unknown:
         unknown.setattr(criteria, "LEVEL_UNDECLARED", 1e-300)
         sent(client, BEFORE)

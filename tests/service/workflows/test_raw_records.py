@@ -1,6 +1,7 @@
 """Raw records beside the database: never lost, whoever ends in the middle; what nothing names is collected, nothing else."""
 
 import time
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,10 @@ def collect(database: Database, *, later: float = 0.0) -> raw_records.Collected:
     return collected
 
 
+def crash(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
 def test_what_no_run_names_is_removed_after_the_grace_period_and_nothing_else(
     database: Database, raw_address: str
 ) -> None:
@@ -95,10 +100,6 @@ def test_a_removal_that_is_still_going_on_refuses_runs_that_begin_after_it(
 ) -> None:
     raw_records.use(database, in_folder)
     put(database, 1)
-
-    def crash(*_: object) -> None:
-        raise KeyboardInterrupt
-
     with monkeypatch.context() as cut_off:
         cut_off.setattr(FolderStore, "delete", crash)
         with pytest.raises(KeyboardInterrupt):
@@ -159,13 +160,10 @@ def test_what_is_damaged_is_not_moved(database: Database, in_folder: str, in_buc
 def test_a_store_belongs_to_one_database(database: Database, tmp_path: Path, raw_address: str) -> None:
     raw_records.use(database, raw_address)
     keys = store(database, 1)
-    other = open_database(f"sqlite:///{tmp_path}/other.db")
-    try:
+    with closing(open_database(f"sqlite:///{tmp_path}/other.db")) as other:
         with pytest.raises(ValueError, match="another database"):
             raw_records.use(other, raw_address)
         assert raw_records.collect(other, grace=0.0, now=time.time() + GRACE) == []
-    finally:
-        other.close()
     open_store(raw_address).set_mark("of somebody else")
     with pytest.raises(ValueError, match="is not marked as this database's"):
         collect(database, later=2 * GRACE)
@@ -175,9 +173,6 @@ def test_a_store_belongs_to_one_database(database: Database, tmp_path: Path, raw
 def test_a_start_that_is_cut_off_between_row_and_mark_can_be_repeated(
     database: Database, in_folder: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def crash(*_: object) -> None:
-        raise KeyboardInterrupt
-
     with monkeypatch.context() as cut_off:
         cut_off.setattr(FolderStore, "set_mark", crash)
         with pytest.raises(KeyboardInterrupt):
@@ -212,30 +207,27 @@ def test_kills_between_blob_and_row_lose_no_run_and_leave_only_what_is_collected
     tmp_path: Path, in_folder: str
 ) -> None:
     url = f"sqlite:///{tmp_path}/kills.db"
-    opened = open_database(url)
-    raw_records.use(opened, in_folder)
-    keys = store(opened, 0)
-    opened.close()
+    with closing(open_database(url)) as opened:
+        raw_records.use(opened, in_folder)
+        keys = store(opened, 0)
 
     def ingest(number: int) -> None:
-        own = open_database(url)
-        name(own, number, put(own, number))
-        own.close()
+        with closing(open_database(url)) as own:
+            name(own, number, put(own, number))
 
     begin = time.perf_counter()
     ingest(1)
     longest = time.perf_counter() - begin
     ended = [killed_after(longest * number / 8, lambda number=number: ingest(2 + number)) for number in range(12)]
-    again = open_database(url)
-    with again.reading() as connection:
-        known = runs.keys(connection, "bench3-017")
-    keys |= {number: known[f"run-{number:04d}"] for number in range(1, 14) if f"run-{number:04d}" in known}
-    assert all(2 + number in keys for number, whole in enumerate(ended) if whole)
-    assert all_there(again, keys)
-    collect(again, later=2 * GRACE)
-    assert all_there(again, keys)
-    left = {blob for blob, _ in open_store(in_folder).names()}
-    with again.reading() as connection:
-        (used,) = raw_stores.all_of(connection)
-        assert raw_stores.named(connection, used.store_key, left) == left
-    again.close()
+    with closing(open_database(url)) as again:
+        with again.reading() as connection:
+            known = runs.keys(connection, "bench3-017")
+        keys |= {number: known[f"run-{number:04d}"] for number in range(1, 14) if f"run-{number:04d}" in known}
+        assert all(2 + number in keys for number, whole in enumerate(ended) if whole)
+        assert all_there(again, keys)
+        collect(again, later=2 * GRACE)
+        assert all_there(again, keys)
+        left = {blob for blob, _ in open_store(in_folder).names()}
+        with again.reading() as connection:
+            (used,) = raw_stores.all_of(connection)
+            assert raw_stores.named(connection, used.store_key, left) == left

@@ -10,6 +10,7 @@ import pytest
 from service.cli.sending import delivery
 from service.cli.sending.spool import Spool
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body, problem
+from tests.service.cli.sending.test_delivery import of_run
 from tests.service.cli.sending.test_spool import written
 from tests.service.clients import clutchlife
 
@@ -63,7 +64,7 @@ def present(_request: httpx2.Request) -> None:
 def test_what_waits_is_listed_with_its_tries_and_the_last_answer(terminal: Terminal) -> None:
     assert "nothing is in the spool" in terminal("spool", "list")
     terminal.push(body(-1, "bad"), "bad.json", code=65)
-    terminal.service.instead = lambda request: None if request.method == "GET" else away(request)
+    terminal.service.instead = of_run(b"", lambda: httpx2.Response(503))
     terminal.push(body(70000), code=75)
     terminal.push(body(7000), code=75)
     terminal.push(body(8000, "r2"), "other.json", code=75, clutch="c2")
@@ -87,23 +88,19 @@ def test_what_waits_is_listed_with_its_tries_and_the_last_answer(terminal: Termi
 
 
 def test_a_run_that_was_corrected_while_the_service_was_away_is_delivered_corrected(terminal: Terminal) -> None:
+    """A version that may be stored is named: one try got no answer, whatever later ones did."""
     terminal.service.instead = away
     assert "1 run waits" in terminal.push(body(70000), code=75)
     output = terminal.push(body(7000), code=75)
     assert "; the old version is kept in " in output
     assert "may be stored" not in output
+    for status in (504, 503):
+        terminal.service.instead = of_run(b"", lambda status=status: httpx2.Response(status))
+        terminal("spool", "send", "--url", URL, "--patience", "0", code=75)
+    assert "the old version may be stored: if so, withdraw it" in terminal.push(body(700), code=75)
     terminal.service.instead = present
     assert "1 stored now, 0 stored before, 0 refused" in terminal("spool", "send", "--url", URL)
-    assert list(terminal.service.stored.values()) == [body(7000)]
-
-
-def test_a_replaced_version_that_may_be_stored_is_named(terminal: Terminal) -> None:
-    terminal.service.instead = lambda request: None if request.method == "GET" else httpx2.Response(504)
-    terminal.push(body(70000), code=75)
-    terminal.service.instead = away  # which stores nothing; a try before it may have
-    terminal("spool", "send", "--url", URL, "--patience", "0", code=75)
-    terminal.service.instead = present
-    assert "the old version may be stored: if so, withdraw it" in terminal.push(body(7000))
+    assert list(terminal.service.stored.values()) == [body(700)]
 
 
 def test_push_names_other_runs_that_wait_in_one_line(terminal: Terminal) -> None:
@@ -165,14 +162,14 @@ def test_only_runs_for_the_address_are_sent_there(terminal: Terminal) -> None:
 def test_refusals_end_the_command_as_data_errors_and_absence_as_a_failure_for_now(terminal: Terminal) -> None:
     terminal.service.instead = lambda _request: problem(401, "unauthorized", "a key [is] needed")
     assert "a key [is] needed; 1 run waits in" in terminal.push(body(1), code=65)
-    terminal.service.instead = lambda request: None if request.method == "GET" else httpx2.Response(500)
+    terminal.service.instead = of_run(b"", lambda: httpx2.Response(500))
     assert "the service did not accept 1 run;" in terminal.push(body(1), code=75)
     terminal.service.instead = lambda _request: httpx2.Response(200, html="<p>log in</p>")
     assert "a login page or a proxy?" in terminal.push(body(1), code=75)
     assert len(terminal.listed()) == 1
 
 
-def test_a_rigs_files_are_sent_with_its_name_and_what_else_is_given(terminal: Terminal) -> None:
+def test_a_record_is_sent_with_the_name_of_its_rig_or_its_kind_and_cycles(terminal: Terminal) -> None:
     asked: list[httpx2.Request] = []
     terminal.service.instead = lambda request: asked.append(request)
     folder = terminal.folder / "records"
@@ -181,25 +178,11 @@ def test_a_rigs_files_are_sent_with_its_name_and_what_else_is_given(terminal: Te
         (folder / name).write_bytes(name.encode())
     terminal.push_files(folder, "--rig", "bench-3")
     sent = [request for request in asked if request.url.path.endswith("/runs/file")]
-    assert sorted((request.url.params["filename"], request.url.params["rig"]) for request in sent) == [
-        ("a_1000.xlsx", "bench-3"),
-        ("b_2000.csv", "bench-3"),
-    ]
+    named = sorted((request.url.params["filename"], request.url.params["rig"]) for request in sent)
+    assert named == [("a_1000.xlsx", "bench-3"), ("b_2000.csv", "bench-3")]
     assert all("kind" not in request.url.params and "cycles" not in request.url.params for request in sent)
     asked.clear()
     terminal.push_files(folder / "b_2000.csv", "--rig", "bench-3", "--cycles", "7")
     sent = [request for request in asked if request.url.path.endswith("/runs/file")]
     assert [(request.url.params["rig"], request.url.params["cycles"]) for request in sent] == [("bench-3", "7.0")]
-
-
-def test_without_a_rig_a_record_needs_its_kind_and_cycles(terminal: Terminal) -> None:
     assert "Give --kind and --cycles" in terminal.push(b"1,2", "a.csv", code=64)
-
-
-def test_a_file_whose_reader_cannot_start_waits_in_the_spool(terminal: Terminal) -> None:
-    busy = "the program that reads TDMS files could not start (status 1)"
-    terminal.service.instead = lambda request: problem(503, "busy", busy) if "/runs" in request.url.path else None
-    record = written(terminal.folder / "a.tdms", b"TDSm")
-    assert "1 run waits" in terminal.push_files(record, "--rig", "bench-3", code=75)
-    terminal.service.instead = present
-    assert "1 stored" in terminal("spool", "send", "--url", URL)

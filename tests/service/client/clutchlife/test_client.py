@@ -253,6 +253,7 @@ def test_what_is_refused_is_not_tried_again(clock: Clock) -> None:
         ({"Retry-After": "7"}, 7),
         ({"Retry-After": "Sun, 01 Mar 2026 12:01:30 GMT"}, 90),
         ({"Retry-After": "Sat, 28 Feb 2026 12:00:00 GMT"}, 0),
+        ({"Retry-After": "Sun, 01 Mar 2026 12:00:20 -0000"}, 20),
         ({"Retry-After": "Sunday, 01-Mar-26 12:00:30 GMT"}, 30),
         *(({"Retry-After": text}, 0) for text in ("-3", "nan", "inf", "1e9", "soon", "", "Mon, 99 Foo 2026")),
         # this machine's clock is a year behind: the service's own says how long it is

@@ -43,7 +43,7 @@ def idle_record() -> dict[str, list[float]]:
     return record | {"pressure_bar": [0.0] * len(record["time_s"]), "torque_nm": [0.1 * t for t in record["torque_nm"]]}
 
 
-def test_each_kind_of_run_arrives_in_si_units(client: TestClient, database_url: str) -> None:
+def test_each_kind_of_run_arrives_in_si_units_and_nothing_is_written(client: TestClient, database_url: str) -> None:
     duty = {"cycles": 500, "energy_per_cycle_kj": 18.0, "initial_speed_rpm": 2000, "maximum_pressure_bar": 8}
     post(
         client,
@@ -53,7 +53,10 @@ def test_each_kind_of_run_arrives_in_si_units(client: TestClient, database_url: 
         {"kind": "maintenance", "cycles": 500, "run_id": "oil", "event": "oil_change"},
         stationary(500, run_id="s500"),
     )
+    path = Path(database_url.removeprefix("sqlite:///"))
+    before = path.read_bytes()
     found = campaign(database_url).campaign
+    assert path.read_bytes() == before
     assert [run.run_id for run in found.stationary] == ["s0", "s500"]
     assert found.stationary[0].moment == 1767222000.0
     assert found.stationary[1].moment is None
@@ -126,14 +129,6 @@ def test_a_record_is_thinned_to_means() -> None:
     assert thin.time.size == 250
     assert (thin.torque[0], thin.torque[-1]) == (1.5, 997.5)
     assert np.abs(thin.speed - np.sin(thin.time)).max() < 1e-3
-
-
-def test_nothing_of_it_is_written(client: TestClient, database_url: str) -> None:
-    post(client, stationary(0, run_id="s0"))
-    path = Path(database_url.removeprefix("sqlite:///"))
-    before = path.read_bytes()
-    campaign(database_url)
-    assert path.read_bytes() == before
 
 
 def test_the_plate_and_a_declared_filter_reach_the_diagnosis(client: TestClient, database_url: str) -> None:
