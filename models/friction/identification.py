@@ -145,7 +145,7 @@ def _covariance(
     variances of the points, `shape` [P, n] times sd² [P]; `transform` [P, 4, 4] leads from the fit's coordinates to the
     parameters. Where the 90 % interval of log V_S, the fourth coordinate, reaches further than a factor e (`stray` [P] > 1),
     the variance along it is widened to that half-range: the linearised fit is too sure."""
-    inner = _linearised(columns * prior[:, None, :], shape, sd)
+    inner = _sandwich(columns * prior[:, None, :], shape, sd)
     inner *= prior[:, :, None] * prior[:, None, :]
     variance = inner[:, 3, 3]
     missing = np.where(stray > 1.0, np.maximum((stray / criteria.Z90) ** 2 - variance, 0.0), 0.0)
@@ -179,17 +179,18 @@ def _leverage(columns: FloatArray) -> FloatArray:
     return np.asarray(np.square(columns @ (vectors * scale[:, None, :])).sum(axis=2))
 
 
-def _linearised(columns: FloatArray, shape: FloatArray, sd: FloatArray) -> FloatArray:
-    """M (CᵀDC/σ² + 1) M, M = (CᵀC/σ² + 1)^-1, for columns C [P, n, 4] and D = diag(shape [P, n]): [P, 4, 4].
+def _sandwich(columns: FloatArray, relative_variance: FloatArray, sd: FloatArray) -> FloatArray:
+    """The linearised covariance of the scaled terms [P, 4, 4]: M (CᵀDC/σ² + 1) M with M = (CᵀC/σ² + 1)^-1.
 
-    The inverse goes by eigenvalues, those that are rounding taken as zero.
+    C are the columns [P, n, 4] of the Jacobian, σ = `sd` [P] the noise, D the diagonal of each point's variance in units of
+    σ² [P, n], and 1 the weak prior's. M goes by eigenvalues; those that are rounding are taken as zero.
     """
     columns = columns / sd[:, None, None]
     across = columns.swapaxes(1, 2)
     values, vectors = np.linalg.eigh(across @ columns)
     values = np.where(values > _ROUNDING * values[:, -1:], values, 0.0)
     inverse = (vectors / (values + 1)[:, None, :]) @ vectors.swapaxes(1, 2)
-    middle = across @ (shape[..., None] * columns) + np.eye(4)
+    middle = across @ (relative_variance[..., None] * columns) + np.eye(4)
     return np.asarray(inverse @ middle @ inverse)
 
 

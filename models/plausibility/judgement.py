@@ -335,13 +335,14 @@ class _Weighed:
 
     def _log_level(self, test: int) -> float:
         """log prior that a new level begins with a test."""
-        return math.log(self._level_share(self.life_of[test], self.clutch.runs[test].sent.cycles))
+        return math.log(self._new_level_probability(self.life_of[test], self.clutch.runs[test].sent.cycles))
 
-    def _level_share(self, life: int, cycles: float) -> float:
-        """Prior probability that a new level begins with a test of a life at these cycles: an event lies between it and the
-        one before, or none."""
+    def _new_level_probability(self, life: int, cycles: float) -> float:
+        """Prior probability that a new level begins with a test of a life at these cycles; larger where maintenance lies
+        between it and the test before, or at the cycles of either: which came first is not known then."""
         runs, shifts = self.clutch.runs, self._shifts(life)
-        earlier = (runs[i].sent.cycles for i in self.fits[life][1])
+        _, fitted_tests = self.fits[life]
+        earlier = (runs[i].sent.cycles for i in fitted_tests)
         before = max((at for at in earlier if at < cycles), default=0.0)  # tests at the same cycles step together
         declared = ((shifts >= before) & (shifts <= cycles)).any()
         return criteria.LEVEL_AFTER_EVENT if declared else criteria.LEVEL_UNDECLARED
@@ -350,7 +351,7 @@ class _Weighed:
         """Log probability of a new level from this test on; later tests would have it too. 0 before the first test."""
         runs = self.clutch.runs
         other_cycles = [runs[i].sent.cycles for i in self.fits[life][1] if i != index]
-        return self._level_share(life, cycles) if other_cycles and max(other_cycles) < cycles else 0.0
+        return self._new_level_probability(life, cycles) if other_cycles and max(other_cycles) < cycles else 0.0
 
     def log_cof(self, index: int, readings: Sequence[Reading]) -> list[float]:
         """log density of the COF of readings of a run by the course of the others; 0 for one that shows none."""

@@ -97,7 +97,7 @@ class FleetPrior:
         drawn = pooled(under_weak, under_fleet)
         log_weak = _log_prior(drawn, ours)
         # a vanishing density: no draws beyond REACH deviations of the prior
-        lean = np.where(_within(drawn, theirs), _log_prior(drawn, theirs) - log_weak, (-700.0))
+        lean = np.where(_on_the_grid_of(theirs, drawn), _log_prior(drawn, theirs) - log_weak, (-700.0))
         split = under_weak.weight.size
         ratio = _log_evidence_ratio(lean[:split], under_weak.weight, lean[split:], under_fleet.weight)
         learned = self.log_density(_coordinates(drawn)) - np.log(np.abs(drawn.initial)) - log_weak
@@ -206,8 +206,11 @@ def _log_prior(drawn: Posterior, prior: Prior) -> FloatArray:
     return np.asarray(density - np.where(no_exponent, of_exponent, 0.0))
 
 
-def _within(drawn: Posterior, prior: Prior) -> NDArray[np.bool_]:
-    """Which draws a grid under a prior can have [n]."""
+def _on_the_grid_of(prior: Prior, drawn: Posterior) -> NDArray[np.bool_]:
+    """Which draws [n] lie where the exact filter under a prior has its grid: within REACH deviations of the prior's means.
+
+    Only those can be in the samples of both priors, as Bennett's ratio of their evidences needs.
+    """
     of_exponent = (drawn.log_exponent - prior.log_exponent_mean) / prior.log_exponent_sd
     off = [
         (drawn.log_scale - prior.log_scale_mean) / prior.log_scale_sd,

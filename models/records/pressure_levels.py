@@ -57,37 +57,49 @@ class PressureStretch:
 def pressure_stretches(time: FloatArray, pressure: FloatArray) -> Iterator[PressureStretch]:
     """The stretches of time [n] s, ascending, in which pressure [n] Pa is constant, in their order.
 
-    Medians over a quarter of a second that stay within LEVEL_GAP of the stretch's own median belong together; where
-    pressure still moves towards the level or already away from it is cut off. Ramps between levels give stretches that
-    are too short (under 2 s) to count, or straight lines, which do not count either.
+    Medians over a quarter of a second that stay within `level_width` of their own median belong together: too few (ramps
+    between levels give such groups) or a straight line are no stretch. Where pressure still moves towards the level or
+    already away from it is cut off; what is left lasts as long as its medians are apart.
     """
     smooth = running_median(pressure, 5)
     block = np.floor((time - time[0]) / max(MEDIAN_DURATION, 5 * sample_interval(time))).astype(np.int64)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1, [time.size]])
     medians = _block_medians(smooth, block, edges)
-    first = 0
-    ordered: list[float] = []  # the medians [first, i), ascending
-    for i in range(1, medians.size + 1):
-        bisect.insort(ordered, float(medians[i - 1]))
-        level = 0.5 * (ordered[(i - first - 1) // 2] + ordered[(i - first) // 2])
+    for first, end, level in _groups(medians):
         allowed = level_width(abs(level))
-        if i < medians.size and abs(medians[i] - level) <= allowed:
+        if end - first < SHORTEST_STRETCH or _ramps(medians[first:end], allowed):
             continue
-        if i - first >= SHORTEST_STRETCH:
-            near = np.abs(smooth - level) <= allowed
-            lowest, highest = edges[max(first - 1, 0)], edges[min(i + 1, medians.size)]
-            inside_start, inside_stop = edges[first + 1], edges[i - 1]
-            before = np.flatnonzero(~near[lowest:inside_start])
-            after = np.flatnonzero(~near[inside_stop:highest])
-            start = int(lowest + before[-1] + 1) if before.size else int(lowest)
-            stop = int(inside_stop + after[0]) if after.size else int(highest)
-            if _ramps(medians[first:i], allowed):
-                first, ordered = i, []
-                continue
-            start, stop = _without_ramps(smooth, start, stop, allowed)
-            if time[stop - 1] - time[start] >= SHORTEST_STRETCH * MEDIAN_DURATION - MEDIAN_DURATION:
-                yield PressureStretch(pressure=float(np.median(pressure[start:stop])), start=start, stop=stop)
-        first, ordered = i, []
+        start, stop = _rows_near(level, allowed, smooth, edges, first, end)
+        start, stop = _without_ramps(smooth, start, stop, allowed)
+        if time[stop - 1] - time[start] >= (SHORTEST_STRETCH - 1) * MEDIAN_DURATION:
+            yield PressureStretch(pressure=float(np.median(pressure[start:stop])), start=start, stop=stop)
+
+
+def _groups(medians: FloatArray) -> Iterator[tuple[int, int, float]]:
+    """The blocks [first, end) whose medians [b] stay near the median of those before them in the group, and that of all."""
+    first = 0
+    ordered: list[float] = []  # the medians [first, end), ascending
+    for end in range(1, medians.size + 1):
+        bisect.insort(ordered, float(medians[end - 1]))
+        level = 0.5 * (ordered[(end - first - 1) // 2] + ordered[(end - first) // 2])
+        if end == medians.size or abs(medians[end] - level) > level_width(abs(level)):
+            yield first, end, level
+            first, ordered = end, []
+
+
+def _rows_near(
+    level: float, allowed: float, smooth: FloatArray, edges: NDArray[np.intp], first: int, end: int
+) -> tuple[int, int]:
+    """The rows [start, stop) of the blocks [first, end), without what is off the level in the first and the last block, and
+    with what is near it in the blocks beside them."""
+    near = np.abs(smooth - level) <= allowed
+    lowest, highest = edges[max(first - 1, 0)], edges[min(end + 1, edges.size - 1)]
+    inside_start, inside_stop = edges[first + 1], edges[end - 1]
+    before = np.flatnonzero(~near[lowest:inside_start])
+    after = np.flatnonzero(~near[inside_stop:highest])
+    start = lowest + before[-1] + 1 if before.size else lowest
+    stop = inside_stop + after[0] if after.size else highest
+    return int(start), int(stop)
 
 
 def _block_medians(values: FloatArray, block: NDArray[np.int64], edges: NDArray[np.int64]) -> FloatArray:

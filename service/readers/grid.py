@@ -85,13 +85,13 @@ class DataRows:
 
     def __init__(self, rows: Sequence[Row], layout: Layout) -> None:
         self.rows, self.layout, above = rows, layout, rows[: layout.start]
-        self.titles, self.first = rows[layout.titles], rows[layout.start] if layout.start < len(rows) else []
+        self.titles, self.first_row = rows[layout.titles], rows[layout.start] if layout.start < len(rows) else []
         self._above = {tuple(row) for row in above if not all(map(is_value, row))}
         #: The first row of data of each further table under the same titles.
         self.breaks: list[int] = []
         self.notices: list[Notice] = []
         self._summaries: list[Row] = []
-        self._summarised = _is_summary(self.first)
+        self._summarised = _is_summary(self.first_row)
         if layout.labelled:
             self._leave_out(above[-layout.labelled :], "above the first row of")
 
@@ -116,9 +116,9 @@ class DataRows:
             self._leave_out(self._summaries, "of means, extremes or sums in")
 
     def _split_footer(self, held: list[tuple[int, Row]]) -> list[Row]:
-        """The rows at the end that are words, or that a word begins (`Mean;5;100;20`), which are taken out."""
+        """The rows at the end of `held` that are words, or that a word begins (`Mean;5;100;20`): taken out of it."""
         end = len(held)
-        while end and is_footer(held[end - 1][1], self.first):
+        while end and is_footer(held[end - 1][1], self.first_row):
             end -= 1
         footer = [row for _, row in held[end:]]
         del held[end:]
@@ -147,7 +147,7 @@ def table_in(data: DataRows, *, first_line: int, rows_read: Callable[[], int], *
     columns = list(layout.columns())
     counted = _counted(columns, head)
     for place, column in enumerate(columns):
-        if is_counter(column) and shown(data.first)[place : place + 1] == ("",):
+        if is_counter(column) and shown(data.first_row)[place : place + 1] == ("",):
             columns[place] = Column("", title=column.title)
             continue
         own_rows = [row for row in above if len(row) > place and row[place]]

@@ -30,6 +30,8 @@ from service.readers.table import Reading, Table
 
 #: Bytes of a block; the first must hold the titles. Chosen: rows that are no plain numbers take 60 times as much memory.
 _BLOCK = 1 << 17
+#: Bytes of a table on its side, which is turned as a whole. Chosen: a quarter of a million samples of five channels.
+_MAX_TURNED = 8 << 20
 _COMMENTS = ("#", "%", "//")
 _NEWLINE, _COMMA = b"\n,"
 _SEPARATOR_LINE = re.compile(r"\s*sep=(.?)\s*", re.IGNORECASE)
@@ -69,7 +71,7 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
     """The table of a text. Raises InvalidError where it has no titles, or its lines are no text."""
     with opened() as source:
         first = source.read(_BLOCK)
-    if len(first) == _BLOCK and b"\n" in first and b"\0" not in first:
+    if len(first) == _BLOCK and b"\n" in first and b"\0" not in first:  # whole lines alone; with zeros it may be UTF-16
         first = first[: first.rindex(b"\n") + 1]
     if not first.strip():
         rule = "is empty, and so is the rest of the file: send a file with a header and rows of numbers"
@@ -77,7 +79,14 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
     try:
         form = _form(first, reading, limits)
     except InvalidError:
-        if len(first) == _BLOCK or (on_its_side := _turned(first, reading)) is None:
+        if _turned(first, reading) is None:
+            raise
+        with opened() as source:
+            text = source.read(_MAX_TURNED)
+            if source.read(1):
+                message = f"a table on its side must have at most {_MAX_TURNED} bytes: send it with a column a channel"
+                raise TooLargeError(message) from None
+        if (on_its_side := _turned(text, reading)) is None:
             raise
         table = read_text(lambda: nullcontext(io.BytesIO(on_its_side)), reading, limits)
         return replace(table, notices=[*table.notices, TURNED])
@@ -258,7 +267,7 @@ class _Body:
     def __init__(self, opened: Open, form: _Form, reading: Reading, limits: Limits) -> None:
         self._opened, self._form, self._limits = opened, form, limits
         self.data = DataRows(form.rows, form.layout)
-        named, first = len(form.layout.headings), self.data.first
+        named, first = len(form.layout.headings), self.data.first_row
         self._width = named if any(first[named:]) else max(named, len(first))
         self._separator = form.separator
         if form.separator == "  " and len(_cells(" ".join(first), " ")) == self._width:
@@ -279,7 +288,7 @@ class _Body:
         """The columns [n] by index. Raises InvalidError naming line and value, TooLargeError past the limits."""
         self._settle(channels)
         times = [at for at, name in channels.items() if name == "time_s"]
-        dated = any(is_stamp("".join(self.data.first[at : at + 1])) for at in times)
+        dated = any(is_stamp("".join(self.data.first_row[at : at + 1])) for at in times)
         parts: list[list[NDArray[Any]]] = [[] for _ in channels]
         most = self._limits.most_values // len(channels)
         end, late = time.thread_time() + self._limits.seconds, time.monotonic() + self._limits.wall_seconds

@@ -97,17 +97,19 @@ _FOREIGN = (
 
 
 def _key(unit: str) -> str:
-    """What the spellings of a unit have in common: no width, no capitals, no dots, dashes, carets, underscores or blanks.
+    """What the spellings of a unit have in common: plain characters for wide or raised ones, no capitals, none of blanks,
+    dots, signs of multiplication, dashes, carets, underscores and brackets. Empty where nothing is left, or for no unit.
 
-    Single letters keep their capitals (K is not k). So do mega and milli, which differ by nothing else: mPa is not MPa.
+    A capital is kept where it tells units apart: K and k; MPa and mPa, MNm and mNm.
     """
-    if len(unit) > LONGEST_UNIT:
+    if len(unit) > LONGEST_UNIT:  # a sentence
         return ""
     plain = unicodedata.normalize("NFKC", unit.replace("º", "°")).replace("−", "-").strip()
     key = re.sub(r"[\s·⋅•∙×*・.^_()-]+", "", plain)
     if len(key) == 1:
         return key
-    return key[:1] * (key[:1] in tuple("mM") and key[1:].casefold() in ("pa", "nm")) + key.casefold()
+    prefix, rest = key[:1], key[1:].casefold()
+    return prefix + rest if rest in ("pa", "nm") and prefix in ("m", "M") else key.casefold()
 
 
 _BY_KEY = {

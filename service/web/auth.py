@@ -108,10 +108,10 @@ def _key_of(request: Request) -> str | None:
 
 
 async def snapshot_at(request: Request, clutch_id: str | None) -> Snapshot:
-    """The caller's key and the clutch's revision, read once a request and kept with it."""
+    """The caller's key and the clutch's revision, read together, and kept with the request for whatever else needs them."""
     key = _key_of(request)
     if clutch_id is not None and len(clutch_id) > LONGEST_IDENTIFIER:
-        clutch_id = None  # no clutch is called so, and whoever asks is not known yet
+        clutch_id = None  # no clutch is called so: the key is checked alone, and then there is no such clutch
     question = Question(clutch_id, None if key is None else _digest(key))
     snapshot = await context_of(request).database.watch.look(question)
     request.state.snapshot = snapshot

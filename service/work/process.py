@@ -77,7 +77,10 @@ class Child:
         return json.loads(steps[-1].removeprefix(PROGRESS)) if steps else None
 
     def written(self, name: str) -> dict[str, Any]:
-        """What it wrote at its end. Raises FailedError, AwayError; what it complained of is logged under its `name`."""
+        """What the process, which has ended, wrote as its answer; what it complained of is logged under the job's `name`.
+
+        Raises FailedError; AwayError where the database did not answer, so that the job can be done again.
+        """
         code = self._process.returncode
         if code == -signal.SIGXCPU:
             raise FailedError(f"the computation took longer than {self._work.processor_seconds} s of processor time")
@@ -95,13 +98,13 @@ class Child:
                 "again, tell the operator of the service"
             )
         try:
-            written = json.loads(self._lines()[-1])
+            answer = json.loads(self._lines()[-1])
         except (ValueError, IndexError):
-            written = None
-        if not isinstance(written, dict):
+            answer = None
+        if not isinstance(answer, dict):
             _log.error("%s: its process gave no readable answer", name)
             raise FailedError("the computation gave no readable answer: see the service's log")
-        return written
+        return answer
 
     def _lines(self) -> list[bytes]:
         """The whole lines that it has written so far: it alone moves the place in the file."""

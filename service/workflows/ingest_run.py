@@ -170,7 +170,11 @@ def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
 
 
 def _computed(database: Database, before: ClutchState, arrival: Arrival, read_with: tuple[Geometry, float]) -> _Outcome:
-    """The results of the run in the clutch's history `before` it; it was read with a geometry and a filter."""
+    """The results of the run in the clutch's history `before` it; it was read with a geometry and a filter.
+
+    Accepted, it is one more event. Doubted, it is held, and only the summary speaks of it. Where it is evidence for or
+    against other runs, these are accepted or held as well, and the whole history is computed again.
+    """
     if (before.geometry, before.record.torque_filter) != read_with:
         raise BusyError("the clutch's geometry or filter was edited while the run was read: send the run again")
     event = _event_of(arrival)
@@ -178,20 +182,7 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
     state = replace(before, events=order([*before.events, event]))
     require_within_ends(state.events)
     levels = _levels(database, state, event, arrival)
-    evaluated = stationary_tests_of(before.events)  # what loops were evaluated against, those of the run too
-    loops: Sequence[Loop] = ()
-    if event.kind == DYNAMIC:
-        test = evaluated[event.run_id] = stationary_tests_of(state.events)[event.run_id]
-        curves = [] if test is None else levels.get(test, [])
-        loops = loops_of(arrival.run.channels, state.geometry, state.record.torque_filter, curves)
-    answer = receipt(
-        before.clutch_id,
-        arrival.run,
-        arrival.analysis,
-        received_at=arrival.received_at,
-        cofs=event.cofs,
-        loops=loops,
-    )
+    answer, evaluated = _receipt(before, state, event, arrival, levels)
     judged = Judged()
     if not arrival.odd:
         corrected = before.extension is not None
@@ -218,15 +209,15 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
     else:
         final, computed = _one_step(database, state, event, levels, answer, arrival, evaluated)
     evidence = _evidence(database, final, arrival, answer) if needs_evidence(final) else None
-    changed = dict(computed.receipts)
-    own_receipt = changed.pop(event.run_id, answer)
+    of_others = dict(computed.receipts)
+    own_receipt = of_others.pop(event.run_id, answer)
     return _Outcome(
         revision=before.revision,
         receipt=own_receipt,
         cofs=computed.cofs.get(event.run_id, event.cofs),
         results=replace(
             computed,
-            receipts=changed,
+            receipts=of_others,
             levels={run_id: fits for run_id, fits in computed.levels.items() if run_id != event.run_id},
             summary=summarised(final, computed.tracking or Tracking(), evidence),
             judged=judged,
@@ -234,6 +225,28 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
         ),
         doubts=doubtful,
     )
+
+
+def _receipt(
+    before: ClutchState, state: ClutchState, event: Event, arrival: Arrival, levels: Levels
+) -> tuple[dict[str, Any], dict[str, str | None]]:
+    """The run's receipt, and by which stationary test the loops of each dynamic one were evaluated: of those before, and of
+    the run itself."""
+    evaluated = stationary_tests_of(before.events)
+    loops: Sequence[Loop] = ()
+    if event.kind == DYNAMIC:
+        test = evaluated[event.run_id] = stationary_tests_of(state.events)[event.run_id]
+        curves = [] if test is None else levels.get(test, [])
+        loops = loops_of(arrival.run.channels, state.geometry, state.record.torque_filter, curves)
+    answer = receipt(
+        before.clutch_id,
+        arrival.run,
+        arrival.analysis,
+        received_at=arrival.received_at,
+        cofs=event.cofs,
+        loops=loops,
+    )
+    return answer, evaluated
 
 
 def _one_step(

@@ -61,7 +61,7 @@ def raw_evidence(campaign: Campaign, without: frozenset[str] = frozenset()) -> t
             dwells.append((record, cut_plateaus(record)))
     records = [whitened_record(record, np.stack([cut.start, cut.stop], axis=1)) for record, cut in dwells]
     records += [whitened_record(record) for _, record in _evenly([(run, run.record) for run in campaign.dynamic])]
-    swings = _lines([record for record in records if record is not None])
+    swings = _swings([record for record in records if record is not None])
     nameless = [replace(swing, effect=FIXED_LINE) if swing.effect in without else swing for swing in swings]
     return (*nameless, *(_unsettled(dwells) if UNSETTLED_DWELL.slug not in without else ()))
 
@@ -75,24 +75,28 @@ def _evenly(runs: Sequence[tuple[Run, Record]]) -> Sequence[tuple[Run, Record]]:
     return [runs[i] for i in np.linspace(0, len(runs) - 1, most).round().astype(int)]
 
 
-def _lines(records: list[WhitenedRecord]) -> list[RawEvidence]:
-    """Ripple and stick-slip; the one with more evidence is taken out of the records before the other is looked for again."""
+def _swings(records: list[WhitenedRecord]) -> list[RawEvidence]:
+    """Of ripple, and of a line of one frequency: stick-slip where only low speeds have it, else a note.
+
+    The one with more evidence is taken out of the records before the other is looked for again.
+    """
     if not records:
         return []
-    order, (line, slow) = best_order(records), _fixed_line(records, None)
+    order = best_order(records)
+    line, slow = _fixed_line(records, None)
     if order.evidence >= line.evidence > LEAST_EVIDENCE:
         line, slow = _fixed_line(records, order)
     elif line.evidence > order.evidence > LEAST_EVIDENCE:
         order = best_order(records, line)
-    lines = []
+    found = []
     if order.evidence > LEAST_EVIDENCE and order.amplitude > 0:
         note = f"torque swings {order.position:g} times a revolution at every speed"
-        lines.append(_line_evidence(SHAFT_RIPPLE.slug, order, "ripple amplitude", note))
+        found.append(_line_evidence(SHAFT_RIPPLE.slug, order, "ripple amplitude", note))
     if line.evidence > LEAST_EVIDENCE and line.amplitude > 0:
         low = f"below {100 * line.speed_share:.0f} % of the highest speed and not above"
         note = f"torque swings at {line.position:.3g} Hz {low if slow else 'at all speeds alike'}"
-        lines.append(_line_evidence(STICK_SLIP.slug if slow else FIXED_LINE, line, "line amplitude", note))
-    return lines
+        found.append(_line_evidence(STICK_SLIP.slug if slow else FIXED_LINE, line, "line amplitude", note))
+    return found
 
 
 def _fixed_line(records: list[WhitenedRecord], order: Line | None) -> tuple[Line, bool]:

@@ -207,7 +207,7 @@ def _notes(
     ended = "ended before its optimum: its probability may be larger than stated."
     notes += [f"The fit with {name} {ended}" for name in unfinished]
     if judgement.verdict in {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}:
-        # an effect in one run alone may bend a better baseline's laws until that run fits
-        alone = outlying_run(baseline.problem, baseline.fit)
-        notes.append(alone or outlying_run(posterior.problem, posterior.null.fit))
+        # the first baseline before the better one, whose laws may have bent until an outlying run fits
+        first_note = outlying_run(baseline.problem, baseline.fit)
+        notes.append(first_note or outlying_run(posterior.problem, posterior.null.fit))
     return tuple(note for note in notes if note)

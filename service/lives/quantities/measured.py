@@ -348,9 +348,10 @@ def pressure_level(measured: MeasuredLife, tracks: ParameterTracks, direct: Trac
         if near is not None:
             progress.append(float(series.scale.progress(event.cycles)))
             fits.append(determined[near])
+    # COF is torque over the pressure that was measured in the first test with COFs, so torque is made with the same pressure
     reference = next((levels for event, levels in tests if event.cofs and levels), ())
-    mean_pressure = {level.fit.pressure: (level.mean_pressure, 0.0) for level in reference}
-    tested, _ = nearest(pressure, mean_pressure) or (pressure, 0.0)
+    measured_at = {level.fit.pressure: level.mean_pressure for level in reference}
+    near = nearest_pressure(pressure, list(measured_at))
     return PressureLevel(
         progress=np.array(progress),
         parameters=np.array([fit.parameters.as_array() for fit in fits]),
@@ -360,7 +361,7 @@ def pressure_level(measured: MeasuredLife, tracks: ParameterTracks, direct: Trac
         cof_progress=np.array([measurement.progress for measurement in series.measurements]),
         cof=np.array([measurement.value for measurement in series.measurements]),
         cof_track=posterior,
-        torque_per_cof=measured.geometry.torque_per_cof(tested),
+        torque_per_cof=measured.geometry.torque_per_cof(pressure if near is None else measured_at[near]),
         reference_cof=measured.life.reference[pressure][0],
     )
 
