@@ -126,6 +126,7 @@ class Effect:
     named: bool = True  # whether it may be named as a cause; else what it explains is uncatalogued and lies on `axis`
     axis: str = ""
     article: str = ""  # what stands before its name where it is the cause (`a`, `changed`)
+    check: str = ""  # what to look at on the rig where it is the cause, after "Next: "
     opposite_physics: str = ""  # a sentence for a negative amplitude, where `physics` holds for a positive one only
 
     def changes(self, scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:

@@ -34,6 +34,7 @@ INERTIA_TORQUE = Effect(
     article="an",
     physics="A mass between clutch and sensor turns with the shaft: the sensor also measures the torque that "
     "accelerates it.",
+    check="look at what turns between the clutch and the torque sensor",
     formula="J dω/dt",
     source="Newton; on the reference's rig the sensor stands on the grounded side, on others it does not",
     kind=Kind.LAG,
@@ -163,6 +164,7 @@ SQUEEZE_FILM = Effect(
     article="a",
     physics="While speed rises the film is still thin from before and more asperities carry: torque is higher than "
     "stationary, also where the curve rises; the GMS attractor cannot reproduce that.",
+    check="repeat a dynamic test at a third of the frequency",
     formula="a (p/5 bar)^x v̇ / (v/v_0 + f)^(y + 1/2), eq. 7's film to first order; or S(w) for S(v) with C_v v^γ (v/w)^s, "
     "ẇ = (v - w)(w/v_0 + f)^y/τ; or a' (p/5 bar)^(1 + x/2) (H - h), τ ḣ = H - h, "
     "H = (v/v_0 + f)^(0.55/(1 + y))",
@@ -189,12 +191,13 @@ SQUEEZE_FILM = Effect(
 )
 
 
-def _vibration(slug: str, title: str, amplitude: str, physics: str, formula: str, source: str) -> Effect:
+def _vibration(slug: str, title: str, amplitude: str, physics: str, check: str, formula: str, source: str) -> Effect:
     """An effect that averages of plateaus and loops do not show."""
     return Effect(
         slug=slug,
         title=title,
         physics=physics,
+        check=check,
         formula=formula,
         source=source,
         kind=Kind.VIBRATION,
@@ -213,6 +216,7 @@ SHAFT_RIPPLE = _vibration(
     "Torque swings with the shaft's turns",
     "amplitude of the ripple",
     "Misalignment, run-out or a coupling: torque swings once or a few times a turn, at a frequency that follows the speed.",
+    "check shaft, discs and coupling for run-out",
     "a cos(k ∫ω dt + φ), k = 1, 2, ...",
     "order analysis of rotating machinery",
 )
@@ -221,6 +225,7 @@ STICK_SLIP = _vibration(
     "Stick-slip or shudder",
     "amplitude of the vibration",
     "Where friction falls with speed the driveline vibrates by itself, at its own frequency and at low speed.",
+    "record two constant low speeds: stick-slip keeps its frequency, a ripple follows the speed",
     "a cos(2π f t + φ) with f that does not follow the speed",
     "Ompusunggu et al. 2013, section 3.1.1: positive slope is anti-shudder",
 )

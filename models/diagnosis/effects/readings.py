@@ -99,8 +99,9 @@ TORQUE_ZERO_SHIFT = Effect(
     slug="torque_zero_shift",
     title="The torque sensor's zero has shifted",
     article="a",
-    physics="The sensor's reading without load is not zero: from a cycle on, drifting with the test's clock (it warms), or "
-    "creeping along the life, by cycles or by days. It adds the same torque at every speed and pressure.",
+    physics="The sensor reads a torque without load: from some cycle on, warming within a test, or creeping along the life. "
+    "It adds the same torque at every speed and pressure.",
+    check="read the torque with the shaft unloaded, before and after a test",
     formula="a · step(ζ > ζ_k), a · t/30 min, a (1 - e^{-t/τ}), or a · (ζ/ζ_last)^q or the same in days, with the sensor's "
     "sign",
     source="strain-gauge transducers: ISO 376, zero drift and creep",
@@ -177,6 +178,7 @@ PRESSURE_OFFSET = Effect(
     title="The pressure reading is off",
     article="a",
     physics="The pressure at the clutch differs from the gauge's reading; the torque changes as it does with pressure.",
+    check="compare the pressure reading with a second gauge at the piston",
     formula="S(p + a) - S(p), a constant, growing as (ζ/ζ_last)^q or towards an end, or from a cycle on",
     source="Ompusunggu et al. 2013, fig. 1: one gauge in the line, none at the piston",
     kind=Kind.ARTEFACT,
@@ -231,6 +233,7 @@ UNSETTLED_DWELL = Effect(
     article="an",
     physics="Friction approaches its steady value exponentially after a step; a reading taken too early still contains a "
     "share of the plateau before.",
+    check="hold each speed longer before it is read",
     formula="a (x_before - S), x = S + k a (x_before - S) what a plateau ends with; a = e^{-dwell/τ} averaged over what was "
     "read",
     source="Ompusunggu et al. 2013, section 2.3.3: 5 s a plateau; real transients in tests/real",
@@ -280,6 +283,7 @@ CHANNEL_DELAY = Effect(
     article="a",
     physics="A filter or the recorder delays torque against speed: while the clutch accelerates, the recorded torque "
     "belongs to an earlier, lower speed.",
+    check="compare the filters of the torque and the speed channel",
     formula="S(v(t - δ)) - S(v(t)), to first order -δ dS/dt",
     source="anti-aliasing filters and multiplexed recorders; no friction is in it",
     kind=Kind.LAG,

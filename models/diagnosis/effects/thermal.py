@@ -87,6 +87,7 @@ OIL_TEMPERATURE = Effect(
     article="changed",
     physics="Oil temperature differed between tests or within them. Thinner oil shears more easily, and its thinner film "
     "lets asperities touch up to a higher speed.",
+    check="compare the oil's temperature between the tests, and hold it or send it",
     formula="C_v |v|^γ ((ν(T)/ν_ref)^β - 1), and V_S (ν(T)/ν_ref)^{κβ} for V_S, ν by ASTM D341 at a film's "
     "temperature, which follows the oil's within τ; κ = -1/γ with β = γ is Hersey's similarity",
     source="ASTM D341-20; M. D. Hersey, J. Wash. Acad. Sci. 4 (1914) 542; Ompusunggu et al. 2013, section 2.3 (80 to 90 °C)",
@@ -163,6 +164,7 @@ INTERFACE_HEATING = Effect(
     title="Frictional heat at the interface lowers the torque",
     physics="Frictional power heats the interface above the oil's temperature; the boundary film and the oil there lose "
     "strength.",
+    check="measure the plate's temperature, or shorten the plateaus of high power",
     formula="-S (1 - e^{-a w}), w the heat flux |S| ω/A over 0.32 W/mm², saturating by s and lagging by τ; S or its "
     "viscous part; where the plate's temperature was measured w is its rise above the oil over that at 0.32 W/mm²",
     source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
@@ -196,6 +198,7 @@ VISCOUS_EXPONENT = Effect(
     article="a different",
     physics="Viscous torque does not grow with the model's power of speed, 0.3: grooves, porosity or another oil give "
     "another one.",
+    check="look up which oil is in, and whether the grooves are worn",
     formula="C_v |v|^γ ((|v|/v_0)^δ - 1), v_0 the middle of the speeds",
     source="Ompusunggu et al. 2013, section 3.1.2: γ = 0.3 fixed beforehand",
     kind=Kind.ARTEFACT,
@@ -233,6 +236,7 @@ HYDRODYNAMIC_DRAG = Effect(
     slug="hydrodynamic_drag",
     title="Hydrodynamic drag beside the friction",
     physics="Oil sheared in grooves and gaps adds a torque that grows with speed and viscosity, whatever the pressure.",
+    check="measure the torque with the clutch open",
     formula="a (v/v_0)^m (1 + r)/(1 + r (v/v_0)²) (ν(T)/ν_ref)^t, v_0 the middle of the speeds",
     source="Kato et al., drag torque of disengaged wet clutches; Newtonian shear in an annular gap",
     kind=Kind.ARTEFACT,

@@ -104,10 +104,8 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
     """Why an extension is not proposed, or nothing where one is or none was fitted. The verdict stays."""
     if not sizes.draws:
         return ""
-    if gain is not None and gain.rmse_after > criteria.MOST_WORSE * gain.rmse_before:
-        return "No extended model is offered: its error on left-out runs is larger than the baseline's."
-    if gain is not None and gain.log_score_gain < 0:
-        return "No extended model is offered: the baseline predicts left-out runs better."
+    if gain is not None and (gain.rmse_after > criteria.MOST_WORSE * gain.rmse_before or gain.log_score_gain < 0):
+        return "Nothing is offered to adopt: runs left out of the fit are predicted better without it."
     sentences = []
     for slug, size in sizes.by_slug.items():
         if size.other_sign > criteria.SIGN_UNDETERMINED:
@@ -115,7 +113,7 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
             low, high = (number(effect.scale * end) for end in size.interval)
             course = "it depends on the assumed course over life, and " if size.courses else ""
             sentences.append(
-                f"No extended model is offered: these data do not determine the size of {effect_name(slug)} (90 % interval "
+                f"Nothing is offered to adopt: these data do not determine the size of {effect_name(slug)} (90 % interval "
                 f"{low} to {high} {effect.unit}); {course}its sign may be wrong with probability {size.other_sign:.2f}."
             )
     return " ".join(sentences)

@@ -29,8 +29,19 @@ _AXES = {
     CYCLES: "cycles",
     CLOCK: "the time since the test began",
     TEMPERATURE: "oil temperature",
-    PHASE: "the phase of the loops",
+    PHASE: "the place within a dynamic test's loop",
     FREQUENCY: "frequency, in the raw records",
+}
+#: What to look at where an error that has no name depends on an axis.
+_LOOK_AT = {
+    PRESSURE: "the pressure sensor and what holds the pressure",
+    TORQUE: "the torque sensor's scale",
+    SPEED: "the speed signal and what rubs beside the clutch",
+    CYCLES: "what was changed between the tests",
+    CLOCK: "what warms or drifts during a test",
+    TEMPERATURE: "the oil's thermometer and the plate's temperature",
+    PHASE: "filters and delays between the channels",
+    FREQUENCY: "what turns, or is driven, like that",
 }
 
 
@@ -68,20 +79,15 @@ def with_unit(text: str, unit: str) -> str:
 
 
 def signed(estimate: Estimate) -> str:
-    """Value with its 90 % interval where one is stated, else with its deviation (to the second digit of that), and where the
-    sign is open its probability: said to be open where the interval holds both signs."""
+    """Value with its 90 % interval, and where the sign is open its probability: said to be open where the interval holds
+    both signs."""
     sign = None if estimate.one_sided else estimate.sign_probability
-    (low, high), sd, unit = estimate.interval, estimate.sd, estimate.unit
-    size, stated = number(estimate.value), estimate.stated_interval is not None
-    if stated:
-        size = f"{with_unit(size, unit)}, 90 % interval {number(low)} to {number(high)}"
-    elif sd > 0:
-        digits = max(0, 1 - math.floor(math.log10(sd)))
-        rounded = f"{_signed(f'{estimate.value:.{digits}f}')} ± {sd:.{digits}f}"
-        size = rounded if digits <= 5 else f"{size} ± {number(sd)}"
-    size = f"{estimate.name}: {with_unit(size, unit)}"
+    (low, high), unit = estimate.interval, estimate.unit
+    size = f"{estimate.name}: {with_unit(number(estimate.value), unit)}"
+    if high > low:
+        size += f", 90 % interval {number(low)} to {with_unit(number(high), unit)}"
     # where it holds one sign the interval says it
-    if sign is None or (stated and not low < 0.0 < high and sign > 0.99):
+    if sign is None or (not low < 0.0 < high and sign > 0.99):
         return size
     way = f"{'negative' if estimate.value < 0 else 'positive'} with probability {probability(sign)}"
     return f"{size}, the sign is open ({way})" if low < 0.0 < high else f"{size}, {way}"
@@ -164,7 +170,6 @@ def _adequate(report: Report) -> list[Sentence]:
     return sentences
 
 
-_HARDEST_FORM = " in its least visible form"
 #: What an engineer asks for first: what the paragraph always gives, where the data show it in some form.
 _ASKED_FIRST = ("torque_zero_shift", "pressure_offset")
 
@@ -178,25 +183,29 @@ def _detection_limits(report: Report) -> list[Sentence]:
     first = [*first, *(v for v in order if v not in first)][: criteria.VISIBLE_MENTIONED]
     sentences = []
     if first:
-        shown = [_shown(visible) for visible in first]
-        before, form, after = listed(shown).partition(_HARDEST_FORM)
-        sizes = f"{before}{form}{after.replace(_HARDEST_FORM, '')}"  # explained once
-        sentences = [Sentence(f"These data would show, in nine of ten cases, {sizes}.")]
+        least = listed(
+            [f"{_sized_effect(visible)} from {_threshold(visible.least, visible.unit)} on" for visible in first]
+        )
+        hardest = [
+            f"only from {_threshold(visible.amplitude, visible.unit)}"
+            if math.isfinite(visible.amplitude)
+            else "not at all"
+            for visible in first
+        ]
+        forms = "their least visible forms" if len(first) > 1 else "its least visible form"
+        shown = f"Nine times in ten, these data would show {least}; in {forms} {listed(hardest)}."
+        sentences = [Sentence(shown)]
     if report.unseen:
         names = listed([effect_name(slug) for slug in report.unseen])
         sentences.append(Sentence(f"These data cannot show, at any size: {names}.", SHOULD))
     return sentences
 
 
-def _shown(visible: Visible) -> str:
-    """The smallest sizes that show, `a torque zero shift from 0.64 Nm (from 11 Nm in its least visible form)`."""
-    name = _with_article(visible.effect)
+def _sized_effect(visible: Visible) -> str:
+    """What has the size: `a torque zero shift`; where that has no unit, its name too."""
     if visible.unit == "-":
-        name = f"{BY_SLUG[visible.effect].amplitude} of {effect_name(visible.effect)}"
-    hardest = "not at all in the least visible form"
-    if math.isfinite(visible.amplitude):
-        hardest = f"from {_threshold(visible.amplitude, visible.unit)}{_HARDEST_FORM}"
-    return f"{name} from {_threshold(visible.least, visible.unit)} ({hardest})"
+        return f"{BY_SLUG[visible.effect].amplitude} of {effect_name(visible.effect)}"
+    return _with_article(visible.effect)
 
 
 def _threshold(value: float, unit: str) -> str:
@@ -209,7 +218,7 @@ def _scatter(scatter: RunScatter | None) -> str:
         return ""
     median, lower, upper = (f"{100 * share:.2g}" for share in (scatter.median, scatter.lower, scatter.upper))
     if scatter.assumed:
-        return f" (assumed to be {median} % of the torque; these data hardly show it)"
+        return f" (taken as {median} % of the torque; these data can hardly tell)"
     return f" ({median} % of the torque; 90 % interval {lower} to {upper} %)"
 
 
@@ -224,8 +233,9 @@ def _named(report: Report) -> list[Sentence]:
         if item.effect in causes:
             effect, below = BY_SLUG[item.effect], item.estimate.value < 0
             physics = effect.opposite_physics if below and effect.opposite_physics else effect.physics
-            sentences += [Sentence(physics, SHOULD), Sentence(f"{_capitalised(signed(item.estimate))}.")]
-    sentences.append(Sentence(_error(report), MAY))
+            seen = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{item.effect}: ")]
+            sentences += [Sentence(physics, SHOULD), *(Sentence(_capitalised(note)) for note in seen)]
+            sentences.append(Sentence(f"{_capitalised(signed(item.estimate))}."))
     companions = [
         f"{effect_name(item.effect)} (probability {probability(item.probability)})"
         for item in report.candidates
@@ -247,7 +257,7 @@ def _ambiguous(report: Report) -> list[Sentence]:
     sized = {candidate.effect: candidate.estimate for candidate in report.candidates}
     shares = probabilities_by_slug(report.explanations)
     sure = tuple(slug for slug in report.causes if shares.get(slug, 0.0) >= criteria.SURE)
-    near = smallest({item.effects: item.probability for item in report.explanations})
+    near = _worth_saying(report)
     choices = []
     for item in (item for item in report.explanations if item.effects in near and set(sure) <= set(item.effects)):
         names = [_cause_name(slug) for slug in item.effects if slug not in sure]
@@ -260,16 +270,21 @@ def _ambiguous(report: Report) -> list[Sentence]:
         ]
         choices.append((" together with ".join(names) or "nothing", probability(item.probability), sizes))
     certain = [Sentence(f"{_capitalised(signed(sized[slug]))}.") for slug in sure if slug in sized]
-    remaining = [Sentence(_error(report), MAY), *_gained(report), *_next(report)]
+    remaining = [*_gained(report), *_next(report)]
     descriptions = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in choices]
-    ways = [descriptions]  # then without sizes, which are in the report's fields, and with fewer probabilities
+    others = sum(item.probability for item in report.explanations if item.effects and item.effects not in near)
+    rest = [f"others ({probability(others)})"] if others >= 0.005 and not sure else []
+    ways = [
+        [*descriptions, *rest]
+    ]  # then without sizes, which are in the report's fields, and with fewer probabilities
     for shown in range(min(len(choices), 8), 0, -1):
         brief = [
             f"{name.partition(', such as ')[0]} ({'; '.join((chance, *(size for size in sizes if size == _NO_SIZE)))})"
             for name, chance, sizes in choices[:shown]
         ]
         other_names = [effect_name(slug) for slug in report.causes if slug not in {*sure, UNCATALOGUED}]
-        ways.append([*brief, *(name for name in other_names if not any(name in alternative for alternative in brief))])
+        unsaid = [name for name in other_names if not any(name in alternative for alternative in brief)]
+        ways.append([*brief, *(unsaid or rest)])
     for alternatives in ways:
         sentences = [*_open(report, sure, certain, alternatives), *remaining]
         if _words([sentence for sentence in sentences if sentence.matters == MUST]) <= criteria.MAX_WORDS:
@@ -277,19 +292,25 @@ def _ambiguous(report: Report) -> list[Sentence]:
     return sentences
 
 
+def _worth_saying(report: Report) -> list[tuple[str, ...]]:
+    """The fewest explanations that are SURE to hold the truth if anything is at work, without those that are far less
+    probable than the first."""
+    shares = {item.effects: item.probability for item in report.explanations}
+    near = smallest(shares)
+    return [effects for effects in near if shares[effects] > (1.0 - criteria.SURE) * shares[near[0]]]
+
+
 def _open(
     report: Report, sure: Sequence[str], certain: Sequence[Sentence], alternatives: Sequence[str]
 ) -> list[Sentence]:
     """What is certain with its size, and the alternatives in words."""
     if not sure:
-        first = "One explanation remains (with its probability)"
-        if len(alternatives) > 1:
-            first = "These data cannot distinguish between the following explanations (with probabilities)"
         wrong = 1.0 - sum(item.probability for item in report.explanations if not item.effects)
         disagree = f"probably disagree with the model (probability {probability(wrong)})"
         if wrong > 0.99:
             disagree = "disagree with the model"
-        return [Sentence(f"The data {disagree}. {first}: {listed(alternatives)}.")]
+        first = "Explanations that remain, with their probabilities"
+        return [Sentence(f"The data {disagree}. {first}: {listed(alternatives, 'or')}.")]
     share = sum(item.probability for item in report.explanations if set(sure) <= set(item.effects))
     verb = "is at work" if len(sure) == 1 else "are at work"
     names_in_words = f"{listed([_with_article(slug) for slug in sure])} {verb} (probability {probability(share)})"
@@ -312,39 +333,29 @@ def _unexplained(report: Report) -> list[Sentence]:
         f"The model is wrong in a way that no effect of the catalogue explains (probability {probability(unknown)}), "
     )
     first += f"so no cause is named.{resembles}"
-    repeat_advice = (
-        "Next: repeat the last test at once. If the error is gone, it came from one run; if it stays, look for"
-    )
-    swings = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{FIXED_LINE}: ")]
-    if swings and _axes(report.baseline).startswith(_AXES[FREQUENCY]):
-        swing_sentences = [Sentence(f"In the raw records {swing}") for swing in swings]
-        return [Sentence(first), *swing_sentences, Sentence(f"{repeat_advice} what turns, or is driven, like that.")]
-    where = _axes(report.baseline) or "the rig"
-    return [
-        Sentence(first),
-        Sentence(_error(report)),
-        *_gained(report),
-        Sentence(f"{repeat_advice} what depends on {where}."),
+    axes = [
+        where.axis for where in ([] if report.baseline is None else report.baseline.where[:2]) if where.strength > 0
     ]
+    swings = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{FIXED_LINE}: ")]
+    if swings and axes[:1] == [FREQUENCY]:
+        sentences, axes = [Sentence(f"In the raw records {swing}") for swing in swings], [FREQUENCY]
+    else:
+        sentences = [Sentence(_error(report.baseline, axes)), *_gained(report)]
+    look_at = listed([_LOOK_AT[axis] for axis in axes]) or "the rig"
+    again = "Next: repeat the last test at once and diagnose again. If the error is gone, one run caused it; if not, look at"
+    return [Sentence(first), *sentences, Sentence(f"{again} {look_at}.")]
 
 
-def _error(report: Report) -> str:
+def _error(misfit: Misfit | None, axes: Sequence[str]) -> str:
     """The baseline's error, and what it depends on."""
-    misfit = report.baseline
     if misfit is None:
         return ""
-    error = f"The baseline is off by {number(misfit.rmse)} Nm RMS"
-    where = _axes(misfit)
+    size, where = number(misfit.rmse), listed([_AXES[axis] for axis in axes])
     if misfit.rmse <= misfit.noise:
-        pattern = f", but in a pattern that depends on {where}" if where else ""
-        return f"{error}, as much as noise alone gives{pattern}."
-    rest_in_words = f"; the rest depends on {where}" if where else ""
-    return f"{error}, where noise alone gives {number(misfit.noise)} Nm{rest_in_words}."
-
-
-def _axes(misfit: Misfit | None) -> str:
-    shown = () if misfit is None else misfit.where[:2]
-    return " and ".join(_AXES[axis.axis] for axis in shown if axis.strength > 0)
+        pattern = f", but it is not random: it depends on {where}" if where else ""
+        return f"The error is small ({size} Nm RMS, no more than the noise){pattern}."
+    depends = f", and depends on {where}" if where else ""
+    return f"The error is {size} Nm RMS, where noise alone gives {number(misfit.noise)} Nm{depends}."
 
 
 def _gained(report: Report) -> list[Sentence]:
@@ -354,24 +365,22 @@ def _gained(report: Report) -> list[Sentence]:
         return [Sentence(report.not_adoptable)]
     if gain is None:
         return []
-    model = {
-        Verdict.CAUSE_AMBIGUOUS: f"the model with {' and '.join(map(effect_name, report.extended_effects))}",
-        Verdict.UNEXPLAINED_STRUCTURE: "the model with a smooth correction",
-    }.get(report.verdict, "the extended model")
+    added = "it" if len(report.causes) == 1 else "them"
+    if report.verdict is not Verdict.CAUSE_NAMED:
+        added = listed([effect_name(slug) for slug in report.extended_effects] or ["a smooth correction"])
     way = "smaller" if gain.reduction_percent >= 0 else "larger"
-    change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} % {way} than the baseline's"
+    change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} % {way}"
     hardest = _hardest(gain, report.extended)
-    sentences = [Sentence(f"On left-out runs, the error of {model} is {change}.{hardest}", SHOULD)]
+    left_out = f"With {added} in the model, the error on runs left out of the fit is {change}.{hardest}"
+    sentences = [Sentence(left_out, SHOULD)]
     if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         return sentences
-    better, then = "better", "lets the effect go on developing"
-    may = "; it can be adopted" if report.extension is not None else ""
-    if not gain.forecast_log_score_gain > 0:
-        better, then, may = "no better", "leaves the effect's development out", ""
-    ahead = f"From the earlier tests, {model} predicts the last ones {better} than the baseline{may}."
+    better, further = ("better", "with") if gain.forecast_log_score_gain > 0 else ("no better", "without")
+    ahead = f"With {added} in the model, the last tests are predicted {better} from the earlier ones"
+    ahead += "; it can be adopted." if report.extension is not None and further == "with" else "."
     adoptable = () if report.extension is None else report.extension.effects
     if any(BY_SLUG[slug].kind is Kind.COURSE for slug in adoptable):
-        ahead += f" If you adopt it, the predicted remaining life {then}."
+        ahead += f" If you adopt it, remaining life is predicted {further} its further course."
     return [*sentences, Sentence(ahead, SHOULD if report.verdict is Verdict.CAUSE_AMBIGUOUS else MUST)]
 
 
@@ -388,23 +397,33 @@ def _hardest(gain: Gain, extended: Misfit | None) -> str:
 
 
 def _next(report: Report) -> list[Sentence]:
-    """The first test of the plan, and what it is good for."""
+    """What to look at of a named cause, and the first test of the plan with what it is good for; where no test is, what to
+    look at of the likeliest explanation."""
+    looked_at: Sequence[str] = ()
+    if report.verdict is Verdict.CAUSE_NAMED:
+        looked_at = report.causes
+    elif not report.advice:
+        looked_at = next(iter(_worth_saying(report)), ())
+    checks = [BY_SLUG[slug].check for slug in looked_at if slug in BY_SLUG]
+    sentences = [Sentence(f"Next: {'; '.join(checks)}.")] if checks else []
     if not report.advice:
-        if report.extension is not None:
-            return [Sentence("No test in the plan would tell much more.")]
-        look = "Next: look for it at the rig."
-        return [Sentence(look)] if report.verdict is Verdict.CAUSE_NAMED and report.gain is None else []
+        no_more = "" if report.gain is None else "No test in the plan would tell much more."
+        return [*sentences, Sentence(no_more, SHOULD)]
     best = report.advice[0]
     if best.narrows:
-        left = f"its uncertainty falls by {100 * (1 - best.narrows):.0f} %"
-        amplitude = BY_SLUG[best.effect].amplitude
-        return [Sentence(f"Next, to measure the {amplitude} better: {brief_test(best)}; {left}.")]
-    first = "No single test would decide. The best" if best.nats < criteria.WORTHWHILE else "Next"
-    hardest = f"hardest to tell apart: {_cause_name(best.effect)} and {_cause_name(best.other)}"
+        narrower = f"its interval narrows by {100 * (1 - best.narrows):.0f} %"
+        size = "its size" if len(report.causes) == 1 else f"the {BY_SLUG[best.effect].amplitude}"
+        return [*sentences, Sentence(f"To measure {size} better: {brief_test(best)}; {narrower}.")]
+    first = "Then" if sentences else "Next"
+    if best.nats < criteria.WORTHWHILE:
+        first = "No single test would decide. The best"
+    hardest = f" (hardest to tell apart: {_cause_name(best.effect)} and {_cause_name(best.other)})"
     if best.other == BASELINE:
-        hardest = f"hardest to tell: whether {_cause_name(best.effect)} is at work"
-    left = f"It leaves one explanation with probability {probability(best.probability)}"
-    return [Sentence(f"{first}: {brief_test(best)}. {left} ({hardest}).")]
+        hardest = f" (hardest to tell: whether {_cause_name(best.effect)} is at work)"
+    elif len(_worth_saying(report)) == 2:
+        hardest = ""
+    decides = f"The probability that it decides is {probability(best.probability)}{hardest}"
+    return [*sentences, Sentence(f"{first}: {brief_test(best)}. {decides}.")]
 
 
 #: Words from which a test is put shortly. The longest test of one kind has 16, two kinds take 29 and more.

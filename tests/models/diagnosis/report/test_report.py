@@ -53,8 +53,8 @@ def reported(
     [
         (GAIN, ""),
         (None, ""),
-        (WORSE, "the baseline predicts left-out runs better"),
-        (LARGER, "error on left-out runs is larger"),
+        (WORSE, "runs left out of the fit are predicted better without it"),
+        (LARGER, "runs left out of the fit are predicted better without it"),
     ],
 )
 def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(given, posterior, gain, why):
@@ -128,7 +128,7 @@ def test_the_size_of_a_swing_has_no_sign(given: Study) -> None:
     raw = (RawEvidence(effect="shaft_ripple", log_evidence=50.0, estimate=estimate, note="it swings"),)
     found = posterior_of(given.baseline, raw)
     (ripple,) = (c for c in candidates_of(found.problem, judge(found), raw, {}) if c.effect == "shaft_ripple")
-    assert signed(ripple.estimate) == "ripple amplitude: 0.500 ± 0.020 Nm"
+    assert signed(ripple.estimate) == "ripple amplitude: 0.5 Nm, 90 % interval 0.467 to 0.533 Nm"
 
 
 # --- Residual maps against means taken row by row, NaN where nothing was measured, loops as they were measured.
