@@ -90,7 +90,8 @@ def _swings(records: list[WhitenedRecord]) -> list[RawEvidence]:
         order = best_order(records, line)
     found = []
     if order.evidence > LEAST_EVIDENCE and order.amplitude > 0:
-        note = f"torque swings {order.position:g} times a revolution at every speed"
+        times = {1.0: "once", 2.0: "twice"}.get(order.position, f"{order.position:g} times")
+        note = f"torque swings {times} a revolution at every speed"
         found.append(_line_evidence(SHAFT_RIPPLE.slug, order, "ripple amplitude", note))
     if line.evidence > LEAST_EVIDENCE and line.amplitude > 0:
         low = f"below {100 * line.speed_share:.0f} % of the highest speed and not above"

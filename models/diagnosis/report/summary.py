@@ -376,7 +376,7 @@ def _gained(report: Report) -> list[Sentence]:
     if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         return sentences
     better, further = ("better", "with") if gain.forecast_log_score_gain > 0 else ("no better", "without")
-    ahead = f"With {added} in the model, the last tests are predicted {better} from the earlier ones"
+    ahead = f"The last tests are predicted {better} from the earlier ones with {added} in the model"
     ahead += "; it can be adopted." if report.extension is not None and further == "with" else "."
     adoptable = () if report.extension is None else report.extension.effects
     if any(BY_SLUG[slug].kind is Kind.COURSE for slug in adoptable):
@@ -399,12 +399,11 @@ def _hardest(gain: Gain, extended: Misfit | None) -> str:
 def _next(report: Report) -> list[Sentence]:
     """What to look at of a named cause, and the first test of the plan with what it is good for; where no test is, what to
     look at of the likeliest explanation."""
-    looked_at: Sequence[str] = ()
-    if report.verdict is Verdict.CAUSE_NAMED:
-        looked_at = report.causes
-    elif not report.advice:
-        looked_at = next(iter(_worth_saying(report)), ())
-    checks = [BY_SLUG[slug].check for slug in looked_at if slug in BY_SLUG]
+    looked_at = [report.causes] if report.verdict is Verdict.CAUSE_NAMED else []
+    if not looked_at and not report.advice:
+        looked_at = _worth_saying(report)
+    known = ([BY_SLUG[slug].check for slug in effects if slug in BY_SLUG] for effects in looked_at)
+    checks = next(filter(None, known), [])
     sentences = [Sentence(f"Next: {'; '.join(checks)}.")] if checks else []
     if not report.advice:
         no_more = "" if report.gain is None else "No test in the plan would tell much more."

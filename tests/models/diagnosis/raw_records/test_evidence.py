@@ -157,7 +157,7 @@ def test_ripple_is_found_at_its_order_with_its_amplitude() -> None:
     rng = np.random.default_rng(1)
     evidence = raw_evidence(campaign([with_ripple(stepped(rng), 0.03, 2.0) for _ in range(2)], []))
     assert [each.effect for each in evidence] == ["shaft_ripple"]
-    assert "2 times a revolution" in evidence[0].note
+    assert "twice a revolution" in evidence[0].note
     assert evidence[0].estimate.value == pytest.approx(0.03, rel=0.25)
 
 
@@ -245,7 +245,7 @@ def test_ripple_is_found_between_slow_reversals(order: float) -> None:
     given = campaign([], [with_ripple(record, 0.05, order, 100.0) for record in records])
     (evidence,) = raw_evidence(given)
     assert evidence.effect == "shaft_ripple"
-    assert f"{order:g} times a revolution" in evidence.note
+    assert f"{ {1.0: 'once', 2.0: 'twice'}[order] } a revolution" in evidence.note
     assert evidence.estimate.value == pytest.approx(0.05, rel=0.25)
 
 
