@@ -34,7 +34,7 @@ INERTIA_TORQUE = Effect(
     article="an",
     physics="A mass between clutch and sensor turns with the shaft: the sensor also measures the torque that "
     "accelerates it.",
-    check="look at what turns between the clutch and the torque sensor",
+    check="compare it with the inertia of what turns between the clutch and the torque sensor",
     formula="J dω/dt",
     source="Newton; on the reference's rig the sensor stands on the grounded side, on others it does not",
     kind=Kind.LAG,
@@ -164,7 +164,7 @@ SQUEEZE_FILM = Effect(
     article="a",
     physics="While speed rises the film is still thin from before and more asperities carry: torque is higher than "
     "stationary, also where the curve rises; the GMS attractor cannot reproduce that.",
-    check="repeat a dynamic test at a third of the frequency",
+    check="repeat a dynamic test at a third of the frequency: its loop must narrow",
     formula="a (p/5 bar)^x v̇ / (v/v_0 + f)^(y + 1/2), eq. 7's film to first order; or S(w) for S(v) with C_v v^γ (v/w)^s, "
     "ẇ = (v - w)(w/v_0 + f)^y/τ; or a' (p/5 bar)^(1 + x/2) (H - h), τ ḣ = H - h, "
     "H = (v/v_0 + f)^(0.55/(1 + y))",

@@ -99,8 +99,7 @@ TORQUE_ZERO_SHIFT = Effect(
     slug="torque_zero_shift",
     title="The torque sensor's zero has shifted",
     article="a",
-    physics="The sensor reads a torque without load: from some cycle on, warming within a test, or creeping along the life. "
-    "It adds the same torque at every speed and pressure.",
+    physics="The sensor reads a torque without load, which it adds at every speed and pressure alike.",
     check="read the torque with the shaft unloaded, before and after a test",
     formula="a · step(ζ > ζ_k), a · t/30 min, a (1 - e^{-t/τ}), or a · (ζ/ζ_last)^q or the same in days, with the sensor's "
     "sign",

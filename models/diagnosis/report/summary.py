@@ -183,29 +183,21 @@ def _detection_limits(report: Report) -> list[Sentence]:
     first = [*first, *(v for v in order if v not in first)][: criteria.VISIBLE_MENTIONED]
     sentences = []
     if first:
-        least = listed(
-            [f"{_sized_effect(visible)} from {_threshold(visible.least, visible.unit)} on" for visible in first]
-        )
-        hardest = [
-            f"only from {_threshold(visible.amplitude, visible.unit)}"
-            if math.isfinite(visible.amplitude)
-            else "not at all"
-            for visible in first
-        ]
-        forms = "their least visible forms" if len(first) > 1 else "its least visible form"
-        shown = f"Nine times in ten, these data would show {least}; in {forms} {listed(hardest)}."
-        sentences = [Sentence(shown)]
+        sizes = listed([_shown(visible) for visible in first])
+        sentences = [Sentence(f"Nine times in ten, these data would show {sizes}.")]
     if report.unseen:
         names = listed([effect_name(slug) for slug in report.unseen])
         sentences.append(Sentence(f"These data cannot show, at any size: {names}.", SHOULD))
     return sentences
 
 
-def _sized_effect(visible: Visible) -> str:
-    """What has the size: `a torque zero shift`; where that has no unit, its name too."""
+def _shown(visible: Visible) -> str:
+    """The smallest sizes that show, `a torque zero shift from 0.64 Nm (least visible form: 11 Nm)`."""
+    name = _with_article(visible.effect)
     if visible.unit == "-":
-        return f"{BY_SLUG[visible.effect].amplitude} of {effect_name(visible.effect)}"
-    return _with_article(visible.effect)
+        name = f"{BY_SLUG[visible.effect].amplitude} of {effect_name(visible.effect)}"
+    hardest = _threshold(visible.amplitude, visible.unit) if math.isfinite(visible.amplitude) else "never"
+    return f"{name} from {_threshold(visible.least, visible.unit)} (least visible form: {hardest})"
 
 
 def _threshold(value: float, unit: str) -> str:
@@ -406,7 +398,7 @@ def _next(report: Report) -> list[Sentence]:
     checks = next(filter(None, known), [])
     sentences = [Sentence(f"Next: {'; '.join(checks)}.")] if checks else []
     if not report.advice:
-        no_more = "" if report.gain is None else "No test in the plan would tell much more."
+        no_more = "" if report.gain is None else "No further test would tell much more."
         return [*sentences, Sentence(no_more, SHOULD)]
     best = report.advice[0]
     if best.narrows:

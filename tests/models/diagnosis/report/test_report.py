@@ -53,8 +53,8 @@ def reported(
     [
         (GAIN, ""),
         (None, ""),
-        (WORSE, "runs left out of the fit are predicted better without it"),
-        (LARGER, "runs left out of the fit are predicted better without it"),
+        (WORSE, "is known too little to predict left-out runs"),
+        (LARGER, "is known too little to predict left-out runs"),
     ],
 )
 def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(given, posterior, gain, why):
