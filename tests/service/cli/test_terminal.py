@@ -230,21 +230,16 @@ def test_photographs_are_sent_and_repeated_safely(terminal: Terminal, client: Te
     for _ in range(2):
         shown = terminal(*inspect, *photographs)
         assert all(words in shown for words in ("11,000", "side A", "1.94", "-3.4", "accepted"))
+        assert "withdrawn" not in shown
         (stored,) = client.get(LIST).json()["items"]
         assert [photograph["photograph_id"] for photograph in stored["photographs"]] == [sha256(png(1)), sha256(png(2))]
         assert stored["performed_at"].startswith("2026-11-02T08:00:00")
     assert stored["inspection_id"] in terminal("inspections", "c1")
     assert json.loads(terminal("inspections", "c1", "--json")) == [stored]
-
-
-def test_an_inspection_withdrawn_and_sent_again_stays_withdrawn(terminal: Terminal, client: TestClient) -> None:
-    inspect = ("inspect", "c1", "--cycles", 11000, "--ra", 1.94)
-    assert "withdrawn" not in terminal(*inspect)
-    (stored,) = client.get(LIST).json()["items"]
     address = f"{LIST}/{stored['inspection_id']}"
     assert client.post(f"{address}/withdraw", json={"reason": "another disc"}).status_code == 200
-    shown = terminal(*inspect)
-    assert f"{stored['inspection_id']} was stored earlier and then withdrawn: it stays withdrawn" in shown
+    again = terminal(*inspect, *photographs)
+    assert f"{stored['inspection_id']} was stored earlier and then withdrawn: it stays withdrawn" in again
     assert client.get(address).json()["state"] == "withdrawn"
 
 
@@ -311,23 +306,19 @@ def test_a_clutch_is_one_archive_with_its_tables(terminal: Terminal, client: Tes
     assert runs[2][runs[0].index("cycles")] == 1000.0
 
 
-def test_a_workbook_computes_nothing_and_takes_any_text(tmp_path: Path) -> None:
-    path = tmp_path / "a.xlsx"
-    rows = [["=1+1", "1e3", "", "a<b & \x00c", "1_000", "nan"]]
-    write_workbook(path, {"x" * 40: rows})
-    book = CalamineWorkbook.from_path(str(path))
-    assert book.sheet_names == ["x" * 31]
-    assert book.get_sheet_by_index(0).to_python() == [["=1+1", 1000.0, "", "a<b & c", "1_000", "nan"]]
-
-
-def test_the_same_tables_are_the_same_workbook_at_any_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    written = []
+def test_a_workbook_computes_nothing_takes_any_text_and_is_the_same_at_any_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, written = tmp_path / "a.xlsx", []
     for seconds in (1_700_000_000.0, 1_800_000_000.0):
         monkeypatch.setattr("time.time", lambda at=seconds: at)
         monkeypatch.setattr("time.localtime", lambda _=None, at=seconds: gmtime(at))
-        write_workbook(tmp_path / "a.xlsx", {"x": [["cycles", "mean_cof"], ["1000", ".13"]]})
-        written.append((tmp_path / "a.xlsx").read_bytes())
+        write_workbook(path, {"x" * 40: [["=1+1", "1e3", "", "a<b & \x00c", "1_000", "nan"]]})
+        written.append(path.read_bytes())
     assert written[0] == written[1]
+    book = CalamineWorkbook.from_path(str(path))
+    assert book.sheet_names == ["x" * 31]
+    assert book.get_sheet_by_index(0).to_python() == [["=1+1", 1000.0, "", "a<b & c", "1_000", "nan"]]
 
 
 # --- A working day: register, list, status, watch, alarms; what a mistyped name leaves behind.

@@ -168,7 +168,8 @@ def life(exponent: float, steps: tuple[float, ...] = (10e3, 20e3, 40e3), seed: i
 
 
 @pytest.mark.parametrize("exponent", [0.0, 1.0, 2.0])
-def test_energy_that_steps_tells_its_exponent(exponent: float) -> None:
+def test_energy_that_steps_tells_its_exponent_and_doubts_another(exponent: float) -> None:
+    """By cycles, whose exponent is 0, where wear goes with energy."""
     found = severity_estimate(life(exponent), Assumptions())
     assert found is not None
     assert found.basis is SeverityBasis.DISSIPATED_ENERGY
@@ -176,16 +177,11 @@ def test_energy_that_steps_tells_its_exponent(exponent: float) -> None:
     assert found.probability[SEVERITY_EXPONENTS.index(exponent)] > 0.5
     assert found.probability.sum() == pytest.approx(1.0)
     assert abs(found.mean - exponent) < 3.0 * max(found.deviation, 0.05)
-
-
-def test_an_exponent_that_the_tests_contradict_is_doubted() -> None:
-    """By cycles, whose exponent is 0, where wear goes with energy; not by energy itself."""
-    found = severity_estimate(life(1.0), Assumptions())
-    assert found is not None
-    (doubt,) = found.doubts(Severity(basis=SeverityBasis.CYCLES))
-    assert doubt.code == "severity_exponent"
-    assert "wear grows with dissipated energy to the power of 1" in doubt.message
-    assert found.doubts(Severity(basis=SeverityBasis.DISSIPATED_ENERGY, exponent=1.0)) == []
+    by_cycles, work = Severity(basis=SeverityBasis.CYCLES), SeverityBasis.DISSIPATED_ENERGY
+    doubts = found.doubts(by_cycles)
+    assert [doubt.code for doubt in doubts] == ["severity_exponent"] * (exponent > 0)
+    assert all(f"wear grows with dissipated energy to the power of {exponent:g}" in doubt.message for doubt in doubts)
+    assert found.doubts(Severity(basis=work, exponent=exponent) if exponent else by_cycles) == []
 
 
 def test_nothing_is_weighed_where_nothing_tells() -> None:

@@ -131,19 +131,12 @@ def test_what_is_said_of_held_runs_does_not_depend_on_the_order_of_arrival(
 def summary(left: float | None, **other: Any) -> dict[str, Any]:
     """A clutch 10,000 cycles old with so many left at every quantile."""
     quantiles = {f"{level:g}": left for level in QUANTILES}
-    criterion = {
-        "quantity": "slope",
-        "speed_rpm": 100,
-        "pressure_bar": 5,
-        "fraction": None,
-        "below": 0.0,
-        "above": None,
-    }
+    limit = {"quantity": "slope", "speed_rpm": 100, "pressure_bar": 5, "fraction": None, "below": 0.0, "above": None}
     return {
         "status": "predicted", "as_of_cycles": 10_000, "from_cycles": 0, "runs_used": 9, "at_least": left,
         "remaining_cycles": quantiles, "current": {"health": 0.5, "measured_at_cycles": 9_000},
         "end_of_life_cycles": dict.fromkeys(quantiles, None if left is None else 9000 + left),
-        "criterion": criterion, "held": 0, "with_held": None,
+        "criterion": limit, "held": 0, "with_held": None,
         "probability_of_reaching": 0.94, **other,
     }  # fmt: skip
 

@@ -5,6 +5,7 @@ import multiprocessing.connection
 import os
 import pickle
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from signal import SIGKILL, SIGSTOP, pause
 
@@ -26,25 +27,21 @@ IN_TIME = 120.0
 
 
 @pytest.fixture
-def database(tmp_path: Path) -> Iterator[Database]:
-    opened = open_database(f"sqlite:///{tmp_path / 'a.db'}")
-    edit_clutch.register(opened, ClutchIn(clutch_id="c1"), created_at=AT)
-    yield opened
-    opened.close()
+def database(in_file: Database) -> Database:
+    edit_clutch.register(in_file, ClutchIn(clutch_id="c1"), created_at=AT)
+    return in_file
 
 
 @pytest.fixture(params=["threads", "processes"])
 def workers(database: Database, request: pytest.FixtureRequest) -> Iterator[Workers]:
-    made = in_threads(database) if request.param == "threads" else in_processes(database, 2)
-    yield made
-    made.close()
+    with closing(in_threads(database) if request.param == "threads" else in_processes(database, 2)) as made:
+        yield made
 
 
 @pytest.fixture
 def processes(database: Database) -> Iterator[Workers]:
-    made = in_processes(database, 1)
-    yield made
-    made.close()
+    with closing(in_processes(database, 1)) as made:
+        yield made
 
 
 def test_a_call_sees_what_was_committed_before_it(database: Database, workers: Workers) -> None:

@@ -53,18 +53,16 @@ METHODS = {
 
 
 def _report(campaign: Campaign, extension: Extension | None) -> Report:
-    tests = len(campaign.stationary)
-    misfit = Misfit(
-        rmse=0.3, noise=0.25, unexplained_share=0.3, where=(Where(axis="oil_temperature_c", strength=30.0),)
-    )
+    where = (Where(axis="oil_temperature_c", strength=30.0),)
     table = np.arange(6.0).reshape(2, 3)
     table[0, 0] = np.nan
     speed = np.linspace(0.0, 200.0, 8)
+    causes = extension.effects if extension else ()
     return Report(
         verdict=Verdict.CAUSE_NAMED if extension else Verdict.MODEL_ADEQUATE,
-        causes=extension.effects if extension else (),
-        summary=f"A stand-in looked at {tests} tests.",
-        explanations=(Explanation(effects=extension.effects if extension else (), probability=1.0),),
+        causes=causes,
+        summary=f"A stand-in looked at {len(campaign.stationary)} tests.",
+        explanations=(Explanation(effects=causes, probability=1.0),),
         candidates=(
             Candidate(
                 effect="torque_zero_shift",
@@ -74,7 +72,7 @@ def _report(campaign: Campaign, extension: Extension | None) -> Report:
                 estimate=Estimate(name="zero shift", value=SHIFT_NM, sd=float("inf"), unit="Nm"),
             ),
         ),
-        baseline=misfit,
+        baseline=Misfit(rmse=0.3, noise=0.25, unexplained_share=0.3, where=where),
         extended=Misfit(rmse=0.25, noise=0.25, unexplained_share=0.0),
         gain=Gain(
             held_out_runs=tuple(run.run_id for run in campaign.stationary[-1:]),
@@ -102,8 +100,6 @@ def _report(campaign: Campaign, extension: Extension | None) -> Report:
                         kind="stationary_stribeck",
                         pressures=(0.0, 4e5),
                         speeds=(10.0, 20.0),
-                        frequency=None,
-                        periods=None,
                         temperature=333.15,
                         repeats=5,
                         cycles=3000.0,
@@ -135,7 +131,6 @@ def _report(campaign: Campaign, extension: Extension | None) -> Report:
             ),
         ),
         extension=extension,
-        not_adoptable="",
         notes=("made by a stand-in",),
         statistics={"alarm": float("nan"), "threshold": 11.0},
     )

@@ -37,24 +37,17 @@ from tests.service.workflows.benches import (
 from tests.support import one_quick
 
 
-def test_the_only_test_is_withdrawn(benches: tuple[Bench, Bench]) -> None:
-    slipped, untouched = benches
-    slipped.send(body("test", "a", 0.0))
-    slipped.withdraw("a")
-    assert_same(slipped, untouched)
-    assert slipped.answers()["clutch"]["summary"] is None
-    for bench in benches:
-        bench.send(body("test", "b", 0.0))
-    assert_same(slipped, untouched)
-
-
 def test_the_reference_test_is_withdrawn_and_comes_back(benches: tuple[Bench, Bench]) -> None:
+    """At first it is the only one."""
     slipped, right = benches
-    names = {"a": "few", "b": "test", "c": "test", "l": "loop"}
-    for number, (name, kind) in enumerate(names.items()):
-        slipped.send(body(kind, name, 1000.0 * number))
-        if name != "a":
-            right.send(body(kind, name, 1000.0 * number))
+    slipped.send(body("few", "a", 0.0))
+    slipped.withdraw("a")
+    assert_same(slipped, right)
+    assert slipped.answers()["clutch"]["summary"] is None
+    slipped.restore("a")
+    for number, (name, kind) in enumerate({"b": "test", "c": "test", "l": "loop"}.items(), start=1):
+        for bench in benches:
+            bench.send(body(kind, name, 1000.0 * number))
     whole = slipped.answers()
     slipped.withdraw("a")
     assert_same(slipped, right)

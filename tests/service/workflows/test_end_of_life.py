@@ -87,6 +87,9 @@ def test_a_clutch_that_was_taken_out_is_no_failure_and_its_end_lies_ahead(tested
 
 
 def test_nothing_later_is_taken_in_until_a_rebuild_and_what_is_earlier_still_is(tested: TestClient) -> None:
+    assert post(tested, END | {"reason": "broken"}, 422)["errors"][0]["pointer"] == "/reason"
+    alone = {"kind": "maintenance", "event": "rest", "cycles": 1, "reason": "worn"}
+    assert "end_of_life" in post(tested, alone, 422)["detail"]
     assert "'test-3000' at 3000 cycles" in post(tested, END | {"cycles": 2500}, 409)["detail"]
     assert life(tested)["ended"] is None
     end = post(tested, END)
@@ -124,12 +127,6 @@ def test_a_declared_end_is_taken_back_and_all_is_as_it_was(tested: TestClient) -
     later = post(tested, stationary(4000, run_id="later", **FEW))
     assert later["state"] == "accepted"
     assert post(tested, {"reason": "ended after all"}, 409, f"{RUNS}/{end['run_id']}/restore")
-
-
-def test_a_reason_goes_with_an_end_alone(client: TestClient) -> None:
-    problem = post(client, {"kind": "maintenance", "event": "rest", "cycles": 1, "reason": "worn"}, 422)
-    assert "end_of_life" in problem["detail"]
-    assert post(client, END | {"reason": "broken"}, 422)["errors"][0]["pointer"] == "/reason"
 
 
 @pytest.mark.slow

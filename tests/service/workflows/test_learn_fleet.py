@@ -55,8 +55,8 @@ def post(client: TestClient, name: str, scale: float, last: int = 9000, **record
         post_run(client, measured(f"{name}-{cycles}", cycles, wear(cycles, scale) + noise), name)
 
 
-def post_fleet(client: TestClient, *scales: float, last: int = 6000) -> None:
-    for number, scale in enumerate(scales or (5000.0, 6000.0, 7000.0)):
+def post_fleet(client: TestClient, last: int = 6000) -> None:
+    for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
         post(client, f"old-{number}", scale, last=last)
 
 
@@ -81,25 +81,33 @@ def refresh(url: str, advance: Callable[[], object] = lambda: None) -> learn_fle
 
 def test_a_fleet_teaches_the_next_clutch_and_nobody_itself(url: str) -> None:
     with client_on(url) as client:
-        post_fleet(client, 5000.0, 6000.0, 7000.0, 6500.0, last=9000)
+        post_fleet(client, last=9000)
         post(client, "new", 6000.0, last=2000)
         post(client, "other", 6000.0, last=2000, friction_material="sinter")
         before = {name: life(client, name) for name in ("new", "other", "old-0")}
         assert all(said["prior"] == {"name": "weak", "version": None, "clutches": 0} for said in before.values())
+        refresh(url)
+        # with three in all, two are left for each of them: no fleet
+        assert (life(client, "new")["prior"]["clutches"], life(client, "old-0")["prior"]["name"]) == (3, "weak")
+        post(client, "old-3", 6500.0)
         done = refresh(url)
         assert [kind["friction_material"] for kind in done.kinds] == ["paper"]
         assert set(done.changed) == {"old-0", "old-1", "old-2", "old-3", "new"}
         after = {name: life(client, name) for name in before}
-        assert after["new"]["prior"] == {"name": "fleet", "version": 1, "clutches": 4}
-        assert after["old-0"]["prior"] == {"name": "fleet", "version": 1, "clutches": 3}
+        assert after["new"]["prior"] == {"name": "fleet", "version": 2, "clutches": 4}
+        assert after["old-0"]["prior"] == {"name": "fleet", "version": 2, "clutches": 3}
         assert after["other"] == before["other"]
-        assert after["new"]["revision"] == before["new"]["revision"] + 1
+        assert after["new"]["revision"] == before["new"]["revision"] + 2
         assert width(after["new"]) < 0.9 * width(before["new"])
         item = client.get("/v1/fleet/priors").json()["items"][0]
-        assert (item["version"], item["clutches"]) == (1, 4)
+        assert (item["version"], item["clutches"]) == (2, 4)
         assert item["members"] == ["old-0", "old-1", "old-2", "old-3"]
         assert -1.0 < item["population"]["change"]["median"] < -0.5
         assert "scale_cycles_median" in client.get("/v1/fleet/priors.csv").text
+        said = client.get(LIFE.format("new"))
+        again = refresh(url)  # which learns nothing new, and changes nothing
+        assert (again.changed, again.kinds) == ((), ())
+        assert client.get(LIFE.format("new"), headers={"If-None-Match": said.headers["etag"]}).status_code == 304
 
 
 def accelerating(cycles: float, end: float) -> float:
@@ -142,21 +150,6 @@ def test_lives_that_ended_calibrate_the_next(url: str, monkeypatch: pytest.Monke
         planned = client.post(f"{LIFE.format('new')}/forecast", json={"programme": [{"cycles": 100}]}).json()
         assert planned["ended_lives"] == 4
         assert planned["remaining_cycles"]["0.5"] == pytest.approx(after["remaining_cycles"]["0.5"], rel=1e-3)
-
-
-def test_a_refresh_that_learns_nothing_new_changes_nothing(url: str) -> None:
-    with client_on(url) as client:
-        post_fleet(client)
-        post(client, "new", 6000.0, last=2000)
-        refresh(url)
-        said = client.get(LIFE.format("new"))
-        assert said.json()["prior"]["clutches"] == 3
-        # with three in all, two are left for each of them: no fleet
-        assert life(client, "old-0")["prior"]["name"] == "weak"
-        again = refresh(url)
-        assert again.changed == ()
-        assert again.kinds == ()
-        assert client.get(LIFE.format("new"), headers={"If-None-Match": said.headers["etag"]}).status_code == 304
 
 
 def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
