@@ -127,3 +127,24 @@ class Watched:
         found = (self.violations(), self.abroad(), self.errors())
         self.context.close()
         assert found == ([], [], []), found
+
+
+class Wire:
+    """What a page receives, headers included: addresses and bytes, an entry a request that has ended."""
+
+    def __init__(self, page: Page) -> None:
+        self.loaded: list[tuple[str, int]] = []
+        addresses: dict[str, str] = {}
+        session = page.context.new_cdp_session(page)
+        session.send("Network.enable")
+        session.on(
+            "Network.requestWillBeSent", lambda event: addresses.update({event["requestId"]: event["request"]["url"]})
+        )
+        session.on(
+            "Network.loadingFinished",
+            lambda event: self.loaded.append((addresses[event["requestId"]], int(event["encodedDataLength"]))),
+        )
+
+    def of(self, part: str) -> list[int]:
+        """Bytes of all whose address holds a part."""
+        return [size for url, size in self.loaded if part in url]

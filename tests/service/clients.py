@@ -55,6 +55,12 @@ def post_run(client: TestClient, run: dict[str, Any], clutch_id: str = "c1") -> 
     return answer.json()
 
 
+def csv_text(channels: dict[str, list[float]]) -> str:
+    """Channels as a file of comma-separated values."""
+    rows = zip(*channels.values(), strict=True)
+    return "\n".join([",".join(channels), *(",".join(map(repr, row)) for row in rows)])
+
+
 @contextmanager
 def client_on_copy(laid: Path, folder: Path, **settings: Any) -> Iterator[TestClient]:
     """A client of a service on a copy, in that folder, of a database that several tests begin with."""

@@ -10,13 +10,10 @@ from playwright.sync_api import Page, expect
 
 from tests.browser.driving import Watched, drop, turned
 from tests.journeys.dashboard.test_axe import violations
+from tests.service.web.test_import_preview import german
 from tests.support import ONCE, SPEEDS_RPM, Server, serving, stationary
 
 pytestmark = pytest.mark.browser
-
-TITLES = ("Druck", "Drehzahl", "Mz", "Öltemperatur", "Bemerkung")
-OF_WORKBOOK = ("Druck", "Drehzahl", "Mx", "Öltemperatur", "Bemerkung")
-UNITS = ("bar", "1/min", "kNm", "°C", "")
 
 
 @pytest.fixture(scope="module")
@@ -26,39 +23,22 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield running
 
 
-def rows_of(cycles: int) -> list[tuple[float, float, float, float, str]]:
-    """A stationary test with its torque in kNm."""
-    channels = stationary(cycles, pressures=(4.0, 5.0, 6.0), speeds=SPEEDS_RPM[::4])["channels"]
-    columns = (channels["pressure_bar"], channels["speed_rpm"], channels["torque_nm"])
-    return [(p, n, round(m / 1000, 7), 85.0, "i.O.") for p, n, m in zip(*columns, strict=True)]
-
-
 def workbook(cycles: int) -> bytes:
-    """A German workbook with a title block and a row of units."""
+    """A German workbook with a title block and a row of units, its torque Mx."""
     book = openpyxl.Workbook()
     sheet = book.active
     assert sheet is not None
-    sheet.title = "Messung"
-    head = [("Prüfstand", "3"), ("Prüfer", "Müller"), ("Lastspiele", cycles), (), OF_WORKBOOK, UNITS]
-    for line in [*head, *rows_of(cycles)]:
-        sheet.append(line)
+    for line in german(cycles, torque="Mx").decode("latin-1").splitlines():
+        cells = [cell.replace(",", ".") for cell in line.split(";")]
+        sheet.append([float(cell) if cell.replace(".", "").isdigit() else cell for cell in cells])
     content = io.BytesIO()
     book.save(content)
     return content.getvalue()
 
 
-def text(cycles: int) -> bytes:
-    """The same as a German program exports it: semicolons, decimal commas, Latin-1."""
-
-    def cell(value: Any) -> str:
-        return str(value).replace(".", ",") if isinstance(value, float) else str(value)
-
-    head = ["Prüfstand;3", "Prüfer;Müller", f"Lastspiele;{cycles}", "", ";".join(TITLES), ";".join(UNITS)]
-    return "\r\n".join([*head, *(";".join(map(cell, row)) for row in rows_of(cycles))]).encode("latin-1")
-
-
 @pytest.mark.parametrize(
-    ("ending", "content", "torque"), [("csv", text, "Mz"), pytest.param("xlsx", workbook, "Mx", marks=pytest.mark.slow)]
+    ("ending", "content", "torque"),
+    [("csv", german, "Mz"), pytest.param("xlsx", workbook, "Mx", marks=pytest.mark.slow)],
 )
 def test_the_second_file_of_a_rig_is_taken_without_a_question(
     watched: Watched, server: Server, ending: str, content: Any, torque: str
@@ -88,7 +68,8 @@ def test_the_second_file_of_a_rig_is_taken_without_a_question(
     receipt = server.http.get("/v1/clutches/bench3-017/runs").json()["items"][-1]
     assert (receipt["cycles"], receipt["kind"], receipt["file"]["rig"]) == (second, "stationary_stribeck", rig)
     channels = server.http.get(f"/v1/clutches/bench3-017/runs/{receipt['run_id']}").json()["channels"]
-    assert channels["torque_nm"] == pytest.approx([1000 * row[2] for row in rows_of(second)])
+    sent = stationary(second, pressures=(4.0, 5.0, 6.0), speeds=SPEEDS_RPM[::4])
+    assert channels["torque_nm"] == pytest.approx(sent["channels"]["torque_nm"])
 
 
 def opened(watched: Watched) -> Page:
@@ -99,7 +80,7 @@ def opened(watched: Watched) -> Page:
 
 def test_the_importer_is_used_by_keyboard_and_passes_axe(watched: Watched) -> None:
     page = opened(watched)
-    drop(page, {"other.csv": text(5000).replace(b"Mz", b"Spur")})
+    drop(page, {"other.csv": german(5000).replace(b"Mz", b"Spur")})
     dialog = page.get_by_role("dialog", name="Send a run")
     expect(dialog.get_by_label("Channel of Spur")).to_be_visible()
     dialog.get_by_label("Channel of Spur").focus()

@@ -8,8 +8,6 @@ from itertools import pairwise
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from storage import clutches
-from storage.engine.opening import open_database
 from tests.browser.driving import Watched
 from tests.scale.copies import life, multiply, name
 from tests.support import Server, serving, stationary
@@ -153,24 +151,3 @@ def test_the_focus_stays_while_the_rows_about_it_change(watched: Watched) -> Non
         if number % 10 == 0:  # nobody is faster than the rows ahead
             page.get_by_role("link", name=name(number + 11), exact=True).wait_for(state="attached")
     assert page.locator(ROWS).count() <= MAX_ROWS
-
-
-def test_a_walk_by_name_skips_nothing_while_ranks_change(server: Server) -> None:
-    """Between two pages half of the clutches get better by so much that they lie behind all others."""
-    database = open_database(server.address)
-    seen: list[str] = []
-    address: str | None = "/v1/clutches?sort=name&limit=37"
-    while address is not None:
-        answer = server.http.get(address)
-        answer.raise_for_status()
-        seen += [item["clutch_id"] for item in answer.json()["items"]]
-        address = answer.links["next"]["url"] if "next" in answer.links else None
-        with database.writing() as connection:
-            for number in range(len(seen) % 2, CLUTCHES, 2):
-                row = clutches.get(connection, name(number))
-                assert row is not None
-                state = {"life": "", "state": row.state, "if_disputed": row.state}
-                clutches.set_summary(connection, row.clutch_id, row.rank + 1000.0, row.summary, **state)
-    database.close()
-    assert seen == [name(number) for number in range(CLUTCHES)]
-    assert server.http.get("/v1/fleet/totals").json()["all"] == CLUTCHES

@@ -1,9 +1,10 @@
-"""A clutch that several criteria end: its shudder margin, its lag over life and its pressure laws."""
+"""A clutch that several criteria end: its shudder margin, its lag over life, its pressure laws, and planned duty."""
 
+import re
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.driving import Watched, turned
 from tests.browser.lives import loops, post
@@ -18,7 +19,8 @@ CRITERIA = [{"quantity": "mean_cof"}, {"quantity": "slope", "pressure_bar": 5, "
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A clutch with two criteria, three stationary tests and two dynamic ones."""
+    """`bench` with two criteria, three stationary tests and two dynamic ones; `planned`, whose severity is its energy, 18 kJ
+    a cycle, tested at four states and one pressure."""
     with serving(tmp_path_factory.mktemp("quantities") / "clutchlife.db", loaded=True) as running:
         record = {"clutch_id": "bench", "end_of_life": {"criteria": CRITERIA}}
         running.http.post("/v1/clutches", json=record).raise_for_status()
@@ -26,6 +28,12 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
             post(running.http, "bench", stationary(cycles, pressures=PRESSURES))
         for cycles in (0, 4000):
             post(running.http, "bench", loops(cycles, pressures=(4.0, 5.0)))
+        record = {"clutch_id": "planned", "severity": {"basis": "dissipated_energy"}}
+        running.http.post("/v1/clutches", json=record).raise_for_status()
+        for cycles in range(0, 4000, 1000):
+            post(running.http, "planned", stationary(cycles, pressures=(5.0,)))
+        duty = {"cycles": 3000, "energy_per_cycle_kj": 18}
+        post(running.http, "planned", {"kind": "duty_cycles", "cycles": 3000, "duty": duty})
         yield running
 
 
@@ -123,3 +131,63 @@ def test_remaining_life_by_any_quantity_and_pressure_is_chosen_on_the_page(watch
     quantity.select_option("Stop time")
     expect(part.get_by_role("alert")).to_contain_text("stop_time_s is not measured in this life")
     watched.said = [line for line in watched.said if "404" not in line]  # the browser notes the refusal
+
+
+# --- Planned duty: blocks and a pace are typed; cycles, blocks, dates and errors by field come out.
+
+
+@pytest.fixture
+def plan(watched: Watched) -> Iterator[Page]:
+    page = watched.open("/clutches/planned")
+    page.get_by_text("Planned duty", exact=True).click()
+    yield page
+    # the browser notes every refusal in its console, and a plan that is refused is one
+    watched.said = [line for line in watched.said if "422" not in line]
+
+
+def test_a_plan_is_typed_by_keyboard_and_answered_with_cycles_blocks_and_dates(plan: Page, server: Server) -> None:
+    plan.get_by_label("Energy per cycle, kJ").fill("25,5")
+    plan.keyboard.press("Tab")
+    plan.keyboard.type("5000")
+    plan.keyboard.press("Tab")
+    plan.keyboard.type("2")
+    plan.keyboard.press("Tab")
+    plan.keyboard.type("120")
+    plan.keyboard.press("Enter")
+    table = plan.get_by_role("table", name="Remaining life under planned duty, by probability")
+    expect(table).to_contain_text("Remaining blocks")
+    sent = {"programme": [{"cycles": 5000, "energy_per_cycle_kj": 25.5, "sd": 2}], "pace_cycles_per_hour": 120}
+    said = server.http.post("/v1/clutches/planned/remaining-useful-life/forecast", json=sent).json()
+    median = said["remaining_cycles"]["0.5"]
+    assert median is not None
+    for words in (f"{median:,.0f}", f"{said['remaining_blocks']['0.5']:.1f}", said["end_of_life_at"]["0.5"][:10]):
+        expect(table).to_contain_text(words)
+    assert violations(plan) == []
+
+
+@pytest.mark.slow
+def test_what_is_wrong_is_said_at_its_field_and_can_be_mended(plan: Page) -> None:
+    plan.get_by_role("button", name="Add a block").click()
+    second = plan.get_by_role("group", name="Block 2")
+    expect(second.get_by_label("Energy per cycle, kJ")).to_be_focused()
+    second.get_by_label("Duty cycles").fill("-5")
+    plan.get_by_role("button", name="Predict", exact=True).click()
+    wrong = second.get_by_label("Duty cycles")
+    expect(wrong).to_have_attribute("aria-invalid", "true")
+    expect(wrong).to_be_focused()
+    expect(wrong).to_have_accessible_description(re.compile("^must be greater than"))
+    expect(plan.get_by_role("group", name="Block 1").locator("[aria-invalid]")).to_have_count(0)
+    assert violations(plan) == []
+    for typed in ("1,000", "ten"):
+        wrong.fill(typed)
+        plan.get_by_role("button", name="Predict", exact=True).click()
+        expect(wrong).to_have_accessible_description(re.compile("^Write a number as 25.5 or 25,5"))
+    # a standard deviation without an energy is an error of the block
+    wrong.fill("1000")
+    second.get_by_label("Standard deviation of this energy, kJ").fill("3")
+    plan.get_by_role("button", name="Predict", exact=True).click()
+    expect(second).to_contain_text("needs energy_per_cycle_kj")
+    plan.get_by_role("button", name="Remove block 2").click()
+    plan.get_by_role("button", name="Predict", exact=True).click()
+    expect(plan.get_by_role("table", name="Remaining life under planned duty, by probability")).to_be_visible()
+    expect(plan.locator(".planned [aria-invalid]")).to_have_count(0)

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from storage import channels, runs
 from storage.engine.opening import open_database
-from tests.browser.driving import Watched, pointed_at
+from tests.browser.driving import Watched, Wire, pointed_at
 from tests.browser.lives import loops, post
 from tests.support import Server, serving, stationary, torque_nm
 
@@ -66,36 +66,13 @@ def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield server
 
 
-class Wire:
-    """What the browser receives, headers included, by address."""
-
-    def __init__(self, page: Page) -> None:
-        self.loaded: dict[str, int] = {}
-        self._address: dict[str, str] = {}
-        session = page.context.new_cdp_session(page)
-        session.send("Network.enable")
-        session.on("Network.requestWillBeSent", self._asked)
-        session.on("Network.loadingFinished", self._finished)
-
-    def _asked(self, event: dict[str, Any]) -> None:
-        self._address[event["requestId"]] = event["request"]["url"]
-
-    def _finished(self, event: dict[str, Any]) -> None:
-        url = self._address[event["requestId"]]
-        self.loaded[url] = self.loaded.get(url, 0) + int(event["encodedDataLength"])
-
-    def of(self, part: str) -> list[int]:
-        """Bytes of all whose address holds a part."""
-        return [size for url, size in self.loaded.items() if part in url]
-
-
 def runs_read(page: Page, wire: Wire, count: int) -> None:
     """Wait for the channels of that many runs."""
     for _ in range(400):
         if len(wire.of("?points=")) == count:
             return
         page.wait_for_timeout(50)
-    raise AssertionError(sorted(wire.loaded))
+    raise AssertionError(wire.loaded)
 
 
 @pytest.mark.slow
@@ -110,7 +87,7 @@ def test_a_tab_of_a_clutch_of_raw_runs_is_light(browser_3d: Browser, life: Serve
     assert len(wire.loaded) > 50
     assert min(len(wire.of(part)) for part in ("/clutches/bench", "clutch.js")) >= 1
     assert wire.of("plotly") == []
-    assert [url for url in wire.loaded if "/runs/" in url and "?points=" not in url] == []
+    assert [url for url, _ in wire.loaded if "/runs/" in url and "?points=" not in url] == []
     if tab == "loops":  # the charts show the records with their peaks
         page.locator("#chart-loop-curves[data-sketched]").wait_for()
         page.locator("#chart-loop-curves summary").click()
@@ -120,7 +97,7 @@ def test_a_tab_of_a_clutch_of_raw_runs_is_light(browser_3d: Browser, life: Serve
             page.get_by_role("button", name="Loops: torque over speed: save data as CSV").click()
         rows = list(csv.DictReader(saved.value.path().read_text(encoding="utf-8").splitlines()))
         assert sum(float(row["friction torque, Nm"]) == PEAK for row in rows) == 6  # one a record that is drawn
-    everything = sum(wire.loaded.values())
+    everything = sum(wire.of(""))
     print(f"{tab}: {everything} bytes, of which runs {sum(wire.of('?points='))}")
     assert everything < MOST_BYTES
     watched.close()
@@ -136,5 +113,5 @@ def test_the_library_is_loaded_once_and_kept(browser: Browser, life: Server) -> 
     assert 1_000_000 < size < 1_500_000
     page.reload()
     pointed_at(page)
-    assert wire.of("plotly") == [size]
+    assert wire.of("plotly") == [size, 0]
     watched.close()

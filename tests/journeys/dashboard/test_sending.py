@@ -10,6 +10,7 @@ from playwright.sync_api import Browser, Locator, Page, Route, expect
 from tests.browser.driving import Watched, drop
 from tests.browser.lives import post
 from tests.browser.pixels import seen
+from tests.service.clients import csv_text
 from tests.support import Server, serving, stationary
 
 pytestmark = pytest.mark.browser
@@ -38,10 +39,8 @@ def watched(browser: Browser, server: Server) -> Iterator[Watched]:
     found.close()
 
 
-def csv_text(cycles: float) -> str:
-    channels = stationary(cycles)["channels"]
-    rows = zip(*channels.values(), strict=True)
-    return "\n".join([",".join(channels), *(",".join(map(str, row)) for row in rows)])
+def sheet(cycles: float) -> str:
+    return csv_text(stationary(cycles)["channels"])
 
 
 def asked(server: Server, path: str) -> Any:
@@ -65,7 +64,7 @@ def file_in(dialog: Locator, name: str) -> Locator:
 @pytest.mark.slow
 def test_no_clutch_is_chosen_for_the_reader(watched: Watched) -> None:
     page = opened(watched)
-    drop(page, {"a.csv": csv_text(0)})
+    drop(page, {"a.csv": sheet(0)})
     dialog = page.get_by_role("dialog", name="Send a run")
     expect(dialog.get_by_label("Clutch", exact=True)).to_have_value("")
     expect(dialog.get_by_label("Clutch", exact=True)).to_be_focused()
@@ -74,7 +73,7 @@ def test_no_clutch_is_chosen_for_the_reader(watched: Watched) -> None:
     dialog.get_by_role("button", name="Send").click()  # the browser asks for what is empty
     assert [url for url in watched.asked[before:] if "/runs" in url] == []
     page = opened(watched, "/clutches/other")
-    drop(page, {"a.csv": csv_text(0)})
+    drop(page, {"a.csv": sheet(0)})
     expect(page.get_by_label("Clutch", exact=True)).to_have_value("other")
 
 
@@ -83,10 +82,10 @@ def test_several_files_each_have_their_outcome(watched: Watched, server: Server)
     drop(
         page,
         {
-            "2026-11-02-stationary-2000.csv": csv_text(2000),
+            "2026-11-02-stationary-2000.csv": sheet(2000),
             "sweep_9k.csv": WRONG,
             "first.json": json.dumps(stationary(0, run_id="first") | {"clutch_id": "another"}),
-            "measured.csv": csv_text(1000),
+            "measured.csv": sheet(1000),
             "notes.json": '{"text": "not a run"}',
         },
     )
@@ -132,7 +131,7 @@ def test_several_files_each_have_their_outcome(watched: Watched, server: Server)
 def test_a_slip_of_typing_makes_no_clutch(watched: Watched, server: Server) -> None:
     page = opened(watched)
     known = names(server)
-    drop(page, {"stationary-4000.csv": csv_text(4000)})
+    drop(page, {"stationary-4000.csv": sheet(4000)})
     dialog = page.get_by_role("dialog", name="Send a run")
     dialog.get_by_label("Clutch", exact=True).fill("bench3-17")
     dialog.get_by_role("button", name="Send").click()
@@ -213,7 +212,7 @@ def test_a_busy_service_is_asked_again(watched: Watched, server: Server) -> None
 
     watched.page.route("**/runs/file?*", answer)  # before the page is loaded, else a request may pass by it
     page = opened(watched, "/clutches/other")
-    drop(page, {"stationary-100.csv": csv_text(100)})
+    drop(page, {"stationary-100.csv": sheet(100)})
     page.get_by_role("dialog").get_by_role("button", name="Send").click()
     page.get_by_text("at 100 cycles").last.wait_for()
     assert busy == []
@@ -229,7 +228,7 @@ def test_a_campaign_s_folder_says_itself_what_its_files_are(watched: Watched, se
     ]
     record = {"clutch_id": "whole", "origin": "simulated", "geometry": {"inner_diameter_mm": 100}}
     texts = {"runs.json": json.dumps(listed), "clutch.json": json.dumps(record)}
-    drop(page, texts | {"a.csv": csv_text(90), "b.csv": csv_text(70)})
+    drop(page, texts | {"a.csv": sheet(90), "b.csv": sheet(70)})
     dialog = page.get_by_role("dialog", name="Send 2 runs")
     expect(dialog.get_by_label("Clutch", exact=True)).to_have_value("whole")
     dialog.get_by_role("button", name="Send 2 runs").click()

@@ -38,10 +38,6 @@ def test_what_browsers_load_is_named_by_its_path_in_the_tree(tmp_path: Path) -> 
     assert loaded.by_name["shared/dom.js"].body == b"1"
     assert loaded.by_name["fleet/dom.js"].body == b"2"
     assert loaded.by_name["fleet/deep/er.css"].media_type == "text/css; charset=utf-8"
-
-
-def test_a_page_names_the_folder_of_this_version(tmp_path: Path) -> None:
-    loaded = assets.load(written(tmp_path, TREE))
     assert loaded.page("page.html", "../").body.decode() == f'<a href="../">../assets/{loaded.digest}</a>'
 
 
@@ -163,17 +159,13 @@ def imported(name: str) -> list[str]:
     return [normpath(PurePosixPath(name).parent / path) for path in paths]
 
 
-@pytest.mark.parametrize("name", sorted(MODULES))
-def test_a_module_is_checked_and_its_imports_lead_to_modules_and_never_to_a_later_chapter(name: str) -> None:
-    assert MODULES[name].splitlines()[0] == "// @ts-check"
-    own = CHAPTERS.index(name.split("/")[0])
-    for target in imported(name):
-        assert target in MODULES
-        assert CHAPTERS.index(target.split("/")[0]) <= own
-        assert not (name.startswith("fleet/") and target.startswith("clutch/"))
-
-
-def test_no_module_imports_itself_by_a_circle() -> None:
+def test_modules_are_checked_and_import_modules_in_no_circle_and_never_from_a_later_chapter() -> None:
+    for name, text in MODULES.items():
+        assert text.splitlines()[0] == "// @ts-check", name
+        for target in imported(name):
+            assert target in MODULES, name
+            assert CHAPTERS.index(target.split("/")[0]) <= CHAPTERS.index(name.split("/")[0]), (name, target)
+            assert not (name.startswith("fleet/") and target.startswith("clutch/")), (name, target)
     TopologicalSorter({name: imported(name) for name in MODULES}).prepare()
 
 
@@ -193,40 +185,22 @@ def test_every_module_is_loaded_by_a_page() -> None:
 # --- `/help`: the built site, or how to build it.
 
 
-def client_of(folder: Path) -> TestClient:
+def test_the_site_is_served_and_where_none_was_built_the_answer_says_how(tmp_path: Path) -> None:
     app = FastAPI()
-    app.include_router(site.router(folder))
-    return TestClient(app)
-
-
-@pytest.fixture
-def client(tmp_path: Path) -> TestClient:
-    (tmp_path / "how-to").mkdir()
-    (tmp_path / "index.html").write_text("<p>first</p>", encoding="utf-8")
-    (tmp_path / "how-to" / "index.html").write_text("<p>tasks</p>", encoding="utf-8")
-    (tmp_path / "searchindex.js").write_text("Search.setIndex({})", encoding="utf-8")
-    (tmp_path / "objects.inv").write_bytes(b"no page")
-    return client_of(tmp_path)
-
-
-def test_pages_and_what_they_load_are_served(client: TestClient) -> None:
+    app.include_router(site.router(tmp_path / "missing"))
+    answer = TestClient(app).get("/help/")
+    assert (answer.status_code, "make docs" in answer.text) == (404, True)
+    pages_built = {"index.html": "<p>first</p>", "how-to/index.html": "<p>tasks</p>", "searchindex.js": "1"}
+    app = FastAPI()
+    app.include_router(site.router(written(tmp_path, pages_built | {"objects.inv": "no page"})))
+    client = TestClient(app)
     assert client.get("/help").text == "<p>first</p>", "by a redirect to the address with the slash"
     assert client.get("/help/how-to/").text == "<p>tasks</p>"
-    script = client.get("/help/searchindex.js")
-    assert script.headers["content-type"].startswith("text/javascript")
+    assert client.get("/help/searchindex.js").headers["content-type"].startswith("text/javascript")
     known = {"If-None-Match": client.get("/help/").headers["etag"]}
     assert client.get("/help/index.html", headers=known).status_code == 304
-
-
-@pytest.mark.parametrize("name", ["missing.html", "objects.inv", "../pages.py", "%2e%2e/pages.py", "how-to"])
-def test_other_files_are_not(client: TestClient, name: str) -> None:
-    assert client.get(f"/help/{name}").status_code == 404
-
-
-def test_where_nothing_was_built_the_answer_says_how(tmp_path: Path) -> None:
-    answer = client_of(tmp_path / "missing").get("/help/")
-    assert answer.status_code == 404
-    assert "make docs" in answer.text
+    for name in ("missing.html", "objects.inv", "../pages.py", "%2e%2e/pages.py", "how-to"):
+        assert client.get(f"/help/{name}").status_code == 404, name
 
 
 # --- The types that the pages' JavaScript is checked against are those of the OpenAPI document.

@@ -101,18 +101,15 @@ def test_a_plot_has_samples_as_they_were_measured_and_every_peak(database: Datab
     for name, column in dynamic().items():
         assert found[name].tobytes() == column[rows].tobytes()
         assert (found[name].min(), found[name].max()) == (column.min(), column.max())
+    packed = written(database, tmp_path / "a", points=500, compressed=True)
+    assert gzip.decompress(packed) == (tmp_path / "body").read_bytes()
+    assert packed == written(database, tmp_path / "another name", points=500, compressed=True)
 
 
 @pytest.mark.parametrize("points", [1, 10, 159])
 def test_plateaus_come_whole(database: Database, tmp_path: Path, points: int) -> None:
     body = json.loads(written(database, tmp_path / "body", "plateaus", points=points))
     assert len(body["channels"]["torque_nm"]) == body["samples"] == 160
-
-
-def test_a_packed_body_is_the_same_body(database: Database, tmp_path: Path) -> None:
-    packed = written(database, tmp_path / "a", points=500, compressed=True)
-    assert gzip.decompress(packed) == written(database, tmp_path / "b", points=500)
-    assert packed == written(database, tmp_path / "another name", points=500, compressed=True)
 
 
 def test_parquet_has_all_samples_units_and_the_receipt(database: Database, tmp_path: Path) -> None:
@@ -163,21 +160,18 @@ def test_memory_is_that_of_a_channel_whatever_the_length(database: Database, tmp
     assert body.stat().st_size < 50_000
 
 
-# --- Wherever long channels are a run is the same; a store that is away is a problem with its reason, and loses nothing.
-
-
 RUNS = "/v1/clutches/c1/runs"
 PARQUET = {"Accept": "application/vnd.apache.parquet"}
 
 
-def long_run(cycles: float = 0.0) -> dict[str, Any]:
+def long_run(cycles: float = 0.0, samples: int = SAMPLES) -> dict[str, Any]:
     """A dynamic test whose torque does not deflate to little."""
-    rng, time = np.random.default_rng(int(cycles)), np.arange(SAMPLES) / 100
+    rng, time = np.random.default_rng(int(cycles)), np.arange(samples) / 100
     channels = {
         "time_s": time,
-        "pressure_bar": np.full(SAMPLES, 5.0),
-        "speed_rpm": 1000 - 990 * np.cos(2 * np.pi * 0.1 * time) + rng.normal(scale=1e-2, size=SAMPLES),
-        "torque_nm": 20 + np.sin(time) + rng.normal(scale=1e-3, size=SAMPLES),
+        "pressure_bar": np.full(samples, 5.0),
+        "speed_rpm": 1000 - 990 * np.cos(2 * np.pi * 0.1 * time) + rng.normal(scale=1e-2, size=samples),
+        "torque_nm": 20 + np.sin(time) + rng.normal(scale=1e-3, size=samples),
     }
     sent = {name: column.tolist() for name, column in channels.items()}
     return {"kind": "dynamic_stribeck", "cycles": cycles, "run_id": f"long-{cycles:g}", "channels": sent}
@@ -189,6 +183,87 @@ def service(database: str, raw: str | None = None) -> Iterator[TestClient]:
     with client_on(database, raw=raw, max_body_mb=8) as client:
         client.post("/v1/clutches", json={"clutch_id": "c1"})
         yield client
+
+
+# --- Over HTTP: negotiated, packed, not sent again where it is known; lists hold no channels.
+
+ONE = f"{RUNS}/long-0"
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    """A service that has one record of 6,000 samples."""
+    with service(f"sqlite:///{tmp_path_factory.mktemp('stored')}/a.db") as client:
+        assert client.post(RUNS, json=long_run(samples=6000)).status_code == 201
+        yield client
+
+
+def test_points_thin_the_channels(stored: TestClient) -> None:
+    whole, plot = stored.get(ONE).json(), stored.get(f"{ONE}?points=200").json()
+    assert len(plot["channels"]["time_s"]) <= 200
+    assert plot | {"channels": whole["channels"]} == whole == stored.get(f"{ONE}?points=6000").json()
+    for wrong in ("0", "-1", "a", "1.5", "1000001"):
+        assert stored.get(f"{ONE}?points={wrong}").status_code == 422
+    assert stored.get(f"{RUNS}/nobody?points=2").status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("accepted", "given"),
+    [
+        ("", "application/json"),
+        ("*/*", "application/json"),
+        ("text/html,application/xhtml+xml,*/*;q=0.8", "application/json"),
+        (PARQUET["Accept"], PARQUET["Accept"]),
+        (f"application/json;q=0.5, {PARQUET['Accept'].upper()}; q=0.9", PARQUET["Accept"]),
+        (f"application/json, {PARQUET['Accept']};q=0.9", "application/json"),
+        (f"application/json;q=0.1, {PARQUET['Accept']};q=0", "application/json"),
+        (f"application/json;q=0.1, {PARQUET['Accept']};q=inf", "application/json"),
+    ],
+)
+def test_accept_chooses_the_format(stored: TestClient, accepted: str, given: str) -> None:
+    found = stored.get(f"{ONE}?points=100", headers={"Accept": accepted})
+    assert (found.status_code, found.headers["content-type"]) == (200, given)
+    assert set(found.headers["vary"].split(", ")) == {"Accept", "Accept-Encoding"}
+
+
+def test_what_is_known_is_not_decoded_nor_sent_and_nothing_is_left_on_disk(
+    stored: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    asked = [(address, headers) for address in (ONE, f"{ONE}?points=100") for headers in ({}, PARQUET)]
+    tags = [stored.get(address, headers=headers).headers["etag"] for address, headers in asked]
+    assert list(tmp_path.iterdir()) == []
+    for name in ("stored", "stored_of_run"):
+        monkeypatch.setattr(channels, name, None)
+    monkeypatch.setattr(raw_run, "write_run", None)
+    for tag, (address, headers) in zip(tags, asked, strict=True):
+        held = stored.get(address, headers=headers | {"If-None-Match": f'"other", W/{tag}'})
+        assert (held.status_code, held.content, held.headers["etag"]) == (304, b"", tag)
+
+
+def test_a_packed_plot_has_a_tag_of_its_own(stored: TestClient) -> None:
+    packed, plain = (
+        stored.get(f"{ONE}?points=100", headers={"Accept-Encoding": coding}) for coding in ("gzip", "identity")
+    )
+    assert packed.json() == plain.json()
+    assert (packed.headers["content-encoding"], plain.headers.get("content-encoding")) == ("gzip", None)
+    assert packed.headers["etag"] != plain.headers["etag"]
+    assert int(packed.headers["content-length"]) < int(plain.headers["content-length"]) == len(plain.content)
+
+
+def test_lists_hold_no_channels(stored: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither in what is answered nor in what is read for it."""
+    stored.post(RUNS, json=stationary(1000)).raise_for_status()
+    for name in ("stored", "stored_of_run", "lengths"):
+        monkeypatch.setattr(channels, name, None)
+    names = ("runs", "runs.csv", "loops", "stribeck", "series", "degradation", "remaining-useful-life", "diagnoses")
+    for address in ("/v1/clutches", *(f"/v1/clutches/c1/{name}" for name in names)):
+        found = stored.get(address)
+        assert (found.status_code, '"channels"' in found.text) == (200, False), address
+    assert stored.get(RUNS).json()["items"][0]["run_id"] == "long-0"
+
+
+# --- Wherever long channels are a run is the same; a store that is away is a problem with its reason, and loses nothing.
 
 
 @pytest.fixture(params=[DATABASE, "in_folder", "in_bucket"])

@@ -102,12 +102,7 @@ def test_nothing_is_made_twice_for_one_revision(client: TestClient, monkeypatch:
     assert len(made) == 3
 
 
-def test_an_unknown_clutch_is_unknown_however_often_it_is_asked_for(client: TestClient) -> None:
-    for name in ASKED:
-        assert [client.get(f"/v1/clutches/nobody/{name}").status_code for _ in range(2)] == [404, 404]
-
-
-def test_of_an_unknown_clutch_nothing_is_taken_over_from_another_service(
+def test_an_unknown_clutch_is_unknown_however_often_it_is_asked_for_and_whatever_another_service_has_kept(
     client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = []
@@ -117,7 +112,8 @@ def test_of_an_unknown_clutch_nothing_is_taken_over_from_another_service(
         return 0, b'{"items":[]}'
 
     monkeypatch.setattr(answers, "shared_answer", kept)
-    assert client.get("/v1/clutches/nobody/degradation").status_code == 404
+    for name in ASKED:
+        assert [client.get(f"/v1/clutches/nobody/{name}").status_code for _ in range(2)] == [404, 404]
     assert asked == []
     post(client, 1000.0)
     assert client.get(f"{BASE}/surfaces").status_code == 200
@@ -190,6 +186,8 @@ def test_the_same_again_is_the_same_answer_or_304(polled: TestClient, routed: li
         assert "Content-Security-Policy" in seen.headers
         assert polled.head(address).headers["ETag"] == first.headers["ETag"]
     assert routed == []
+    for other, status in (("c1/runs?limits=1", 422), ("c1/runs?limit=0", 422), ("other/runs", 404)):
+        assert polled.get(f"/v1/clutches/{other}").status_code == status
 
 
 def test_a_changed_clutch_is_looked_at_anew(polled: TestClient, routed: list[str]) -> None:
@@ -260,12 +258,6 @@ def polls_of(client: TestClient) -> Polls:
     while not isinstance(layer, Polls):
         layer = layer.app
     return layer
-
-
-def test_other_arguments_are_another_address(polled: TestClient) -> None:
-    assert polled.get("/v1/clutches/c1/runs?limits=1").status_code == 422
-    assert polled.get("/v1/clutches/c1/runs?limit=0").status_code == 422
-    assert polled.get("/v1/clutches/other/runs").status_code == 404
 
 
 def test_requests_are_counted_by_their_routes_either_way(polled: TestClient) -> None:

@@ -20,7 +20,7 @@ from service.web.files import emptied_folder
 from service.web.routes import runs
 from storage.encoding import to_text
 from tests.benchmarks.memory import family, resident
-from tests.service.clients import client_on
+from tests.service.clients import client_on, csv_text
 from tests.service.web.routes.granting import context_of
 from tests.support import ONCE, serving, stationary
 
@@ -183,10 +183,7 @@ def test_every_post_is_answered_within_a_minute_where_every_child_is_stopped(tmp
 ADDRESS = "/v1/clutches/c1/runs/file?kind=stationary_stribeck&cycles=0&filename=a.csv"
 
 
-def text() -> str:
-    channels = stationary(0)["channels"]
-    rows = zip(*channels.values(), strict=True)
-    return ",".join(channels) + "\n" + "\n".join(",".join(map(repr, row)) for row in rows)
+TEXT = csv_text(stationary(0)["channels"])
 
 
 @pytest.fixture
@@ -212,7 +209,7 @@ def test_a_file_for_which_the_disk_has_no_room_is_refused_with_the_reason(
     client: TestClient, full: None, caplog: pytest.LogCaptureFixture
 ) -> None:
     del full
-    for sent in ({"content": text()}, {"files": {"file": ("a.csv", text())}}):
+    for sent in ({"content": TEXT}, {"files": {"file": ("a.csv", TEXT)}}):
         answer = client.post(ADDRESS, **sent)  # type: ignore[arg-type]
         assert (answer.status_code, answer.headers["content-type"]) == (507, "application/problem+json")
         assert answer.json()["type"] == "urn:clutchlife:problem:no-room"
@@ -235,7 +232,7 @@ def test_files_are_kept_beside_the_database_while_they_are_read(
         return read(given, **of_run)  # type: ignore[arg-type]
 
     monkeypatch.setattr(runs, "read_file_run", watched)
-    assert client.post(ADDRESS, content=text()).status_code == 201
+    assert client.post(ADDRESS, content=TEXT).status_code == 201
     assert [given.parent.parent for given in seen] == [beside]
     assert list(beside.iterdir()) == []
 

@@ -102,12 +102,6 @@ def test_no_answer_of_the_api_stands_without_a_word_while_two_runs_are_held(held
     assert SAID.search(forecast.text)
     assert {f"{CLUTCH}{end}" for end in ANSWERS} <= set(asked)
     assert {"/v1/clutches", f"{CLUTCH}/remaining-useful-life.csv", f"{CLUTCH}/degradation.csv"} <= set(asked)
-
-
-def test_an_alarm_says_how_many_runs_are_held_beside_it(held: TestClient) -> None:
-    rule = {"quantity": "remaining_cycles", "probability": 0.05, "below": 1e9, "clutch_id": "c1"}
-    assert held.post("/v1/alarms", json=rule).status_code == 201
-    _sent(held, 3500.0, 1.0, "accepted")
     (raised,) = held.get("/v1/alarms/events").json()["items"]
     assert raised["message"].endswith("2 runs are held and do not count")
 

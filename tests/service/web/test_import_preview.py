@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.service.clients import csv_text
 from tests.service.run_files.test_upload import dynamic_record, raw_record
 from tests.support import SPEEDS_RPM, stationary
 
@@ -133,8 +134,7 @@ def test_columns_that_are_left_out_stay_so_whatever_their_names(client: TestClie
 @pytest.mark.parametrize("kind", ["stationary_stribeck", "dynamic_stribeck"])
 def test_what_is_cut_of_a_record_is_shown_before_it_is_sent(client: TestClient, kind: str) -> None:
     record = raw_record() if kind == "stationary_stribeck" else dynamic_record()
-    rows = zip(*record.values(), strict=True)
-    content = "\n".join([",".join(record), *(",".join(map(repr, row)) for row in rows)]).encode()
+    content = csv_text(record).encode()
     assert preview(client, content)["kinds"] == ["stationary_stribeck", "dynamic_stribeck"]
     shown = preview(client, content, kind=kind, cycles=0)
     assert shown["missing"] == []

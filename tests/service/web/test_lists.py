@@ -144,9 +144,6 @@ def test_a_list_is_of_what_was_asked_for(fleet: TestClient) -> None:
         assert ids(fleet, question) == expected, question
     for wrong in ("state=broken", "sort=age", "offset=-1", "find=%00"):
         assert fleet.get(f"/v1/clutches?{wrong}").status_code == 422, wrong
-
-
-def test_a_walk_follows_its_cursor(fleet: TestClient) -> None:
     for sort, last in (("name", "ended"), ("kind", "c1")):
         following = fleet.get(f"/v1/clutches?sort={sort}&limit=2").json()["next"]
         assert ids(fleet, f"sort={sort}&limit=2&cursor={following}") == [last]

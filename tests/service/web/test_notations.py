@@ -57,29 +57,37 @@ def test_a_run_at_another_instant_is_another_run(client: TestClient) -> None:
         assert sent(client, json.dumps(body | {"started_at": started_at})).status_code == status
 
 
-def test_a_number_is_the_same_however_it_is_written(client: TestClient) -> None:
-    duty = '{"cycles": %s, "energy_per_cycle_kj": %s, "engagement_duration_s": null, "initial_speed_rpm": %s}'
-    texts = [
-        '{"kind": "duty_cycles", "cycles": 7000, "duty": %s, "started_at": null}' % (duty % ("7000", "18", "-0.0")),
-        '{"kind": "duty_cycles", "cycles": 7e3, "duty": %s}' % (duty % ("7000.0", "1.8E+1", "0")),
+DUTY = '{"cycles": %s, "energy_per_cycle_kj": %s, "engagement_duration_s": null, "initial_speed_rpm": %s}'
+CHANNELS = (
+    '{"kind": "stationary_stribeck", "cycles": 0, "channels": {"speed_rpm": [%s, 500, 1000, 2e3], '
+    '"pressure_bar": [5, 5, 5, 5], "torque_nm": [21, 22.50, 21.8, 21], "torque_sd_nm": null}}'
+)
+REMARK = {"kind": "maintenance", "cycles": 10, "event": "other", "note": "Ölwechsel bei Gerät Å"}
+INSPECTION = '{"cycles": %s, "performed_at": "%s", "roughness_um": %s, "skewness": null}'
+WRITTEN = {
+    "numbers": [
+        '{"kind": "duty_cycles", "cycles": 7000, "duty": %s, "started_at": null}' % (DUTY % ("7000", "18", "-0.0")),
+        '{"kind": "duty_cycles", "cycles": 7e3, "duty": %s}' % (DUTY % ("7000.0", "1.8E+1", "0")),
         '{"duty": {"initial_speed_rpm": 0e5, "energy_per_cycle_kj": 18.00, "cycles": 70e2}, "cycles": 7000.0, '
         '"run_id": null, "kind": "duty_cycles", "channels": null, "origin": "measured"}',
-    ]
-    assert_one(client, texts)
+    ],
+    "channels": [CHANNELS % zero for zero in ("-0.0", "0", "0.0", "-0")],
+    "normal forms": [
+        unicodedata.normalize(form, json.dumps(REMARK, ensure_ascii=ascii_alone))
+        for form in ("NFC", "NFD")
+        for ascii_alone in (False, True)
+    ],
+    "inspection": [
+        INSPECTION % (cycles, performed_at, roughness)
+        for cycles, roughness in (("7000", "3"), ("7e3", "3.0"))
+        for performed_at in INSTANTS
+    ],
+}
 
 
-def test_the_numbers_of_a_channel_are_the_same_however_they_are_written(client: TestClient) -> None:
-    text = (
-        '{"kind": "stationary_stribeck", "cycles": 0, "channels": {"speed_rpm": [%s, 500, 1000, 2e3], '
-        '"pressure_bar": [5, 5, 5, 5], "torque_nm": [21, 22.50, 21.8, 21], "torque_sd_nm": null}}'
-    )
-    assert_one(client, [text % zero for zero in ("-0.0", "0", "0.0", "-0")])
-
-
-def test_a_remark_is_the_same_in_every_normal_form(client: TestClient) -> None:
-    body = {"kind": "maintenance", "cycles": 10, "event": "other", "note": "Ölwechsel bei Gerät Å"}
-    plain, escaped = (json.dumps(body, ensure_ascii=ascii_alone) for ascii_alone in (False, True))
-    assert_one(client, [unicodedata.normalize(form, text) for form in ("NFC", "NFD") for text in (plain, escaped)])
+@pytest.mark.parametrize("written", WRITTEN)
+def test_values_are_the_same_however_they_are_written(client: TestClient, written: str) -> None:
+    assert_one(client, WRITTEN[written], "/v1/clutches/c1/inspections" if written == "inspection" else RUNS)
 
 
 def test_a_clutch_is_the_same_however_its_record_is_written(client: TestClient) -> None:
@@ -91,15 +99,6 @@ def test_a_clutch_is_the_same_however_its_record_is_written(client: TestClient) 
     assert [sent(client, text, CLUTCHES).status_code for text in texts] == [201, 200]
     wrong = sent(client, '{"clutch_id": "c3", "geometry": {"friction_faces": 2.5}}', CLUTCHES)
     assert (wrong.status_code, wrong.json()["errors"][0]["pointer"]) == (422, "/geometry/friction_faces")
-
-
-def test_an_inspection_is_the_same_however_it_is_written(client: TestClient) -> None:
-    texts = [
-        f'{{"cycles": {cycles}, "performed_at": "{performed_at}", "roughness_um": {roughness}, "skewness": null}}'
-        for cycles, roughness in (("7000", "3"), ("7e3", "3.0"))
-        for performed_at in INSTANTS
-    ]
-    assert_one(client, texts, "/v1/clutches/c1/inspections")
 
 
 BODY = json.dumps({"kind": "maintenance", "cycles": 1, "event": "other", "note": "Öl"}, ensure_ascii=False)

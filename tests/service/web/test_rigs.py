@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from contextlib import closing
 from typing import Any
 
-import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
@@ -19,7 +18,8 @@ from storage.channels import FILE
 from storage.engine.opening import open_database
 from storage.rigs import MAX_AT_ONCE
 from storage.tables import channel
-from tests.support import PRESSURES_BAR, SPEEDS_RPM, stationary, torque_nm
+from tests.browser.lives import loops
+from tests.support import PRESSURES_BAR, SPEEDS_RPM, stationary
 
 RIG = {
     "name": "bench-3",
@@ -157,7 +157,7 @@ def test_many_large_profiles_come_in_small_pages(client: TestClient) -> None:
     assert (len(first["items"]), len(rest["items"]), rest["next"]) == (MAX_AT_ONCE, 1, None)
 
 
-def test_a_file_is_read_by_its_rig_and_arguments_win(client: TestClient) -> None:
+def test_a_file_is_read_by_its_rig_arguments_win_and_it_is_given_out_as_it_was_sent(client: TestClient) -> None:
     client.post("/v1/rigs", json=RIG)
     receipt = post(client, "c1", 7000, rig="bench-3").json()
     assert (receipt["kind"], receipt["cycles"]) == ("stationary_stribeck", 7000)
@@ -172,16 +172,11 @@ def test_a_file_is_read_by_its_rig_and_arguments_win(client: TestClient) -> None
     unnamed = post(client, "c1", 8000, rig="bench-3", filename="other.csv")
     assert (unnamed.status_code, unnamed.json()["errors"][0]["pointer"]) == (422, "/query/cycles")
     assert post(client, "c1", 8000, rig="none").status_code == 404
-
-
-def test_the_file_is_given_out_as_it_was_sent(client: TestClient) -> None:
-    client.post("/v1/rigs", json=RIG)
-    run = post(client, "c1", 0, rig="bench-3").json()["run_id"]
-    sent = client.get(f"/v1/clutches/c1/runs/{run}/file")
-    assert sent.content == table(0)
+    address = f"/v1/clutches/c1/runs/{receipt['run_id']}/file"
+    sent = client.get(address)
+    assert sent.content == table(7000)
     assert sent.headers["Content-Disposition"].startswith("attachment")
-    tag = {"If-None-Match": sent.headers["ETag"]}
-    assert client.get(f"/v1/clutches/c1/runs/{run}/file", headers=tag).status_code == 304
+    assert client.get(address, headers={"If-None-Match": sent.headers["ETag"]}).status_code == 304
     posted = client.post("/v1/clutches/c1/runs", json=stationary(500)).json()
     assert posted["file"] is None
     assert client.get(f"/v1/clutches/c1/runs/{posted['run_id']}/file").status_code == 404
@@ -194,13 +189,12 @@ def test_runs_that_are_read_again_answer_as_if_they_had_been_read_so_at_first(
     client.post("/v1/clutches", json={"clutch_id": "c2"})
     client.post("/v1/rigs", json=RIG)
     client.put("/v1/rigs/mended", json=MENDED | {"name": "mended"})
-    loops = {"kind": "dynamic_stribeck", "cycles": 2500, "run_id": "loop", "channels": dynamic()}
     for clutch, rig in (("c1", "bench-3"), ("c2", "mended")):
         for cycles in (0, 1000, 2000, 3000):
             own = "mended" if cycles in (1000, 2000) else rig
             answer = post(client, clutch, cycles, rig=own, run_id=f"r{cycles}")
             assert answer.status_code == 201, answer.text
-        client.post(f"/v1/clutches/{clutch}/runs", json=loops)
+        assert client.post(f"/v1/clutches/{clutch}/runs", json=loops(2500, pressures=(5.0,))).status_code == 201
     assert answers(client, "c1") != answers(client, "c2")
     for run in ("r0", "r3000"):
         body = {"rig": "mended", "reason": "the torque was in M2"}
@@ -221,20 +215,7 @@ def test_runs_that_are_read_again_answer_as_if_they_had_been_read_so_at_first(
             assert check_results(database, clutch).findings == check_runs(database, clutch).findings == ()
 
 
-def dynamic() -> dict[str, list[float]]:
-    """A dynamic test of 15 s at 5 bar."""
-    time = np.arange(0, 15, 0.02)
-    speed = 1000 - 1000 * np.cos(0.2 * np.pi * time)
-    torque = [torque_nm(5.0, max(n, 1e-9), 0.2) + np.sin(0.2 * np.pi * t) for n, t in zip(speed, time, strict=True)]
-    return {
-        "time_s": time.tolist(),
-        "pressure_bar": (5 + 0.001 * np.sin(time)).tolist(),
-        "speed_rpm": speed.tolist(),
-        "torque_nm": [float(m) for m in torque],
-    }
-
-
-def test_sending_the_file_again_after_it_was_read_again_stores_no_second_run(client: TestClient) -> None:
+def test_a_file_that_was_read_again_is_stored_once_and_verified(client: TestClient, database_url: str) -> None:
     client.post("/v1/rigs", json=RIG)
     first = post(client, "c1", 0, rig="bench-3").json()
     client.put("/v1/rigs/bench-3", json=MENDED)
@@ -244,6 +225,13 @@ def test_sending_the_file_again_after_it_was_read_again_stores_no_second_run(cli
     before = post(client, "c1", 0, map="torque_nm:M1", kind="stationary_stribeck", cycles=0)
     assert (before.status_code, before.json()["duplicate"]) == (200, True)
     assert len(client.get("/v1/clutches/c1/runs").json()["items"]) == 1
+    client.__exit__(None, None, None)
+    with closing(open_database(database_url)) as database:
+        assert check_runs(database, "c1").findings == check_results(database, "c1").findings == ()
+        with database.writing() as connection:
+            data = table(0).replace(b"Druck", b"Drvck")
+            connection.execute(channel.update().where(channel.c.name == FILE).values(codec="as-sent", data=data))
+        assert "differs from what was sent" in check_runs(database, "c1").findings[0]
 
 
 def test_what_cannot_be_read_again_changes_nothing(client: TestClient) -> None:
@@ -261,17 +249,3 @@ def test_what_cannot_be_read_again_changes_nothing(client: TestClient) -> None:
     assert client.patch(address + file, json={"rig": "bench-3", "cycles": 1, "reason": "both"}).status_code == 422
     assert client.patch(address + file, json={"reason": "neither"}).status_code == 422
     assert client.get("/v1/clutches/c1").headers["ETag"] == before
-
-
-def test_verify_finds_a_file_that_was_changed_in_the_database(client: TestClient, database_url: str) -> None:
-    client.post("/v1/rigs", json=RIG)
-    first = post(client, "c1", 0, rig="bench-3").json()
-    client.put("/v1/rigs/bench-3", json=MENDED)
-    client.patch(f"/v1/clutches/c1/runs/{first['run_id']}", json={"rig": "bench-3", "reason": "the other torque"})
-    client.__exit__(None, None, None)
-    with closing(open_database(database_url)) as database:
-        assert check_runs(database, "c1").findings == check_results(database, "c1").findings == ()
-        with database.writing() as connection:
-            data = table(0).replace(b"Druck", b"Drvck")
-            connection.execute(channel.update().where(channel.c.name == FILE).values(codec="as-sent", data=data))
-        assert "differs from what was sent" in check_runs(database, "c1").findings[0]

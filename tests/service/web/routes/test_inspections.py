@@ -68,12 +68,14 @@ def test_inspections_are_listed_by_cycles_and_as_a_table(client: TestClient) -> 
 
 def test_an_inspection_is_withdrawn_with_a_reason_and_restored(client: TestClient) -> None:
     address = inspected(client)
+    _, photograph = post(client, address, png())
     tag = client.get(LIST).headers["etag"]
     assert client.post(f"{address}/withdraw", json={}).status_code == 422
     for _ in range(2):  # what is so already is not changed
         answer = client.post(f"{address}/withdraw", json={"reason": "the other bench's disc"})
         assert (answer.status_code, answer.json()["state"]) == (200, "withdrawn")
     assert client.get(LIST).headers["etag"] != tag
+    assert client.get(photograph).status_code == 200
     again = client.post(LIST, json=WORN)
     assert (again.status_code, again.json()["state"]) == (200, "withdrawn")
     answer = client.post(f"{address}/restore", json={"reason": "it was ours"})
@@ -86,13 +88,15 @@ def test_an_inspection_is_withdrawn_with_a_reason_and_restored(client: TestClien
     assert (trail[1]["before"], trail[1]["after"]) == (of_it | {"state": "accepted"}, of_it | {"state": "withdrawn"})
 
 
-def test_an_inspection_changes_no_prediction_and_makes_no_diagnosis_stale(client: TestClient) -> None:
+def test_an_inspection_changes_no_prediction_and_an_archived_clutch_may_be_inspected(client: TestClient) -> None:
     for cycles in (0, 1000, 2000):
         assert client.post(f"{BASE}/runs", json=stationary(cycles)).status_code == 201
     life, clutch = (client.get(f"{BASE}{path}") for path in ("/remaining-useful-life", ""))
     inspected(client)
     assert client.get(f"{BASE}/remaining-useful-life").headers["etag"] == life.headers["etag"]
     assert client.get(BASE).json() == clutch.json()
+    assert client.patch(BASE, json={"archived": True}).status_code == 200
+    assert client.get(inspected(client, FRESH)).status_code == 200
 
 
 def test_what_is_not_there_is_not_found(client: TestClient) -> None:
@@ -105,11 +109,6 @@ def test_what_is_not_there_is_not_found(client: TestClient) -> None:
     for suffix in ("", ".csv"):
         assert client.get(f"/v1/clutches/nobody/inspections{suffix}").status_code == 404
     assert client.post("/v1/clutches/nobody/inspections", json=WORN).status_code == 404
-
-
-def test_an_archived_clutch_may_still_be_inspected(client: TestClient) -> None:
-    assert client.patch(BASE, json={"archived": True}).status_code == 200
-    assert client.get(inspected(client)).status_code == 200
 
 
 def test_an_inspection_names_the_key_that_sent_it(client: TestClient) -> None:
@@ -185,18 +184,15 @@ def test_a_file_that_is_no_photograph_of_its_type_is_refused(
     assert client.get(address).json()["photographs"] == []
 
 
-def test_a_photograph_that_is_too_large_is_refused(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_photographs_are_bounded_in_size_and_number(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("service.web.routes.inspections.MAX_PHOTOGRAPH_BYTES", 1000)
+    monkeypatch.setattr(inspect_clutch, "MAX_PHOTOGRAPHS", 2)
+    address = inspected(client, FRESH)
+    assert [post(client, address, png(red=red))[0] for red in (1, 2, 3, 2)] == [201, 201, 409, 200]
     address = inspected(client)
     assert post(client, address, png() + bytes(1000 - len(png())))[0] == 201
     answer = client.post(f"{address}/photographs", content=png() + bytes(1000), headers={"Content-Type": "image/png"})
     assert (answer.status_code, "at most 1000 bytes" in answer.json()["detail"]) == (413, True)
-
-
-def test_an_inspection_has_only_so_many_photographs(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(inspect_clutch, "MAX_PHOTOGRAPHS", 2)
-    address = inspected(client)
-    assert [post(client, address, png(red=red))[0] for red in (1, 2, 3, 2)] == [201, 201, 409, 200]
 
 
 def test_a_photograph_is_found_below_its_own_inspection_only(client: TestClient) -> None:
@@ -211,10 +207,3 @@ def test_a_photograph_is_found_below_its_own_inspection_only(client: TestClient)
     bound = granted(client, "read", clutches=["c2"])
     assert client.get(photograph, headers=bound).status_code == 403
     assert client.get(f"{elsewhere}/photographs/{name}", headers=bound).status_code == 404
-
-
-def test_a_withdrawn_inspection_keeps_its_photographs(client: TestClient) -> None:
-    address = inspected(client)
-    _, photograph = post(client, address, png())
-    assert client.post(f"{address}/withdraw", json={"reason": "a slip"}).status_code == 200
-    assert client.get(photograph).status_code == 200

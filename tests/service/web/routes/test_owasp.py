@@ -75,14 +75,13 @@ def test_api8_every_answer_has_the_headers_that_browsers_heed(shared_client: Tes
     assert "server" not in answer.headers
 
 
-@pytest.mark.parametrize("note", ["=1+1", "@SUM(A1)", "+1", "-1+cmd", "as new"])
-def test_api10_a_note_is_no_formula_in_a_spreadsheet(client: TestClient, note: str) -> None:
+def test_api10_a_note_is_no_formula_in_a_spreadsheet(client: TestClient) -> None:
     """A rig's key must not have an engineer's spreadsheet compute, or ask, what it likes."""
-    sent = {"cycles": 0, "note": note, "roughness_um": 2.5, "skewness": -3.5}
-    assert client.post(f"{CLUTCHES}/c1/inspections", json=sent, headers=granted(client, "ingest")).status_code == 201
-    headers = granted(client, "read")
-    (row,) = csv.DictReader(client.get(f"{CLUTCHES}/c1/inspections.csv", headers=headers).text.splitlines())
-    assert row["note"] == (note if note == "as new" else f"'{note}")
-    assert row["skewness"] == "-3.5", "numbers stay numbers"
-    (item,) = client.get(f"{CLUTCHES}/c1/inspections", headers=headers).json()["items"]
-    assert item["note"] == note
+    notes = ["as new", "=1+1", "@SUM(A1)", "+1", "-1+cmd"]
+    for cycles, note in enumerate(notes):
+        sent = {"cycles": cycles, "note": note, "roughness_um": 2.5, "skewness": -3.5}
+        assert client.post(f"{CLUTCHES}/c1/inspections", json=sent).status_code == 201
+    rows = list(csv.DictReader(client.get(f"{CLUTCHES}/c1/inspections.csv").text.splitlines()))
+    assert [row["note"] for row in rows] == ["as new", *(f"'{note}" for note in notes[1:])]
+    assert {row["skewness"] for row in rows} == {"-3.5"}, "numbers stay numbers"
+    assert [item["note"] for item in client.get(f"{CLUTCHES}/c1/inspections").json()["items"]] == notes
