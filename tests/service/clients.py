@@ -1,8 +1,7 @@
 """Clients of a service in this process, and the databases that they begin with."""
 
 import json
-import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -16,7 +15,6 @@ from service.app import create_app
 from service.cli.main import app as command_line
 from service.settings import Settings
 from tests.storage.samples import lay_empty
-from tests.support import stationary
 
 
 def clutchlife(*arguments: object, code: int = 0, answers: str = "") -> str:
@@ -61,29 +59,22 @@ def csv_text(channels: dict[str, list[float]]) -> str:
     return "\n".join([",".join(channels), *(",".join(map(repr, row)) for row in rows)])
 
 
-@contextmanager
-def client_on_copy(laid: Path, folder: Path, **settings: Any) -> Iterator[TestClient]:
-    """A client of a service on a copy, in that folder, of a database that several tests begin with."""
-    shutil.copyfile(laid, folder / "copy.db")
-    with client_on(f"sqlite:///{folder / 'copy.db'}", **settings) as client:
-        yield client
+def _as_it_is(_client: TestClient) -> None:
+    """Add nothing."""
 
 
 @cache
-def filled(*cycles: float, clutch_id: str = "c1") -> bytes:
-    """A database with `c1` and with a clutch that has stationary tests at those cycles; made once, for each test to copy."""
+def _laid(fill: Callable[[TestClient], object]) -> bytes:
     with TemporaryDirectory() as folder:
         with client_on(f"sqlite:///{folder}/a.db") as client:
-            for each in dict.fromkeys(("c1", clutch_id)):
-                assert client.post("/v1/clutches", json={"clutch_id": each}).status_code == 201
-            for each in cycles:
-                post_run(client, stationary(each), clutch_id)
+            assert client.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
+            fill(client)
         return Path(folder, "a.db").read_bytes()
 
 
 @contextmanager
-def client_of(path: Path, *cycles: float, clutch_id: str = "c1") -> Iterator[TestClient]:
-    """A client of a service on a copy of that database."""
-    path.write_bytes(filled(*cycles, clutch_id=clutch_id))
+def client_of(path: Path, fill: Callable[[TestClient], object] = _as_it_is) -> Iterator[TestClient]:
+    """A client of a service on a database with `c1` and what `fill` adds to it, made once and copied to `path`."""
+    path.write_bytes(_laid(fill))
     with client_on(f"sqlite:///{path}") as client:
         yield client

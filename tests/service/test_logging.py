@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from service.logging import JsonLines, LogFormat, LogLevel, TextLines, configure, log_request, request_id
+from service.logging import JsonLines, LogFormat, LogLevel, TextLines, configure, request_id
 
 FORGED = 'x\n2026-01-01T00:00:00.000Z INFO clutchlife: key revoked\r\n{"level": "info"}\x85\u2028\x1b[2Jy'
 
@@ -33,21 +33,16 @@ def configured(form: LogFormat, level: LogLevel) -> io.StringIO:
     return written
 
 
-def test_a_record_is_one_line_of_json() -> None:
-    line = JsonLines().format(record("%s: %s", "a", FORGED, key=FORGED))
+def test_a_record_is_one_line_of_json_its_traceback_too() -> None:
+    line = JsonLines().format(record("%s: %s", "a", FORGED, error=raised(), key=FORGED))
     assert len(line.splitlines()) == 1
     assert line.isascii()
     read = json.loads(line)
+    assert read["exception"].startswith("Traceback")
     expected = {"level": "warning", "logger": "clutchlife", "message": f"a: {FORGED}", "key": FORGED}
     assert expected.items() <= read.items()
     assert read["time"].endswith("Z")
     assert "request_id" not in read
-
-
-def test_an_error_is_in_the_same_line_with_its_traceback() -> None:
-    line = JsonLines().format(record("it failed", error=raised()))
-    assert len(line.splitlines()) == 1
-    assert json.loads(line)["exception"].startswith("Traceback")
 
 
 def test_no_line_of_text_begins_with_what_is_logged() -> None:
@@ -91,13 +86,3 @@ def test_auto_is_text_on_a_terminal_and_json_elsewhere(
     configure(form, "info", stream)
     logging.getLogger("clutchlife").info("x")
     assert stream.getvalue().startswith("{") is is_json
-
-
-def test_a_request_is_a_line_with_numbers() -> None:
-    written = configured("json", "info")
-    log_request(logging.INFO, "GET", "/v1/clutches", 200, 0.0123456, 2048, "key:1a2b bench 3")
-    line = json.loads(written.getvalue())
-    assert line["message"] == "GET /v1/clutches 200"
-    expected = {"method": "GET", "route": "/v1/clutches", "status": 200, "duration_ms": 12.35, "bytes": 2048}
-    assert expected.items() <= line.items()
-    assert line["key"] == "key:1a2b bench 3"

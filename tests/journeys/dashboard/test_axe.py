@@ -180,9 +180,13 @@ def test_all_that_is_drawn_stands_out_three_to_one(browser: Browser, url: str) -
     watched.close()
 
 
-def test_what_was_done_and_an_archived_clutch(browser: Browser, url: str) -> None:
+def test_an_empty_clutch_an_unknown_one_and_an_archived_one(browser: Browser, url: str) -> None:
     watched = Watched(browser, url, viewport=PHONE)
-    page = watched.open("/clutches/waiting")
+    for path, title in (("nobody", "No such clutch"), ("waiting", "No run has arrived")):
+        page = watched.open(f"/clutches/{path}")
+        page.get_by_role("heading", name=title).wait_for()
+        assert violations(page) == []
+    watched.said.clear()  # the browser notes that nobody is there
     page.get_by_text("More", exact=True).click()
     page.get_by_role("button", name="Archive …").click()
     page.get_by_role("dialog").get_by_role("button", name="Archive").click()
@@ -193,12 +197,3 @@ def test_what_was_done_and_an_archived_clutch(browser: Browser, url: str) -> Non
     page.locator(".done").get_by_role("button", name="Undo").click()
     page.locator(".done").get_by_text("back in the list").wait_for()
     watched.close()
-
-
-def test_an_empty_clutch_and_an_unknown_one(browser: Browser, url: str) -> None:
-    watched = Watched(browser, url)
-    for path, title in (("waiting", "No run has arrived"), ("nobody", "No such clutch")):
-        page = watched.open(f"/clutches/{path}")
-        page.get_by_role("heading", name=title).wait_for()
-        assert violations(page) == []
-    watched.context.close()

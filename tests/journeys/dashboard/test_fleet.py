@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.driving import Watched, Wire
 from tests.browser.lives import post, worn
-from tests.support import ONCE, Server, clutchlife, one_quick, serving, stationary
+from tests.support import ONCE, Server, clutchlife, serving, stationary
 
 pytestmark = pytest.mark.browser
 
@@ -83,6 +83,9 @@ def test_the_worst_comes_first_with_all_that_is_asked_of_a_row(watched: Watched)
     assert not any("plotly" in url for url in watched.asked)
     # what comes from outside is text, never markup
     assert "<i>carbon</i> on steel" in first.inner_text()
+    for width in (320, 390, 1360, 2560):
+        page.set_viewport_size({"width": width, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 def test_states_differ_in_word_shape_and_colour(watched: Watched) -> None:
@@ -134,15 +137,6 @@ def test_by_keyboard_alone(watched: Watched) -> None:
     assert float(outline.removesuffix("px")) >= 2
     page.keyboard.press("Enter")
     page.get_by_role("heading", name="worn-out").wait_for()
-
-
-@pytest.mark.parametrize("width", one_quick([320, 390, 1360, 2560]))
-def test_no_width_scrolls_sideways(browser: Browser, server: Server, width: int) -> None:
-    watched = Watched(browser, server.url, viewport={"width": width, "height": 800})
-    page = watched.open("/")
-    rows(page)
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    watched.close()
 
 
 def test_a_poll_without_news_costs_a_few_hundred_bytes(watched: Watched) -> None:

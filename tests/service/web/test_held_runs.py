@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from tests.service.clients import client_of, client_on_copy
+from tests.service.clients import client_of
 from tests.support import stationary
 
 CLUTCH = "/v1/clutches/c1"
@@ -47,22 +47,17 @@ ANSWERS = (
 SAID = re.compile(r'"held(_runs)?":(2\b|2\.0\b|\{"count":2\b)|"(code|quantity)":"held_runs"|2 (runs are|held runs)')
 
 
-@pytest.fixture(scope="module")
-def laid(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A database of a clutch with four tests that count and two that are held."""
-    path = tmp_path_factory.mktemp("held") / "held.db"
-    with client_of(path) as client:
-        for cycles in (0.0, 1000.0, 2000.0, 3000.0):
-            _sent(client, cycles, 1.0, "accepted")
-        for cycles in (4000.0, 5000.0):
-            _sent(client, cycles, 60.0, "held")
-    return path
+def fill(client: TestClient) -> None:
+    """A clutch with four tests that count and two that are held."""
+    for cycles in (0.0, 1000.0, 2000.0, 3000.0):
+        _sent(client, cycles, 1.0, "accepted")
+    for cycles in (4000.0, 5000.0):
+        _sent(client, cycles, 60.0, "held")
 
 
 @pytest.fixture
-def held(laid: Path, tmp_path: Path) -> Iterator[TestClient]:
-    """A client of a service on a copy of it."""
-    with client_on_copy(laid, tmp_path) as client:
+def held(tmp_path: Path) -> Iterator[TestClient]:
+    with client_of(tmp_path / "a.db", fill) as client:
         yield client
 
 

@@ -117,18 +117,14 @@ def test_a_unit_is_chosen_never_taken_for_granted_and_not_overruled_in_silence(c
     assert client.post(address, content=german(0, torque="M", unit="kNm")).status_code == 201
 
 
-def test_a_scale_and_an_offset_are_of_the_channel(client: TestClient) -> None:
+def test_a_column_is_scaled_and_left_out_as_the_profile_says_whatever_its_name(client: TestClient) -> None:
     first = preview(client, german(0))
+    without = preview(client, german(0), chosen(first, "Drehzahl", channel=None))
+    assert "speed_rpm" in without["missing"]
+    assert "speed_rpm" not in without["channels"]
     plain = preview(client, german(0), chosen(first, "Mz", channel="torque_nm"))["channels"]["torque_nm"]
     scaled = preview(client, german(0), chosen(first, "Mz", channel="torque_nm", scale=2.0, offset=-1.5))
     assert scaled["channels"]["torque_nm"] == pytest.approx([2 * value - 1.5 for value in plain])
-
-
-def test_columns_that_are_left_out_stay_so_whatever_their_names(client: TestClient) -> None:
-    shown = preview(client, german(0))
-    without = preview(client, german(0), chosen(shown, "Drehzahl", channel=None))
-    assert "speed_rpm" in without["missing"]
-    assert "speed_rpm" not in without["channels"]
 
 
 @pytest.mark.parametrize("kind", ["stationary_stribeck", "dynamic_stribeck"])

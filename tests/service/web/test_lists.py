@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from tests.service.clients import client_of, client_on, client_on_copy
+from tests.service.clients import client_of, client_on
 from tests.service.web.routes.granting import granted
 from tests.support import stationary
 
@@ -86,23 +86,14 @@ def test_a_limit_is_refused_where_nothing_is_listed_and_a_cursor_that_is_none_ev
 # --- Lists of clutches.
 
 
-@pytest.fixture(scope="module")
-def laid(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """c1, without a run; two that wear, one of them to its end and with a held run; one that is archived."""
-    path = tmp_path_factory.mktemp("fleet") / "clutchlife.db"
-    with client_of(path) as client:
-        fill(client)
-    return path
-
-
 @pytest.fixture
-def fleet(laid: Path, tmp_path: Path) -> Iterator[TestClient]:
-    """A client of a service on a copy of it."""
-    with client_on_copy(laid, tmp_path) as client:
+def fleet(tmp_path: Path) -> Iterator[TestClient]:
+    with client_of(tmp_path / "a.db", fill) as client:
         yield client
 
 
 def fill(client: TestClient) -> None:
+    """c1, without a run; two that wear, one of them to its end and with a held run; one that is archived."""
     for clutch_id, material in (("ageing", "Carbon"), ("ended", "carbon_2"), ("gone", "paper")):
         record = {"clutch_id": clutch_id, "friction_material": material}
         assert client.post("/v1/clutches", json=record).status_code == 201

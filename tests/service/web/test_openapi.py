@@ -7,7 +7,6 @@ from typing import Any
 import jsonschema_rs
 import openapi_spec_validator
 import pytest
-import schemathesis
 from openapi_spec_validator.validation.exceptions import UnresolvableParameterError
 
 from service.web.openapi import consists_of_fields
@@ -62,21 +61,10 @@ def references(part: Any) -> Iterator[str]:
             yield from references(item)
 
 
-def test_the_description_is_valid_and_every_reference_is_found_in_it(api: dict[str, Any]) -> None:
-    schemathesis.openapi.from_dict(api).validate()
-    for reference in set(references(api)):
-        part: Any = api
-        for name in reference.removeprefix("#/").split("/"):
-            part = part[name]
-    broken = copy.deepcopy(api)
-    broken["info"] = 7
-    with pytest.raises(Exception, match="7 is not of type"):
-        schemathesis.openapi.from_dict(broken).validate()
-
-
 def test_the_description_keeps_to_the_standard(api: dict[str, Any]) -> None:
-    """By the OpenAPI Initiative's own schema, and what it cannot say: unique ids, parameters of the paths, defaults."""
+    """By the OpenAPI Initiative's own schema, and what it cannot say: references, unique ids, parameters of the paths."""
     openapi_spec_validator.validate(api)
+    assert "servers" not in api, "it is at any address"
     paths = copy.deepcopy(api)
     del paths["paths"]["/v1/clutches/{clutch_id}"]["get"]["parameters"]
     with pytest.raises(UnresolvableParameterError, match="clutch_id"):

@@ -160,12 +160,3 @@ async def test_what_is_being_made_is_not_made_twice_to_make_room(kept: Revalidat
     await worker.gives(1, b"one")
     assert await first == await second == (1, Answer.of(b"one"))
     assert len(worker.asked) == 2
-
-
-def test_a_poll_of_what_is_held_counts_as_asking() -> None:
-    kept = Revalidation(AnswerCache(8))
-    for name in ("a", "b"):
-        kept.begin(name, 1, b"four")
-    assert kept._cache.held("a", 1) == Answer.of(b"four")
-    kept.begin("c", 1, b"four")
-    assert [name for name in ("a", "b", "c") if kept.knows(name)] == ["a", "c"]

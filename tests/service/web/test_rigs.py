@@ -116,7 +116,7 @@ def test_a_profile_that_cannot_be_used_is_refused(
     assert shared_client.get("/v1/rigs").json()["items"] == []
 
 
-def test_no_name_of_a_file_takes_long_by_any_pattern() -> None:
+def test_no_name_of_a_file_takes_long_by_any_pattern_and_one_with_the_cycles_twice_is_none() -> None:
     """Each of three `*` may stand for anything: 10 s where all of it was tried. What is found is the same."""
     columns = [{"title": "a", "channel": "torque_nm"}]
     slow = RigProfile.model_validate({"columns": columns, "file_name": "*a*a*a*b"})
@@ -127,9 +127,6 @@ def test_no_name_of_a_file_takes_long_by_any_pattern() -> None:
     for _ in range(500):
         pattern, name = ("".join(rng.choices(of, k=rng.randint(1, 7))) for of in ("*ab", "ab"))
         assert bool(_regex(pattern).fullmatch(name)) == fnmatch.fnmatchcase(name, pattern), (pattern, name)
-
-
-def test_a_name_that_holds_the_cycles_twice_is_no_pattern() -> None:
     assert pattern_for("test_7000_3.csv", 7000.0) == "test_{cycles}_*.csv"
     assert pattern_for("test_7000_7000.csv", 7000.0) is None
     assert pattern_for("test_7000_7k.csv", 7000.0) is None

@@ -53,13 +53,6 @@ def test_pages_and_what_they_load_are_addressed_from_where_they_are(proxied: tup
             assert answer.status_code == 200 or (address == f"{up}help/" and "make docs" in answer.text), address
 
 
-def test_without_a_proxy_addresses_are_as_they_were(client: TestClient) -> None:
-    assert client.post("/v1/clutches", json={"clutch_id": "c9"}).headers["Location"] == "/v1/clutches/c9"
-    assert "servers" not in client.get("/openapi.json").json()
-    redirected = client.get("/v1/clutches/", follow_redirects=False)
-    assert redirected.headers["Location"] == "/v1/clutches"
-
-
 def test_a_path_that_cannot_be_told_from_the_service_s_own_is_refused(client: TestClient) -> None:
     routes = [getattr(route, "path", "/") for route in client.app.routes]  # type: ignore[attr-defined]
     own = {path.split("/")[1] for path in routes} - {""}

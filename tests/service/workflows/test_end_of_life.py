@@ -15,7 +15,7 @@ from fastapi.testclient import TestClient
 from service.workflows.learn_fleet import refresh
 from storage.engine.opening import open_database
 from tests.real import loaders
-from tests.service.clients import client_of, client_on_copy
+from tests.service.clients import client_of
 from tests.support import serving, stationary
 
 RUNS, LIFE = "/v1/clutches/c1/runs", "/v1/clutches/c1/remaining-useful-life"
@@ -31,19 +31,15 @@ def post(client: httpx2.Client, body: dict[str, Any], status: int = 201, path: s
     return answer.json()
 
 
-@pytest.fixture(scope="module")
-def laid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def fill(client: TestClient) -> None:
     """A clutch with four tests up to 3000 cycles, half of the way to its end."""
-    path = tmp_path_factory.mktemp("tested") / "a.db"
-    with client_of(path) as client:
-        for cycles in (0, 1000, 2000, 3000):
-            post(client, stationary(cycles, run_id=f"test-{cycles}", **FEW))
-    return path
+    for cycles in (0, 1000, 2000, 3000):
+        post(client, stationary(cycles, run_id=f"test-{cycles}", **FEW))
 
 
 @pytest.fixture
-def tested(laid: Path, tmp_path: Path) -> Iterator[TestClient]:
-    with client_on_copy(laid, tmp_path) as client:
+def tested(tmp_path: Path) -> Iterator[TestClient]:
+    with client_of(tmp_path / "a.db", fill) as client:
         yield client
 
 

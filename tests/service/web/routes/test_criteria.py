@@ -14,29 +14,24 @@ from models.rig.campaign import simulate
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
 from service.run_files.simulated import simulated_body
-from tests.service.clients import client_on, client_on_copy
+from tests.service.clients import client_of, post_run
 from tests.support import one_quick
 
 WAIT = {"Prefer": "wait=60"}
 SHUDDER = {"quantity": "slope", "pressure_bar": 5, "speed_rpm": 100}
 
 
-@pytest.fixture(scope="module")
-def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A database with a simulated clutch whose friction soon falls with speed at 100 rpm, six tests with loops."""
-    path = tmp_path_factory.mktemp("criteria") / "filled.db"
+def fill(client: TestClient) -> None:
+    """A simulated clutch whose friction soon falls with speed at 100 rpm, six tests with loops."""
     record = {"clutch_id": "s", "origin": "simulated", "end_of_life": {"criteria": [{"quantity": "mean_cof"}, SHUDDER]}}
-    with client_on(f"sqlite:///{path}") as client:
-        assert client.post("/v1/clutches", json=record).status_code == 201
-        for run in simulate(7, most_tests=6, programme=Programme(dynamic=DynamicTest(rate=25.0, pressures=(5e5, 7e5)))):
-            assert client.post("/v1/clutches/s/runs", json=simulated_body(run)).status_code == 201
-    return path
+    assert client.post("/v1/clutches", json=record).status_code == 201
+    for run in simulate(7, most_tests=6, programme=Programme(dynamic=DynamicTest(rate=25.0, pressures=(5e5, 7e5)))):
+        post_run(client, simulated_body(run), "s")
 
 
 @pytest.fixture
-def tested(filled: Path, tmp_path: Path) -> Iterator[TestClient]:
-    """A client of a service on a copy of it."""
-    with client_on_copy(filled, tmp_path) as client:
+def tested(tmp_path: Path) -> Iterator[TestClient]:
+    with client_of(tmp_path / "a.db", fill) as client:
         yield client
 
 
@@ -125,7 +120,9 @@ def test_an_earlier_life_stays_reachable(tested: TestClient) -> None:
     assert asked(tested, "remaining-useful-life")["status"] == "insufficient_data"
 
 
-def test_too_few_tests_of_a_quantity_name_that_quantity(tested: TestClient) -> None:
+def test_too_few_tests_of_a_quantity_name_that_quantity_and_what_was_known_then_is_answered_for_then(
+    tested: TestClient,
+) -> None:
     assert tested.post("/v1/clutches", json={"clutch_id": "s2", "origin": "simulated"}).status_code == 201
     for run in simulate(7, most_tests=2):
         assert tested.post("/v1/clutches/s2/runs", json=simulated_body(run)).status_code == 201
@@ -134,9 +131,6 @@ def test_too_few_tests_of_a_quantity_name_that_quantity(tested: TestClient) -> N
     assert answer["status"] == "insufficient_data"
     assert answer["criterion"]["quantity"] == "static_torque_nm"
     assert tested.get("/v1/clutches/s/degradation", params={"life": 3}, headers=WAIT).status_code == 404
-
-
-def test_what_was_known_then_is_answered_for_then(tested: TestClient) -> None:
     items = asked(tested, "degradation", quantity="static_torque_nm", at_cycles=2_000)["items"]
     assert all(item["measured"]["cycles"] == [0, 500, 1_000, 2_000] for item in items)
 

@@ -7,6 +7,7 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import httpx2
 import pytest
@@ -17,6 +18,7 @@ from service.web.readiness import available_memory
 from tests.benchmarks.memory import family
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import context_of
+from tests.service.work.waiting import until
 from tests.support import ONCE, serving
 
 WHOLE = dict.fromkeys(("database", "disk", "memory", "workers"), "ok")
@@ -76,20 +78,20 @@ def test_a_disk_that_hangs_is_not_ready_in_time(client: TestClient, monkeypatch:
 @pytest.mark.slow
 def test_a_worker_that_died_is_not_ready_until_another_is_up(tmp_path: Path) -> None:
     with serving(tmp_path / "a.db", environment={"CLUTCHLIFE_WORKERS": "2"}) as server:
-        url, deadline = f"{server.url}/readyz", time.monotonic() + 60
-        with httpx2.Client(timeout=30) as http:
-            while 'clutchlife_worker_calls{lane="runs"} 0.0' not in http.get(f"{server.url}/metrics").text:
-                assert time.monotonic() < deadline, "the workers are not up"
-                time.sleep(0.1)
+        with httpx2.Client(base_url=server.url, timeout=30) as http:
+
+            def checks(status: int) -> Any:
+                answer = http.get("/readyz")
+                return answer.json()["checks"] if answer.status_code == status else None
+
+            until(lambda: 'clutchlife_worker_calls{lane="runs"} 0.0' in http.get("/metrics").text)
             found = workers_of(server.pid)
             assert len(found) == 2
-            assert http.get(url).status_code == 200
+            assert checks(200) == WHOLE
             os.kill(found[0], signal.SIGKILL)
-            answer = until(http, url, 503, deadline)
-            assert answer.json()["checks"] == WHOLE | {
-                "workers": "a worker process has ended and is being started again: runs"
-            }
-            assert until(http, url, 200, deadline).json()["checks"] == WHOLE
+            ended = "a worker process has ended and is being started again: runs"
+            assert until(lambda: checks(503)) == WHOLE | {"workers": ended}
+            assert until(lambda: checks(200)) == WHOLE
         assert set(workers_of(server.pid)).isdisjoint(found[:1])
         assert ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
 
@@ -104,16 +106,6 @@ def parent(pid: int) -> int:
         return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
     except FileNotFoundError:
         return 0
-
-
-def until(http: httpx2.Client, url: str, status: int, deadline: float) -> httpx2.Response:
-    """The first answer with that status."""
-    while time.monotonic() < deadline:
-        answer = http.get(url)
-        if answer.status_code == status:
-            return answer
-        time.sleep(0.01)
-    raise TimeoutError(f"no {status}")
 
 
 def test_memory_is_that_of_the_machine_and_of_the_own_group(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -127,7 +127,9 @@ def test_a_full_lane_refuses_its_own_and_leaves_all_else_alone(
 
 
 def test_who_asks_for_many_answers_holds_up_nobody_else(client: TestClient, tmp_path: Path, gate: Path) -> None:
-    """Six that take long are asked for before somebody else's one; callers take turns, so it is the second."""
+    """Six that take long are asked for before somebody else's one; callers take turns, so it is the second.
+
+    Who asks for an answer that is being made waits for that one."""
     for cycles in (0.0, 2000.0, 4000.0):
         client.post(f"{CLUTCHES}/c1/runs", json=stationary(cycles))
     many, one = granted(client, "read"), granted(client, "read")
@@ -144,35 +146,14 @@ def test_who_asks_for_many_answers_holds_up_nobody_else(client: TestClient, tmp_
         thread.start()
         while workers.calls()[Lane.ANSWERS] < asked:
             time.sleep(0.01)
+    same = [threading.Thread(target=ask, args=(many, 500)) for _ in range(8)]
+    for thread in same:
+        thread.start()
+    time.sleep(0.5)
+    assert workers.calls()[Lane.ANSWERS] == 1 + len(threads)
     gate.touch()
     held.result(60)
-    for thread in threads:
+    for thread in threads + same:
         thread.join()
-    assert [status for status, _ in ended] == [200] * 7
+    assert [status for status, _ in ended] == [200] * 15
     assert [of_one for _, of_one in ended].index(True) <= 3
-
-
-@pytest.mark.slow
-def test_sixty_engagements_are_one_computation_where_they_are_the_same(client: TestClient) -> None:
-    """Who asks for an answer that is being made waits for that one."""
-    for cycles in (0.0, 2000.0, 4000.0):
-        client.post(f"{CLUTCHES}/c1/runs", json=stationary(cycles))
-    workers, submitted, statuses = context_of(client).workers, [], []
-    submit = workers.submit
-
-    def counted(lane: Lane, *arguments: Any, **more: Any) -> Any:
-        submitted.append(lane)
-        return submit(lane, *arguments, **more)
-
-    workers.submit = counted  # type: ignore[method-assign]
-
-    def ask() -> None:
-        statuses.append(client.get(f"{CLUTCHES}/c1/engagement", headers=WAIT).status_code)
-
-    threads = [threading.Thread(target=ask) for _ in range(60)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert statuses == [200] * 60
-    assert submitted.count(Lane.SIMULATIONS) == 1
