@@ -86,11 +86,8 @@ def test_the_worst_comes_first_with_all_that_is_asked_of_a_row(watched: Watched)
     for width in (320, 390, 1360, 2560):
         page.set_viewport_size({"width": width, "height": 800})
         assert page.evaluate("document.documentElement.scrollWidth") <= width
-
-
-def test_states_differ_in_word_shape_and_colour(watched: Watched) -> None:
-    page = watched.open("/")
-    rows(page)
+    # states differ in word, shape and colour
+    page.set_viewport_size({"width": 1360, "height": 900})
     found = page.eval_on_selector_all(
         "table.fleet .state svg",
         "icons => icons.map(i => [i.outerHTML, getComputedStyle(i).color, i.nextSibling.firstChild.textContent])",

@@ -76,7 +76,7 @@ def written(database: Database, path: Path, run_id: str = "raw", points: int | N
     return path.read_bytes()
 
 
-def test_all_samples_bit_for_bit_behind_the_receipt(database: Database, tmp_path: Path) -> None:
+def test_all_samples_bit_for_bit_behind_the_receipt_as_json_and_as_parquet(database: Database, tmp_path: Path) -> None:
     body = json.loads(written(database, tmp_path / "body"))
     with database.reading() as connection:
         row = runs.get(connection, CLUTCH, "raw")
@@ -89,6 +89,13 @@ def test_all_samples_bit_for_bit_behind_the_receipt(database: Database, tmp_path
     assert list(body["channels"]) == list(dynamic())
     for name, column in dynamic().items():
         assert np.array(body["channels"][name]).tobytes() == column.tobytes(), name
+    written(database, tmp_path / "run.parquet", kind="parquet")
+    table = parquet.read_table(tmp_path / "run.parquet")
+    assert table.column_names == list(dynamic())
+    for name, column in dynamic().items():
+        assert table[name].to_numpy().tobytes() == column.tobytes()
+    assert table.schema.field("torque_nm").metadata == {b"unit": b"Nm"}
+    assert json.loads(table.schema.metadata[b"clutchlife"])["run_id"] == "raw"
 
 
 def test_a_plot_has_samples_as_they_were_measured_and_every_peak(database: Database, tmp_path: Path) -> None:
@@ -104,22 +111,9 @@ def test_a_plot_has_samples_as_they_were_measured_and_every_peak(database: Datab
     packed = written(database, tmp_path / "a", points=500, compressed=True)
     assert gzip.decompress(packed) == (tmp_path / "body").read_bytes()
     assert packed == written(database, tmp_path / "another name", points=500, compressed=True)
-
-
-@pytest.mark.parametrize("points", [1, 10, 159])
-def test_plateaus_come_whole(database: Database, tmp_path: Path, points: int) -> None:
-    body = json.loads(written(database, tmp_path / "body", "plateaus", points=points))
-    assert len(body["channels"]["torque_nm"]) == body["samples"] == 160
-
-
-def test_parquet_has_all_samples_units_and_the_receipt(database: Database, tmp_path: Path) -> None:
-    written(database, tmp_path / "run.parquet", kind="parquet")
-    table = parquet.read_table(tmp_path / "run.parquet")
-    assert table.column_names == list(dynamic())
-    for name, column in dynamic().items():
-        assert table[name].to_numpy().tobytes() == column.tobytes()
-    assert table.schema.field("torque_nm").metadata == {b"unit": b"Nm"}
-    assert json.loads(table.schema.metadata[b"clutchlife"])["run_id"] == "raw"
+    for points in (1, 10, 159):
+        body = json.loads(written(database, tmp_path / "body", "plateaus", points=points))
+        assert len(body["channels"]["torque_nm"]) == body["samples"] == 160, "plateaus come whole"
 
 
 def test_parquet_needs_its_extra(database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,6 +25,7 @@ from tests.service.web.routes.granting import context_of
 from tests.support import ONCE, serving, stationary
 
 RUNS = "/v1/clutches/c1/runs"
+JSON = {"Content-Type": "application/json"}
 
 
 def padded(cycles: float, size: int) -> bytes:
@@ -38,9 +39,7 @@ def test_twelve_bodies_of_18_mib_raise_the_service_by_160_mib_at_most(tmp_path: 
     with serving(tmp_path / "a.db") as server:
         with httpx2.Client(base_url=server.url, timeout=120) as http:
             assert http.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
-            assert (
-                http.post(RUNS, content=padded(0.0, 0), headers={"Content-Type": "application/json"}).status_code == 201
-            )
+            assert http.post(RUNS, content=padded(0.0, 0), headers=JSON).status_code == 201
         before, peak, ended = resident(server.pid), 0, threading.Event()
 
         def look() -> None:
@@ -51,7 +50,7 @@ def test_twelve_bodies_of_18_mib_raise_the_service_by_160_mib_at_most(tmp_path: 
         def post(number: int) -> httpx2.Response:
             body = padded(1000.0 * (number + 1), 18 << 20)
             with httpx2.Client(base_url=server.url, timeout=300) as http:
-                return http.post(RUNS, content=body, headers={"Content-Type": "application/json"})
+                return http.post(RUNS, content=body, headers=JSON)
 
         looking = threading.Thread(target=look)
         looking.start()
@@ -80,7 +79,6 @@ def small(database_url: str, monkeypatch: pytest.MonkeyPatch) -> Any:
 def test_a_long_run_waits_on_disk_and_is_read_as_a_short_one_is(
     small: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sent = {"Content-Type": "application/json"}
     seen: list[list[str]] = []
     submit = context_of(small).workers.submit
 
@@ -90,25 +88,24 @@ def test_a_long_run_waits_on_disk_and_is_read_as_a_short_one_is(
 
     monkeypatch.setattr(context_of(small).workers, "submit", noted)
     short, long = padded(0.0, 0), padded(1000.0, 200_000)
-    assert small.post(RUNS, content=short, headers=sent).status_code == 201
-    assert small.post(RUNS, content=long, headers=sent).status_code == 201
-    assert small.post(RUNS, content=long.rstrip(), headers=sent).json()["duplicate"]
+    assert small.post(RUNS, content=short, headers=JSON).status_code == 201
+    assert small.post(RUNS, content=long, headers=JSON).status_code == 201
+    assert small.post(RUNS, content=long.rstrip(), headers=JSON).json()["duplicate"]
     assert [len(names) for names in seen[:2]] == [0, 1]
     assert list(context_of(small).folder.iterdir()) == []
-    refused = small.post(RUNS, content=b"{" + long, headers=sent)
+    refused = small.post(RUNS, content=b"{" + long, headers=JSON)
     assert (refused.status_code, refused.json()["errors"][0]["code"]) == (422, "json_invalid")
     assert list(context_of(small).folder.iterdir()) == []
 
 
 def test_bodies_for_which_there_is_no_room_are_refused_with_503_and_room_comes_back(small: TestClient) -> None:
-    sent = {"Content-Type": "application/json"}
     for _ in range(5):
-        refused = small.post("/v1/clutches", content=b"{}".ljust(150_000), headers=sent)
+        refused = small.post("/v1/clutches", content=b"{}".ljust(150_000), headers=JSON)
         assert (refused.status_code, refused.headers["Retry-After"]) == (503, "1")
         assert "all available room" in refused.json()["detail"]
     for number in range(5):
         body = to_text({"clutch_id": f"d{number}"}).encode().ljust(90_000)
-        assert small.post("/v1/clutches", content=body, headers=sent).status_code == 201
+        assert small.post("/v1/clutches", content=body, headers=JSON).status_code == 201
 
 
 def test_scores_of_the_fleet_are_computed_by_workers(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -138,12 +135,10 @@ def test_every_post_is_answered_within_a_minute_where_every_child_is_stopped(tmp
     """The workers and what starts them: every POST hung for ever, and `/readyz` said ok."""
     with serving(tmp_path / "a.db") as server, httpx2.Client(base_url=server.url, timeout=65) as http:
         assert http.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
-        assert http.post(RUNS, json=stationary(0.0)).status_code == 201
+        assert http.post(RUNS, json=stationary(0.0, run_id="first")).status_code == 201
         if at_work:
             with suppress(httpx2.TimeoutException):
-                http.post(
-                    f"{RUNS}/{http.get(RUNS).json()['items'][0]['run_id']}/confirm", json={"reason": "a"}, timeout=0.01
-                )
+                http.post(f"{RUNS}/first/confirm", json={"reason": "a"}, timeout=0.01)
         children = [pid for pid in family(server.pid) if pid != server.pid]
         assert len(children) > 3
         for pid in children:

@@ -149,12 +149,11 @@ def test_of_several_processes_at_a_port_all_are_counted(database_url: str, tmp_p
     after = said(processes[2])
     for process in processes[1:]:
         process.communicate()
-    asked, runs = (
-        'clutchlife_requests_total{method="GET",route="/a",status="200"}',
-        'clutchlife_worker_calls{lane="runs"}',
-    )
-    assert [seen[asked] for seen in (alone, both, after)] == [2, 4, 6]
-    assert [seen[runs] for seen in (alone, both, after)] == [3, 6, 6]
+    for name, values in (
+        ('clutchlife_requests_total{method="GET",route="/a",status="200"}', [2, 4, 6]),
+        ('clutchlife_worker_calls{lane="runs"}', [3, 6, 6]),
+    ):
+        assert [seen[name] for seen in (alone, both, after)] == values
     memory = "process_resident_memory_bytes"
     assert 1.5 < both[memory] / alone[memory] < 2.5
     assert 1.5 < after[memory] / alone[memory] < 2.5

@@ -119,10 +119,9 @@ def test_dates_follow_from_a_pace(aged: TestClient) -> None:
 
 def test_what_cannot_be_counted_is_said(client: TestClient) -> None:
     nothing = planned(client, {"cycles": 100, "energy_per_cycle_kj": 20}, clutch="c1")
-    assert (nothing["status"], nothing["remaining_blocks"]["0.5"], nothing["block_severity"]) == (
-        "insufficient_data", None, [None],
-    )  # fmt: skip
-    assert (nothing["pace_from"], nothing["end_of_life_at"]) == (None, None)
+    unknown = {"status": "insufficient_data", "block_severity": [None], "pace_from": None, "end_of_life_at": None}
+    assert unknown.items() <= nothing.items()
+    assert nothing["remaining_blocks"]["0.5"] is None
     send(client, "c1", *(stationary(cycles, pressures=(5.0,)) for cycles in (0.0, 1000.0, 2000.0, 3000.0)))
     counted = planned(client, {"cycles": 100, "energy_per_cycle_kj": 20}, clutch="c1")
     assert "severity_not_counted" in [warning["code"] for warning in counted["warnings"]]
@@ -136,8 +135,8 @@ def test_a_rebuilt_clutch_has_a_whole_horizon_again(client: TestClient) -> None:
     usual = client.get("/v1/clutches/c1/remaining-useful-life").json()
     same = planned(client, {"cycles": 1000}, clutch="c1")
     assert same["status"] == usual["status"]
-    assert same["end_of_life_cycles"]["0.05"] == pytest.approx(usual["end_of_life_cycles"]["0.05"], rel=1e-3)
-    assert same["end_of_life_cycles"]["0.5"] == pytest.approx(usual["end_of_life_cycles"]["0.5"], rel=1e-3)
+    for quantile in ("0.05", "0.5"):
+        assert same["end_of_life_cycles"][quantile] == pytest.approx(usual["end_of_life_cycles"][quantile], rel=1e-3)
 
 
 def test_plans_at_the_edge_of_what_is_taken_are_answered(aged: TestClient) -> None:

@@ -94,23 +94,16 @@ def test_what_machines_ask_again_and_again_is_logged_for_debugging_alone(client:
     assert [(line["status"], line["level"]) for line in lines()] == [(200, "debug")] * 3 + [(304, "debug")]
 
 
-@pytest.fixture
-def broken(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> TestClient:
-    """A service with a mistake in it."""
-
+@pytest.mark.parametrize("method", ["GET", "HEAD"])
+def test_an_unexpected_error_is_logged_whole_and_answered_without_internals(
+    client: TestClient, lines: Lines, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
     def fail(*_: object) -> NoReturn:
         raise RuntimeError("the password is s3cr3t\n{forged}")
 
     monkeypatch.setattr("service.web.routes.clutches.clutch_list.look_up", fail)
-    return client
-
-
-@pytest.mark.parametrize("method", ["GET", "HEAD"])
-def test_an_unexpected_error_is_logged_whole_and_answered_without_internals(
-    broken: TestClient, lines: Lines, method: str
-) -> None:
     lines()
-    answer = broken.request(method, CLUTCH, headers={"X-Request-ID": "rig-7"})
+    answer = client.request(method, CLUTCH, headers={"X-Request-ID": "rig-7"})
     assert answer.status_code == 500
     assert answer.headers["content-type"] == "application/problem+json"
     assert answer.headers["X-Request-ID"] == "rig-7"

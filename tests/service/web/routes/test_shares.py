@@ -59,11 +59,9 @@ def test_the_load_of_a_test_field_is_not_hindered(client: TestClient) -> None:
 
 def trickled(port: int, seconds: float) -> bytes:
     """What is answered to a body that comes a byte at a time."""
-    head = (
-        f"POST {CLUTCHES} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Type: application/json\r\nContent-Length: 9000"
-    )
+    head = f"POST {CLUTCHES} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Type: application/json\r\n"
     with socket.create_connection(("127.0.0.1", port), timeout=10) as line:
-        line.sendall(f"{head}\r\n\r\n".encode())
+        line.sendall(f"{head}Content-Length: 9000\r\n\r\n".encode())
         line.settimeout(0.2)
         begun, answer = time.monotonic(), b""
         while time.monotonic() - begun < seconds and not answer:
