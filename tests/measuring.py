@@ -126,6 +126,14 @@ def shared(hits: int, count: int) -> tuple[str, str]:
     return f"{hits / count:.0%}", f"{low:.0%} to {high:.0%}"
 
 
+def blocks(page: Path, *languages: str) -> list[tuple[str, str]]:
+    """(language, text) of the fenced blocks of a page, of some languages alone where they are given."""
+    found = re.findall(
+        r"^```([a-z]*)[^\n]*\n(.*?)^```$", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL
+    )
+    return [(language, text) for language, text in found if not languages or language in languages]
+
+
 def parts(text: str) -> dict[str, str]:
     """The parts of a document by name: what stands between `<!-- name -->` and `<!-- end -->`."""
     found = re.findall(r"<!-- ([a-z -]+) -->\n(.*?)<!-- end -->", text, flags=re.DOTALL)

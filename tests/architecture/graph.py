@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 from tests.architecture.source import PACKAGES, by_name, first_sentence, imports
 
-#: Files directly in storage hold the rows of one table each: one box, but for the schema.
-ROWS, SCHEMA = "storage.rows", "storage.tables"
+#: Files directly in storage hold the rows of one table each: one box, but for those that folders of storage import.
+ROWS, OTHERS = "storage.rows", ("storage.tables", "storage.dialects", "storage.encoding")
 DIAGNOSIS = "models.diagnosis"
 
 Edges = Mapping[str, frozenset[str]]
@@ -29,7 +30,7 @@ def package_of(module: str) -> str | None:
     if not below:
         return None
     name = f"{package}.{below[0]}"
-    return ROWS if package == "storage" and not by_name()[name].is_package and name != SCHEMA else name
+    return ROWS if package == "storage" and not by_name()[name].is_package and name not in OTHERS else name
 
 
 def chapter_of(module: str) -> str | None:
@@ -78,33 +79,19 @@ def reachable(graph: Edges, start: str) -> frozenset[str]:
     return frozenset(reached)
 
 
-def circles(graph: Edges) -> frozenset[tuple[str, str]]:
-    """The arrows that lie on a circle."""
-    reach = {name: reachable(graph, name) for name in graph}
-    return frozenset((name, target) for name, targets in graph.items() for target in targets if name in reach[target])
-
-
 def reduced(graph: Edges) -> dict[str, frozenset[str]]:
-    """The arrows that no longer way implies, circles left out: what is drawn."""
-    round_about = circles(graph)
-    straight = {name: frozenset(t for t in targets if (name, t) not in round_about) for name, targets in graph.items()}
-    reach = {name: reachable(straight, name) for name in straight}
-    return {
-        name: targets - frozenset().union(*(reach[target] for target in targets)) for name, targets in straight.items()
-    }
+    """The arrows that no longer way implies: what is drawn. There is no circle, which import-linter forbids."""
+    reach = {name: reachable(graph, name) for name in graph}
+    return {name: targets - frozenset().union(*(reach[each] for each in targets)) for name, targets in graph.items()}
 
 
 def rows(graph: Edges, names: Iterable[str]) -> list[list[str]]:
-    """The boxes of one layer in rows, each box above all that it imports; a circle is cut at an arrow of it."""
+    """The boxes of one layer in rows, each box above all that it imports."""
     chosen = sorted(names)
-    round_about = circles(graph)
-    depth: dict[str, int] = {}
 
+    @cache
     def depth_of(name: str) -> int:
-        if name not in depth:
-            below = [t for t in graph[name] if t in chosen and (name, t) not in round_about]
-            depth[name] = 1 + max((depth_of(target) for target in below), default=-1)
-        return depth[name]
+        return 1 + max((depth_of(target) for target in graph[name] if target in chosen), default=-1)
 
-    deepest = max((depth_of(name) for name in chosen), default=0)
-    return [[name for name in chosen if depth[name] == level] for level in range(deepest, -1, -1)]
+    deepest = max(map(depth_of, chosen), default=0)
+    return [[name for name in chosen if depth_of(name) == level] for level in range(deepest, -1, -1)]

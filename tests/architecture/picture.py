@@ -1,8 +1,7 @@
 """`python -m tests.architecture.picture`: draws the code from its imports, into docs/figures/architecture.svg.
 
 Four bands from the top: service, storage, models, and inside models the chapters of the diagnosis. A box imports only boxes
-below it; an arrow that a longer way implies is left out, and what a box takes from the bands below stands in it. An arrow on
-a circle, which import-linter forbids, is dashed red.
+below it; an arrow that a longer way implies is left out, and what a box takes from the bands below stands in it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +22,7 @@ _STYLE = (
     ".ground{fill:#fff}.band{fill:#f3f5f8}.box{fill:#fff;stroke:#5b6b80}.name{fill:#1b2430;font-weight:600}"
     ".files{fill:#5b6b80;font-size:10px}.layer{fill:#1b2430;font-size:14px;font-weight:700}"
     ".arrow{fill:none;stroke:#7d8da3;stroke-width:1.1}"
-    ".circle{fill:none;stroke:#c2410c;stroke-width:1.4;stroke-dasharray:5 3}.head{fill:#7d8da3}"
+    ".head{fill:#7d8da3}"
     "@media (prefers-color-scheme:dark){.ground{fill:#10151c}.band{fill:#18202a}.box{fill:#222d3a;stroke:#8fa1b8}"
     ".name,.layer{fill:#e8edf3}.files{fill:#a9b7c8}.arrow{stroke:#8393a8}.head{fill:#8393a8}}"
 )
@@ -135,26 +134,17 @@ def _box(box: Box, place: Place) -> str:
 
 
 def _arrows(edges: Mapping[str, frozenset[str]], places: Mapping[str, Place]) -> list[str]:
-    round_about = graph.circles(edges)
     kept = graph.reduced(edges)
-    drawn = [
-        _arrow(places[name], places[target], "arrow")
-        for name, targets in sorted(kept.items())
-        for target in sorted(targets)
-    ]
-    return drawn + [_arrow(places[name], places[target], "circle") for name, target in sorted(round_about)]
+    return [_arrow(places[name], places[each]) for name, targets in sorted(kept.items()) for each in sorted(targets)]
 
 
-def _arrow(start: Place, end: Place, kind: str) -> str:
+def _arrow(start: Place, end: Place) -> str:
     x0, x1 = start[0] + start[2] / 2, end[0] + end[2] / 2
-    y0, y1 = (start[1] + _BOX, end[1]) if end[1] > start[1] else (start[1], end[1] + _BOX)
-    if start[1] == end[1]:
-        y0 = y1 = start[1] + _BOX
-    bend = max(20.0, abs(y1 - y0) * 0.45) * (1 if y1 >= y0 else -1)
-    back = bend if start[1] != end[1] else -bend
+    y0, y1 = start[1] + _BOX, end[1]
+    bend = max(20.0, (y1 - y0) * 0.45)
     return (
-        f'<path class="{kind}" marker-end="url(#head)" d="M{x0:.1f} {y0:.1f}C{x0:.1f} {y0 + bend:.1f} '
-        f'{x1:.1f} {y1 - back:.1f} {x1:.1f} {y1:.1f}"/>'
+        f'<path class="arrow" marker-end="url(#head)" d="M{x0:.1f} {y0:.1f}C{x0:.1f} {y0 + bend:.1f} '
+        f'{x1:.1f} {y1 - bend:.1f} {x1:.1f} {y1:.1f}"/>'
     )
 
 

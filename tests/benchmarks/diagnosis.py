@@ -1,6 +1,5 @@
-"""`python -m tests.benchmarks.diagnosis`: how long a diagnosis takes, and how fast GETs are answered meanwhile."""
+"""`python -m tests.benchmarks.diagnosis`: how long a diagnosis takes; `make load` times GETs meanwhile."""
 
-import itertools
 import json
 import statistics
 import time
@@ -19,10 +18,7 @@ from tests.blind.test_blind import FAMILIES
 from tests.measuring import show
 from tests.support import served
 
-#: Seconds between two questions: a dashboard's, but far more often.
-_PAUSE = 0.01
 SEED = 10
-_PAGES = ("remaining-useful-life", "diagnoses", "model", "series", "")
 
 
 def post_life(http: httpx2.Client, clutch_id: str, states: int, programme: Programme) -> None:
@@ -35,29 +31,6 @@ def post_life(http: httpx2.Client, clutch_id: str, states: int, programme: Progr
             body["channels"]["torque_nm"] = warmed(run.plateaus, clutch, run.wear).torque.tolist()
         headers = {"Content-Type": "application/json"}
         http.post(f"/v1/clutches/{clutch_id}/runs", content=json.dumps(body), headers=headers).raise_for_status()
-
-
-def get_times(http: httpx2.Client, clutch_id: str, until: str | None) -> tuple[list[float], float]:
-    """Times of GETs [ms] while the diagnosis `until` runs, or for five seconds; and how long that was [s]."""
-    taken, began = [], time.perf_counter()
-    for name in itertools.cycle(_PAGES):
-        start = time.perf_counter()
-        answer = http.get(f"/v1/clutches/{clutch_id}/{name}".rstrip("/"))
-        taken.append(1e3 * (time.perf_counter() - start))
-        assert answer.status_code == 200
-        over = time.perf_counter() - began
-        if until is None and over > 5.0:
-            break
-        if until is not None and len(taken) % 20 == 0 and http.get(until).json()["status"] != "running":
-            break
-        time.sleep(_PAUSE)
-    return taken, over
-
-
-def row(name: str, taken: list[float]) -> tuple[object, ...]:
-    """One line of the table: how many, median, 99 of 100, longest."""
-    times = (statistics.median(taken), statistics.quantiles(taken, n=100)[-1], max(taken))
-    return name, len(taken), *(f"{each:.1f}" for each in times)
 
 
 def verdict_seconds(slugs: tuple[str, ...], lam: float, count: int) -> list[float]:
@@ -87,21 +60,17 @@ def verdicts() -> list[tuple[object, ...]]:
 
 
 def main() -> None:
-    """Lives of two lengths, with and without a diagnosis that runs."""
-    gets, times = [], []
+    """Lives of two lengths, diagnosed by a service; then campaigns of the blind rig, by the diagnosis alone."""
+    times = []
     with served() as (_, http):
         for name, states, programme in (("10 states with loops", 10, WHOLE), ("60 states", 60, QUICK)):
             clutch_id = name.replace(" ", "-")
             post_life(http, clutch_id, states, programme)
-            http.get(f"/v1/clutches/{clutch_id}/degradation")
-            gets.append(row(f"{name}, idle", get_times(http, clutch_id, None)[0]))
-            posted = http.post(f"/v1/clutches/{clutch_id}/diagnoses", json={}, headers={"Prefer": "wait=0"})
-            taken, over = get_times(http, clutch_id, posted.headers["Location"])
-            gets.append(row(f"{name}, while it is diagnosed", taken))
-            report = http.get(posted.headers["Location"]).json()
+            began = time.perf_counter()
+            answer = http.post(f"/v1/clutches/{clutch_id}/diagnoses", json={}, headers={"Prefer": "wait=110"})
+            over, report = time.perf_counter() - began, answer.json()
             times.append((name, f"{over:.1f}", f"{report['verdict']}: {', '.join(report['causes'])}"))
-    show("A diagnosis, and GETs meanwhile", "GETs | asked | median, ms | 99 %, ms | longest, ms", gets)
-    show("Its time", "diagnosis, its process' start and remaining life included | s | verdict", times)
+    show("A diagnosis", "diagnosis, its process' start and remaining life included | s | verdict", times)
     show("Verdicts", "verdict on 10 states with loops | campaigns | median, s of one core | longest, s", verdicts())
 
 

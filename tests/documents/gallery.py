@@ -1,35 +1,30 @@
 """`make gallery`: the figures of docs/gallery.md, by its own lines from a simulated clutch, into docs/figures/gallery."""
 
-import re
 import tempfile
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from service.cli.main import app
-from tests.measuring import ROOT
+from tests.measuring import ROOT, blocks
 from tests.support import serving
 
 PAGE = ROOT / "docs" / "gallery.md"
 FIGURES = ROOT / "docs" / "figures" / "gallery"
 
 
-def blocks() -> list[str]:
-    """The page's blocks of Python: what all need, then one a figure."""
-    return re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
-
-
 def draw(url: str, folder: Path) -> list[Path]:
-    """Every figure from the clutch sim-7 of a service; the same clutch gives the same bytes."""
+    """Every figure from the clutch sim-7 of a service, by a block of Python each after one that all need; the same clutch
+    gives the same bytes."""
     import matplotlib as mpl  # 0.4 s for whoever draws, not for every collection
 
     mpl.use("svg")
     mpl.rcParams["svg.hashsalt"] = "clutchlife"
-    preamble, *figures = blocks()
+    (_, preamble), *figures = blocks(PAGE, "python")
     names: dict[str, Any] = {"URL": url}
     exec(compile(preamble, "the first block", "exec"), names)  # noqa: S102  (the page's own lines)
     drawn = []
-    for number, block in enumerate(figures, start=1):
+    for number, (_, block) in enumerate(figures, start=1):
         exec(compile(block, f"figure {number}", "exec"), names)  # noqa: S102
         path = folder / f"{number}.svg"
         names["fig"].savefig(path, metadata={"Date": None})

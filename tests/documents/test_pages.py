@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.documents import gallery
-from tests.measuring import ROOT
+from tests.measuring import ROOT, blocks
 from tests.support import serving
 
 DOCS = ROOT / "docs"
@@ -28,12 +28,6 @@ PAGES = (
 )
 #: Blocks that are read, not run: what must be installed first, or answers of the service.
 READ_ONLY = {"console", "json", "matlab", "nginx", "caddy", "text"}
-
-
-def blocks(path: Path) -> list[tuple[str, str]]:
-    """(language, text) of every fenced block."""
-    text = path.read_text(encoding="utf-8")
-    return re.findall(r"^```([a-z]*)[^\n]*\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
 
 
 def test_every_page_of_both_rooms_is_run_or_has_nothing_to_run() -> None:
@@ -82,8 +76,7 @@ def test_the_tutorial_and_the_tasks_run(tmp_path: Path) -> None:
 
 def test_a_figure_stands_below_each_block() -> None:
     shown = re.findall(r"\(figures/gallery/(\d+)\.svg\)", gallery.PAGE.read_text(encoding="utf-8"))
-    figures = gallery.blocks()[1:]
-    assert shown == [str(number) for number in range(1, len(figures) + 1)]
+    assert shown == [str(number) for number in range(1, len(blocks(gallery.PAGE, "python")))]
     assert all((gallery.FIGURES / f"{number}.svg").is_file() for number in shown)
 
 
@@ -93,5 +86,5 @@ def test_the_figures_are_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     with serving(tmp_path / "gallery.db") as server:
         gallery.simulated(server.url, tmp_path)
         drawn = gallery.draw(server.url, tmp_path)
-    assert len(drawn) == len(gallery.blocks()) - 1
+    assert len(drawn) == len(blocks(gallery.PAGE, "python")) - 1
     assert min(path.stat().st_size for path in drawn) > 10_000, "each has axes and lines"

@@ -4,25 +4,20 @@ import os
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
 
-from tests.service.clients import described
+from tests.measuring import ROOT, blocks
 from tests.support import Server
 
-ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
-
-
-def blocks(path: Path, language: str) -> list[str]:
-    """The fenced blocks of one language."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.slow
 def test_the_examples_of_the_api_run(server: Server) -> None:
-    script = "\n".join(["set -eu", *blocks(ROOT / "docs" / "reference" / "api.md", "sh")])
+    script = "\n".join(["set -eu", *(text for _, text in blocks(ROOT / "docs" / "reference" / "api.md", "sh"))])
     done = subprocess.run(
         ["bash", "-c", script], env=os.environ | {"URL": server.url}, capture_output=True, text=True, check=False
     )
@@ -35,7 +30,7 @@ def test_the_examples_of_the_api_run(server: Server) -> None:
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_commands_that_are_named_are_there(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
-    shown = "\n".join(blocks(path, "console") + blocks(path, "sh"))
+    shown = "\n".join(text for _, text in blocks(path, "console", "sh"))
     commands = set(re.findall(r"\bclutchlife ((?:key )?[a-z]+)\b", shown))
     for command in commands - {"clutchlife"}:
         called = [sys.executable, "-m", "service.cli.main", *command.split(), "--help"]
@@ -57,57 +52,29 @@ def own_words(path: Path) -> str:
     return re.sub(r"<!-- example-[a-z-]+ -->.*?<!-- end -->", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
 
 
-every_document = pytest.mark.parametrize(
-    "path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: str(path.relative_to(ROOT))
-)
-
-
-@every_document
-def test_paths_exist(path: Path) -> None:
-    """Every file, folder and module that a document names, from the top of the repository."""
-    text = own_words(path)
-    assert [name for name in PATH.findall(text) if not (ROOT / name).exists()] == []
-    modules = [name.replace(".", "/") for name in MODULE.findall(text)]
-    assert [name for name in modules if not ((ROOT / name).is_dir() or (ROOT / f"{name}.py").is_file())] == []
-
-
 #: `name.py` or `folder/name.py` in backticks, from wherever the page is at home.
 SHORT = re.compile(r"`((?:[\w-]+/)*\w+\.py)`")
 
 
-def missing(text: str) -> list[str]:
-    """The Python files that a text names in backticks and that are nowhere: no path of product or tests ends so."""
+@cache
+def ends() -> set[str]:
+    """The ends of the paths of all Python files: `decide.py`, `explanations/decide.py`."""
     folders = ("docs", "models", "service", "storage", "tests")
     files = [path.relative_to(ROOT).parts for folder in folders for path in (ROOT / folder).rglob("*.py")]
-    ends = {"/".join(parts[-n:]) for parts in files for n in range(1, len(parts) + 1)}
-    return [name for name in SHORT.findall(text) if name not in ends]
+    return {"/".join(parts[-n:]) for parts in files for n in range(1, len(parts) + 1)}
 
 
-@every_document
-def test_files_that_are_named_shortly_exist(path: Path) -> None:
-    """`decide.py` or `explanations/decide.py`."""
-    assert missing(own_words(path)) == []
+@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: str(path.relative_to(ROOT)))
+def test_paths_exist(path: Path) -> None:
+    """Every file, folder and module that a document names, from the top of the repository or by the end of its path."""
+    text = own_words(path)
+    assert [name for name in PATH.findall(text) if not (ROOT / name).exists()] == []
+    modules = [name.replace(".", "/") for name in MODULE.findall(text)]
+    assert [name for name in modules if not ((ROOT / name).is_dir() or (ROOT / f"{name}.py").is_file())] == []
+    assert [name for name in SHORT.findall(text) if name not in ends()] == []
 
-
-def test_a_file_that_is_gone_is_noticed() -> None:
-    assert missing("`decide.py` and `explanations/decide.py`, `models/diagnosis/explanations/decide.py`") == []
-    assert missing("`repeats.py`, `detection/decide.py`, `cide.py`") == ["repeats.py", "detection/decide.py", "cide.py"]
-
-
-# --- docs/paper.md names, for each part of the paper, files that are there.
 
 OF_THE_PAPER = [line for line in (ROOT / "docs" / "paper.md").read_text().splitlines() if line.startswith("| ")][1:]
-
-
-@pytest.mark.parametrize("row", OF_THE_PAPER)
-def test_what_stands_in_the_table_is_there(row: str) -> None:
-    what, files, address, section, test = (cell.strip() for cell in row.strip("|").split(" | "))
-    if files == "**not built**":
-        assert (address, section, test) == ("-", "-", "-")
-        return
-    named = re.findall(r"`([^`]+)`", f"{files} {test}")
-    assert len(named) >= 2, what
-    assert [name for name in named if not (ROOT / name).is_file()] == []
 
 
 def test_all_equations_and_figures_are_in_it() -> None:
@@ -118,13 +85,3 @@ def test_all_equations_and_figures_are_in_it() -> None:
     assert equations == set(range(1, 9))
     figures = {int(number) for part in re.findall(r"figs?\. ([\d, ab]+)", first) for number in re.findall(r"\d+", part)}
     assert figures == set(range(1, 18))
-
-
-def test_every_address_is_documented() -> None:
-    description = described()
-    text = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8") + (
-        ROOT / "docs" / "reference" / "operations.md"
-    ).read_text(encoding="utf-8")
-    for address in description["paths"]:
-        name = address.rstrip("/").rsplit("/", 1)[-1].removesuffix(".csv")
-        assert name.startswith("{") or name in text, address

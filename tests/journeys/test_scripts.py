@@ -14,18 +14,17 @@ import pandas as pd
 import pytest
 
 from service.client.clutchlife import Client
+from tests.measuring import ROOT, blocks
 from tests.support import Server
 
-ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "how-to" / "scripts.md").read_text(encoding="utf-8")
+PAGE = ROOT / "docs" / "how-to" / "scripts.md"
 #: Where the package is that scripts import.
 SCRIPTS = os.environ | {"PYTHONPATH": str(ROOT / "service" / "client")}
 
 
 def block(language: str) -> str:
-    found = re.search(rf"^```{language}\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
-    assert found is not None, language
-    return found[1]
+    """The first one."""
+    return blocks(PAGE, language)[0][1]
 
 
 def test_the_python_example_runs(server: Server) -> None:
@@ -78,8 +77,9 @@ def test_the_recipe_for_matlab_is_understood(server: Server) -> None:
 
 def test_the_recipe_for_labview_is_understood(server: Server, tmp_path: Path) -> None:
     """The text as its buffer, and a file as its body: a POST without a type."""
-    path = re.search(r"`(/v1/[^`]*/runs)`", PAGE)
-    file_address = re.search(r"`(/v1/[^`]*/runs/file[^`]*)`", PAGE)
+    page = PAGE.read_text(encoding="utf-8")
+    path = re.search(r"`(/v1/[^`]*/runs)`", page)
+    file_address = re.search(r"`(/v1/[^`]*/runs/file[^`]*)`", page)
     assert path is not None
     assert file_address is not None
     body = block("json")
@@ -91,9 +91,3 @@ def test_the_recipe_for_labview_is_understood(server: Server, tmp_path: Path) ->
         assert sent.status_code == 201, sent.text
         sent = http.post(file_address[1].replace("run.tdms", "run.csv"), content=csv.read_bytes())
         assert sent.status_code == 201, sent.text
-
-
-@pytest.mark.parametrize("name", ["clutches", "post_run", "remaining_useful_life", "diagnose", "runs"])
-def test_every_method_of_the_contract_is_on_the_page(name: str) -> None:
-    assert callable(getattr(Client, name))
-    assert f"`{name}(" in PAGE or f".{name}(" in PAGE

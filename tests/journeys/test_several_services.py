@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -16,6 +15,7 @@ import httpx2
 import pytest
 
 from tests.benchmarks.memory import family, resident
+from tests.service.work.waiting import until
 from tests.service.workflows import stand_in_engine
 from tests.storage.engine.postgresql.server import PostgresServer
 from tests.support import ONCE, Server, clutchlife, free_port, serving, stationary, wait_until_ready
@@ -103,16 +103,11 @@ def test_a_job_that_one_has_another_cancels(address: str, tmp_path: Path) -> Non
         one, other = (stack.enter_context(serving(address, loaded=True, environment=environment)) for _ in range(2))
         one.http.post("/v1/clutches", json={"clutch_id": "c1"}).raise_for_status()
         asked = one.http.post(f"{CLUTCH}/diagnoses", json={}, headers={"Prefer": "wait=0"}).json()["diagnosis_id"]
-        deadline = time.monotonic() + 60
-        while not (tmp_path / "pid").exists():
-            assert time.monotonic() < deadline, "it does not begin"
-            time.sleep(0.05)
-        process = (tmp_path / "pid").read_text()
+        until((tmp_path / "pid").exists)
+        process = Path("/proc", (tmp_path / "pid").read_text())
         for server in (one, other):
             assert server.http.delete(f"/v1/jobs/{asked}").json()["state"] == "cancelled"
-        while Path("/proc", process).exists():
-            assert time.monotonic() < deadline, "its process goes on"
-            time.sleep(0.05)
+        until(lambda: not process.exists())
         assert other.http.get(f"{CLUTCH}/diagnoses/{asked}").json()["problem"] == "cancelled by local"
 
 
@@ -175,10 +170,9 @@ def test_processes_behind_one_port_answer_are_replaced_and_stop(address: str, mo
 
 def answering(parent: int, but: int = 0) -> set[int]:
     """The two processes that serve, once there are two other ones than `but`."""
-    deadline = time.monotonic() + 60
-    while True:
+
+    def look() -> set[int]:
         found = {pid for pid in family(parent) if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()} - {but}
-        if len(found) == 2:
-            return found
-        assert time.monotonic() < deadline, found
-        time.sleep(0.1)
+        return found if len(found) == 2 else set()
+
+    return until(look)

@@ -16,7 +16,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import httpx2
@@ -26,46 +26,18 @@ from service.client.clutchlife import ClutchlifeError
 from tests.benchmarks.diagnosis import post_life
 from tests.load import beside, checks
 from tests.load.beside import Beside, Processor
-from tests.load.bodies import SAMPLES, TESTS, SentLife, life
-from tests.load.field import ALONE, Field
+from tests.load.bodies import SentLife, life
+from tests.load.field import Field, Options
 from tests.load.report import Loaded, demands, markdown, paces
 from tests.storage.engine.postgresql.server import postgresql_server
 from tests.support import Server, serving
 
-#: The clutch that is diagnosed all the time; states with a stationary and a dynamic test each.
-DIAGNOSED, STATES = "diagnosed", 10
+#: The clutch that is diagnosed all the time.
+DIAGNOSED = "diagnosed"
 #: In place of an address: a server that is started for the load, whose commits are on the disk.
 TEMPORARY = "postgresql"
 #: Clutches of a fleet whose remaining life a replay must not change.
 _REPLAYED = 2
-
-
-@dataclass(frozen=True, kw_only=True)
-class Options:
-    """The load's size; `interval`: seconds from one run of a rig to its next, at least.
-
-    Where a test asks for it, `tests` in a life, `samples` of a raw file and `states` of the diagnosed clutch are fewer, and
-    services are forked off a loaded process (`loaded`).
-    `services` share a `database`, an address; empty: one service, on a file.
-    """
-
-    seconds: float = 180.0
-    rigs: int = 8
-    clients: int = 20
-    seed: int = 1
-    raw: bool = False
-    interval: float = 0.52
-    tests: int = TESTS
-    samples: int = SAMPLES
-    states: int = STATES
-    loaded: bool = False
-    services: int = 1
-    database: str = ""
-
-    @property
-    def alone(self) -> int:
-        """Rigs whose clutches are of no fleet, so that a service which is sent their runs alone answers the same."""
-        return max(ALONE, self.rigs // 2) if self.database else ALONE
 
 
 def run(options: Options, folder: Path) -> Loaded:
@@ -87,31 +59,18 @@ def run(options: Options, folder: Path) -> Loaded:
         processor = Processor.since_start(pids).minus(before)
         gc.unfreeze()
         return Loaded(
-            seconds=options.seconds,
-            raw=options.raw,
+            options=options,
             counts=field.counts,
             beside=noted,
             processor=processor,
             losses=_wrong(field, servers[0], folder),
-            services=options.services,
-            on_server=bool(options.database),
         )
 
 
 async def _loaded(options: Options, servers: Sequence[Server], lives: Sequence[SentLife]) -> tuple[Field, Beside]:
     begin = asyncio.get_running_loop().time() + 0.5
     end = begin + options.seconds
-    field = Field(
-        ports=[server.port for server in servers],
-        alone=options.alone,
-        lives=lives,
-        rigs=options.rigs,
-        clients=options.clients,
-        seed=options.seed,
-        interval=options.interval,
-        begin=begin,
-        end=end,
-    )
+    field = Field(options=options, ports=[server.port for server in servers], lives=lives, begin=begin, end=end)
     noted = Beside()
     await asyncio.gather(
         *field.tasks(),
@@ -126,16 +85,16 @@ async def _loaded(options: Options, servers: Sequence[Server], lives: Sequence[S
 def _wrong(field: Field, server: Server, folder: Path) -> list[str]:
     """What is lost, and what calm computing gives otherwise: of the first clutch of some rigs."""
     counts = field.counts
-    first = [(number, f"load-{number}-000") for number in range(field.rigs)]
+    first = [(number, f"load-{number}-000") for number in range(field.options.rigs)]
     posted = {clutch_id: field.fluid(number, 0) for number, clutch_id in first if clutch_id in counts.acknowledged}
-    alone = dict(list(posted.items())[-field.alone :])
+    alone = dict(list(posted.items())[-field.options.alone :])
     taught = [clutch_id for clutch_id in posted if clutch_id not in alone][:_REPLAYED]
     asked_for: tuple[Callable[[], list[str]], ...] = (
         lambda: checks.losses(server, counts),
         lambda: checks.calm_differences(folder, server, alone, counts.acknowledged),
         lambda: checks.replay_differences(server, taught),
     )
-    most = min(field.alone, field.rigs)
+    most = min(field.options.alone, field.options.rigs)
     wrong = [] if len(alone) == most else [f"runs of {len(alone)} clutches to be posted calmly, not of {most}"]
     for check in asked_for:
         try:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from httpx2 import AsyncClient, Limits, Response, TimeoutException, TransportError
 
-from tests.load.bodies import Post, Request, SentLife, registration
+from tests.load.bodies import SAMPLES, TESTS, Post, Request, SentLife, registration
 
 #: What a client asks in each second, a quarter of a second apart.
 ROUTES = ("remaining-useful-life", "degradation", "clutches", "runs")
@@ -24,8 +24,6 @@ LIST, LIVEZ = "clutches", "livez"
 LIVEZ_EVERY = 0.1
 #: Seconds after the end until which questions that were planned before it are still asked.
 GRACE = 5.0
-#: Rigs whose clutches have a fluid of their own each: no fleet teaches them, so that a fresh service answers the same.
-ALONE = 2
 #: Seconds that a rig waits after an error where the answer names none, before it sends the same run again.
 _PAUSE = 1.0
 
@@ -58,32 +56,57 @@ class Counts:
     held: int = 0
 
 
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The load's size; `interval`: seconds from one run of a rig to its next, at least.
+
+    Where a test asks for it, `tests` in a life, `samples` of a raw file and `states` of the diagnosed clutch are fewer, and
+    services are forked off a loaded process (`loaded`).
+    `services` share a `database`, an address; empty: one service, on a file.
+    """
+
+    seconds: float = 180.0
+    rigs: int = 8
+    clients: int = 20
+    seed: int = 1
+    raw: bool = False
+    interval: float = 0.52
+    tests: int = TESTS
+    samples: int = SAMPLES
+    states: int = 10
+    loaded: bool = False
+    services: int = 1
+    database: str = ""
+
+    @property
+    def alone(self) -> int:
+        """Rigs whose clutches have a fluid of their own each: no fleet teaches them, so that a fresh service which is sent
+        their runs alone answers the same."""
+        return max(2, self.rigs // 2) if self.database else 2
+
+
 @dataclass(slots=True)
 class Field:
     """The field on the ports of the services that share a database, over which rigs and clients are spread, from `begin` to
     `end` by the clock of the event loop."""
 
+    options: Options
     ports: Sequence[int]
     lives: Sequence[SentLife]
-    rigs: int
-    clients: int
-    seed: int
-    interval: float
     begin: float
     end: float
-    alone: int = ALONE
     counts: Counts = field(default_factory=Counts)
     #: The clutch on each rig, None before the first.
     on_rigs: list[str | None] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.on_rigs = [None] * self.rigs
+        self.on_rigs = [None] * self.options.rigs
 
     def tasks(self) -> list[Awaitable[None]]:
         """Everything that runs until `end`."""
-        rng = random.Random(self.seed)  # noqa: S311  (no secret)
-        tasks: list[Awaitable[None]] = [self._rig(number, rng.random()) for number in range(self.rigs)]
-        for number in range(self.clients):
+        rng = random.Random(self.options.seed)  # noqa: S311  (no secret)
+        tasks: list[Awaitable[None]] = [self._rig(number, rng.random()) for number in range(self.options.rigs)]
+        for number in range(self.options.clients):
             phase = rng.random()
             tasks += [self._client(number, phase, part) for part in range(len(ROUTES))]
         return [*tasks, self._livez()]
@@ -96,7 +119,7 @@ class Field:
     async def _rig(self, number: int, phase: float) -> None:
         loop = asyncio.get_running_loop()
         async with line(self._port(number)) as http:
-            await _until(self.begin + phase * self.interval)  # rigs know nothing of each other
+            await _until(self.begin + phase * self.options.interval)  # rigs know nothing of each other
             for turn in itertools.count():
                 clutch_id = f"load-{number}-{turn:03d}"
                 if await self._sent(http, registration(clutch_id, self.fluid(number, turn)), "registration") is None:
@@ -109,7 +132,7 @@ class Field:
                         self.counts.unanswered.add((clutch_id, post.run_id))
                         return
                     self._acknowledge(clutch_id, post, answer)
-                    await _until(started + self.interval)
+                    await _until(started + self.options.interval)
 
     def life(self, number: int, turn: int) -> SentLife:
         """The life that a rig posts at its so many-th turn."""
@@ -117,7 +140,7 @@ class Field:
 
     def fluid(self, number: int, turn: int) -> str:
         """The fluid of that clutch: the last rigs' clutches have each their own."""
-        return f"ATF {number} {turn}" if number >= self.rigs - self.alone else "ATF"
+        return f"ATF {number} {turn}" if number >= self.options.rigs - self.options.alone else "ATF"
 
     async def _sent(self, http: AsyncClient, request: Request, what: str) -> Response | None:
         """The good answer to a POST, which is sent again after an error; None where the time is over before."""
@@ -153,7 +176,7 @@ class Field:
                     return
                 if not await self._due(planned, route):
                     continue
-                clutch_id = self.on_rigs[(number + tick) % self.rigs]
+                clutch_id = self.on_rigs[(number + tick) % self.options.rigs]
                 if clutch_id is None:
                     continue
                 address = "/v1/clutches" if route == LIST else f"/v1/clutches/{clutch_id}/{route}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from tests.load.beside import Beside, Processor
-from tests.load.field import LIVEZ, ROUTES, Counts
+from tests.load.field import LIVEZ, ROUTES, Counts, Options
 from tests.measuring import table
 
 #: The demands of docs/appendix/benchmarks.md: ms of 99 of 100 GETs and plain POSTs, posts a second without raw files, how
@@ -18,17 +18,13 @@ MOST_GET_MS, MOST_POST_MS, LEAST_POSTS_A_SECOND, MOST_GROWTH = 50.0, 500.0, 15.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loaded:
-    """What a load came to; by the clock in `seconds`."""
+    """What a load came to."""
 
-    seconds: float
-    raw: bool
+    options: Options
     counts: Counts
     beside: Beside
     processor: Processor
     losses: Sequence[str]
-    #: Services that share the load, and whether their database is on a server.
-    services: int = 1
-    on_server: bool = False
 
     @property
     def problems(self) -> Counter[str]:
@@ -38,7 +34,7 @@ class Loaded:
     @property
     def pace(self) -> float:
         """Runs acknowledged a second."""
-        return self.runs / self.seconds
+        return self.runs / self.options.seconds
 
     @property
     def runs(self) -> int:
@@ -78,7 +74,7 @@ def demands(loaded: Loaded) -> list[Demand]:
         Demand("no error", str(errors), errors == 0),
         Demand("nothing lost, and the same as posted calmly", str(len(loaded.losses)), not loaded.losses),
     ]
-    if loaded.on_server:  # the others are those of one service on a file
+    if loaded.options.database:  # the others are those of one service on a file
         return found
     growths = f"{100 * (alone - 1):+.1f} % alone, {100 * (together - 1):+.1f} % with its processes"
     most = f"{100 * (MOST_GROWTH - 1):.0f} %"
@@ -91,7 +87,7 @@ def demands(loaded: Loaded) -> list[Demand]:
             max(alone, together) <= MOST_GROWTH,
         ),
     ]
-    if not loaded.raw:
+    if not loaded.options.raw:
         least = LEAST_POSTS_A_SECOND
         found.append(Demand(f"at least {least:.0f} posts a second", f"{loaded.pace:.1f}", loaded.pace >= least))
     return found
@@ -137,7 +133,7 @@ def totals(loaded: Loaded) -> list[str]:
 
 def paces(loads: Sequence[Loaded]) -> str:
     """Posts a second of one service and of several, beside each other."""
-    rows = [(each.services, f"{each.pace:.1f}", f"{each.pace / loads[0].pace:.2f}") for each in loads]
+    rows = [(each.options.services, f"{each.pace:.1f}", f"{each.pace / loads[0].pace:.2f}") for each in loads]
     return "\n".join(table(("services", "posts a second", "times one service"), rows))
 
 

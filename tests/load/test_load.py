@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.load.__main__ import Options, run
+from tests.load.__main__ import run
 from tests.load.beside import Beside, Processor
 from tests.load.bodies import Post, life
 from tests.load.checks import lost_of
-from tests.load.field import ROUTES, Acknowledged, Counts
+from tests.load.field import ROUTES, Acknowledged, Counts, Options
 from tests.load.report import Loaded, demands, markdown
 
 
@@ -53,7 +53,8 @@ def found(*, get: float = 0.01, post: float = 0.1, runs: int = 20, memory: int =
     counts.acknowledged["c"] = [Acknowledged(post=run_named(str(number)), sha256="") for number in range(runs)]
     noted = Beside(alone=[100, 100, memory], together=[100, 100, 100])
     nothing = Processor(generator=0.0, service=0.0, refreshes=0.0, others=0.0)
-    return Loaded(seconds=1.0, raw=raw, counts=counts, beside=noted, processor=nothing, losses=[])
+    options = Options(seconds=1.0, raw=raw)
+    return Loaded(options=options, counts=counts, beside=noted, processor=nothing, losses=[])
 
 
 def test_each_demand_can_fail_by_itself() -> None:

@@ -6,7 +6,6 @@ Both services run side by side and are asked in turn, so that what else the mach
 """
 
 import argparse
-import json
 import statistics
 import tempfile
 import time
@@ -21,12 +20,10 @@ import httpx2
 import sqlalchemy as sa
 from playwright.sync_api import Browser
 
-from models.rig import campaign
-from service.run_files.simulated import simulated_body
 from storage.engine.sqlite.database import back_up
 from tests.benchmarks.memory import held, held_alone
 from tests.browser.driving import chromium
-from tests.scale.copies import kilobytes, life, multiply, name
+from tests.scale.copies import bodies, kilobytes, life, multiply, name
 from tests.storage.engine.postgresql.server import postgresql_server
 from tests.support import serving
 
@@ -48,12 +45,6 @@ class Found:
     alone: int
     memory: int
     times: Times
-
-
-def bodies(count: int) -> list[bytes]:
-    """The stationary runs of one simulated life, tested past its end."""
-    runs = campaign.simulate(1, stop_fraction=0.01, most_tests=count)
-    return [json.dumps(simulated_body(run)).encode() for run in runs if run.plateaus is not None]
 
 
 def timed(times: Times, title: str, ask: Callable[..., httpx2.Response], *arguments: Any) -> None:

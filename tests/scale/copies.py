@@ -1,14 +1,22 @@
 """A database with copies of one clutch's life: what a request meets is the same, and only their number differs."""
 
-from pathlib import Path
+import json
+from contextlib import closing
 from typing import Any
 
-import httpx2
 import sqlalchemy as sa
 
+from models.rig import campaign
+from service.run_files.json_run import read_run
+from service.run_files.simulated import simulated_body
+from service.schemas.clutch import ClutchIn
+from service.workflows.edit_clutch import register
+from service.workflows.ingest_run import ingest
 from storage.dialects import TEXT
+from storage.engine.opening import open_database
 from storage.tables import change, channel, clutch, filter_state, metadata, prediction, run
-from tests.support import serving
+
+AT = "2026-01-01T00:00:00+00:00"
 
 #: Columns that tell copies apart; keys of tables that nothing refers to are given by the database.
 _OF_CLUTCH, _OF_RUN = clutch.c.clutch_id.name, run.c.run_key.name
@@ -21,14 +29,18 @@ def name(number: int) -> str:
     return f"copy-{number:05}"
 
 
-def life(database: Path | str, bodies: list[bytes]) -> None:
-    """Post a life to a service on a new file, or on an empty database at an address."""
-    with serving(database, loaded=True) as server, httpx2.Client(base_url=server.url, timeout=60) as http:
-        http.post("/v1/clutches", json={"clutch_id": name(0)}).raise_for_status()
-        for body in bodies:
-            http.post(
-                f"/v1/clutches/{name(0)}/runs", content=body, headers={"Content-Type": "application/json"}
-            ).raise_for_status()
+def bodies(count: int) -> list[bytes]:
+    """The stationary runs of one simulated life, tested past its end."""
+    runs = campaign.simulate(1, stop_fraction=0.01, most_tests=count)
+    return [json.dumps(simulated_body(run)).encode() for run in runs if run.plateaus is not None]
+
+
+def life(address: str, runs: list[bytes]) -> None:
+    """Take in a life, as a service would, on a new file or an empty database at an address."""
+    with closing(open_database(address)) as database:
+        register(database, ClutchIn(clutch_id=name(0)), created_at=AT)
+        for body in runs:
+            ingest(database, name(0), read_run(body), received_at=AT)
 
 
 def kilobytes(address: str) -> dict[str, float]:

@@ -17,24 +17,16 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from models.rig import campaign
 from service import records, stored_runs
-from service.queries.cache import to_json
-from service.run_files.json_run import read_run
-from service.run_files.simulated import simulated_body
-from service.schemas.clutch import ClutchIn
 from service.work.executor import executor_of
-from service.workflows.edit_clutch import register
-from service.workflows.ingest_run import ingest
 from service.workflows.replay import clutch_ids, replay
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from storage.tables import clutch, corrected_cof, filter_state, fit, prediction, run
 from storage.transfer import digest
-from tests.scale.copies import multiply, name
+from tests.scale.copies import bodies, life, multiply
 from tests.service.work.clusters import local_cluster
 
-AT = "2026-01-01T00:00:00+00:00"
 #: The tables that hold results.
 RESULTS = (clutch, run, fit, prediction, filter_state, corrected_cof)
 PROFILED = 5
@@ -52,13 +44,8 @@ class Found:
 
 def source(path: Path, states: int, clutches: int) -> None:
     """A file with a life of so many stationary tests, under so many names."""
-    address = f"sqlite:///{path}"
-    runs = [each for each in campaign.simulate(1, stop_fraction=0.01, most_tests=states) if each.plateaus is not None]
-    with closing(open_database(address)) as database:
-        register(database, ClutchIn(clutch_id=name(0)), created_at=AT)
-        for each in runs[:states]:
-            ingest(database, name(0), read_run(to_json(simulated_body(each))), received_at=AT)
-    multiply(address, clutches)
+    life(f"sqlite:///{path}", bodies(states)[:states])
+    multiply(f"sqlite:///{path}", clutches)
 
 
 def replayed(path: Path, scheduler: str, advance: Callable[[int], object] = lambda _: None) -> Found:

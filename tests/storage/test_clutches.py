@@ -15,13 +15,6 @@ from tests.storage.samples import CLUTCH, clutch_row, new_run
 NAMED = {"life": "", "state": "normal", "if_disputed": "normal"}
 
 
-def test_a_clutch_comes_back_as_it_was_stored_and_its_id_is_taken_once(connection: Connection) -> None:
-    assert clutches.get(connection, CLUTCH) == clutch_row()
-    assert clutches.get(connection, "unknown") is None
-    with pytest.raises(IntegrityError), connection.begin_nested():
-        clutches.insert(connection, clutch_row())
-
-
 def test_lists_are_worst_first_and_pages_join_without_gap_or_repeat(database: Database) -> None:
     ranks = {"a": 0.5, "b": -1.0, "c": 0.5, "d": float("inf"), "e": 0.25}
     with database.writing() as connection:
@@ -45,7 +38,11 @@ def test_archived_clutches_are_listed_apart(connection: Connection) -> None:
     assert clutches.page(connection, Choice(archived=True), limit=9, after=(row.rank, CLUTCH)) == []
 
 
-def test_summary_and_revision(connection: Connection) -> None:
+def test_a_clutch_comes_back_as_it_was_stored_once_and_its_summary_and_revision_change(connection: Connection) -> None:
+    assert clutches.get(connection, CLUTCH) == clutch_row()
+    assert clutches.get(connection, "unknown") is None
+    with pytest.raises(IntegrityError), connection.begin_nested():
+        clutches.insert(connection, clutch_row())
     clutches.set_summary(connection, CLUTCH, 0.2, {"health": 0.2}, **NAMED)
     assert [clutches.bump_revision(connection, CLUTCH) for _ in range(3)] == [1, 2, 3]
     assert clutches.get(connection, CLUTCH) == replace(
@@ -128,14 +125,6 @@ def test_a_choice_is_listed_and_counted(fleet: Database, choice: Choice, worst_f
     assert counts == Counts(states={state: states.count(state) for state in set(states)}, held=len(held))
 
 
-def test_a_part_of_a_list_is_what_stands_there_in_the_whole(fleet: Database) -> None:
-    whole = ids(fleet)
-    with fleet.reading() as connection:
-        for left_out in range(5):
-            part = clutches.page(connection, limit=2, left_out=left_out)
-            assert [row.clutch_id for row in part] == whole[left_out : left_out + 2]
-
-
 def test_what_an_edit_changes_is_searched_for(fleet: Database) -> None:
     with fleet.writing() as connection:
         content = {"record": {"friction_material": "sintered"}, "content_sha256": "cd", "registered": None}
@@ -165,8 +154,12 @@ def test_a_walk_by_name_meets_each_clutch_once_while_ranks_change_and_one_worst_
     assert walked(by_name=True) == ["A-1", "a-2", "b-3", "c-4"]
 
 
-def test_the_clutch_at_a_share_of_the_ranks(fleet: Database) -> None:
+def test_a_part_of_a_list_and_the_clutch_at_a_share_of_the_ranks(fleet: Database) -> None:
+    whole = ids(fleet)
     with fleet.reading() as connection:
+        for left_out in range(5):
+            part = clutches.page(connection, limit=2, left_out=left_out)
+            assert [row.clutch_id for row in part] == whole[left_out : left_out + 2]
 
         def at(share: float, choice: Choice = IN_USE, below: float = 9.0) -> str | None:
             row = clutches.at_rank(connection, choice, share, below=below)

@@ -88,6 +88,7 @@ def test_the_stored_bytes_are_little_endian_wherever_they_were_written() -> None
     assert encode(np.array([-1.5]))[-8:] == struct.pack("<d", -1.5)
 
 
+SHAPES = hnp.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=5)
 SMALL = np.round(np.random.default_rng(1).standard_normal(60), 2)
 
 
@@ -112,22 +113,15 @@ def test_every_damaged_byte_and_every_cut_is_noticed(stored: bytes, read: Callab
 @given(
     st.dictionaries(
         st.text(max_size=8),
-        hnp.arrays(np.uint64, hnp.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=5)),
+        hnp.arrays(np.uint64, SHAPES).map(lambda pattern: np.asarray(pattern.view(np.float64)))
+        | hnp.arrays(np.float64, SHAPES, elements=st.sampled_from([0.0, 1.0, -0.0])),  # flags among them
         max_size=4,
     )
 )
-def test_packed_arrays_come_back(patterns: dict[str, NDArray[np.uint64]]) -> None:
-    arrays = {name: np.asarray(pattern.view(np.float64)) for name, pattern in patterns.items()}
+def test_packed_arrays_come_back(arrays: dict[str, NDArray[np.float64]]) -> None:
     back = unpack(pack(arrays))
     assert list(back) == list(arrays)
     assert all(back[name].shape == array.shape and same_bits(back[name], array) for name, array in arrays.items())
-
-
-@given(hnp.arrays(np.float64, hnp.array_shapes(max_dims=3, min_side=0), elements=st.sampled_from([0.0, 1.0, -0.0])))
-def test_flags_come_back(array: NDArray[np.float64]) -> None:
-    back = unpack(pack({"flags": array}))["flags"]
-    assert back.shape == array.shape
-    assert same_bits(back, array)
 
 
 def test_flags_take_a_bit_each_and_states_of_earlier_releases_are_read() -> None:
@@ -198,10 +192,6 @@ def test_one_value_that_is_no_decimal_or_steps_too_far_leaves_the_column_alone(o
     assert same_bits(decode_decimals(whole, column.size), column)
     column[77_777] = other
     assert encode_decimals(column) is None
-
-
-def test_noise_is_none_of_decimals() -> None:
-    assert encode_decimals(np.random.default_rng(1).standard_normal(10_000)) is None
 
 
 @given(st.integers(0, 60_000), st.integers(1, 255))

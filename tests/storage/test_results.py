@@ -34,17 +34,15 @@ def test_predictions_as_they_would_have_been_said_then(connection: Connection) -
     assert results.prediction_at(connection, CLUTCH, "particle", 0.0) is None
     history = results.predictions_of(connection, CLUTCH, "grid", 0.0)
     assert [row.cycles for row in history] == [0.0, 3000.0, 7000.0]
-
-
-def test_predictions_are_replaced_and_cleared_for_one_clutch(connection: Connection) -> None:
-    for clutch_id in (CLUTCH, "other"):
-        results.put_predictions(connection, clutch_id, [prediction(0.0), prediction(1.0)])
-    results.put_predictions(connection, CLUTCH, [prediction(1.0, said="again")])
-    assert results.prediction_at(connection, CLUTCH, "grid", 0.0) == prediction(1.0, said="again")
-    assert len(results.predictions_of(connection, CLUTCH, "grid", 0.0)) == 2
+    # replaced, and cleared for one clutch
+    results.put_predictions(connection, CLUTCH, [prediction(7000.0, said="again")])
+    assert results.prediction_at(connection, CLUTCH, "grid", 0.0) == prediction(7000.0, said="again")
+    assert len(results.predictions_of(connection, CLUTCH, "grid", 0.0)) == 3
     results.clear_predictions(connection, CLUTCH)
     assert results.predictions_of(connection, CLUTCH, "grid", 0.0) == []
-    assert results.prediction_at(connection, "other", "grid", 0.0) == prediction(1.0)
+    assert results.prediction_at(connection, "other", "grid", 0.0) == prediction(8000.0)
+    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), connection.begin_nested():
+        results.put_predictions(connection, "nobody", [prediction(0.0)])
 
 
 def test_fits_come_back_and_are_replaced(connection: Connection) -> None:
@@ -101,6 +99,8 @@ def test_filter_states_come_back_are_replaced_and_cleared(connection: Connection
     results.clear_filter_states(connection, CLUTCH)
     assert results.filter_states_of(connection, CLUTCH) == {}
     assert list(results.filter_states_of(connection, "other")) == [("ukf", 0.0)]
+    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), connection.begin_nested():
+        results.put_filter_states(connection, "nobody", [state("ukf", 0.0)])
 
 
 def test_a_damaged_state_is_named(connection: Connection) -> None:
@@ -108,10 +108,3 @@ def test_a_damaged_state_is_named(connection: Connection) -> None:
     connection.execute(update(filter_state).values(arrays=b"\0"))
     with pytest.raises(DamagedData, match=r"state of ukf at 500000 Pa of clutch 'bench3"):
         results.filter_states_of(connection, CLUTCH)
-
-
-def test_predictions_and_states_belong_to_a_clutch(connection: Connection) -> None:
-    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), connection.begin_nested():
-        results.put_predictions(connection, "nobody", [prediction(0.0)])
-    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), connection.begin_nested():
-        results.put_filter_states(connection, "nobody", [state("ukf", 0.0)])

@@ -12,7 +12,7 @@ from storage.tables import run
 from tests.storage.samples import CLUTCH, new_run
 
 
-def test_a_run_comes_back_as_it_was_stored(connection: Connection) -> None:
+def test_a_run_comes_back_as_it_was_stored_belongs_to_a_clutch_and_has_an_id_of_its_own(connection: Connection) -> None:
     keys = [runs.insert(connection, new_run(number)) for number in range(2)]
     for number, key in enumerate(keys):
         stored = runs.get(connection, CLUTCH, f"run-{number:04d}")
@@ -20,6 +20,10 @@ def test_a_run_comes_back_as_it_was_stored(connection: Connection) -> None:
         assert asdict(stored) == {**asdict(new_run(number)), "run_key": key}
     assert runs.get(connection, CLUTCH, "unknown") is None
     assert runs.get(connection, "unknown", "run-0000") is None
+    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), connection.begin_nested():
+        runs.insert(connection, new_run(clutch_id="nobody"))
+    with pytest.raises(IntegrityError, match=r"(?i)unique"), connection.begin_nested():
+        runs.insert(connection, new_run())
 
 
 def test_runs_are_in_order_of_cycles_then_id_whatever_order_they_came_in(connection: Connection) -> None:
@@ -75,15 +79,7 @@ def test_a_rebuild_that_is_held_is_none(connection: Connection) -> None:
     assert [row.run_id for row in runs.rebuilds(connection, CLUTCH)] == ["run-0000"]
 
 
-def test_a_run_belongs_to_a_clutch_and_its_id_is_taken_once(connection: Connection) -> None:
-    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), connection.begin_nested():
-        runs.insert(connection, new_run(clutch_id="nobody"))
-    runs.insert(connection, new_run())
-    with pytest.raises(IntegrityError, match=r"(?i)unique"), connection.begin_nested():
-        runs.insert(connection, new_run())
-
-
-def test_a_receipt_is_replaced(connection: Connection) -> None:
+def test_a_receipt_is_replaced_and_an_unknown_run_is_named(connection: Connection) -> None:
     key = runs.insert(connection, new_run())
     runs.insert(connection, new_run(1))
     runs.set_results(connection, key, {"origin": "measured"}, {"mean_cof": 0.134}, "0.2.0")
@@ -91,9 +87,6 @@ def test_a_receipt_is_replaced(connection: Connection) -> None:
     assert changed.details == {"origin": "measured"}
     assert (changed.receipt, changed.code_version) == ({"mean_cof": 0.134}, "0.2.0")
     assert (other.receipt, other.code_version) == (new_run(1).receipt, "0.1.0")
-
-
-def test_an_unknown_run_is_named(connection: Connection) -> None:
     with pytest.raises(LookupError, match="run 99"):
         runs.set_results(connection, 99, {}, {}, "0.1.0")
     with pytest.raises(LookupError, match="run 99"):

@@ -30,7 +30,10 @@ _IN_SIGHT = """rows => rows.map((row) => [row.getBoundingClientRect(), Number(ro
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     path = tmp_path_factory.mktemp("large") / "clutchlife.db"
-    life(path, [json.dumps(stationary(cycles, wear=cycles / 26_000)).encode() for cycles in range(0, 8000, 2000)])
+    life(
+        f"sqlite:///{path}",
+        [json.dumps(stationary(cycles, wear=cycles / 26_000)).encode() for cycles in range(0, 8000, 2000)],
+    )
     multiply(f"sqlite:///{path}", CLUTCHES)
     with serving(path, loaded=True) as running:
         yield running

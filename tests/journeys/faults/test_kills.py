@@ -31,6 +31,7 @@ from storage.engine.sqlite.database import back_up
 from storage.migrations.upgrade import head
 from tests.service.alarms.receiving import SECRET, Receiver, receiving
 from tests.service.work.replaying import ended
+from tests.service.work.waiting import until
 from tests.service.workflows import stand_in_engine
 from tests.service.workflows.benches import Bench, body, stood_in
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
@@ -46,8 +47,8 @@ def kills(few: int, many: int) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("number", cases)
 
 
-def killed_after(seconds: float, act: Callable[[], object]) -> bool:
-    """Do something in a process that is killed after some time; whether it had come to its end."""
+def forked(act: Callable[[], object]) -> int:
+    """The number of a process that does something."""
     child = os.fork()
     if child == 0:
         code = 1
@@ -56,6 +57,12 @@ def killed_after(seconds: float, act: Callable[[], object]) -> bool:
             code = 0
         finally:
             os._exit(code)
+    return child
+
+
+def killed_after(seconds: float, act: Callable[[], object]) -> bool:
+    """Do something in a process that is killed after some time; whether it had come to its end."""
+    child = forked(act)
     time.sleep(seconds)
     os.kill(child, signal.SIGKILL)  # a process that has ended is there until it is waited for
     _, status = os.waitpid(child, 0)
@@ -66,14 +73,15 @@ def killed_after(seconds: float, act: Callable[[], object]) -> bool:
 def duration(act: Callable[[], object]) -> float:
     """Seconds that something takes in a process of its own."""
     started = time.perf_counter()
-    child = os.fork()
-    if child == 0:
-        try:
-            act()
-        finally:
-            os._exit(0)
-    os.waitpid(child, 0)
+    os.waitpid(forked(act), 0)
     return time.perf_counter() - started
+
+
+def lay_again(path: Path, source: Path) -> None:
+    """A copy of a database in place of one and of all that lies beside it."""
+    for left in path.parent.glob(f"{path.name}*"):
+        left.unlink()
+    shutil.copyfile(source, path)
 
 
 def address_of(database: Path | str) -> str:
@@ -175,9 +183,7 @@ def test_a_migration_that_is_killed_is_whole_or_not_begun(tmp_path: Path, number
     name = f"a.db-before-{head()}"
     seen = set()
     for kill in range(number):
-        for left in tmp_path.glob("a.db*"):
-            left.unlink()
-        shutil.copyfile(source, path)
+        lay_again(path, source)
         killed_after(longest * kill / number, lambda: open_database(url).close())
         seen.add(revision(path))
         assert integrity(path) == ["ok"]
@@ -226,9 +232,7 @@ def test_a_restore_that_is_killed_leaves_one_of_the_two_whole(tmp_path: Path, fi
     back_up(url, tmp_path / "since.db")
     longest = duration(lambda: restore(url, backup))
     for kill in range(number):
-        for left in tmp_path.glob("a.db*"):
-            left.unlink()
-        shutil.copyfile(tmp_path / "since.db", filled)
+        lay_again(filled, tmp_path / "since.db")
         killed_after(longest * kill / number, lambda: restore(url, backup))
         assert integrity(filled) == ["ok"]
         kept = [each for each in tmp_path.glob("a.db-replaced*") if created(each) == "since"]
@@ -258,9 +262,7 @@ def test_an_adoption_that_is_killed_is_whole_or_not_begun(
         back_up(url, tmp_path / "before.db")
         longest = duration(lambda: adopt_on(url))
         for kill in range(number):
-            for left in tmp_path.glob("a.db*"):
-                left.unlink()
-            shutil.copyfile(tmp_path / "before.db", tmp_path / "a.db")
+            lay_again(tmp_path / "a.db", tmp_path / "before.db")
             ended = killed_after(longest * kill / number, lambda: adopt_on(url))
             with closing(open_database(url)) as database, database.reading() as connection:
                 versions = assumptions.adoptions_of(connection, "c1")
@@ -275,8 +277,6 @@ def adopt_on(url: str) -> None:
 
 # --- On PostgreSQL: the server is killed, or one of several services.
 
-#: [s] Within which a server that was killed is used again.
-IN_TIME = 60.0
 #: The clutch that is diagnosed, by an engine that takes two seconds; a killed service's job is begun again soon.
 DIAGNOSED = "diagnosed"
 SEVERAL = {"CLUTCHLIFE_ENGINE": f"{stand_in_engine.__name__}:slow", "CLUTCHLIFE_JOB_LEASE_SECONDS": "2"}
@@ -357,22 +357,19 @@ def test_what_a_killed_service_of_several_was_diagnosing_another_makes(postgres:
 
 def claimer(database: Database, job_id: str) -> int:
     """The number of the process that has the job, once one has."""
-    deadline = time.monotonic() + IN_TIME
-    while True:
+
+    def look() -> str | None:
         with database.reading() as connection:
             job = jobs.get(connection, job_id)
-        if job is not None and job.claimed_by is not None:
-            return int(job.claimed_by.split(":")[1])
-        assert time.monotonic() < deadline, "nobody claims it"
-        time.sleep(0.01)
+        return None if job is None else job.claimed_by
+
+    return int((until(look) or "").split(":")[1])
 
 
 def wait_for_runs(acknowledged: Acknowledged, number: int) -> None:
     """Wait until so many more runs are acknowledged."""
-    enough, deadline = len(acknowledged) + number, time.monotonic() + IN_TIME
-    while len(acknowledged) < enough:
-        assert time.monotonic() < deadline, "no run was acknowledged"
-        time.sleep(0.001)
+    enough = len(acknowledged) + number
+    until(lambda: len(acknowledged) >= enough)
 
 
 def post_until_done(url: str, acknowledged: Acknowledged, refused: list[int], done: threading.Event) -> None:

@@ -1,13 +1,12 @@
 """Runs come in any order, and some fit no life: the answers are the same, and say so."""
 
-import threading
 from pathlib import Path
 
 import httpx2
 import numpy as np
 import pytest
 
-from tests.support import PRESSURES_BAR, SPEEDS_RPM, Server, serving, stationary
+from tests.support import PRESSURES_BAR, SPEEDS_RPM, serving, stationary
 
 BASE = "/v1/clutches/c1"
 
@@ -135,24 +134,3 @@ def test_a_rebuild_starts_a_new_life(http: httpx2.Client) -> None:
         assert isinstance(old, dict)
         assert isinstance(new, dict)
         assert new[quantile] == pytest.approx(old[quantile] + 3000, rel=0.1)
-
-
-def test_many_writers_at_once(server: Server) -> None:
-    failures: list[str] = []
-
-    def rig(name: str) -> None:
-        with httpx2.Client(base_url=server.url, timeout=60) as http:
-            http.post("/v1/clutches", json={"clutch_id": name})
-            for cycles in (0, 1000, 2000, 3000):
-                answer = http.post(f"/v1/clutches/{name}/runs", json=stationary(cycles, run_id=f"r{cycles}"))
-                if answer.status_code != 201:
-                    failures.append(answer.text)
-
-    rigs = [threading.Thread(target=rig, args=(f"rig-{index}",)) for index in range(6)]
-    for thread in rigs:
-        thread.start()
-    for thread in rigs:
-        thread.join()
-    assert failures == []
-    with httpx2.Client(base_url=server.url) as http:
-        assert [item["runs"] for item in http.get("/v1/clutches").json()["items"]] == [4] * 6

@@ -22,9 +22,7 @@ Writer = Callable[..., Path]
 FORMATS: list[tuple[Writer, str]] = [(write_tdms, "a.tdms"), (write_mdf, "a.mf4"), (write_parquet, "a.parquet")]
 WRITERS = pytest.mark.parametrize(("write", "name"), FORMATS)
 #: What comes after a format was taken apart.
-AFTERWARDS = pytest.mark.parametrize(
-    ("write", "name"), [FORMATS[0], *(pytest.param(*form, marks=pytest.mark.slow) for form in FORMATS[1:])]
-)
+AFTERWARDS = pytest.mark.parametrize(("write", "name"), one_quick(FORMATS))
 GERMAN = {"M": "kNm", "n": "rad/s", "p": "MPa", "Öltemperatur": "K"}
 
 

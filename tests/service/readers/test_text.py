@@ -297,19 +297,6 @@ def test_two_million_wrong_cells_are_refused_block_by_block() -> None:
     assert 50 < raised.value.total < 50_000
 
 
-def test_a_title_is_taken_apart_in_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each step reads the whole title: there are no more of them for a long one."""
-    steps = []
-    ours = column_names.meaning
-    monkeypatch.setattr(column_names, "meaning", lambda *name: steps.append(name) or ours(*name))
-    counts = []
-    for words in (50, 100, 250, 499):
-        steps.clear()
-        column_of("a " * words)
-        counts.append(len(steps))
-    assert counts[0] == counts[-1] < 30
-
-
 def test_the_longest_title_that_is_read_and_the_first_that_is_not() -> None:
     assert column_of("x" * LONGEST_TITLE).name == "x" * LONGEST_TITLE
     with pytest.raises(InvalidError, match="must not be longer than 1000 characters, got 1001: 'xxx"):

@@ -175,16 +175,6 @@ def test_a_full_disk_changes_nothing(database: Database) -> None:
         store_run(connection, 0, length=10_000)
 
 
-def test_a_read_only_database_is_said_to_be_so(database: Database) -> None:
-    def write() -> None:
-        with database.writing() as connection:
-            connection.exec_driver_sql("PRAGMA query_only=ON")
-            clutches.insert(connection, clutch_row())
-
-    with pytest.raises(StorageUnavailable, match="read-only"):
-        write()
-
-
 def test_a_mistake_in_the_program_is_not_disguised(database: Database) -> None:
     with pytest.raises(OperationalError, match="no such table"), database.reading() as connection:
         connection.execute(text("SELECT * FROM no_such"))

@@ -13,6 +13,7 @@ from storage import channels, clutches, runs
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.storage.samples import CLUTCH, child, clutch_row, columns, integrity, store_run
+from tests.support import one_quick
 
 #: Kills itself at a named moment of the second run's transaction.
 SUICIDE = """
@@ -86,12 +87,7 @@ def assert_whole(database: Database) -> int:
 
 @pytest.mark.parametrize(
     ("moment", "length"),
-    [
-        pytest.param("begun", 40, marks=pytest.mark.slow),
-        pytest.param("run inserted", 40, marks=pytest.mark.slow),
-        pytest.param("channels written", 300_000, marks=pytest.mark.slow),
-        ("all written", 300_000),
-    ],
+    one_quick([("all written", 300_000), ("begun", 40), ("run inserted", 40), ("channels written", 300_000)]),
 )
 def test_killed_in_mid_transaction(path: Path, journal_mode: str, moment: str, length: int) -> None:
     with child(SUICIDE, path, journal_mode, moment, length) as (writer, _, _):
@@ -104,7 +100,7 @@ def test_killed_in_mid_transaction(path: Path, journal_mode: str, moment: str, l
     assert integrity(path) == ["ok"]
 
 
-@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
+@pytest.mark.parametrize("seed", one_quick([1, 2, 3]))
 def test_killed_at_any_moment_what_was_committed_stays(path: Path, journal_mode: str, seed: int) -> None:
     with child(BUSY, path, journal_mode) as (writer, _, says):
         for number in range(1, 6):
