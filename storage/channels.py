@@ -24,8 +24,8 @@ from storage.encoding import CODEC, DECIMAL_CODEC, LONG, decode, decode_decimals
 from storage.engine.errors import DamagedData, DatabaseBusy
 from storage.tables import channel, raw_store, run
 
-#: Bytes of an encoded column that stay in the database wherever raw records go. Chosen: docs/appendix/benchmarks.md
-#: (`python -m tests.benchmarks.places`): a store adds 20 to 45 ms to a column of any length. Some 10,000 samples are longer.
+#: Bytes of an encoded column that stay in the database wherever raw records go. Chosen: docs/appendix/benchmarks.md: a store
+#: adds 20 to 45 ms to a column of any length. Some 10,000 samples are longer.
 MAX_INLINE = 64 << 10
 #: The name under which a run's file stands among its channels; no channel has it.
 FILE = "@file"

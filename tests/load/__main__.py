@@ -26,7 +26,7 @@ from service.client.clutchlife import ClutchlifeError
 from tests.benchmarks.diagnosis import post_life
 from tests.load import beside, checks
 from tests.load.beside import Beside, Processor
-from tests.load.bodies import SentLife, life
+from tests.load.bodies import Post, life
 from tests.load.field import Field, Options
 from tests.load.report import Loaded, demands, markdown, paces
 from tests.storage.engine.postgresql.server import postgresql_server
@@ -67,7 +67,7 @@ def run(options: Options, folder: Path) -> Loaded:
         )
 
 
-async def _loaded(options: Options, servers: Sequence[Server], lives: Sequence[SentLife]) -> tuple[Field, Beside]:
+async def _loaded(options: Options, servers: Sequence[Server], lives: Sequence[Sequence[Post]]) -> tuple[Field, Beside]:
     begin = asyncio.get_running_loop().time() + 0.5
     end = begin + options.seconds
     field = Field(options=options, ports=[server.port for server in servers], lives=lives, begin=begin, end=end)

@@ -29,8 +29,6 @@ _RAW = RawTest(rate=SAMPLES / (280 * PLATEAU_DURATION))
 _RAW_CHANNELS = ("time_s", "pressure_bar", "speed_rpm", "torque_nm")
 #: Maintenance by the number of the stationary test that it follows.
 _MAINTENANCE = {13: ("oil_change", "new oil"), 26: ("rest", "three days")}
-JSON_TYPE = "application/json"
-
 #: The arguments of a client's `request`.
 Request = dict[str, Any]
 
@@ -68,17 +66,14 @@ class Post:
         }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SentLife:
-    """The posts of one simulated life in the rig's order."""
-
-    seed: int
-    posts: tuple[Post, ...] = field(repr=False)
-
-
 def posted(address: str, content: bytes, **headers: str) -> Request:
     """A POST of JSON."""
-    return {"method": "POST", "url": address, "content": content, "headers": {"Content-Type": JSON_TYPE} | headers}
+    return {
+        "method": "POST",
+        "url": address,
+        "content": content,
+        "headers": {"Content-Type": "application/json"} | headers,
+    }
 
 
 def registration(clutch_id: str, fluid: str) -> Request:
@@ -86,8 +81,9 @@ def registration(clutch_id: str, fluid: str) -> Request:
     return posted("/v1/clutches", json.dumps(simulated_clutch_body(clutch_id) | {"fluid": fluid}).encode())
 
 
-def life(seed: int, *, raw: Path | None = None, tests: int = TESTS, samples: int = SAMPLES) -> SentLife:
-    """A life by its seed; `raw`: the folder for recorders' files, which take the place of every fifth stationary test."""
+def life(seed: int, *, raw: Path | None = None, tests: int = TESTS, samples: int = SAMPLES) -> list[Post]:
+    """The posts of a simulated life by its seed, in the rig's order; `raw`: the folder for recorders' files, which take the
+    place of every fifth stationary test."""
     clutch = campaign.simulated_clutch(seed)
     posts: list[Post] = []
     count = 0
@@ -102,7 +98,7 @@ def life(seed: int, *, raw: Path | None = None, tests: int = TESTS, samples: int
         else:
             posts.append(_json_post(run))
         posts += [post for post in _after(run, clutch, seed, count) if raw is not None or not post.sampled]
-    return SentLife(seed=seed, posts=tuple(posts))
+    return posts
 
 
 def _after(run: SimulatedRun, clutch: SimulatedClutch, seed: int, count: int) -> Iterator[Post]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from httpx2 import AsyncClient, Limits, Response, TimeoutException, TransportError
 
-from tests.load.bodies import SAMPLES, TESTS, Post, Request, SentLife, registration
+from tests.load.bodies import SAMPLES, TESTS, Post, Request, registration
 
 #: What a client asks in each second, a quarter of a second apart.
 ROUTES = ("remaining-useful-life", "degradation", "clutches", "runs")
@@ -92,7 +92,7 @@ class Field:
 
     options: Options
     ports: Sequence[int]
-    lives: Sequence[SentLife]
+    lives: Sequence[Sequence[Post]]
     begin: float
     end: float
     counts: Counts = field(default_factory=Counts)
@@ -125,7 +125,7 @@ class Field:
                 if await self._sent(http, registration(clutch_id, self.fluid(number, turn)), "registration") is None:
                     return
                 self.on_rigs[number] = clutch_id
-                for post in self.life(number, turn).posts:
+                for post in self.lives[(number + turn) % len(self.lives)]:
                     started = loop.time()
                     answer = await self._sent(http, post.request(clutch_id), "sampled" if post.sampled else "plain")
                     if answer is None:
@@ -133,10 +133,6 @@ class Field:
                         return
                     self._acknowledge(clutch_id, post, answer)
                     await _until(started + self.options.interval)
-
-    def life(self, number: int, turn: int) -> SentLife:
-        """The life that a rig posts at its so many-th turn."""
-        return self.lives[(number + turn) % len(self.lives)]
 
     def fluid(self, number: int, turn: int) -> str:
         """The fluid of that clutch: the last rigs' clutches have each their own."""

@@ -20,18 +20,18 @@ def run_named(name: str) -> Post:
 def test_a_life_is_whole_and_the_same_for_a_seed(tmp_path: Path) -> None:
     own = life(3, tests=20)
     assert own == life(3, tests=20)
-    assert own.posts != life(4, tests=20).posts
-    kinds = [post.kind for post in own.posts]
+    assert own != life(4, tests=20)
+    kinds = [post.kind for post in own]
     assert kinds.count("stationary_stribeck") == 20
     assert set(kinds) == {"run_in", "duty_cycles", "stationary_stribeck", "maintenance"}
-    for post in own.posts:
+    for post in own:
         body = json.loads(post.content)
         assert (body["run_id"], body["kind"]) == (post.run_id, post.kind)
     # sampled records: raw files take the place of stationary tests, one post in ten; dynamic tests come beside them
     raw = life(3, raw=tmp_path, tests=20, samples=2_000)
-    assert sum(post.kind == "dynamic_stribeck" for post in raw.posts) == 2
-    assert [post.run_id for post in raw.posts if post.kind != "dynamic_stribeck"] == [post.run_id for post in own.posts]
-    files = [post for post in raw.posts if post.raw]
+    assert sum(post.kind == "dynamic_stribeck" for post in raw) == 2
+    assert [post.run_id for post in raw if post.kind != "dynamic_stribeck"] == [post.run_id for post in own]
+    files = [post for post in raw if post.raw]
     assert len(files) == 4
     assert {Path(str(post.path)).suffix for post in files} == {".gz", ".parquet"}
 
