@@ -65,23 +65,18 @@ class DynamicRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DutyRun:
-    """A block of duty that ends at `cycles`; None stands for a quantity that the rig did not send."""
+    """A block of duty that ends at `cycles`; `energy` [J] is that of each engagement where the rig sent it."""
 
-    run_id: str
     cycles: float
     engagements: float
-    energy: float | None = None  # of each [J]
-    initial_speed: float | None = None  # [rad/s]
-    maximum_pressure: float | None = None  # [Pa]
+    energy: float | None = None
     moment: float | None = None
-    record: Record | None = None  # one engagement's trace if it was sent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MaintenanceEvent:
     """Maintenance of clutch or rig at `cycles`."""
 
-    run_id: str
     cycles: float
     event: EventKind
     moment: float | None = None
@@ -93,7 +88,6 @@ class Campaign:
 
     geometry: Geometry = field(default_factory=Geometry)
     oil: Oil = field(default_factory=Oil)
-    cof_fraction: float = 0.5
     stationary: tuple[StationaryRun, ...] = ()
     dynamic: tuple[DynamicRun, ...] = ()
     duty: tuple[DutyRun, ...] = ()

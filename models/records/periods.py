@@ -34,8 +34,7 @@ class Cycle:
     """A fitted swing: frequency [Hz], origin t_0 [s], mean v_0, cosine and sine [h], in the unit of what was fitted.
 
     `covariance` [2h, 2h] is that of (cosine, sine) with f free; `noise` the deviation of a sample; the swing begins at
-    `begin` [s], its last whole periods are those of start <= t < stop [s]; `outliers` samples were left out;
-    `converged` says whether the last step moved the frequency by less than the tolerance.
+    `begin` [s], its last whole periods are those of start <= t < stop [s]; `outliers` samples were left out.
     """
 
     frequency: float
@@ -50,7 +49,6 @@ class Cycle:
     start: float
     stop: float
     outliers: int
-    converged: bool
 
     @property
     def amplitude(self) -> float:
@@ -230,7 +228,6 @@ def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, t
     coefficients: FloatArray = np.zeros(2 * count + 1)
     gram: FloatArray = np.zeros((0, 0))
     residual: FloatArray = value
-    move = math.inf
     for step in range(_STEPS):
         basis = harmonics(2 * math.pi * frequency * (time - origin), count)
         design = np.column_stack([np.ones_like(time), basis])
@@ -273,5 +270,4 @@ def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, t
         start=stop - periods / frequency,
         stop=stop,
         outliers=int((~keep).sum()),
-        converged=abs(move) < tolerance,
     )

@@ -15,7 +15,6 @@ relaxation's own time between phases), and so are its sensitivities: a change δ
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.lapack import dtbtrs
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import (
@@ -34,6 +33,7 @@ from models.diagnosis.baseline.laws import (
 )
 from models.diagnosis.design.design import Design
 from models.diagnosis.design.loop_bins import PHASES
+from models.relaxation import kept, recursion
 
 #: A curve below this share of its loop's largest value is lifted to it: C/S must stay finite.
 _LEAST_SHARE = 1e-3
@@ -60,9 +60,7 @@ def lag_of(curve: FloatArray, attractor: FloatArray, angular_frequency: FloatArr
     rate = np.clip(attractor / strength, 1e-9, 1e9)
     step = 2 * np.pi / (curve.shape[1] * angular_frequency[:, None])
     x = 0.5 * step * (rate + np.roll(rate, 1, axis=1))
-    keep = np.exp(-x)
-    tiny = x < 1e-4
-    mean_keep = np.where(tiny, 1 - x / 2 + x * x / 6, -np.expm1(-x) / np.where(tiny, 1.0, x))
+    keep, mean_keep = kept(x)
     torque = _relaxed(keep, mean_keep, curve[:, :, None])[:, :, 0]
     by_mean = keep - mean_keep  # x dm/dx of M_i = e^-x M_{i-1} + (1 - m) S_i + (m - e^-x) S_{i-1}
     gain = -x * keep * np.roll(torque, 1, axis=1) - by_mean * curve + (by_mean + x * keep) * np.roll(curve, 1, axis=1)
@@ -84,13 +82,8 @@ def _relaxed(keep: FloatArray, mean_keep: FloatArray, target: FloatArray) -> Flo
 
 def _periodic(keep: FloatArray, gain: FloatArray) -> FloatArray:
     """The periodic y [l, k, m] of y_i = keep_i y_{i-1} + gain_i, keep [l, k], gain [l, k, m]: once around from y = 0, then
-    the share of its end that was missing at its start is added. All loops are one system of two diagonals."""
-    if gain.shape[2] == 0:
-        return gain  # LAPACK writes where nothing is
-    bands = np.ones((2, keep.size))
-    bands[1] = np.append(-keep[:, 1:], np.zeros((keep.shape[0], 1)), axis=1).ravel()
-    from_zero, _ = dtbtrs(bands, gain.reshape(keep.size, -1), uplo="L", diag="U")
-    from_zero = from_zero.reshape(gain.shape)
+    the share of its end that was missing at its start is added."""
+    from_zero = recursion(keep, gain)
     left = np.cumprod(keep, axis=1)[:, :, None]
     return np.asarray(from_zero + left * (from_zero[:, -1:] / (1 - left[:, -1:])), dtype=np.float64)
 

@@ -116,14 +116,6 @@ def _evenly(states: FloatArray, count: int) -> set[float]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunInfo:
-    """A run that gave rows."""
-
-    run_id: str
-    cycles: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
     """What the baseline and the effects are fitted to."""
 
@@ -142,7 +134,7 @@ class Design:
     loops: int
     # of neighbouring bins, and of those next but one, by the loops' samples; None where these are too few
     bin_autocorrelation: tuple[float, float] | None
-    runs: tuple[RunInfo, ...]
+    runs: tuple[StationaryRun | DynamicRun, ...]  # that gave rows
     facts: Facts
     notes: tuple[str, ...]  # what was left out
 
@@ -179,14 +171,14 @@ def build_design(campaign: Campaign) -> Design:
     """All rows of a campaign. Never raises on a campaign that is valid by itself; it may have no rows."""
     notes: list[str] = []
     thinned_campaign = thinned(campaign, notes)
-    runs: list[RunInfo] = []
+    runs: list[StationaryRun | DynamicRun] = []
     blocks = [points_of(0)]
     torques = [np.zeros(0)]
     plateaus = 0
     for run in thinned_campaign.stationary:
         points, torque = _plateaus(run, thinned_campaign, len(runs), plateaus, notes)
         if torque.size:
-            runs.append(RunInfo(run_id=run.run_id, cycles=run.cycles))
+            runs.append(run)
             blocks.append(points)
             torques.append(torque)
             plateaus += torque.size
@@ -200,7 +192,7 @@ def build_design(campaign: Campaign) -> Design:
             blocks.append(_loop_points(loop, dynamic, len(runs), len(loops)))
             loops.append(loop)
         if test_loops:
-            runs.append(RunInfo(run_id=dynamic.run_id, cycles=dynamic.cycles))
+            runs.append(dynamic)
     if reasons:
         count = f"{len(reasons)} of {len(thinned_campaign.dynamic)} ({reasons[0].rstrip('.')})"
         notes.append(f"Dynamic tests that could not be evaluated and were left out: {count}.")

@@ -20,7 +20,6 @@ from enum import StrEnum
 from typing import TypeAlias
 
 import numpy as np
-from scipy.linalg.lapack import dtbtrs
 from scipy.special import logsumexp
 
 from models.arrays import FloatArray
@@ -29,6 +28,7 @@ from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.design import IntArray, Points
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.design.loop_bins import PHASES
+from models.relaxation import recursion
 
 #: Powers of life in which an offset, a zero or a gain that creeps is tried first [-].
 CREEPS = (0.5, 1.0, 2.0)
@@ -240,13 +240,6 @@ def log_amplitude_peak(effect: Effect) -> float:
     return peak + math.lgamma(half + 0.5) - math.lgamma(half) - 0.5 * math.log(half)
 
 
-def ends_of(target: FloatArray, keep: FloatArray) -> FloatArray:
-    """What each plateau ends with [P], x_i = (1 - k_i) target_i + k_i x_{i-1}: plateaus follow each other."""
-    bands = np.stack([np.ones(keep.size), np.append(-keep[1:], 0.0)])
-    ends, _ = dtbtrs(bands, ((1.0 - keep) * target)[:, None], uplo="L", diag="U")
-    return np.asarray(ends[:, 0], dtype=np.float64)
-
-
 def followed(target: FloatArray, points: Points, settling: float) -> FloatArray:
     """The mean over each plateau [P] of a quantity that relaxes to that plateau's target [P] with the time constant
     `settling` [s], beginning at what the plateau before ended with. A run's first plateau and loops are at their target."""
@@ -256,7 +249,8 @@ def followed(target: FloatArray, points: Points, settling: float) -> FloatArray:
     keep = np.zeros(points.previous.size)
     keep[follows] = np.exp(-durations)
     out = target.copy()
-    out[follows] += (ends_of(target, keep)[before] - target[follows]) * (1.0 - keep[follows]) / durations
+    ends = recursion(keep, (1.0 - keep) * target)
+    out[follows] += (ends[before] - target[follows]) * (1.0 - keep[follows]) / durations
     return out
 
 

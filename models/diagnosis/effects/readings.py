@@ -23,10 +23,10 @@ from models.diagnosis.effects.effect import (
     ShapeParameter,
     Tried,
     by_loop,
-    ends_of,
     flattening,
     life_of,
 )
+from models.relaxation import recursion
 
 #: Courses of the zero: one offset from a cycle on, along the test's clock (straight, or settling), along the life by cycles
 #: or by the days that it took.
@@ -221,8 +221,8 @@ def _unsettled_dwell_change(scene: Scene, amplitude: float, shape: Shape) -> Flo
         limit = np.abs(scene.curve)
         difference = np.clip(difference, -limit, limit)
     else:
-        share = float(np.clip(amplitude * carried, 0.0, 0.95))
-        difference = ends_of(scene.curve, np.where(follows, share, 0.0))[before] - scene.curve
+        keep = np.where(follows, float(np.clip(amplitude * carried, 0.0, 0.95)), 0.0)
+        difference = recursion(keep, (1.0 - keep) * scene.curve)[before] - scene.curve  # what each plateau ends with
     return np.asarray(amplitude * np.where(follows, difference, 0.0), dtype=np.float64)
 
 

@@ -155,20 +155,14 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
     if trial.later:
         energies = [run.energy for run in campaign.duty if run.energy is not None]
         energy = trial.energy * float(np.median(energies)) if energies else None
-        duty = (
-            DutyRun(run_id=f"trial-duty-{k}", cycles=cycles, engagements=step, energy=energy)
-            for k, cycles in enumerate(ahead)
-        )
+        duty = (DutyRun(cycles=cycles, engagements=step, energy=energy) for cycles in ahead)
         added = replace(added, duty=(*campaign.duty, *duty))
     rests = tuple(
         MaintenanceEvent(
-            run_id=f"trial-rest-{k}",
-            cycles=test.cycles,
-            event=EventKind.REST,
-            moment=None if test.moment is None else test.moment - rested[k],
+            cycles=test.cycles, event=EventKind.REST, moment=None if test.moment is None else test.moment - pause
         )
-        for k, test in enumerate(tests)
-        if rested[k]
+        for test, pause in zip(tests, rested, strict=True)
+        if pause
     )
     return replace(added, maintenance=(*campaign.maintenance, *rests))
 

@@ -78,10 +78,11 @@ def judge(posterior: Posterior) -> Judgement:
     """The judgement before validation: the verdict, and what was fitted behind it."""
     explanations = explanations_of(posterior)
     verdict, causes = decide(explanations)
-    fitted = _fitted(posterior, explanations)
+    fitted = _fitted(posterior)
     shares = {explanation.effects: explanation.probability for explanation in explanations}
     sets = {Verdict.CAUSE_NAMED: [causes], Verdict.CAUSE_AMBIGUOUS: smallest(shares)}.get(verdict, [])
-    chosen = {_averaged_causes(effects, posterior) for effects in sets}
+    # what averages of plateaus and loops show of an explanation
+    chosen = {frozenset(effects) - {UNCATALOGUED, *posterior.vibrations} for effects in sets}
     stand = tuple(cause for cause in fitted if frozenset(cause.slugs) in chosen)
     unnamed = [alternative for alternative in posterior.probabilities if alternative.unknown]
     return Judgement(
@@ -101,27 +102,17 @@ def judge(posterior: Posterior) -> Judgement:
     )
 
 
-def _averaged_causes(effects: Sequence[str], posterior: Posterior) -> frozenset[str]:
-    """The causes of an explanation that averages of plateaus and loops show."""
-    return frozenset(effects) - {UNCATALOGUED, *posterior.vibrations}
-
-
-def _fitted(posterior: Posterior, explanations: Sequence[Explanation]) -> tuple[Fitted, ...]:
+def _fitted(posterior: Posterior) -> tuple[Fitted, ...]:
     """The causes that were fitted, alone and in pairs, most probable first."""
-    fitted = []
-    for alternative, node in posterior.nodes.items():
-        if alternative == NOTHING or alternative.unknown:
-            continue
-        same = frozenset(alternative.causes)
-        fitted.append(
-            Fitted(
-                slugs=tuple(effect.effect.slug for effect in node.fit.effects),
-                fit=node.fit,
-                evidence=posterior.weights[alternative] - posterior.prior(alternative),
-                probability=sum(e.probability for e in explanations if _averaged_causes(e.effects, posterior) == same),
-            )
+    named = [alternative for alternative in posterior.nodes if alternative != NOTHING and not alternative.unknown]
+    return tuple(
+        Fitted(
+            slugs=tuple(effect.effect.slug for effect in posterior.nodes[alternative].fit.effects),
+            fit=posterior.nodes[alternative].fit,
+            evidence=posterior.weights[alternative] - posterior.prior(alternative),
         )
-    return tuple(sorted(fitted, key=lambda cause: -posterior.weights[Alternative(tuple(sorted(cause.slugs)))]))
+        for alternative in sorted(named, key=posterior.weights.__getitem__, reverse=True)
+    )
 
 
 def _where(evidence: Mapping[str, float]) -> tuple[Where, ...]:

@@ -109,7 +109,6 @@ class Fitted:
     slugs: tuple[str, ...]  # in the order of the fit's effects
     fit: Fit
     evidence: float  # [nats] over nothing
-    probability: float  # that they and no others of the catalogue are at work
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -59,7 +59,6 @@ class Fit:
     effects: tuple[FittedEffect, ...]
     cost: float  # [nats], half the whitened squares, priors included
     status: FitStatus  # how it ended
-    steps: int  # that lowered the cost
 
     @property
     def wrong_sign(self) -> bool:
@@ -75,7 +74,7 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
     white, priors = whitening(problem.design, problem.gained, problem.noise), problem.priors
     state = _evaluated(problem, white, start, tuple(effects))
     damping, growth = 1e-3, 2.0
-    status, steps_made = FitStatus.OUT_OF_STEPS, 0
+    status = FitStatus.OUT_OF_STEPS
     for _ in range(steps):
         with np.errstate(over="ignore", invalid="ignore"):
             gram, gradient = _normal(problem, white, state)
@@ -100,11 +99,11 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
         if fallen <= 0:
             status = FitStatus.STALLED
             break
-        state, steps_made = candidate, steps_made + 1
+        state = candidate
         if fallen < 0.01:  # nats
             status = FitStatus.CONVERGED
             break
-    return replace(state, status=status if np.isfinite(state.cost) else FitStatus.NOT_FINITE, steps=steps_made)
+    return replace(state, status=status if np.isfinite(state.cost) else FitStatus.NOT_FINITE)
 
 
 def _inside(state: Fit, priors: Priors, matrix: FloatArray, gradient: FloatArray) -> FloatArray:
@@ -143,7 +142,6 @@ def _evaluated(problem: FitProblem, white: Whiten, laws: Laws, effects: tuple[Fi
         effects=effects,
         cost=cost,
         status=FitStatus.OUT_OF_STEPS,
-        steps=0,
     )
 
 

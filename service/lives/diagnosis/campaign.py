@@ -13,7 +13,6 @@ from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, 
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, Record
 from models.records.torque_filter import filtered_as_torque
-from service.columns import CHANNELS
 from service.lives.criteria import MAX_OF_CAMPAIGN, MAX_OF_RECORD
 from service.lives.history import DYNAMIC, MAINTENANCE, STATIONARY, Life
 from service.lives.incoming_run import IncomingRun, sampled_record, stationary_plateaus
@@ -49,7 +48,6 @@ def campaign_of(record: ClutchIn, runs: Sequence[CampaignRun]) -> Campaign:
             viscosity_40=record.oil.kinematic_viscosity_40c_cst * 1e-6,
             viscosity_100=record.oil.kinematic_viscosity_100c_cst * 1e-6,
         ),
-        cof_fraction=record.end_of_life.cof_fraction,
         stationary=_runs_of_kind(StationaryRun, runs),
         dynamic=_runs_of_kind(DynamicRun, runs),
         duty=_runs_of_kind(DutyRun, runs),
@@ -83,16 +81,10 @@ def run_of(run: IncomingRun, *, origin: float, torque_filter: float = 0.0, keep_
         record = filtered_as_torque(sampled_record(run.channels), torque_filter)
         return DynamicRun(**head_of(run, origin), record=thinned(record))
     if run.kind == MAINTENANCE:
-        return MaintenanceEvent(**head_of(run, origin), event=EventKind(run.details["event"]))
+        return MaintenanceEvent(**_when(run, origin), event=EventKind(run.details["event"]))
     duty = run.details["duty"]
-    return DutyRun(
-        **head_of(run, origin),
-        engagements=duty["cycles"],
-        energy=_si(duty["energy_per_cycle_kj"], 1000.0),
-        initial_speed=_si(duty["initial_speed_rpm"], CHANNELS["speed_rpm"].factor),
-        maximum_pressure=_si(duty["maximum_pressure_bar"], CHANNELS["pressure_bar"].factor),
-        record=sampled_record(run.channels) if run.channels and keep_record else None,
-    )
+    energy = None if duty["energy_per_cycle_kj"] is None else 1000.0 * duty["energy_per_cycle_kj"]
+    return DutyRun(**_when(run, origin), engagements=duty["cycles"], energy=energy)
 
 
 def without_record(run: IncomingRun, *, origin: float) -> CampaignRun:
@@ -107,9 +99,14 @@ def without_record(run: IncomingRun, *, origin: float) -> CampaignRun:
 
 
 def head_of(run: IncomingRun, origin: float) -> dict[str, Any]:
-    """What every run has; `moment` is when it was started [s since 1970], None where the rig did not say."""
+    """What every test has."""
+    return {"run_id": run.run_id, **_when(run, origin)}
+
+
+def _when(run: IncomingRun, origin: float) -> dict[str, Any]:
+    """`moment` is when it was started [s since 1970], None where the rig did not say."""
     moment = None if run.started_at is None else datetime.fromisoformat(run.started_at).timestamp()
-    return {"run_id": run.run_id, "cycles": run.cycles - origin, "moment": moment}
+    return {"cycles": run.cycles - origin, "moment": moment}
 
 
 def _stationary(run: IncomingRun, origin: float, torque_filter: float, keep_record: bool) -> StationaryRun:
@@ -143,7 +140,3 @@ def thinned(record: Record, most: int = MAX_OF_RECORD) -> Record:
         oil_temperature=None if record.oil_temperature is None else means(record.oil_temperature),
         plate_temperature=None if record.plate_temperature is None else means(record.plate_temperature),
     )
-
-
-def _si(value: float | None, factor: float) -> float | None:
-    return None if value is None else value * factor

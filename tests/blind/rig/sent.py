@@ -100,19 +100,16 @@ def campaign(hidden: Hidden) -> Campaign:
     ]
     duty = [
         DutyRun(
-            run_id=run["run_id"],
             cycles=run["cycles"],
             engagements=run["duty"]["cycles"],
             energy=1e3 * run["duty"]["energy_per_cycle_kj"] if "energy_per_cycle_kj" in run["duty"] else None,
-            initial_speed=run["duty"]["initial_speed_rpm"] * RPM,
-            maximum_pressure=run["duty"]["maximum_pressure_bar"] * 1e5,
             moment=_moment(run),
         )
         for run in sent
         if run["kind"] == "duty_cycles"
     ]
     maintenance = [
-        MaintenanceEvent(run_id=run["run_id"], cycles=run["cycles"], event=EventKind(run["event"]), moment=_moment(run))
+        MaintenanceEvent(cycles=run["cycles"], event=EventKind(run["event"]), moment=_moment(run))
         for run in sent
         if run["kind"] == "maintenance"
     ]

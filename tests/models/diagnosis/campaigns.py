@@ -176,9 +176,8 @@ def campaign_of(runs: Iterable[SimulatedRun]) -> Campaign:
         if run.plateaus is not None:
             stationary.append(StationaryRun(**head, plateaus=run.plateaus))
         elif run.duty is not None:
-            block = run.duty
-            engaged = {"energy": block.energy_per_cycle, "initial_speed": block.initial_speed}
-            duty.append(DutyRun(**head, engagements=block.cycles, maximum_pressure=block.maximum_pressure, **engaged))
+            energy = run.duty.energy_per_cycle
+            duty.append(DutyRun(cycles=float(run.cycles), engagements=run.duty.cycles, energy=energy))
         elif run.record is not None:
             moving.append(DynamicRun(**head, record=run.record))
     return Campaign(stationary=tuple(stationary), dynamic=tuple(moving), duty=tuple(duty))

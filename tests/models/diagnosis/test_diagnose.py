@@ -132,7 +132,7 @@ def test_a_campaign_of_one_speed_is_judged_and_says_what_it_cannot_show() -> Non
 @pytest.mark.slow
 def test_a_logged_oil_change_is_preferred_to_an_unlogged_one() -> None:
     given = campaign(7, PLANTED["oil_change"])
-    logged = replace(given, maintenance=(MaintenanceEvent(run_id="oil", cycles=4500.0, event=Event.OIL_CHANGE),))
+    logged = replace(given, maintenance=(MaintenanceEvent(cycles=4500.0, event=Event.OIL_CHANGE),))
     with_log = next(each for each in look(logged).candidates if each.effect == "oil_change")
     without = next(each for each in look(given).candidates if each.effect == "oil_change")
     assert with_log.log_evidence_gain > without.log_evidence_gain + 1.0

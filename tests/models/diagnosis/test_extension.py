@@ -26,8 +26,8 @@ ONSET = 6000.0
 def warm() -> Study:
     given = campaign(51, warmth, loops=False)
     duty = (
-        DutyRun(run_id="a", cycles=3000.0, engagements=3000.0, energy=8e3),
-        DutyRun(run_id="b", cycles=15000.0, engagements=12000.0, energy=12e3),
+        DutyRun(cycles=3000.0, engagements=3000.0, energy=8e3),
+        DutyRun(cycles=15000.0, engagements=12000.0, energy=12e3),
     )
     return study(replace(given, duty=duty))
 

@@ -34,12 +34,11 @@ class Recipe:
         ]
         moving = [_dynamic(rng, k, rows, self.scale, self.shape) for k, rows in enumerate(self.loops)]
         duty = [
-            DutyRun(run_id=f"u{k}", cycles=100.0 * k, engagements=100.0, energy=float(rng.choice([1.0, 1e4])))
+            DutyRun(cycles=100.0 * k, engagements=100.0, energy=float(rng.choice([1.0, 1e4])))
             for k in range(self.blocks)
         ]
         events = [
-            MaintenanceEvent(run_id=f"m{k}", cycles=float(rng.integers(0, 300)), event=kind)
-            for k, kind in enumerate(self.events)
+            MaintenanceEvent(cycles=float(rng.integers(0, 300)), event=kind) for k, kind in enumerate(self.events)
         ]
         return Campaign(stationary=tuple(steady), dynamic=tuple(moving), duty=tuple(duty), maintenance=tuple(events))
 

@@ -167,7 +167,7 @@ def test_an_open_clutch_is_advised_where_it_decides(swung: Study) -> None:
         swung.extended(("inertia_torque", 0.001, ())),
         swung.extended(("squeeze_film", 0.005, (0.4, 0.8, 0.05, 0.7, 1.0, 1.0))),
     ]
-    standing = [Fitted(slugs=(), fit=each, evidence=0.0, probability=0.5) for each in fits]
+    standing = [Fitted(slugs=(), fit=each, evidence=0.0) for each in fits]
     found = advise(swung.campaign, swung.problem, standing)
     opened_up = next(advice for advice in found if advice.key == "open_clutch")
     assert opened_up.nats > WORTHWHILE

@@ -297,10 +297,8 @@ def rested(*hours: float) -> Campaign:
     given = campaign(1)
     tests = given.stationary[1 : 1 + len(hours)]
     events = [
-        MaintenanceEvent(
-            run_id=f"rest-{k}", cycles=test.cycles, event=EventKind.REST, moment=(test.moment or 0.0) - HOUR * rest
-        )
-        for k, (test, rest) in enumerate(zip(tests, hours, strict=True))
+        MaintenanceEvent(cycles=test.cycles, event=EventKind.REST, moment=(test.moment or 0.0) - HOUR * rest)
+        for test, rest in zip(tests, hours, strict=True)
     ]
     return replace(given, maintenance=tuple(events))
 
@@ -335,12 +333,12 @@ def test_a_pause_is_what_the_engagements_between_two_tests_leave(told: str) -> N
     12 h before the one from 1000 cycles and for 30 h before that from 6000."""
     rests = {1000.0: 12 * HOUR, 6000.0: 30 * HOUR}
     given, moment, tests, blocks = campaign(1, loops=False), 1e9, list[StationaryRun](), list[DutyRun]()
-    for number, (test, after) in enumerate(itertools.pairwise(given.stationary)):
+    for test, after in itertools.pairwise(given.stationary):
         tests.append(replace(test, moment=moment))
         engagements = after.cycles - test.cycles
         begun = moment + 0.5 * HOUR + rests.get(test.cycles, 0.0)
         over = begun + 20.0 * engagements
-        block = DutyRun(run_id=f"block-{number}", cycles=after.cycles, engagements=engagements)
+        block = DutyRun(cycles=after.cycles, engagements=engagements)
         if told != "not at all":
             blocks.append(replace(block, moment=begun if told == "at the beginning" else over - 60.0))
         moment = over
@@ -353,7 +351,7 @@ def test_a_pause_is_what_the_engagements_between_two_tests_leave(told: str) -> N
 def test_a_test_before_the_pause_at_the_same_cycles_has_not_rested() -> None:
     """The dynamic test follows the stationary one by 2000 s; the pause lies between them."""
     given = campaign(1)
-    pause = MaintenanceEvent(run_id="rest", cycles=3000.0, event=EventKind.REST, moment=1e9 + 2 * DAY + 1000.0)
+    pause = MaintenanceEvent(cycles=3000.0, event=EventKind.REST, moment=1e9 + 2 * DAY + 1000.0)
     scene = scene_of(replace(given, maintenance=(pause,)))
     change = BY_SLUG["rest_recovery"].change(scene, 0.01, (100.0, BY_CLOCK, math.log(600.0), 0.0, WHOLE))
     here = scene.points.cycles == 3000.0

@@ -57,8 +57,8 @@ def warm() -> Study:
 
 
 def advised(given: Study, *fits: Fit, nearby: tuple[Fit, ...] = ()) -> tuple[Advice, ...]:
-    credible = [Fitted(slugs=(), fit=fit, evidence=0.0, probability=0.5) for fit in fits]
-    behind = [Fitted(slugs=(), fit=fit, evidence=-5.0, probability=0.1) for fit in nearby]
+    credible = [Fitted(slugs=(), fit=fit, evidence=0.0) for fit in fits]
+    behind = [Fitted(slugs=(), fit=fit, evidence=-5.0) for fit in nearby]
     return advise(given.campaign, given.problem, credible, behind)
 
 
@@ -147,7 +147,7 @@ def test_no_candidate_no_advice(warm):
 
 @pytest.mark.parametrize("key", TRIALS)
 def test_every_trial_adds_runs_that_can_be_analysed(key, swung):
-    energetic = replace(swung.campaign, duty=(DutyRun(run_id="duty", cycles=4000.0, engagements=4000.0, energy=8e3),))
+    energetic = replace(swung.campaign, duty=(DutyRun(cycles=4000.0, engagements=4000.0, energy=8e3),))
     then = with_trial(energetic, key)
     added = build_design(replace(then, stationary=then.stationary[3:], dynamic=then.dynamic[3:]))
     assert added.torque.size > 50

@@ -65,11 +65,10 @@ def test_each_kind_of_run_arrives_in_si_units_and_nothing_is_written(client: Tes
     assert (plateaus.pressure[0], plateaus.speed[0]) == (pytest.approx(4e5), pytest.approx(20 * np.pi / 30))
     assert found.dynamic[0].record.speed.max() == pytest.approx(2000 * np.pi / 30, rel=1e-3)
     block = found.duty[0]
-    assert (block.engagements, block.energy, block.maximum_pressure) == (500, 18000.0, pytest.approx(8e5))
-    assert block.initial_speed == pytest.approx(2000 * np.pi / 30)
+    assert (block.engagements, block.energy) == (500, 18000.0)
     assert [(each.cycles, each.event) for each in found.maintenance] == [(500.0, EventKind.OIL_CHANGE)]
     assert (found.oil.viscosity_40, found.oil.viscosity_100) == (pytest.approx(56e-6), pytest.approx(9.3e-6))
-    assert (found.geometry.mean_radius, found.cof_fraction) == (pytest.approx(0.058), 0.5)
+    assert found.geometry.mean_radius == pytest.approx(0.058)
 
 
 def test_readings_without_pressure_are_evidence_and_no_curve(client: TestClient, database_url: str) -> None:
