@@ -48,8 +48,8 @@ def diagnose(
     posterior = posterior_of(baseline, raw, without)
     problem = posterior.problem
     judgement = judge(posterior)
-    validation = validate(problem, posterior.null.fit, judgement, of_gain)
+    extended, gain = validate(problem, posterior.null.fit, judgement, of_gain)
     sizes = sizes_of(problem, judgement, of_sizes)
     advice = advise(campaign, problem, *rivals_of(judgement))
-    report = report_of(baseline, posterior, judgement, raw, validation, sizes, advice)
+    report = report_of(baseline, posterior, judgement, raw, extended, gain, sizes, advice)
     return replace(report, isolability=isolability_of(campaign, posterior)) if isolability else report

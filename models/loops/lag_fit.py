@@ -164,11 +164,16 @@ _MOVED = 0.01
 
 
 class LagStatus(StrEnum):
-    """DETERMINED; UNRESOLVED: no lag that noise would not make; AGAINST_THE_LAW: torque lags as the law cannot."""
+    """DETERMINED; UNRESOLVED: no lag that noise would not make; AGAINST_THE_LAW: torque lags as the law cannot. Of a loop
+    that no law was fitted to: NO_CURVE: no stationary curve at this pressure; REVERSES: the speed changes sign, which the
+    laws do not describe; NO_PERIOD: no whole period."""
 
     DETERMINED = "determined"
     UNRESOLVED = "unresolved"
     AGAINST_THE_LAW = "against_the_law"
+    NO_CURVE = "no_curve"
+    REVERSES = "reverses"
+    NO_PERIOD = "no_period"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,6 @@ Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, sections 2.3.4 a
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
@@ -18,23 +17,11 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.stribeck import torque as stationary_torque
 from models.loops.criteria import FEWEST_SAMPLES
-from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, StationaryCurve, fit_lag
+from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
 from models.loops.loop_area import Area, Direction, Samples, area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
 from models.records.pressure_levels import level_width, levels_of, pressure_stretches
 from models.records.runs import Record
-
-
-class LoopStatus(StrEnum):
-    """DETERMINED, UNRESOLVED, AGAINST_THE_LAW are the attractor's; NO_CURVE: no stationary curve at this pressure;
-    REVERSES: the speed changes sign, which the laws do not describe; NO_PERIOD: no whole period."""
-
-    DETERMINED = "determined"
-    UNRESOLVED = "unresolved"
-    AGAINST_THE_LAW = "against_the_law"
-    NO_CURVE = "no_curve"
-    REVERSES = "reverses"
-    NO_PERIOD = "no_period"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +44,7 @@ class Loop:
     film_time: float | None = None
     film_time_sd: float | None = None
     better_law: str | None = None
-    status: LoopStatus
+    status: LagStatus
     message: str
 
 
@@ -103,7 +90,7 @@ def _loop(
     if isinstance(cycle, str) or samples is None or samples.phase.size < FEWEST_SAMPLES:
         return Loop(
             pressure=level,
-            status=LoopStatus.NO_PERIOD,
+            status=LagStatus.NO_PERIOD,
             message=cycle if isinstance(cycle, str) else "Too few samples lie in whole periods.",
         )
     area = area_of(cycle, samples)
@@ -129,18 +116,18 @@ def _loop(
 
 def _lags(
     cycle: Cycle, samples: Samples, curve: StationaryCurve | None
-) -> tuple[LoopStatus, tuple[LagFit, LagFit] | None]:
-    """The fits of both laws of lag to a loop, or why there are none. With fits, the status is that of the attractor's."""
+) -> tuple[LagStatus, tuple[LagFit, LagFit] | None]:
+    """The fits of both laws of lag to a loop, or why there are none. With fits, the status is the attractor's."""
     speed_over_a_swing = cycle.value(np.linspace(0.0, 2 * np.pi, 361))
     # where the stationary curve falls below 1 % of the loop's largest torque, lag has no meaning
     least = 0.01 * float(np.abs(samples.torque).max())
     if curve is None or stationary_torque(np.maximum(speed_over_a_swing, 0.0), curve.parameters).min() < least:
-        return LoopStatus.NO_CURVE, None
+        return LagStatus.NO_CURVE, None
     if float(speed_over_a_swing.min()) < -0.02 * cycle.amplitude:  # of the swing
-        return LoopStatus.REVERSES, None
+        return LagStatus.REVERSES, None
     attractor = fit_lag(ATTRACTOR, cycle, samples.phase, samples.torque, curve)
     film = fit_lag(SQUEEZE_FILM, cycle, samples.phase, samples.torque, curve)
-    return LoopStatus(attractor.status.value), (attractor, film)
+    return attractor.status, (attractor, film)
 
 
 def _better(attractor: LagFit, film: LagFit, telling: float = 5.0) -> str | None:
@@ -151,15 +138,15 @@ def _better(attractor: LagFit, film: LagFit, telling: float = 5.0) -> str | None
     return ATTRACTOR.name if lead > 0 else SQUEEZE_FILM.name
 
 
-def _message(status: LoopStatus, area: Area, better: str | None) -> str:
+def _message(status: LagStatus, area: Area, better: str | None) -> str:
     """A sentence or two for a person."""
     sentence = {
-        LoopStatus.DETERMINED: "The attractor is determined.",
-        LoopStatus.UNRESOLVED: "The lag is too small for this noise: the attractor C has only a lower bound.",
-        LoopStatus.AGAINST_THE_LAW: "The loop turns against the attractor law: is a channel delayed?",
-        LoopStatus.NO_CURVE: "No lag was fitted: there is no stationary test with such torques at this pressure.",
-        LoopStatus.REVERSES: "No lag was fitted, because the speed changes sign.",
-        LoopStatus.NO_PERIOD: "",
+        LagStatus.DETERMINED: "The attractor is determined.",
+        LagStatus.UNRESOLVED: "The lag is too small for this noise: the attractor C has only a lower bound.",
+        LagStatus.AGAINST_THE_LAW: "The loop turns against the attractor law: is a channel delayed?",
+        LagStatus.NO_CURVE: "No lag was fitted: there is no stationary test with such torques at this pressure.",
+        LagStatus.REVERSES: "No lag was fitted, because the speed changes sign.",
+        LagStatus.NO_PERIOD: "",
     }[status]
     parts = [sentence]
     if better is not None:

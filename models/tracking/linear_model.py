@@ -40,17 +40,6 @@ class Sums:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Conditional:
-    """The normal posterior of (ξ0, Δ) given φ, ε, s and q: means, variances and covariance, equal shapes."""
-
-    initial: FloatArray
-    change: FloatArray
-    initial_variance: FloatArray
-    change_variance: FloatArray
-    covariance: FloatArray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
     """Where the closed form is taken: log |φ|, log |ε|, log s, the form (`courses`) [n]; which runs are outlying [t, n]."""
 
@@ -110,20 +99,18 @@ def evidence(sums: Sums, prior: Prior) -> FloatArray:
     return pull
 
 
-def conditional(sums: Sums, prior: Prior) -> Conditional:
-    """The posterior of (ξ0, Δ) given φ, ε, s and q."""
+def drawn_pair(sums: Sums, prior: Prior, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Draws of (ξ0, Δ) given φ, ε, s and q, each [n], from standard normals [n, 2]."""
     pivot, pull = _eliminate(sums, prior)
     a00 = sums.r + prior.initial_sd**-2
     change_variance = 1.0 / pivot
     slope = sums.rb / a00
     change = pull * change_variance
-    return Conditional(
-        initial=prior.initial_mean + sums.ry / a00 - slope * change,
-        change=change,
-        initial_variance=1.0 / a00 + slope**2 * change_variance,
-        change_variance=change_variance,
-        covariance=-slope * change_variance,
-    )
+    initial = prior.initial_mean + sums.ry / a00 - slope * change
+    initial_sd = np.sqrt(np.maximum(1.0 / a00 + slope**2 * change_variance, 1e-300))
+    lean = -slope * change_variance / initial_sd
+    remaining_sd = np.sqrt(np.maximum(change_variance - lean**2, 0.0))
+    return initial + initial_sd * normals[:, 0], change + (lean * normals[:, 0] + remaining_sd * normals[:, 1])
 
 
 def _eliminate(sums: Sums, prior: Prior) -> tuple[FloatArray, FloatArray]:

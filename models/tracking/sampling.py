@@ -15,7 +15,7 @@ from models.arrays import FloatArray
 from models.tracking.courses import FORM_PROPORTIONAL, UNIT_OF_CHANGE, coefficients_at
 from models.tracking.discrepancy import PAST, drawn
 from models.tracking.history import History
-from models.tracking.linear_model import Points, Sums, Terms, conditional, drawn_terms
+from models.tracking.linear_model import Points, Sums, Terms, drawn_pair, drawn_terms
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 
@@ -76,16 +76,6 @@ def spread_normals(size: int, offset: FloatArray) -> FloatArray:
     return np.asarray(ndtri(spread_points(size, offset)), dtype=np.float64)
 
 
-def correlated_pair(
-    normals: FloatArray, first_variance: FloatArray, second_variance: FloatArray, covariance: FloatArray
-) -> FloatArray:
-    """Standard normals [n, 2] made to have the variances and covariance [n] of each row; [n, 2]."""
-    first = np.sqrt(np.maximum(first_variance, 1e-300))
-    lean = covariance / first
-    remaining_sd = np.sqrt(np.maximum(second_variance - lean**2, 0.0))
-    return np.stack([first * normals[:, 0], lean * normals[:, 0] + remaining_sd * normals[:, 1]], axis=1)
-
-
 def with_linear_terms(
     history: History,
     prior: Prior,
@@ -98,9 +88,7 @@ def with_linear_terms(
     """Points of weights [n] that sum to one, with what is linear drawn given each: ξ0 and Δ by standard normals [n, 2], the
     discrepancy and the steps by `rng`. `solved` is `linear_model.pointwise` of the points."""
     sums, terms = solved
-    conditioned = conditional(sums, prior)
-    pair = correlated_pair(normals, conditioned.initial_variance, conditioned.change_variance, conditioned.covariance)
-    initial, change = conditioned.initial + pair[:, 0], conditioned.change + pair[:, 1]
+    initial, change = drawn_pair(sums, prior, normals)
     further = rng.standard_normal((weight.size, PAST + history.steps.size))
     further = drawn_terms(terms, initial - prior.initial_mean, change, further)
     scale, exponent = coefficients_at(points.log_scale, points.log_exponent, points.course)

@@ -99,15 +99,11 @@ class Prediction:
     def change_at_rows(self, design: Design, change: FloatArray, *, before_lag: bool) -> FloatArray:
         """A change [P] or [P, m] Nm at the points -> [N] or [N, m] at the rows; what changes the stationary curve goes
         through the loops' lag first."""
-        return design.to_rows(self._lagged(design, change) if before_lag else change)
-
-    def _lagged(self, design: Design, change: FloatArray) -> FloatArray:
-        if self.lag is None:
-            return change
-        out = change.copy()
-        loops = out[design.plateaus :].reshape(design.loops, PHASES, -1)
-        loops[:] = self.lag.follow(loops)
-        return out
+        if before_lag and self.lag is not None:
+            change = change.copy()
+            loops = change[design.plateaus :].reshape(design.loops, PHASES, -1)
+            loops[:] = self.lag.follow(loops)
+        return design.to_rows(change)
 
     def jacobian(self, design: Design, of_effects: FloatArray | None = None) -> FloatArray:
         """∂torque/∂θ [N, θ.size]. `of_effects` [N, 5]: how effects beside the baseline change with the four parameters and

@@ -95,9 +95,9 @@ class Effect:
 
     slug: str  # public, as the title is
     title: str
-    physics: str  # a sentence
-    formula: str  # the change of torque
-    source: str
+    physics: str = ""  # a sentence; none for what is never named, as the next two
+    formula: str = ""  # the change of torque
+    source: str = ""
     kind: Kind
     channels: tuple[str, ...] = ()  # what must have been measured or sent for it to be judged (public names)
     amplitude: str  # its name

@@ -50,6 +50,7 @@ def _gains_with_life(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _gain_with_life(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    """a S from a cycle on, or a S (ζ/ζ_last)^q [P] Nm."""
     course, value = shape
     share = np.where(scene.points.cycles > value, 1.0, 0.0) if course == _STEP else life_of(scene) ** value
     return np.asarray(amplitude * share * scene.curve, dtype=np.float64)
@@ -60,6 +61,7 @@ def _gains_with_clock(_: Facts) -> tuple[Tried, ...]:
 
 
 def _gain_with_clock(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    """a S t/30 min, or a S (1 - e^{-t/τ}) [P] Nm."""
     time, in_loops = shape
     clock = np.maximum(scene.points.clock, 0.0)
     share = -np.expm1(-clock / time) if time > 0 else clock / 1800.0
@@ -86,7 +88,6 @@ def _factor(amplitude: float) -> float:
 def _fault(
     slug: str,
     title: str,
-    formula: str,
     axis: str,
     change: Callable[[Scene, float, Shape], FloatArray],
     grid: Callable[[Facts], tuple[Tried, ...]] = lambda _: (Tried(shape=()),),
@@ -98,9 +99,6 @@ def _fault(
     return Effect(
         slug=slug,
         title=title,
-        physics=title,
-        formula=formula,
-        source="faults of rigs",
         kind=Kind.ARTEFACT,
         amplitude="size",
         unit="-",
@@ -114,9 +112,9 @@ def _fault(
     )
 
 
-def _step(slug: str, title: str, formula: str, change: Callable[[Scene, float, Shape], FloatArray]) -> Effect:
+def _step(slug: str, title: str, change: Callable[[Scene, float, Shape], FloatArray]) -> Effect:
     """A fault from a cycle on, and not from the start: the baseline has absorbed it there."""
-    fault = begins(_fault(slug, title, f"{formula} from a cycle on", CYCLES, change, before_lag=True))
+    fault = begins(_fault(slug, title, CYCLES, change, before_lag=True))
 
     def grid(facts: Facts) -> tuple[Tried, ...]:
         return tuple(Tried(shape=(onset,)) for _, onset, _ in facts.onsets) if facts.states.size > 2 else ()
@@ -129,7 +127,6 @@ FAULTS: tuple[Effect, ...] = (
         _fault(
             "gain_with_clock",
             "a gain of the torque that drifts while a test lasts, as a sensor's does that warms up",
-            "a S t/30 min, or a S (1 - e^{-t/τ})",
             CLOCK,
             _gain_with_clock,
             _gains_with_clock,
@@ -139,7 +136,6 @@ FAULTS: tuple[Effect, ...] = (
     _fault(
         "gain_with_life",
         "a gain of the torque that steps or creeps over the life, as after another calibration",
-        "a S from a cycle on, or a S (ζ/ζ_last)^q",
         CYCLES,
         _gain_with_life,
         _gains_with_life,
@@ -148,26 +144,16 @@ FAULTS: tuple[Effect, ...] = (
     _step(
         "speed_scale_step",
         "another scale of the speed from a cycle on, as of another encoder or belt",
-        "S((1 + a) v) - S(v)",
         lambda scene, a, _: scene.curve_at(velocity=scene.points.velocity * _factor(a)) - scene.curve,
     ),
+    _step("static_torque_step", "a static torque that steps at a cycle", _parameter_scaled("static_torque")),
     _step(
-        "static_torque_step",
-        "a static torque that steps at a cycle",
-        "S with (1 + a) M_s",
-        _parameter_scaled("static_torque"),
-    ),
-    _step(
-        "stribeck_velocity_step",
-        "a Stribeck velocity that steps at a cycle",
-        "S with (1 + a) V_S",
-        _parameter_scaled("stribeck_velocity"),
+        "stribeck_velocity_step", "a Stribeck velocity that steps at a cycle", _parameter_scaled("stribeck_velocity")
     ),
     begins(
         _fault(
             "gauge_hysteresis",
             "a pressure that depends on whether it was last raised or lowered",
-            "± a p ∂S/∂p",
             PRESSURE,
             lambda scene, a, _: (
                 a * direction_if_both(scene, scene.points.pressure) * scene.points.pressure * scene.by_pressure
@@ -178,7 +164,6 @@ FAULTS: tuple[Effect, ...] = (
         _fault(
             "speed_hysteresis",
             "a torque that depends on whether the speed was last raised or lowered",
-            "± a S",
             SPEED,
             lambda scene, a, _: a * direction_if_both(scene, scene.points.velocity) * scene.curve,
         )

@@ -21,8 +21,8 @@ from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
 
-#: Samples a period of a dynamic test.
-_SAMPLES = 200
+#: Frequency [Hz] of a dynamic test, and its samples a period.
+_FREQUENCY, _SAMPLES = 0.3, 200
 #: Light pressures of loops, as multiples: far enough apart to be distinguished.
 LIGHT = (1.0, 1.5, 2.0)
 #: Sweeps over the speeds in a run with the clutch open: there is one pressure only, none.
@@ -37,7 +37,6 @@ class Trial:
 
     text: str  # for the engineer, empty where it is only made as a part of others
     loops: bool = False  # a dynamic test, else a stationary one
-    frequency: float = 0.3  # [Hz] of a dynamic test
     temperature: float | None = None  # of the oil [K], None: as usual
     falling: bool = False  # the speeds of a stationary test
     # times the usual pressures [-] (of loops at LIGHT times that of the lowest one, where it is not 1; 0: the clutch is
@@ -215,7 +214,7 @@ def _loops(pattern: DynamicRun, trial: Trial, cycles: float) -> DynamicRun:
     if trial.pressure != 1.0:
         levels = trial.pressure * float(levels[0]) * np.array(LIGHT if trial.pressure > 0.0 else LIGHT[:1])
     count = _SAMPLES * 10 + 1
-    step = 1.0 / (trial.frequency * _SAMPLES)
+    step = 1.0 / (_FREQUENCY * _SAMPLES)
     phase = 2 * np.pi * np.arange(count) / _SAMPLES
     slowest, fastest = np.quantile(record.speed, (0.01, 0.99))  # spikes are no speeds
     speed = np.tile(slowest + (fastest - slowest) * (1 - np.cos(phase)) / 2, levels.size)
@@ -293,8 +292,8 @@ def steps_of(campaign: Campaign, key: str) -> tuple[Step, ...]:
                 kind="dynamic_stribeck",
                 pressures=pressures,
                 speeds=(float(record.speed.min()), float(record.speed.max())),
-                frequency=trial.frequency,
-                periods=round(seconds * trial.frequency / len(pressures)),
+                frequency=_FREQUENCY,
+                periods=round(seconds * _FREQUENCY / len(pressures)),
                 temperature=trial.temperature,
                 cycles=swing.cycles,
                 minutes=seconds / 60.0 + settling,

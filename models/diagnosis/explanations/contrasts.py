@@ -6,9 +6,7 @@ as v^γ (eq. 2), because most of a curve's shape lies within its lowest tenth. T
 the torque, bumps and kinks in speed, waves over a loop's phase, and single states. Axes: `design.design`.
 """
 
-from collections.abc import Callable
 from itertools import product
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +15,6 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.prediction import Prediction
 from models.diagnosis.design.design import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE, Design
 from models.friction.stribeck import GAMMA
-
-#: Takes the axis and a column [N] relative to the torque.
-Add: TypeAlias = Callable[[str, FloatArray], None]
 
 #: Waves of a nonlinear sensor over its range; ripples over speed (an encoder's, a mount's).
 TORQUE_WAVES, SPEED_WAVES = 20, range(4, 17)
@@ -31,7 +26,7 @@ def contrasts_of(design: Design, prediction: Prediction) -> tuple[FloatArray, li
     """Every contrast that the design can show: columns [N, m] Nm at the rows, and the axis [m] on which each lives."""
     rows = design.rows
     torque = rows.engaged * np.abs(prediction.torque)  # with the clutch open there is no friction to be wrong
-    steady, looping = rows.steady.astype(np.float64), 1.0 - rows.steady
+    steady = rows.steady.astype(np.float64)
     speed, pressure = _unit(rows.velocity, design.closed), _unit(rows.pressure, design.closed)
     life = _rank(rows.cycles)
     states, levels = design.facts.states.size, design.levels.size
@@ -65,8 +60,24 @@ def contrasts_of(design: Design, prediction: Prediction) -> tuple[FloatArray, li
         add(CLOCK, _cosine(t, clock) * steady)
         if states > 1:
             add(CLOCK, _cosine(t, clock) * steady * _cosine(1, life))
-    if design.loops:
-        _add_loops(design, add, np.asarray(looping, dtype=np.float64), lives, presses)
+    looping = np.where(rows.steady, 0.0, 1.0)
+    for h in range(1, 7):
+        for wave in (np.cos(h * rows.phase), np.sin(h * rows.phase)):
+            add(PHASE, wave * looping)
+            if h > 4:
+                continue
+            for p in range(1, presses + 1):
+                add(PHASE, wave * looping * _cosine(p, pressure))
+            for z in range(1, min(lives, 2) + 1):
+                add(PHASE, wave * looping * _cosine(z, life))
+    add(PHASE, looping)
+    rising = np.sign(rows.acceleration) * looping
+    for s in range(4):
+        add(PHASE, rising * _cosine(s, speed))
+    for way in (1.0, -1.0):
+        one_way = looping * (way * rows.acceleration > 0)
+        for centre, width in product(np.linspace(0.06, 0.94, 11), (0.06, 0.12)):
+            add(PHASE, _bump(speed, centre, width) * one_way)
     if np.isfinite(rows.temperature).any():
         warm = np.where(np.isfinite(rows.temperature), rows.temperature - design.facts.reference_temperature, 0.0) / 3.0
         for s in range(4):
@@ -108,29 +119,6 @@ def _axis(s: int, p: int, z: int) -> str:
         return SPEED
     least = 2 if s == 0 and z > 0 else 1
     return PRESSURE if p >= least else CYCLES
-
-
-def _add_loops(design: Design, add: Add, looping: FloatArray, lives: int, presses: int) -> None:
-    rows = design.rows
-    life, pressure = _rank(rows.cycles), _unit(rows.pressure, design.closed)
-    speed = _unit(rows.velocity, design.closed)
-    for h in range(1, 7):
-        for wave in (np.cos(h * rows.phase), np.sin(h * rows.phase)):
-            add(PHASE, wave * looping)
-            if h > 4:
-                continue
-            for p in range(1, presses + 1):
-                add(PHASE, wave * looping * _cosine(p, pressure))
-            for z in range(1, min(lives, 2) + 1):
-                add(PHASE, wave * looping * _cosine(z, life))
-    add(PHASE, looping)
-    rising = np.sign(rows.acceleration) * looping
-    for s in range(4):
-        add(PHASE, rising * _cosine(s, speed))
-    for way in (1.0, -1.0):
-        one_way = looping * (way * rows.acceleration > 0)
-        for centre, width in product(np.linspace(0.06, 0.94, 11), (0.06, 0.12)):
-            add(PHASE, _bump(speed, centre, width) * one_way)
 
 
 def _bump(unit: FloatArray, centre: float, width: float) -> FloatArray:

@@ -128,7 +128,8 @@ def project(gram: Gram, run_gain: float, curve_gain: float) -> Projected:
     base = gram.base
     corner = full[:base, :base]
     scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
-    factor = _factor(corner * scale[:, None] * scale)
+    # a correlation matrix may be singular to rounding: where it is none more would change determinants unseen
+    factor = np.linalg.cholesky(corner * scale[:, None] * scale + 1e-11 * np.eye(base))
     half = np.linalg.solve(factor, full[:base, base:] * scale[:, None])
     left = full[base:, base:] - half.T @ half
     fitted = float(np.log(np.diag(factor)).sum() - np.log(scale).sum())
@@ -152,12 +153,6 @@ def log_gain_prior(run_gain: float) -> float:
     """ln p_0 of ln σ_g [nats], up to a constant, for the runs' scatter σ_g > 0."""
     off = float(np.log(run_gain / criteria.USUAL_GAIN))
     return -0.5 * (off / (criteria.GAIN_SD_BELOW if off < 0 else criteria.GAIN_SD_ABOVE)) ** 2
-
-
-def _factor(correlation: FloatArray) -> FloatArray:
-    """The Cholesky factor of a correlation matrix that may be singular to rounding. Raises LinAlgError where it is no such
-    matrix: more than that added to its diagonal would change determinants unseen."""
-    return np.asarray(np.linalg.cholesky(correlation + 1e-11 * np.eye(correlation.shape[0])))
 
 
 def amplitude_deviations(problem: FitProblem, fitted: Fit) -> list[float]:

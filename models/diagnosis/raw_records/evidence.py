@@ -122,11 +122,8 @@ def _line_evidence(effect: str, line: Line, name: str, note: str) -> RawEvidence
 def _unsettled(dwells: list[tuple[Record, PlateauCut]]) -> list[RawEvidence]:
     """Dwells that ended before torque had settled, by the evidence of all their transients together: one that looks late
     without it adds nothing."""
-    settling = settling_evidence(dwells)
-    if settling.evidence <= LEAST_EVIDENCE:
+    evidence, constant = settling_evidence(dwells)
+    if evidence <= LEAST_EVIDENCE:
         return []
-    seconds = f"{settling.time_constant:.2g} s"
-    note = f"after each step torque settles from the side of the last level, with a time constant of {seconds}"
-    constant, deviation = settling.time_constant, settling.deviation
-    estimate = Estimate(name="settling time constant", value=constant, sd=deviation, unit="s", one_sided=True)
-    return [RawEvidence(effect=UNSETTLED_DWELL.slug, log_evidence=settling.evidence, estimate=estimate, note=note)]
+    note = f"after each step torque settles from the side of the last level, with a time constant of {constant.value:.2g} s"
+    return [RawEvidence(effect=UNSETTLED_DWELL.slug, log_evidence=evidence, estimate=constant, note=note)]

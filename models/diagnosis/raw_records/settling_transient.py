@@ -10,12 +10,12 @@ a ~ N(0, S²) positive, evidence is
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
 
 from models.arrays import FloatArray
+from models.diagnosis.effects.fitted_effect import Estimate
 from models.gaussian_evidence import log_gain_alone, log_positive
 from models.records.plateaus import PlateauCut
 from models.records.runs import Record
@@ -26,17 +26,8 @@ _FAST_TIMES, _SLOW_TIMES = (0.1, 0.25), (0.8, 1.3, 2.0, 3.2, 5.0)
 _USUAL_SHARE = 0.2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SettlingEvidence:
-    """Evidence [nats] of slow settling transients over none, their time constant τ [s] and its deviation [s]."""
-
-    evidence: float
-    time_constant: float
-    deviation: float
-
-
-def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> SettlingEvidence:
-    """Of all dwells together."""
+def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> tuple[float, Estimate]:
+    """Evidence [nats] of slow settling transients over none, by all dwells together, and their time constant τ [s]."""
     times = np.array([*_FAST_TIMES, *_SLOW_TIMES])
     gram, along = np.zeros((times.size, times.size)), np.zeros(times.size)
     for record, cut in dwells:
@@ -63,10 +54,12 @@ def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> SettlingEv
     weights, log_times = np.exp(logs - logsumexp(logs)), np.log(_SLOW_TIMES)
     middle = float(weights @ log_times)
     within = np.ptp(log_times) / (log_times.size - 1) / np.sqrt(12)  # the grid cannot tell τ closer than its spacing
-    return SettlingEvidence(
-        evidence=float(logsumexp(logs) - np.log(len(_SLOW_TIMES))),
-        time_constant=float(np.exp(middle)),
-        deviation=float(np.exp(middle) * np.sqrt(weights @ (log_times - middle) ** 2 + within**2)),
+    return float(logsumexp(logs) - np.log(len(_SLOW_TIMES))), Estimate(
+        name="settling time constant",
+        value=float(np.exp(middle)),
+        sd=float(np.exp(middle) * np.sqrt(weights @ (log_times - middle) ** 2 + within**2)),
+        unit="s",
+        one_sided=True,
     )
 
 

@@ -20,7 +20,7 @@ from models.diagnosis.explanations.sizes import Size, Sizes
 from models.diagnosis.explanations.verdict import NOTHING, Explanation, Judgement, Verdict
 from models.diagnosis.extension import build_extension
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
-from models.diagnosis.pooled_fit.gauss_newton import FitStatus
+from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import RunScatter, amplitude_deviations, run_scatter
 from models.diagnosis.raw_records.evidence import RawEvidence
@@ -28,7 +28,6 @@ from models.diagnosis.report.isolability import unseen_of, visible_of
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.report import Candidate, Report, misfit_of
 from models.diagnosis.report.summary import effect_name, listed, number, summarise
-from models.diagnosis.validation.extended_model import Validation
 from models.diagnosis.validation.held_out import Gain
 
 
@@ -144,22 +143,22 @@ def report_of(
     posterior: Posterior,
     judgement: Judgement,
     raw: Sequence[RawEvidence],
-    validation: Validation,
+    extended: Fit | None,
+    gain: Gain | None,
     sizes: Sizes,
     advice: tuple[Advice, ...],
 ) -> Report:
     """Candidates, misfits, gain, advice, maps, loops, extension, summary."""
     problem, fitted = posterior.problem, posterior.null.fit
-    reason = reason_against(validation.gain, sizes)
+    reason = reason_against(gain, sizes)
     notes = _notes(baseline, posterior, judgement, raw)
     scatter = run_scatter(posterior.null.evidence.screened)
     candidates = candidates_of(problem, judgement, raw, sizes.by_slug)
-    extended = validation.extended
     visible = visible_of(posterior)
     extension = None
     if not reason and any(draw.effects for draw in sizes.draws):
         # effects of use are followed beyond the data only where they help to predict the last states from the first ones
-        follow = validation.gain is not None and validation.gain.forecast_log_score_gain > 0
+        follow = gain is not None and gain.forecast_log_score_gain > 0
         design = problem.design
         extension = build_extension(sizes.draws, design.facts, ranges_of(design.rows), courses=follow)
     report = Report(
@@ -170,7 +169,7 @@ def report_of(
         baseline=misfit_of(problem, fitted, judgement.where),
         extended=None if extended is None else misfit_of(problem, extended, judgement.left),
         extended_effects=() if extended is None else tuple(effect.effect.slug for effect in extended.effects),
-        gain=validation.gain,
+        gain=gain,
         advice=advice,
         visible=visible,
         unseen=unseen_of(posterior, visible, raw),

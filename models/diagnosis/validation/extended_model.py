@@ -10,7 +10,7 @@ is kept, and nothing of it is followed into the future of a life.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import product
 
@@ -92,9 +92,6 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
     return Effect(
         slug=SLUG,
         title="Structure without a name",
-        physics="",
-        formula="S(v; p, ζ) a cos(π k x)",
-        source="this module",
         kind=Kind.LAG,
         amplitude="share of the torque",
         unit="-",
@@ -114,18 +111,12 @@ def _size(problem: FitProblem, baseline: Fit, effects: Sequence[Effect]) -> floa
     return max(criteria.CORRECTION_SIZES, key=lambda size: log_gain(projected.info, projected.score, size * unit))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Validation:
-    """The extended model (None where there is nothing to extend by) and its gain (None where nothing can be held out)."""
-
-    extended: Fit | None
-    gain: Gain | None
-
-
-def validate(problem: FitProblem, baseline: Fit, judgement: Judgement, rng: np.random.Generator) -> Validation:
-    """Extend the baseline by the likeliest causes, or by a smooth correction on the axes of unexplained structure."""
+def validate(
+    problem: FitProblem, baseline: Fit, judgement: Judgement, rng: np.random.Generator
+) -> tuple[Fit | None, Gain | None]:
+    """The baseline extended by the likeliest causes, or by a smooth correction on the axes of unexplained structure (None
+    where there is nothing to extend by), and its gain (None where nothing can be held out)."""
     extended = judgement.stand[0].fit if judgement.stand else None
     if judgement.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         extended = smooth_fit(problem, baseline, [axis.axis for axis in judgement.where if axis.axis in AXES])
-    gain = None if extended is None else measure_gain(problem, baseline, extended, rng)
-    return Validation(extended=extended, gain=gain)
+    return extended, None if extended is None else measure_gain(problem, baseline, extended, rng)

@@ -111,31 +111,16 @@ class UkfState:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Way:
-    """From one run to the next: the `reference` progress of the coordinates, the largest progress `before` and `after`,
-    how far the level's `steps` may go [e], and the new run's progress, value, variance and `relative` size squared."""
-
-    reference: float
-    before: float
-    after: float
-    steps: FloatArray
-    progress: float
-    value: float
-    variance: float
-    relative: float
-
-
-def stepped(state: UkfState, way: Way, forget: float = 0.3) -> UkfState:
-    """The filters advanced to the next run. Squared innovations are those of a sound and of an outlying run, mixed like the
-    step; their running mean forgets at the rate `forget`."""
+def stepped(state: UkfState, history: History, forget: float = 0.3) -> UkfState:
+    """The filters advanced to the last run of a history. Squared innovations are those of a sound and of an outlying run,
+    mixed like the step; their running mean forgets at the rate `forget`."""
     prior, unit = state.prior, state.prior.initial_sd
-    mean, covariance = predicted(state, way)
-    growth = np.where(FORM_PROPORTIONAL[state.kinds], way.relative, 1.0)
+    mean, covariance = predicted(state, history)
+    growth = np.where(FORM_PROPORTIONAL[state.kinds], prior.relative_squared(history.value[-1]), 1.0)
     scatter = state.scatter[:, 0] * growth
-    expected, variance, across = measured(prior, state.kinds, mean, covariance, way)
-    variance = variance + (way.variance + scatter) / unit**2
-    off = way.value / unit - expected
+    expected, variance, across = measured(state, mean, covariance, float(history.progress[-1]))
+    variance = variance + (history.variance[-1] + scatter) / unit**2
+    off = history.value[-1] / unit - expected
     shares = np.array([1.0 - prior.outlying_share, prior.outlying_share])
     variances = variance[:, None] + np.array([0.0, (prior.outlying_size * prior.size / unit) ** 2])
     squared = off[:, None] ** 2 / variances
@@ -152,6 +137,7 @@ def stepped(state: UkfState, way: Way, forget: float = 0.3) -> UkfState:
     squared_innovation = float(normalised(log_weight) @ np.minimum((share * squared).sum(axis=1), OUTLIER**2))
     return replace(
         state,
+        history=history,
         squared_innovation=(1.0 - forget) * state.squared_innovation + forget * squared_innovation,
         log_weight=log_weight - log_weight.max(),
         mean=np.clip(mean + middle, -DOMAIN, DOMAIN),
@@ -160,32 +146,38 @@ def stepped(state: UkfState, way: Way, forget: float = 0.3) -> UkfState:
     )
 
 
-def predicted(state: UkfState, way: Way) -> tuple[FloatArray, FloatArray]:
-    """Means and covariances led on to the next run; of the level's steps those that have none yet are as the prior has
-    them."""
-    prior, (count, before), dimension = state.prior, state.mean.shape, BEFORE_STEPS + way.steps.size
+def predicted(state: UkfState, history: History) -> tuple[FloatArray, FloatArray]:
+    """Means and covariances led on to the last run of a history; of the level's steps those that have none yet are as the
+    prior has them, and the process noise of δ and its slope goes with the size q of each filter."""
+    prior, (count, before), steps = state.prior, state.mean.shape, history.step_sizes(state.prior)
+    dimension = BEFORE_STEPS + steps.size
     mean, covariance = np.zeros((count, dimension)), np.zeros((count, dimension, dimension))
     mean[:, :before], covariance[:, :before, :before] = state.mean, state.covariance
     new = np.arange(before, dimension)
-    covariance[:, new, new] = (way.steps[new - BEFORE_STEPS] * prior.size / prior.initial_sd) ** 2
-    gap = (way.after - way.before) / way.reference
+    covariance[:, new, new] = (steps[new - BEFORE_STEPS] * prior.size / prior.initial_sd) ** 2
+    gap = (history.span - state.history.span) / state.reference
     mean[:, 4] += gap * mean[:, 5]
     covariance[:, 4] += gap * covariance[:, 5]
     covariance[:, :, 4] += gap * covariance[:, :, 5]
-    return mean, covariance + process(prior, FORM_SIZE[state.kinds], way)
+    density = (
+        3.0 * (FORM_SIZE[state.kinds] * prior.size / prior.initial_sd) ** 2 * (state.reference / history.span) ** 3
+    )
+    noise = np.tile(1e-9 * np.eye(dimension), (count, 1, 1))
+    noise[:, 4:6, 4:6] += density[:, None, None] * np.array([[gap**3 / 3.0, gap**2 / 2.0], [gap**2 / 2.0, gap]])
+    return mean, covariance + noise
 
 
 def measured(
-    prior: Prior, form: NDArray[np.intp], mean: FloatArray, covariance: FloatArray, way: Way
+    state: UkfState, mean: FloatArray, covariance: FloatArray, progress: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Of what a run would measure without noise, in the prior's unit: mean [k], variance [k], covariance with the state
-    [k, d]; by the sigma points."""
-    dimension = mean.shape[1]
-    points, weight = _standard_points(dimension)
+    """Of what a run at a progress would measure without noise, in the prior's unit: mean [k], variance [k], covariance with
+    the state [k, d]; by the sigma points of mean [k, d] and covariance [k, d, d]."""
+    prior, reference = state.prior, state.reference
+    points, weight = _standard_points(mean.shape[1])
     away = points @ np.linalg.cholesky(covariance).swapaxes(1, 2)
     rows = unscaled(prior, mean[:, None] + away)
-    scale, exponent = coefficients(rows[..., 2], rows[..., 3], FORM_COURSE[form][:, None], way.reference)
-    share, at_reference = progress_fraction(np.array([way.progress, way.reference])[:, None, None], scale, exponent)
+    scale, exponent = coefficients(rows[..., 2], rows[..., 3], FORM_COURSE[state.kinds][:, None], reference)
+    share, at_reference = progress_fraction(np.array([progress, reference])[:, None, None], scale, exponent)
     values = (
         rows[..., 0] + (rows[..., 1] - rows[..., 0]) * share / at_reference + rows[..., 4] + rows[..., 6:].sum(axis=2)
     )
@@ -211,15 +203,6 @@ def coefficients(
     """Signed φ and ε of a state's place and log |ε|, broadcast against the course."""
     log_scale, _ = log_scale_at(place, course, reference)
     return coefficients_at(log_scale, log_exponent, course)
-
-
-def process(prior: Prior, size: FloatArray, way: Way) -> FloatArray:
-    """Process noise [k, d, d] of δ and its slope over the way to the last measurement, for discrepancies of sizes q [k]."""
-    noise = np.tile(1e-9 * np.eye(BEFORE_STEPS + way.steps.size), (size.size, 1, 1))
-    gap = (way.after - way.before) / way.reference
-    density = 3.0 * (size * prior.size / prior.initial_sd) ** 2 * (way.reference / way.after) ** 3
-    noise[:, 4:6, 4:6] += density[:, None, None] * np.array([[gap**3 / 3.0, gap**2 / 2.0], [gap**2 / 2.0, gap]])
-    return noise
 
 
 def _units(prior: Prior, dimension: int) -> tuple[FloatArray, FloatArray]:
@@ -312,17 +295,7 @@ class Ukf:
         new = state.form.size == 0 or backwards or measurement.progress > 2.0 * state.reference
         if new:
             return _started(prior, history)
-        way = Way(
-            reference=state.reference,
-            before=before.span,
-            after=history.span,
-            steps=history.step_sizes(prior),
-            progress=measurement.progress,
-            value=measurement.value,
-            variance=float(history.variance[-1]),
-            relative=float(prior.relative_squared(history.value)[-1]),
-        )
-        updated = stepped(replace(state, history=history), way)
+        updated = stepped(state, history)
         # where courses that end before what is measured have much of the weight: lives that fall at once (ad hoc) are
         # forecast the same where they start again at every test; without it they end
         if updated.squared_innovation > 4.0 or _over(updated) > 0.1:

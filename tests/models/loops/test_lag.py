@@ -13,7 +13,7 @@ from models.loops import lag_fit
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, Law, StationaryCurve, fit_lag
 from models.loops.lag_laws import attractor_torque, film_speed, squeeze_film_torque
 from models.loops.loop_area import Direction, clean_samples
-from models.loops.loops import LoopStatus, evaluate_loops
+from models.loops.loops import evaluate_loops
 from models.records.periods import fit_cycle
 from tests.models.loops.dynamic_records import (
     FALLING,
@@ -131,7 +131,7 @@ def test_attractor_of_a_record_without_noise(parameters, c):
     # the fit's own grid has 1000 steps a period: 2e-4
     loop = evaluated(attractor(parameters, c), parameters)
     assert loop.attractor == pytest.approx(c, rel=5e-4)
-    assert loop.status is LoopStatus.DETERMINED
+    assert loop.status is LagStatus.DETERMINED
     assert loop.direction is (Direction.HIGHER_ACCELERATING if parameters is FALLING else Direction.HIGHER_DECELERATING)
 
 
@@ -163,14 +163,14 @@ def test_the_law_that_made_the_record_is_reported(parameters, name):
 
 def test_a_lag_that_the_attractor_cannot_give():
     loop = evaluated(squeezed(RISING, 0.2), RISING, noise=0.01, rng=np.random.default_rng(6))
-    assert loop.status is LoopStatus.AGAINST_THE_LAW
+    assert loop.status is LagStatus.AGAINST_THE_LAW
     assert (loop.attractor, loop.attractor_sd) == (None, None)
     assert abs(loop.film_time - 0.2) < 4 * loop.film_time_sd
 
 
 def test_a_loop_within_its_noise_leaves_the_attractor_open():
     loop = evaluated(attractor(FALLING, 20_000.0), FALLING, noise=0.01, rng=np.random.default_rng(0))
-    assert loop.status is LoopStatus.UNRESOLVED
+    assert loop.status is LagStatus.UNRESOLVED
     assert loop.attractor is None
 
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.loops.lag_fit import StationaryCurve
+from models.loops.lag_fit import LagStatus, StationaryCurve
 from models.loops.loop_area import Direction, area_of, clean_samples
-from models.loops.loops import LoopStatus, evaluate_loops
+from models.loops.loops import evaluate_loops
 from models.records.periods import fit_cycle
 from models.records.runs import Record
 from tests.models.loops.dynamic_records import FALLING, GEOMETRY, SWING, attractor, curve, record, velocity
@@ -50,7 +50,7 @@ def test_area_of_a_closed_form(rate, torque):
     assert loop.area == pytest.approx(closed_form(), rel=1e-6)
     assert loop.frequency == pytest.approx(0.1, rel=1e-9)
     assert (loop.periods, loop.direction) == (1, Direction.HIGHER_ACCELERATING)
-    assert loop.status is LoopStatus.NO_CURVE
+    assert loop.status is LagStatus.NO_CURVE
 
 
 def test_fifteen_seconds_are_one_period():
@@ -140,7 +140,7 @@ def test_deviation_follows_the_periods_where_they_differ():
 @pytest.mark.parametrize(("change", "words"), [({"duration": 9.5}, "No whole period"), ({"frequency": 0.001}, "")])
 def test_nothing_closed_is_said(change, words):
     loop = only(evaluate_loops(record([lambda t: 20 + 0 * t], [5e5], **change), GEOMETRY, None))
-    assert loop.status is LoopStatus.NO_PERIOD
+    assert loop.status is LagStatus.NO_PERIOD
     assert loop.area is None
     assert words in loop.message
     assert loop.message
@@ -149,7 +149,7 @@ def test_nothing_closed_is_said(change, words):
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_constant_speed_has_no_loop(noise):
     speed = 100 + noise * np.random.default_rng(0).standard_normal(1500)
-    assert only(evaluate_loops(replace(FULL, speed=speed), GEOMETRY, None)).status is LoopStatus.NO_PERIOD
+    assert only(evaluate_loops(replace(FULL, speed=speed), GEOMETRY, None)).status is LagStatus.NO_PERIOD
 
 
 def test_held_between_two_pressures_and_brought_back_is_left_out():
@@ -167,15 +167,15 @@ def test_a_reversing_speed_has_area_and_no_law():
     swing = record([lagging], [5e5])
     back = replace(swing, speed=swing.speed - SWING)
     loop = only(evaluate_loops(back, GEOMETRY, {5e5: EXACT}))
-    assert loop.status is LoopStatus.REVERSES
+    assert loop.status is LagStatus.REVERSES
     assert loop.area == pytest.approx(closed_form(), rel=1e-6)
     assert loop.attractor is None
 
 
 def test_curve_of_another_pressure_is_not_taken():
     swing = record([attractor(FALLING, 100.0)], [5e5])
-    assert only(evaluate_loops(swing, GEOMETRY, {5.5e5: EXACT})).status is LoopStatus.NO_CURVE
-    assert only(evaluate_loops(swing, GEOMETRY, {5.05e5: EXACT})).status is LoopStatus.DETERMINED
+    assert only(evaluate_loops(swing, GEOMETRY, {5.5e5: EXACT})).status is LagStatus.NO_CURVE
+    assert only(evaluate_loops(swing, GEOMETRY, {5.05e5: EXACT})).status is LagStatus.DETERMINED
 
 
 def test_a_bent_swing():
@@ -208,7 +208,7 @@ def test_the_other_sense_of_rotation_is_the_same_loop():
 def test_a_curve_of_no_torque_is_none():
     nothing = replace(FALLING, static_torque=0.0, viscous_coefficient=0.0)
     loop = only(evaluate_loops(record([lagging], [5e5]), GEOMETRY, {5e5: StationaryCurve(parameters=nothing)}))
-    assert loop.status is LoopStatus.NO_CURVE
+    assert loop.status is LagStatus.NO_CURVE
 
 
 @settings(max_examples=30, deadline=None)
@@ -260,4 +260,4 @@ def test_any_record_has_an_answer(rows, kind, seed):
         Record(time=time, pressure=pressure, speed=speed, torque=torque), GEOMETRY, {5e5: EXACT}
     ):
         assert loop.message
-        assert (loop.area is None) == (loop.status is LoopStatus.NO_PERIOD)
+        assert (loop.area is None) == (loop.status is LagStatus.NO_PERIOD)

@@ -225,10 +225,12 @@ def test_evidence_is_that_of_the_whole_normal(measurements: list[Measurement]) -
         assert log_probability == pytest.approx(expected, abs=2e-3)
 
 
-def test_conditional_is_that_of_the_whole_normal() -> None:
-    """(ξ0, Δ) and the data are jointly normal: condition on the data."""
+def test_the_drawn_pair_is_that_of_the_whole_normal() -> None:
+    """(ξ0, Δ) and the data are jointly normal: condition on the data. Normals of 0 and 1 draw the mean and a root."""
     history = History.of(EPOCHS, BELIEF)
-    given = linear_model.conditional(linear_model.pointwise(history, BELIEF, POINTS)[0], BELIEF)
+    sums = linear_model.pointwise(history, BELIEF, POINTS)[0]
+    units = [np.tile(unit, (COUNT, 1)) for unit in ([0.0, 0.0], [1.0, 0.0], [0.0, 1.0])]
+    middle, *ends = (np.stack(linear_model.drawn_pair(sums, BELIEF, unit)) for unit in units)
     for point in range(COUNT):
         mean, covariance = normal(point, EPOCHS)
         b = (mean - BELIEF.initial_mean) / BELIEF.change_mean
@@ -237,9 +239,9 @@ def test_conditional_is_that_of_the_whole_normal() -> None:
         gain = np.linalg.solve(covariance, cross.T).T
         expected = np.array([BELIEF.initial_mean, BELIEF.change_mean]) + gain @ (history.value - mean)
         spread = prior - gain @ cross.T
-        np.testing.assert_allclose([given.initial[point], given.change[point]], expected, rtol=1e-4)
-        found = [given.initial_variance[point], given.covariance[point], given.change_variance[point]]
-        np.testing.assert_allclose(found, spread[[0, 0, 1], [0, 1, 1]], rtol=2e-3)
+        np.testing.assert_allclose(middle[:, point], expected, rtol=1e-4)
+        root = np.stack([(end - middle)[:, point] for end in ends], axis=1)
+        np.testing.assert_allclose(root @ root.T, spread, rtol=2e-3)
 
 
 def test_the_table_and_the_points_are_one_sum() -> None:
@@ -287,12 +289,8 @@ def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
         outlying=np.repeat(POINTS.outlying[:, 1:2], count, axis=1),
     )
     sums, terms = linear_model.pointwise(history, BELIEF, points)
-    given = linear_model.conditional(sums, BELIEF)
     rng = np.random.default_rng(0)
-    pair = sampling.correlated_pair(
-        rng.standard_normal((count, 2)), given.initial_variance, given.change_variance, given.covariance
-    )
-    initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
+    initial, change = linear_model.drawn_pair(sums, BELIEF, rng.standard_normal((count, 2)))
     drawn = linear_model.drawn_terms(terms, initial - BELIEF.initial_mean, change, rng.standard_normal((count, 6)))
     at_the_last = drawn @ smooth(history.progress, history.span, 6)[-1]
     mean, covariance = normal(1, EVEN)
@@ -303,7 +301,7 @@ def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
     assert at_the_last.std() == pytest.approx(sd, rel=0.03)
 
 
-# --- Priors, measurements and histories check themselves; draws are even and as correlated as they should be.
+# --- Priors, measurements and histories check themselves; draws are even.
 
 
 def test_a_prior_survives_its_array_and_checks_itself() -> None:
@@ -364,9 +362,3 @@ def test_spread_points_are_more_even_than_chance() -> None:
         return float(np.sqrt(np.mean((shares - edges.prod(axis=1)) ** 2)))
 
     assert error(points) < 0.5 * error(rng.random((1_000, 3)))
-
-
-def test_correlated_pairs_have_their_covariance() -> None:
-    normals = sampling.spread_normals(20_000, np.full(2, 0.5))
-    pair = sampling.correlated_pair(normals, np.full(20_000, 4.0), np.full(20_000, 1.0), np.full(20_000, -1.5))
-    np.testing.assert_allclose(np.cov(pair, rowvar=False), [[4.0, -1.5], [-1.5, 1.0]], atol=0.02)

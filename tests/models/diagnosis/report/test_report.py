@@ -11,20 +11,19 @@ from models.diagnosis.explanations.decide import judge
 from models.diagnosis.explanations.posterior import Posterior, posterior_of
 from models.diagnosis.explanations.sizes import Size, Sizes, sizes_of
 from models.diagnosis.explanations.verdict import Judgement, Verdict
-from models.diagnosis.pooled_fit.gauss_newton import FitStatus
+from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
 from models.diagnosis.pooled_fit.projection import without_likely_gains
 from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.assemble import candidates_of, reason_against, report_of
 from models.diagnosis.report.maps import MOST_BINS, SHOWN, loop_traces, residual_maps
 from models.diagnosis.report.report import Report, misfit_of
 from models.diagnosis.report.summary import signed
-from models.diagnosis.validation.extended_model import Validation
+from models.diagnosis.validation.held_out import Gain
 from tests.models.diagnosis.campaigns import CYCLES, PRESSURES, SPEEDS, Study, bump, campaign, look, study
 from tests.models.diagnosis.report.test_summary import GAIN
 from tests.models.diagnosis.test_diagnose import late
 
 WORSE = replace(GAIN, log_score_gain=-1.0)
-NOTHING = Validation(extended=None, gain=None)
 LARGER = replace(GAIN, rmse_after=1.1 * GAIN.rmse_before)
 
 
@@ -42,10 +41,11 @@ def reported(
     given: Study,
     posterior: Posterior,
     judgement: Judgement,
-    validation: Validation = NOTHING,
+    extended: Fit | None = None,
+    gain: Gain | None = None,
     sizes: Sizes | None = None,
 ) -> Report:
-    return report_of(given.baseline, posterior, judgement, (), validation, sizes or Sizes(by_slug={}), ())
+    return report_of(given.baseline, posterior, judgement, (), extended, gain, sizes or Sizes(by_slug={}), ())
 
 
 @pytest.mark.parametrize(
@@ -60,9 +60,8 @@ def reported(
 def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(given, posterior, gain, why):
     judgement = judge(posterior)
     assert (judgement.verdict, judgement.causes) == (Verdict.CAUSE_NAMED, ("unsettled_dwell",))
-    validation = Validation(extended=judgement.stand[0].fit, gain=gain)
     sizes = sizes_of(posterior.problem, judgement, np.random.default_rng(1))
-    report = reported(given, posterior, judgement, validation, sizes)
+    report = reported(given, posterior, judgement, judgement.stand[0].fit, gain, sizes)
     assert (report.verdict, report.causes) == (judgement.verdict, judgement.causes)
     assert (report.extension is None) == bool(why)
     assert why in report.not_adoptable

@@ -18,7 +18,7 @@ from models.tracking.criteria import COURSE_SHARES, EQ_6_SHARE, KNEE_HAZARD, PRO
 from models.tracking.filters import ukf
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
-from models.tracking.filters.ukf import DOMAIN, Ukf, Way, scatter_learnt, unscaled
+from models.tracking.filters.ukf import DOMAIN, Ukf, scatter_learnt, unscaled
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
@@ -311,30 +311,21 @@ def test_a_step_of_all_filters_at_once_is_filterpys_step_of_each() -> None:
     )
     assert normals.mean.shape == (2, 6)
     last, reference, unit = CAMPAIGN[8].progress, state.reference, PRIOR.initial_sd
-    after, still = 1.2 * last, np.zeros(0)
-    way = Way(
-        reference=reference,
-        before=last,
-        after=after,
-        steps=still,
-        progress=after,
-        value=0.1,
-        variance=0.0,
-        relative=1.0,
-    )
+    after = 1.2 * last
+    history = normals.history.append(Measurement(progress=after, value=0.1, variance=0.0), PRIOR)
 
     def moved(x: FloatArray, _: float) -> FloatArray:
         return x + np.eye(6)[4] * x[5] * 0.2 * last / reference
 
     def seen(x: FloatArray) -> FloatArray:
         initial, at_reference, log_scale, log_exponent, beside, _ = unscaled(PRIOR, x)
-        share, whole = progress_fraction(np.array([way.progress, reference]), np.exp(log_scale), np.exp(log_exponent))
+        share, whole = progress_fraction(np.array([after, reference]), np.exp(log_scale), np.exp(log_exponent))
         return np.array([(initial + (at_reference - initial) * share / whole + beside) / unit])
 
-    mean, covariance = ukf.predicted(normals, way)
-    noise = covariance - ukf.predicted(replace(normals, form=np.zeros(2, dtype=np.intp)), way)[1]
+    mean, covariance = ukf.predicted(normals, history)
+    noise = covariance - ukf.predicted(replace(normals, form=np.zeros(2, dtype=np.intp)), history)[1]
     assert noise[0].max() == 0.0 < noise[1].max()
-    expected, variance, across = ukf.measured(PRIOR, normals.kinds, mean, covariance, way)
+    expected, variance, across = ukf.measured(normals, mean, covariance, after)
     for one in range(2):
         points = MerweScaledSigmaPoints(n=6, alpha=1.0, beta=0.0, kappa=0.0)
         theirs = UnscentedKalmanFilter(dim_x=6, dim_z=1, dt=1.0, hx=seen, fx=moved, points=points)
