@@ -104,10 +104,7 @@ def benches(tmp_path: Path, prepare: Callable[[Sender], None], act: Callable[[Se
 
 
 OLDER, NEWER = body(70000), body(7000)
-
-
-def waits(bench: Sender) -> None:
-    bench.push(OLDER)
+waits = partial(Sender.push, content=OLDER)
 
 
 def test_a_killed_push_loses_nothing_and_keeps_no_half(tmp_path: Path) -> None:
