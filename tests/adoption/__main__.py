@@ -14,7 +14,7 @@ import numpy as np
 
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.prognosis.criteria import HORIZON
-from models.prognosis.scoring import crps_of_quantiles
+from models.prognosis.scoring import covered, crps_of_quantiles
 from tests.adoption.trials import ARTEFACTS, COURSES, LOUD, STORE, Adopted, adopted, trials
 from tests.measuring import APPENDIX, Asked, each, fill, table, where
 
@@ -24,8 +24,7 @@ WORSE = 0.02
 
 def held(quantiles: dict[str, float | None], truth: float) -> bool:
     """Whether the 90 % interval of the end holds it."""
-    low, high = (HORIZON if quantiles[q] is None else float(quantiles[q] or 0.0) for q in ("0.05", "0.95"))
-    return low <= truth <= high
+    return covered(quantiles["0.05"], quantiles["0.95"], truth)
 
 
 def off(quantiles: dict[str, float | None], truth: float) -> float:
@@ -71,13 +70,6 @@ def size_held(one: Adopted) -> bool:
     return low <= one.size <= high
 
 
-TITLES = (
-    "hidden", "made", "named right", "offered of these", "adopted", "end held before", "end held after", "nothing hidden",
-    "nearer", "further by 2 % of life", "than nothing hidden too", "wrong sign", "size held",
-    "CRPS of ln end, before and after",
-)  # fmt: skip
-
-
 def rows(results: Sequence[Adopted]) -> list[str]:
     """A row an effect and loudness, and all artefacts."""
     groups = [(f"`{slug}`, λ = {lam:.0f}", (slug,), (lam,)) for slug in (*ARTEFACTS, *COURSES) for lam in LOUD]
@@ -93,25 +85,24 @@ def rows(results: Sequence[Adopted]) -> list[str]:
         scores = [
             np.mean([crps(getattr(one, name), one.end) for one in offered]) for name in ("before", "after") if offered
         ]
-        lines.append(
-            (
-                title,
-                len(mine),
-                len(right),
-                _share(right, lambda one: one.adoptable),
-                len(offered),
-                _share(offered, lambda one: held(one.before, one.end)),
-                _share(offered, lambda one: held(one.after, one.end)),
-                _share(distorted, lambda one: held(one.clean, one.end)),
-                _share(offered, nearer),
-                _share(offered, worse),
-                _share(distorted, worse_than_clean),
-                sum(wrong_sign(one) for one in ours),
-                _share([one for one in right if one.clean], size_held),
-                ", ".join(f"{score:.3f}" for score in scores),
-            )
-        )
-    return table(TITLES, lines)
+        cells = {
+            "hidden": title,
+            "made": len(mine),
+            "named right": len(right),
+            "offered of these": _share(right, lambda one: one.adoptable),
+            "adopted": len(offered),
+            "end held before": _share(offered, lambda one: held(one.before, one.end)),
+            "end held after": _share(offered, lambda one: held(one.after, one.end)),
+            "nothing hidden": _share(distorted, lambda one: held(one.clean, one.end)),
+            "nearer": _share(offered, nearer),
+            "further by 2 % of life": _share(offered, worse),
+            "than nothing hidden too": _share(distorted, worse_than_clean),
+            "wrong sign": sum(wrong_sign(one) for one in ours),
+            "size held": _share([one for one in right if one.clean], size_held),
+            "CRPS of ln end, before and after": ", ".join(f"{score:.3f}" for score in scores),
+        }
+        lines.append(cells)
+    return table(list(lines[0]), (cells.values() for cells in lines)) if lines else []
 
 
 def meaning(results: Sequence[Adopted], command: str) -> list[str]:

@@ -25,7 +25,7 @@ from service.run_files.simulated import simulated_body
 from tests.benchmarks.pages import pages
 from tests.benchmarks.records import records
 from tests.measuring import show
-from tests.statistical.lives import series
+from tests.models.tracking.tracked_series import sent
 from tests.support import served
 
 
@@ -116,7 +116,7 @@ def tracking() -> None:
     for count in (20, 60):
         zeta = np.linspace(0.0, 12_000.0, count)
         level = np.array([law.mean_cof(each) for each in zeta])
-        seen = series(zeta, level * (1 + 0.003 * rng.standard_normal(count)), (0.001 * level) ** 2)
+        seen = sent(zeta, level * (1 + 0.003 * rng.standard_normal(count)), (0.001 * level) ** 2)
         for tracker in (Grid(), Particle(), Ukf()):
             state = tracker.start(weak(seen[0], falling=True))
             updates = []

@@ -10,10 +10,10 @@ After a change of code remove them.
 import os
 import pickle
 from ast import literal_eval
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from time import process_time
+from unittest.mock import patch
 
 from models.diagnosis import criteria
 from models.diagnosis.design.design import build_design
@@ -57,17 +57,6 @@ def asked(ablate: str) -> dict[str, tuple[object, ...]]:
     return {name: (literal_eval(value),)}
 
 
-@contextmanager
-def taken_for(number: str, value: object) -> Iterator[None]:
-    """A number of the diagnosis' criteria as another."""
-    before = getattr(criteria, number)
-    setattr(criteria, number, value)
-    try:
-        yield
-    finally:
-        setattr(criteria, number, before)
-
-
 def verdicts(trial: Trial, numbers: Mapping[str, Sequence[object]]) -> dict[str, Outcome]:
     """What is said as it is, and with each value of each number; what a number does not act on is computed once."""
     seen = campaign(trial.hidden())
@@ -87,7 +76,7 @@ def verdicts(trial: Trial, numbers: Mapping[str, Sequence[object]]) -> dict[str,
     for number, values in numbers.items():
         for value in values:
             began, other = process_time(), search
-            with taken_for(number, value):
+            with patch.object(criteria, number, value):
                 if number not in ON_WHAT_WAS_FOUND:
                     other = Search(fit_baseline(design) if number in ON_NOISE else baseline, raw, trial.without)
                     other.run()

@@ -1,14 +1,14 @@
 """The rows of the table: which trials each takes, and what is counted in them against which target."""
 
-import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
 from tests.blind.rig.makers import CATALOGUED, HISTORY, OUTSIDE
-from tests.blind.trials import Outcome, Trial
+from tests.blind.trials import Outcome, Trial, trial
 
 Test = Callable[[Outcome], bool]
 LOUDNESSES = (20.0, 50.0, 80.0, 300.0)
@@ -16,8 +16,6 @@ LOUDNESSES = (20.0, 50.0, 80.0, 300.0)
 NOISES = (1.0, 0.3, 0.1)
 #: Effects that only loops show, and those that only raw records do.
 LOOPS, RECORDS = {"channel_delay", "inertia_torque", "squeeze_film"}, {"shaft_ripple", "stick_slip"}
-#: Effects that raise or lower the whole course of friction or do not show without raw records need no temperature.
-WARM = ("oil_temperature",)
 #: So many advised tests are made one after the other, each chosen by the report before it.
 MOST_ADVISED = 3
 #: Whose error beyond noise an extension has to halve.
@@ -57,46 +55,45 @@ class Count:
         return f"≤ {100 * self.most:g} %" if self.most is not None else ""
 
 
-def _seeds(row: str, seed: int, count: int) -> Iterator[tuple[int, ...]]:
-    return ((seed, zlib.crc32(row.encode()), k) for k in range(count))
-
-
 def trials(seed: int, size: float = 1.0) -> list[Trial]:
     """All trials of the table; `size` 1 is the whole, smaller takes that share of each row, at least one."""
+    made: list[Trial] = []
 
     def some(count: float) -> int:
         return max(1, round(size * count))
 
-    made = []
+    def add(row: str, count: int, *slugs: str, mixed: bool = False, **wanted: Any) -> None:
+        """So many campaigns of a row; mixed ones have loops every second time."""
+        for k in range(count):
+            made.append(trial(row, seed, k, *slugs, **wanted | ({"loops": k % 2 == 0} if mixed else {})))
+
     for noise in NOISES:
-        row = f"none/{noise:g}"
-        seeds = _seeds(row, seed, some(130))
-        made += [Trial(row, s, wanted={"noise": noise, "loops": s[-1] % 2 == 0}) for s in seeds]
+        add(f"none/{noise:g}", some(130), noise=noise, mixed=True)
     for slug in CATALOGUED:
-        row = f"one/{slug}"
-        made += [Trial(row, s, (slug,), 20.0, follow=MOST_ADVISED) for s in _seeds(row, seed, some(40))]
-        row = f"twelve/{slug}"
-        made += [Trial(row, s, (slug,), 50.0, wanted={"states": 12}) for s in _seeds(row, seed, some(12))]
-        row = f"left/{slug}"
-        made += [Trial(row, s, (slug,), 50.0, frozenset({slug})) for s in _seeds(row, seed, some(12))]
+        add(f"one/{slug}", some(40), slug, lam=20.0, follow=MOST_ADVISED)
+        add(f"twelve/{slug}", some(12), slug, lam=50.0, states=12)
+        add(f"left/{slug}", some(12), slug, lam=50.0, left=True)
     for slug in CATALOGUED:
+        loops = {"loops": True} if slug in LOOPS | RECORDS else {"mixed": True}
         for lam in LOUDNESSES:
-            row = f"loud/{lam:.0f}/{slug}"
-            seeds = _seeds(row, seed, some(20))
-            made += [
-                Trial(row, s, (slug,), lam, wanted={"loops": slug in LOOPS | RECORDS or s[-1] % 2 == 0}) for s in seeds
-            ]
+            add(f"loud/{lam:.0f}/{slug}", some(20), slug, lam=lam, **loops)
     for slug in OUTSIDE:
-        row = f"outside/{slug}"
-        made += [Trial(row, s, (slug,), 50.0) for s in _seeds(row, seed, some(20))]
-    made += _pairs(seed, some(100))
-    made += _special(seed, some(30))
+        add(f"outside/{slug}", some(20), slug, lam=50.0)
+    made += [trial("two", seed, k, *pair, lam=50.0) for k, pair in enumerate(drawn_pairs(seed, some(100)))]
+    many, few = some(30), some(30) // 3 or 1
+    for lam in (50.0, 200.0):
+        add(f"blindfold/{lam:.0f}", many, "oil_temperature", lam=lam, oil=False, moments=True)
+    for slug in HALVED:
+        add(f"gain/{slug}", many, slug, lam=60.0)
+    add("film", many, "squeeze_film", lam=2000.0, full=True)
+    for slug in ("unsettled_dwell", "shaft_ripple", "stick_slip"):
+        add(f"raw/{slug}", few, slug, lam=20.0, raw=True, loops=False, rate=100.0)
+    for speeds in (1, 2, 3):
+        add(f"few/none/{speeds}", many, speeds=speeds, loops=False, states=12)
+        for slug in FEW_SPEEDS:
+            add(f"few/{slug}/{speeds}", few, slug, lam=80.0, speeds=speeds, loops=False, states=12)
+    add("raw/none", many, raw=True, loops=False)
     return made
-
-
-def _pairs(seed: int, count: int) -> list[Trial]:
-    pairs = drawn_pairs(seed, count)
-    return [Trial("two", s, pair, 50.0) for s, pair in zip(_seeds("two", seed, count), pairs, strict=True)]
 
 
 def drawn_pairs(seed: int, count: int) -> list[tuple[str, str]]:
@@ -104,33 +101,6 @@ def drawn_pairs(seed: int, count: int) -> list[tuple[str, str]]:
     able = [pair for pair in combinations(CATALOGUED, 2) if not set(pair) <= HISTORY]
     dice = np.random.default_rng([seed, 2])
     return [able[int(k)] for k in dice.integers(len(able), size=count)]
-
-
-def _special(seed: int, count: int) -> list[Trial]:
-    made = []
-    for lam in (50.0, 200.0):
-        row = f"blindfold/{lam:.0f}"
-        wanted = {"oil": False, "moments": True}
-        made += [Trial(row, s, WARM, lam, wanted=wanted) for s in _seeds(row, seed, count)]
-    for slug in HALVED:
-        row = f"gain/{slug}"
-        made += [Trial(row, s, (slug,), 60.0) for s in _seeds(row, seed, count)]
-    row = "film"
-    made += [Trial(row, s, ("squeeze_film",), 2000.0, wanted={"full": True}) for s in _seeds(row, seed, count)]
-    for slug in ("unsettled_dwell", "shaft_ripple", "stick_slip"):
-        row = f"raw/{slug}"
-        wanted = {"raw": True, "loops": False, "rate": 100.0}
-        made += [Trial(row, s, (slug,), 20.0, wanted=wanted) for s in _seeds(row, seed, count // 3 or 1)]
-    for speeds in (1, 2, 3):
-        few = {"speeds": speeds, "loops": False, "states": 12}
-        made += [Trial(f"few/none/{speeds}", s, wanted=few) for s in _seeds(f"few/none/{speeds}", seed, count)]
-        for slug in FEW_SPEEDS:
-            row = f"few/{slug}/{speeds}"
-            made += [Trial(row, s, (slug,), 80.0, wanted=few) for s in _seeds(row, seed, count // 3 or 1)]
-    row = "raw/none"
-    wanted = {"raw": True, "loops": False}
-    made += [Trial(row, s, wanted=wanted) for s in _seeds(row, seed, count)]
-    return made
 
 
 def _alarm(one: Outcome) -> bool:

@@ -8,13 +8,12 @@ ARGS="--against OTHER": the rows of both beside each other, campaign by campaign
 import math
 import os
 import sys
-import zlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
 from tests.blind.rows import LOOPS, RECORDS, drawn_pairs
-from tests.blind.trials import Outcome, Trial, file_of, stored
+from tests.blind.trials import Outcome, Trial, file_of, stored, trial
 from tests.measuring import Asked
 from tests.measuring import table as markdown
 
@@ -23,9 +22,8 @@ def trials(seed: int) -> list[Trial]:
     """The campaigns, in an order in which any part of them is a fair sample."""
     made: list[Trial] = []
 
-    def add(row: str, number: int, *slugs: str, lam: float = 0.0, left: bool = False, **wanted: Any) -> None:
-        out = frozenset(slugs) if left else frozenset[str]()
-        made.append(Trial(row, (seed, zlib.crc32(row.encode()), number), slugs, lam, out, wanted=wanted))
+    def add(row: str, number: int, *slugs: str, **wanted: Any) -> None:
+        made.append(trial(row, seed, number, *slugs, **wanted))
 
     for k in range(3):
         for j in range(5):
@@ -104,13 +102,13 @@ def table(first: Sequence[Outcome], second: Sequence[Outcome], labels: tuple[str
 def main(arguments: Sequence[str]) -> None:
     """Judge, and print the rows."""
     label, asked = os.environ["SUBSET"], Asked.here()
-    chosen = [trial for trial in trials(asked.seed) if trial.row.startswith(asked.only)]
-    mine = [one for trial in chosen if (one := stored(trial, label)).made]
+    chosen = [each for each in trials(asked.seed) if each.row.startswith(asked.only)]
+    mine = [one for each in chosen if (one := stored(each, label)).made]
     other, against = mine, label
     if "--against" in arguments:
         against = arguments[arguments.index("--against") + 1]
-        there = [trial for trial in chosen if file_of(trial, against).exists()]
-        other = [one for trial in there if (one := stored(trial, against)).made]
+        there = [each for each in chosen if file_of(each, against).exists()]
+        other = [one for each in there if (one := stored(each, against)).made]
     print("\n".join(table(other, mine, (against, label))))
 
 

@@ -33,10 +33,6 @@ ALLOWED = {
     "models.records.plateaus",
     "models.records.runs",
 }
-#: What lives besides need: the service as whoever uses it sees it, and scores.
-IN_USE = {"models.prognosis.scoring", "service.app", "service.settings"}
-#: Where cases are run, which says nothing of what is looked for.
-EXECUTORS = {"service.work.executor", "service.work.progress"}
 #: Loops say nothing of them that plateaus do not, and make the refits long.
 STEADY = {"running_in", "accelerated_wear", "pressure_offset", "torque_zero_shift", "interface_heating", "seasons"}
 CONTRACT = {
@@ -74,8 +70,7 @@ def test_nothing_of_the_catalogue_is_imported() -> None:
     sources = [path for path in FOLDER.rglob("*.py") if not path.name.startswith("test_")]
     assert len(sources) > 10
     for path in sources:
-        more = {"lives.py": IN_USE, "__main__.py": EXECUTORS, "ablations.py": CHAPTERS}.get(path.name, set())
-        assert imported(path.read_text()) <= ALLOWED | more, path
+        assert imported(path.read_text()) <= ALLOWED | (CHAPTERS if path.name == "ablations.py" else set()), path
     assert not imported("from models.diagnosis.effects.oil import X\nfrom models.diagnosis import baseline") <= ALLOWED
 
 

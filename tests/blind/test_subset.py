@@ -43,15 +43,11 @@ def test_a_seed_has_its_campaigns_and_no_two_are_alike() -> None:
     assert not {*first} & {*other}
 
 
-def test_a_number_is_asked_for_by_name_and_another_until_it_was_tried() -> None:
+def test_a_number_is_asked_for_by_name() -> None:
     assert all(hasattr(criteria, number) for number in ablations.asked("each"))
     assert ablations.asked("SLACK=0.0") == {"SLACK": (0.0,)}
     with pytest.raises(ValueError, match="have no number NOT_THERE"):
         ablations.asked("NOT_THERE=1")
-    usual = criteria.SLACK
-    with ablations.taken_for("SLACK", 7.0):
-        assert criteria.SLACK == 7.0
-    assert usual == criteria.SLACK
 
 
 def test_a_row_counts_what_changed_for_better_and_worse_and_wrong_names() -> None:

@@ -1,7 +1,7 @@
 """One trial: hide, let the diagnosis look, note what it said beside what was true."""
 
 import pickle
-from collections.abc import Callable
+import zlib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import process_time
@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from models.diagnosis.campaign import Campaign
 from models.diagnosis.diagnose import diagnose
-from models.diagnosis.report.report import Report
 from models.diagnosis.validation.held_out import Gain
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.loudness import UnreachableError
@@ -19,7 +17,6 @@ from tests.blind.rig.more import with_test
 from tests.blind.rig.sent import campaign
 from tests.measuring import ROOT, kept
 
-Diagnose = Callable[..., Report]
 #: The verdict on a campaign that could not be made: no draw in which the effect was as loud as it should be.
 UNREACHABLE = "unreachable"
 #: Outcomes, a file each: of `make blind` those in `table`, of its fixed set in a folder of the name that was given.
@@ -45,6 +42,14 @@ class Trial:
         more = "".join(f", {name}={value!r}" for name, value in self.wanted.items())
         less = f"  without={sorted(self.without)}" if self.without else ""
         return f"hide({self.seed}, {self.slugs}, {self.lam}{more}){less}"
+
+
+def trial(
+    row: str, seed: int, number: int, *slugs: str, lam: float = 0.0, left: bool = False, follow: int = 0, **wanted: Any
+) -> Trial:
+    """The campaign of that number in a row; `left`: what is hidden is left out of the catalogue."""
+    without = frozenset(slugs if left else ())
+    return Trial(row, (seed, zlib.crc32(row.encode()), number), slugs, lam, without, wanted, follow)
 
 
 @dataclass(frozen=True)
@@ -111,17 +116,17 @@ class Outcome:
         return bool(self.where) and self.where[0] in self.axes
 
 
-def judge(trial: Trial, look: Diagnose = diagnose) -> Outcome:
+def judge(trial: Trial) -> Outcome:
     """Hide, diagnose, and hold what was said beside what was true. A crash is an outcome, and never a good one."""
     try:
         hidden = trial.hidden()
     except UnreachableError as failure:
         return nothing(trial, UNREACHABLE, str(failure))
-    first = last = judged(trial, hidden, campaign(hidden), look)
+    first = last = judged(trial, hidden)
     advised: list[Outcome] = []
     while len(advised) < trial.follow and last.verdict == "cause_ambiguous" and last.advice:
         hidden = with_test(hidden, last.advice[0])
-        last = judged(trial, hidden, campaign(hidden), look)
+        last = judged(trial, hidden)
         advised.append(last)
     return replace(first, advised=tuple(advised))
 
@@ -143,12 +148,12 @@ def nothing(trial: Trial, verdict: str, error: str, axes: frozenset[str] = froze
     return Outcome(trial, verdict, frozenset(), (), (), axes, None, (), 0.0, error)
 
 
-def judged(trial: Trial, hidden: Hidden, seen: Campaign, look: Diagnose = diagnose) -> Outcome:
-    """The same where the campaign is at hand."""
+def judged(trial: Trial, hidden: Hidden) -> Outcome:
+    """The same where the campaign is made."""
     axes = frozenset().union(*(effect.axes for effect, _ in hidden.effects))
-    began = process_time()
+    seen, began = campaign(hidden), process_time()
     try:
-        report = look(seen, rng=np.random.default_rng(11), without=trial.without)
+        report = diagnose(seen, rng=np.random.default_rng(11), without=trial.without)
     except Exception as failure:  # noqa: BLE001 -- one crash must not end a night of trials; it fails its row instead
         return nothing(trial, "crashed", repr(failure), axes)
     seconds = process_time() - began

@@ -10,21 +10,16 @@ from models.clutch import Geometry
 RPM = 2 * math.pi / 60
 
 
-def test_1970_rpm_is_11_97_m_per_s():
+def test_the_geometry_has_the_references_numbers() -> None:
     velocity = Geometry().sliding_velocity(np.array([20.0, 1970.0, -1970.0]) * RPM)
     np.testing.assert_allclose(velocity, [0.12147, 11.9652, -11.9652], rtol=1e-4)
-
-
-def test_an_override_replaces_the_mean_radius_everywhere():
+    # 2 faces · 5 bar · 61.95 cm² · 58 mm = 359.3 Nm.
+    assert Geometry().torque_per_cof(5e5) == pytest.approx(359.3, rel=1e-3)
+    assert Geometry(pressure_factor=0.5, friction_faces=4).torque_per_cof(5e5) == pytest.approx(359.3, rel=1e-3)
+    # an override replaces the mean radius everywhere
     geometry = Geometry(mean_radius_override=0.1)
     assert geometry.sliding_velocity(np.array([2.0])).tolist() == [0.2]
     assert geometry.torque(0.1, 5e5) == pytest.approx(Geometry().torque(0.1, 5e5) * 0.1 / 0.058)
-
-
-def test_torque_of_a_unit_cof():
-    """2 faces · 5 bar · 61.95 cm² · 58 mm = 359.3 Nm."""
-    assert Geometry().torque_per_cof(5e5) == pytest.approx(359.3, rel=1e-3)
-    assert Geometry(pressure_factor=0.5, friction_faces=4).torque_per_cof(5e5) == pytest.approx(359.3, rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -21,15 +21,13 @@ def test_it_is_the_ratio_of_the_densities_with_and_without_the_coefficients(seed
     assert log_gain(columns.T @ columns, columns.T @ data, 2 * sd) != pytest.approx(expected, abs=1e-3)
 
 
-def test_coefficients_alone_are_those_of_one_column_each() -> None:
+def test_coefficients_alone_are_those_of_one_column_each_and_rounding_below_zero_counts_as_nothing() -> None:
     columns, data, sd = drawn(4)
     info, score = columns.T @ columns, columns.T @ data
     alone = [log_gain(info[k : k + 1, k : k + 1], score[k : k + 1], sd[k]) for k in range(3)]
     np.testing.assert_allclose(log_gain_alone(np.diag(info), score, sd), alone)
     assert log_gain(np.zeros((0, 0)), np.zeros(0), 1.0) == 0.0
-
-
-def test_what_rounding_leaves_below_zero_counts_as_nothing() -> None:
+    # what rounding leaves below zero counts as nothing
     columns, data, sd = drawn(5)
     info, score = columns.T @ columns, columns.T @ data
     with_nothing = np.pad(info, (0, 1)), np.append(score, 0.0), np.append(sd, 1e4)

@@ -11,7 +11,7 @@ Plausibility was developed on the simulated rig with other seeds; the blind rig 
 import itertools
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import Any
@@ -127,39 +127,35 @@ def main() -> int:
     seed, store = Asked.here().seed, Lines(os.environ.get("STORE"))
     sizes = {"CAMPAIGNS": 200, "HONEST": 2000, "LIVES": 20, "ABLATED": 60}
     campaigns, runs, count, ablated = (number(name, size) for name, size in sizes.items())
-    outcomes = partial(_known, store)
 
     def life(label: str, make: Callable[[int, str, int], dict[str, int]], kind: str, n: int) -> dict[str, int]:
         return store.get(f"{label} {seed} {kind} {n}", partial(make, seed, kind, n))
 
+    def sent(
+        label: str, make: Callable[..., Outcome | list[Outcome]], names: Iterable[str], many: int, **how: bool
+    ) -> list[Outcome]:
+        """What comes of so many trials of each name."""
+        jobs = itertools.product(range(many), names)
+        return [one for n, name in jobs for one in _known(store, label, make, seed, name, n, **how)]
+
     def honest_runs(source: str, share: int) -> list[Outcome]:
         """So many honest runs of a source, or all that there are."""
-        sent: list[Outcome] = []
+        found: list[Outcome] = []
         for n in itertools.count():
-            own = outcomes("honest", trials.honest, seed, source, n)
-            sent += own
-            if not own or len(sent) >= share:
-                return sent[:share]
-        return sent
+            own = _known(store, "honest", trials.honest, seed, source, n)
+            found += own
+            if not own or len(found) >= share:
+                return found[:share]
+        return found
 
-    def slipped(rig: str) -> list[Outcome]:
-        return [one for n in range(campaigns // 2) for one in outcomes("slip", trials.slipped, seed, rig, n)]
-
-    rigs = {rig: slipped(rig) for rig in trials.RIGS}
+    rigs = {rig: sent("slip", trials.slipped, [rig], campaigns // 2) for rig in trials.RIGS}
     wrong = [*itertools.chain(*rigs.values())]
-    numbers = [(rig, n) for rig in trials.RIGS for n in range(campaigns // 5)]
-    aside = [one for rig, n in numbers for one in outcomes("aside", trials.aside, seed, rig, n)]
+    aside = sent("aside", trials.aside, trials.RIGS, campaigns // 5)
     lives = {kind: [life("life", trials.honest_life, kind, n) for n in range(count)] for kind in KINDS}
     shares = {"simulated rig": 2 * runs // 5, "blind rig": 2 * runs // 5, "real": runs // 5}
     honest = [one for source, share in shares.items() for one in honest_runs(source, share)]
-    numbers = [(rig, n) for n in range(ablated) for rig in trials.RIGS]
-    slips_without = [
-        one for rig, n in numbers for one in outcomes("slip without", trials.slipped, seed, rig, n, ablated=True)
-    ]
-    numbers = [(source, n) for n in range(ablated // 10) for source in shares]
-    honest_without = [
-        one for source, n in numbers for one in outcomes("honest without", trials.honest, seed, source, n, ablated=True)
-    ]
+    slips_without = sent("slip without", trials.slipped, trials.RIGS, ablated, ablated=True)
+    honest_without = sent("honest without", trials.honest, shares, ablated // 10, ablated=True)
     judged = [(kind, n) for n in range(min(ablated // 10, count)) for kind in KINDS]
     lives_without = [life("life without", trials.honest_life_without, kind, n) for kind, n in judged]
     of_judged = (sum(lives[kind][n][name] for kind, n in judged) for name in ("runs", "end"))

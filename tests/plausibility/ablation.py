@@ -10,7 +10,6 @@ import numpy as np
 from models.arrays import FloatArray
 from models.plausibility import course, criteria, judgement, pace, slips
 from service.lives.plausibility import doubts, reading
-from service.lives.plausibility import reading as of_reading
 
 Patches = tuple[tuple[object, str, Any], ...]
 #: A probability of nothing.
@@ -83,8 +82,8 @@ WITHOUT: dict[str, Patches] = {
     "a first run at the start": _changed(AT_START=_NEVER),
     "maintenance within the life": _changed(WITHIN=0.0, BEYOND=0.0),
     "a most that clutches last": _changed(MAX_CYCLES=1e30),
-    "dynamic tests as exact as stationary ones": ((of_reading, "DYNAMIC_SD", 0.0),),
-    "engagements twice as exact": ((of_reading, "ENGAGEMENT_SD", 0.5 * of_reading.ENGAGEMENT_SD),),
+    "dynamic tests as exact as stationary ones": ((reading, "DYNAMIC_SD", 0.0),),
+    "engagements twice as exact": ((reading, "ENGAGEMENT_SD", 0.5 * reading.ENGAGEMENT_SD),),
     "held from half the odds on": _changed(HELD=0.5 * criteria.HELD),
     "held from twice the odds on": _changed(HELD=2.0 * criteria.HELD),
 }

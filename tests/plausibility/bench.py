@@ -9,22 +9,14 @@ from typing import Any
 import numpy as np
 
 from service.errors import InvalidError
-from service.lives.history import (
-    REBUILD,
-    Event,
-    Life,
-    duty_block,
-    life_with,
-    lives_of,
-    moment_of,
-    order,
-    reference_velocities,
-)
+from service.lives.history import Event, Life, life_with, lives_of, order, reference_velocities
 from service.lives.incoming_run import IncomingRun
 from service.lives.plausibility import doubts
+from service.lives.recomputation import Arrival
 from service.lives.run_analysis import Analysis, analyse, mean_cofs
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
+from service.workflows import ingest_run
 from tests.plausibility.ablation import WITHOUT, without
 
 Body = dict[str, Any]
@@ -113,13 +105,11 @@ class Bench:
         run = read_run(json.dumps(body).encode())
         analysis = self.analyses.get(run.run_id) or analyse(run, self.geometry, 0.0)
         self.analyses[run.run_id] = analysis
-        event = _event(run, analysis)
+        shown, odd = doubts.doubts_alone(run, analysis, self.geometry)
+        arrival = Arrival(run=run, sampled=False, analysis=analysis, shown=shown, odd=odd, received_at=RECEIVED)
+        event = ingest_run._event_of(arrival)
         life = life_with(order([*self.events, event]), event)
-        return (
-            run,
-            analysis,
-            replace(event, cofs=self._cofs(life, event), shown=doubts.doubts_alone(run, analysis, self.geometry)[0]),
-        )
+        return run, analysis, replace(event, cofs=self._cofs(life, event))
 
     def _settle(self, events: tuple[Event, ...]) -> None:
         self.events = events
@@ -137,19 +127,3 @@ class Bench:
             return {}
         fits = self.analyses[event.run_id].fits
         return mean_cofs(fits, reference_velocities(life.speed_range, self.geometry), self.geometry)
-
-
-def _event(run: IncomingRun, analysis: Analysis) -> Event:
-    duty, maintenance = run.details.get("duty") or {}, run.details.get("event")
-    names = ("cycles", "energy_per_cycle_kj", "initial_speed_rpm", "engagement_duration_s")
-    return Event(
-        run_id=run.run_id,
-        kind=run.kind,
-        cycles=run.cycles,
-        moment=moment_of(run.started_at, RECEIVED),
-        speed_range=analysis.speed_range,
-        rebuild=maintenance == REBUILD,
-        shift=maintenance not in (None, REBUILD),
-        duty=duty_block(run.cycles, *(duty.get(name) for name in names)),
-        dated=run.started_at is not None,
-    )

@@ -1,4 +1,4 @@
-"""The bench on which trials are made sees the same history as the service, and a coin does not pass its demand."""
+"""The bench on which trials are made sees the same history as the service, and slips change runs."""
 
 import json
 from contextlib import closing
@@ -13,7 +13,7 @@ from service.schemas.clutch import ClutchIn
 from service.workflows.edit_clutch import register
 from service.workflows.ingest_run import ingest
 from storage.engine.opening import open_database
-from tests.plausibility import slips, trials
+from tests.plausibility import slips
 from tests.plausibility.bench import RECEIVED, Bench
 from tests.support import stationary
 
@@ -56,11 +56,3 @@ def test_a_slip_changes_the_run_or_is_none() -> None:
         assert wrong is not None
         assert wrong != honest
     assert slips.CYCLES["cycles x 10"](rng, honest | {"cycles": 0}) is None
-
-
-@pytest.mark.slow
-def test_each_group_of_slips_is_drawn() -> None:
-    for group in slips.GROUPS:
-        outcome = trials.one_slip(np.random.default_rng([7, 1]), trials.RIGS["simulated rig"], "simulated rig", group)
-        assert outcome.slip
-        assert outcome.answer.without or outcome.held

@@ -1,7 +1,5 @@
 """Honest lives are not shut out: whatever is asked about on the way, nothing is held in the end."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -14,11 +12,11 @@ from tests.real import loaders
 from tests.support import one_quick, stationary
 
 
-def even(step: float, share: float = 0.96, count: int = 8, start: float = 0.0) -> list[Body]:
+def even(step: float, share: float = 0.96, count: int = 8) -> list[Body]:
     """Tests a step of cycles apart, COF lower by the same share each time."""
     runs = []
     for k in range(count):
-        body = stationary(start + k * step, run_id=f"t{k}", wear=0.0, pressures=(4.0, 6.0))
+        body = stationary(k * step, run_id=f"t{k}", wear=0.0, pressures=(4.0, 6.0))
         runs.append(with_gain(body, share**k))
     return runs
 
@@ -34,13 +32,6 @@ def sent(runs: list[Body]) -> tuple[Bench, str]:
 @pytest.mark.parametrize("step", [10.0, 1000.0, 50_000.0, 1e6, 1e7])
 def test_any_scale_of_cycles_is_accepted(step: float) -> None:
     bench, states = sent(even(step))
-    assert states.count("h") <= 1
-    assert bench.held == ()
-
-
-@pytest.mark.parametrize("start", [5000.0, 50_000.0, 2e6])
-def test_a_first_test_that_comes_late_shuts_nothing_out(start: float) -> None:
-    bench, states = sent(even(0.02 * start, start=start, share=0.99))
     assert states.count("h") <= 1
     assert bench.held == ()
 
@@ -76,26 +67,13 @@ def test_an_honest_life_is_not_shut_out(kind: str) -> None:
     assert bench.held == ()
 
 
-def test_the_order_of_arrival_does_not_matter() -> None:
-    """Nine tests and one with a zero too many, in several orders: the same run is held in the end."""
-    runs = even(1000.0, share=0.97, count=10)
-    slipped = slips.CYCLES["cycles x 10"](np.random.default_rng(1), runs[4])
-    runs[4] = slipped
-    for seed in range(4):
-        order = np.random.default_rng(seed).permutation(10)
-        bench, _ = sent([json.loads(json.dumps(runs[k])) for k in order])
-        assert [event.run_id for event in bench.held] == ["t4"]
-
-
-def test_a_slip_that_was_accepted_is_held_once_others_contradict_it() -> None:
+def test_a_slip_among_honest_runs_is_held_once_they_contradict_it() -> None:
     """The second test of a life, ten times too many cycles: nothing speaks against it yet."""
     runs = even(1000.0, share=0.95, count=10)
     slipped = runs[1] | {"cycles": 10_000.0}
     bench, _ = sent([runs[0], slipped, *runs[2:8]])
     assert [event.run_id for event in bench.held] == ["t1"]
-
-
-def test_a_slip_stays_held_among_honest_runs() -> None:
+    # a slip stays held among honest runs
     runs = even(1000.0, share=0.98, count=18)
     slipped = slips.OTHERS["torque at a wrong gain"](np.random.default_rng(3), runs[7])
     bench, states = sent([*runs[:7], slipped, *runs[8:]])

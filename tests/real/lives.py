@@ -36,12 +36,13 @@ from models.prognosis.stated_end import stated_end
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.measuring import Asked, Lines
+from tests.models.tracking.tracked_series import sent
 from tests.real import loaders
 from tests.real.lag import Row, table
 from tests.real.prognosis import BLOCKS
 from tests.score.table import score
 from tests.statistical.forecasts import DRAWS, GRID, forecast
-from tests.statistical.lives import series, taught
+from tests.statistical.lives import taught
 
 SEED, TESTS, LIMIT, CRACK, RISE, DONE = 2026, 30, 600.0, 0.25, 0.05, 0.9
 STAGES = (0.4, 0.6, 0.8)
@@ -67,7 +68,7 @@ def filters() -> Iterator[Life]:
         moments = np.linspace(0.0, end, TESTS + 1)[:-1]
         near = np.abs(seconds[:, None] - moments) <= max(1.0, end / 200.0)
         values = np.array([np.median(value[each]) for each in near.T])
-        yield f"feed {data['dust_feed'][here][0]:g}", series(moments, values), end
+        yield f"feed {data['dust_feed'][here][0]:g}", sent(moments, values), end
 
 
 def cells(maker: str) -> Iterator[Life]:
@@ -76,7 +77,7 @@ def cells(maker: str) -> Iterator[Life]:
         if group.startswith(maker):
             cycles, capacity = np.array([(float(row["cycle"]), float(row["relative_capacity"])) for row in rows[::2]]).T
             values = _folded(1.0 - capacity, 1.0 - float(rows[0]["threshold"]))
-            yield group, series(cycles, values), float(rows[0]["end_cycle"])
+            yield group, sent(cycles, values), float(rows[0]["end_cycle"])
 
 
 def cracks() -> Iterator[Life]:
@@ -107,7 +108,7 @@ def _folded(change: FloatArray, whole: float) -> FloatArray:
 
 def _ended(progress: FloatArray, values: FloatArray) -> Life:
     end = measured_end(progress, values, 0.05)
-    return "", series(progress, values), end
+    return "", sent(progress, values), end
 
 
 #: By row.

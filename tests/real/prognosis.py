@@ -25,9 +25,9 @@ from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
 from tests.models.prognosis.sample_scores import crps_of_sample
+from tests.models.tracking.tracked_series import sent
 from tests.real import loaders
 from tests.real.lag import Row, table
-from tests.statistical.lives import series
 
 SEED, DRAWS = 2013, 1_000
 GRID = Grid()
@@ -48,7 +48,7 @@ def next_values(posterior: Posterior, progress: float, rng: np.random.Generator)
 
 def lasers() -> list[Row]:
     """By the hours seen and the prior: what of 15 left-out lasers is held."""
-    histories = [series(hours, 1.0 - rise) for hours, rise in loaders.lasers().values()]
+    histories = [sent(hours, 1.0 - rise) for hours, rise in loaders.lasers().values()]
     lessons = [taught(history) for history in histories]
     failed = [history[-1].value <= LASER_FRACTION for history in histories]
     rows = []
@@ -129,7 +129,7 @@ def pins() -> list[Row]:
             out = data["unit"] == unit
             others = ~out & (group == group[out][0])
             rng = np.random.default_rng([SEED, int(unit)])
-            posterior = drawn(_scar_prior(data["microns"]), series(progress[others], data["microns"][others]), rng)
+            posterior = drawn(_scar_prior(data["microns"]), sent(progress[others], data["microns"][others]), rng)
             for at, scar in zip(progress[out].tolist(), data["microns"][out].tolist(), strict=True):
                 sample = next_values(posterior, at, rng)
                 low, high = weighted_quantiles(sample, posterior.weight, (0.05, 0.95))
@@ -164,7 +164,7 @@ def running_in() -> list[Row]:
         blocks = np.array_split(np.arange(data["Traction Coeff (-)"].size), BLOCKS)
         time = np.array([data["Step Time (s)"][each].mean() for each in blocks])
         friction = np.array([data["Traction Coeff (-)"][each].mean() for each in blocks])
-        history = series(time, friction)
+        history = sent(time, friction)
         for share in (0.2, 0.5, 0.8):
             rng = np.random.default_rng([SEED, int(10 * share)])
             seen = history[: round(share * BLOCKS)]

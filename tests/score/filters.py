@@ -8,9 +8,10 @@ from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
+from tests.models.tracking.tracked_series import sent
 from tests.score.off_prior import rig_lives
 from tests.score.table import EVERY, Scores, joined, percents, written
-from tests.statistical.lives import PRIOR, STAGES, at_stages, ends, exact, lives, series, upto
+from tests.statistical.lives import PRIOR, STAGES, at_stages, ends, exact, lives, upto
 
 RUNS, DRAWS = 25, 1_000
 FILTERS = (Grid(), Particle(), Ukf())
@@ -101,7 +102,7 @@ def after_end(count: int, seed: int) -> str:
         shares = np.linspace(0.0, PAST[-1], TESTS)
         cofs = 0.1 * np.array([course(share) for share in shares.tolist()])
         values = cofs * (1.0 + GAIN * rng.standard_normal(TESTS)) + 0.1 * NOISE * rng.standard_normal(TESTS)
-        tests = series(shares * end, values, (0.1 * NOISE) ** 2)
+        tests = sent(shares * end, values, (0.1 * NOISE) ** 2)
         for tracker in (Grid(), Particle(), Ukf()):
             told.setdefault(tracker.name, []).append(_past(tracker, tests, end, rng))
     rows = []

@@ -13,8 +13,9 @@ from models.prognosis.stated_end import stated_end
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
+from tests.models.tracking.tracked_series import sent
 from tests.score.table import EVERY, Scores, joined, percents, score, written
-from tests.statistical.lives import STAGES, Life, series, taught, upto
+from tests.statistical.lives import STAGES, Life, taught, upto
 
 GRID = Grid()
 #: Damage up to a factor, by the share of a life.
@@ -114,7 +115,7 @@ def _drawn(name: str, longer: float, rng: np.random.Generator) -> Drawn:
 
     def measured(share: float, count: int) -> list[Measurement]:
         x = np.linspace(0.0, share, count)
-        return series(
+        return sent(
             end * x, 0.13 * (1.0 - 0.5 * damage(x) / damage(np.ones(1))) * (1.0 + 0.003 * rng.standard_normal(count))
         )
 

@@ -15,9 +15,10 @@ from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
+from tests.models.tracking.tracked_series import sent
 from tests.score.table import joined, percents, written
 from tests.statistical.forecasts import LAWS, STAGES, TESTS, followed
-from tests.statistical.lives import CAP, PRIOR, series
+from tests.statistical.lives import CAP, PRIOR
 
 
 def laws(count: int, seed: int) -> str:
@@ -117,7 +118,7 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
             noise += outlying * PRIOR.outlying_size * PRIOR.size * rng.standard_normal(runs)
         zeta = np.linspace(0.0, last, runs)
         values = truth.values(zeta)[:, 0] + noise
-        drawn = grid.posterior(grid.from_history(PRIOR, series(zeta, values)), 1_000, rng)
+        drawn = grid.posterior(grid.from_history(PRIOR, sent(zeta, values)), 1_000, rng)
         passage = predict_first_passage(drawn, fraction=0.5, as_of=last)
         assert all(x is None or math.isfinite(x) for x in passage.end_of_life.values())
         told.append(passage.probability_of_reaching)

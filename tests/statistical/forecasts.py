@@ -13,7 +13,8 @@ from models.prognosis.stated_end import stated_end
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
-from tests.statistical.lives import STAGES, series
+from tests.models.tracking.tracked_series import sent
+from tests.statistical.lives import STAGES
 
 DRAWS, FEWEST = 1_000, 3
 GRID = Grid()
@@ -34,7 +35,7 @@ def observed(course: Callable[[float], float], rng: np.random.Generator, end: fl
     """Tests up to 80 % of a life."""
     share = np.linspace(0.0, 0.8, TESTS)
     cof = 0.1 * np.array([course(x) for x in share.tolist()]) * (1 + SCATTER * rng.standard_normal(TESTS))
-    return series(share * end, cof, (0.001 * cof) ** 2)
+    return sent(share * end, cof, (0.001 * cof) ** 2)
 
 
 def forecast(tests: Sequence[Measurement], end: float, rng: np.random.Generator) -> dict[float, tuple[float, ...]]:

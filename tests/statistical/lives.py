@@ -19,6 +19,7 @@ from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
 from tests import dense
+from tests.models.tracking.tracked_series import sent
 
 LEVELS = np.array([0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95])
 STAGES = (0.2, 0.4, 0.6, 0.8)
@@ -40,13 +41,7 @@ class Life:
         values = value(progress, self.truth) + self.scatter * rng.standard_normal(runs)
         if outlying > 0.0:
             values *= np.where(rng.random(runs) < outlying, 1.0 + 0.1 * rng.choice([-1.0, 1.0], runs), 1.0)
-        return series(progress, values)
-
-
-def series(progress: np.ndarray, values: np.ndarray, variance: np.ndarray | float = 0.0) -> list[Measurement]:
-    """Measurements at these progresses [n]; the variance of each, or of all."""
-    columns = (column.tolist() for column in np.broadcast_arrays(progress, values, variance))
-    return [Measurement(progress=z, value=y, variance=v) for z, y, v in zip(*columns, strict=True)]
+        return sent(progress, values)
 
 
 def upto(measurements: list[Measurement], stage: float) -> list[Measurement]:
@@ -89,13 +84,6 @@ def typical(count: int, seed: int) -> Iterator[tuple[Life, np.random.Generator]]
         end = float(first_passage(0.5 * initial, truth))
         if end < CAP:
             yield Life(truth, 0.003 * initial, end), rng
-
-
-def followed(tracker: Any, prior: Prior, measurements: list[Measurement], rng: np.random.Generator) -> Any:
-    state = tracker.start(prior)
-    for measurement in measurements:
-        state = tracker.update(state, measurement, rng)
-    return state
 
 
 def at_stages(
@@ -226,10 +214,6 @@ def taught(tests: Sequence[Measurement], end: float) -> EndedLife:
 
 def ends(posterior: Posterior) -> np.ndarray:
     return np.minimum(ends_of_life(posterior, 0.5), CAP)
-
-
-def effective(posterior: Posterior) -> float:
-    return 1.0 / float(np.square(posterior.weight).sum())
 
 
 def misplaced(reference: Posterior, other: Posterior, of: Callable[[Posterior], np.ndarray] = ends) -> np.ndarray:

@@ -144,7 +144,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(proportional: float, cons
     assert np.abs(share - COVERAGE).max() <= WITHIN
 
 
-def test_intervals_with_known_deviations_hold_the_truth() -> None:
+def test_intervals_with_known_deviations_hold_the_truth_and_those_too_small_are_not_believed() -> None:
     """Torque noise of 0.05 to 0.5 Nm that differs from point to point, and is given."""
     truth, torque, _ = _simulated(0.0)
     rng = np.random.default_rng(SEED)
@@ -152,9 +152,7 @@ def test_intervals_with_known_deviations_hold_the_truth() -> None:
     noisy = torque + sd * rng.standard_normal(torque.shape)
     fits = fit_curves([curve(VELOCITY, y, s) for y, s in zip(noisy, sd, strict=True)])
     assert np.abs(_coverage(fits, truth) - COVERAGE).max() <= WITHIN
-
-
-def test_deviations_given_too_small_are_not_believed() -> None:
+    # deviations given too small are not believed
     truth, torque, noisy = _simulated(0.01)
     fits = fit_curves([curve(VELOCITY, y, 0.002 * t) for y, t in zip(noisy, torque, strict=True)])
     assert np.abs(_coverage(fits, truth) - COVERAGE).max() <= WITHIN

@@ -16,20 +16,18 @@ from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
+from tests.models.tracking.tracked_series import followed, sent
 from tests.score.table import Scores
 from tests.statistical.lives import (
     LEVELS,
     PRIOR,
     STAGES,
     at_stages,
-    effective,
     ends,
     exact,
-    followed,
     from_prior,
     lives,
     misplaced,
-    series,
     typical,
     upto,
 )
@@ -40,7 +38,7 @@ pytestmark = pytest.mark.slow
 def check_against(reference: Posterior, count: float, found: Posterior) -> None:
     """The quantiles of each coefficient and of the end of life within four Monte-Carlo deviations of both samples. Draws
     of equal weight were thinned out of weighted ones: they count for half."""
-    error = math.sqrt(1.0 / min(count, 4_000) + 1.0 / min(effective(found), 2_000.0))
+    error = math.sqrt(1.0 / min(count, 4_000) + 1.0 / min(found.effective_draws, 2_000.0))
     for name in ("initial", "change", "scale", "exponent", "scatter"):
         assert misplaced(reference, found, lambda p, n=name: getattr(p, n)).max() < 4.0 * error * 0.5, name
     assert misplaced(reference, found).max() < 4.0 * error * 0.5
@@ -103,7 +101,7 @@ def test_no_draw_of_the_grid_outweighs_the_others(monkeypatch: pytest.MonkeyPatc
     state, least = Grid().from_history(PRIOR, measurements[:17]), {}
     for blend in (grid_module.BLEND, 0.0):
         monkeypatch.setattr(grid_module, "BLEND", blend)
-        least[blend] = min(effective(Grid().posterior(state, 1_000, np.random.default_rng(k))) for k in range(150))
+        least[blend] = min(Grid().posterior(state, 1_000, np.random.default_rng(k)).effective_draws for k in range(150))
     print("effective draws at least", least)
     assert least[0.0] < 650
     assert least[max(least)] > 700
@@ -122,7 +120,7 @@ def weird(rng: np.random.Generator) -> list[Measurement]:
     values = value(progress, truth) + float(rng.choice([0.0, 1e-4, 0.01, 0.3])) * rng.standard_normal(runs)
     values = values + float(rng.choice([0.0, 0.0, 5.0, -1.0])) * (np.arange(runs) >= runs // 2)
     unit = float(rng.choice([1e-6, 0.13, 25.0, -4.0]))
-    return series(progress, unit * values, float(rng.choice([0.0, 1e-8, 1e-3])) * unit**2)
+    return sent(progress, unit * values, float(rng.choice([0.0, 1e-8, 1e-3])) * unit**2)
 
 
 @pytest.mark.parametrize(

@@ -39,15 +39,13 @@ _PER_UNIT = {"oil_change": 100.0, "running_in": 100.0, "rest_recovery": 100.0, "
 
 @dataclass(frozen=True)
 class Shown:
-    """What became of a hidden effect: the amplitudes stated and hidden, in the catalogue's unit; whether it was seen; the
-    log odds against nothing [nats]."""
+    """What became of a hidden effect: the amplitudes stated and hidden, in the catalogue's unit; whether it was seen."""
 
     seed: tuple[int, ...]
     slug: str
     stated: float
     hidden: float
     seen: bool
-    beyond: float
 
 
 def shown(seed: tuple[int, ...], slug: str) -> Shown | str:
@@ -69,16 +67,11 @@ def shown(seed: tuple[int, ...], slug: str) -> Shown | str:
         return "the effect makes no number of some readings"
     given = campaign(replace(blank, measured=measure(rng, blank.plan, blank.sensor, truth)))
     try:
-        seen, beyond = alarmed(given)
+        # whether the diagnosis calls the model anything but adequate
+        seen = bool(_posterior(given).probabilities[NOTHING] < LIKELY)
     except IndeterminateError as lacking:
         return str(lacking)
-    return Shown(seed, slug, stated.amplitude, TIMES * stated.amplitude, seen, beyond)
-
-
-def alarmed(given: Campaign) -> tuple[bool, float]:
-    """Whether the diagnosis calls the model anything but adequate, and the log odds against it [nats]."""
-    nothing = _posterior(given).probabilities[NOTHING]
-    return nothing < LIKELY, float(np.log(max(1.0 - nothing, 1e-300) / max(nothing, 1e-300)))
+    return Shown(seed, slug, stated.amplitude, TIMES * stated.amplitude, seen)
 
 
 def _posterior(given: Campaign) -> Posterior:

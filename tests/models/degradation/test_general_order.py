@@ -20,11 +20,20 @@ exponents = st.floats(0.05, 20.0)
 changes = st.floats(-2.0, 2.0).filter(lambda change: abs(change) > 1e-3)
 
 
-def test_half_of_the_change_by_hand() -> None:
+def test_eq_6_by_hand() -> None:
     """(1 + 15000/5000)^-0.5 = 4^-0.5 = 1/2."""
     d = Degradation(initial=0.13, change=-0.1, scale=5_000.0, exponent=0.5)
     assert value(15_000.0, d) == pytest.approx(0.08, rel=1e-15)
     assert first_passage(0.08, d) == pytest.approx(15_000.0, rel=1e-12)
+    # passages broadcast and overflow to infinity without a warning
+    d = Degradation(initial=1.0, change=np.array([-0.4, -0.6, -0.5 - 1e-15]), scale=1e5, exponent=0.01)
+    assert first_passage(0.5, d).tolist()[0] == math.inf
+    assert np.isinf(first_passage(0.5, d)[2])
+    # At ζ/φ = 1e-12 the series ε x (1 - (1 + ε) x/2) is exact to rounding; 1 - (1 + x)^-ε keeps four digits.
+    x, exponent = 1e-12, 0.7
+    series = exponent * x * (1 - (1 + exponent) * x / 2)
+    assert progress_fraction(x, 1.0, exponent) == pytest.approx(series, rel=1e-14)
+    assert abs((1.0 - (1.0 + x) ** -exponent) / series - 1.0) > 1e-6
 
 
 @given(st.floats(-5.0, 5.0), changes, scales, exponents)
@@ -58,20 +67,6 @@ def test_a_level_outside_the_range_is_never_passed(level: float, change: float) 
     assert first_passage(level, d) == math.inf
 
 
-def test_passages_broadcast_and_overflow_to_infinity_without_a_warning() -> None:
-    d = Degradation(initial=1.0, change=np.array([-0.4, -0.6, -0.5 - 1e-15]), scale=1e5, exponent=0.01)
-    assert first_passage(0.5, d).tolist()[0] == math.inf
-    assert np.isinf(first_passage(0.5, d)[2])
-
-
-def test_small_progress_keeps_its_digits() -> None:
-    """At ζ/φ = 1e-12 the series ε x (1 - (1 + ε) x/2) is exact to rounding; 1 - (1 + x)^-ε keeps four digits."""
-    x, exponent = 1e-12, 0.7
-    series = exponent * x * (1 - (1 + exponent) * x / 2)
-    assert progress_fraction(x, 1.0, exponent) == pytest.approx(series, rel=1e-14)
-    assert abs((1.0 - (1.0 + x) ** -exponent) / series - 1.0) > 1e-6
-
-
 #: φ and ε of either sign.
 SIGNED = pytest.mark.parametrize(
     ("scale", "exponent"),
@@ -80,7 +75,9 @@ SIGNED = pytest.mark.parametrize(
 
 
 @SIGNED
-def test_each_course_is_kinetics_of_its_order(scale: float, exponent: float) -> None:
+def test_each_course_is_kinetics_of_its_order_and_passes_a_level_where_it_has_that_value(
+    scale: float, exponent: float
+) -> None:
     """dD/dζ = -k Dⁿ with n = 1 + 1/ε and k = ε/φ, and with both signs turned dD/dζ = k Dⁿ, by differences over half a
     cycle."""
     zeta, step, sign = np.linspace(10.0, 8_000.0, 40), 0.25, np.sign(scale) * np.sign(exponent)
@@ -92,10 +89,7 @@ def test_each_course_is_kinetics_of_its_order(scale: float, exponent: float) -> 
     expected, first_order = (-sign * abs(exponent / scale) * left(zeta) ** n for n in (1.0 + 1.0 / exponent, 1.0))
     np.testing.assert_allclose(rate, expected, rtol=1e-5)
     assert np.abs(rate / first_order - 1.0).max() > 0.1  # the control
-
-
-@SIGNED
-def test_the_first_passage_is_where_the_course_has_that_value(scale: float, exponent: float) -> None:
+    # the first passage is where the course has that value
     degradation = Degradation(initial=0.13, change=-0.1, scale=scale, exponent=exponent)
     for zeta in (1.0, 500.0, 8_500.0):
         assert first_passage(float(value(zeta, degradation)), degradation) == pytest.approx(zeta, rel=1e-9)

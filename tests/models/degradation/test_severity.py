@@ -39,13 +39,36 @@ def test_blocks_that_are_all_alike_leave_the_count_of_cycles() -> None:
     assert severity_map(ENERGY, [Block(end=500.0, cycles=500.0)]) is IDENTITY
 
 
-def test_a_block_of_twice_the_energy_counts_two_to_the_power_of_the_exponent() -> None:
+def test_severity_by_hand() -> None:
+    # a block of twice the energy counts two to the power of the exponent
     severity = Severity(basis=SeverityBasis.DISSIPATED_ENERGY, exponent=1.5)
     found = severity_map(severity, blocks([10e3, 20e3]))
     assert found.progress(2000.0) == pytest.approx(1000.0 + 1000.0 * 2**1.5)
     assert found.unit == pytest.approx(0.5**1.5)
     # beyond the last block recent duty goes on: the last 1,000 cycles
     assert found.progress(3000.0) - found.progress(2000.0) == pytest.approx(1000.0 * 2**1.5)
+    # what says nothing takes the usual
+    found = severity_map(ENERGY, blocks([10e3, None, 30e3, None]))
+    steps = np.diff(found.progress(np.arange(0.0, 4001.0, 1000.0)))
+    assert steps == pytest.approx([1000.0, 2000.0, 3000.0, 2000.0])
+    # overlaps count once and a run in before zero not at all
+    made = [
+        Block(end=0.0, cycles=200.0, energy=5e3),
+        *blocks([10e3, 10e3]),
+        Block(end=2500.0, cycles=2500.0, energy=40e3),
+    ]
+    found = severity_map(ENERGY, made)
+    assert found.progress(np.array([1000.0, 2000.0, 2500.0])) == pytest.approx([1000.0, 2000.0, 4000.0])
+    # recent duty is the last tenth or a thousand cycles
+    made = blocks([10e3] * 28 + [20e3] * 2)
+    assert severity_map(ENERGY, made).rate == pytest.approx((2.0 * 2000.0 + 1000.0) / 3000.0)
+    assert severity_map(ENERGY, blocks([10e3, 20e3], length=500.0)).rate == pytest.approx(1.5)
+    # sliding distance assumes a duration only where none is stated
+    told = Block(end=1.0, cycles=1.0, speed=200.0, duration=0.5)
+    assumed = Block(end=1.0, cycles=1.0, speed=200.0)
+    assert told.work(SeverityBasis.SLIDING_DISTANCE) == pytest.approx(50.0)
+    assert assumed.work(SeverityBasis.SLIDING_DISTANCE) == pytest.approx(100.0)
+    assert told.work(SeverityBasis.DISSIPATED_ENERGY) is None
 
 
 @pytest.mark.parametrize("severity", [ENERGY, Severity(basis=SeverityBasis.SLIDING_DISTANCE, exponent=0.7)])
@@ -58,36 +81,6 @@ def test_the_inverse_leads_back(severity: Severity) -> None:
     at = rng.uniform(0.0, 9000.0, 300)
     assert found.cycles_at(found.progress(at)) == pytest.approx(at, rel=1e-10)
     assert (np.diff(found.progress(np.sort(at))) > 0).all()
-
-
-def test_what_says_nothing_takes_the_usual() -> None:
-    found = severity_map(ENERGY, blocks([10e3, None, 30e3, None]))
-    steps = np.diff(found.progress(np.arange(0.0, 4001.0, 1000.0)))
-    assert steps == pytest.approx([1000.0, 2000.0, 3000.0, 2000.0])
-
-
-def test_overlaps_count_once_and_a_run_in_before_zero_not_at_all() -> None:
-    made = [
-        Block(end=0.0, cycles=200.0, energy=5e3),
-        *blocks([10e3, 10e3]),
-        Block(end=2500.0, cycles=2500.0, energy=40e3),
-    ]
-    found = severity_map(ENERGY, made)
-    assert found.progress(np.array([1000.0, 2000.0, 2500.0])) == pytest.approx([1000.0, 2000.0, 4000.0])
-
-
-def test_recent_duty_is_the_last_tenth_or_a_thousand_cycles() -> None:
-    made = blocks([10e3] * 28 + [20e3] * 2)
-    assert severity_map(ENERGY, made).rate == pytest.approx((2.0 * 2000.0 + 1000.0) / 3000.0)
-    assert severity_map(ENERGY, blocks([10e3, 20e3], length=500.0)).rate == pytest.approx(1.5)
-
-
-def test_sliding_distance_assumes_a_duration_only_where_none_is_stated() -> None:
-    told = Block(end=1.0, cycles=1.0, speed=200.0, duration=0.5)
-    assumed = Block(end=1.0, cycles=1.0, speed=200.0)
-    assert told.work(SeverityBasis.SLIDING_DISTANCE) == pytest.approx(50.0)
-    assert assumed.work(SeverityBasis.SLIDING_DISTANCE) == pytest.approx(100.0)
-    assert told.work(SeverityBasis.DISSIPATED_ENERGY) is None
 
 
 @pytest.mark.parametrize("wrong", [{"cycles": 0.0}, {"energy": -1.0}, {"speed": math.nan}, {"end": math.inf}])

@@ -111,7 +111,7 @@ def test_hidden_heating_is_named_by_the_plate_and_not_without_it() -> None:
     assert HEATING not in look(campaign(7, heated)).causes
 
 
-def test_without_the_channel_the_effect_is_what_it_was() -> None:
+def test_where_the_channel_is_missing_warmth_is_computed() -> None:
     scene = scene_of(campaign(1))
     assert scene.facts.plate_warming is None
     assert np.isnan(scene.points.plate_rise).all()
@@ -119,6 +119,27 @@ def test_without_the_channel_the_effect_is_what_it_was() -> None:
     assert len(tried) == 20
     computed = _computed(scene, 1.5, 1.5)
     assert _measured(scene, computed) is computed
+    # where some tests have it the others are computed
+    given = with_plate(campaign(1), RISE)
+    scene = scene_of(altered(given, moving=lambda _: {"plate_temperature": None}))
+    assert len(INTERFACE_HEATING.grid(scene.facts)) == 20
+    computed = _computed(scene, 1.5, 0.0)
+    used, steady = _measured(scene, computed), scene.points.steady
+    np.testing.assert_array_equal(used[~steady], computed[~steady])
+    assert np.abs(used - computed)[steady].min() > 0
+
+    # a plate that stays at the oils temperature is nowhere warm
+    def cool(table: Plateaus | Record) -> dict[str, FloatArray]:
+        return {"plate_temperature": np.asarray(table.oil_temperature)}
+
+    scene = scene_of(altered(campaign(1), lambda run: cool(run.plateaus), lambda run: cool(run.record)))
+    assert not INTERFACE_HEATING.change(scene, 0.1, (0.0, WHOLE, 0.0)).any()
+    # without oil temperature the plate is above its own coldest
+    given = with_plate(campaign(1, temperature=False), RISE)
+    points = build_design(given).points
+    for run in range(len(given.stationary)):
+        assert points.plate_rise[points.steady & (points.run == run)].min() == 0.0
+    assert facts_of(given).plate_warming is not None
 
 
 def test_with_the_channel_it_goes_with_the_plate_and_a_thermometers_offset_is_nothing() -> None:
@@ -135,32 +156,6 @@ def test_with_the_channel_it_goes_with_the_plate_and_a_thermometers_offset_is_no
         loops = ~scene.points.steady
         modelled = warmth(scene.curve, scene.points.velocity, 0.0, np.zeros(1)) * 0.32e6 * area
         assert np.corrcoef(lost[loops], modelled[loops])[0, 1] > 0.7  # the course within a loop is the plate's own
-
-
-def test_a_plate_that_stays_at_the_oils_temperature_is_nowhere_warm() -> None:
-    def cool(table: Plateaus | Record) -> dict[str, FloatArray]:
-        return {"plate_temperature": np.asarray(table.oil_temperature)}
-
-    scene = scene_of(altered(campaign(1), lambda run: cool(run.plateaus), lambda run: cool(run.record)))
-    assert not INTERFACE_HEATING.change(scene, 0.1, (0.0, WHOLE, 0.0)).any()
-
-
-def test_where_some_tests_have_it_the_others_are_computed() -> None:
-    given = with_plate(campaign(1), RISE)
-    scene = scene_of(altered(given, moving=lambda _: {"plate_temperature": None}))
-    assert len(INTERFACE_HEATING.grid(scene.facts)) == 20
-    computed = _computed(scene, 1.5, 0.0)
-    used, steady = _measured(scene, computed), scene.points.steady
-    np.testing.assert_array_equal(used[~steady], computed[~steady])
-    assert np.abs(used - computed)[steady].min() > 0
-
-
-def test_without_oil_temperature_the_plate_is_above_its_own_coldest() -> None:
-    given = with_plate(campaign(1, temperature=False), RISE)
-    points = build_design(given).points
-    for run in range(len(given.stationary)):
-        assert points.plate_rise[points.steady & (points.run == run)].min() == 0.0
-    assert facts_of(given).plate_warming is not None
 
 
 @pytest.mark.slow

@@ -60,7 +60,7 @@ def test_json_carries_it_exactly(warm):
     assert facts_to(facts_from(json.loads(json.dumps(facts_to(facts))))) == facts_to(facts)
 
 
-def test_the_artefact_of_temperature_is_that_of_the_viscosity(warm):
+def test_the_artefact_of_temperature_is_that_of_the_viscosity_in_both_directions(warm) -> None:
     """Written out: C_v v^0.3 ((ν/ν_ref)^β - 1) with C_v of the fitted laws."""
     run = warm.campaign.stationary[4]
     found = extension_of(warm, TEMPERATURE).artefact(run, warm.campaign)[0]
@@ -74,9 +74,7 @@ def test_the_artefact_of_temperature_is_that_of_the_viscosity(warm):
     # and what it leaves is nearer to a run at the usual temperature than what was measured
     usual = replace(run.plateaus, oil_temperature=np.full_like(run.plateaus.torque, facts.reference_temperature))
     assert np.abs(extension_of(warm, TEMPERATURE).artefact(replace(run, plateaus=usual), warm.campaign)).max() < 1e-12
-
-
-def test_turned_the_other_way_the_artefact_turns_as_well(warm):
+    # turned the other way the artefact turns as well
     run = warm.campaign.stationary[4]
     back = replace(run, plateaus=replace(run.plateaus, speed=-run.plateaus.speed, torque=-run.plateaus.torque))
     built = extension_of(warm, TEMPERATURE)
@@ -86,9 +84,7 @@ def test_turned_the_other_way_the_artefact_turns_as_well(warm):
     assert np.allclose(zero.artefact(back, warm.campaign), 0.3)
     assert np.allclose(zero.artefact(run, warm.campaign), 0.3)
     assert np.allclose(zero.artefact(warm.campaign.stationary[1], warm.campaign), 0.0)
-
-
-def test_without_temperature_nothing_is_taken_off(warm):
+    # without temperature nothing is taken off
     table = warm.campaign.stationary[4].plateaus
     bare = Plateaus(pressure=table.pressure, speed=table.speed, torque=table.torque)
     run = StationaryRun(run_id="later", cycles=2e4, plateaus=bare)
@@ -169,7 +165,7 @@ def test_a_course_ends_friction_at_most_and_does_not_turn_it(warm):
     assert np.allclose(half, 0.5 * found)
 
 
-def test_every_draw_is_a_correction_of_its_own_and_they_weigh_as_they_should(warm):
+def test_draws_weigh_as_they_should_and_logged_severity_is_counted(warm) -> None:
     alone = extension_of(warm, WEAR).course(CYCLES, PRESSURE, VELOCITY)
     both = extended(warm, drawn(warm, WEAR, weight=0.6), drawn(warm, weight=0.2))
     assert both.effects == ("accelerated_wear",)
@@ -177,6 +173,13 @@ def test_every_draw_is_a_correction_of_its_own_and_they_weigh_as_they_should(war
     course = both.course(CYCLES, PRESSURE, VELOCITY)
     assert np.allclose(course[0], alone[0])
     assert not course[1].any()
+    # logged severity is counted and then no course
+    logged = extension_of(warm, ("load_severity", 0.8, ()))
+    assert logged.severity_exponent == 0.8
+    assert not logged.course(CYCLES, PRESSURE, VELOCITY).any()
+    # the controls: without courses nothing of it is followed; others count nothing
+    assert extension_of(warm, ("load_severity", 0.8, ()), courses=False).severity_exponent is None
+    assert extension_of(warm, WEAR).severity_exponent is None
 
 
 def test_a_draw_carries_the_template_s_discrepancy_along_life(warm):
@@ -190,15 +193,6 @@ def test_a_draw_carries_the_template_s_discrepancy_along_life(warm):
     assert np.allclose(built.artefact(tests[-1], warm.campaign), 0.4 * 0.75)
     later = replace(tests[-1], cycles=3.0 * tests[-1].cycles)
     assert np.allclose(built.artefact(later, warm.campaign), 0.4 * 0.75)
-
-
-def test_logged_severity_is_counted_and_then_no_course(warm):
-    logged = extension_of(warm, ("load_severity", 0.8, ()))
-    assert logged.severity_exponent == 0.8
-    assert not logged.course(CYCLES, PRESSURE, VELOCITY).any()
-    # the controls: without courses nothing of it is followed; others count nothing
-    assert extension_of(warm, ("load_severity", 0.8, ()), courses=False).severity_exponent is None
-    assert extension_of(warm, WEAR).severity_exponent is None
 
 
 def test_a_zero_that_creeps_by_days_keeps_the_days_of_its_diagnosis(warm):

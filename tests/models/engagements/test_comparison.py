@@ -27,11 +27,16 @@ def straight(duration: float, points: int = 65) -> SpeedCourse:
     )
 
 
-def test_the_same_engagement_is_no_distance_away() -> None:
+def test_the_same_engagement_is_no_distance_away_from_its_reference() -> None:
     found = compared(straight(1.0), reference_of([straight(1.0), straight(1.0)]))
     assert found.normalised_duration.value == pytest.approx(1.0)
     assert found.euclidean_distance.value == pytest.approx(0.0, abs=1e-9)
     assert found.spectral_angle.value == pytest.approx(0.0, abs=1e-6)
+    # a reference needs an engagement and duties differ by more than a tenth
+    with pytest.raises(ValueError, match="at least one"):
+        reference_of([])
+    assert same_duty(2100, 2000)
+    assert not same_duty(1200, 2000)
 
 
 @pytest.mark.parametrize("longer", [1.2, 2.0])
@@ -61,13 +66,6 @@ def test_wear_shows_in_noisy_records_beyond_its_standard_error() -> None:
         assert noise.value < 3 * noise.sd
 
 
-def test_a_reference_needs_an_engagement_and_duties_differ_by_more_than_a_tenth() -> None:
-    with pytest.raises(ValueError, match="at least one"):
-        reference_of([])
-    assert same_duty(2100, 2000)
-    assert not same_duty(1200, 2000)
-
-
 # --- A measured engagement beside a model's: none where the model is right, as much as the model is wrong.
 
 GEOMETRY = Geometry()
@@ -92,13 +90,18 @@ def test_the_right_model_has_no_discrepancy_but_noise(name: str) -> None:
     assert abs(found.stop_time_difference.value) < 0.02
 
 
-def test_a_model_that_is_ten_percent_too_strong_stops_a_tenth_too_early() -> None:
+def test_a_model_that_is_too_strong_stops_too_early_and_one_that_is_too_weak_never() -> None:
     found = against(record(FORMS["constant"], 100.0), coulomb(0.132))
     stop = FORMS["constant"].stop
     assert found.stop_time_difference.value == pytest.approx(
         stop - stop / 1.1, rel=0.15
     )  # 1 % of the inertia is 11 % of it
     assert found.torque_share == pytest.approx(0.1, rel=0.1)
+    # a model that is too weak to stop the shaft has no stop time
+    found = against(record(FORMS["constant"], 100.0), coulomb(0.01))
+    assert found.simulated_stop_time is None
+    assert found.stop_time_difference is None
+    assert found.torque_share == pytest.approx(11 / 12, rel=0.02)
 
 
 def test_the_rig_of_the_reference_shows_its_motor_and_its_inertia() -> None:
@@ -112,10 +115,3 @@ def test_the_rig_of_the_reference_shows_its_motor_and_its_inertia() -> None:
     assert found.torque_share < 0.02
     worn = against(measured, clutch.capacity(2000.0))
     assert worn.torque_share > 5 * found.torque_share
-
-
-def test_a_model_that_is_too_weak_to_stop_the_shaft_has_no_stop_time() -> None:
-    found = against(record(FORMS["constant"], 100.0), coulomb(0.01))
-    assert found.simulated_stop_time is None
-    assert found.stop_time_difference is None
-    assert found.torque_share == pytest.approx(11 / 12, rel=0.02)

@@ -34,14 +34,12 @@ def test_noiseless_curves_are_recovered(life):
     assert all(fit.status is FitStatus.DETERMINED and fit.acceptable for fit in fits)
 
 
-def test_fits_do_not_depend_on_the_curves_beside_them():
+def test_fits_do_not_depend_on_the_curves_beside_them_nor_on_batches() -> None:
     curves = [curve(VELOCITY, noisy(1)), curve(VELOCITY[::4], noisy(2)[::4]), curve(VELOCITY[:1], [3.0])]
     for together, alone in zip(fit_curves(curves), (fit_curves([each])[0] for each in curves), strict=True):
         np.testing.assert_allclose(together.parameters.as_array(), alone.parameters.as_array(), rtol=1e-6)
     assert fit_curves([]) == ()
-
-
-def test_many_points_are_fitted_in_batches():
+    # many points are fitted in batches
     velocity, measured = np.tile(VELOCITY, 300), np.tile(eq3(FRESH, VELOCITY), 300)
     fits = fit_curves([curve(velocity, measured), curve(velocity, measured)])
     np.testing.assert_allclose([fit.parameters.as_array() for fit in fits], [FRESH, FRESH], rtol=1e-5)
@@ -75,29 +73,25 @@ def test_a_repeated_point_shifts_the_mean_torque_within_noise(row, seed):
     assert abs(mean_torques([after], VELOCITY)[0, 0] - mean) < 3 * sd
 
 
-def test_both_directions_are_one_curve():
+def test_both_directions_are_one_curve_with_points_at_rest() -> None:
     measured = noisy(3)
     forward, backward = one(VELOCITY, measured), one(-VELOCITY, -measured)
     np.testing.assert_array_equal(forward.parameters.as_array(), backward.parameters.as_array())
     assert mean_torques([forward], -VELOCITY)[0, 0] == -mean_torques([forward], VELOCITY)[0, 0]
-
-
-def test_points_at_rest_give_the_static_torque():
+    # points at rest give the static torque
     velocity = np.concatenate([[0.0, -0.0], VELOCITY])
     fit = one(velocity, np.concatenate([[25.0, -25.0], eq3(FRESH, VELOCITY)]))
     np.testing.assert_allclose(fit.parameters.as_array(), FRESH, rtol=1e-5)
 
 
-def test_weights_follow_the_given_deviations():
+def test_given_deviations_are_weights_unless_the_residuals_contradict_them() -> None:
     """Three wild points with a deviation to match leave the curve where it was."""
     measured, sd = noisy(4), np.full(VELOCITY.size, 0.25)
     measured[[3, 17, 30]], sd[[3, 17, 30]] = 90.0, 1e4
     fit = one(VELOCITY, measured, sd)
     assert mean_torques([fit], VELOCITY)[0, 0] == pytest.approx(eq3(FRESH, VELOCITY).mean(), abs=0.3)
     assert mean_torques([one(VELOCITY, measured)], VELOCITY)[0, 0] > eq3(FRESH, VELOCITY).mean() + 2
-
-
-def test_deviations_that_the_residuals_contradict_are_not_believed():
+    # deviations that the residuals contradict are not believed
     small, fair = (one(VELOCITY, noisy(5), np.full(VELOCITY.size, sd)) for sd in (0.01, 0.25))
     assert "are larger than torque_sd_nm" in small.message
     assert "exceed" not in fair.message
@@ -114,16 +108,14 @@ def test_eq_5_is_one_minus_r_squared():
     assert fit.acceptable == (fit.mse_percent < 5)
 
 
-def test_a_constant_torque_has_no_error_of_eq_5():
+def test_what_a_curve_does_not_determine_is_said() -> None:
+    # a constant torque has no error of eq 5
     fit = one(VELOCITY, np.full(VELOCITY.size, 12.0))
     assert fit.mse_percent is None
     assert not fit.acceptable
     assert "stribeck_velocity" in fit.undetermined
     np.testing.assert_allclose(torque(VELOCITY, fit.parameters), 12.0, rtol=1e-6)
-
-
-def test_a_torque_that_only_rises_has_no_coulomb_ratio():
-    """M_s -> 0 with M_s M̄_c finite: the curve is right to a millionth and M̄_c is called what it is."""
+    # M_s -> 0 with M_s M̄_c finite: the curve is right to a millionth and M̄_c is called what it is.
     measured = 30.0 * np.exp(-4.0 / VELOCITY)
     fit = one(VELOCITY, measured)
     np.testing.assert_allclose(torque(VELOCITY, fit.parameters), measured, atol=30 * 3e-5)
@@ -131,9 +123,7 @@ def test_a_torque_that_only_rises_has_no_coulomb_ratio():
     assert "coulomb_ratio" in fit.undetermined
     assert fit.parameters.stribeck_velocity == pytest.approx(4.0, rel=1e-3)
     assert mean_torques([fit], VELOCITY)[0, 1] < 0.01
-
-
-def test_a_viscous_coefficient_at_zero_is_at_bound():
+    # a viscous coefficient at zero is at bound
     fit = one(VELOCITY, eq3(np.array([25.0, 0.5, 3.0, 0.0]), VELOCITY) - 0.3 * VELOCITY**0.3)
     assert fit.status is FitStatus.AT_BOUND
     assert fit.parameters.viscous_coefficient == 0

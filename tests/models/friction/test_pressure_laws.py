@@ -64,7 +64,7 @@ def test_no_general_optimiser_does_better() -> None:
         )  # the search over p_0 stops at 1e-5 of its log
 
 
-def test_the_laws_of_a_simulated_clutch() -> None:
+def test_the_laws_of_a_simulated_clutch_from_three_pressures_on() -> None:
     clutch = simulated_clutch(3)
     laws = fit_pressure_laws(fits_of_fresh_clutch())
     assert laws.static_torque.slope > 0
@@ -73,9 +73,7 @@ def test_the_laws_of_a_simulated_clutch() -> None:
     assert laws.coulomb_ratio.excess > 0
     found = laws.parameters(PROTOCOL_PRESSURES).as_array()
     assert found == pytest.approx(clutch.parameters(PROTOCOL_PRESSURES, 0.0).as_array(), rel=1e-3)
-
-
-def test_too_few_pressures_have_no_law() -> None:
+    # too few pressures have no law
     fits = fits_of_fresh_clutch()
     assert fit_pressure_laws(fits[:2]) is None
     untold = [replace(fit, undetermined=("stribeck_velocity",)) for fit in fits[:5]]
@@ -83,7 +81,7 @@ def test_too_few_pressures_have_no_law() -> None:
     assert fit_pressure_laws([*untold[:4], *fits[4:]]) is not None
 
 
-def test_laws_through_medians_are_the_laws_that_made_them() -> None:
+def test_laws_through_medians_are_the_laws_that_made_them_at_several_states_too() -> None:
     clutch = simulated_clutch(3)
     columns = clutch.parameters(PROTOCOL_PRESSURES, 2_000.0).as_array().T
     between = np.array([4.2e5, 6.9e5])
@@ -93,9 +91,7 @@ def test_laws_through_medians_are_the_laws_that_made_them() -> None:
     assert laws_of(PROTOCOL_PRESSURES, columns[:, ::-1]).parameters(between).as_array() != pytest.approx(
         expected, rel=0.1
     )
-
-
-def test_a_parameter_over_pressure_at_several_states_is_its_law_at_each() -> None:
+    # a parameter over pressure at several states is its law at each
     clutch = simulated_clutch(3)
     states, pressures = [0.0, 2_000.0, 9_000.0], np.linspace(4e5, 7e5, 5)
     for name in PARAMETER_NAMES:
@@ -134,7 +130,7 @@ def test_the_band_of_the_falling_law_is_how_far_repeated_tests_scatter() -> None
     assert np.all(sd < deviation)
 
 
-def test_parameters_off_their_law_widen_it() -> None:
+def test_parameters_off_their_law_widen_its_band_and_a_bound_has_none() -> None:
     value = 2.0 + 3e-6 * PROTOCOL_PRESSURES
     off = value + 0.1 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
     deviation = np.full(7, 0.01)
@@ -143,9 +139,7 @@ def test_parameters_off_their_law_widen_it() -> None:
         for values in (value, off)
     )
     assert far[0, 0] > 50.0 * near[0, 0]
-
-
-def test_what_is_held_at_its_bound_has_no_band() -> None:
+    # what is held at its bound has no band
     flat = np.full(7, 0.6)
     covariance = law_covariance(
         AsymptoticLaw(asymptote=0.6, excess=0.0, decay=1e5), PROTOCOL_PRESSURES, flat, np.full(7, 0.1)

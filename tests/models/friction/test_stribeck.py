@@ -16,28 +16,16 @@ CASES = [FRESH, np.array([12.0, 0.4, 2.7, 3.2]), np.array([3.0, 4.0, 0.3, 0.0]),
 
 
 @pytest.mark.parametrize("values", CASES)
-def test_torque_is_eq_3_as_printed_and_odd(values):
+def test_torque_is_eq_3_as_printed_and_odd_with_its_derivatives(values) -> None:
     p = parameters(values)
     np.testing.assert_allclose(torque(VELOCITY, p), eq3(values, VELOCITY), rtol=1e-14)
     np.testing.assert_array_equal(torque(-VELOCITY, p), -torque(VELOCITY, p))
     np.testing.assert_array_equal(gradient(-VELOCITY, p), -gradient(VELOCITY, p))
-
-
-@pytest.mark.parametrize("values", CASES)
-def test_gradient_by_complex_step(values):
-    """A complex step has no cancellation: equal to rounding."""
+    # A complex step has no cancellation: equal to rounding.
     steps = np.eye(4) * 1e-30j
     witness = np.stack([_complex_eq3(values + step).imag / 1e-30 for step in steps], axis=1)
     np.testing.assert_allclose(gradient(VELOCITY, parameters(values)), witness, rtol=1e-12, atol=1e-14)
-
-
-def _complex_eq3(x):
-    return x[0] * (1 + (x[1] - 1) * np.exp(-x[2] / VELOCITY)) + x[3] * VELOCITY**GAMMA
-
-
-@pytest.mark.parametrize("values", CASES)
-def test_slope_by_central_differences(values):
-    """Differences over 1e-5 of v: truncation 1e-10 and rounding 1e-11 of the torque over the step."""
+    # Differences over 1e-5 of v: truncation 1e-10 and rounding 1e-11 of the torque over the step.
     h = 1e-5 * VELOCITY
     p = parameters(values)
     witness = (torque(VELOCITY + h, p) - torque(VELOCITY - h, p)) / (2 * h)
@@ -45,7 +33,11 @@ def test_slope_by_central_differences(values):
     np.testing.assert_array_equal(slope(-VELOCITY, p), slope(VELOCITY, p))
 
 
-def test_at_rest_the_sign_bit_names_the_limit():
+def _complex_eq3(x):
+    return x[0] * (1 + (x[1] - 1) * np.exp(-x[2] / VELOCITY)) + x[3] * VELOCITY**GAMMA
+
+
+def test_at_rest_the_sign_bit_names_the_limit() -> None:
     p = parameters(FRESH)
     assert torque(np.array([0.0, -0.0]), p).tolist() == [25.0, -25.0]
     assert gradient(np.array([0.0, -0.0]), p).tolist() == [[1, 0, 0, 0], [-1, 0, 0, 0]]
@@ -53,15 +45,12 @@ def test_at_rest_the_sign_bit_names_the_limit():
     np.testing.assert_allclose(torque(tiny, p), [25.0, -25.0], atol=1e-8)
     assert slope(np.array([0.0]), p).tolist() == [np.inf]
     assert slope(np.array([0.0]), parameters([25.0, 0.5, 4.5, 0.0])).tolist() == [0.0]
-
-
-def test_at_rest_without_a_stribeck_velocity():
-    """V_S = 0 means e = 1 wherever it moves; at rest e is 0 by its limit, for every V_S."""
+    # V_S = 0 means e = 1 wherever it moves; at rest e is 0 by its limit, for every V_S.
     p = parameters([20.0, 0.5, 0.0, 0.0])
     assert torque(np.array([0.0, 1e-9, 5.0]), p).tolist() == [20.0, 10.0, 10.0]
 
 
-def test_parameters_round_trip_and_broadcast():
+def test_parameters_round_trip_and_broadcast() -> None:
     p = parameters(FRESH)
     np.testing.assert_array_equal(p.as_array(), FRESH)
     assert isinstance(p.static_torque, float)
@@ -70,6 +59,9 @@ def test_parameters_round_trip_and_broadcast():
     assert gradient(VELOCITY, many).shape == (2, VELOCITY.size, 4)
     np.testing.assert_array_equal(torque(VELOCITY, many)[0], torque(VELOCITY, p))
     assert many.as_array().shape == (4, 2, 1)
+    # an array of another length is refused
+    with pytest.raises(ValueError, match="values must have 4 rows"):
+        StribeckParameters.from_array(np.ones(3))
 
 
 @pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
@@ -79,11 +71,6 @@ def test_a_parameter_that_is_not_finite_and_positive_is_refused(bad, index):
     values[index] = bad
     with pytest.raises(ValueError, match=f"{PARAMETER_NAMES[index]} must be finite and not negative"):
         parameters(values)
-
-
-def test_an_array_of_another_length_is_refused():
-    with pytest.raises(ValueError, match="values must have 4 rows"):
-        StribeckParameters.from_array(np.ones(3))
 
 
 # --- dμ/dv of a fitted curve: its gradient by differences, its sign by eye, and what it refuses.

@@ -161,21 +161,17 @@ def test_the_law_that_made_the_record_is_reported(parameters, name):
     assert f"The {name} law describes the loop better." in loop.message
 
 
-def test_a_lag_that_the_attractor_cannot_give():
+def test_what_leaves_the_attractor_open_and_what_does_not_reach_it() -> None:
+    # a lag that the attractor cannot give
     loop = evaluated(squeezed(RISING, 0.2), RISING, noise=0.01, rng=np.random.default_rng(6))
     assert loop.status is LagStatus.AGAINST_THE_LAW
     assert (loop.attractor, loop.attractor_sd) == (None, None)
     assert abs(loop.film_time - 0.2) < 4 * loop.film_time_sd
-
-
-def test_a_loop_within_its_noise_leaves_the_attractor_open():
+    # a loop within its noise leaves the attractor open
     loop = evaluated(attractor(FALLING, 20_000.0), FALLING, noise=0.01, rng=np.random.default_rng(0))
     assert loop.status is LagStatus.UNRESOLVED
     assert loop.attractor is None
-
-
-def test_gain_and_zero_of_the_day_do_not_reach_the_attractor():
-    """A record at 3 % more torque and 0.4 Nm of zero: scaled torque lags at C, its curve's C is that over the gain."""
+    # A record at 3 % more torque and 0.4 Nm of zero: scaled torque lags at C, its curve's C is that over the gain.
     scaled = StribeckParameters.from_array(FALLING.as_array() * [1.03, 1.0, 1.0, 1.03])
     made = attractor(scaled, 150.0)
     loop = evaluated(lambda t: made(t) + 0.4, FALLING)
@@ -230,7 +226,7 @@ def test_the_curve_s_error_is_the_lag_s(law, truth, made):  # noqa: ARG001
     assert (1 / low - 1 / high) / 2 == pytest.approx(Z90 * told.lag_sd / told.lag**2, rel=0.02)
 
 
-def test_a_curve_that_may_be_flat_leaves_the_lag_open():
+def test_a_curve_that_may_be_flat_leaves_the_lag_open_and_too_few_samples_are_refused() -> None:
     vague = StationaryCurve(parameters=FALLING, covariance=np.diag([1.0, 0.3, 1.0, 0.5]) ** 2)
     fit = fitted(ATTRACTOR, attractor(FALLING, 150.0)(TIME), vague)
     assert fit.status is LagStatus.UNRESOLVED
@@ -238,9 +234,7 @@ def test_a_curve_that_may_be_flat_leaves_the_lag_open():
     assert fit.interval[1] == math.inf
     with pytest.raises(ValueError, match="4 x 4 and finite"):
         StationaryCurve(parameters=FALLING, covariance=np.full((4, 4), np.nan))
-
-
-def test_too_few_sliding_samples_are_refused():
+    # too few sliding samples are refused
     with pytest.raises(ValueError, match="at least 20 samples must slide, got 3"):
         fit_lag(
             SQUEEZE_FILM, fit_cycle(TIME, velocity(TIME)), np.zeros(3), np.ones(3), StationaryCurve(parameters=FALLING)

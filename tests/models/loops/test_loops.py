@@ -163,19 +163,14 @@ def test_held_between_two_pressures_and_brought_back_is_left_out():
     assert loop.area == pytest.approx(closed_form(), rel=0.015)  # the end is blurred, and so are two periods' ends
 
 
-def test_a_reversing_speed_has_area_and_no_law():
-    swing = record([lagging], [5e5])
-    back = replace(swing, speed=swing.speed - SWING)
-    loop = only(evaluate_loops(back, GEOMETRY, {5e5: EXACT}))
-    assert loop.status is LagStatus.REVERSES
-    assert loop.area == pytest.approx(closed_form(), rel=1e-6)
-    assert loop.attractor is None
-
-
-def test_curve_of_another_pressure_is_not_taken():
+def test_a_curve_of_another_pressure_or_of_no_torque_is_none() -> None:
     swing = record([attractor(FALLING, 100.0)], [5e5])
     assert only(evaluate_loops(swing, GEOMETRY, {5.5e5: EXACT})).status is LagStatus.NO_CURVE
     assert only(evaluate_loops(swing, GEOMETRY, {5.05e5: EXACT})).status is LagStatus.DETERMINED
+    # a curve of no torque is none
+    nothing = replace(FALLING, static_torque=0.0, viscous_coefficient=0.0)
+    loop = only(evaluate_loops(record([lagging], [5e5]), GEOMETRY, {5e5: StationaryCurve(parameters=nothing)}))
+    assert loop.status is LagStatus.NO_CURVE
 
 
 def test_a_bent_swing():
@@ -197,18 +192,19 @@ def test_a_bent_swing():
     assert area_of(pure, clean_samples(pure, time, torque(time))).area != pytest.approx(expected, rel=1e-3)
 
 
-def test_the_other_sense_of_rotation_is_the_same_loop():
+def test_the_sense_of_rotation_does_not_matter_and_a_reversing_speed_has_no_law() -> None:
     swing = record([attractor(FALLING, 100.0)], [5e5])
     turned = replace(swing, speed=-swing.speed, torque=-swing.torque)
     here, there = (only(evaluate_loops(one, GEOMETRY, {5e5: EXACT})) for one in (swing, turned))
     assert there.area == pytest.approx(here.area, rel=1e-9)
     assert there.attractor == pytest.approx(here.attractor, rel=1e-9)
-
-
-def test_a_curve_of_no_torque_is_none():
-    nothing = replace(FALLING, static_torque=0.0, viscous_coefficient=0.0)
-    loop = only(evaluate_loops(record([lagging], [5e5]), GEOMETRY, {5e5: StationaryCurve(parameters=nothing)}))
-    assert loop.status is LagStatus.NO_CURVE
+    # a reversing speed has area and no law
+    swing = record([lagging], [5e5])
+    back = replace(swing, speed=swing.speed - SWING)
+    loop = only(evaluate_loops(back, GEOMETRY, {5e5: EXACT}))
+    assert loop.status is LagStatus.REVERSES
+    assert loop.area == pytest.approx(closed_form(), rel=1e-6)
+    assert loop.attractor is None
 
 
 @settings(max_examples=30, deadline=None)

@@ -37,16 +37,13 @@ def posterior_of(tracker: Any, seen: list[Measurement]) -> Posterior:
 
 
 @TRACKERS
-def test_a_life_that_accelerates_is_said_to_and_held(tracker: Any) -> None:
+def test_a_life_that_accelerates_is_said_to_and_held_and_one_of_eq_6_too(tracker: Any) -> None:
     posterior = posterior_of(tracker, accelerating(0.6))
     assert course_shares(posterior)[0].name is CourseName.ACCELERATING
     assert course_shares(posterior)[0].probability > 0.8
     found = predict_first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life
     assert found[0.05] < 10_000.0 < (found[0.95] or math.inf)
-
-
-@TRACKERS
-def test_a_life_of_eq_6_is_said_to_be(tracker: Any) -> None:
+    # a life of eq 6 is said to be
     shares = course_shares(posterior_of(tracker, CAMPAIGN))
     assert shares[0].name is CourseName.EQ_6
     assert (shares[0].order or 0.0) > 1.0

@@ -178,17 +178,14 @@ def test_ended_lives_of_another_kind_do_not_move_the_end_once_its_own_tests_spea
     assert stated_by[:3] == pytest.approx(stated_by[3:], rel=0.02)
 
 
-def test_what_is_behind_stays_behind_and_weights_sum_to_one() -> None:
+def test_what_is_behind_stays_behind_and_one_draw_that_agrees_is_no_certainty() -> None:
     kin = said(measured(1_100.0, 0.6), lives())
     own, weight = np.array([600.0, 900.0, 1_200.0, np.inf]), np.array([0.1, 0.3, 0.4, 0.2])
     for share in (0.0, 0.9):
         ends, given = replace(kin, lawful=share).together(own, weight, np.zeros(4, dtype=np.intp), 660.0)
         assert given.sum() == pytest.approx(1.0)
         assert given[ends <= 660.0].sum() == pytest.approx(0.1)
-
-
-def test_one_draw_that_agrees_with_the_ended_lives_is_no_certainty() -> None:
-    """Of a filter whose draws end, where at all, far from where the others did but for one."""
+    # Of a filter whose draws end, where at all, far from where the others did but for one.
     kin = said(measured(1_100.0, 0.6), lives())
     own = np.concatenate([[1_100.0], np.geomspace(2_000.0, 1e6, 199), np.full(300, np.inf)])
     ends, given = replace(kin, lawful=1.0).together(own, np.full(500, 0.002), np.zeros(500, dtype=np.intp), 660.0)
@@ -209,11 +206,6 @@ def test_courses_that_fit_a_clutch_do_not_take_the_share_of_its_filter(log_odds:
         assert given[-kin.ends.size :].sum() == pytest.approx(courses * weight[own > 660.0].sum(), rel=0.05)
 
 
-def test_a_clutch_that_has_outlived_all_of_them_by_far_is_not_of_their_kind() -> None:
-    tests = measured(8_000.0, 0.6)
-    assert of_kind(said(tests, lives())) < 0.1
-
-
 def test_the_predictive_is_a_density_with_censored_ends_and_without() -> None:
     at = np.linspace(-6.0, 6.0, 4_001)
     values = np.array([-0.2, 0.0, 0.1, 0.3])
@@ -222,10 +214,13 @@ def test_the_predictive_is_a_density_with_censored_ends_and_without() -> None:
         assert density.sum() * (at[1] - at[0]) == pytest.approx(1.0, abs=0.01)
 
 
-def test_it_is_alive_now() -> None:
+def test_a_clutch_is_alive_now_and_one_that_has_outlived_all_of_them_by_far_is_not_of_their_kind() -> None:
     """At an age that most of the others did not reach."""
     low, _, _ = quantiles(said(measured(1_500.0, 0.8), lives()))
     assert low > 1_200.0
+    # a clutch that has outlived all of them by far is not of their kind
+    tests = measured(8_000.0, 0.6)
+    assert of_kind(said(tests, lives())) < 0.1
 
 
 @pytest.mark.parametrize(("new_level", "size"), [(0, STEP_SIZE), (1, LEVEL_SIZE)])
@@ -271,7 +266,7 @@ def test_a_life_counts_in_other_units_alike() -> None:
     assert [2.0 * x for x in found] == pytest.approx(quantiles(said(tests, lives())))
 
 
-def test_an_ended_life_has_the_course_of_its_tests_until_its_end() -> None:
+def test_an_ended_life_has_the_course_of_its_tests_until_its_end_and_is_stored_exactly() -> None:
     progress = np.array([300.0, 0.0, 300.0, 600.0, 1_200.0])
     values = np.array([0.09, 0.1, 0.08, 0.07, 0.04])
     life = ended_life(progress, values, 1_000.0, initial=0.1, fraction=0.5)
@@ -279,6 +274,9 @@ def test_an_ended_life_has_the_course_of_its_tests_until_its_end() -> None:
     assert life.damage == pytest.approx((0.0, 0.3, 0.6))
     assert life.course(np.array([0.3, 0.8, 1.0, 1.5])).tolist() == pytest.approx([0.3, 0.8, 1.0, 1.5])
     assert ended_life(progress[:3], values[:3], 1_000.0, initial=0.1, fraction=0.5) is None
+    # ended lives are stored exactly
+    for life in (lives()[0], replace(lives()[0], deviation=0.1), replace(lives()[1], censored=True)):
+        assert EndedLife.from_dict(life.to_dict()) == life
 
 
 def test_uncertain_and_censored_ends_are_weighed_as_by_brute_force() -> None:
@@ -334,8 +332,3 @@ def test_a_life_without_wear_that_is_declared_worn_ended_then() -> None:
     end, deviation = declared_end(level, 1_000.0, fraction=0.5, horizon=1e6)
     assert 1_000.0 <= end < 1_500.0
     assert 0.0 < deviation < 0.5
-
-
-def test_ended_lives_are_stored_exactly() -> None:
-    for life in (lives()[0], replace(lives()[0], deviation=0.1), replace(lives()[1], censored=True)):
-        assert EndedLife.from_dict(life.to_dict()) == life

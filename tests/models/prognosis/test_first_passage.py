@@ -48,34 +48,32 @@ def test_a_horizon_before_now_is_now(horizon: float) -> None:
     assert passage.end_of_life[0.5] == pytest.approx(1_000.0)
 
 
-def test_half_of_the_probability_decides_what_is_reached() -> None:
+def test_what_is_reached_and_within_the_horizon() -> None:
     """Ends of life 1,000 (Δ = -1) and never (Δ = -0.4)."""
     for weight, status in ((0.5, "reached"), (0.49, "may_never_reach")):
         passage = predict_first_passage(sample([-1.0, -0.4], [weight, 1.0 - weight]), fraction=0.5, as_of=1_001.0)
         assert passage.status == status
         assert passage.probability_of_reaching == pytest.approx(weight)
-
-
-def test_a_quantile_beyond_the_horizon_is_none() -> None:
+    # a quantile beyond the horizon is none
     passage = predict_first_passage(sample([-1.0] * 60 + [-0.4] * 40), fraction=0.5, as_of=0.0)
     assert passage.status == "may_never_reach"
     assert passage.probability_of_reaching == pytest.approx(0.6)
     assert passage.end_of_life[0.5] == pytest.approx(1_000.0)
     assert passage.end_of_life[0.75] is None
     assert passage.end_of_life[0.95] is None
+    late = predict_first_passage(sample([-1.0], scale=2e6), fraction=0.5, as_of=0.0)
+    assert (set(late.end_of_life.values()), late.probability_of_reaching) == ({None}, 0.0)
+    later = predict_first_passage(sample([-1.0], scale=2e6), fraction=0.5, as_of=0.0, horizon=3e6)
+    assert later.status == "predicted"
 
 
-def test_beyond_the_horizon_counts_as_not_reached() -> None:
-    passage = predict_first_passage(sample([-1.0], scale=2e6), fraction=0.5, as_of=0.0)
-    assert set(passage.end_of_life.values()) == {None}
-    assert passage.probability_of_reaching == 0.0
-    assert predict_first_passage(sample([-1.0], scale=2e6), fraction=0.5, as_of=0.0, horizon=3e6).status == "predicted"
-
-
-def test_the_threshold_is_each_draws_own() -> None:
+def test_the_threshold_is_each_draws_own_and_reached_from_the_start_below_zero() -> None:
     """Two clutches alike but for the level of ξ0: a ratio is indifferent to it."""
     draws = sample([-1.0, -2.0])
     np.testing.assert_allclose(ends_of_life(replace(draws, initial=np.array([1.0, 2.0])), 0.5), 1_000.0)
+    # ξ0 = -1 lies below -0.5 at once, though eq. 6 then rises through it.
+    draws = replace(sample([2.0]), initial=np.array([-1.0]))
+    assert ends_of_life(draws, 0.5)[0] == 0.0
 
 
 @given(
@@ -123,27 +121,24 @@ def bent(draws: Posterior, size: float, curvature: float = 0.0, step: float = 0.
     return replace(draws, discrepancy=course)
 
 
-def test_a_discrepancy_that_is_nothing_changes_nothing_but_the_way_it_is_found() -> None:
+def test_a_discrepancy_by_hand() -> None:
     """Along the path, linear between places 6 % apart, the closed form's end is found to 0.1 %."""
     draws = sample([-1.0, -0.7, -0.4])
     found = ends_of_life(bent(draws, 0.03), 0.5)
     np.testing.assert_allclose(found, ends_of_life(draws, 0.5), rtol=1e-3)
     assert math.isinf(found[2])
+    # Constant but for δ: curvature w on the first sixth of T = 1,000 alone gives δ = w √18 (u - 1/12)/6 from there on.
+    draws = replace(sample([-1.0]), change=np.zeros(1))
+    w = -0.5
+    slope = w * math.sqrt(18.0) / 6.0
+    found = ends_of_life(bent(draws, 0.1, w), 0.5)[0]
+    assert found == pytest.approx(1_000.0 * (-0.5 / slope + 1.0 / 12.0), rel=1e-3)
 
 
 @pytest.mark.parametrize(("step", "end", "rel"), [(-0.1, 666.7, 2e-3), (-0.2, 500.0, 0.02), (0.1, 1_500.0, 2e-3)])
 def test_a_step_of_the_level_is_a_crossing_where_it_is(step: float, end: float, rel: float) -> None:
     """1/(1 + ζ/φ) is 0.55 at ζ = 818: a step of -0.1 at 500, where it is 0.667, brings the end to 1/0.6 - 1."""
     assert ends_of_life(bent(sample([-1.0]), 0.0, 0.0, step, at=500.0), 0.5) == pytest.approx(end, rel=rel)
-
-
-def test_a_bend_by_hand() -> None:
-    """Constant but for δ: curvature w on the first sixth of T = 1,000 alone gives δ = w √18 (u - 1/12)/6 from there on."""
-    draws = replace(sample([-1.0]), change=np.zeros(1))
-    w = -0.5
-    slope = w * math.sqrt(18.0) / 6.0
-    found = ends_of_life(bent(draws, 0.1, w), 0.5)[0]
-    assert found == pytest.approx(1_000.0 * (-0.5 / slope + 1.0 / 12.0), rel=1e-3)
 
 
 def test_looking_at_every_sixth_place_first_is_looking_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -197,13 +192,11 @@ def test_bands_are_those_of_the_paths() -> None:
     assert 0.5 <= quantiles[1, 0] < quantiles[1, 2] <= 0.75
 
 
-def test_a_value_that_is_not_positive_at_first_is_at_its_threshold_from_the_start() -> None:
-    """ξ0 = -1 lies below -0.5 at once, though eq. 6 then rises through it."""
-    draws = replace(sample([2.0]), initial=np.array([-1.0]))
-    assert ends_of_life(draws, 0.5)[0] == 0.0
-
-
 def test_first_below_is_straight_between_places_and_inf_where_never() -> None:
+    at = first_passage.places(5_000.0, 1e6)
+    assert (at[0], at[-1]) == (0.0, pytest.approx(1e6))
+    assert (np.diff(at) > 0.0).all()
+    assert 5_000.0 in at
     paths = np.array([[1.0, 0.4, 1.0], [0.6, 0.3, 0.9], [0.2, 0.1, 0.8]])
     found = first_passage.first_below(paths, np.array([0.0, 10.0, 30.0]), np.full(3, 0.5))
     assert found[:2] == pytest.approx([15.0, 0.0])
@@ -282,18 +275,9 @@ def test_the_first_of_two_counts_and_says_which() -> None:
     first, shares = first_passage.first_reached([(fast, weight), (slow, weight)], 40_000, rng)
     assert shares == pytest.approx([0.75, 0.25], abs=0.01)
     assert first.mean() == pytest.approx(0.75, abs=0.015)
-
-
-def test_what_is_never_reached_is_nobodys_first() -> None:
+    # what is never reached is nobody's first
     weight = np.array([0.5, 0.5])
     ends = [(np.array([10.0, np.inf]), weight), (np.array([np.inf, np.inf]), weight)]
-    first, shares = first_passage.first_reached(ends, 1_000, np.random.default_rng(1))
+    first, shares = first_passage.first_reached(ends, 1_000, rng)
     assert shares.tolist() == [pytest.approx(0.5), 0.0]
     assert np.isfinite(first).mean() == pytest.approx(0.5)
-
-
-def test_places_go_from_the_beginning_to_the_horizon() -> None:
-    at = first_passage.places(5_000.0, 1e6)
-    assert (at[0], at[-1]) == (0.0, pytest.approx(1e6))
-    assert (np.diff(at) > 0.0).all()
-    assert 5_000.0 in at

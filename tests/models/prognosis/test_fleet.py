@@ -44,7 +44,7 @@ def fleet(count: int, seed: int, scale: float = 5000.0) -> FleetPrior:
     return population([taught(measured(life(rng, scale), 3.0 * scale, 14, rng)) for _ in range(count)])
 
 
-def test_the_population_is_found() -> None:
+def test_the_population_is_found_and_a_small_fleet_has_little_say() -> None:
     found = fleet(12, 1)
     assert found.clutches == 12
     assert found.mean[0] == pytest.approx(-0.75, abs=0.06)
@@ -52,22 +52,26 @@ def test_the_population_is_found() -> None:
     assert found.mean[2] == pytest.approx(math.log(0.8), abs=0.35)
     assert found.mean[3] == pytest.approx(math.log(0.003), abs=0.3)
     assert (np.sqrt(np.diag(found.scale)) < [0.16, 0.75, 0.6, 0.5]).all()
-
-
-def test_a_small_fleet_stays_vague_and_has_little_say() -> None:
+    # a small fleet stays vague and has little say
     small, large = fleet(3, 2), fleet(12, 2)
     assert small.share < large.share < 0.5
     deviations = [np.sqrt(np.diag(each.scale) * each.freedom / (each.freedom - 2)) for each in (small, large)]
     assert (deviations[0] > deviations[1]).all()
 
 
-def test_it_survives_json_and_counts_in_other_units() -> None:
+def test_a_fleet_survives_json_counts_in_other_units_and_needs_tests() -> None:
     found = fleet(3, 3)
     again = FleetPrior.from_dict(json.loads(json.dumps(found.to_dict())))
     assert again.to_dict() == found.to_dict()
     first = Measurement(progress=0.0, value=0.13, variance=0.0)
     shifted = found.in_unit(2.0).prior_for(first)
     assert math.exp(shifted.log_scale_mean) == pytest.approx(0.5 * math.exp(found.prior_for(first).log_scale_mean))
+    # too few tests teach nothing
+    rng = np.random.default_rng(4)
+    with pytest.raises(ValueError, match=f"{FEWEST_TESTS_TO_LEARN} tests to teach"):
+        taught(measured(life(rng, 5000.0), 9000.0, FEWEST_TESTS_TO_LEARN - 1, rng))
+    with pytest.raises(ValueError, match=f"{FEWEST_TESTS_TO_LEARN} tests or more"):
+        population([])
 
 
 def test_a_population_has_converged() -> None:
@@ -79,14 +83,6 @@ def test_a_population_has_converged() -> None:
     assert found.mean == pytest.approx(further.mean, abs=near)
     assert first.mean != pytest.approx(further.mean, abs=near)
     assert (population(samples).mean == found.mean).all()
-
-
-def test_too_few_tests_teach_nothing() -> None:
-    rng = np.random.default_rng(4)
-    with pytest.raises(ValueError, match=f"{FEWEST_TESTS_TO_LEARN} tests to teach"):
-        taught(measured(life(rng, 5000.0), 9000.0, FEWEST_TESTS_TO_LEARN - 1, rng))
-    with pytest.raises(ValueError, match=f"{FEWEST_TESTS_TO_LEARN} tests or more"):
-        population([])
 
 
 def crps(posterior: Posterior, truth: float) -> float:

@@ -86,7 +86,7 @@ def paths(levels, references=None, now=float(AT[-1])):
     )
 
 
-def test_sure_tracks_give_eq_3_of_eq_6() -> None:
+def test_sure_tracks_give_eq_3_of_eq_6_and_end_where_it_passes_the_threshold() -> None:
     found = paths([level()])
     assert found.progress[found.now] == AT[-1]
     assert (np.diff(found.progress) > 0).all()
@@ -95,9 +95,7 @@ def test_sure_tracks_give_eq_3_of_eq_6() -> None:
     assert found.paths[early].mean(axis=1) == pytest.approx(mean_cofs(found.progress[early]), rel=1e-3)
     lower, median, upper = found.band()
     assert ((lower <= median) & (median <= upper)).all()
-
-
-def test_ends_of_life_are_where_the_mean_cof_passes_the_threshold() -> None:
+    # ends of life are where the mean cof passes the threshold
     found = paths([level()])
     fine = np.linspace(0.0, 20_000.0, 4_001)
     course = mean_cofs(fine)
@@ -147,9 +145,7 @@ def test_disagreement_of_two_normals() -> None:
     found = disagreement(now, 500.0 + ends, direct, 500.0 + direct_ends, np.full(n, 1.0 / n), 500.0)
     assert found.now == pytest.approx(-0.004 / math.sqrt(0.5 * (0.003**2 + 0.001**2)), rel=0.01)
     assert found.end_of_life == pytest.approx(-0.5 / math.sqrt(0.5 * (0.3**2 + 0.1**2)), rel=0.02)
-
-
-def test_no_disagreement_is_stated_beyond_the_horizon_or_without_uncertainty() -> None:
+    # no disagreement is stated beyond the horizon or without uncertainty
     weight = np.full(4, 0.25)
     same, ends, never = np.full(4, 0.1), np.array([1e4, 1.1e4, 1.2e4, 1.3e4]), np.full(4, np.inf)
     assert disagreement(same, never, same, ends, weight, 0.0).end_of_life is None
@@ -209,16 +205,14 @@ def test_without_correlation_each_track_is_as_it_was() -> None:
         assert found.std() == pytest.approx(sd, rel=0.35)
 
 
-def test_pairs_have_the_wanted_correlation_and_the_same_values() -> None:
+def test_pairs_have_the_wanted_correlation_which_shrinks_where_few_tests_tell_it() -> None:
     rng = np.random.default_rng(3)
     values = np.stack([rng.standard_normal(2000), np.exp(rng.standard_normal(2000))], axis=1)
     index = paired(values, np.array([[1.0, 0.9], [0.9, 1.0]]), rng)
     found = np.take_along_axis(values, index, axis=0)
     assert np.sort(found, axis=0) == pytest.approx(np.sort(values, axis=0))
     assert np.corrcoef(found[:, 0], np.log(found[:, 1]))[0, 1] == pytest.approx(0.9, abs=0.03)
-
-
-def test_correlation_shrinks_where_few_tests_tell_it() -> None:
+    # correlation shrinks where few tests tell it
     rng = np.random.default_rng(4)
     common = rng.standard_normal(60)
     residuals = np.stack([common, common + 0.1 * rng.standard_normal(60)], axis=1)

@@ -81,12 +81,10 @@ def test_a_clutch_is_alive_at_its_first_test() -> None:
     assert (probability, weight.tolist()) == (1.0, [0.0])
 
 
-def test_a_first_test_early_in_what_was_measured_and_few_tests_are_not_weighed() -> None:
+def test_which_first_tests_are_weighed_and_that_their_order_does_not_matter() -> None:
     assert late_start(own(0.03, 0.8), 0.5, offset=None, horizon=1e6) is None
     assert late_start(elsewhere(5.0)[:2], 0.5, offset=None, horizon=1e6) is None
-
-
-def test_tests_that_came_in_another_order_say_the_same() -> None:
+    # tests that came in another order say the same
     tests = elsewhere(1.0)
     one, other = (late_start(each, 0.5, offset=None, horizon=1e6) for each in (tests, tests[::-1]))
     assert other.log_odds == pytest.approx(one.log_odds, abs=0.01)

@@ -55,13 +55,11 @@ def test_crps_of_quantiles_nears_that_of_the_distribution() -> None:
         assert crps_of_quantiles(LEVELS, norm.ppf(LEVELS), truth) == pytest.approx(exact, rel=0.15)
 
 
-def test_levels_must_ascend_within_the_unit_interval() -> None:
+def test_levels_ascend_and_a_bound_beyond_the_horizon_holds_what_never_came() -> None:
     for levels, quantiles in (((0.5, 0.4), (1.0, 2.0)), ((0.0, 0.5), (1.0, 2.0)), ((0.5,), (1.0, 2.0)), ((), ())):
         with pytest.raises(ValueError, match="levels must ascend"):
             crps_of_quantiles(levels, quantiles, 1.0)
-
-
-def test_a_bound_beyond_the_horizon_holds_what_never_came() -> None:
+    # a bound beyond the horizon holds what never came
     assert covered(5.0, None, None)
     assert covered(5.0, None, 9.0)
     assert not covered(5.0, None, 4.0)
@@ -87,15 +85,13 @@ def test_the_pit_by_quantiles(truth: float, share: float) -> None:
     assert pit_of_quantiles((0.1, 0.5, 0.9), (1.0, 2.0, 4.0), truth) == pytest.approx(share)
 
 
-def test_alpha_lambda_accuracy() -> None:
+def test_alpha_lambda_accuracy_and_the_prognostic_horizon() -> None:
     """At 600 of 1,000 cycles 400 remain: ±20 % is 320 to 480."""
     right = {319.0: False, 321.0: True, 479.0: True, 481.0: False, None: False}
     assert {predicted: alpha_lambda(predicted, 600.0, 1_000.0) for predicted in right} == right
     with pytest.raises(ValueError, match="no life left"):
         alpha_lambda(1.0, 1_000.0, 1_000.0)
-
-
-def test_the_prognostic_horizon_counts_from_where_all_that_follow_are_right() -> None:
+    # the prognostic horizon counts from where all that follow are right
     at = [0.0, 250.0, 500.0, 750.0]
     assert prognostic_horizon(at, [1_050.0, 900.0, 480.0, 260.0], 1_000.0) == 500.0
     assert prognostic_horizon(at, [1_050.0, 800.0, 480.0, 260.0], 1_000.0) == 1_000.0
@@ -127,9 +123,7 @@ def test_a_miss_is_counted_in_half_widths_of_the_interval() -> None:
     np.testing.assert_allclose(judged.misses, [1.0, 2.0], rtol=0.02)
     assert forecast().judged(measured(1_500.0, 60.0)).misses.tolist() == [3.0]  # however far off
     assert replace(judged, misses=np.array([0.9, 1.0, 1.1])).held == 2
-
-
-def test_scatter_and_the_fits_variance_belong_to_the_interval() -> None:
+    # scatter and the fits variance belong to the interval
     scattered = forecast(replace(FLAT, scatter=np.full(SPREAD_LEVELS.size, 0.1))).judged(measured(1_500.0, 1.2))
     uncertain = forecast().judged(measured(1_500.0, 1.2, variance=0.01))
     for judged in (scattered, uncertain):

@@ -89,11 +89,16 @@ def test_every_rate_dwell_ramp_and_count(how):
     assert_cuts(make(*protocol(rng, speeds), rng, **how))
 
 
-def test_a_protocol_in_any_order():
+def test_a_protocol_in_any_order_and_direction() -> None:
     rng = np.random.default_rng(6)
     pressure, speed = protocol(speeds=TENTH)
     order = rng.permutation(pressure.size)
     assert_cuts(make(pressure[order], speed[order], rng))
+    # both directions of rotation
+    rng = np.random.default_rng(9)
+    speed = np.concatenate([-TENTH[::-1], TENTH])
+    cut = assert_cuts(make(np.full(speed.size, 5e5), speed, rng))
+    assert (np.sign(cut.plateaus.torque) == np.sign(speed)).all()
 
 
 def test_a_missing_and_a_repeated_step():
@@ -104,13 +109,6 @@ def test_a_missing_and_a_repeated_step():
     assert cut.count.size == 9, "the repeated step is one dwell of twice the length"
     assert cut.count[5] > 1.8 * cut.count[4]
     np.testing.assert_allclose(cut.plateaus.speed, np.delete(speed, 6), atol=RPM)
-
-
-def test_both_directions_of_rotation():
-    rng = np.random.default_rng(9)
-    speed = np.concatenate([-TENTH[::-1], TENTH])
-    cut = assert_cuts(make(np.full(speed.size, 5e5), speed, rng))
-    assert (np.sign(cut.plateaus.torque) == np.sign(speed)).all()
 
 
 def test_an_open_clutch_is_cut_by_its_speed():
@@ -132,15 +130,13 @@ def test_lost_samples(reference, gap):
     assert dict(cut.notes)["samples_missing"].startswith(f"About {reference.record.time.size - record.time.size} ")
 
 
-def test_a_gap_within_a_dwell_parts_it(reference):
+def test_a_clock_that_jitters_and_a_gap_that_parts_a_dwell(reference) -> None:
+    cut = assert_cuts(reference, jitter(reference.record, np.random.default_rng(11)))
+    assert "clock_jitter" in codes(cut)
+    # a gap within a dwell parts it
     keep = (reference.record.time < reference.start[3] + 2) | (reference.record.time > reference.start[3] + 3)
     cut = cut_plateaus(reference.record.take(keep))
     assert np.count_nonzero(of(cut, reference) == 3) == 2
-
-
-def test_a_clock_that_jitters(reference):
-    cut = assert_cuts(reference, jitter(reference.record, np.random.default_rng(11)))
-    assert "clock_jitter" in codes(cut)
 
 
 @pytest.mark.parametrize("rate", [10.0, 100.0, 1000.0, 2000.0])

@@ -69,29 +69,6 @@ def test_a_recorder_with_noise(stepped):
     assert worst > 0.2
 
 
-def test_a_pressure_that_wanders_keeps_its_ends():
-    """A ripple of 0.03 bar all through, counts of 0.05 bar: nothing is cut off, nothing is split."""
-    time = np.arange(1500) / 100
-    rng = np.random.default_rng(5)
-    for pressure in (
-        5e5 + 3e3 * np.sin(2 * math.pi * 0.1 * time) + 500 * rng.standard_normal(1500),
-        np.round((5e5 + 2e3 * rng.standard_normal(1500)) / 5e3) * 5e3,
-    ):
-        (found,) = pressure_stretches(time, pressure)
-        assert found.start < 5
-        assert found.stop > 1495
-
-
-def test_a_ramp_is_no_level():
-    """But for what the record's end leaves of it, which is too little to be told from a level that drifts."""
-    time = np.arange(6000) / 100
-    longest = max((s.stop - s.start for s in pressure_stretches(time, np.linspace(4e5, 5e5, 6000))), default=0)
-    assert longest < 500
-    # the control: as long, and standing
-    (standing,) = pressure_stretches(time, np.full(6000, 4e5))
-    assert standing.stop - standing.start == 6000
-
-
 @pytest.mark.parametrize("step", [0.02e5, 0.03e5, 0.05e5, 0.1e5])
 @pytest.mark.parametrize("count", [5, 7])
 def test_levels_closer_than_a_gap_are_cut_without_harm(step: float, count: int) -> None:
@@ -101,7 +78,7 @@ def test_levels_closer_than_a_gap_are_cut_without_harm(step: float, count: int) 
     assert all(0 <= each.start < each.stop <= pressure.size for each in found)
 
 
-def test_stretches_of_pressure():
+def test_pressure_stands_between_ramps_however_it_wanders() -> None:
     time = np.arange(4000) / 100
     pressure = np.concatenate([np.full(1500, 4e5), np.linspace(4e5, 4.5e5, 200), np.full(2300, 4.5e5)])
     pressure = pressure + 2e3 * np.random.default_rng(0).standard_normal(4000)
@@ -110,6 +87,23 @@ def test_stretches_of_pressure():
     assert abs(found[0].stop - 1500) < 60
     assert abs(found[1].start - 1700) < 60
     assert (found[0].start, found[1].stop) == (0, 4000)
+    # A ripple of 0.03 bar all through, counts of 0.05 bar: nothing is cut off, nothing is split.
+    time = np.arange(1500) / 100
+    rng = np.random.default_rng(5)
+    for pressure in (
+        5e5 + 3e3 * np.sin(2 * math.pi * 0.1 * time) + 500 * rng.standard_normal(1500),
+        np.round((5e5 + 2e3 * rng.standard_normal(1500)) / 5e3) * 5e3,
+    ):
+        (found,) = pressure_stretches(time, pressure)
+        assert found.start < 5
+        assert found.stop > 1495
+    # But for what the record's end leaves of it, which is too little to be told from a level that drifts.
+    time = np.arange(6000) / 100
+    longest = max((s.stop - s.start for s in pressure_stretches(time, np.linspace(4e5, 5e5, 6000))), default=0)
+    assert longest < 500
+    # the control: as long, and standing
+    (standing,) = pressure_stretches(time, np.full(6000, 4e5))
+    assert standing.stop - standing.start == 6000
 
 
 # --- Levels of pressure among nominal and among scattered pressures.

@@ -45,11 +45,6 @@ def test_a_wave_is_as_behind_the_closed_form_whatever_the_clock() -> None:
     )
 
 
-def test_without_a_declaration_the_record_is_the_same_object() -> None:
-    swing = record([attractor(FALLING, 150.0)], [5e5])
-    assert filtered_as_torque(swing, 0.0) is swing
-
-
 @pytest.mark.parametrize(
     ("made", "curve", "frequency", "read"),
     [
@@ -108,7 +103,7 @@ def test_spikes_are_removed_before_the_filter_spreads_them(seed: int) -> None:
     assert abs(tailed.area / plain.area - 1) > 0.02
 
 
-def test_no_noise_grows() -> None:
+def test_no_noise_grows_and_without_a_declaration_nothing_changes() -> None:
     rng = np.random.default_rng(5)
     noisy = record([attractor(FALLING, 150.0)], [5e5], rate=1000.0, noise=0.02, rng=rng)
     mended = filtered_as_torque(noisy, FILTER)
@@ -116,6 +111,9 @@ def test_no_noise_grows() -> None:
     assert np.diff(mended.speed).std() < 0.2 * np.diff(noisy.speed).std()
     deconvolved = noisy.torque + FILTER * np.gradient(noisy.torque, noisy.time)
     assert np.diff(deconvolved).std() > 8 * np.diff(noisy.torque).std()
+    # without a declaration the record is the same object
+    swing = record([attractor(FALLING, 150.0)], [5e5])
+    assert filtered_as_torque(swing, 0.0) is swing
 
 
 def test_a_slow_filter_leaves_no_more_than_the_bare_torque_in_plateaus() -> None:

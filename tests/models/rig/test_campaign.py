@@ -26,7 +26,7 @@ def bits(run: SimulatedRun) -> tuple[object, ...]:
     return run.run_id, run.kind, run.cycles, run.duty, *(column.tobytes() for column in columns)
 
 
-def test_runs_come_in_rig_order():
+def test_runs_come_in_rig_order_as_in_fig_2() -> None:
     runs = list(itertools.islice(simulate(7), 8))
     assert [(run.run_id, run.kind.value, run.cycles) for run in runs] == [
         ("sim-7-run-in-00000", "run_in", 0),
@@ -42,6 +42,19 @@ def test_runs_come_in_rig_order():
     assert runs[0].duty.initial_speed == pytest.approx(1200 * RPM)
     assert runs[2].duty.initial_speed == pytest.approx(2000 * RPM)
     assert runs[2].duty.maximum_pressure == 8 * BAR
+    # the whole of fig 2 in its order
+    runs = list(simulate(7, programme=WHOLE, most_tests=2))
+    assert [(run.run_id, run.kind.value, run.cycles) for run in runs] == [
+        ("sim-7-run-in-00000", "run_in", 0),
+        ("sim-7-stationary-00000", "stationary_stribeck", 0),
+        ("sim-7-dynamic-00000", "dynamic_stribeck", 0),
+        ("sim-7-duty-00500", "duty_cycles", 500),
+        ("sim-7-stationary-00500", "stationary_stribeck", 500),
+        ("sim-7-dynamic-00500", "dynamic_stribeck", 500),
+    ]
+    for run in (runs[0], runs[3]):
+        assert run.record.pressure.max() == pytest.approx(8e5, rel=0.01)
+        assert run.record.speed[:50].mean() == pytest.approx(run.duty.initial_speed, rel=0.01)
 
 
 def test_a_campaign_ends_with_the_first_test_below_the_stop():
@@ -74,21 +87,6 @@ def test_a_given_clutch_is_the_one_that_is_measured():
 
 def rng(seed: int = 2) -> np.random.Generator:
     return np.random.default_rng(seed)
-
-
-def test_the_whole_of_fig_2_in_its_order() -> None:
-    runs = list(simulate(7, programme=WHOLE, most_tests=2))
-    assert [(run.run_id, run.kind.value, run.cycles) for run in runs] == [
-        ("sim-7-run-in-00000", "run_in", 0),
-        ("sim-7-stationary-00000", "stationary_stribeck", 0),
-        ("sim-7-dynamic-00000", "dynamic_stribeck", 0),
-        ("sim-7-duty-00500", "duty_cycles", 500),
-        ("sim-7-stationary-00500", "stationary_stribeck", 500),
-        ("sim-7-dynamic-00500", "dynamic_stribeck", 500),
-    ]
-    for run in (runs[0], runs[3]):
-        assert run.record.pressure.max() == pytest.approx(8e5, rel=0.01)
-        assert run.record.speed[:50].mean() == pytest.approx(run.duty.initial_speed, rel=0.01)
 
 
 def test_what_is_added_does_not_change_the_stationary_tests() -> None:

@@ -1,4 +1,4 @@
-"""Every qualitative finding of the reference's section 3 and conclusion, on simulated lives, one named test each.
+"""Every qualitative finding of the reference's section 3 and conclusion, on simulated lives, each by name.
 
 The lives are measured by the simulated rig with its noise and evaluated as a service would: curves fitted, pressure laws
 and eq. 6 fitted to those, loops cut out of sampled records. Two clutches: the nominal one, and one drawn (seed 11).
@@ -115,21 +115,15 @@ def life(request: pytest.FixtureRequest) -> Life:
 # --- 3.1.1, fig. 6: the fresh clutch ---
 
 
-def test_at_the_lowest_pressure_the_fresh_curve_rises_slightly_with_speed(life: Life) -> None:
-    lowest = life.curves(0)[0]
-    assert 0 < lowest[-5:].mean() / lowest[:5].mean() - 1 < 0.1
-
-
-def test_at_higher_pressure_the_fresh_curve_rises_then_falls(life: Life) -> None:
-    for curve in life.curves(0)[FIVE_BAR:]:
+def test_the_fresh_curve_rises_slightly_at_the_lowest_pressure_and_rises_then_falls_at_higher_ones(life: Life) -> None:
+    curves = life.curves(0)
+    assert 0 < curves[0, -5:].mean() / curves[0, :5].mean() - 1 < 0.1
+    for curve in curves[FIVE_BAR:]:
         top = int(curve.argmax())
         assert 0 < top < 20
         assert curve[top] > 1.01 * curve[0]
         assert curve[-1] < 0.95 * curve[top]
-
-
-def test_the_fresh_slope_at_low_speed_is_more_positive_at_higher_pressure(life: Life) -> None:
-    rises = life.curves(0)[:, 3] - life.curves(0)[:, 0]
+    rises = curves[:, 3] - curves[:, 0]  # at low speed the more, the higher the pressure
     assert fitted_slope(PROTOCOL_PRESSURES, rises) > 0
     assert rises[-1] > rises[0] > 0
 
@@ -137,23 +131,16 @@ def test_the_fresh_slope_at_low_speed_is_more_positive_at_higher_pressure(life: 
 # --- 3.1.1, fig. 7: over life ---
 
 
-def test_the_whole_curve_drops_as_degradation_goes_on(life: Life) -> None:
+def test_the_whole_curve_drops_drastically_at_first_and_saturates_below_a_half(life: Life) -> None:
     for earlier, later in itertools.pairwise(STAGES):
         assert (life.curves(later) < life.curves(earlier)).all()
-
-
-def test_the_drop_is_drastic_at_first_and_saturates(life: Life) -> None:
     cof = life.mean_cofs()
     lost = cof[0] - cof
     first, before, last = (float(lost[life.cycles == cycles][0]) for cycles in (3000, 12_000, 15_000))
     assert first > 0.4 * last  # 40 % of the loss in the first fifth
     assert last - before < first / 4
-
-
-def test_the_mean_coefficient_of_friction_comes_down_to_a_half(life: Life) -> None:
-    share = life.mean_cofs() / life.mean_cofs()[0]
-    crossed = float(life.cycles[np.argmax(share < 0.5)])
-    assert share[-1] < 0.5
+    crossed = float(life.cycles[np.argmax(cof < 0.5 * cof[0])])
+    assert cof[-1] < 0.5 * cof[0]
     assert crossed - 1000 <= life.clutch.end_of_life() <= crossed + 1000  # to a test's distance
 
 
@@ -194,16 +181,22 @@ def test_the_coulomb_ratio_falls_with_pressure_towards_an_asymptote(life: Life) 
 
 
 @pytest.mark.parametrize("name", PARAMETER_NAMES)
-def test_three_parameters_fall_over_life_and_the_viscous_one_rises(life: Life, name: str) -> None:
+def test_three_parameters_fall_over_life_and_the_viscous_one_rises_as_eq_6_alike_at_all_pressures(
+    life: Life, name: str
+) -> None:
     values, deviations = (column[:, FIVE_BAR] for column in life.parameter(name))
     sign = 1 if name == RISING else -1
     change = sign * (values[-4:].mean() - values[0])
     assert change > 4 * deviations[0]
     assert sign * fitted_slope(life.cycles, values) > 0
-
-
-@pytest.mark.parametrize("name", PARAMETER_NAMES)
-def test_equation_6_describes_how_a_parameter_evolves(life: Life, name: str) -> None:
+    # and alike at all pressures
+    values, deviations = life.parameter(name)
+    weight = deviations**-2
+    progress = progress_fraction(life.cycles, 4000.0, 0.8)[:, None]
+    centred = progress - (weight * progress).sum(axis=0) / weight.sum(axis=0)
+    trend = (weight * centred * values).sum(axis=0) / (weight * centred**2).sum(axis=0)
+    assert (np.sign(trend) == sign).all()
+    # equation 6 describes how a parameter evolves
     values, deviations = (column[:, FIVE_BAR] for column in life.parameter(name))
 
     def miss(x: FloatArray) -> FloatArray:
@@ -218,16 +211,6 @@ def test_equation_6_describes_how_a_parameter_evolves(life: Life, name: str) -> 
     assert flat > 2 * found.cost + 20  # nothing evolving is refuted
 
 
-@pytest.mark.parametrize("name", PARAMETER_NAMES)
-def test_the_trends_are_similar_at_all_pressures(life: Life, name: str) -> None:
-    values, deviations = life.parameter(name)
-    weight = deviations**-2
-    progress = progress_fraction(life.cycles, 4000.0, 0.8)[:, None]
-    centred = progress - (weight * progress).sum(axis=0) / weight.sum(axis=0)
-    trend = (weight * centred * values).sum(axis=0) / (weight * centred**2).sum(axis=0)
-    assert (np.sign(trend) == (1 if name == RISING else -1)).all()
-
-
 # --- 3.2, figs. 12 to 17: the loops ---
 
 
@@ -237,16 +220,12 @@ def test_torque_is_higher_while_accelerating(life: Life) -> None:
 
 
 def test_an_attractor_alone_would_lag_the_other_way_where_the_fresh_curve_rises(life: Life) -> None:
-    """The control of the finding above: the law of the reference's own framework cannot give it."""
-    with_attractor = replace(life.clutch, lag=replace(NO_LAG, attractor=200.0))
-    lowest = areas_of(with_attractor, 0, DynamicTest())[0]
-    assert lowest < 0
-
-
-def test_a_higher_attractor_means_a_smaller_loop(life: Life) -> None:
-    clutches = [replace(life.clutch, lag=replace(NO_LAG, attractor=c)) for c in (50.0, 200.0)]
-    weak, strong = (abs(areas_of(clutch, 15_000, DynamicTest())[-1]) for clutch in clutches)
-    assert weak > 2 * strong > 0
+    """The control of the finding above: the law of the reference's own framework cannot give it. A higher attractor means a
+    smaller loop."""
+    weak, strong = (replace(life.clutch, lag=replace(NO_LAG, attractor=c)) for c in (50.0, 200.0))
+    assert areas_of(strong, 0, DynamicTest())[0] < 0
+    small, smaller = (abs(areas_of(clutch, 15_000, DynamicTest())[-1]) for clutch in (weak, strong))
+    assert small > 2 * smaller > 0
 
 
 def test_the_loop_depends_on_the_frequency(life: Life) -> None:
@@ -268,23 +247,17 @@ def test_the_dynamic_torque_falls_over_life_as_the_stationary_does(life: Life) -
     assert means[-1] < 0.65 * means[0]
 
 
-def test_at_5_bar_the_area_grows_over_life(life: Life) -> None:
-    areas = [life.areas(cycles)[FIVE_BAR] for cycles in STAGES]
-    assert areas == sorted(areas)
-    assert areas[-1] > 1.5 * areas[0]
-
-
 def test_the_area_grows_over_life_up_to_6_bar_and_falls_above(life: Life) -> None:
-    growth = life.areas(15_000) / life.areas(0)
+    at_5_bar = [life.areas(cycles)[FIVE_BAR] for cycles in STAGES]
+    assert at_5_bar == sorted(at_5_bar)
+    assert at_5_bar[-1] > 1.5 * at_5_bar[0]
+    fresh, worn = life.areas(0), life.areas(15_000)
+    assert fitted_slope(PROTOCOL_PRESSURES, worn) < 0 < fitted_slope(PROTOCOL_PRESSURES, fresh)
+    assert worn[-1] < 0.7 * worn[0]
+    growth = worn / fresh
     assert (growth[PROTOCOL_PRESSURES <= 6e5] > 1).all()
     assert (growth[PROTOCOL_PRESSURES > 6e5] < 1).all()
     assert fitted_slope(PROTOCOL_PRESSURES, growth) < 0
-
-
-def test_at_the_end_of_life_the_area_falls_with_pressure(life: Life) -> None:
-    areas = life.areas(15_000)
-    assert fitted_slope(PROTOCOL_PRESSURES, areas) < 0 < fitted_slope(PROTOCOL_PRESSURES, life.areas(0))
-    assert areas[-1] < 0.7 * areas[0]
 
 
 # --- 2.3.1 and 2.3.2: engagements ---

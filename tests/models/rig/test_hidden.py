@@ -53,16 +53,14 @@ def test_an_effect_changes_torque_and_no_more_than_it_says(slug: str, bare: list
     assert (largest[RunKind.STATIONARY_STRIBECK] == 0) == EFFECTS[slug].loops
 
 
-def test_a_squeezed_film_is_in_the_clutch_only_where_it_is_hidden() -> None:
-    clutch = simulated_clutch(7)
-    assert clutch_for(clutch, {"squeeze_film": 0.2}).lag.film_time == 0.2
-    assert clutch_for(clutch, {"running_in": 5.0}).lag.film_time == 0.0
-
-
-def test_every_hidden_effect_is_of_the_catalogue_and_an_unknown_one_lists_them() -> None:
+def test_every_hidden_effect_is_of_the_catalogue_and_a_film_is_in_the_clutch() -> None:
     assert EFFECTS.keys() <= {effect.slug for effect in CATALOGUE}
     with pytest.raises(ValueError, match=r"torque_zero_shift \(zero shift in the end: 1.5 Nm\)"):
         effect_of("warm_oil")
+    # a squeezed film is in the clutch only where it is hidden
+    clutch = simulated_clutch(7)
+    assert clutch_for(clutch, {"squeeze_film": 0.2}).lag.film_time == 0.2
+    assert clutch_for(clutch, {"running_in": 5.0}).lag.film_time == 0.0
 
 
 @pytest.mark.slow

@@ -34,12 +34,19 @@ def rng(seed: int = 2) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-def test_rows_stand_in_the_references_order():
+def test_rows_stand_in_the_references_order_and_oil_does_not_act() -> None:
     plateaus = stationary_test(CLUTCH, 0, np.random.default_rng(0))
     assert plateaus.pressure.reshape(7, 40)[:, 0] / BAR == pytest.approx([4, 4.5, 5, 5.5, 6, 6.5, 7])
     assert np.ptp(plateaus.pressure.reshape(7, 40), axis=1).max() == 0
     assert plateaus.speed.reshape(7, 40)[3] / RPM == pytest.approx(np.arange(20, 1971, 50))
     assert len(curves_by_pressure(plateaus, GEOMETRY)) == 7
+    # oil temperature is recorded and does not act
+    for seed in range(20):
+        plateaus = stationary_test(CLUTCH, 0, rng(seed), NOISELESS)
+        assert plateaus.oil_temperature.min() >= 273.15 + 80
+        assert plateaus.oil_temperature.max() <= 273.15 + 90
+        assert np.ptp(plateaus.oil_temperature) > 1
+        assert np.array_equal(plateaus.torque, torque_by(NOISELESS, 99))
 
 
 def torque_by(sensor: Sensor, seed: int = 0) -> FloatArray:
@@ -58,15 +65,6 @@ def test_noise_floor_and_counts_are_what_was_asked_for():
     assert np.std(left) == pytest.approx(0.02, rel=0.04)  # 5600 values, four sigma
     recorded = torque_by(Sensor(torque_counts=100.0))
     assert np.array_equal(recorded, np.round(recorded, 2))
-
-
-def test_oil_temperature_is_recorded_and_does_not_act():
-    for seed in range(20):
-        plateaus = stationary_test(CLUTCH, 0, rng(seed), NOISELESS)
-        assert plateaus.oil_temperature.min() >= 273.15 + 80
-        assert plateaus.oil_temperature.max() <= 273.15 + 90
-        assert np.ptp(plateaus.oil_temperature) > 1
-        assert np.array_equal(plateaus.torque, torque_by(NOISELESS, 99))
 
 
 # --- The simulated recorder: noise, counts, losses and spikes.
@@ -131,22 +129,19 @@ def test_torque_follows_the_film_as_an_integrator_finds_it() -> None:
     assert np.abs(torque(v, at) - by_hand).max() > 0.5  # without the lag it would be far off
 
 
-def test_the_film_time_is_lost_with_use_the_more_the_higher_the_pressure() -> None:
+def test_a_lag_is_its_law_and_lost_with_use() -> None:
+    # the film time is lost with use the more the higher the pressure
     lag = FrictionLag(film_time=0.2, loss=LinearLaw(intercept=-2.0, slope=0.5e-5), scale=1000.0, exponent=1.0)
     found = lag.film_time_at(np.array([3e5, 5e5, 7e5]), 1000.0)
     assert found == pytest.approx(0.2 * np.exp([-0.0, -0.25, -0.75]))
-
-
-def test_a_lag_of_an_attractor_alone_is_the_attractor_law() -> None:
+    # a lag of an attractor alone is the attractor law
     clutch = replace(CLUTCH, lag=replace(NO_LAG, attractor=150.0))
     record = sampled_test(clutch, 1000, SILENT, rng(), NOISELESS)
     rows = record.time < 15
     velocity = clutch.geometry.sliding_velocity(record.speed[rows])
     law = attractor_torque(record.time[rows], velocity, clutch.parameters(4e5, 1000), 150.0)
     assert record.torque[rows] == pytest.approx(law, abs=1e-9)
-
-
-def test_without_lag_it_is_the_stationary_curve() -> None:
+    # without lag it is the stationary curve
     record = sampled_test(replace(CLUTCH, lag=NO_LAG), 0, SILENT, rng(), NOISELESS)
     at = CLUTCH.parameters(record.pressure, 0)
     assert record.torque == pytest.approx(torque(CLUTCH.geometry.sliding_velocity(record.speed), at), rel=1e-12)

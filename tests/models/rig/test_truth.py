@@ -60,35 +60,22 @@ def test_mean_cof_is_the_mean_over_all_plateaus():
     assert CLUTCH.mean_cof(7000) == pytest.approx(math.fsum(rows) / 280, rel=1e-9)
 
 
-def test_a_fresh_clutch_gives_about_25_newton_metres_at_5_bar_and_half_of_its_cof_after_15_000_cycles():
+def test_a_fresh_clutch_gives_about_25_newton_metres_at_5_bar_and_ends_where_its_mean_cof_crosses() -> None:
     at_1000_rpm = np.interp(1000 * RPM, SPEEDS, curves(CLUTCH, 0)[5.0])
     assert at_1000_rpm == pytest.approx(25, abs=1)
     assert CLUTCH.end_of_life() == pytest.approx(15_000, rel=0.02)
-
-
-def test_the_end_of_life_is_where_mean_cof_crosses_on_a_dense_grid():
+    # the end of life is where mean cof crosses on a dense grid
     cycles = np.arange(0.0, 40_000.0, 10.0)
     share = CLUTCH.mean_cofs(cycles) / CLUTCH.mean_cof(0)
     for fraction in (0.9, 0.5, 0.45):
         crossing = cycles[np.argmax(share <= fraction)]
         assert crossing - 10 <= CLUTCH.end_of_life(fraction) <= crossing
-
-
-def test_no_life_ends_where_the_loss_saturates_above_the_threshold():
+    # no life ends where the loss saturates above the threshold
     assert CLUTCH.mean_cof(1e6) > 0.2 * CLUTCH.mean_cof(0)
     assert CLUTCH.end_of_life(0.2) is None
 
 
-def test_lives_of_drawn_clutches_spread_around_the_nominal_one():
-    lives = [draw(np.random.default_rng(seed)).end_of_life() for seed in range(50)]
-    assert None not in lives
-    assert min(lives) > 8_000
-    assert max(lives) < 32_000
-    assert np.median(lives) == pytest.approx(15_000, rel=0.1)
-    assert 0.12 < np.std(np.log(lives)) < 0.35
-
-
-def test_drawn_clutches_differ_by_5_to_15_percent():
+def test_drawn_clutches_differ_by_5_to_15_percent_and_live_about_as_long_as_the_nominal_one() -> None:
     drawn = [draw(np.random.default_rng(seed)).parameters(5 * BAR, 0) for seed in range(200)]
     for name in ("static_torque", "coulomb_ratio", "stribeck_velocity", "viscous_coefficient"):
         values = np.array([float(getattr(parameters, name)) for parameters in drawn])
@@ -96,6 +83,13 @@ def test_drawn_clutches_differ_by_5_to_15_percent():
         assert (values > 0).all()
     # in none of them sliding grips more than rest
     assert all(draw(np.random.default_rng(seed)).parameters(4 * BAR, 0).coulomb_ratio < 1 for seed in range(200))
+    # lives of drawn clutches spread around the nominal one
+    lives = [draw(np.random.default_rng(seed)).end_of_life() for seed in range(50)]
+    assert None not in lives
+    assert min(lives) > 8_000
+    assert max(lives) < 32_000
+    assert np.median(lives) == pytest.approx(15_000, rel=0.1)
+    assert 0.12 < np.std(np.log(lives)) < 0.35
 
 
 def test_the_clutch_transfers_what_its_curve_says_and_less_below_its_lowest_pressure() -> None:
@@ -112,17 +106,16 @@ CLUTCHES = (SimulatedClutch(), simulated_clutch(1))
 
 
 @pytest.mark.parametrize("clutch", CLUTCHES, ids=["nominal", "drawn"])
-def test_roughness_and_skewness_are_the_references_before_and_after_the_tests(clutch: SimulatedClutch) -> None:
+def test_the_lining_gets_smoother_and_flatter_from_the_references_figures_to_those_after_the_tests(
+    clutch: SimulatedClutch,
+) -> None:
     end = clutch.end_of_life()
     fresh, worn = surface(clutch, 0.0), surface(clutch, 2 * end)
     assert (fresh.roughness, fresh.skewness) == pytest.approx((9.52e-6, -0.87))
     assert (worn.roughness, worn.skewness) == pytest.approx((1.94e-6, -3.4))
     halved = surface(clutch, end)
     assert (halved.roughness, halved.skewness) == pytest.approx((1.94e-6, -3.4), rel=1e-6)
-
-
-@pytest.mark.parametrize("clutch", CLUTCHES, ids=["nominal", "drawn"])
-def test_the_lining_gets_smoother_and_flatter_all_its_life(clutch: SimulatedClutch) -> None:
+    # the lining gets smoother and flatter all its life
     end = clutch.end_of_life()
     surfaces = [surface(clutch, float(cycles)) for cycles in np.linspace(0.0, 0.99 * end, 20)]
     assert (np.diff([state.roughness for state in surfaces]) < 0).all()

@@ -62,16 +62,7 @@ def test_courses_without_an_exponent_are_what_they_are_called(course: Course, ex
     np.testing.assert_allclose(found[:, 0], expected(zeta / 5_000.0), atol=1e-3)
 
 
-def test_a_course_that_ends_does_so_beyond_what_was_measured() -> None:
-    course, place = np.array([Course.EQ_6, Course.ENDING, Course.HYPERBOLIC]), np.full(3, math.log(100.0))
-    log_scale, stretch = courses.log_scale_at(place, course, 7_000.0)
-    np.testing.assert_allclose(np.exp(log_scale), [100.0, 7_100.0, 7_100.0])
-    np.testing.assert_allclose(courses.place_of(log_scale, course, 7_000.0), place)
-    near = courses.log_scale_at(place + 1e-6, course, 7_000.0)[0]
-    np.testing.assert_allclose(stretch, np.log((near - log_scale) / 1e-6), atol=1e-5)
-
-
-def test_forms_are_courses_by_sizes_and_share_the_prior() -> None:
+def test_forms_are_courses_by_sizes_and_ends_lie_beyond_what_was_measured() -> None:
     weight = np.exp(courses.log_form_weight(PRIOR))
     assert weight.sum() == pytest.approx(1.0)
     assert weight[courses.FORM_COURSE == Course.EQ_6].sum() == pytest.approx(PRIOR.eq_6_share)
@@ -81,6 +72,13 @@ def test_forms_are_courses_by_sizes_and_share_the_prior() -> None:
     )
     sure = courses.log_form_weight(replace(PRIOR, eq_6_share=1.0))
     assert np.isneginf(sure[courses.FORM_COURSE != Course.EQ_6]).all()
+    # a course that ends does so beyond what was measured
+    course, place = np.array([Course.EQ_6, Course.ENDING, Course.HYPERBOLIC]), np.full(3, math.log(100.0))
+    log_scale, stretch = courses.log_scale_at(place, course, 7_000.0)
+    np.testing.assert_allclose(np.exp(log_scale), [100.0, 7_100.0, 7_100.0])
+    np.testing.assert_allclose(courses.place_of(log_scale, course, 7_000.0), place)
+    near = courses.log_scale_at(place + 1e-6, course, 7_000.0)[0]
+    np.testing.assert_allclose(stretch, np.log((near - log_scale) / 1e-6), atol=1e-5)
 
 
 # --- The discrepancy beside eq. 6: its size, lives of another law, and steps at events.
@@ -215,7 +213,9 @@ def normal(point: int, measurements: list[Measurement]) -> tuple[np.ndarray, np.
 
 
 @pytest.mark.parametrize("measurements", [EVEN, EPOCHS], ids=["one epoch", "three epochs"])
-def test_evidence_is_that_of_the_whole_normal(measurements: list[Measurement]) -> None:
+def test_evidence_is_that_of_the_whole_normal_also_with_the_last_run_turned_outlying(
+    measurements: list[Measurement],
+) -> None:
     """All linear terms integrated out, the data are normal; δ's covariance comes from quadrature here."""
     history = History.of(measurements, BELIEF)
     found = linear_model.evidence(linear_model.pointwise(history, BELIEF, POINTS)[0], BELIEF)
@@ -223,6 +223,16 @@ def test_evidence_is_that_of_the_whole_normal(measurements: list[Measurement]) -
         mean, covariance = normal(point, measurements)
         expected = multivariate_normal(mean, covariance).logpdf(history.value)
         assert log_probability == pytest.approx(expected, abs=2e-3)
+    # With one epoch the first point has no further terms, with three all have.
+    history = History.of(measurements, BELIEF)
+    sound = replace(POINTS, outlying=POINTS.outlying * (np.arange(13) < 12)[:, None])
+    outlying = replace(sound, outlying=sound.outlying + (np.arange(13) == 12)[:, None])
+    sums, terms = linear_model.pointwise(history, BELIEF, sound)
+    last = courses.basis(history.progress[-1], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
+    turned = linear_model.last_outlying(history, BELIEF, sound, sums, terms, last)
+    anew = linear_model.pointwise(history, BELIEF, outlying)[0]
+    for name, found in asdict(turned).items():
+        np.testing.assert_allclose(found, getattr(anew, name), rtol=1e-9, err_msg=name)
 
 
 def test_the_drawn_pair_is_that_of_the_whole_normal() -> None:
@@ -261,20 +271,6 @@ def test_the_table_and_the_points_are_one_sum() -> None:
         )
         pointed = linear_model.evidence(linear_model.pointwise(history, BELIEF, points, table)[0], BELIEF)
         np.testing.assert_allclose(tabled[kind, level], pointed, rtol=1e-9)
-
-
-@pytest.mark.parametrize("measurements", [EVEN, EPOCHS], ids=["one epoch", "three epochs"])
-def test_the_last_run_turned_outlying_is_that_of_all_sums_anew(measurements: list[Measurement]) -> None:
-    """With one epoch the first point has no further terms, with three all have."""
-    history = History.of(measurements, BELIEF)
-    sound = replace(POINTS, outlying=POINTS.outlying * (np.arange(13) < 12)[:, None])
-    outlying = replace(sound, outlying=sound.outlying + (np.arange(13) == 12)[:, None])
-    sums, terms = linear_model.pointwise(history, BELIEF, sound)
-    last = courses.basis(history.progress[-1], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
-    turned = linear_model.last_outlying(history, BELIEF, sound, sums, terms, last)
-    anew = linear_model.pointwise(history, BELIEF, outlying)[0]
-    for name, found in asdict(turned).items():
-        np.testing.assert_allclose(found, getattr(anew, name), rtol=1e-9, err_msg=name)
 
 
 def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
@@ -343,14 +339,11 @@ def test_measurements_check_themselves(numbers: tuple[float, float, float]) -> N
         Measurement(progress=numbers[0], value=numbers[1], variance=numbers[2])
 
 
-def test_systematic_draws_share_out_the_weights() -> None:
+def test_draws_share_out_weights_and_are_even() -> None:
     weight = np.array([0.5, 0.0, 0.3, 0.2])
     for offset in (0.0, 0.5, 0.999):
         assert np.bincount(sampling.systematic(weight, 10, offset), minlength=4).tolist() == [5, 0, 3, 2]
-
-
-def test_spread_points_are_more_even_than_chance() -> None:
-    """The share of 200 corners of the cube: these points err by less than half of what independent ones do."""
+    # The share of 200 corners of the cube: these points err by less than half of what independent ones do.
     rng = np.random.default_rng(0)
     edges = rng.random((200, 3))
     points = sampling.spread_points(1_000, np.full(3, 0.5))

@@ -58,13 +58,11 @@ def test_draws_that_know_the_last_test_are_less_surprised_by_it() -> None:
     assert innovation(posterior, measurements[-1], PLAIN) < predicted(posterior, measurements[-1]) - 1.0
 
 
-def test_a_test_far_off_is_off_track_and_a_good_one_is_not() -> None:
+def test_a_test_far_off_is_off_track_after_enough_tests_without_an_event() -> None:
     far, good = measured(-60.0), measured(0.0)
     assert last_innovation(drawn(far, PRIOR), far, PRIOR) < -FAR
     assert abs(last_innovation(drawn(good, PRIOR), good, PRIOR)) <= FAR
-
-
-def test_nothing_is_off_track_after_few_tests_or_across_an_event() -> None:
+    # nothing is off track after few tests or across an event
     far = measured(-60.0)
     posterior = drawn(far, PRIOR)
     assert last_innovation(posterior, far[-FEWEST_BEFORE:], PRIOR) is None

@@ -26,12 +26,9 @@ def series(d: Degradation, progress: np.ndarray, noise: float, seed: int = 0) ->
     return sent(progress, value(progress, d) + noise * rng.standard_normal(progress.size), 1e-8)
 
 
-def sent(progress: ArrayLike, values: ArrayLike, variance: float = 0.0, epoch: ArrayLike = 0) -> list[Measurement]:
-    columns = np.broadcast_arrays(progress, values, epoch)
-    return [
-        Measurement(progress=z, value=y, variance=variance, epoch=int(e))
-        for z, y, e in zip(*(column.tolist() for column in columns), strict=True)
-    ]
+def sent(progress: ArrayLike, values: ArrayLike, variance: ArrayLike = 0.0, epoch: ArrayLike = 0) -> list[Measurement]:
+    columns = (column.tolist() for column in np.broadcast_arrays(progress, values, variance, epoch))
+    return [Measurement(progress=z, value=y, variance=v, epoch=int(e)) for z, y, v, e in zip(*columns, strict=True)]
 
 
 def on_grid(tests: list[Measurement], count: int, rng: np.random.Generator, prior: Prior | None = None) -> Posterior:
@@ -59,7 +56,7 @@ def beside(count: int, **given: Any) -> Discrepancy:
     return Discrepancy(**{"span": 1_000.0} | nothing | given)
 
 
-def followed(tracker: Any, prior: Prior, measurements: list[Measurement], seed: int = 0) -> Any:
+def followed(tracker: Any, prior: Prior, measurements: list[Measurement], seed: int | np.random.Generator = 0) -> Any:
     rng, state = np.random.default_rng(seed), tracker.start(prior)
     for measurement in measurements:
         state = tracker.update(state, measurement, rng)

@@ -224,7 +224,7 @@ def without_pressure(given: Campaign) -> Campaign:
     )
 
 
-def test_nothing_but_open_readings_is_too_little() -> None:
+def test_open_readings_alone_are_too_little_and_loops_without_pressure_go_with_sweeps_under_it() -> None:
     idle = without_pressure(campaign(24, cycles=(0.0, 3000.0)))
     design = build_design(idle)
     assert design.torque.size > 200
@@ -232,9 +232,7 @@ def test_nothing_but_open_readings_is_too_little() -> None:
     assert "0 plateaus" in missing_for_baseline(design)
     assert look(idle, 1).verdict is Verdict.INSUFFICIENT_DATA
     assert with_trial(idle, "open_sweep") is None
-
-
-def test_loops_only_without_pressure_go_with_sweeps_under_it() -> None:
+    # loops only without pressure go with sweeps under it
     whole = campaign(25, cycles=(0.0, 3000.0, 6000.0))
     mixed = replace(whole, dynamic=without_pressure(whole).dynamic)
     fitted = fit_baseline(build_design(mixed))

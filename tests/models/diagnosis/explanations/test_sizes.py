@@ -49,16 +49,14 @@ def test_where_nothing_of_a_size_may_be_left_its_sign_is_not_determined() -> Non
     assert _size([(4.4, 0)] * 10 * tenth).other_sign == 0.0
 
 
-def test_a_zero_whose_sign_is_known_is_offered(shifted: Report) -> None:
+def test_a_zero_whose_sign_is_known_is_offered_by_draws_that_carry_only_what_the_report_names(shifted: Report) -> None:
     assert shifted.causes == ("torque_zero_shift",)
     assert shifted.extension is not None
     assert shifted.not_adoptable == ""
     estimate = next(each for each in shifted.candidates if each.effect == "torque_zero_shift").estimate
     low, high = estimate.interval
     assert 0.0 < low < estimate.value < high
-
-
-def test_draws_weigh_one_and_carry_only_what_the_report_names(shifted: Report) -> None:
+    # draws weigh one and carry only what the report names
     assert shifted.extension.weights.size <= DRAWS
     assert shifted.extension.weights.sum() == pytest.approx(1.0)
     assert set(shifted.extension.effects) == set(shifted.causes)

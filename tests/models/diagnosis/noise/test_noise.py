@@ -205,7 +205,7 @@ def test_times_that_repeat_do_no_harm() -> None:
     assert max(estimate) < 0.05
 
 
-def test_loops_sampled_otherwise_do_not_mix() -> None:
+def test_loops_sampled_otherwise_do_not_mix_and_too_few_samples_give_no_estimate() -> None:
     """The same noise, autocorrelated over 50 ms, in bins of 0.16 s sampled at 40 and at 1000 a second."""
 
     def sampled(rate: float) -> SampleAutocorrelation:
@@ -215,9 +215,7 @@ def test_loops_sampled_otherwise_do_not_mix() -> None:
     both = bin_autocorrelation([sampled(40.0), sampled(1000.0)])
     assert both[0] == pytest.approx(np.mean(alone))
     assert alone[0] == pytest.approx(alone[1], abs=0.05)
-
-
-def test_too_few_samples_give_no_estimate() -> None:
+    # too few samples give no estimate
     phase = np.linspace(0.0, 2 * np.pi, 3000)
     everything = np.ones(phase.size, dtype=np.bool_)
     assert sample_autocorrelation(np.sin(phase), phase, everything, 2.0) is None
@@ -253,7 +251,7 @@ RPM = 2 * np.pi / 60
 PERIOD, RATE, DEVIATION = 1.7, 100.0, 0.2
 
 
-def test_three_periods_by_hand() -> None:
+def test_differences_of_periods_by_hand_and_of_white_samples() -> None:
     """Bin 0 is met by two samples, by two and by one, which is too few; bin 1 in the first and last, bin 2 in the last."""
     torque = np.array([1.0, 3.0, 5.0, 6.0, 8.0, 70.0, 8.0, 9.0])
     bins = np.array([0, 0, 1, 0, 0, 0, 1, 2])
@@ -263,10 +261,7 @@ def test_three_periods_by_hand() -> None:
     expected = [[(7 - 2) / np.sqrt(1 / 2 + 1 / 2), nan, nan], [nan, (8 - 5) / np.sqrt(1 / 1 + 1 / 1), nan]]
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     assert period_differences(torque[:3], bins[:3], turns[:3], 3).shape == (0, 3)
-
-
-def test_white_samples_give_white_differences_and_a_loop_gives_none() -> None:
-    """Linear in the samples, with rows that are orthonormal and blind to what every period has."""
+    # Linear in the samples, with rows that are orthonormal and blind to what every period has.
     rng = np.random.default_rng(3)
     turns = np.arange(0.0, 4.3, 0.061)
     bins = np.floor(5 * np.mod(turns, 1)).astype(np.intp)
@@ -307,7 +302,7 @@ def estimated(design: Design, expected: FloatArray) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_periods_show_slow_noise(seed: int) -> None:
+def test_periods_show_slow_noise_and_white_noise(seed: int) -> None:
     """It is autocorrelated over 0.3 s, ten bins: harmonics absorb most of that. Fewer than four samples fall into
     a bin each period, so samples do not show it either."""
     memory, expected = 0.3, designed(seed, 0.0, 0.0).torque
@@ -325,10 +320,7 @@ def test_periods_show_slow_noise(seed: int) -> None:
     neighbour, slow = estimated(replace(design, period_differences=()), expected)
     assert neighbour < 0.85
     assert slow < 0.2 * strength
-
-
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_periods_show_white_noise(seed: int) -> None:
+    # periods show white noise
     expected, design = designed(seed, 0.0, 0.0).torque, designed(seed, 0.0, DEVIATION)
     neighbour, slow = estimated(design, expected)
     assert neighbour < 0.05

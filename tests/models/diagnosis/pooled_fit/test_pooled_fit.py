@@ -27,7 +27,7 @@ def given() -> Study:
     return study(campaign(2, loops=False))
 
 
-def test_enough_steps_converge_and_too_few_do_not(given: Study) -> None:
+def test_a_fit_says_how_it_ended(given: Study) -> None:
     ended = fit(given.problem, start_of(given.design), steps=60)
     assert ended.status in {FitStatus.CONVERGED, FitStatus.STALLED}
     cut = fit(given.problem, start_of(given.design), steps=1)
@@ -38,9 +38,7 @@ def test_enough_steps_converge_and_too_few_do_not(given: Study) -> None:
     again = fit(given.problem, ended.laws)
     assert again.status in {FitStatus.CONVERGED, FitStatus.STALLED}
     assert ended.cost - 1.0 < again.cost <= ended.cost
-
-
-def test_numbers_that_cannot_be_fitted_are_a_status(given: Study) -> None:
+    # numbers that cannot be fitted are a status
     torque = given.design.torque.copy()
     torque[3] = np.nan
     broken = fit(replace(given.problem, design=replace(given.design, torque=torque)), start_of(given.design))

@@ -1,7 +1,7 @@
 """Evidence out of raw records: found where it is, named for what it is, and silent where there is only noise."""
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -51,17 +51,6 @@ def stepped(rng: np.random.Generator, *, settling: float = 0.1, memory: float = 
     return Record(time=time, pressure=pressure, speed=speed, torque=torque + noise(rng, time.size, memory))
 
 
-def swinging(rng: np.random.Generator, memory: float = 0.8) -> Record:
-    """A dynamic test: 15 s of 0.1 Hz at each pressure."""
-    count = int(15 * RATE)
-    speed = np.tile((1000 - 1000 * np.cos(2 * np.pi * 0.1 * np.arange(count) / RATE)) * RPM, len(LEVELS))
-    pressure = np.repeat(LEVELS, count)
-    time = np.arange(speed.size) / RATE
-    return Record(
-        time=time, pressure=pressure, speed=speed, torque=friction(speed, pressure) + noise(rng, time.size, memory)
-    )
-
-
 def reversing(
     rng: np.random.Generator, *, frequency: float = 0.1, rate: float = 100.0, deviation: float = 0.05
 ) -> Record:
@@ -82,15 +71,21 @@ def loops(
     deviation: float = 0.15,
     count: float = 0.01,
     pointed: bool = False,
+    levels: Sequence[float] = tuple(np.linspace(4e5, 7e5, 7)),
+    pause: float = 3.0,
 ) -> Record:
-    """A dynamic test of 0.1 Hz at seven pressures, 15 s each and 3 s between; speed swings as a sine or is pointed."""
+    """A dynamic test of 0.1 Hz, 15 s at each pressure and a pause between; speed swings as a sine or is pointed."""
     size = int(15 * rate)
     swing = np.cos(2 * np.pi * 0.1 * np.arange(size) / rate)
-    speed = np.tile((1000 - 1000 * (2 / np.pi * np.arcsin(swing) if pointed else swing)) * RPM, 7)
-    pressure = np.repeat(np.linspace(4e5, 7e5, 7), size)
-    time = np.arange(speed.size) / rate + 3.0 * (np.arange(speed.size) // size)
+    speed = np.tile((1000 - 1000 * (2 / np.pi * np.arcsin(swing) if pointed else swing)) * RPM, len(levels))
+    pressure = np.repeat(levels, size)
+    time = np.arange(speed.size) / rate + pause * (np.arange(speed.size) // size)
     torque = friction(speed, pressure) + noise(rng, time.size, memory, deviation)
     return Record(time=time, pressure=pressure, speed=speed, torque=np.round(torque / count) * count)
+
+
+def swinging(rng: np.random.Generator, memory: float = 0.8) -> Record:
+    return loops(rng, rate=RATE, memory=memory, deviation=0.2, count=1e-9, levels=LEVELS, pause=0.0)
 
 
 def with_bursts(record: Record, rng: np.random.Generator, amplitude: float, hertz: float, below: float) -> Record:
@@ -250,16 +245,13 @@ def test_ripple_is_found_between_slow_reversals(order: float) -> None:
     assert evidence.estimate.value == pytest.approx(0.05, rel=0.25)
 
 
-def test_dwells_that_end_before_torque_settles() -> None:
+def test_dwells_that_end_before_torque_settles_along_the_step_are_evidence() -> None:
     slow = found(campaign([stepped(np.random.default_rng(6), settling=2.0)], []))
     assert slow.keys() == {"unsettled_dwell"}
     time_constant, deviation = slow["unsettled_dwell"]
     assert abs(time_constant - 2.0) < 2.0 * deviation < 2.0
     assert found(campaign([stepped(np.random.default_rng(6), settling=0.3)], [])) == {}
-
-
-def test_dwells_that_look_late_but_settle_from_anywhere_are_no_evidence() -> None:
-    """Torque that wanders into each dwell, from above or from below whatever the step."""
+    # Torque that wanders into each dwell, from above or from below whatever the step.
     rng = np.random.default_rng(12)
     calm = stepped(rng)
     dwells = 40
@@ -315,25 +307,23 @@ def test_power_of_noise_is_exponential_of_mean_one(memory: float) -> None:
     assert np.mean(u > 2.0) == pytest.approx(np.exp(-2.0), abs=4 * np.sqrt(np.exp(-2.0) / u.size))
 
 
-def test_a_line_comes_out_with_its_amplitude() -> None:
+def test_a_line_comes_out_with_its_amplitude_of_records_fast_enough() -> None:
     rng = np.random.default_rng(12)
     record = loops(rng)
     here = whitened_record(with_line(record, 0.1, 17.0))
     assert amplitude(*demodulated(here, 17.0)) == pytest.approx(0.1, rel=0.1)
     assert amplitude(*demodulated(here, 31.0)) < 0.03
+    # records that are too slow or still have none
+    record = loops(np.random.default_rng(13))
+    assert whitened_record(record.take(np.arange(0, record.time.size, 20))) is None
+    assert whitened_record(replace(record, torque=0 * record.torque)) is None
+    assert whitened_record(with_ripple(record, 0.1, 1.0)) is not None
 
 
 def test_the_table_of_the_bessel_function() -> None:
     power, lam = np.meshgrid(np.geomspace(1e-3, 1e4, 200), np.geomspace(1e-3, 1e4, 200))
     root = 2 * np.sqrt(power * lam)
     np.testing.assert_allclose(rice(power, lam), np.log(i0e(root)) + root - lam, atol=3e-3, rtol=1e-9)
-
-
-def test_records_that_are_too_slow_or_still_have_none() -> None:
-    record = loops(np.random.default_rng(13))
-    assert whitened_record(record.take(np.arange(0, record.time.size, 20))) is None
-    assert whitened_record(replace(record, torque=0 * record.torque)) is None
-    assert whitened_record(with_ripple(record, 0.1, 1.0)) is not None
 
 
 def test_what_reverses_is_cut_where_it_does_and_settles_before_it_counts() -> None:
@@ -391,12 +381,10 @@ def test_a_transient_is_seen_and_its_time_is_estimated() -> None:
     evidence, constant = evidence_of(share=0.3)
     assert evidence > 15.0
     assert abs(constant.value - 2.0) < 2.0 * constant.sd < 3.0
+    # one dwell says nothing
+    assert settling_evidence([])[0] == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("wanted", [{}, {"lag": 0.08}, {"lag": 0.3}, {"drift": 0.02}], ids=str)
 def test_lag_drift_and_noise_are_no_transient(wanted: dict[str, float]) -> None:
     assert max(evidence_of(**wanted, seed=seed)[0] for seed in range(4)) < 3.0
-
-
-def test_one_dwell_says_nothing() -> None:
-    assert settling_evidence([])[0] == pytest.approx(0.0, abs=1e-9)

@@ -70,20 +70,20 @@ def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(give
     assert sum(each.probability for each in report.explanations) == pytest.approx(1.0)
 
 
-def test_a_fit_that_ran_out_of_steps_is_said_with_what_follows_from_it(given: Study, posterior: Posterior) -> None:
+def test_what_no_reading_shows_is_no_candidate_and_a_fit_that_ran_out_of_steps_is_said(
+    given: Study, posterior: Posterior
+) -> None:
+    report = reported(given, posterior, judge(posterior))
+    loops_only = {"channel_delay", "inertia_torque", "squeeze_film"}
+    assert not loops_only & {each.effect for each in report.candidates}
+    assert not loops_only & {slug for each in report.explanations for slug in each.effects}
+    # a fit that ran out of steps is said with what follows from it
     judgement = judge(posterior)
     (cause,) = judgement.stand
     cut = replace(cause, fit=replace(cause.fit, status=FitStatus.OUT_OF_STEPS))
     expected = "The fit with unsettled dwell ended before its optimum: its probability may be larger than stated."
     assert expected in reported(given, posterior, replace(judgement, stand=(cut,))).notes
     assert expected not in reported(given, posterior, judgement).notes
-
-
-def test_what_no_reading_shows_is_no_candidate(given: Study, posterior: Posterior) -> None:
-    report = reported(given, posterior, judge(posterior))
-    loops_only = {"channel_delay", "inertia_torque", "squeeze_film"}
-    assert not loops_only & {each.effect for each in report.candidates}
-    assert not loops_only & {slug for each in report.explanations for slug in each.effects}
 
 
 def test_why_an_extension_is_not_proposed_is_said(given: Study) -> None:
@@ -138,7 +138,7 @@ def bumped() -> Study:
     return study(campaign(31, bump))
 
 
-def test_cells_are_means_of_residual_over_noise(bumped):
+def test_cells_are_means_of_residual_over_noise_and_the_bump_shows_where_it_is(bumped) -> None:
     found = residual_maps(bumped.problem, bumped.baseline.fit, None)
     assert np.allclose(found.pressure, PRESSURES)
     assert np.allclose(found.speed, SPEEDS)
@@ -157,6 +157,14 @@ def test_cells_are_means_of_residual_over_noise(bumped):
             assert found.pressure_cycles_before[c, p] == pytest.approx(cell.mean())
     # without an extension after is before
     assert np.array_equal(found.speed_pressure_before, found.speed_pressure_after)
+    # the bump shows where it is
+    found = residual_maps(bumped.problem, bumped.baseline.fit, None)
+    by_speed = found.speed_pressure_before.mean(axis=0)
+    velocity = found.speed * 0.058
+    assert abs(velocity[int(by_speed.argmax())] - 3.0) < 1.0
+    assert by_speed.max() > 1
+    # the control: over cycles nothing stands out
+    assert np.abs(found.pressure_cycles_before.mean(axis=1)).max() < 0.5 * by_speed.max()
 
 
 def test_what_maps_and_loops_show_is_the_error_that_the_report_states(bumped: Study) -> None:
@@ -171,16 +179,6 @@ def test_what_maps_and_loops_show_is_the_error_that_the_report_states(bumped: St
     assert np.nanmean(np.abs(found.speed_pressure_after)) < 2
     for loop in loop_traces(problem, fit, None):
         assert np.sqrt(np.mean((loop.measured - loop.baseline) ** 2)) < 0.5
-
-
-def test_the_bump_shows_where_it_is(bumped):
-    found = residual_maps(bumped.problem, bumped.baseline.fit, None)
-    by_speed = found.speed_pressure_before.mean(axis=0)
-    velocity = found.speed * 0.058
-    assert abs(velocity[int(by_speed.argmax())] - 3.0) < 1.0
-    assert by_speed.max() > 1
-    # the control: over cycles nothing stands out
-    assert np.abs(found.pressure_cycles_before.mean(axis=1)).max() < 0.5 * by_speed.max()
 
 
 def test_nothing_measured_is_not_a_number():

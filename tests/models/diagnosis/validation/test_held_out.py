@@ -186,7 +186,7 @@ def test_a_bump_in_speed_is_filled_in(bumped):
     assert gain.rmse_after < gain.rmse_before
 
 
-def test_the_wrong_axis_and_no_structure_gain_nothing(bumped):
+def test_the_wrong_axis_and_no_structure_gain_nothing(bumped) -> None:
     wrong = smoothed(bumped, BY_CYCLES)
     assert bumped.baseline.fit.cost - wrong.cost < 5
     plain = study(campaign(41, loops=False))
@@ -194,9 +194,7 @@ def test_the_wrong_axis_and_no_structure_gain_nothing(bumped):
     assert plain.baseline.fit.cost - found.cost < 5
     gain = measure_gain(plain.problem, plain.baseline.fit, found, np.random.default_rng(0))
     assert abs(gain.log_score_gain) < 5
-
-
-def test_axes_that_cannot_carry_it(bumped):
+    # axes that cannot carry it
     assert smoothed(bumped) is None
     assert smoothed(bumped, "noise") is None
     assert smoothed(bumped, PHASE) is None  # no loops

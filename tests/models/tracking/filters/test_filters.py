@@ -63,33 +63,25 @@ def test_any_series_leaves_finite_numbers(tracker: Any, falling: bool, case: str
 
 
 @EACH
-def test_a_seed_gives_the_same_answer_twice(tracker: Any) -> None:
-    first, second = (followed(tracker, PRIOR, CAMPAIGN, seed=5) for _ in range(2))
-    assert same(first, second)
-    draws = [tracker.posterior(first, 500, np.random.default_rng(2)) for _ in range(2)]
-    assert all(np.array_equal(getattr(draws[0], n), getattr(draws[1], n)) for n in COLUMNS)
-    places = np.array([0.0, 6e3, 5e4])
-    assert np.array_equal(draws[0].values(places), draws[1].values(places))
-
-
-@EACH
-def test_a_state_survives_its_arrays_exactly(tracker: Any) -> None:
+def test_a_seed_gives_the_same_answer_twice_from_stored_arrays_too(tracker: Any) -> None:
     state = followed(tracker, PRIOR, CAMPAIGN[:7], seed=5)
     arrays = state.to_arrays()
+    assert arrays.keys() == STORED_NAMES[tracker.name]
+    # in the order of the fields of Prior, of which 0.05 is the share of outlying runs and 0.1 their size
+    assert arrays["prior"].tolist()[10:] == [0.05, 0.1, 0.95, 0.05, EQ_6_SHARE, PROPORTIONAL_SHARE, KNEE_HAZARD]
     assert all(column.dtype == np.float64 for column in arrays.values())
-    again = type(state).from_arrays({name: column.copy() for name, column in reversed(arrays.items())})
+    before, again = (
+        type(state).from_arrays({name: column.copy() for name, column in reversed(arrays.items())}) for _ in range(2)
+    )
     assert list(again.to_arrays()) == list(arrays)
     assert same(state, again)
     steps = [tracker.update(s, CAMPAIGN[7], np.random.default_rng(9)) for s in (state, again)]
     assert same(*steps)
-
-
-@EACH
-def test_an_update_leaves_the_old_state_alone(tracker: Any) -> None:
-    state = followed(tracker, PRIOR, CAMPAIGN[:7], seed=5)
-    before = {name: column.copy() for name, column in state.to_arrays().items()}
-    tracker.update(state, CAMPAIGN[7], np.random.default_rng(1))
-    assert same(state, type(state).from_arrays(before))
+    assert same(state, before)  # an update leaves the old state alone
+    draws = [tracker.posterior(step, 500, np.random.default_rng(2)) for step in steps]
+    assert all(np.array_equal(getattr(draws[0], n), getattr(draws[1], n)) for n in COLUMNS)
+    places = np.array([0.0, 6e3, 5e4])
+    assert np.array_equal(draws[0].values(places), draws[1].values(places))
 
 
 def test_particle_and_grid_agree_on_the_coefficients() -> None:
@@ -111,26 +103,15 @@ STORED_NAMES = {
 }
 
 
-@EACH
-def test_stored_arrays_have_the_names_of_this_version(tracker: Any) -> None:
-    arrays = followed(tracker, PRIOR, CAMPAIGN).to_arrays()
-    assert arrays.keys() == STORED_NAMES[tracker.name]
-    # in the order of the fields of Prior, of which 0.05 is the share of outlying runs and 0.1 their size
-    assert arrays["prior"].tolist()[10:] == [0.05, 0.1, 0.95, 0.05, EQ_6_SHARE, PROPORTIONAL_SHARE, KNEE_HAZARD]
-
-
 # --- The grid against plain quadrature, the prior and itself.
 
 
-def test_a_whole_history_at_once_is_what_updates_fold_to() -> None:
+def test_a_whole_history_at_once_is_what_updates_fold_to_in_any_order() -> None:
     grid = Grid(nodes=13, rows=13, levels=7)
     whole = grid.from_history(PRIOR, CAMPAIGN)
     assert same(whole, followed(grid, PRIOR, CAMPAIGN))
     assert not same(whole, grid.from_history(PRIOR, CAMPAIGN[::-1]))
-
-
-def test_the_order_of_runs_does_not_matter_to_the_grid() -> None:
-    """Only the order of sums differs."""
+    # Only the order of sums differs.
     grid = Grid()
     there, back = (grid.laid(grid.from_history(PRIOR, each)).mass for each in (CAMPAIGN, CAMPAIGN[::-1]))
     np.testing.assert_allclose(there, back, atol=1e-9)
@@ -251,9 +232,7 @@ def test_the_ukf_learns_the_scatter_from_its_innovations() -> None:
         scatter = scatter_learnt(PRIOR, scatter, off**2 / variance, variance, 1.0)
     assert math.sqrt(scatter[0]) == pytest.approx(truth, rel=0.15)
     assert scatter[1] == 602.0
-
-
-def test_no_innovation_teaches_the_ukf_more_than_five_deviations_do() -> None:
+    # no innovation teaches the ukf more than five deviations do
     start = np.array([9e-8, 20.0])
     learnt = [
         float(scatter_learnt(PRIOR, start, surprise, 1.1 * 9e-8 / PRIOR.initial_sd**2, 1.0)[0])

@@ -6,7 +6,7 @@ import httpx2
 import numpy as np
 import pytest
 
-from tests.blind import lives
+from tests.adoption import trials
 from tests.blind.rig.hide import hide
 from tests.blind.rig.plan import RADIUS, RPM
 from tests.blind.rig.world import read
@@ -21,17 +21,17 @@ def test_the_true_course_is_that_of_what_is_measured() -> None:
     site = hidden.plan.sites[0]
     torque = read(hidden.plan, hidden.clutch, hidden.effects)[0]
     seen = (torque / site.bar).mean(axis=1)
-    course = lives.mean_cof(hidden, hidden.plan.life.cycles)
+    course = trials.mean_cof(hidden, hidden.plan.life.cycles)
     np.testing.assert_allclose(course / course[0], seen / seen[0], rtol=2e-3)
-    bare = lives.mean_cof(replace(hidden, effects=()), hidden.plan.life.cycles)
+    bare = trials.mean_cof(replace(hidden, effects=()), hidden.plan.life.cycles)
     assert np.abs(bare / bare[0] - seen / seen[0]).max() > 5e-3  # the effect is in it
 
 
 def test_an_artefact_moves_no_life() -> None:
     hidden = hide(SECONDS, ("oil_temperature",), 50.0, loops=False)
     cycles = np.linspace(0, 2 * hidden.plan.life.span, 7)
-    bare = lives.mean_cof(replace(hidden, effects=()), cycles)
-    np.testing.assert_array_equal(lives.mean_cof(hidden, cycles), bare)
+    bare = trials.mean_cof(replace(hidden, effects=()), cycles)
+    np.testing.assert_array_equal(trials.mean_cof(hidden, cycles), bare)
     law = hidden.clutch.law(hidden.plan.pressures[:, None], np.array(cycles[-1]))
     torque = law.torque(np.linspace(20, 1970, 40) * RPM * RADIUS)
     assert bare[-1] == pytest.approx((torque / hidden.plan.pressures[:, None]).mean(), rel=1e-12)
@@ -40,14 +40,14 @@ def test_an_artefact_moves_no_life() -> None:
 def test_an_end_is_the_first_time_that_its_share_is_passed() -> None:
     hidden = hide(SECONDS, loops=False)
     end = 2 * hidden.plan.life.span
-    share = lives.passed_at(hidden, end)
+    share = trials.passed_at(hidden, end)
     assert share is not None
     cycles = np.linspace(0, 2 * end, 4001)
-    course = lives.mean_cof(hidden, cycles)
+    course = trials.mean_cof(hidden, cycles)
     first = cycles[np.flatnonzero(course <= share * course[0])[0]]
     assert first == pytest.approx(end, abs=2 * cycles[1])
     growing = replace(hidden, clutch=replace(hidden.clutch, theta=np.abs(hidden.clutch.theta)))
-    assert lives.passed_at(growing, end) is None  # it never falls
+    assert trials.passed_at(growing, end) is None  # it never falls
 
 
 def test_a_busy_service_is_asked_again() -> None:
@@ -55,4 +55,4 @@ def test_a_busy_service_is_asked_again() -> None:
     answers = [httpx2.Response(503, headers={"Retry-After": "0"}), httpx2.Response(200, json={"version": 1})]
     transport = httpx2.MockTransport(lambda _: answers.pop(0))
     with httpx2.Client(base_url="http://127.0.0.1", transport=transport) as http:
-        assert lives.asked(http, "PUT", "model", json={}) == {"version": 1}
+        assert trials.asked(http, "PUT", "model", json={}) == {"version": 1}
