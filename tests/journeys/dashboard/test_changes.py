@@ -150,16 +150,13 @@ def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server) -
 
     ask(held, "Correct the cycles", "it was a zero too many after all", cycles=LAST)
     settled(page, 0)
+    assert life(server) == after
     ask(run_in(page, "test-7"), "Undo the correction", "only to see it")
     settled(page, 1)
-    ask(held, "Correct the cycles", "and back", cycles=LAST)
-    settled(page, 0)
-    assert life(server) == after
 
     turned(page, "history")
-    expect(page.locator("#changes tbody tr")).to_have_count(6)
+    expect(page.locator("#changes tbody tr")).to_have_count(5)
     assert trail(page) == [
-        ["Cycles corrected: 70,000 to 7,000", "this machine", "and back"],
         ["Cycles corrected: 7,000 to 70,000", "this machine", "only to see it"],
         ["Cycles corrected: 70,000 to 7,000", "this machine", "it was a zero too many after all"],
         ["Cycles corrected: 7,000 to 70,000", "this machine", "the correction is undone"],
@@ -174,7 +171,7 @@ def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server) -
     sending.get_by_role("button", name="Send").click()
     sending.get_by_text("Stored before").wait_for()
     page.keyboard.press("Escape")
-    assert life(server) == after
+    assert life(server) == before
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from tests.browser.driving import Watched, pointed_at, turned
 from tests.browser.lives import demo, post
 from tests.browser.pixels import seen
-from tests.support import ONCE, Server, serving, stationary
+from tests.support import ONCE, Server, serving
 
 pytestmark = pytest.mark.browser
 
@@ -283,27 +283,6 @@ def test_pressure_and_view_are_chosen_by_keyboard(watched: Watched) -> None:
     law.focus()
     page.keyboard.press("Enter")
     page.locator("#chart-pressure-law table tbody tr").first.wait_for()
-
-
-@pytest.mark.slow
-def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, server: Server) -> None:
-    server.http.post("/v1/clutches", json={"clutch_id": "live"})
-    watched = Watched(browser, server.url)
-    page = watched.open("/clutches/live")
-    page.get_by_role("heading", name="No run has arrived").wait_for()
-    page.evaluate("window.same = true")
-    post(server.http, "live", stationary(0))
-    pointed_at(page)
-    expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(1)
-    turned(page, "history").locator("#chart-predicted").get_by_text("From the third stationary test on").wait_for()
-    turned(page, "loops").locator("#chart-loop-curves").get_by_text("No dynamic Stribeck test yet").wait_for()
-    for cycles in (1000, 2000):
-        post(server.http, "live", stationary(cycles))
-    expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(3)
-    turned(page, "history")
-    page.locator("#chart-predicted[data-drawn]").wait_for()
-    assert page.evaluate("window.same")
-    watched.close()
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.driving import Watched, Wire
+from tests.browser.driving import Watched, Wire, turned
 from tests.browser.lives import post, worn
 from tests.support import ONCE, Server, clutchlife, serving, stationary
 
@@ -56,6 +56,12 @@ def test_an_empty_service_says_what_to_do_and_fills_by_itself(browser: Browser, 
     page.get_by_role("link", name="first").click()
     page.get_by_role("heading", name="No run has arrived for this clutch yet").wait_for()
     assert f"--clutch first --url {empty.url}" in page.locator("pre").first.inner_text()
+    page.evaluate("window.same = true")
+    for cycles in (0, 1000, 2000):
+        post(empty.http, "first", stationary(cycles, pressures=(5.0,)))
+    expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(3)
+    turned(page, "history").locator("#chart-predicted[data-sketched]").wait_for()
+    assert page.evaluate("window.same")
     watched.close()
 
 

@@ -9,10 +9,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any, TypeVar
+from typing import Any
+
+from tests.service.work.waiting import until
 
 SECRET = "a-secret-of-tests"  # noqa: S105
-Found = TypeVar("Found")
 
 
 class Receiver:
@@ -35,16 +36,8 @@ class Receiver:
 
     def await_requests(self, count: int, seconds: float = 20.0) -> list[dict[str, Any]]:
         """The bodies, once there are so many."""
-        assert once(lambda: len(self.requests) >= count, seconds), f"{len(self.requests)} of {count} requests arrived"
+        until(lambda: len(self.requests) >= count, within=seconds)
         return self.bodies
-
-
-def once(found: Callable[[], Found], seconds: float = 20.0) -> Found:
-    """What is found as soon as it holds, or after so many seconds."""
-    deadline = time.monotonic() + seconds
-    while not (there := found()) and time.monotonic() < deadline:
-        time.sleep(0.02)
-    return there
 
 
 @contextmanager

@@ -10,8 +10,9 @@ from fastapi.testclient import TestClient
 from service.alarms import outbox, rules
 from service.schemas.alarm import AlarmIn
 from service.workflows import change_alarms
-from tests.service.alarms.receiving import SECRET, Receiver, once, receiving, signed_rightly
+from tests.service.alarms.receiving import SECRET, Receiver, receiving, signed_rightly
 from tests.service.clients import client_of, post_run
+from tests.service.work.waiting import until
 from tests.support import stationary
 
 CYCLES = (0.0, 1000.0, 2000.0, 3000.0)
@@ -215,7 +216,7 @@ def test_a_new_verdict_is_an_alarm(life: TestClient) -> None:
 def test_a_silent_rig_is_an_alarm_and_a_state(life: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outbox, "CLOCK_SECONDS", 0.1)
     rule(life, quantity="silent_hours", above=0.5 / 3600)
-    (raised,) = once(lambda: events(life))
+    (raised,) = until(lambda: events(life))
     clutch = life.get("/v1/clutches/e").json()
     assert clutch["state"]["name"] == "check"
     assert "the rig is silent" in clutch["state"]["why"]
@@ -289,7 +290,7 @@ def deliveries(client: TestClient, webhook_id: str, state: str = "delivered") ->
     def listed() -> list[dict[str, Any]]:
         return client.get(f"/v1/webhooks/{webhook_id}/deliveries").json()["items"]
 
-    once(lambda: [item["state"] for item in listed()[:1]] == [state])
+    until(lambda: [item["state"] for item in listed()[:1]] == [state])
     return listed()
 
 

@@ -17,8 +17,9 @@ from fastapi.testclient import TestClient
 
 from service.alarms import notify, receivers
 from service.alarms.receivers import post, shown, why_not
-from tests.service.alarms.receiving import SECRET, in_thread, once, receiving
+from tests.service.alarms.receiving import SECRET, in_thread, receiving
 from tests.service.web.routes.granting import granted
+from tests.service.work.waiting import until
 
 BODY = b'{"type": "alarm.test"}'
 RAISED = b'{"type": "alarm.raised", "event": {"name": "n", "quantity": "state", "message": "m"}}'
@@ -231,7 +232,7 @@ def test_an_alarm_arrives_as_a_mail(client: TestClient) -> None:
         assert made.status_code == 201, made.text
         assert "example.org" not in made.text
         client.post("/v1/alarms", json={"clutch_id": "c1", "quantity": "state", "name": "look at it"})
-        (mail,) = once(lambda: mails, 40)
+        (mail,) = until(lambda: mails)
     assert b"look at it" in mail
 
 

@@ -114,12 +114,6 @@ def test_ranges_at_their_edges(frame: Module, values: list[Any], mode: str | Non
     assert layout["xaxis"]["range"] == pytest.approx(expected)
 
 
-def test_error_bars_are_in_the_range(frame: Module) -> None:
-    bars = {"array": [1, 2, 5], "color": "#000", "thickness": 1, "width": 3}
-    layout = settled(frame, trace([0, 1, 2], [10, 20, None], error_y=bars))["layout"]
-    assert layout["yaxis"]["range"] == pytest.approx([9 - 0.65, 22 + 0.65])
-
-
 def test_a_legend_fits_beside_itself_or_breaks_into_rows(frame: Module) -> None:
     named = [trace([0, 1], [0, 1], name=name) for name in ("a", "bb", "ccc")]
     short = settled(frame, *named, trace([0], [0]), trace([0], [0], name="hidden", showlegend=False))
@@ -357,6 +351,7 @@ def test_a_name_that_leaves_a_doubt(file_name: Module) -> None:
     for name in (
         "run-0012.csv",  # a number of the file
         "0012.csv",
+        "12.csv",
         "stationary-2.csv",  # the second one, or two cycles
         "bench3.csv",
         "stationary_7000_dyn_8000.csv",  # two numbers of cycles
@@ -395,6 +390,8 @@ quantity ["oil_temperature_c"]                 = Oil temperature, °C
 quantity ["torque_nm"]                         = Torque, Nm
 quantity ["cycles"]                            = Cycles
 quantity ["mean_cof"]                          = Mean cof
+quantity ["_c"]                                = , °C
+quantity [""]                                  =
 fixed [1234.5678, 2]                           = 1,234.57
 fixed [0.5, 0]                                 = 1
 fixed [-0.0004, 2]                             = 0.00
@@ -467,6 +464,7 @@ moment [null]                                  = –
 kindName ["stationary_stribeck"]               = Stationary Stribeck test
 kindName ["another_kind"]                      = Another kind
 words ["oil_change"]                           = Oil change
+words [""]                                     =
 words [7]                                      = 7
 seconds [400]                                  = 1 s
 seconds [1499]                                 = 1 s

@@ -207,7 +207,7 @@ def test_points_thin_the_channels(stored: TestClient) -> None:
         ("", "application/json"),
         ("*/*", "application/json"),
         ("text/html,application/xhtml+xml,*/*;q=0.8", "application/json"),
-        (PARQUET["Accept"], PARQUET["Accept"]),
+        (f"{PARQUET['Accept']};q=0.3", PARQUET["Accept"]),
         (f"application/json;q=0.5, {PARQUET['Accept'].upper()}; q=0.9", PARQUET["Accept"]),
         (f"application/json, {PARQUET['Accept']};q=0.9", "application/json"),
         (f"application/json;q=0.1, {PARQUET['Accept']};q=0", "application/json"),

@@ -25,7 +25,7 @@ def _nothing_is_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(f"service.workflows.{workflow}.doubts_together", lambda *_, **__: Judged())
 
 
-def test_a_change_moves_the_tag_on_and_its_repeat_does_not(client: TestClient) -> None:
+def test_a_change_moves_the_tag_on_its_repeat_does_not_and_states_are_asked_for(client: TestClient) -> None:
     post(client)
     tags = []
     for _ in range(2):
@@ -41,18 +41,14 @@ def test_a_change_moves_the_tag_on_and_its_repeat_does_not(client: TestClient) -
         "before": {"state": "accepted", "cycles": 7000}, "after": {"state": "accepted", "cycles": 700},
     }  # fmt: skip
     assert client.get(RUN).json()["changes"] == [entry]
-
-
-def test_states_are_asked_for(client: TestClient) -> None:
-    post(client)
     for change, state in (("withdraw", "withdrawn"), ("restore", "accepted"), ("withdraw", "withdrawn")):
         assert client.post(f"{RUN}/{change}", json={"reason": "x"}).json()["state"] == state
     assert [len(client.get(f"{BASE}/runs?state={s}").json()["items"]) for s in ("accepted", "withdrawn")] == [0, 1]
     assert client.get(f"{BASE}/runs?state=lost").status_code == 422
     trail = client.get(f"{BASE}/changes").json()["items"]
-    assert [each["action"] for each in trail] == ["withdraw", "restore", "withdraw"]
+    assert [each["action"] for each in trail] == ["withdraw", "restore", "withdraw", "correct"]
     lines = client.get(f"{BASE}/changes.csv").text.splitlines()
-    assert (len(lines), lines[0]) == (4, "at,by,action,run_id,reason,before,after")
+    assert (len(lines), lines[0]) == (5, "at,by,action,run_id,reason,before,after")
     assert client.get("/v1/clutches/c1").json()["runs"] == 0
 
 

@@ -100,8 +100,6 @@ def test_no_answer_of_the_api_stands_without_a_word_while_two_runs_are_held(held
     (raised,) = held.get("/v1/alarms/events").json()["items"]
     assert raised["message"].endswith("2 runs are held and do not count")
 
-
-def test_answers_along_a_life_say_of_held_runs_in_the_same_words(held: TestClient) -> None:
     for answer in ("degradation", "surfaces", "stribeck", "engagement", "loops"):
         said = held.get(f"{CLUTCH}/{answer}").json()
         warnings = [warning["message"] for warning in said["warnings"] if warning["code"] == "held_runs"]

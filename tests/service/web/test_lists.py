@@ -113,7 +113,7 @@ def ids(client: TestClient, question: str, **asked: Any) -> list[str]:
     return [item["clutch_id"] for item in answer.json()["items"]]
 
 
-def test_a_list_is_of_what_was_asked_for(fleet: TestClient) -> None:
+def test_a_list_is_of_what_was_asked_for_and_says_states_and_why(fleet: TestClient) -> None:
     for question, expected in (
         ("", ["ended", "ageing", "c1"]),
         ("sort=name", ["ageing", "c1", "ended"]),
@@ -139,8 +139,6 @@ def test_a_list_is_of_what_was_asked_for(fleet: TestClient) -> None:
         following = fleet.get(f"/v1/clutches?sort={sort}&limit=2").json()["next"]
         assert ids(fleet, f"sort={sort}&limit=2&cursor={following}") == [last]
 
-
-def test_a_clutch_says_its_state_and_why(fleet: TestClient) -> None:
     states = {item["clutch_id"]: item["state"] for item in fleet.get("/v1/clutches").json()["items"]}
     assert states == {
         "ended": {"name": "failure", "why": "the end of life is reached: its limit is mean COF at 50 % of new"},

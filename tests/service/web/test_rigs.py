@@ -58,18 +58,13 @@ def post(client: TestClient, clutch: str, at: int, **query: Any) -> Any:
 
 def answers(client: TestClient, clutch: str) -> dict[str, Any]:
     """What is computed of a clutch, without what names it and what only tells the way of its runs."""
-    base = f"/v1/clutches/{clutch}"
-    names = ("stribeck", "loops", "runs")
-    found = {name: client.get(f"{base}/{name}").json() for name in names}
     dropped = {"clutch_id", "time", "revision", "received_at", "content_sha256", "file", "next"}
 
-    def bare(value: Any) -> Any:
-        if isinstance(value, Mapping):
-            return {name: bare(item) for name, item in value.items() if name not in dropped}
-        return [bare(item) for item in value] if isinstance(value, list) else value
+    def bare(part: dict[str, Any]) -> dict[str, Any]:
+        return {name: value for name, value in part.items() if name not in dropped}
 
-    kept: dict[str, Any] = bare(found)
-    return kept
+    names = ("stribeck", "loops", "runs")
+    return {name: client.get(f"/v1/clutches/{clutch}/{name}").json(object_hook=bare) for name in names}
 
 
 def test_a_profile_is_saved_once_and_replaced_by_put_alone(client: TestClient) -> None:

@@ -62,6 +62,10 @@ def test_a_query_takes_the_names_that_criteria_take(tested: TestClient) -> None:
         assert by_alias["items"] == by_name["items"], alias
         answer = tested.get("/v1/clutches/s/remaining-useful-life", params={"quantity": alias}, headers=WAIT)
         assert answer.status_code == 200 or name in answer.json()["detail"]
+    none = tested.get("/v1/clutches/s/degradation", params={"quantity": "nonsense"}, headers=WAIT)
+    assert (none.status_code, "film_time" in none.json()["detail"]) == (422, True)
+    unmeasured = tested.get("/v1/clutches/s/remaining-useful-life", params={"criterion": "film_time"}, headers=WAIT)
+    assert unmeasured.status_code == 404
 
 
 def test_mean_cof_alone_is_one_criterion_and_as_it_was(tested: TestClient) -> None:
@@ -165,11 +169,3 @@ def test_a_criterion_that_is_none_is_refused(client: TestClient, criterion: dict
     answer = client.post("/v1/clutches", json={"clutch_id": "x", "end_of_life": {"criteria": [criterion]}})
     assert answer.status_code == 422
     assert said in answer.text
-
-
-def test_what_is_no_quantity_is_refused_with_those_that_are(tested: TestClient) -> None:
-    answer = tested.get("/v1/clutches/s/degradation", params={"quantity": "nonsense"}, headers=WAIT)
-    assert answer.status_code == 422
-    assert "film_time" in answer.json()["detail"]
-    unmeasured = tested.get("/v1/clutches/s/remaining-useful-life", params={"criterion": "film_time"}, headers=WAIT)
-    assert unmeasured.status_code == 404

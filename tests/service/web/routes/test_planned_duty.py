@@ -8,10 +8,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.lives.plausibility.doubts import Judged
-from tests.service.clients import client_on
+from tests.service.clients import client_on, post_run
 from tests.support import stationary
 
 FORECAST = "/v1/clutches/{}/remaining-useful-life/forecast"
+FEW: dict[str, Any] = {"pressures": (5.0,), "speeds": (20, 120, 520, 1020, 1970)}
 QUANTILES = ("0.05", "0.5", "0.95")
 
 
@@ -22,24 +23,22 @@ def _nothing_is_doubted() -> Iterator[None]:
         yield
 
 
-def send(client: TestClient, clutch: str, *runs: dict[str, Any]) -> None:
-    for run in runs:
-        assert client.post(f"/v1/clutches/{clutch}/runs", json=run).status_code == 201
+def live(client: TestClient, clutch: str, tests: int, **record: Any) -> None:
+    """A clutch that is tested every 1,000 cycles, a day apart, and does 20 kJ a cycle between."""
+    assert client.post("/v1/clutches", json={"clutch_id": clutch} | record).status_code == 201
+    for place in range(tests):
+        if place:
+            duty = {"cycles": 1000, "energy_per_cycle_kj": 20}
+            post_run(client, {"kind": "duty_cycles", "cycles": 1000.0 * place, "duty": duty}, clutch)
+        test = stationary(1000.0 * place, **FEW)
+        post_run(client, test | {"started_at": f"2026-03-0{1 + place}T08:00:00+00:00"}, clutch)
 
 
 @pytest.fixture(scope="module")
 def aged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
-    """A clutch whose severity is its energy, 20 kJ a cycle, tested every 1,000 cycles, a day apart; nobody adds to it."""
-    record = {"clutch_id": "aged", "severity": {"basis": "dissipated_energy", "exponent": 1.0}}
+    """A clutch whose severity is its energy; nobody adds to it."""
     with client_on(f"sqlite:///{tmp_path_factory.mktemp('aged') / 'clutchlife.db'}") as client:
-        assert client.post("/v1/clutches", json=record).status_code == 201
-        for place in range(8):
-            cycles = 1000.0 * place
-            block = {"cycles": 1000, "energy_per_cycle_kj": 20}
-            duty = {"kind": "duty_cycles", "cycles": cycles, "duty": block}
-            test = stationary(cycles, pressures=(5.0,), speeds=(20, 120, 520, 1020, 1970))
-            test["started_at"] = f"2026-03-0{1 + place}T08:00:00+00:00"
-            send(client, "aged", *([duty, test] if place else [test]))
+        live(client, "aged", 8, severity={"basis": "dissipated_energy", "exponent": 1.0})
         yield client
 
 
@@ -81,11 +80,7 @@ def test_twice_the_energy_halves_the_cycles_blocks_take_turns_and_nothing_is_sto
 
 
 def test_planned_energy_counts_on_a_record_that_counts_cycles_and_the_answer_says_so(aged: TestClient) -> None:
-    assert aged.post("/v1/clutches", json={"clutch_id": "plain"}).status_code == 201
-    for place in range(5):
-        duty = {"kind": "duty_cycles", "cycles": 1000.0 * place, "duty": {"cycles": 1000, "energy_per_cycle_kj": 20}}
-        test = stationary(1000.0 * place, pressures=(5.0,), speeds=(20, 120, 520, 1020, 1970))
-        send(aged, "plain", *([duty, test] if place else [test]))
+    live(aged, "plain", 5)
     harsh = {"cycles": 100, "energy_per_cycle_kj": 40}
     by_energy = planned(aged, harsh, clutch="plain")
     by_cycles = planned(aged, harsh, clutch="plain", counted_by="cycles")
@@ -122,16 +117,16 @@ def test_what_cannot_be_counted_is_said(client: TestClient) -> None:
     unknown = {"status": "insufficient_data", "block_severity": [None], "pace_from": None, "end_of_life_at": None}
     assert unknown.items() <= nothing.items()
     assert nothing["remaining_blocks"]["0.5"] is None
-    send(client, "c1", *(stationary(cycles, pressures=(5.0,)) for cycles in (0.0, 1000.0, 2000.0, 3000.0)))
+    for cycles in (0.0, 1000.0, 2000.0, 3000.0):
+        post_run(client, stationary(cycles, pressures=(5.0,)))
     counted = planned(client, {"cycles": 100, "energy_per_cycle_kj": 20}, clutch="c1")
     assert "severity_not_counted" in [warning["code"] for warning in counted["warnings"]]
 
 
 def test_a_rebuilt_clutch_has_a_whole_horizon_again(client: TestClient) -> None:
-    send(client, "c1", {"kind": "maintenance", "event": "rebuild", "cycles": 999_000})
-    for place in range(5):
-        test = stationary(1000.0 * place, pressures=(5.0,), speeds=(20, 120, 520, 1020, 1970))
-        send(client, "c1", test | {"cycles": 999_000.0 + 1000.0 * place})
+    post_run(client, {"kind": "maintenance", "event": "rebuild", "cycles": 999_000})
+    for cycles in range(0, 5000, 1000):
+        post_run(client, stationary(float(cycles), **FEW) | {"cycles": 999_000.0 + cycles})
     usual = client.get("/v1/clutches/c1/remaining-useful-life").json()
     same = planned(client, {"cycles": 1000}, clutch="c1")
     assert same["status"] == usual["status"]
