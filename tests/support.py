@@ -144,11 +144,11 @@ def _run(arguments: list[str], environment: dict[str, str], output: Path | None 
     app(arguments)
 
 
-def clutchlife(*arguments: str | Path, code: int = 0, **environment: str) -> str:
+def clutchlife(*arguments: str | Path, code: int = 0) -> str:
     """Run a command, forked as well, and return what it printed."""
     with TemporaryDirectory() as folder:
         output = Path(folder) / "output"
-        child = _LOADED.Process(target=_run, args=([*map(str, arguments)], os.environ | environment, output))
+        child = _LOADED.Process(target=_run, args=([*map(str, arguments)], dict(os.environ), output))
         child.start()
         child.join()
         printed = output.read_text(encoding="utf-8")
@@ -225,16 +225,11 @@ class Server:
     """
 
     def __init__(
-        self,
-        database: Path | str,
-        *,
-        port: int | None = None,
-        loaded: bool = False,
-        environment: Mapping[str, str] | None = None,
+        self, database: Path | str, *, loaded: bool = False, environment: Mapping[str, str] | None = None
     ) -> None:
         self.database = database
         self.address = database if isinstance(database, str) else f"sqlite:///{database}"
-        self.port = port or free_port()
+        self.port = free_port()
         self.loaded = loaded
         self.environment = dict(environment or {})
         self.url = f"http://127.0.0.1:{self.port}"

@@ -33,10 +33,3 @@ def run_check(name: str, product: Path) -> str:
         [sys.executable, "-P", str(script)], env=environment, cwd=product, capture_output=True, text=True, check=False
     )
     return "" if done.returncode == 0 else done.stderr or "failed without a word"
-
-
-def test_an_edit_of_a_line_that_has_changed_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    edit = {"file": "storage/tables.py", "old": "no such line", "new": ""}
-    monkeypatch.setattr(examples, "edits_of", lambda _: {"edit": [edit]})
-    with pytest.raises(ValueError, match="'no such line' once, got 0"):
-        examples.applied("made up", tmp_path)

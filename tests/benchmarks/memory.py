@@ -61,12 +61,12 @@ def _total(pid: int, of: Callable[[int], float]) -> float:
     return total
 
 
-def added(pid: int, work: Callable[[], object], every: float = 0.02) -> int:
-    """By how many bytes a process and its children grow at most while some work is being done; looked at `every` s."""
+def added(pid: int, work: Callable[[], object]) -> int:
+    """By how many bytes a process and its children grow at most while some work is being done."""
     rest, seen, done = held(pid), [0], threading.Event()
 
     def watch() -> None:
-        while not done.wait(every):
+        while not done.wait(0.02):
             seen.append(held(pid))
 
     watching = threading.Thread(target=watch)

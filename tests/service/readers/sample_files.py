@@ -50,15 +50,14 @@ def write_tdms(
     columns: Mapping[str, FloatArray],
     *,
     units: Mapping[str, str] | None = None,
-    group: str = "Rig",
     properties: Mapping[str, float] | None = None,
     more: Mapping[str, FloatArray] | None = None,
 ) -> Path:
-    """A TDMS file with one group; `more` goes into a second group."""
+    """A TDMS file with a group `Rig`; `more` goes into a second one."""
     units = {} if units is None else units
     with TdmsWriter(path) as writer:
         objects = [RootObject()]
-        for place, columns_there in ((group, columns), ("More", more or {})):
+        for place, columns_there in (("Rig", columns), ("More", more or {})):
             for name, values in columns_there.items():
                 channel_properties = dict(properties or {}) | ({"unit_string": units[name]} if name in units else {})
                 objects.append(ChannelObject(place, name, values, properties=channel_properties))
