@@ -11,7 +11,7 @@ from tests.support import served
 
 REPEATS = 5
 _LAST = (
-    "performance.getEntriesByType('resource').filter((entry) => entry.name.includes('series?quantity=')).at(-1).responseEnd"
+    "performance.getEntriesByType('resource').filter((one) => one.name.includes('series?quantity=')).at(-1).responseEnd"
 )
 _MARK = "performance.getEntriesByName({0!r})[0].startTime"
 ROWS = (
