@@ -40,11 +40,10 @@ class Direction(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Area:
-    """Eq. 8 [Nm m/s] of a period and its deviation; how many samples were left out."""
+    """Eq. 8 [Nm m/s] of a period and its deviation."""
 
     area: float
     area_sd: float
-    outliers: int
 
     @property
     def direction(self) -> Direction:
@@ -96,11 +95,7 @@ def area_of(cycle: Cycle, samples: Samples) -> Area:
     variance = noise**2 * float(along @ inverse @ along) + float(by_speed @ cycle.covariance @ by_speed)
     if cycle.periods >= 3:
         variance = max(variance, _between_periods(cycle, phase, measured, count))
-    return Area(
-        area=float(along @ solution),
-        area_sd=math.sqrt(max(variance, 0.0)),
-        outliers=samples.outliers,
-    )
+    return Area(area=float(along @ solution), area_sd=math.sqrt(max(variance, 0.0)))
 
 
 def _harmonics_for(phase: FloatArray) -> int:

@@ -18,7 +18,7 @@ from models.clutch import Geometry
 from models.friction.stribeck import torque as stationary_torque
 from models.loops.criteria import FEWEST_SAMPLES
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
-from models.loops.loop_area import Area, Direction, Samples, area_of, clean_samples
+from models.loops.loop_area import Direction, Samples, area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
 from models.records.pressure_levels import level_width, levels_of, pressure_stretches
 from models.records.runs import Record
@@ -110,7 +110,7 @@ def _loop(
         film_time_sd=None if film is None or film.lag is None else film.lag_sd,
         better_law=better,
         status=status,
-        message=_message(status, area, better),
+        message=_message(status, samples.outliers, better),
     )
 
 
@@ -138,7 +138,7 @@ def _better(attractor: LagFit, film: LagFit, telling: float = 5.0) -> str | None
     return ATTRACTOR.name if lead > 0 else SQUEEZE_FILM.name
 
 
-def _message(status: LagStatus, area: Area, better: str | None) -> str:
+def _message(status: LagStatus, outliers: int, better: str | None) -> str:
     """A sentence or two for a person."""
     sentence = {
         LagStatus.DETERMINED: "The attractor is determined.",
@@ -151,6 +151,6 @@ def _message(status: LagStatus, area: Area, better: str | None) -> str:
     parts = [sentence]
     if better is not None:
         parts.append(f"The {better} law describes the loop better.")
-    if area.outliers:
-        parts.append(f"{area.outliers} outlying samples were left out.")
+    if outliers:
+        parts.append(f"{outliers} outlying samples were left out.")
     return " ".join(parts)

@@ -19,17 +19,15 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import bdtr, ndtri
+from scipy.special import bdtr
 
 from models.arrays import FloatArray
-from models.prognosis.criteria import AHEAD, BAND, COVERAGE
+from models.friction.criteria import Z90
+from models.prognosis.criteria import AHEAD, COVERAGE
 from models.prognosis.first_passage import bands
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
-
-#: Half the width of a normal's 90 % interval, in deviations.
-HALF_WIDTH = float(ndtri(BAND[-1]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +77,7 @@ class BackCast:
         low, median, high = (
             float(np.interp(test.progress, row[0] * np.array(AHEAD), ends)) for ends in row[2:].reshape(-1, 3).T
         )
-        half = math.hypot(median - low if test.value < median else high - median, HALF_WIDTH * math.sqrt(test.variance))
+        half = math.hypot(median - low if test.value < median else high - median, Z90 * math.sqrt(test.variance))
         miss = abs(test.value - median) / half if half > 0.0 else 0.0
         return replace(self, misses=np.append(self.misses, min(miss, 3.0)))  # it may be outlying
 
@@ -88,7 +86,7 @@ class BackCast:
         _, ahead = bands(posterior, newest.progress * np.array(AHEAD))
         medians = ahead[:, 1]
         scatter = [math.sqrt(float(posterior.weight @ posterior.scatter_variance(x, prior))) for x in medians.tolist()]
-        half = np.hypot(ahead - medians[:, None], HALF_WIDTH * np.array(scatter)[:, None])
+        half = np.hypot(ahead - medians[:, None], Z90 * np.array(scatter)[:, None])
         ends = medians[:, None] + np.array([-1.0, 0.0, 1.0]) * half
         row = np.concatenate([[newest.progress, newest.epoch], ends.ravel()])
         return replace(self, forecasts=np.vstack([self.forecasts, row]))

@@ -25,6 +25,7 @@ from models.diagnosis.baseline.laws import BLOCKS, RAISED, Laws, Scene
 from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.design.design import Design, Points
 from models.diagnosis.effects.effect import Discrepancy, Effect, Kind, Shape, amplitude_precision
+from models.friction.criteria import Z90
 
 #: Steps of the differences: shares of the prior deviation and of a shape's range; and of a law's largest value.
 _STEP, _RAISE = 1e-3, 1e-6
@@ -191,10 +192,6 @@ class Draw:
     effects: tuple[FittedEffect, ...] = ()
 
 
-#: Half the width of a normal's 90 % interval, in deviations.
-HALF_WIDTH = 1.6448536269514722
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
     """The amplitude of an effect in engineering units."""
@@ -210,7 +207,7 @@ class Estimate:
     @property
     def interval(self) -> tuple[float, float]:
         """The 90 % interval."""
-        half = HALF_WIDTH * self.sd
+        half = Z90 * self.sd
         return self.stated_interval or (self.value - half, self.value + half)
 
     @property

@@ -173,7 +173,7 @@ def fresh(at: Where) -> np.ndarray:
 @pytest.mark.slow
 def test_a_logged_oil_change_is_likelier_than_a_temperature_that_nobody_measured() -> None:
     """One step at the cycle of the log against a course of its own for every test: each is possible, one is simple."""
-    change = MaintenanceEvent(run_id="oil", cycles=4000.0, event=EventKind.OIL_CHANGE)
+    change = MaintenanceEvent(cycles=4000.0, event=EventKind.OIL_CHANGE)
     report = look(replace(campaign(5, fresh, temperature=False), maintenance=(change,)), 0)
     assert "oil_change" in report.causes
     gained = {each.effect: each.log_evidence_gain for each in report.candidates}
