@@ -262,7 +262,8 @@ def test_what_is_unknown_or_wrong_is_refused(client: TestClient) -> None:
         answer = client.request(method, f"/v1/clutches/nobody/{at}", json=body if method != "GET" else None)
         assert answer.status_code == 404, (method, at)
     assert client.post(f"{BASE}/diagnoses", json={"adopt": 1}).status_code == 422
-    assert client.put(f"{BASE}/model", json={}).status_code == 422
+    for body in ({}, {"diagnosis_id": 7}, {"diagnosis_id": ""}):
+        assert client.put(f"{BASE}/model", json=body).status_code == 422, body
     assert client.post(f"{BASE}/diagnoses", content=b"{}", headers={"Content-Type": "text/plain"}).status_code == 415
     assert client.get(f"{BASE}/diagnoses").json() == {"items": [], "next": None}
 
