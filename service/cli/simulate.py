@@ -140,7 +140,7 @@ def simulate(
         }
         manifest.write(out_folder / manifest.ANSWER, answer)
         made_so_far = f"{len(wear_and_cycles)} simulated runs and {inspections} inspections"
-        out.print(f"{made_so_far} of {clutch_id} in {out_folder}", soft_wrap=True)
+        out.print(f"{made_so_far} of {clutch_id} in {out_folder}", markup=False, soft_wrap=True)
         out.print(f"the true mean COF {halving}")
 
 
