@@ -1,4 +1,4 @@
-"""The tables of adopted models and of priors learned from fleets.
+"""The tables of adopted models, with the mean COFs as they correct them, and of priors learned from fleets.
 
 Priors are kept by kind of clutch, version, and the clutches that were left out.
 """

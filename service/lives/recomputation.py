@@ -1,7 +1,8 @@
 """The state of a clutch as one value, and all results that are computed from it; nothing here uses a database.
 
 A workflow loads a `ClutchState`, computes `Results` with the functions below, and stores them in one short transaction that
-checks that the state's revision is still the newest. An `Arrival` is a run as it comes in, among the stored ones.
+checks that the state's revision is still the newest. An `Arrival` is a run as it comes in, among the stored ones. Where
+the filters may go one step on from their stored states, and where a life is tracked again, is decided here.
 """
 
 from __future__ import annotations

@@ -26,6 +26,7 @@ def ask(
             records.clutch(connection, clutch_id)
         already = jobs.open_of(connection, kind)
         for row in already:
+            # a fleet refresh that has learned already and only predicts again would miss what came since
             if row.of == clutch_id and not row.arguments.get("learned", False):
                 return row
         if len(already) >= most:

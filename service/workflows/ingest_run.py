@@ -172,7 +172,7 @@ def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
 def _computed(database: Database, before: ClutchState, arrival: Arrival, read_with: tuple[Geometry, float]) -> _Outcome:
     """The results of the run in the clutch's history `before` it; it was read with a geometry and a filter.
 
-    Accepted, it is one more event. Doubted, it is held, and only the summary speaks of it. Where it is evidence for or
+    Accepted, it is one more event. Doubted, it is held, and only the summary speaks of it. Where it speaks for or
     against other runs, these are accepted or held as well, and the whole history is computed again.
     """
     if (before.geometry, before.record.torque_filter) != read_with:
@@ -187,18 +187,18 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
     if not arrival.odd:
         corrected = before.extension is not None
         judged = doubts_together(before.events, before.held, event, before.geometry, corrected=corrected)
-    doubtful = arrival.odd or judged.doubts.get(event.run_id, ())
-    if judged.changes:  # the run is evidence for or against others: these are accepted or held
-        state = replace(
-            before,
-            events=judged.settled(before.events, [] if doubtful else [event]),
-            held=judged.aside(before.held, [event] if doubtful else []),
-        )
-    elif doubtful:
+    doubts = arrival.odd or judged.doubts.get(event.run_id, ())
+    if doubts and not judged.changes:
         with_held = replace(before, held=(*before.held, event))
         part = held_summary(with_held, before.filters or {}, _evidence(database, with_held, arrival, answer))
         summary = Results(summary={**before.summary, **part})
-        return _Outcome(revision=before.revision, receipt=answer, cofs=event.cofs, results=summary, doubts=doubtful)
+        return _Outcome(revision=before.revision, receipt=answer, cofs=event.cofs, results=summary, doubts=doubts)
+    if judged.changes:  # the run speaks for or against others, which are accepted or held from now on
+        state = replace(
+            before,
+            events=judged.settled(before.events, [] if doubts else [event]),
+            held=judged.aside(before.held, [event] if doubts else []),
+        )
     if judged.changes or _changes_the_past(before, state.events, event):
         with database.reading() as connection:
             receipts = records.receipts(connection, before.clutch_id) | {event.run_id: answer}
@@ -221,9 +221,9 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
             levels={run_id: fits for run_id, fits in computed.levels.items() if run_id != event.run_id},
             summary=summarised(final, computed.tracking or Tracking(), evidence),
             judged=judged,
-            teaches=state.kind if not doubtful and life_with(state.events, event).end is not None else None,
+            teaches=state.kind if not doubts and life_with(state.events, event).end is not None else None,
         ),
-        doubts=doubtful,
+        doubts=doubts,
     )
 
 

@@ -79,18 +79,18 @@ def with_unit(text: str, unit: str) -> str:
 
 
 def signed(estimate: Estimate) -> str:
-    """Value with its 90 % interval, and where the sign is open its probability: said to be open where the interval holds
-    both signs."""
+    """Value with its 90 % interval, and the probability of its sign where that is not sure: said to be open where the
+    interval holds both signs."""
     sign = None if estimate.one_sided else estimate.sign_probability
     (low, high), unit = estimate.interval, estimate.unit
     size = f"{estimate.name}: {with_unit(number(estimate.value), unit)}"
     if high > low:
         size += f", 90 % interval {number(low)} to {with_unit(number(high), unit)}"
-    # where it holds one sign the interval says it
-    if sign is None or (not low < 0.0 < high and sign > 0.99):
+    both_signs = low < 0.0 < high
+    if sign is None or (not both_signs and sign > 0.99):  # the interval says it
         return size
     way = f"{'negative' if estimate.value < 0 else 'positive'} with probability {probability(sign)}"
-    return f"{size}, the sign is open ({way})" if low < 0.0 < high else f"{size}, {way}"
+    return f"{size}, the sign is open ({way})" if both_signs else f"{size}, {way}"
 
 
 def number(value: float) -> str:

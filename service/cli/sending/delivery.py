@@ -83,7 +83,8 @@ class Sent:
 
 
 def deliver(service: Service, spool: Spool, sent: Sent, report: Report, on_run: Callable[[], None]) -> None:
-    """Send what waits in a spool, counted in `sent`; the caller holds `spool.sending`. `on_run` is called after every run.
+    """Send what waits in a spool, counted in `sent`; the caller holds `spool.sending`. `on_run` is called after every run
+    that still waited.
 
     Raises ServiceAwayError where the service is away, RefusedError where it would refuse every run.
     """
@@ -96,7 +97,7 @@ def deliver(service: Service, spool: Spool, sent: Sent, report: Report, on_run: 
         except ServiceAwayError as error:
             spool.note(entry, last_answer=str(error), perhaps_stored=entry.perhaps_stored or error.perhaps_stored)
             sent.unanswered += 1
-            if sent.unanswered == _MAX_UNANSWERED or not _present(service, spool):
+            if sent.unanswered >= _MAX_UNANSWERED or not _present(service, spool):
                 raise
             _stays(spool, entry, sent, report, str(error))
         on_run()
