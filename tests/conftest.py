@@ -27,8 +27,6 @@ settings.load_profile("untimed")
 
 #: Fixtures, and values of fixtures, that start a server or a browser.
 OUTSIDE = {"postgresql", "s3", "on_server", "in_bucket", "browser", "server"}
-#: Tests of the service that run on a server, too, in every run; the others do so in `make slow`. Tests of storage always do.
-ON_BOTH = {"test_compute_then_store.py"}
 #: Folders, files and tests that take longer than 0.1 s of the processor; `make quick ARGS=--durations=20` shows what belongs
 #: here.
 LONG = frozenset(Path(__file__).with_name("long.txt").read_text(encoding="utf-8").split())
@@ -42,8 +40,8 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What needs more than its own process is marked `outside`: `make quick` leaves it out. So is what says the same of a
-    server again, as slow."""
+    """What needs more than its own process is marked `outside`: `make quick` leaves it out. Tests of the service that say the
+    same of a server again are slow; those of storage and the journeys run on both databases in every run."""
     for item in items:
         drawn = getattr(getattr(item, "callspec", None), "params", {})
         used = {*getattr(item, "fixturenames", ()), *(value for value in drawn.values() if isinstance(value, str))}
@@ -51,7 +49,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("outside")
         if item.nodeid.partition("[")[0] in LONG:
             item.add_marker("long")
-        if "on_server" in used and "/tests/service/" in item.path.as_posix() and item.path.name not in ON_BOTH:
+        if "on_server" in used and "/tests/service/" in item.path.as_posix():
             item.add_marker("slow")
 
 
