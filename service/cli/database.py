@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.progress import Progress
@@ -25,9 +25,6 @@ from service.cli.options import (
     say,
 )
 from storage.engine.errors import DatabaseTooOld
-
-if TYPE_CHECKING:
-    from service.work.background import AtOnce
 
 
 def backup(path: Path, database: Database = DATABASE) -> None:
@@ -86,25 +83,20 @@ def replay(
 
     A clutch with a run that this code cannot evaluate keeps its results; the command goes on with the others.
     """
-    from service.work.background import in_background  # start-up time: only this command needs it
     from service.work.progress import progress  # start-up time: only this command needs it
+    from service.workflows import replay as workflow  # start-up time
 
-    def replay_all(at_once: "AtOnce") -> list[str]:
-        from service.workflows import replay as workflow  # start-up time, in the background
-
-        clutch_ids, left = clutch_ids_given or workflow.clutch_ids(opened), []
-        advance(0, total=len(clutch_ids))
-        for replayed in workflow.replay(opened, clutch_ids, computing, at_once=at_once):
-            if replayed.error is not None:
-                left.append(replayed.clutch_id)
-                say(f"{replayed.clutch_id}: not replayed: {replayed.error}")
-            else:
-                print_line(f"{replayed.clutch_id}: {replayed.runs} runs")
-            advance()
-        return left
-
+    left = []
     with existing(database) as opened, executor(scheduler) as computing, progress(err, "replaying") as advance:
-        left = in_background(replay_all)
+        clutch_ids = clutch_ids_given or workflow.clutch_ids(opened)
+        advance(0, total=len(clutch_ids))
+        for replayed in workflow.replay(opened, clutch_ids, computing):
+            if replayed.error is not None:
+                left.append(replayed.name)
+                say(f"{replayed.name}: not replayed: {replayed.error}")
+            elif replayed.result is not None:
+                print_line(f"{replayed.name}: {len(replayed.result.receipts)} runs")
+            advance()
     if left:
         fail(f"{len(left)} clutches keep their previous results: {', '.join(left)}")
 

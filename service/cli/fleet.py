@@ -3,15 +3,11 @@ database, while the service runs.
 """
 
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from service.cli.options import DATABASE, EX_USAGE, Database, Scheduler, err, executor, existing, fail, print_line
-
-if TYPE_CHECKING:
-    from service.work.background import AtOnce
-    from service.workflows.learn_fleet import Refreshed
 
 app = typer.Typer(help="The priors learned from earlier clutches.")
 
@@ -38,18 +34,14 @@ def refresh(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print changes only")] = False,
 ) -> None:
     """Learn every kind's prior again, and update the predictions of clutches whose prior has changed."""
-    from service.work.background import in_background  # start-up time
+    from service.queries.fleet_priors import newest  # start-up time
     from service.work.progress import progress  # start-up time
+    from service.workflows.learn_fleet import refresh as learn_priors  # start-up time
 
-    def learn(at_once: "AtOnce") -> "tuple[Refreshed, list[dict[str, Any]]]":
-        from service.queries.fleet_priors import newest  # start-up time, in the background
-        from service.workflows.learn_fleet import refresh as learn_priors  # start-up time, in the background
-
-        now = datetime.now(UTC).isoformat(timespec="seconds")
-        return learn_priors(opened, now=now, at_once=at_once, executor=computing, advance=advance), newest(opened)
-
+    now = datetime.now(UTC).isoformat(timespec="seconds")
     with existing(database) as opened, executor(scheduler) as computing, progress(err, "learning") as advance:
-        done, priors = in_background(learn)
+        done = learn_priors(opened, computing, now=now, advance=advance)
+        priors = newest(opened)
     for item in priors:
         new = item["kind"] in done.kinds
         if new or not quiet:

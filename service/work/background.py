@@ -5,33 +5,15 @@ python -m service.work.background MODULE ...    runs a module so, what it import
 
 import multiprocessing
 import os
-import queue
 import runpy
 import sys
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future
-from functools import partial
-from typing import Any, Protocol, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-Result = TypeVar("Result")
-
 #: What libraries of linear algebra read when they are loaded.
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-
-
-class AtOnce(Protocol):
-    """How work in the background has something done that others wait for, as they do for who holds the write lock."""
-
-    def __call__(self, function: Callable[..., Result], /, *arguments: Any) -> Result:
-        """What `function(*arguments)` returns or raises."""
-
-
-def directly(function: Callable[..., Result], /, *arguments: Any) -> Result:
-    """`AtOnce` for work that does not yield."""
-    return function(*arguments)
 
 
 def use_one_blas_thread() -> None:
@@ -67,39 +49,6 @@ def end_with_parent(end: Callable[[], object] = lambda: os._exit(3)) -> None:
             end()
 
     threading.Thread(target=await_it, daemon=True).start()
-
-
-def in_background(work: Callable[[AtOnce], Result]) -> Result:
-    """What `work` returns, done in a thread that yields; what it has done at once the calling thread does.
-
-    An interrupt (Ctrl-C) ends the call without waiting for the work, which ends with the process. It stores nothing
-    itself: a transaction is one of the calling thread, which the interrupt rolls back.
-    """
-    done: Future[Result] = Future()
-    calls: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = queue.SimpleQueue()
-
-    def at_once(function: Callable[..., Any], /, *arguments: Any) -> Any:
-        answer: Future[Any] = Future()
-        calls.put((answer, partial(function, *arguments)))
-        return answer.result()
-
-    def whole() -> None:
-        try:
-            yield_to_others()
-            done.set_result(work(at_once))
-        except BaseException as error:  # noqa: BLE001  (raised again by the calling thread)
-            done.set_exception(error)
-        finally:
-            calls.put(None)
-
-    threading.Thread(target=whole, name="background", daemon=True).start()
-    while (asked := calls.get()) is not None:
-        answer, call = asked
-        try:
-            answer.set_result(call())
-        except Exception as error:  # noqa: BLE001  (raised again for who waits; an interrupt ends this thread's wait)
-            answer.set_exception(error)
-    return done.result()
 
 
 if __name__ == "__main__":

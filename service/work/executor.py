@@ -23,6 +23,7 @@ from enum import Enum
 from functools import cache
 from importlib.metadata import version
 from itertools import count
+from queue import SimpleQueue
 from typing import Any, Generic, Self, TypeVar, cast
 
 from service.defaults import SCHEDULERS
@@ -100,7 +101,11 @@ def _carried(error: Exception) -> Exception:
 
 
 class InProcess(Executor):
-    """The executor `local`."""
+    """The executor `local`: a thread of this process, which yields to all others.
+
+    The thread that asks loads and stores, for others may wait for its locks. An interrupt (Ctrl-C) ends it without waiting
+    for the computation, which ends with the process.
+    """
 
     elsewhere = False
 
@@ -112,9 +117,22 @@ class InProcess(Executor):
         in_order: bool = True,  # noqa: ARG002  (as they come is in order)
     ) -> Iterator[Outcome[Result]]:
         """As `Executor.map`; one item is in memory at a time."""
-        for index, item in enumerate(items):
-            result, error = called(function, item)
-            yield Outcome(index=index, result=result, error=error)
+        inputs: SimpleQueue[tuple[Item] | None] = SimpleQueue()
+        called_ones: SimpleQueue[tuple[Result | None, Exception | None]] = SimpleQueue()
+
+        def compute() -> None:
+            yield_to_others()
+            while (given := inputs.get()) is not None:
+                called_ones.put(called(function, *given))
+
+        threading.Thread(target=compute, name="background", daemon=True).start()
+        try:
+            for index, item in enumerate(items):
+                inputs.put((item,))
+                result, error = called_ones.get()
+                yield Outcome(index=index, result=result, error=error)
+        finally:
+            inputs.put(None)
 
 
 #: How often the process of an input may end before that is taken for the input's doing. Chosen: as Dask's
@@ -382,7 +400,8 @@ _prepare = cache(use_one_blas_thread)
 
 
 def executor_of(scheduler: str) -> Executor:
-    """`local`: this process; `processes[:N]`: a pool of N, or of a process a core; `tcp://host:port`: a Dask cluster.
+    """`local`: a thread of this process that yields; `processes[:N]`: a pool of N, or of a process a core;
+    `tcp://host:port`: a Dask cluster.
 
     Raises ValueError on anything else, ExecutorUnavailableError where the cluster cannot be used.
     """

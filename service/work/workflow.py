@@ -7,12 +7,11 @@ import sys
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from service.settings import DATABASE_VARIABLE
 from service.work import process
-from service.work.background import AtOnce, in_background
+from service.work.executor import Executor, InProcess
 from service.work.process import AWAY
 from storage.encoding import Json
 from storage.engine.database import Database
@@ -45,23 +44,23 @@ def main() -> None:
     process.end_with_the_service()
     try:
         with closing(open_database(os.environ[DATABASE_VARIABLE])) as database:
-            process.answer(in_background(partial(done, database, task, process.say)))
+            process.answer(done(database, task, process.say, InProcess()))
     except (DatabaseBusy, StorageUnavailable) as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(AWAY)
 
 
-def done(database: Database, task: Task, say: Callable[[Json], None], at_once: AtOnce) -> dict[str, Any]:
+def done(database: Database, task: Task, say: Callable[[Json], None], executor: Executor) -> dict[str, Any]:
     """The result, in numbers and with the reasons why clutches were left, and the progress that was said last."""
     module, _, name = task.function.partition(":")
-    function = getattr(importlib.import_module(module), name)  # in the background, as all that it computes
+    function = getattr(importlib.import_module(module), name)
     steps: list[Json] = []
 
     def say_and_keep(progress: Json) -> None:
         steps[:] = [progress]
         say(progress)
 
-    counts, left = function(database, task, say=say_and_keep, at_once=at_once)
+    counts, left = function(database, task, say=say_and_keep, executor=executor)
     for clutch_id, reason in left.items():
         sys.stderr.write(f"{clutch_id}: left as it was: {reason}\n")
     reasons = [{"clutch_id": clutch_id, "reason": reason} for clutch_id, reason in left.items()]

@@ -24,8 +24,7 @@ from service.lives.payloads import warned_again
 from service.lives.recomputation import ClutchState, Receipt, Results, track
 from service.lives.tracks import CARRIED, mean_offset_of
 from service.settings import CODE_VERSION
-from service.work.background import AtOnce, directly
-from service.work.executor import Ended, Ending, Executor, InProcess, in_rounds
+from service.work.executor import Ended, Ending, Executor, in_rounds
 from service.work.workflow import Task
 from storage import assumptions, clutches, jobs, results
 from storage.assumptions import NOBODY, FleetPriorRow
@@ -83,28 +82,25 @@ _Tracked: TypeAlias = tuple[ClutchState, Mapping[str, Receipt], Evidence | None]
 
 def refresh(
     database: Database,
+    executor: Executor,
     *,
     now: str,
     of: str | None = None,
     learned: bool = False,
-    at_once: AtOnce = directly,
-    executor: Executor | None = None,
     advance: Callable[[], object] = lambda: None,
     gives_way: Callable[[], bool] = lambda: False,
 ) -> Refreshed:
     """Learn the prior of a fleet, by its key, None: of all, again; one that differs is a new version, and tracks are made
-    again. Stored by `at_once`.
+    again.
 
     Where it is `learned` already, tracks alone are made again; of no more clutches once it `gives_way`, but of one at least.
-    Computed by the executor, None: in this process. `advance` is called twice for every clutch: as it has taught, and as its
-    tracks are up to date.
+    `advance` is called twice for every clutch: as it has taught, and as its tracks are up to date.
     """
-    executor = InProcess() if executor is None else executor
-    fresh = set() if learned else _learned(database, of, now, at_once, executor, advance)
+    fresh = set() if learned else _learned(database, of, now, executor, advance)
     names = _names(database, of)
     ended: dict[Ending, list[str]] = {ending: [] for ending in Ending}
     left: dict[str, str] = {}
-    for clutch in _brought_up(database, names, at_once, executor):
+    for clutch in _brought_up(database, names, executor):
         if clutch.error is not None:
             raise clutch.error
         ended[clutch.ending].append(clutch.name)
@@ -130,13 +126,13 @@ def _names(database: Database, of: str | None) -> list[str]:
 
 
 def _learned(
-    database: Database, of: str | None, now: str, at_once: AtOnce, executor: Executor, advance: Callable[[], object]
+    database: Database, of: str | None, now: str, executor: Executor, advance: Callable[[], object]
 ) -> set[str]:
     """The fleets, by key, of which a new version was learned and stored."""
     fresh: set[str] = set()
     while True:
         endings = {
-            key: _stored_again(database, fleet, now, at_once, executor)
+            key: _stored_again(database, fleet, now, executor)
             for key, fleet in _fleets(database, executor, _names(database, of), advance).items()
             if of in (key, None)
         }
@@ -171,9 +167,9 @@ def _fleets(
 
 
 def as_job(
-    database: Database, task: Task, *, say: Callable[[Json], None], at_once: AtOnce
+    database: Database, task: Task, *, say: Callable[[Json], None], executor: Executor
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Refresh a fleet's prior, or all of them, in this process, saying how far it has come.
+    """Refresh a fleet's prior, or all of them, saying how far it has come.
 
     Once a clutch is tracked, another fleet that is to learn goes first; the rest of the clutches becomes a job of its own.
     How many kinds have a new version and of how many clutches the answers have changed, and why others are left.
@@ -198,11 +194,9 @@ def as_job(
         return any(row.state == jobs.WAITING and not row.arguments.get("learned", False) for row in open_jobs)
 
     say_so()
-    done = refresh(
-        database, now=task.at, of=task.of, learned=learned, at_once=at_once, advance=advance, gives_way=gives_way
-    )
+    done = refresh(database, executor, now=task.at, of=task.of, learned=learned, advance=advance, gives_way=gives_way)
     if GAVE_WAY in done.left.values():
-        at_once(_ask_for_the_rest, database, task)
+        _ask_for_the_rest(database, task)
     return {"kinds": len(done.kinds), "changed": len(done.changed)}, dict(done.left)
 
 
@@ -254,7 +248,7 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
     return Lesson(taught=lesson, ended=replace(ended.in_unit(1.0 / unit), energy=done / worked if worked else None))
 
 
-def _stored_again(database: Database, fleet: Fleet, now: str, at_once: AtOnce, executor: Executor) -> Ending:
+def _stored_again(database: Database, fleet: Fleet, now: str, executor: Executor) -> Ending:
     """Store a fleet's prior, and what it is without each of its clutches, as the version after the one before its lessons.
 
     NOTHING where it is what is stored already; LEFT where another refresh has stored a version since.
@@ -265,19 +259,15 @@ def _stored_again(database: Database, fleet: Fleet, now: str, at_once: AtOnce, e
     if learned.value() is None or (stored is not None and stored.content == learned.value()):
         return Ending.NOTHING
     rows = _versions(fleet, learned.value(), fleet.version + 1, now, executor)
-
-    def store() -> Ending:
-        with database.writing() as connection:
-            newest = assumptions.current_fleet_prior(connection, fleet.kind)
-            if newest is not None and newest.version > fleet.version:
-                return Ending.LEFT
-            for row in rows:
-                assumptions.insert_fleet_prior(connection, row)
-            # clutches are still under the last
-            assumptions.forget_left_out(connection, fleet.kind, before=fleet.version)
-        return Ending.STORED
-
-    return at_once(store)
+    with database.writing() as connection:
+        newest = assumptions.current_fleet_prior(connection, fleet.kind)
+        if newest is not None and newest.version > fleet.version:
+            return Ending.LEFT
+        for row in rows:
+            assumptions.insert_fleet_prior(connection, row)
+        # clutches are still under the last
+        assumptions.forget_left_out(connection, fleet.kind, before=fleet.version)
+    return Ending.STORED
 
 
 def learned_without(of: tuple[Fleet, Collection[str]]) -> Json | None:
@@ -307,9 +297,7 @@ def _versions(fleet: Fleet, whole: Json | None, version: int, now: str, executor
     ]
 
 
-def _brought_up(
-    database: Database, names: Sequence[str], at_once: AtOnce, executor: Executor
-) -> Iterator[Ended[Results]]:
+def _brought_up(database: Database, names: Sequence[str], executor: Executor) -> Iterator[Ended[Results]]:
     """Track clutches again where their stored predictions were made under another prior."""
 
     def load(clutch_id: str) -> _Tracked | None:
@@ -326,7 +314,7 @@ def _brought_up(
         return state, receipts, evidence
 
     def store(tracked: _Tracked, retracked: Results) -> bool:
-        return at_once(_replaced, database, tracked[0], retracked)
+        return _replaced(database, tracked[0], retracked)
 
     return in_rounds(executor, names, load=load, compute=_retracked, store=store, rounds=MAX_ATTEMPTS)
 

@@ -1,14 +1,14 @@
 """Results are recomputed from the raw runs, which are never changed: loaded, computed by a pure function, stored."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
+from functools import partial
 
 from service import records, stored_runs
 from service.errors import BusyError, ServiceError
 from service.lives.criteria import MAX_ATTEMPTS
 from service.stored_runs import Recomputed, Recorded
-from service.work.background import AtOnce, directly
-from service.work.executor import Ending, Executor, InProcess, WorkerLostError, in_rounds
+from service.work.executor import Ended, Ending, Executor, WorkerLostError, in_rounds
 from service.work.workflow import Task
 from storage import clutches
 from storage.encoding import Json
@@ -16,24 +16,13 @@ from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Replayed:
-    """Outcome of a clutch's replay: how many runs were recomputed, or why its results are kept."""
-
-    clutch_id: str
-    runs: int = 0
-    error: Exception | None = None
-
-
 def clutch_ids(database: Database) -> list[str]:
     with database.reading() as connection:
         return clutches.all_ids(connection)
 
 
-def replay(
-    database: Database, clutch_ids: Sequence[str], executor: Executor, at_once: AtOnce = directly
-) -> Iterator[Replayed]:
-    """Fit and track all runs of these clutches again; each as it ends. Stored by `at_once`.
+def replay(database: Database, clutch_ids: Sequence[str], executor: Executor) -> Iterator[Ended[Recomputed]]:
+    """Fit and track all runs of these clutches again; each as it ends.
 
     A clutch of which runs came at each of MAX_ATTEMPTS has a BusyError; errors that are nobody's data are raised. The
     revision moves on only where a result has changed.
@@ -44,34 +33,20 @@ def replay(
             state = records.state(connection, clutch_id)
         return stored_runs.recorded(database, state, whole=executor.elsewhere)
 
-    def store(recorded: Recorded, computed: Recomputed) -> bool:
-        return at_once(_replaced, database, recorded, computed)
-
-    for ended in in_rounds(
-        executor, clutch_ids, load=load, compute=stored_runs.recomputed, store=store, rounds=MAX_ATTEMPTS
-    ):
+    store, compute = partial(_replaced, database), stored_runs.recomputed
+    for ended in in_rounds(executor, clutch_ids, load=load, compute=compute, store=store, rounds=MAX_ATTEMPTS):
         if ended.ending is Ending.LEFT:
-            yield Replayed(clutch_id=ended.name, error=BusyError(_LEFT))
-        elif ended.error is None:
-            yield Replayed(clutch_id=ended.name, runs=0 if ended.result is None else len(ended.result.receipts))
-        elif isinstance(ended.error, (ServiceError, DamagedData, WorkerLostError)):
-            yield Replayed(clutch_id=ended.name, error=ended.error)
+            yield replace(ended, error=BusyError(_LEFT))
+        elif ended.error is None or isinstance(ended.error, (ServiceError, DamagedData, WorkerLostError)):
+            yield ended
         else:
             raise ended.error
 
 
-def replay_clutch(database: Database, clutch_id: str) -> int:
-    """Replay one clutch in this process; returns how many runs it has. Raises NotFoundError and what `replay` gives."""
-    (replayed,) = replay(database, [clutch_id], InProcess())
-    if replayed.error is not None:
-        raise replayed.error
-    return replayed.runs
-
-
 def as_job(
-    database: Database, task: Task, *, say: Callable[[Json], None], at_once: AtOnce
+    database: Database, task: Task, *, say: Callable[[Json], None], executor: Executor
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Replay a clutch, None: all of them, in this process, saying how far it has come.
+    """Replay a clutch, None: all of them, saying how far it has come.
 
     How many clutches were replayed, and why the others keep the results that they had.
     """
@@ -79,9 +54,9 @@ def as_job(
     left: dict[str, str] = {}
     step = "replays the clutches"
     say({"step": step, "done": 0, "of": len(names)})
-    for done, replayed in enumerate(replay(database, names, InProcess(), at_once=at_once), start=1):
+    for done, replayed in enumerate(replay(database, names, executor), start=1):
         if replayed.error is not None:
-            left[replayed.clutch_id] = str(replayed.error)
+            left[replayed.name] = str(replayed.error)
         say({"step": step, "done": done, "of": len(names)})
     return {"replayed": len(names) - len(left)}, left
 

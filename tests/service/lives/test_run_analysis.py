@@ -11,13 +11,13 @@ from fastapi.testclient import TestClient
 
 from models.arrays import FloatArray
 from service.lives.engagements import ALL_INDICATORS
-from service.workflows.replay import replay_clutch
 from storage.engine.opening import open_database
 from tests.models.engagements.closed_forms import Engagement, constant, record
 from tests.models.loops import dynamic_records
 from tests.models.loops.dynamic_records import FALLING, attractor
 from tests.models.records.test_torque_filter import FILTER, behind, spiking
 from tests.service.clients import post_run
+from tests.service.work.replaying import replay_clutch
 from tests.support import SPEEDS_RPM, stationary
 
 VELOCITY = np.array(SPEEDS_RPM) * 2 * np.pi / 60 * 0.058

@@ -13,12 +13,12 @@ from fastapi.testclient import TestClient
 from service.lives.assumptions import Assumptions, ModelInForce
 from service.lives.history import Event, Life
 from service.lives.model_correction import corrected_cofs
-from service.workflows.replay import replay_clutch
 from storage.engine.opening import open_database
 from tests.plausibility.bench import with_gain
 from tests.service.clients import client_on, post_run
 from tests.service.lives.diagnosis.test_campaign import campaign, idle_record, post
 from tests.service.run_files.test_upload import dynamic_record
+from tests.service.work.replaying import replay_clutch
 from tests.service.workflows.benches import without_revision
 from tests.support import stationary
 

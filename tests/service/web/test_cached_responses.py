@@ -16,13 +16,13 @@ from httpx2 import Client
 from service.queries import series
 from service.web import answers, auth
 from service.web.middleware import Polls
-from service.workflows.replay import replay_clutch
 from storage.engine.errors import DatabaseBusy
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import back_up
 from tests.benchmarks.memory import resident
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import granted, revoke_all
+from tests.service.work.replaying import replay_clutch
 from tests.support import serving, stationary
 
 # --- Answers that are kept by the clutch's revision: computed once, and never given when they no longer hold.

@@ -1,6 +1,6 @@
 """Clutches that are to be replayed by a job, seen and ended midway: what the tests of replays as jobs share."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ from sqlalchemy import text
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
 from service.web.answers import to_json
-from service.work.executor import InProcess
+from service.work.executor import Executor, Item, Outcome, Result, called
 from service.workflows.edit_clutch import register
 from service.workflows.ingest_run import ingest
 from service.workflows.replay import clutch_ids, replay
@@ -34,6 +34,24 @@ VERSIONS = (
 OLD = "0.0.1"
 
 
+class InThread(Executor):
+    """In the thread that asks, and as soon as any other."""
+
+    elsewhere = False
+
+    def map(
+        self,
+        function: Callable[[Item], Result],
+        items: Iterable[Item],
+        *,
+        in_order: bool = True,  # noqa: ARG002  (as they come is in order)
+    ) -> Iterator[Outcome[Result]]:
+        """As `Executor.map`."""
+        for index, item in enumerate(items):
+            result, error = called(function, item)
+            yield Outcome(index=index, result=result, error=error)
+
+
 def stock(database: Database, clutches: int = CLUTCHES, tests: int = 2) -> dict[str, tuple[int, str]]:
     """Clutches with some tests each; what a replay in this process stores of them."""
     for number in range(clutches):
@@ -41,8 +59,16 @@ def stock(database: Database, clutches: int = CLUTCHES, tests: int = 2) -> dict[
         for each in range(tests):
             sent = stationary(1000 * each + number, run_id=f"r{each}", pressures=(5.0,))
             ingest(database, f"c{number}", read_run(to_json(sent)), received_at=AT)
-    assert all(replayed.error is None for replayed in replay(database, clutch_ids(database), InProcess()))
+    assert all(replayed.error is None for replayed in replay(database, clutch_ids(database), InThread()))
     return stored(database)
+
+
+def replay_clutch(database: Database, clutch_id: str) -> int:
+    """Replay one clutch in this process; returns how many runs it has. Raises what its replay did."""
+    (replayed,) = replay(database, [clutch_id], InThread())
+    if replayed.error is not None:
+        raise replayed.error
+    return 0 if replayed.result is None else len(replayed.result.receipts)
 
 
 def stored(database: Database) -> dict[str, tuple[int, str]]:

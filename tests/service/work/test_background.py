@@ -1,17 +1,18 @@
-"""Work in the background yields, and what it has done at once does not."""
+"""Work in the background yields, and what is loaded and stored for it does not."""
 
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import NoReturn
 
 import pytest
 
-from service.work.background import AtOnce, directly, in_background
+from service.work.executor import InProcess
 from storage import clutches
 from storage.engine.opening import open_database
 from tests.support import one_quick
@@ -24,24 +25,17 @@ def policy() -> int:
     return os.sched_getscheduler(0)
 
 
-def test_work_yields_what_it_has_done_at_once_does_not_and_what_either_raises_is_raised() -> None:
-    usual = policy()
+def test_what_is_computed_yields_and_what_is_loaded_and_stored_does_not() -> None:
+    usual, loaded = policy(), []
     assert usual != os.SCHED_IDLE
 
-    def work(at_once: AtOnce) -> tuple[int, int]:
-        return policy(), at_once(policy)
+    def items() -> Iterator[int]:
+        loaded.append(policy())
+        yield 0
 
-    assert in_background(work) == (os.SCHED_IDLE, usual)
-    assert policy() == usual
-    assert directly(policy) == usual
-
-    def fail() -> None:
-        raise LookupError("not there")
-
-    with pytest.raises(LookupError, match="not there"):
-        in_background(lambda at_once: at_once(fail))
-    with pytest.raises(LookupError, match="not there"):
-        in_background(lambda _: fail())
+    for outcome in InProcess().map(lambda _: policy(), items()):
+        assert (outcome.value(), loaded, policy()) == (os.SCHED_IDLE, [usual], usual)
+    assert loaded
 
 
 def test_a_module_is_run_in_the_background_from_its_first_import_on() -> None:
@@ -56,7 +50,8 @@ def test_a_system_that_refuses_the_policy_gives_the_lowest_priority(monkeypatch:
         raise PermissionError
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    assert in_background(lambda _: os.getpriority(os.PRIO_PROCESS, 0)) == 19
+    (outcome,) = InProcess().map(lambda _: os.getpriority(os.PRIO_PROCESS, 0), [0])
+    assert outcome.value() == 19
     assert os.getpriority(os.PRIO_PROCESS, 0) < 19
 
 
@@ -80,7 +75,9 @@ def test_linear_algebra_that_is_loaded_in_the_background_has_one_thread() -> Non
     if max(usual) == 1:
         pytest.skip("linear algebra has one thread here anyway")
     assert set(threads_of("-m", "service.work.background", "timeit", "-n1", "-r1", BLAS_THREADS)) == {1}
-    within = f"from service.work.background import in_background; in_background(lambda _: exec({BLAS_THREADS!r}))"
+    within = (
+        f"from service.work.executor import InProcess; list(InProcess().map(lambda _: exec({BLAS_THREADS!r}), [0]))"
+    )
     assert set(threads_of("-c", within)) == {1}
 
 
@@ -92,18 +89,18 @@ from service.workflows import replay
 from storage import clutches
 from tests.storage.samples import clutch_row
 
-def compute(*_, **__):
+def compute(_):
     print("computes", flush=True)
     while True:
         np.linalg.svd(np.ones((200, 200)))
 
-def store(database):
+def store(database, *_):
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
         print("stores", flush=True)
         time.sleep(60)
 
-replay.replay = {"computes": compute, "stores": lambda database, *_, at_once: at_once(store, database)}[sys.argv[1]]
+replay.replay = {"computes": lambda _, names, computing: computing.map(compute, names), "stores": store}[sys.argv[1]]
 from service.cli.main import app
 signal.signal(signal.SIGINT, signal.default_int_handler)  # who tests in the background of a shell has it ignored
 app(["replay", "c1", "--database", sys.argv[2]])

@@ -11,7 +11,7 @@ from sqlalchemy import text
 from service.errors import BusyError
 from service.schemas.clutch import ClutchIn
 from service.schemas.diagnosis import JobOut, JobPage
-from service.work.background import directly
+from service.work.executor import Executor
 from service.work.workflow import MAX_REASONS, Task, done
 from service.workflows import ask_job, learn_fleet
 from service.workflows.edit_clutch import register
@@ -23,7 +23,19 @@ from storage.engine.sqlite.database import back_up
 from storage.tables import fleet_prior
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import granted
-from tests.service.work.replaying import AT, CLUTCHES, WAIT, age, aged, ended, midway, stock, stored, until_none
+from tests.service.work.replaying import (
+    AT,
+    CLUTCHES,
+    WAIT,
+    InThread,
+    age,
+    aged,
+    ended,
+    midway,
+    stock,
+    stored,
+    until_none,
+)
 from tests.storage.engine.postgresql.server import postgresql_server
 from tests.support import ONCE, Server, serving
 
@@ -83,10 +95,10 @@ TASK = Task(function=f"{__name__}:leaving", of=None, at=AT, by="local", argument
 
 
 def leaving(
-    database: Database, task: Task, *, say: Callable[[Json], None], at_once: object
+    database: Database, task: Task, *, say: Callable[[Json], None], executor: Executor
 ) -> tuple[dict[str, int], dict[str, str]]:
     """A workflow that leaves many clutches."""
-    assert (database, task, at_once) == (None, TASK, directly)
+    assert (database, task, type(executor)) == (None, TASK, InThread)
     say({"step": "leaves", "done": 1, "of": 2})
     say({"step": "leaves", "done": 2, "of": 2})
     return {"replayed": 3}, {f"c{number}": "why" for number in range(MAX_REASONS + 5)}
@@ -94,7 +106,7 @@ def leaving(
 
 def test_the_result_has_few_reasons_and_the_log_all(capsys: pytest.CaptureFixture[str]) -> None:
     said: list[Json] = []
-    ended = done(None, TASK, said.append, directly)  # type: ignore[arg-type]  # the workflow reads nothing
+    ended = done(None, TASK, said.append, InThread())  # type: ignore[arg-type]  # the workflow reads nothing
     assert ended["progress"] == said[-1] == {"step": "leaves", "done": 2, "of": 2}
     assert (ended["result"]["replayed"], ended["result"]["left"]) == (3, MAX_REASONS + 5)
     assert ended["result"]["reasons"] == [{"clutch_id": f"c{n}", "reason": "why"} for n in range(MAX_REASONS)]
@@ -117,7 +129,7 @@ def test_a_fleet_refresh_stores_what_one_in_process_does(in_file: Database, tmp_
         assert again["result"] == {"kinds": 0, "changed": 0, "left": 0, "reasons": []}
     with closing(open_database(f"sqlite:///{tmp_path / 'copy.db'}")) as copy:
         assert stored(copy) == before != stored(in_file)
-        learn_fleet.refresh(copy, now=AT)
+        learn_fleet.refresh(copy, InThread(), now=AT)
         assert (stored(copy), priors(copy)) == (stored(in_file), priors(in_file))
 
 

@@ -20,8 +20,8 @@ from service.queries import runs as run_query
 from service.queries.raw_run import write_run
 from service.workflows import change_run, ingest_run, run_diagnosis
 from service.workflows.adopt_model import finish_and_adopt
-from service.workflows.replay import replay_clutch
 from storage import assumptions, changes, clutches, jobs
+from tests.service.work.replaying import replay_clutch
 from tests.service.workflows.benches import (
     AT,
     CLUTCH,

@@ -8,11 +8,12 @@ import pytest
 
 from service.queries import clutch_list
 from service.queries.remaining_life import remaining_life
-from service.workflows import replay, run_diagnosis
+from service.workflows import run_diagnosis
 from service.workflows.edit_clutch import edit
 from storage import clutches, diagnoses, jobs
 from storage.clutches import Choice
 from storage.diagnoses import FINISHED
+from tests.service.work.replaying import replay_clutch
 from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, WHO, Bench, body
 from tests.support import one_quick
 
@@ -99,7 +100,7 @@ class Written:
         self.change("accepted", lambda run_id: self.bench.correct(run_id, float(self.rng.integers(40) * 500)))
 
     def replay(self) -> None:
-        replay.replay_clutch(self.bench.database, CLUTCH)
+        replay_clutch(self.bench.database, CLUTCH)
 
     def edit(self) -> None:
         end = {"cof_fraction": self.one_of((0.5, 0.7, 0.95)), "criteria": []}

@@ -24,12 +24,12 @@ from service.schemas.clutch import ClutchIn
 from service.workflows import adopt_model, edit_clutch, ingest_run, learn_fleet
 from service.workflows.adopt_model import adopt, finish_and_adopt
 from service.workflows.ingest_run import ingest
-from service.workflows.replay import replay_clutch
 from service.workflows.run_diagnosis import ask
 from storage import assumptions, clutches, jobs, results, runs
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 from storage.engine.sqlite.database import FileDatabase
+from tests.service.work.replaying import InThread, replay_clutch
 from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, REPORT, Bench, body, overtaken, send_to
 
 
@@ -86,7 +86,7 @@ def test_nothing_is_computed_while_the_write_lock_is_held(bench: Bench, numerics
         lambda: bench.send_tests(6000),
         lambda: bench.adopt(None),
         lambda: replay_clutch(bench.database, CLUTCH),
-        lambda: learn_fleet.refresh(bench.database, now=AT),
+        lambda: learn_fleet.refresh(bench.database, InThread(), now=AT),
     ]
     for errand in errands:
         before = numerics()

@@ -23,9 +23,9 @@ from service.schemas.diagnosis import DiagnosisListed, DiagnosisOut, Isolability
 from service.work import diagnosis as process
 from service.work.queue import MAX_ATTEMPTS
 from service.workflows import adopt_model
-from service.workflows.replay import replay_clutch
 from storage.engine.opening import open_database
 from tests.service.clients import client_on, post_run
+from tests.service.work.replaying import replay_clutch
 from tests.service.work.waiting import until
 from tests.service.workflows import stand_in_engine
 from tests.support import stationary

@@ -16,6 +16,7 @@ from service.workflows.learn_fleet import refresh
 from storage.engine.opening import open_database
 from tests.real import loaders
 from tests.service.clients import client_of
+from tests.service.work.replaying import InThread
 from tests.support import serving, stationary
 
 RUNS, LIFE = "/v1/clutches/c1/runs", "/v1/clutches/c1/remaining-useful-life"
@@ -141,12 +142,12 @@ def test_declared_ends_teach_the_fleet_by_themselves(client: TestClient, databas
     assert {item["kind"] for item in jobs} == {"fleet_refresh"}
     # the job has the least priority of all: on a busy machine it is not waited for
     with closing(open_database(database_url)) as database:
-        refresh(database, now="2026-11-26T00:00:00+00:00")
+        refresh(database, InThread(), now="2026-11-26T00:00:00+00:00")
     (prior,) = client.get("/v1/fleet/priors").json()["items"]
     assert (prior["ended_lives"], prior["censored_lives"]) == (4, 1)
     post(client, {"reason": "it goes on"}, 200, f"/v1/clutches/w0/runs/{_declared(client, 'w0')}/withdraw")
     with closing(open_database(database_url)) as database:
-        refresh(database, now="2026-11-26T00:00:01+00:00")
+        refresh(database, InThread(), now="2026-11-26T00:00:01+00:00")
     (prior,) = client.get("/v1/fleet/priors").json()["items"]
     assert (prior["ended_lives"], prior["censored_lives"]) == (3, 1)
 

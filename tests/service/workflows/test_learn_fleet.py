@@ -20,19 +20,17 @@ from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
 from service.settings import Settings
 from service.web.answers import to_json
-from service.work.background import directly
 from service.work.queue import workflow_work
 from service.work.workflow import Task
 from service.workflows import learn_fleet
 from service.workflows.edit_clutch import register
 from service.workflows.ingest_run import ingest
-from service.workflows.replay import replay_clutch
 from storage import jobs
 from storage.encoding import Json
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.service.clients import client_on, post_run
-from tests.service.work.replaying import AT, stock
+from tests.service.work.replaying import AT, InThread, replay_clutch, stock
 from tests.support import stationary
 
 LIFE = "/v1/clutches/{}/remaining-useful-life"
@@ -76,7 +74,7 @@ def width(said: dict[str, dict[str, float | None]]) -> float:
 
 def refresh(url: str, advance: Callable[[], object] = lambda: None) -> learn_fleet.Refreshed:
     with closing(open_database(url)) as database:
-        return learn_fleet.refresh(database, now="2026-01-01T00:00:00+00:00", advance=advance)
+        return learn_fleet.refresh(database, InThread(), now="2026-01-01T00:00:00+00:00", advance=advance)
 
 
 def test_a_fleet_teaches_the_next_clutch_and_nobody_itself(url: str) -> None:
@@ -177,7 +175,7 @@ def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
             job = jobs.claim(connection, "here", [jobs.FLEET_REFRESH], lease=60.0, at=AT)
         assert job is not None
         task = Task(**workflow_work("f")(job, Settings()).task)
-        done = learn_fleet.as_job(in_file, task, say=lambda _: None, at_once=directly)
+        done = learn_fleet.as_job(in_file, task, say=lambda _: None, executor=InThread())
         with in_file.writing() as connection:
             jobs.end(connection, job.job_id, jobs.FINISHED, AT)
         return done
