@@ -90,8 +90,7 @@ OIL_CHANGE = Effect(
     slug="oil_change",
     title="The oil was changed",
     article="an",
-    physics="Fresh oil has another viscosity and fresh friction modifiers: the viscous term steps, the boundary friction a "
-    "little.",
+    physics="Fresh oil has another viscosity and fresh additives: viscous friction steps, and boundary friction a little.",
     check="look up when oil was changed or topped up",
     formula="a (C_v |v|^γ + k M̄_c ∂S/∂M̄_c) (1 - l (1 - e^{-2(ζ - ζ_k)/ζ_last})) after ζ_k",
     source="maintenance practice; friction modifiers deplete with use",
@@ -173,7 +172,7 @@ LOAD_SEVERITY = Effect(
     slug="load_severity",
     title="Some duty was harder than other",
     article="varying",
-    physics="The rate of eq. 6's kinetics grows with the energy of an engagement: harder blocks age the clutch faster.",
+    physics="Engagements of more energy age the clutch faster than as many easy ones.",
     check="compare the energy of the engagements along the life",
     formula="S(ζ_e) - S(ζ), ζ_e = Σ (E/E_usual)^m over the engagements whose energy was sent",
     source="models.degradation.general_order: dD/dζ = -k Dⁿ with k by the load's severity",
