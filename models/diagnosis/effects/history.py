@@ -178,7 +178,7 @@ LOAD_SEVERITY = Effect(
     source="models.degradation.general_order: dD/dζ = -k Dⁿ with k by the load's severity",
     kind=Kind.COURSE,
     channels=("energy_per_cycle_kj",),
-    amplitude="severity exponent m",
+    amplitude="severity exponent m (1: proportional)",
     unit="-",
     prior_sd=0.7,
     positive=True,

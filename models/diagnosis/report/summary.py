@@ -192,12 +192,12 @@ def _detection_limits(report: Report) -> list[Sentence]:
 
 
 def _shown(visible: Visible) -> str:
-    """The smallest sizes that show, `a torque zero shift from 0.64 Nm (least visible form: 11 Nm)`."""
+    """The smallest sizes that show, `a torque zero shift of 0.64 Nm at best and 11 Nm at worst`."""
     name = _with_article(visible.effect)
     if visible.unit == "-":
-        name = f"{BY_SLUG[visible.effect].amplitude} of {effect_name(visible.effect)}"
-    hardest = _threshold(visible.amplitude, visible.unit) if math.isfinite(visible.amplitude) else "never"
-    return f"{name} from {_threshold(visible.least, visible.unit)} (least visible form: {hardest})"
+        name = f"a {BY_SLUG[visible.effect].amplitude.partition(' (')[0]}"
+    hardest = _threshold(visible.amplitude, visible.unit) if math.isfinite(visible.amplitude) else "none"
+    return f"{name} of {_threshold(visible.least, visible.unit)} at best and {hardest} at worst"
 
 
 def _threshold(value: float, unit: str) -> str:
@@ -310,7 +310,7 @@ def _open(
     if len(alternatives) == 1:
         sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
     elif alternatives:
-        sentences.append(Sentence(f"What else may be at work (with probabilities): {listed(alternatives, 'or')}."))
+        sentences.append(Sentence(f"Beside it there may be (with probabilities): {listed(alternatives, 'or')}."))
     return sentences
 
 
@@ -367,12 +367,14 @@ def _gained(report: Report) -> list[Sentence]:
     sentences = [Sentence(left_out, SHOULD)]
     if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         return sentences
-    better, further = ("better", "with") if gain.forecast_log_score_gain > 0 else ("no better", "without")
-    ahead = f"The last tests are predicted {better} from the earlier ones with {added} in the model"
-    ahead += "; it can be adopted." if report.extension is not None and further == "with" else "."
+    better = gain.forecast_log_score_gain > 0
     adoptable = () if report.extension is None else report.extension.effects
-    if any(BY_SLUG[slug].kind is Kind.COURSE for slug in adoptable):
-        ahead += f" If you adopt it, remaining life is predicted {further} its further course."
+    way = "better" if better else "no better"
+    ahead = f"The last tests are predicted {way} from the earlier ones with {added} in the model"
+    ahead += "; you can adopt this." if adoptable and better else "."
+    if courses := listed([effect_name(slug) for slug in adoptable if BY_SLUG[slug].kind is Kind.COURSE] or [""]):
+        then = f"includes {courses}" if better else f"leaves out how {courses} goes on"
+        ahead += f" If you adopt it, the predicted remaining life {then}."
     return [*sentences, Sentence(ahead, SHOULD if report.verdict is Verdict.CAUSE_AMBIGUOUS else MUST)]
 
 
@@ -408,12 +410,11 @@ def _next(report: Report) -> list[Sentence]:
     first = "Then" if sentences else "Next"
     if best.nats < criteria.WORTHWHILE:
         first = "No single test would decide. The best"
-    hardest = f" (hardest to tell apart: {_cause_name(best.effect)} and {_cause_name(best.other)})"
+    decides = f"It decides with probability {probability(best.probability)}"
     if best.other == BASELINE:
-        hardest = f" (hardest to tell: whether {_cause_name(best.effect)} is at work)"
-    elif len(_worth_saying(report)) == 2:
-        hardest = ""
-    decides = f"The probability that it decides is {probability(best.probability)}{hardest}"
+        decides += f" whether {_cause_name(best.effect)} is at work"
+    elif len(_worth_saying(report)) != 2:
+        decides += f" (hardest to tell apart: {_cause_name(best.effect)} and {_cause_name(best.other)})"
     return [*sentences, Sentence(f"{first}: {brief_test(best)}. {decides}.")]
 
 

@@ -135,7 +135,7 @@ def test_what_is_named_is_explained_with_its_size_its_gain_and_the_next_test() -
     assert re.search(left_out, summarise(replace(found, advice=())))
     assert "The last tests are predicted better from the earlier ones with it in the model." in said
     assert f"Next: {BY_SLUG['oil_temperature'].check}. Then: stationary test with" in said
-    assert "The probability that it decides is 0.80 (hardest to tell apart: oil change and running in)." in said
+    assert "It decides with probability 0.80 (hardest to tell apart: oil change and running in)." in said
 
 
 def test_what_adoption_does_to_remaining_life_is_said_of_effects_of_use_alone() -> None:
@@ -143,12 +143,12 @@ def test_what_adoption_does_to_remaining_life_is_said_of_effects_of_use_alone() 
         extension = Extension(effects=(slug,), content={})
         found = replace(findings(Verdict.CAUSE_NAMED, slug), extension=extension, advice=(), candidates=())
         said = summarise(found)
-        assert ("If you adopt it, remaining life is predicted with its further course." in said) == course
+        assert ("If you adopt it, the predicted remaining life includes oil change." in said) == course
         assert "No further test would tell much more." in said
-        assert "predicted better from the earlier ones with it in the model; it can be adopted." in said
+        assert "predicted better from the earlier ones with it in the model; you can adopt this." in said
     no_better = summarise(replace(found, extension=Extension(effects=("oil_change",), content={}), gain=NO_BETTER))
-    assert "with it in the model. If you adopt it, remaining life is predicted without its further course" in no_better
-    assert "can be adopted" not in summarise(replace(found, extension=None))
+    assert "If you adopt it, the predicted remaining life leaves out how oil change goes on." in no_better
+    assert "you can adopt" not in summarise(replace(found, extension=None))
 
 
 def test_where_runs_scatter_more_than_usual_the_paragraph_says_what_may_hide_in_it() -> None:
@@ -194,16 +194,16 @@ def test_what_these_data_would_show_is_said_with_units_zero_and_pressure_first()
     shown = tuple(visible(slug, size) for slug, size in (*sizes.items(), ("torque_zero_shift", 12.0)))
     said = summarise(replace(found, visible=shown))
     assert (
-        "Nine times in ten, these data would show a torque zero shift from 3 Nm (least visible form: 6 Nm), a pressure "
-        "offset from 0.075 bar (least visible form: 0.15 bar) and unfinished running in from 120 % (least visible "
-        "form: 240 %)."
+        "Nine times in ten, these data would show a torque zero shift of 3 Nm at best and 6 Nm at "
+        "worst, a pressure offset of 0.075 bar at best and 0.15 bar at worst and unfinished running in of 120 % at best and "
+        "240 % at worst."
     ) in said
     assert "These data cannot show, at any size: channel delay and stick slip." in said
     said = summarise(replace(found, visible=(visible("oil_temperature", 4.0),)))
-    assert "viscosity exponent β of oil temperature from 1.4 (least visible form: 2.8)." in said
+    assert "a viscosity exponent β of 1.4 at best and 2.8 at worst." in said
     some = replace(visible("pressure_offset", 3.0), amplitude=math.inf, least=0.1)  # seen in one of its shapes alone
     said = summarise(replace(found, visible=(some,)))
-    assert "a pressure offset from 0.1 bar (least visible form: never)." in said
+    assert "a pressure offset of 0.1 bar at best and none at worst." in said
 
 
 def sized(interval: tuple[float, float], sign: float) -> str:
@@ -230,7 +230,7 @@ def test_a_cause_of_all_explanations_is_certain_and_open_is_what_is_beside_it() 
     both = explanations_of({("channel_delay",): 0.55, ("channel_delay", UNCATALOGUED): 0.45})
     said = summarise(replace(found, explanations=both))
     assert "A channel delay is at work (probability above 0.99)." in said
-    assert "What else may be at work (with probabilities): nothing (0.55) or something that" in said
+    assert "Beside it there may be (with probabilities): nothing (0.55) or something that" in said
     assert "Explanations that remain" not in said
     one = explanations_of({("channel_delay", UNCATALOGUED): 1.0})
     said = summarise(replace(found, explanations=one))
