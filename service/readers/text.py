@@ -30,8 +30,6 @@ from service.readers.table import Reading, Table
 
 #: Bytes of a block; the first must hold the titles. Chosen: rows that are no plain numbers take 60 times as much memory.
 _BLOCK = 1 << 17
-#: Bytes of a table on its side, which is turned as a whole. Chosen: a quarter of a million samples of five channels.
-_MAX_TURNED = 8 << 20
 _COMMENTS = ("#", "%", "//")
 _NEWLINE, _COMMA = b"\n,"
 _SEPARATOR_LINE = re.compile(r"\s*sep=(.?)\s*", re.IGNORECASE)
@@ -71,7 +69,8 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
     """The table of a text. Raises InvalidError where it has no titles, or its lines are no text."""
     with opened() as source:
         first = source.read(_BLOCK)
-    if len(first) == _BLOCK and b"\n" in first and b"\0" not in first:  # whole lines alone; with zeros it may be UTF-16
+    whole = len(first) < _BLOCK
+    if not whole and b"\n" in first and b"\0" not in first:  # whole lines alone; with zeros it may be UTF-16
         first = first[: first.rindex(b"\n") + 1]
     if not first.strip():
         rule = "is empty, and so is the rest of the file: send a file with a header and rows of numbers"
@@ -79,15 +78,11 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
     try:
         form = _form(first, reading, limits)
     except InvalidError:
-        if _turned(first, reading) is None:
+        if (on_its_side := _turned(first, reading)) is None:
             raise
-        with opened() as source:
-            text = source.read(_MAX_TURNED)
-            if source.read(1):
-                message = f"a table on its side must have at most {_MAX_TURNED} bytes: send it with a column a channel"
-                raise TooLargeError(message) from None
-        if (on_its_side := _turned(text, reading)) is None:
-            raise
+        if not whole:
+            message = f"a table on its side must have less than {_BLOCK} bytes: send it with a column a channel"
+            raise TooLargeError(message) from None
         table = read_text(lambda: nullcontext(io.BytesIO(on_its_side)), reading, limits)
         return replace(table, notices=[*table.notices, TURNED])
     body = _Body(opened, form, reading, limits)

@@ -118,19 +118,24 @@ class InProcess(Executor):
     ) -> Iterator[Outcome[Result]]:
         """As `Executor.map`; one item is in memory at a time."""
         inputs: SimpleQueue[tuple[Item] | None] = SimpleQueue()
-        called_ones: SimpleQueue[tuple[Result | None, Exception | None]] = SimpleQueue()
+        called_ones: SimpleQueue[tuple[Result | None, Exception | None] | BaseException] = SimpleQueue()
 
         def compute() -> None:
-            yield_to_others()
-            while (given := inputs.get()) is not None:
-                called_ones.put(called(function, *given))
+            try:
+                yield_to_others()
+                while (given := inputs.get()) is not None:
+                    called_ones.put(called(function, *given))
+            except BaseException as error:  # noqa: BLE001  (raised again by who asked)
+                called_ones.put(error)
 
         threading.Thread(target=compute, name="background", daemon=True).start()
         try:
             for index, item in enumerate(items):
                 inputs.put((item,))
-                result, error = called_ones.get()
-                yield Outcome(index=index, result=result, error=error)
+                answer = called_ones.get()
+                if isinstance(answer, BaseException):
+                    raise answer
+                yield Outcome(index=index, result=answer[0], error=answer[1])
         finally:
             inputs.put(None)
 

@@ -34,7 +34,7 @@ INERTIA_TORQUE = Effect(
     article="an",
     physics="A mass between clutch and sensor turns with the shaft: the sensor also measures the torque that "
     "accelerates it.",
-    check="compare it with the inertia of what turns between the clutch and the torque sensor",
+    check="look at the inertia of what turns between the clutch and the torque sensor",
     formula="J dω/dt",
     source="Newton; on the reference's rig the sensor stands on the grounded side, on others it does not",
     kind=Kind.LAG,

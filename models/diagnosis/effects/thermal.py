@@ -87,7 +87,7 @@ OIL_TEMPERATURE = Effect(
     article="changed",
     physics="Oil temperature differed between tests or within them: warm oil is thinner, shears more easily, and lets "
     "asperities touch up to a higher speed.",
-    check="compare the oil's temperature between the tests; hold it constant, or record it and send it with each run",
+    check="compare the oil's temperature between tests; hold it constant, or send it with each run",
     formula="C_v |v|^γ ((ν(T)/ν_ref)^β - 1), and V_S (ν(T)/ν_ref)^{κβ} for V_S, ν by ASTM D341 at a film's "
     "temperature, which follows the oil's within τ; κ = -1/γ with β = γ is Hersey's similarity",
     source="ASTM D341-20; M. D. Hersey, J. Wash. Acad. Sci. 4 (1914) 542; Ompusunggu et al. 2013, section 2.3 (80 to 90 °C)",

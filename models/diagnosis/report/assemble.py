@@ -27,7 +27,7 @@ from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.isolability import unseen_of, visible_of
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.report import Candidate, Report, misfit_of
-from models.diagnosis.report.summary import effect_name, listed, number, summarise
+from models.diagnosis.report.summary import effect_name, listed, number, summarise, with_unit
 from models.diagnosis.validation.held_out import Gain
 
 
@@ -105,7 +105,8 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
         return ""
     if gain is not None and (gain.rmse_after > criteria.MOST_WORSE * gain.rmse_before or gain.log_score_gain < 0):
         names = listed([effect_name(slug) for slug in sizes.by_slug])
-        return f"Not to be adopted yet: {names} is known too little to predict left-out runs."
+        known = "is" if len(sizes.by_slug) == 1 else "are"
+        return f"Not to be adopted yet: {names} {known} known too little to predict left-out runs."
     sentences = []
     for slug, size in sizes.by_slug.items():
         if size.other_sign > criteria.SIGN_UNDETERMINED:
@@ -114,7 +115,8 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
             course = "it depends on the assumed course over life, and " if size.courses else ""
             sentences.append(
                 f"Not to be adopted yet: these data do not determine the size of {effect_name(slug)} (90 % interval "
-                f"{low} to {high} {effect.unit}); {course}its sign may be wrong with probability {size.other_sign:.2f}."
+                f"{low} to {with_unit(high, effect.unit)}); {course}"
+                f"its sign may be wrong with probability {size.other_sign:.2f}."
             )
     return " ".join(sentences)
 

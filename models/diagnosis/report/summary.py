@@ -60,8 +60,8 @@ def _capitalised(text: str) -> str:
 
 
 def listed(parts: Sequence[str], word: str = "and") -> str:
-    """`a`, `a and b`, `a, b and c`."""
-    return f" {word} ".join(part for part in (", ".join(parts[:-1]), parts[-1]) if part)
+    """`a`, `a and b`, `a, b and c`; nothing of nothing."""
+    return f" {word} ".join(part for part in (", ".join(parts[:-1]), *parts[-1:]) if part)
 
 
 def _points_of_life(count: int) -> str:
@@ -83,6 +83,7 @@ def signed(estimate: Estimate) -> str:
     interval holds both signs."""
     sign = None if estimate.one_sided else estimate.sign_probability
     (low, high), unit = estimate.interval, estimate.unit
+    low = max(low, 0.0) if estimate.one_sided else low
     size = f"{estimate.name}: {with_unit(number(estimate.value), unit)}"
     if high > low:
         size += f", 90 % interval {number(low)} to {with_unit(number(high), unit)}"
@@ -260,23 +261,28 @@ def _ambiguous(report: Report) -> list[Sentence]:
             for slug in item.effects
             if slug not in sure and (estimate := sized.pop(slug, None)) is not None
         ]
-        choices.append((" together with ".join(names) or "nothing", probability(item.probability), sizes))
+        choices.append((" together with ".join(names) or "nothing", item.probability, sizes))
     certain = [Sentence(f"{_capitalised(signed(sized[slug]))}.") for slug in sure if slug in sized]
     remaining = [*_gained(report), *_next(report)]
-    descriptions = [f"{name} ({'; '.join((chance, *sizes))})" for name, chance, sizes in choices]
-    others = sum(item.probability for item in report.explanations if item.effects and item.effects not in near)
-    rest = [f"others ({probability(others)})"] if others >= 0.005 and not sure else []
-    ways = [
-        [*descriptions, *rest]
-    ]  # then without sizes, which are in the report's fields, and with fewer probabilities
+
+    def others(shown: int) -> list[str]:
+        """All that is not among the first choices."""
+        something = sum(item.probability for item in report.explanations if item.effects)
+        rest = something - sum(chance for _, chance, _ in choices[:shown])
+        return [f"others ({probability(rest)})"] if rest >= 0.005 and not sure else []
+
+    descriptions = [f"{name} ({'; '.join((probability(chance), *sizes))})" for name, chance, sizes in choices]
+    # then without sizes, which are in the report's fields, and with fewer probabilities
+    ways = [[*descriptions, *others(len(choices))]]
     for shown in range(min(len(choices), 8), 0, -1):
         brief = [
-            f"{name.partition(', such as ')[0]} ({'; '.join((chance, *(size for size in sizes if size == _NO_SIZE)))})"
+            f"{name.partition(', such as ')[0]} "
+            f"({'; '.join((probability(chance), *(size for size in sizes if size == _NO_SIZE)))})"
             for name, chance, sizes in choices[:shown]
         ]
         other_names = [effect_name(slug) for slug in report.causes if slug not in {*sure, UNCATALOGUED}]
         unsaid = [name for name in other_names if not any(name in alternative for alternative in brief)]
-        ways.append([*brief, *(unsaid or rest)])
+        ways.append([*brief, *(unsaid or others(shown))])
     for alternatives in ways:
         sentences = [*_open(report, sure, certain, alternatives), *remaining]
         if _words([sentence for sentence in sentences if sentence.matters == MUST]) <= criteria.MAX_WORDS:
@@ -310,7 +316,7 @@ def _open(
     if len(alternatives) == 1:
         sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
     elif alternatives:
-        sentences.append(Sentence(f"Beside it there may be (with probabilities): {listed(alternatives, 'or')}."))
+        sentences.append(Sentence(f"There may also be (with probabilities): {listed(alternatives, 'or')}."))
     return sentences
 
 
@@ -333,7 +339,7 @@ def _unexplained(report: Report) -> list[Sentence]:
         sentences, axes = [Sentence(f"In the raw records {swing}") for swing in swings], [FREQUENCY]
     else:
         sentences = [Sentence(_error(report.baseline, axes)), *_gained(report)]
-    look_at = listed([_LOOK_AT[axis] for axis in axes]) or "the rig"
+    look_at = "; ".join(_LOOK_AT[axis] for axis in axes) or "the rig"
     again = "Next: repeat the last test at once and diagnose again. If the error is gone, one run caused it; if not, look at"
     return [Sentence(first), *sentences, Sentence(f"{again} {look_at}.")]
 
@@ -357,9 +363,10 @@ def _gained(report: Report) -> list[Sentence]:
         return [Sentence(report.not_adoptable)]
     if gain is None:
         return []
-    added = "it" if len(report.causes) == 1 else "them"
-    if report.verdict is not Verdict.CAUSE_NAMED:
-        added = listed([effect_name(slug) for slug in report.extended_effects] or ["a smooth correction"])
+    added = {
+        Verdict.CAUSE_NAMED: "this cause" if len(report.causes) == 1 else "these causes",
+        Verdict.UNEXPLAINED_STRUCTURE: "a smooth correction",
+    }.get(report.verdict, listed([effect_name(slug) for slug in report.extended_effects]))
     way = "smaller" if gain.reduction_percent >= 0 else "larger"
     change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} % {way}"
     hardest = _hardest(gain, report.extended)
@@ -372,7 +379,7 @@ def _gained(report: Report) -> list[Sentence]:
     way = "better" if better else "no better"
     ahead = f"The last tests are predicted {way} from the earlier ones with {added} in the model"
     ahead += "; you can adopt this." if adoptable and better else "."
-    if courses := listed([effect_name(slug) for slug in adoptable if BY_SLUG[slug].kind is Kind.COURSE] or [""]):
+    if courses := listed([effect_name(slug) for slug in adoptable if BY_SLUG[slug].kind is Kind.COURSE]):
         then = f"includes {courses}" if better else f"leaves out how {courses} goes on"
         ahead += f" If you adopt it, the predicted remaining life {then}."
     return [*sentences, Sentence(ahead, SHOULD if report.verdict is Verdict.CAUSE_AMBIGUOUS else MUST)]
@@ -409,11 +416,11 @@ def _next(report: Report) -> list[Sentence]:
         return [*sentences, Sentence(f"To measure {size} better: {brief_test(best)}; {narrower}.")]
     first = "Then" if sentences else "Next"
     if best.nats < criteria.WORTHWHILE:
-        first = "No single test would decide. The best"
+        first = "No single test is likely to decide. The best"
     decides = f"It decides with probability {probability(best.probability)}"
     if best.other == BASELINE:
         decides += f" whether {_cause_name(best.effect)} is at work"
-    elif len(_worth_saying(report)) != 2:
+    elif {(best.effect,), (best.other,)} != set(_worth_saying(report)):
         decides += f" (hardest to tell apart: {_cause_name(best.effect)} and {_cause_name(best.other)})"
     return [*sentences, Sentence(f"{first}: {brief_test(best)}. {decides}.")]
 

@@ -131,9 +131,9 @@ def test_what_is_named_is_explained_with_its_size_its_gain_and_the_next_test() -
     assert "The cause is changed oil temperature (probability 0.97)." in said
     assert BY_SLUG["oil_temperature"].physics in said
     assert "0.363, 90 % interval 0.273 to 0.453." in said
-    left_out = r"With it in the model, the error on runs left out of the fit is 7\.[45] ± 0\.9 % smaller\."
+    left_out = r"With this cause in the model, the error on runs left out of the fit is 7\.[45] ± 0\.9 % smaller\."
     assert re.search(left_out, summarise(replace(found, advice=())))
-    assert "The last tests are predicted better from the earlier ones with it in the model." in said
+    assert "The last tests are predicted better from the earlier ones with this cause in the model." in said
     assert f"Next: {BY_SLUG['oil_temperature'].check}. Then: stationary test with" in said
     assert "It decides with probability 0.80 (hardest to tell apart: oil change and running in)." in said
 
@@ -145,7 +145,7 @@ def test_what_adoption_does_to_remaining_life_is_said_of_effects_of_use_alone() 
         said = summarise(found)
         assert ("If you adopt it, the predicted remaining life includes oil change." in said) == course
         assert "No further test would tell much more." in said
-        assert "predicted better from the earlier ones with it in the model; you can adopt this." in said
+        assert "in the model; you can adopt this." in said
     no_better = summarise(replace(found, extension=Extension(effects=("oil_change",), content={}), gain=NO_BETTER))
     assert "If you adopt it, the predicted remaining life leaves out how oil change goes on." in no_better
     assert "you can adopt" not in summarise(replace(found, extension=None))
@@ -230,7 +230,7 @@ def test_a_cause_of_all_explanations_is_certain_and_open_is_what_is_beside_it() 
     both = explanations_of({("channel_delay",): 0.55, ("channel_delay", UNCATALOGUED): 0.45})
     said = summarise(replace(found, explanations=both))
     assert "A channel delay is at work (probability above 0.99)." in said
-    assert "Beside it there may be (with probabilities): nothing (0.55) or something that" in said
+    assert "There may also be (with probabilities): nothing (0.55) or something that" in said
     assert "Explanations that remain" not in said
     one = explanations_of({("channel_delay", UNCATALOGUED): 1.0})
     said = summarise(replace(found, explanations=one))
@@ -279,12 +279,28 @@ def test_pauses_and_further_use_are_never_left_out_of_a_test() -> None:
         assert (text in summarise(replace(found, advice=(advice,)))) == whole
 
 
+def test_the_gain_of_a_smooth_correction_is_said_in_words_and_nothing_is_asked_of_an_unknown_axis() -> None:
+    found = replace(findings(Verdict.UNEXPLAINED_STRUCTURE), baseline=replace(MISFIT, where=()))
+    found = replace(found, extended_effects=("unexplained_structure",) * 4)  # a wave of the correction each
+    said = summarise(found)
+    assert "With a smooth correction in the model, the error on runs left out of the fit is" in said
+    assert said.endswith("if not, look at the rig.")
+
+
+def test_a_pair_is_looked_at_and_adopted_in_the_plural() -> None:
+    found = findings(Verdict.CAUSE_NAMED, "torque_zero_shift", "inertia_torque")
+    said = summarise(replace(found, extension=Extension(effects=found.causes, content={}), candidates=()))
+    assert "from the earlier ones with these causes in the model; you can adopt this." in said
+    checks = [BY_SLUG[slug].check for slug in found.causes]
+    assert f"Next: {checks[0]}; {checks[1]}." in said
+
+
 def test_an_error_as_large_as_noise_is_not_called_correlated_along_cycles() -> None:
     found = replace(findings(Verdict.UNEXPLAINED_STRUCTURE), baseline=replace(MISFIT, rmse=0.1))
     said = summarise(found)
     assert "The error is small (0.1 Nm RMS, no more than the noise), but it is not random: it depends on oil" in said
     assert said.endswith(
-        "look at the oil's thermometer and the plate's temperature and what was changed between the tests."
+        "look at the oil's thermometer and the plate's temperature; what was changed between the tests."
     )
 
 
