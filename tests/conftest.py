@@ -41,7 +41,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What needs more than its own process is marked `outside`: `make quick` leaves it out. Tests of the service that say
-    the same of a server again are slow; those of storage and the journeys run on both databases in every run."""
+    the same of a server again are slow; those of storage run on both databases in every run."""
     for item in items:
         drawn = getattr(getattr(item, "callspec", None), "params", {})
         used = {*getattr(item, "fixturenames", ()), *(value for value in drawn.values() if isinstance(value, str))}

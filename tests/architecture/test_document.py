@@ -6,7 +6,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from tests.architecture import document, graph, picture, rooms
-from tests.measuring import parts
+from tests.measuring import filled, parts
 
 PARTS = parts(document.DOCUMENT.read_text(encoding="utf-8"))
 AGAIN = "write it again: make architecture"
@@ -41,3 +41,12 @@ def test_the_document_names_the_files_of_an_errand(name: str, errand: Callable[[
         again = rooms.entered(errand)
         paths = [path for path in paths if path in again]
     assert set(documented) == set(paths), "docs/explanation/architecture.md names other files: make architecture"
+
+
+def test_a_part_that_is_missing_is_named() -> None:
+    text = "<!-- get -->\nold\n<!-- end -->\n\n<!-- post -->\n<!-- end -->\n"
+    written = filled(text, {"get": "1. `a.py`: A.", "post": ""})
+    assert parts(written) == {"get": "1. `a.py`: A.", "post": ""}
+    assert document.paths_of(written) == ["a.py"]
+    with pytest.raises(ValueError, match="must hold the part <!-- chapters -->"):
+        filled(text, {"chapters": ""})

@@ -74,6 +74,11 @@ def test_nothing_of_the_catalogue_is_imported() -> None:
     assert not imported("from models.diagnosis.effects.oil import X\nfrom models.diagnosis import baseline") <= ALLOWED
 
 
+def test_what_makes_a_life_for_adoption_knows_nothing_of_the_catalogue() -> None:
+    made = (FOLDER.parent / "adoption" / "trials.py").read_text(encoding="utf-8")
+    assert not [name for name in imported(made) if "effects" in name or "explanations" in name]
+
+
 def test_all_of_the_contract_can_be_hidden_and_more() -> None:
     assert set(CATALOGUED) == CONTRACT
     assert len(OUTSIDE) >= 6

@@ -48,6 +48,18 @@ def test_a_campaign_is_pushed_exported_and_pushed_again(campaign: Path, server: 
         assert ONCE.get(second.url + address).json() == first
 
 
+def test_a_key_that_a_command_revokes_is_refused_by_a_service_on_a_file(tmp_path: Path) -> None:
+    with serving(tmp_path / "keys.db", loaded=True) as server:
+        database = f"sqlite:///{server.database}"
+        assert "scope must be one of" in clutchlife("key", "create", "--scope", "all", "--database", database, code=64)
+        key = clutchlife("key", "create", "--scope", "read", "--database", database).strip()
+        headers, key_id = {"Authorization": f"Bearer {key}"}, key.split("_")[1]
+        assert ONCE.get(f"{server.url}/v1/clutches", headers=headers).status_code == 200
+        assert key_id in clutchlife("key", "list", "--database", database)
+        clutchlife("key", "revoke", key_id, "--database", database)
+        assert [ONCE.get(f"{server.url}/v1/clutches", headers=sent).status_code for sent in ({}, headers)] == [401, 401]
+
+
 def test_the_command_starts_without_database_and_numerics() -> None:
     """They take more than a second to load; only commands that need them do."""
     heavy = ("alembic", "fastapi", "numpy", "pydantic", "scipy", "sqlalchemy")

@@ -71,10 +71,31 @@ def test_paths_exist(path: Path) -> None:
     assert [name for name in PATH.findall(text) if not (ROOT / name).exists()] == []
     modules = [name.replace(".", "/") for name in MODULE.findall(text)]
     assert [name for name in modules if not ((ROOT / name).is_dir() or (ROOT / f"{name}.py").is_file())] == []
-    assert [name for name in SHORT.findall(text) if name not in ends()] == []
+    assert missing(text) == []
+
+
+def missing(text: str) -> list[str]:
+    """The Python files that a text names in backticks and that are nowhere."""
+    return [name for name in SHORT.findall(text) if name not in ends()]
+
+
+def test_a_file_that_is_gone_is_noticed() -> None:
+    assert missing("`decide.py` and `explanations/decide.py`, `models/diagnosis/explanations/decide.py`") == []
+    assert missing("`repeats.py`, `detection/decide.py`, `cide.py`") == ["repeats.py", "detection/decide.py", "cide.py"]
 
 
 OF_THE_PAPER = [line for line in (ROOT / "docs" / "paper.md").read_text().splitlines() if line.startswith("| ")][1:]
+
+
+@pytest.mark.parametrize("row", OF_THE_PAPER)
+def test_what_stands_in_the_table_is_there(row: str) -> None:
+    what, files, address, section, test = (cell.strip() for cell in row.strip("|").split(" | "))
+    if files == "**not built**":
+        assert (address, section, test) == ("-", "-", "-")
+        return
+    named = re.findall(r"`([^`]+)`", f"{files} {test}")
+    assert len(named) >= 2, what
+    assert [name for name in named if not (ROOT / name).is_file()] == []
 
 
 def test_all_equations_and_figures_are_in_it() -> None:

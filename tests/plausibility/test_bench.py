@@ -56,3 +56,10 @@ def test_a_slip_changes_the_run_or_is_none() -> None:
         assert wrong is not None
         assert wrong != honest
     assert slips.CYCLES["cycles x 10"](rng, honest | {"cycles": 0}) is None
+
+
+def test_what_maintenance_does_to_the_level_on_the_bench_is_stated_by_hand() -> None:
+    bench = Bench({})
+    for at, event in enumerate(("rest", "rebuild", "end_of_life")):
+        bench.accept({"kind": "maintenance", "event": event, "run_id": event, "cycles": float(at)})
+    assert [(event.rebuild, event.shift) for event in bench.events] == [(False, True), (True, False), (False, False)]

@@ -22,6 +22,7 @@ from service.queries.cache import (
     to_json,
 )
 from service.settings import CODE_VERSION
+from service.web.limits import MAX_CACHED_BYTES
 from storage import clutches
 from storage.engine.database import Database
 from storage.engine.errors import StorageUnavailable
@@ -48,6 +49,7 @@ def made(cache: AnswerCache, name: str, body: bytes) -> bool:
 
 
 def test_the_least_lately_asked_for_goes_first_and_no_more_than_must() -> None:
+    assert MAX_CACHED_BYTES < 2**27
     cache = AnswerCache(10)
     assert [made(cache, name, name.encode() * size) for name, size in (("a", 4), ("b", 4), ("c", 2))] == [True] * 3
     assert not made(cache, "a", b"aaaa")  # b is now the one not asked for longest

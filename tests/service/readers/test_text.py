@@ -327,3 +327,16 @@ def test_a_number_is_what_it_was(text: str, number: int) -> None:
 def test_a_carriage_return_ends_a_line() -> None:
     text = "time_s,torque\r[s],[Nm]\n" + "".join(f"{n}.0,2\n" for n in range(3))
     assert outcome(text) == "time_s,torque_nm"
+
+
+def test_a_title_is_taken_apart_in_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each step reads the whole title: there are no more of them for a long one."""
+    steps = []
+    ours = column_names.meaning
+    monkeypatch.setattr(column_names, "meaning", lambda *name: steps.append(name) or ours(*name))
+    counts = []
+    for words in (50, 100, 250, 499):
+        steps.clear()
+        column_of("a " * words)
+        counts.append(len(steps))
+    assert counts[0] == counts[-1] < 30

@@ -51,6 +51,7 @@ def test_a_stop_amid_posts_ends_with_0_and_finishes_what_was_on_its_way(tmp_path
     for rig in rigs:
         rig.join()
     assert set(answers.values()) == {201}
+    assert on_their_way, "nothing was on its way"
     assert on_their_way <= answers.keys()
     assert len(answers) < 1500, "it was not stopped"
     server.loaded = True

@@ -213,3 +213,8 @@ def test_progress_is_a_line_now_and_then_where_there_is_no_terminal(monkeypatch:
             advance()
     assert plain.getvalue().splitlines() == ["replaying: 0 of 2", "replaying: 1 of 2", "replaying: 2 of 2"]
     assert "2/2" in terminal.getvalue()
+
+
+def test_a_computation_that_ends_its_thread_keeps_nobody_waiting() -> None:
+    with pytest.raises(SystemExit):
+        [each.value() for each in executor_of("local").map(sys.exit, [3])]
