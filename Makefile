@@ -1,7 +1,7 @@
 # make demo    a simulated clutch's life, posted run by run, with its prognosis      (ARGS=--exit to end by itself)
 # make shell   a shell in which clutchlife is a command, and CLUTCHLIFE_URL is set
 # make test    all tests but those of `make slow`
-# make quick   those that need no browser and no server and take no time, in one process: 1,900 tests within a minute
+# make quick   those that need no browser and no server and take no time, in one process: 1,600 tests within a minute
 # make slow    what takes long and rarely fails: what intervals promise, counted over many lives; further ways to the same
 #              answer, files cut off anywhere, charts drawn by the large library                               (30 minutes)
 # make faults  kills the service and its commands hundreds of times, and sends what nobody sends: schemathesis over whole

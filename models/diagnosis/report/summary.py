@@ -413,7 +413,8 @@ def _next(report: Report) -> list[Sentence]:
     if best.narrows:
         narrower = f"its interval narrows by {100 * (1 - best.narrows):.0f} %"
         size = "its size" if len(report.causes) == 1 else f"the {BY_SLUG[best.effect].amplitude}"
-        return [*sentences, Sentence(f"To measure {size} better: {brief_test(best)}; {narrower}.")]
+        to_measure = "To measure" if sentences else "Next, to measure"
+        return [*sentences, Sentence(f"{to_measure} {size} better: {brief_test(best)}; {narrower}.")]
     first = "Then" if sentences else "Next"
     if best.nats < criteria.WORTHWHILE:
         first = "No single test is likely to decide. The best"

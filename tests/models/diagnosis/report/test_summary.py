@@ -251,6 +251,7 @@ def test_a_certain_cause_with_sized_companions_keeps_to_the_words() -> None:
     assert len(said.split()) <= MAX_WORDS
     assert "pressure offset" in said
     assert "torque zero shift" in said
+    assert "Next, to measure the " in said
 
 
 def test_a_test_of_many_words_is_put_into_a_short_line() -> None:
