@@ -106,7 +106,7 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
     if gain is not None and (gain.rmse_after > criteria.MOST_WORSE * gain.rmse_before or gain.log_score_gain < 0):
         names = listed([effect_name(slug) for slug in sizes.by_slug])
         known = "is" if len(sizes.by_slug) == 1 else "are"
-        return f"Not to be adopted yet: {names} {known} known too little to predict left-out runs."
+        return f"Not to be adopted: {names} {known} known too little to predict left-out runs."
     sentences = []
     for slug, size in sizes.by_slug.items():
         if size.other_sign > criteria.SIGN_UNDETERMINED:
@@ -114,7 +114,7 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
             low, high = (number(effect.scale * end) for end in size.interval)
             course = "it depends on the assumed course over life, and " if size.courses else ""
             sentences.append(
-                f"Not to be adopted yet: these data do not determine the size of {effect_name(slug)} (90 % interval "
+                f"Not to be adopted: these data do not determine the size of {effect_name(slug)} (90 % interval "
                 f"{low} to {with_unit(high, effect.unit)}); {course}"
                 f"its sign may be wrong with probability {size.other_sign:.2f}."
             )

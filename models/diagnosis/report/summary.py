@@ -197,7 +197,7 @@ def _shown(visible: Visible) -> str:
     name = _with_article(visible.effect)
     if visible.unit == "-":
         name = f"a {BY_SLUG[visible.effect].amplitude.partition(' (')[0]}"
-    hardest = _threshold(visible.amplitude, visible.unit) if math.isfinite(visible.amplitude) else "none"
+    hardest = _threshold(visible.amplitude, visible.unit) if math.isfinite(visible.amplitude) else "of no size"
     return f"{name} of {_threshold(visible.least, visible.unit)} at best and {hardest} at worst"
 
 
@@ -339,8 +339,8 @@ def _unexplained(report: Report) -> list[Sentence]:
         sentences, axes = [Sentence(f"In the raw records {swing}") for swing in swings], [FREQUENCY]
     else:
         sentences = [Sentence(_error(report.baseline, axes)), *_gained(report)]
-    look_at = "; ".join(_LOOK_AT[axis] for axis in axes) or "the rig"
-    again = "Next: repeat the last test at once and diagnose again. If the error is gone, one run caused it; if not, look at"
+    look_at = ", then ".join(_LOOK_AT[axis] for axis in axes) or "the rig"
+    again = "Next: repeat the last test at once and diagnose again. If it is gone, one run caused it; if not, look at"
     return [Sentence(first), *sentences, Sentence(f"{again} {look_at}.")]
 
 
@@ -412,7 +412,7 @@ def _next(report: Report) -> list[Sentence]:
     best = report.advice[0]
     if best.narrows:
         narrower = f"its interval narrows by {100 * (1 - best.narrows):.0f} %"
-        size = "its size" if len(report.causes) == 1 else f"the {BY_SLUG[best.effect].amplitude}"
+        size = "its size" if len(report.causes) == 1 else f"the size of {effect_name(best.effect)}"
         to_measure = "To measure" if sentences else "Next, to measure"
         return [*sentences, Sentence(f"{to_measure} {size} better: {brief_test(best)}; {narrower}.")]
     first = "Then" if sentences else "Next"

@@ -94,7 +94,7 @@ def findings(verdict: Verdict, *causes: str) -> Report:
     )
 
 
-WHY = "Not to be adopted yet: oil change is known too little to predict left-out runs."
+WHY = "Not to be adopted: oil change is known too little to predict left-out runs."
 #: Steps of an advised test, and the words of a long one.
 SWEEP = Step(
     kind="stationary_stribeck", pressures=(1e5, 4e5), speeds=(2.0944, 206.3), temperature=None, cycles=1, minutes=3
@@ -203,7 +203,7 @@ def test_what_these_data_would_show_is_said_with_units_zero_and_pressure_first()
     assert "a viscosity exponent β of 1.4 at best and 2.8 at worst." in said
     some = replace(visible("pressure_offset", 3.0), amplitude=math.inf, least=0.1)  # seen in one of its shapes alone
     said = summarise(replace(found, visible=(some,)))
-    assert "a pressure offset of 0.1 bar at best and none at worst." in said
+    assert "a pressure offset of 0.1 bar at best and of no size at worst." in said
 
 
 def sized(interval: tuple[float, float], sign: float) -> str:
@@ -251,7 +251,7 @@ def test_a_certain_cause_with_sized_companions_keeps_to_the_words() -> None:
     assert len(said.split()) <= MAX_WORDS
     assert "pressure offset" in said
     assert "torque zero shift" in said
-    assert "Next, to measure the " in said
+    assert "Next, to measure the size of " in said
 
 
 def test_a_test_of_many_words_is_put_into_a_short_line() -> None:
@@ -301,7 +301,7 @@ def test_an_error_as_large_as_noise_is_not_called_correlated_along_cycles() -> N
     said = summarise(found)
     assert "The error is small (0.1 Nm RMS, no more than the noise), but it is not random: it depends on oil" in said
     assert said.endswith(
-        "look at the oil's thermometer and the plate's temperature; what was changed between the tests."
+        "look at the oil's thermometer and the plate's temperature, then what was changed between the tests."
     )
 
 
