@@ -116,13 +116,15 @@ def _torque(design: Design, prediction: Prediction, fit: Fit) -> FloatArray:
 
 def _joined(first: Gram, second: Gram) -> Gram:
     """Of both designs' rows: runs are independent."""
-    runs = int(first.run_of_curve.max()) + 1
+    most = max(first.along.shape[1], second.along.shape[1])
+    missing = [((0, 0), (0, most - gram.along.shape[1]), (0, 0)) for gram in (first, second)]
+    along = [np.pad(gram.along, pad) for gram, pad in zip((first, second), missing, strict=True)]
+    overlaps = [np.pad(gram.overlaps, (*pad[:2], pad[1])) for gram, pad in zip((first, second), missing, strict=True)]
     return replace(
         first,
         matrix=first.matrix + second.matrix,
-        along=np.concatenate([first.along, second.along]),
-        squares=np.concatenate([first.squares, second.squares]),
-        run_of_curve=np.concatenate([first.run_of_curve, second.run_of_curve + runs]),
+        along=np.concatenate(along),
+        overlaps=np.concatenate(overlaps),
     )
 
 

@@ -167,7 +167,7 @@ def _held_at_bounds(gram: Gram, first: int, fitted: Fit) -> tuple[Gram, FloatArr
     order = np.concatenate(
         [np.setdiff1d(np.arange(gram.base), at_bound), at_bound, np.arange(gram.base, gram.matrix.shape[0])]
     )
-    matrix, along = gram.matrix[np.ix_(order, order)], gram.along[:, order]
+    matrix, along = gram.matrix[np.ix_(order, order)], gram.along[..., order]
     return replace(gram, matrix=matrix, along=along, base=gram.base - at_bound.size), outward[outward != 0]
 
 

@@ -25,9 +25,8 @@ from scipy.special import log_softmax, logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.design.design import IntArray
 from models.diagnosis.effects.fitted_effect import discrepancy_columns, effect_precisions
-from models.diagnosis.noise.covariance import Noise, by_curve, gains_of, whitened
+from models.diagnosis.noise.covariance import Noise, gains_of, modes, whitened
 from models.diagnosis.pooled_fit.gauss_newton import Fit, prior_gram, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
 
@@ -37,22 +36,16 @@ class Gram:
     """Inner products of whitened columns [m], the first `base` of them the baseline's, the last the residual."""
 
     matrix: FloatArray  # [m, m] without gains
-    along: FloatArray  # [c, m] along the directions of the curves
-    squares: FloatArray  # [c]
-    run_of_curve: IntArray  # [c]
+    along: FloatArray  # [R, k, m] along the directions of the curves of each run (`noise.covariance.Gains`)
+    overlaps: FloatArray  # [R, k, k]
     base: int
 
     def with_gains(self, run_gain: float, curve_gain: float) -> tuple[FloatArray, float]:
         """The matrix with gains that scatter so, and the log determinant of what they add [nats, twice]."""
-        freed = 1 / (1 + curve_gain**2 * self.squares)  # of each curve's direction, what its own gain leaves
-        member = np.zeros((int(self.run_of_curve.max()) + 1, self.run_of_curve.size))
-        member[self.run_of_curve, np.arange(self.run_of_curve.size)] = freed
-        along, squares = member @ self.along, member @ self.squares
-        removed = (run_gain / np.sqrt(1 + run_gain**2 * squares))[:, None] * along
-        if curve_gain > 0.0:
-            removed = np.concatenate([removed, (curve_gain * np.sqrt(freed))[:, None] * self.along])
-        matrix = self.matrix - removed.T @ removed
-        return matrix, float(np.log1p(run_gain**2 * squares).sum() - np.log(freed).sum())
+        combined, sizes = modes(self.overlaps, run_gain, curve_gain)
+        removed = (combined.mT @ self.along) / np.sqrt(1 + sizes)[..., None]
+        removed = removed.reshape(-1, self.matrix.shape[1])
+        return self.matrix - removed.T @ removed, float(np.log1p(sizes).sum())
 
     def covariance(self, run_gain: float, curve_gain: float) -> FloatArray:
         """[base, base] of all that the baseline has free, with gains that scatter so."""
@@ -78,9 +71,8 @@ def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None, *,
     matrix[loose, loose] += criteria.DISCREPANCY_SD**-2.0
     return Gram(
         matrix=matrix,
-        along=by_curve(white, gains),
-        squares=gains.squares,
-        run_of_curve=gains.run_of_curve,
+        along=gains.along(white),
+        overlaps=gains.overlaps,
         base=jacobian.shape[1] + loose.size,
     )
 
@@ -196,13 +188,10 @@ def run_scatter(projections: Sequence[Projected]) -> RunScatter:
 
 def without_likely_gains(problem: FitProblem, fitted: Fit) -> FloatArray:
     """The residual [N] Nm less what the likeliest gains of runs and curves make of it: r - M ĝ with the best linear
-    prediction ĝ = σ_g² Mᵀ V⁻¹ r / (1 + σ_g² Mᵀ V⁻¹ M)."""
-    design, noise = problem.design, problem.noise
-    gains = gains_of(design, fitted.torque, noise)
-    white = whitened(fitted.residual[:, None], design, noise)
-    along = by_curve(white, gains)[:, 0]
-    freed = 1 / (1 + noise.curve_gain**2 * gains.squares)
-    squares, sums = gains.by_run(freed * gains.squares), gains.by_run(freed * along)
-    of_run = (noise.run_gain**2 * sums / (1 + noise.run_gain**2 * squares))[gains.run_of_curve]
-    of_curve = noise.curve_gain**2 * freed * (along - gains.squares * of_run)
-    return np.asarray(fitted.residual - fitted.torque * (of_run + of_curve)[gains.curve], dtype=np.float64)
+    prediction ĝ = K Mᵀ V⁻¹ r."""
+    noise = problem.noise
+    gains = gains_of(problem.design, fitted.torque, noise)
+    white = whitened(fitted.residual[:, None], problem.design, noise)
+    combined, sizes = modes(gains.overlaps, noise.run_gain, noise.curve_gain)
+    likeliest = combined @ ((combined.mT @ gains.along(white)) / (1 + sizes)[..., None])
+    return np.asarray(fitted.residual - fitted.torque * likeliest.ravel()[gains.curve], dtype=np.float64)

@@ -91,10 +91,11 @@ def test_an_arma_process_has_the_correlations_that_it_was_made_for(share: float,
     assert step * variance + scale**2 * theta == pytest.approx(share * step, rel=1e-6, abs=1e-9)
 
 
-def test_whitening_is_the_inverse_root_of_the_covariance(design: Design) -> None:
+@pytest.mark.parametrize("sigma", [2.0, 0.02])
+def test_whitening_is_the_inverse_root_of_the_covariance(design: Design, sigma: float) -> None:
     correlation = Correlation(share=0.7, decay=0.6)
     noise = Noise(
-        deviation=np.full(design.torque.size, 2.0),
+        deviation=np.full(design.torque.size, sigma),
         plateaus=correlation,
         loops=Correlation(),
         run_gain=0.004,
@@ -102,17 +103,20 @@ def test_whitening_is_the_inverse_root_of_the_covariance(design: Design) -> None
     )
     rows = np.flatnonzero(design.rows.run == 0)
     distance = np.abs(np.subtract.outer(rows, rows))
-    covariance = 4.0 * np.where(distance == 0, 1.0, 0.7 * 0.6**distance)
+    covariance = sigma**2 * np.where(distance == 0, 1.0, 0.7 * 0.6**distance)
     torque = design.torque[rows]
     covariance += 0.004**2 * np.outer(torque, torque)
     same = np.equal.outer(design.curve[rows], design.curve[rows])
     covariance += 0.002**2 * np.outer(torque, torque) * same
+    rng = np.random.default_rng(SEED)
+    own = rng.standard_normal(int(design.curve.max()) + 1)  # noise alone, and a gain of each curve alone
     probe = np.zeros((design.torque.size, 2))
-    probe[rows] = np.random.default_rng(SEED).standard_normal((rows.size, 2))
+    probe[rows] = np.stack([rng.standard_normal(rows.size), torque * 0.002 * own[design.curve[rows]]], axis=1)
     white = without_gains(whitened(probe, design, noise), gains_of(design, design.torque, noise), 0.004, 0.002)
     expected = probe[rows].T @ np.linalg.solve(covariance, probe[rows])
     # the filter starts from a row's own past that is not known: a part in hundred
-    np.testing.assert_allclose(white.T @ white, expected, rtol=0.02, atol=0.02 * expected[0, 0])
+    scale = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(white.T @ white / np.outer(scale, scale), expected / np.outer(scale, scale), atol=0.02)
 
 
 def scattered(given: Campaign, scatter: float) -> Campaign:
