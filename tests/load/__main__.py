@@ -25,10 +25,9 @@ from models.rig.programme import WHOLE
 from service.client.clutchlife import ClutchlifeError
 from tests.benchmarks.diagnosis import post_life
 from tests.load import beside, checks
-from tests.load.beside import Beside, Processor
 from tests.load.bodies import Post, life
-from tests.load.field import Field, Options
-from tests.load.report import Loaded, demands, markdown, paces
+from tests.load.field import Counts, Field, Options
+from tests.load.report import demands, markdown, paces
 from tests.storage.engine.postgresql.server import postgresql_server
 from tests.support import Server, serving
 
@@ -40,7 +39,7 @@ TEMPORARY = "postgresql"
 _REPLAYED = 2
 
 
-def run(options: Options, folder: Path) -> Loaded:
+def run(options: Options, folder: Path) -> Counts:
     """The load, and what is left of it."""
     lives = [
         life(options.seed + number, raw=folder if options.raw else None, tests=options.tests, samples=options.samples)
@@ -54,32 +53,26 @@ def run(options: Options, folder: Path) -> Loaded:
             post_life(http, DIAGNOSED, options.states, WHOLE)
         gc.collect()
         gc.freeze()  # the prepared bodies are not looked through by the collector: it would delay what is sent meanwhile
-        before = Processor.since_start(pids)
-        field, noted = asyncio.run(_loaded(options, servers, lives))
-        processor = Processor.since_start(pids).minus(before)
+        before = beside.worked(pids)
+        field = asyncio.run(_loaded(options, servers, lives))
+        field.counts.worked = {who: seconds - before[who] for who, seconds in beside.worked(pids).items()}
         gc.unfreeze()
-        return Loaded(
-            options=options,
-            counts=field.counts,
-            beside=noted,
-            processor=processor,
-            losses=_wrong(field, servers[0], folder),
-        )
+        field.counts.losses = _wrong(field, servers[0], folder)
+    return field.counts
 
 
-async def _loaded(options: Options, servers: Sequence[Server], lives: Sequence[Sequence[Post]]) -> tuple[Field, Beside]:
+async def _loaded(options: Options, servers: Sequence[Server], lives: Sequence[Sequence[Post]]) -> Field:
     begin = asyncio.get_running_loop().time() + 0.5
     end = begin + options.seconds
     field = Field(options=options, ports=[server.port for server in servers], lives=lives, begin=begin, end=end)
-    noted = Beside()
     await asyncio.gather(
         *field.tasks(),
-        beside.diagnose(servers[-1].port, DIAGNOSED, end, noted),
-        beside.refresh_fleets(servers[0].address, begin, end, noted),
-        beside.watch([server.pid for server in servers], begin, end, noted),
+        beside.diagnose(servers[-1].port, DIAGNOSED, end, field.counts),
+        beside.refresh_fleets(servers[0].address, begin, end, field.counts),
+        beside.watch([server.pid for server in servers], begin, end, field.counts),
     )
-    await beside.refresh_once(servers[0].address, noted)  # all clutches under what is known at the end
-    return field, noted
+    await beside.refresh_once(servers[0].address, field.counts)  # all clutches under what is known at the end
+    return field
 
 
 def _wrong(field: Field, server: Server, folder: Path) -> list[str]:
@@ -104,7 +97,7 @@ def _wrong(field: Field, server: Server, folder: Path) -> list[str]:
     return wrong
 
 
-def report(options: Options) -> Loaded:
+def report(options: Options) -> Counts:
     """Run and print."""
     with tempfile.TemporaryDirectory(prefix="clutchlife-load-") as folder:
         loaded = run(options, Path(folder))
@@ -116,7 +109,7 @@ def report(options: Options) -> Loaded:
     return loaded
 
 
-def reports(options: Options) -> list[Loaded]:
+def reports(options: Options) -> list[Counts]:
     """One service on a file; on PostgreSQL one service, then as many as are asked for, each on an empty database."""
     if options.database != TEMPORARY:
         return [report(options)]

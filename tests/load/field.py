@@ -10,7 +10,7 @@ import asyncio
 import itertools
 import random
 from collections import Counter, defaultdict
-from collections.abc import Awaitable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Sequence
 from dataclasses import dataclass, field
 
 from httpx2 import AsyncClient, Limits, Response, TimeoutException, TransportError
@@ -34,26 +34,6 @@ class Acknowledged:
 
     post: Post
     sha256: str
-
-
-@dataclass(slots=True)
-class Counts:
-    """All that is counted; times in seconds."""
-
-    gets: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
-    statuses: Counter[tuple[str, int]] = field(default_factory=Counter)
-    posts: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
-    kinds: Counter[str] = field(default_factory=Counter)
-    problems: Counter[str] = field(default_factory=Counter)
-    #: Questions that were still to be asked when the grace was over; their times so far are among `gets`.
-    unasked: int = 0
-    #: By how much the generator itself was late at most.
-    late: float = 0.0
-    acknowledged: dict[str, list[Acknowledged]] = field(default_factory=lambda: defaultdict(list))
-    #: Runs of which it is not known whether they are stored: no receipt came, and the time was over.
-    unanswered: set[tuple[str, str]] = field(default_factory=set)
-    #: Runs that the service has taken in and holds back from the tracks, where it does so.
-    held: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +66,47 @@ class Options:
 
 
 @dataclass(slots=True)
+class Counts:
+    """All that is counted of a load; times in seconds."""
+
+    options: Options
+    gets: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    statuses: Counter[tuple[str, int]] = field(default_factory=Counter)
+    posts: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    kinds: Counter[str] = field(default_factory=Counter)
+    #: All that was not 2xx or 304, by status and reason.
+    problems: Counter[str] = field(default_factory=Counter)
+    #: Questions that were still to be asked when the grace was over; their times so far are among `gets`.
+    unasked: int = 0
+    #: By how much the generator itself was late at most.
+    late: float = 0.0
+    acknowledged: dict[str, list[Acknowledged]] = field(default_factory=lambda: defaultdict(list))
+    #: Runs of which it is not known whether they are stored: no receipt came, and the time was over.
+    unanswered: set[tuple[str, str]] = field(default_factory=set)
+    #: Runs that the service has taken in and holds back from the tracks, where it does so.
+    held: int = 0
+    diagnoses: list[float] = field(default_factory=list)
+    refreshes: list[float] = field(default_factory=list)
+    #: Bytes by second: the services alone, and with the processes that they have started.
+    alone: list[int] = field(default_factory=list)
+    together: list[int] = field(default_factory=list)
+    #: Of the processor, by who worked.
+    worked: dict[str, float] = field(default_factory=dict)
+    #: What is lost, or other than what calm computing gives.
+    losses: list[str] = field(default_factory=list)
+
+    @property
+    def runs(self) -> int:
+        """Runs acknowledged."""
+        return sum(map(len, self.acknowledged.values()))
+
+    @property
+    def pace(self) -> float:
+        """Runs acknowledged a second."""
+        return self.runs / self.options.seconds
+
+
+@dataclass(slots=True)
 class Field:
     """The field on the ports of the services that share a database, over which rigs and clients are spread, from `begin` to
     `end` by the clock of the event loop."""
@@ -95,11 +116,12 @@ class Field:
     lives: Sequence[Sequence[Post]]
     begin: float
     end: float
-    counts: Counts = field(default_factory=Counts)
+    counts: Counts = field(init=False)
     #: The clutch on each rig, None before the first.
     on_rigs: list[str | None] = field(init=False)
 
     def __post_init__(self) -> None:
+        self.counts = Counts(self.options)
         self.on_rigs = [None] * self.options.rigs
 
     def tasks(self) -> list[Awaitable[None]]:
@@ -119,7 +141,7 @@ class Field:
     async def _rig(self, number: int, phase: float) -> None:
         loop = asyncio.get_running_loop()
         async with line(self._port(number)) as http:
-            await _until(self.begin + phase * self.options.interval)  # rigs know nothing of each other
+            await until(self.begin + phase * self.options.interval)  # rigs know nothing of each other
             for turn in itertools.count():
                 clutch_id = f"load-{number}-{turn:03d}"
                 if await self._sent(http, registration(clutch_id, self.fluid(number, turn)), "registration") is None:
@@ -132,7 +154,7 @@ class Field:
                         self.counts.unanswered.add((clutch_id, post.run_id))
                         return
                     self._acknowledge(clutch_id, post, answer)
-                    await _until(started + self.options.interval)
+                    await until(started + self.options.interval)
 
     def fluid(self, number: int, turn: int) -> str:
         """The fluid of that clutch: the last rigs' clutches have each their own."""
@@ -166,12 +188,7 @@ class Field:
         """
         tags, route, dashboard = dict[str, str](), ROUTES[part], number % 2 == 0
         async with line(self._port(number + part)) as http:
-            for tick in itertools.count():
-                planned = self.begin + phase + tick + part / len(ROUTES)
-                if planned >= self.end:
-                    return
-                if not await self._due(planned, route):
-                    continue
+            async for tick, planned in self._planned(route, phase + part / len(ROUTES), 1.0):
                 clutch_id = self.on_rigs[(number + tick) % self.options.rigs]
                 if clutch_id is None:
                     continue
@@ -183,24 +200,25 @@ class Field:
 
     async def _livez(self) -> None:
         async with line(self._port(0)) as http:
-            for number in itertools.count():
-                planned = self.begin + number * LIVEZ_EVERY
-                if planned >= self.end:
-                    return
-                if await self._due(planned, LIVEZ):
-                    await self._timed(http, "/livez", LIVEZ, planned, {})
+            async for _, planned in self._planned(LIVEZ, 0.0, LIVEZ_EVERY):
+                await self._timed(http, "/livez", LIVEZ, planned, {})
 
-    async def _due(self, planned: float, route: str) -> bool:
-        """Wait for the planned moment; False where the grace is over, the time so far then counts."""
+    async def _planned(self, route: str, phase: float, every: float) -> AsyncIterator[tuple[int, float]]:
+        """The number and the moment of each question, once due, until the end; where the grace is over, the time so far
+        counts instead."""
         loop = asyncio.get_running_loop()
-        if planned > loop.time():
-            await _until(planned)
-            self.counts.late = max(self.counts.late, loop.time() - planned)
-        if loop.time() < self.end + GRACE:
-            return True
-        self.counts.unasked += 1
-        self.counts.gets[route].append(loop.time() - planned)
-        return False
+        for number in itertools.count():
+            planned = self.begin + phase + number * every
+            if planned >= self.end:
+                return
+            if planned > loop.time():
+                await until(planned)
+                self.counts.late = max(self.counts.late, loop.time() - planned)
+            if loop.time() < self.end + GRACE:
+                yield number, planned
+            else:
+                self.counts.unasked += 1
+                self.counts.gets[route].append(loop.time() - planned)
 
     async def _timed(
         self, http: AsyncClient, address: str, route: str, planned: float, headers: dict[str, str]
@@ -234,8 +252,6 @@ async def noted(http: AsyncClient, request: Request, what: str, problems: Counte
     return None
 
 
-async def _until(moment: float) -> None:
-    """Sleep until a moment of the loop's clock."""
-    remaining = moment - asyncio.get_running_loop().time()
-    if remaining > 0:
-        await asyncio.sleep(remaining)
+async def until(moment: float) -> None:
+    """Sleep until a moment of the loop's clock; where it is over, others have their turn."""
+    await asyncio.sleep(max(0.0, moment - asyncio.get_running_loop().time()))

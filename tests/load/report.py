@@ -2,44 +2,15 @@
 
 import math
 import statistics
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
-from tests.load.beside import Beside, Processor
-from tests.load.field import LIVEZ, ROUTES, Counts, Options
+from tests.load.field import LIVEZ, ROUTES, Counts
 from tests.measuring import table
 
 #: The demands of docs/appendix/benchmarks.md: ms of 99 of 100 GETs and plain POSTs, posts a second without raw files, how
 #: much more memory the last third of the time may take, on average, than the middle third. The first third fills caches.
 MOST_GET_MS, MOST_POST_MS, LEAST_POSTS_A_SECOND, MOST_GROWTH = 50.0, 500.0, 15.0, 1.10
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Loaded:
-    """What a load came to."""
-
-    options: Options
-    counts: Counts
-    beside: Beside
-    processor: Processor
-    losses: Sequence[str]
-
-    @property
-    def problems(self) -> Counter[str]:
-        """All that was not 2xx or 304, by status and reason."""
-        return self.counts.problems + self.beside.problems
-
-    @property
-    def pace(self) -> float:
-        """Runs acknowledged a second."""
-        return self.runs / self.options.seconds
-
-    @property
-    def runs(self) -> int:
-        """Runs acknowledged."""
-        return sum(map(len, self.counts.acknowledged.values()))
 
 
 class Demand(NamedTuple):
@@ -62,19 +33,18 @@ def growth(sizes: Sequence[int]) -> float:
     return statistics.mean(sizes[-third:]) / statistics.mean(sizes[-2 * third : -third]) if third else 1.0
 
 
-def demands(loaded: Loaded) -> list[Demand]:
+def demands(counts: Counts) -> list[Demand]:
     """Each demand beside what was found."""
-    counts, beside = loaded.counts, loaded.beside
     slowest = max(ROUTES, key=lambda route: quantile(counts.gets[route], 0.99))
     get = 1e3 * quantile(counts.gets[slowest], 0.99)
     post = 1e3 * quantile(counts.posts["plain"], 0.99)
-    errors = sum(loaded.problems.values())
-    alone, together = growth(beside.alone), growth(beside.together)
+    errors = sum(counts.problems.values())
+    alone, together = growth(counts.alone), growth(counts.together)
     found = [
         Demand("no error", str(errors), errors == 0),
-        Demand("nothing lost, and the same as posted calmly", str(len(loaded.losses)), not loaded.losses),
+        Demand("nothing lost, and the same as posted calmly", str(len(counts.losses)), not counts.losses),
     ]
-    if loaded.options.database:  # the others are those of one service on a file
+    if counts.options.database:  # the others are those of one service on a file
         return found
     growths = f"{100 * (alone - 1):+.1f} % alone, {100 * (together - 1):+.1f} % with its processes"
     most = f"{100 * (MOST_GROWTH - 1):.0f} %"
@@ -87,15 +57,14 @@ def demands(loaded: Loaded) -> list[Demand]:
             max(alone, together) <= MOST_GROWTH,
         ),
     ]
-    if not loaded.options.raw:
+    if not counts.options.raw:
         least = LEAST_POSTS_A_SECOND
-        found.append(Demand(f"at least {least:.0f} posts a second", f"{loaded.pace:.1f}", loaded.pace >= least))
+        found.append(Demand(f"at least {least:.0f} posts a second", f"{counts.pace:.1f}", counts.pace >= least))
     return found
 
 
-def latencies(loaded: Loaded) -> list[str]:
+def latencies(counts: Counts) -> list[str]:
     """Quantiles by route."""
-    counts = loaded.counts
     names = {"plain": "POST a run", "sampled": "POST a sampled record", "registration": "POST a clutch"}
     asked = [(f"GET {route}", counts.gets[route], str(counts.statuses[route, 304])) for route in (*ROUTES, LIVEZ)]
     asked += [(name, counts.posts[what], "") for what, name in names.items() if counts.posts[what]]
@@ -106,46 +75,46 @@ def latencies(loaded: Loaded) -> list[str]:
     return table(("request", "asked", "304", "median, ms", "90 %", "99 %", "longest"), rows)
 
 
-def totals(loaded: Loaded) -> list[str]:
+def totals(counts: Counts) -> list[str]:
     """Everything that is no latency."""
-    counts, beside, taken = loaded.counts, loaded.beside, loaded.processor
+    taken = counts.worked
     kinds = ", ".join(f"{count} {kind}" for kind, count in counts.kinds.most_common())
-    half = len(beside.together) // 2
+    half = len(counts.together) // 2
     rows = {
-        "runs acknowledged": f"{loaded.runs} of {len(counts.acknowledged)} clutches: {kinds}",
-        "posts a second": f"{loaded.pace:.1f}",
+        "runs acknowledged": f"{counts.runs} of {len(counts.acknowledged)} clutches: {kinds}",
+        "posts a second": f"{counts.pace:.1f}",
         "runs held": counts.held,
         "GETs not asked by the end": counts.unasked,
-        "diagnoses finished, s": _spread(beside.diagnoses),
-        "fleet refreshes, s": _spread(beside.refreshes),
+        "diagnoses finished, s": _spread(counts.diagnoses),
+        "fleet refreshes, s": _spread(counts.refreshes),
         "memory at half and at the end, MB": (
-            f"alone {_mb(beside.alone, half)} and {_mb(beside.alone, -1)}, "
-            f"with its processes {_mb(beside.together, half)} and {_mb(beside.together, -1)}"
+            f"alone {_mb(counts.alone, half)} and {_mb(counts.alone, -1)}, "
+            f"with its processes {_mb(counts.together, half)} and {_mb(counts.together, -1)}"
         ),
         "processor, s": (
-            f"service {taken.service:.0f}, generator {taken.generator:.1f}, refreshes {taken.refreshes:.0f}, "
-            f"others on the machine {taken.others:.0f}"
+            f"service {taken['service']:.0f}, generator {taken['generator']:.1f}, refreshes {taken['refreshes']:.0f}, "
+            f"others on the machine {taken['others']:.0f}"
         ),
         "the generator's own delay at most, ms": f"{1e3 * counts.late:.0f}",
     }
     return table(("", ""), rows.items())
 
 
-def paces(loads: Sequence[Loaded]) -> str:
+def paces(loads: Sequence[Counts]) -> str:
     """Posts a second of one service and of several, beside each other."""
     rows = [(each.options.services, f"{each.pace:.1f}", f"{each.pace / loads[0].pace:.2f}") for each in loads]
     return "\n".join(table(("services", "posts a second", "times one service"), rows))
 
 
-def markdown(loaded: Loaded) -> str:
+def markdown(counts: Counts) -> str:
     """The whole report."""
-    verdicts = [(each.name, each.found, "yes" if each.met else "**no**") for each in demands(loaded)]
-    parts = [table(("demand", "found", "met"), verdicts), latencies(loaded), totals(loaded)]
-    if loaded.problems:
-        errors = ((count, problem) for problem, count in loaded.problems.most_common(20))
+    verdicts = [(each.name, each.found, "yes" if each.met else "**no**") for each in demands(counts)]
+    parts = [table(("demand", "found", "met"), verdicts), latencies(counts), totals(counts)]
+    if counts.problems:
+        errors = ((count, problem) for problem, count in counts.problems.most_common(20))
         parts.append(table(("errors", ""), errors))
-    if loaded.losses:
-        parts.append(table(("lost or different",), ((loss,) for loss in loaded.losses[:20])))
+    if counts.losses:
+        parts.append(table(("lost or different",), ((loss,) for loss in counts.losses[:20])))
     return "\n\n".join("\n".join(part) for part in parts)
 
 

@@ -6,11 +6,10 @@ from pathlib import Path
 import pytest
 
 from tests.load.__main__ import run
-from tests.load.beside import Beside, Processor
 from tests.load.bodies import Post, life
 from tests.load.checks import lost_of
 from tests.load.field import ROUTES, Acknowledged, Counts, Options
-from tests.load.report import Loaded, demands, markdown
+from tests.load.report import demands, markdown
 
 
 def run_named(name: str) -> Post:
@@ -44,21 +43,20 @@ def test_what_is_lost_changed_or_added_is_noticed() -> None:
         assert len(lost_of("c", own, wrong)) == 1
 
 
-def found(*, get: float = 0.01, post: float = 0.1, runs: int = 20, memory: int = 100, raw: bool = False) -> Loaded:
+def found(*, get: float = 0.01, post: float = 0.1, runs: int = 20, memory: int = 100, raw: bool = False) -> Counts:
     """What a load of one second might come to."""
-    counts = Counts()
+    counts = Counts(Options(seconds=1.0, raw=raw))
     for route in ROUTES:
         counts.gets[route] = [0.001]
     counts.gets["runs"], counts.posts["plain"] = [get], [post]
     counts.acknowledged["c"] = [Acknowledged(post=run_named(str(number)), sha256="") for number in range(runs)]
-    noted = Beside(alone=[100, 100, memory], together=[100, 100, 100])
-    nothing = Processor(generator=0.0, service=0.0, refreshes=0.0, others=0.0)
-    options = Options(seconds=1.0, raw=raw)
-    return Loaded(options=options, counts=counts, beside=noted, processor=nothing, losses=[])
+    counts.alone, counts.together = [100, 100, memory], [100, 100, 100]
+    counts.worked = dict.fromkeys(("service", "generator", "refreshes", "others"), 0.0)
+    return counts
 
 
 def test_each_demand_can_fail_by_itself() -> None:
-    def unmet(loaded: Loaded) -> list[str]:
+    def unmet(loaded: Counts) -> list[str]:
         assert "**no**" in markdown(loaded) or all(each.met for each in demands(loaded))
         return [each.name.split()[0] for each in demands(loaded) if not each.met]
 
@@ -69,7 +67,7 @@ def test_each_demand_can_fail_by_itself() -> None:
     assert unmet(found(runs=10, raw=True)) == []
     assert unmet(found(memory=120)) == ["memory"]
     refused = found()
-    refused.counts.problems["GET runs: 503 busy"] = 1
+    refused.problems["GET runs: 503 busy"] = 1
     assert unmet(refused) == ["no"]
 
 
@@ -80,7 +78,7 @@ def test_a_small_load_has_no_error_and_loses_nothing(tmp_path: Path) -> None:
     loaded = run(options, tmp_path)
     assert not loaded.problems
     assert list(loaded.losses) == []
-    assert loaded.counts.kinds["raw file"] > 0
-    assert all(loaded.counts.gets[route] for route in ROUTES)
-    assert loaded.beside.refreshes
-    assert min(loaded.beside.alone) > 0
+    assert loaded.kinds["raw file"] > 0
+    assert all(loaded.gets[route] for route in ROUTES)
+    assert loaded.refreshes
+    assert min(loaded.alone) > 0
