@@ -19,7 +19,7 @@
 #              `make blind` stored                                                         (the same SEED= SIZE= ONLY=)
 # make visible hides effects at twice the amplitude that a report calls visible, and counts alarms (SEED= COUNT= STORE=)
 # make adoption  hides artefacts, adopts what the diagnosis offers, holds remaining life against the truth: a table of
-#              docs/appendix/diagnosis.md; goes on where it ended                         (SEED= SIZE=small|full ONLY= ARGS=--list)
+#              docs/appendix/diagnosis.md; goes on where it ended                         (SEED= SIZE=small|full ONLY= ARGS=--stored)
 # make mutants  puts small faults into the product, each into a copy, and counts those that the tests of its folder find
 #              (SEED= COUNT= ONLY= STORE=)
 # make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/appendix/benchmarks.md

@@ -5,7 +5,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -92,24 +92,40 @@ class Lines:
             self.known = dict(json.loads(line) for line in self.path.read_text(encoding="utf-8").splitlines())
 
     def get(self, name: str, make: Callable[[], Any]) -> Any:
-        """What is known by a name, or is made and noted."""
+        """What is known by a name, or is made and noted: as JSON has it, a dataclass as its fields."""
         if name not in self.known:
-            self.known[name] = make()
+            line = json.dumps([name, make()], default=asdict)
+            self.known[name] = json.loads(line)[1]
             if self.path is not None:
                 with self.path.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps([name, self.known[name]]) + "\n")
+                    file.write(line + "\n")
         return self.known[name]
 
 
-def table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
+def table(titles: Sequence[object], rows: Iterable[Sequence[object]]) -> list[str]:
     """Lines of a table in Markdown; a pipe within a cell is escaped."""
-    lines = [[*titles], ["---"] * len(titles), *([str(cell) for cell in row] for row in rows)]
-    return ["| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines]
+    lines = [titles, ["---"] * len(titles), *rows]
+    return ["| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines]
 
 
-def show(title: str, titles: str, rows: Iterable[Sequence[object]]) -> None:
-    """Print a table under its title; `titles` with bars between them."""
-    print("\n".join([f"## {title}", "", *table(titles.split(" | "), rows), ""]), flush=True)
+def records(rows: Iterable[Mapping[str, object]]) -> list[str]:
+    """Lines of a table whose rows name their cells; numbers to four digits."""
+    rows = list(rows)
+    cells = [[f"{v:.4g}" if isinstance(v, float) else v for v in row.values()] for row in rows]
+    return table(list(rows[0]), cells)
+
+
+def show(title: str, rows: Iterable[Mapping[str, object]]) -> None:
+    """Print such a table under its title."""
+    print("\n".join([f"{title}\n", *records(rows), ""]), flush=True)
+
+
+def publish(page: str, part: str, lines: Iterable[str]) -> None:
+    """Print what was measured; ARGS=--write puts it into a page of docs/appendix, too."""
+    text = "\n".join(lines).strip()
+    print(text, flush=True)
+    if "--write" in sys.argv:
+        fill(APPENDIX / page, {part: text})
 
 
 def wilson(hits: int, count: int) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 SEED= other campaigns (1)    SIZE= small, full, or a share of the full table    PROCESSES= how many at once (1)
 ONLY= trials whose names begin with these    ARGS="--scheduler WHERE" as in `make blind`
-ARGS=--write puts the table into docs/appendix/diagnosis.md, ARGS=--list lists every trial, ARGS=--stored what is stored
+ARGS=--write puts the table into docs/appendix/diagnosis.md, ARGS=--stored counts only what is stored
 
 Results are stored in .adoption, a file each: the next run goes on where this one ended. After a change of code remove it.
 """
@@ -12,11 +12,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from models.diagnosis.effects.catalogue import BY_SLUG
 from models.prognosis.criteria import HORIZON
 from models.prognosis.scoring import covered, crps_of_quantiles
 from tests.adoption.trials import ARTEFACTS, COURSES, LOUD, STORE, Adopted, adopted, trials
-from tests.measuring import APPENDIX, Asked, each, fill, table, where
+from tests.measuring import Asked, each, publish, records, where
 
 #: A median further from the truth than before by more than this share of life is worse [-].
 WORSE = 0.02
@@ -33,41 +32,24 @@ def off(quantiles: dict[str, float | None], truth: float) -> float:
     return abs((HORIZON if median is None else median) - truth) / truth
 
 
+def worse(one: Adopted, than: dict[str, float | None]) -> bool:
+    return off(one.after, one.end) > off(than, one.end) + WORSE
+
+
 def crps(quantiles: dict[str, float | None], truth: float) -> float:
     """CRPS of the logarithm of the end; one beyond the horizon is scored as if it were at the horizon."""
     ends = {float(q): HORIZON if x is None else max(x, 1.0) for q, x in quantiles.items()}
     return crps_of_quantiles(list(ends), [float(np.log(x)) for x in ends.values()], float(np.log(truth)))
 
 
-def _estimated(one: Adopted) -> list[float]:
-    return one.estimates[one.trial.slug]
+def size_held(one: Adopted) -> bool:
+    low, high = one.estimates[one.trial.slug][2:]
+    return low <= one.size <= high
 
 
 def _share(of: Sequence[Adopted], what: Callable[[Adopted], bool]) -> str:
     count = sum(what(one) for one in of)
     return f"{100 * count / len(of):.0f} % ({count} of {len(of)})" if of else "–"
-
-
-def nearer(one: Adopted) -> bool:
-    return off(one.after, one.end) < off(one.before, one.end)
-
-
-def worse(one: Adopted) -> bool:
-    return off(one.after, one.end) > off(one.before, one.end) + WORSE
-
-
-def worse_than_clean(one: Adopted) -> bool:
-    """Further than before, and further than where the artefact was never there."""
-    return worse(one) and off(one.after, one.end) > off(one.clean, one.end) + WORSE
-
-
-def wrong_sign(one: Adopted) -> bool:
-    return _estimated(one)[0] * one.size < 0
-
-
-def size_held(one: Adopted) -> bool:
-    low, high = _estimated(one)[2:]
-    return low <= one.size <= high
 
 
 def rows(results: Sequence[Adopted]) -> list[str]:
@@ -82,9 +64,7 @@ def rows(results: Sequence[Adopted]) -> list[str]:
         offered = [one for one in mine if one.adoptable]
         distorted = [one for one in offered if one.clean]
         ours = [one for one in distorted if one.trial.slug in one.estimates and one.trial.slug in one.causes]
-        scores = [
-            np.mean([crps(getattr(one, name), one.end) for one in offered]) for name in ("before", "after") if offered
-        ]
+        scores = (np.mean([crps(getattr(one, name), one.end) for one in offered]) for name in ("before", "after"))
         cells = {
             "hidden": title,
             "made": len(mine),
@@ -94,15 +74,15 @@ def rows(results: Sequence[Adopted]) -> list[str]:
             "end held before": _share(offered, lambda one: held(one.before, one.end)),
             "end held after": _share(offered, lambda one: held(one.after, one.end)),
             "nothing hidden": _share(distorted, lambda one: held(one.clean, one.end)),
-            "nearer": _share(offered, nearer),
-            "further by 2 % of life": _share(offered, worse),
-            "than nothing hidden too": _share(distorted, worse_than_clean),
-            "wrong sign": sum(wrong_sign(one) for one in ours),
+            "nearer": _share(offered, lambda one: off(one.after, one.end) < off(one.before, one.end)),
+            "further by 2 % of life": _share(offered, lambda one: worse(one, one.before)),
+            "than nothing hidden too": _share(distorted, lambda one: worse(one, one.before) and worse(one, one.clean)),
+            "wrong sign": sum(one.estimates[one.trial.slug][0] * one.size < 0 for one in ours),
             "size held": _share([one for one in right if one.clean], size_held),
-            "CRPS of ln end, before and after": ", ".join(f"{score:.3f}" for score in scores),
+            "CRPS of ln end, before and after": ", ".join(f"{score:.3f}" for score in scores) if offered else "",
         }
         lines.append(cells)
-    return table(list(lines[0]), (cells.values() for cells in lines)) if lines else []
+    return records(lines) if lines else []
 
 
 def meaning(results: Sequence[Adopted], command: str) -> list[str]:
@@ -124,37 +104,14 @@ def meaning(results: Sequence[Adopted], command: str) -> list[str]:
     ]
 
 
-def listed(one: Adopted) -> str:
-    if not one.made:
-        return f"{one.trial.name:44s} unreachable"
-    estimate = one.estimates.get(one.trial.slug)
-    unit = BY_SLUG[one.trial.slug].unit
-    size = "–" if estimate is None else "{:+.3f} ± {:.3f} [{:+.3f}, {:+.3f}]".format(*estimate)
-    ends = [
-        " ".join("never" if forecast[q] is None else f"{forecast[q]:,.0f}" for q in ("0.05", "0.5", "0.95"))
-        for forecast in (one.before, one.after, one.clean or dict.fromkeys(one.before))
-    ]
-    signs = f"{'offered' if one.adoptable else 'no offer':9s}{'held' if held(one.after, one.end) else 'MISSED':7s}"
-    signs += "nearer " if nearer(one) else "FURTHER" if worse(one) else "as far "
-    return (
-        f"{one.trial.name:44s} {one.verdict:20s} {signs} hidden {one.size:+.3f} {unit}: {size}; end {one.end:,.0f}: "
-        f"{ends[0]} | {ends[1]} | clean {ends[2]}; {','.join(one.causes)}; {one.seconds:.0f} s; {one.reason}"
-    )
-
-
 def main() -> None:
     asked = Asked.here()
     chosen = [trial for trial in trials(asked.seed, asked.size) if trial.name.startswith(asked.only)]
     if "--stored" in sys.argv:
         chosen = [trial for trial in chosen if (STORE / f"{trial.name}.json").exists()]
     results = list(each(adopted, chosen, where(1)))
-    if "--list" in sys.argv:
-        print("\n".join(listed(one) for one in results))
-    lines = [*meaning(results, f"make adoption {asked}"), *rows(results)]
-    print("\n".join(lines))
+    publish("diagnosis.md", "adoption", [*meaning(results, f"make adoption {asked}"), *rows(results)])
     print(f"median {np.median([one.seconds for one in results if one.made] or [0.0]):.1f} s a campaign")
-    if "--write" in sys.argv:
-        fill(APPENDIX / "diagnosis.md", {"adoption": "\n".join(lines)})
 
 
 if __name__ == "__main__":

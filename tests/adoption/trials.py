@@ -12,7 +12,7 @@ import subprocess
 import tempfile
 import time
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -56,22 +56,10 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Campaign:
-    """What is posted, the same runs without the artefact in the same noise (none of what moves a life), and the truth: the
-    share of its first mean COF at which the clutch ends, its end [cycles], the artefact's size in the catalogue's unit and
-    sense after the last state."""
-
-    sent: list[dict[str, Any]]
-    clean: list[dict[str, Any]]
-    fraction: float
-    end: float
-    size: float
-
-
-@dataclass(frozen=True)
 class Adopted:
     """What came of a trial; `estimates` are by effect the value, its deviation and its 90 % interval, `before` and `after`
-    the end's quantiles, `clean` those of the same runs with nothing hidden; all empty where no campaign could be made."""
+    the end's quantiles, `clean` those of the same runs in the same noise without the artefact (none of what moves a life),
+    `end` [cycles] and `size` the truth, in the catalogue's unit and sense; all empty where no campaign could be made."""
 
     trial: Trial
     commit: str
@@ -108,8 +96,9 @@ def trials(seed: int, size: float) -> list[Trial]:
     ]
 
 
-def made(trial: Trial) -> Campaign | None:
-    """The campaign of a trial; None where none of its draws can be made."""
+def made(trial: Trial) -> tuple[Hidden, float, float] | None:
+    """The campaign of a trial, its end [cycles], and the share of its first mean COF that the clutch passes then; None where
+    none of its draws can be made."""
     seed = (trial.seed, zlib.crc32(b"adoption"), zlib.crc32(trial.name.encode()))
     for k in range(DRAWS):
         try:
@@ -119,8 +108,7 @@ def made(trial: Trial) -> Campaign | None:
         end = float(np.random.default_rng([*seed, k]).uniform(SOONEST, LATEST) * hidden.plan.life.span)
         fraction = passed_at(hidden, end)
         if fraction is not None:
-            clean = runs(without(hidden)) if trial.slug in ARTEFACTS else []
-            return Campaign(runs(hidden), clean, fraction, end, size_of(hidden))
+            return hidden, end, fraction
     return None
 
 
@@ -152,11 +140,26 @@ def adopted(trial: Trial) -> Adopted:
 
 
 def _adopted(trial: Trial) -> Adopted:
-    campaign = made(trial)
-    if campaign is None:
+    found = made(trial)
+    if found is None:
         return Adopted(trial, commit())
+    hidden, end, fraction = found
     began = time.monotonic()
-    report, before, after = forecasts_of(campaign.sent, campaign.fraction)
+    with _posted(hidden, fraction) as http:
+        report = asked(http, "POST", "diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"})
+        while report["status"] == "running":
+            time.sleep(1.0)
+            report = asked(http, "GET", f"diagnoses/{report['diagnosis_id']}")
+        if report["status"] != "finished":
+            raise RuntimeError(f"a diagnosis ended without a report: {report['problem']}")
+        before = after = asked(http, "GET", REMAINING)
+        if report["adoptable"]:
+            asked(http, "PUT", "model", json={"diagnosis_id": report["diagnosis_id"]})
+            after = asked(http, "GET", REMAINING)
+    clean = {}
+    if trial.slug in ARTEFACTS:  # what moves a life stays in it
+        with _posted(without(hidden), fraction) as http:
+            clean = asked(http, "GET", REMAINING)["end_of_life_cycles"]
     return Adopted(
         trial=trial,
         commit=commit(),
@@ -167,9 +170,9 @@ def _adopted(trial: Trial) -> Adopted:
         estimates={candidate["effect"]: _estimate(candidate["estimate"]) for candidate in report["candidates"]},
         before=before["end_of_life_cycles"],
         after=after["end_of_life_cycles"],
-        clean=forecast_of(campaign.clean, campaign.fraction)["end_of_life_cycles"] if campaign.clean else {},
-        end=campaign.end,
-        size=campaign.size,
+        clean=clean,
+        end=end,
+        size=size_of(hidden),
         seconds=time.monotonic() - began,
     )
 
@@ -216,25 +219,6 @@ def mean_cof(hidden: Hidden, cycles: FloatArray) -> FloatArray:
     return np.asarray((torque / bar).mean(axis=1)[np.searchsorted(all_cycles, cycles)])
 
 
-def forecasts_of(
-    sent: Sequence[dict[str, Any]], fraction: float
-) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """The report on runs that are posted, and the forecast of the end of life before and after adoption; the same twice
-    where nothing is there to adopt."""
-    with _posted(sent, fraction) as http:
-        report = asked(http, "POST", "diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"})
-        while report["status"] == "running":
-            time.sleep(1.0)
-            report = asked(http, "GET", f"diagnoses/{report['diagnosis_id']}")
-        if report["status"] != "finished":
-            raise RuntimeError(f"a diagnosis ended without a report: {report['problem']}")
-        before = after = asked(http, "GET", REMAINING)
-        if report["adoptable"]:
-            asked(http, "PUT", "model", json={"diagnosis_id": report["diagnosis_id"]})
-            after = asked(http, "GET", REMAINING)
-    return report, before, after
-
-
 def asked(http: httpx2.Client, method: str, path: str, **sent: Any) -> dict[str, Any]:
     """The service's answer; while it is busy, as beside other work on the machine, it is asked again when it says."""
     while (answer := http.request(method, path, **sent)).status_code == 503:
@@ -242,14 +226,8 @@ def asked(http: httpx2.Client, method: str, path: str, **sent: Any) -> dict[str,
     return dict(answer.raise_for_status().json())
 
 
-def forecast_of(sent: Sequence[dict[str, Any]], fraction: float) -> dict[str, Any]:
-    """The forecast of the end of life from runs that are posted."""
-    with _posted(sent, fraction) as http:
-        return asked(http, "GET", REMAINING)
-
-
 @contextmanager
-def _posted(sent: Sequence[dict[str, Any]], fraction: float) -> Iterator[TestClient]:
+def _posted(hidden: Hidden, fraction: float) -> Iterator[TestClient]:
     """A service that has the runs of a clutch, whose addresses are relative to that clutch."""
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -258,6 +236,6 @@ def _posted(sent: Sequence[dict[str, Any]], fraction: float) -> Iterator[TestCli
         clutch = {"clutch_id": "blind", "origin": "simulated", "end_of_life": {"cof_fraction": fraction}}
         asked(http, "POST", "/v1/clutches", json=clutch)
         http.base_url = http.base_url.join(CLUTCH)
-        for run in sent:
+        for run in runs(hidden):
             asked(http, "POST", "runs", json=run | {"origin": "simulated"})
         yield http

@@ -7,16 +7,14 @@ routes run in a pool of threads, so that every thread is watched. A file is ente
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Set
-from contextlib import contextmanager
+from collections.abc import Callable, Set
 from pathlib import Path
 from types import FrameType
 
 from fastapi.testclient import TestClient
 
-from service.app import create_app
-from service.settings import Settings
 from tests.architecture.source import ROOT
+from tests.service.clients import client_on
 from tests.support import stationary
 
 #: Files of these folders count; what the service asks of the numerics is another chapter.
@@ -27,56 +25,39 @@ EARLIER_RUNS = 4
 JOBS: Set[str] = {"jobs", "lease", "outbox"}
 
 
-class Watch:
-    """Records files in the order in which they are entered, while `on`. Installed before the service's threads start.
+def entered(errand: Callable[[TestClient, str], None], *, warm: bool = True, but: Set[str] = JOBS) -> list[str]:
+    """The files of this process that an errand enters, in that order, on one of two clutches of some stationary runs each.
 
-    `but`: names of threads that do no part of the errand, such as the one that looks for jobs from time to time.
+    `warm`: after the same errand on the other clutch. `but`: names of threads that do no part of the errand, such as the one
+    that looks for jobs from time to time.
     """
+    files, watched, folders = dict[str, None](), False, tuple(f"{ROOT / folder}/" for folder in COUNTED)
 
-    def __init__(self, but: Set[str] = frozenset()) -> None:
-        self.on = False
-        self.but = but
-        self.entered: dict[str, None] = {}
-        self._folders = tuple(f"{ROOT / folder}/" for folder in COUNTED)
-
-    def __call__(self, frame: FrameType, event: str, _: object) -> None:
+    def watch(frame: FrameType, event: str, _: object) -> None:
         """The hook: Python calls it at every call and return."""
-        if not self.on or event != "call" or not frame.f_code.co_filename.startswith(self._folders):
+        if not watched or event != "call" or not frame.f_code.co_filename.startswith(folders):
             return
-        if threading.current_thread().name not in self.but:
-            self.entered[frame.f_code.co_filename] = None
+        if threading.current_thread().name not in but:
+            files[frame.f_code.co_filename] = None
 
-    @contextmanager
-    def watching(self) -> Iterator[list[str]]:
-        """Inside, files are recorded; the list is filled at the end with their paths from the root."""
-        paths: list[str] = []
-        self.entered = {}
-        self.on = True
-        try:
-            yield paths
-        finally:
-            self.on = False
-            paths += [Path(name).relative_to(ROOT).as_posix() for name in self.entered]
-
-
-@contextmanager
-def watched_service(but: Set[str] = JOBS) -> Iterator[tuple[TestClient, Watch]]:
-    """A service whose threads are watched, with two clutches of some stationary runs each."""
-    before, before_threads, watch = sys.getprofile(), threading.getprofile(), Watch(but)
-    threading.setprofile(watch)
+    before, before_threads = sys.getprofile(), threading.getprofile()
+    threading.setprofile(watch)  # before the service's threads start
     sys.setprofile(watch)
     try:
-        with tempfile.TemporaryDirectory() as folder:
-            app = create_app(Settings(workers=0, database=f"sqlite:///{folder}/rooms.db"))
-            with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as http:
-                for clutch_id in ("warm-up", "watched"):
-                    http.post("/v1/clutches", json={"clutch_id": clutch_id}).raise_for_status()
-                    for number in range(EARLIER_RUNS):
-                        post_run(http, clutch_id, 1000.0 * number)
-                yield http, watch
+        with tempfile.TemporaryDirectory() as folder, client_on(f"sqlite:///{folder}/rooms.db") as http:
+            for clutch_id in ("warm-up", "watched"):
+                http.post("/v1/clutches", json={"clutch_id": clutch_id}).raise_for_status()
+                for number in range(EARLIER_RUNS):
+                    post_run(http, clutch_id, 1000.0 * number)
+            if warm:
+                errand(http, "warm-up")
+            watched = True
+            errand(http, "watched")
+            watched = False
     finally:
         sys.setprofile(before)
         threading.setprofile(before_threads)
+    return [Path(name).relative_to(ROOT).as_posix() for name in files]
 
 
 def post_run(http: TestClient, clutch_id: str, cycles: float = 1000.0 * EARLIER_RUNS) -> None:
@@ -85,21 +66,11 @@ def post_run(http: TestClient, clutch_id: str, cycles: float = 1000.0 * EARLIER_
 
 
 def get_life(http: TestClient, clutch_id: str) -> None:
+    """Of a clutch that a run has changed since it was asked for."""
     http.get(f"/v1/clutches/{clutch_id}/remaining-useful-life").raise_for_status()
 
 
-def entered(errand: Callable[[TestClient, str], None]) -> list[str]:
-    """The files that an errand enters: a GET of the remaining life after a run has changed it, a POST of one more run."""
-    with watched_service() as (http, watch):
-        errand(http, "warm-up")
-        with watch.watching() as paths:
-            errand(http, "watched")
-    return paths
-
-
-def of_diagnosis() -> list[str]:
-    """The files of this process that a POST of a diagnosis enters until its report is there; it is computed in another."""
-    with watched_service(but=frozenset()) as (http, watch), watch.watching() as paths:
-        asked = {"json": {"adopt": False}, "headers": {"Prefer": "wait=120"}}
-        http.post("/v1/clutches/watched/diagnoses", **asked).raise_for_status()
-    return paths
+def diagnose(http: TestClient, clutch_id: str) -> None:
+    """Until the report is there, which is computed in another process."""
+    asked = {"json": {"adopt": False}, "headers": {"Prefer": "wait=120"}}
+    http.post(f"/v1/clutches/{clutch_id}/diagnoses", **asked).raise_for_status()

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from fastapi.testclient import TestClient
 
-from tests.architecture import document, graph, picture, rooms
+from tests.architecture import document, picture, rooms
 from tests.measuring import filled, parts
 
 PARTS = parts(document.DOCUMENT.read_text(encoding="utf-8"))
@@ -27,8 +27,8 @@ def test_every_part_is_written_by_the_code() -> None:
 
 def test_only_arrows_that_no_longer_way_implies_are_drawn() -> None:
     edges = {name: frozenset(targets) for name, targets in {"a": "bc", "b": "c", "c": "", "d": ""}.items()}
-    assert graph.reduced(edges) == {"a": {"b"}, "b": {"c"}, "c": set(), "d": set()}
-    assert graph.rows(edges, edges) == [["a"], ["b"], ["c", "d"]]
+    assert picture.reduced(edges) == {"a": {"b"}, "b": {"c"}, "c": set(), "d": set()}
+    assert picture.in_rows(edges, edges) == [["a"], ["b"], ["c", "d"]]
 
 
 @pytest.mark.parametrize(("name", "errand"), [("get", rooms.get_life), ("post", rooms.post_run)])

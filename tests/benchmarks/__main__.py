@@ -1,6 +1,5 @@
 """`make benchmark`: how long things take here, beside what a rival takes in the same run, as Markdown."""
 
-import json
 import platform
 import sqlite3
 import statistics
@@ -21,11 +20,11 @@ from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.prior import weak
-from service.run_files.simulated import simulated_body
 from tests.benchmarks.pages import pages
 from tests.benchmarks.records import records
 from tests.measuring import show
 from tests.models.tracking.tracked_series import sent
+from tests.scale.copies import bodies
 from tests.support import served
 
 
@@ -43,13 +42,11 @@ def milliseconds(
 
 def service() -> None:
     """A life of 60 tests posted over HTTP, run by run."""
-    runs = campaign.simulate(1, stop_fraction=0.01, most_tests=60)
-    bodies = [json.dumps(simulated_body(run)).encode() for run in runs if run.plateaus is not None]
     posts, headers = [], {"Content-Type": "application/json"}
     address = "/v1/clutches/bench"
     with served() as (_, http):
         http.post("/v1/clutches", json={"clutch_id": "bench"})
-        for body in bodies:
+        for body in bodies(60):
             start = time.perf_counter()
             answer = http.post(f"{address}/runs", content=body, headers=headers)
             posts.append(1e3 * (time.perf_counter() - start))
@@ -70,7 +67,7 @@ def service() -> None:
             "GET stribeck": (partial(http.get, f"{address}/stribeck"), 10),
         }
         rows |= {name: milliseconds(ask, repeats) for name, (ask, repeats) in asked.items()}
-    show("The service, over a socket", "what | ms", ((name, f"{taken:.1f}") for name, taken in rows.items()))
+    show("## The service, over a socket", ({"what": name, "ms": f"{taken:.1f}"} for name, taken in rows.items()))
 
 
 def identification() -> None:
@@ -103,9 +100,8 @@ def identification() -> None:
         "scipy `trust-constr` with gradients, one start": milliseconds(lambda: [trust(each) for each in found], 1),
     }
     show(
-        "Seven curves of 40 points fitted",
-        "what | ms | times ours",
-        ((name, f"{taken:.1f}", f"{taken / ours:.1f}") for name, taken in rows.items()),
+        "## Seven curves of 40 points fitted",
+        ({"what": name, "ms": f"{taken:.1f}", "times ours": f"{taken / ours:.1f}"} for name, taken in rows.items()),
     )
 
 
@@ -125,17 +121,13 @@ def tracking() -> None:
                 state = tracker.update(state, each, rng)
                 updates.append(1e3 * (time.process_time() - start))
             draw = partial(tracker.posterior, state, 1000, rng)
-            taken = (
-                statistics.mean(updates),
-                statistics.mean(updates[-10:]),
-                milliseconds(draw, 10, time.process_time),
-            )
-            rows.append((tracker.name, count, *(f"{each:.2f}" for each in taken)))
-    show(
-        "One measurement more, and the prediction's draws",
-        "filter | tests | update, mean, ms | the last ten, ms | 1,000 draws, ms",
-        rows,
-    )
+            taken = {
+                "update, mean, ms": statistics.mean(updates),
+                "the last ten, ms": statistics.mean(updates[-10:]),
+                "1,000 draws, ms": milliseconds(draw, 10, time.process_time),
+            }
+            rows.append({"filter": tracker.name, "tests": count} | {what: f"{ms:.2f}" for what, ms in taken.items()})
+    show("## One measurement more, and the prediction's draws", rows)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import json
 import statistics
 import time
+from collections.abc import Iterator
 
 import httpx2
 import numpy as np
@@ -44,7 +45,7 @@ def verdict_seconds(slugs: tuple[str, ...], lam: float, count: int) -> list[floa
     return taken
 
 
-def verdicts() -> list[tuple[object, ...]]:
+def verdicts() -> Iterator[dict[str, object]]:
     """What verdicts take where nothing, one effect or two effects are hidden."""
     hidden = {
         "nothing hidden": [((), 0.0, 6)],
@@ -52,11 +53,14 @@ def verdicts() -> list[tuple[object, ...]]:
         "two effects, λ = 50 each": [(("oil_temperature", "inertia_torque"), 50.0, 2)],
         "one effect, λ = 1000": [((slug,), 1000.0, 1) for slug in FAMILIES.values()],
     }
-    rows = []
     for name, kinds in hidden.items():
         taken = [seconds for kind in kinds for seconds in verdict_seconds(*kind)]
-        rows.append((name, len(taken), f"{statistics.median(taken):.1f}", f"{max(taken):.1f}"))
-    return rows
+        yield {
+            "verdict on 10 states with loops": name,
+            "campaigns": len(taken),
+            "median, s of one core": f"{statistics.median(taken):.1f}",
+            "longest, s": f"{max(taken):.1f}",
+        }
 
 
 def main() -> None:
@@ -69,9 +73,11 @@ def main() -> None:
             began = time.perf_counter()
             answer = http.post(f"/v1/clutches/{clutch_id}/diagnoses", json={}, headers={"Prefer": "wait=110"})
             over, report = time.perf_counter() - began, answer.json()
-            times.append((name, f"{over:.1f}", f"{report['verdict']}: {', '.join(report['causes'])}"))
-    show("A diagnosis", "diagnosis, its process' start and remaining life included | s | verdict", times)
-    show("Verdicts", "verdict on 10 states with loops | campaigns | median, s of one core | longest, s", verdicts())
+            verdict = f"{report['verdict']}: {', '.join(report['causes'])}"
+            diagnosed = "diagnosis, its process' start and remaining life included"
+            times.append({diagnosed: name, "s": f"{over:.1f}", "verdict": verdict})
+    show("## A diagnosis", times)
+    show("## Verdicts", verdicts())
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ REPEATS = 5
 _LAST = (
     "performance.getEntriesByType('resource').filter((one) => one.name.includes('series?quantity=')).at(-1).responseEnd"
 )
-_MARK = "performance.getEntriesByName({0!r})[0].startTime"
 ROWS = (
     "clutch page, the demo's life: first chart seen after its data arrived, nothing cached",
     "the same, from the address entered",
@@ -29,13 +28,15 @@ def pages() -> None:
         demo(http)
         found = [_clutch(browser, f"{server.url}/clutches/sim-1") for _ in range(REPEATS)]
     medians = map(statistics.median, zip(*found, strict=True))
-    show("The pages, in Chromium", "what | ms", ((name, f"{ms:.0f}") for name, ms in zip(ROWS, medians, strict=True)))
+    rows = ({"what": name, "ms": f"{ms:.0f}"} for name, ms in zip(ROWS, medians, strict=True))
+    show("## The pages, in Chromium", rows)
 
 
-def _until(page: Page, mark: str) -> None:
-    """Wait for a mark; the page's policy lets no condition be evaluated inside it."""
-    while not page.evaluate(f"performance.getEntriesByName({mark!r}).length"):
-        page.wait_for_timeout(20)
+def marked(page: Page, mark: str) -> float:
+    """Milliseconds from the start to a mark, waited for; the page's policy lets no condition be evaluated inside it."""
+    while (at := page.evaluate(f"performance.getEntriesByName({mark!r})[0]?.startTime ?? null")) is None:
+        page.wait_for_timeout(5)
+    return float(at)
 
 
 def _clutch(browser: Browser, address: str) -> tuple[float, ...]:
@@ -49,10 +50,9 @@ def _clutch(browser: Browser, address: str) -> tuple[float, ...]:
     taken: list[tuple[float, float, float]] = []
     for _ in range(2):
         page.goto(address)
-        _until(page, "sketched fan")
-        pointed = page.evaluate("performance.now()")
+        seen, pointed = marked(page, "sketched fan"), page.evaluate("performance.now()")
         pointed_at(page)
-        seen, drawn = (page.evaluate(_MARK.format(mark)) for mark in ("sketched fan", "drawn fan"))
+        drawn = marked(page, "drawn fan")
         taken.append((page.evaluate(_LAST), seen, drawn - pointed))
         page.goto("about:blank")
     context.close()

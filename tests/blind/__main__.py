@@ -13,9 +13,9 @@ import sys
 from collections.abc import Sequence
 
 from tests.blind import table
-from tests.blind.rows import trials
+from tests.blind.rows import asked_for
 from tests.blind.trials import Outcome, stored
-from tests.measuring import APPENDIX, Asked, each, fill, where
+from tests.measuring import Asked, each, publish, where
 
 
 def document(outcomes: Sequence[Outcome], command: str) -> list[str]:
@@ -39,15 +39,10 @@ def document(outcomes: Sequence[Outcome], command: str) -> list[str]:
 def main() -> None:
     """Print the table."""
     asked = Asked.here()
-    every = (trial for seed in asked.seeds for trial in trials(seed, asked.size))
-    chosen = [trial for trial in every if trial.row.startswith(asked.only)]
-    outcomes = list(each(stored, chosen, where(2)))
-    lines = document(outcomes, f"make blind {asked}")
-    print("\n".join(lines))
+    outcomes = list(each(stored, asked_for(asked), where(2)))
+    publish("diagnosis.md", "blind", document(outcomes, f"make blind {asked}"))
     if "--failures" in sys.argv:
         print("\n".join(table.failures(outcomes)))
-    if "--write" in sys.argv:
-        fill(APPENDIX / "diagnosis.md", {"blind": "\n".join(lines).strip()})
 
 
 if __name__ == "__main__":

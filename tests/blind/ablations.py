@@ -93,8 +93,7 @@ def stored(trial: Trial, ablate: str) -> dict[str, Outcome]:
         except UnreachableError:
             return pickle.dumps({})
 
-    known: dict[str, Outcome] = pickle.loads(kept(file_of(trial, f"ablations/{ablate}"), judged))  # noqa: S301 -- of this program
-    return known
+    return pickle.loads(kept(file_of(trial, f"ablations/{ablate}"), judged))  # noqa: S301 -- of this program
 
 
 def good(one: Outcome) -> bool:

@@ -12,7 +12,6 @@ can name the cause with 95 %; above `CLEAR` noise hides it in 1 of 300 campaigns
 are not asked about: no baseline takes anything of them up.
 """
 
-import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -26,9 +25,9 @@ from tests.blind.rig.loudness import Ear, listen
 from tests.blind.rig.makers import CATALOGUED
 from tests.blind.rig.refit import Refitted
 from tests.blind.rig.world import Effect
-from tests.blind.rows import trials
+from tests.blind.rows import asked_for
 from tests.blind.trials import Outcome, stored
-from tests.measuring import APPENDIX, Asked, each, fill, table, where
+from tests.measuring import Asked, each, publish, table, where
 
 #: Drawn forms of every rival, and how many rivals are refitted beyond the linear prediction.
 FORMS, REFITTED = 6, 3
@@ -62,7 +61,6 @@ def look(outcome: Outcome) -> Seen:
     ((effect, amplitude),) = hidden.effects
     ear = listen(hidden.plan, hidden.clutch, hidden.sensor)
     wanted = ear.changed(effect, amplitude)
-    assert wanted is not None
     chosen = sorted(_linear(ear, hidden, wanted), key=lambda one: one[0])[:REFITTED]
     alone = ear.refit.lower(wanted, ear.refit.to(wanted)).left
     found = [(alone, "none"), *((_refitted(ear, rival, start, wanted), rival.slug) for _, start, rival in chosen)]
@@ -136,17 +134,12 @@ def _kind(one: Outcome) -> str:
 def main() -> None:
     """Print the table, and with ARGS=--write put it into the appendix."""
     asked = Asked.here()
-    every = (trial for seed in asked.seeds for trial in trials(seed, asked.size))
-    outcomes = [stored(trial) for trial in every if trial.row.startswith(asked.only)]
-    seen = list(each(look, [one for one in outcomes if falls_short(one)], where(2)))
-    lines = document(seen, f"make oracle {asked}")
-    print("\n".join(lines))
+    outcomes = map(stored, asked_for(asked))
+    seen = list(each(look, filter(falls_short, outcomes), where(2)))
+    publish("diagnosis.md", "oracle", document(seen, f"make oracle {asked}"))
     for one in seen:
-        print(
-            f"{one.left:8.1f} {one.rival:20} {one.outcome.trial} -> {one.outcome.verdict} {sorted(one.outcome.causes)}"
-        )
-    if "--write" in sys.argv:
-        fill(APPENDIX / "diagnosis.md", {"oracle": "\n".join(lines)})
+        said = one.outcome
+        print(f"{one.left:8.1f} {one.rival:20} {said.trial} -> {said.verdict} {sorted(said.causes)}")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import numpy as np
 
 from tests.blind.rig.makers import CATALOGUED, HISTORY, OUTSIDE
 from tests.blind.trials import Outcome, Trial, trial
+from tests.measuring import Asked
 
 Test = Callable[[Outcome], bool]
 LOUDNESSES = (20.0, 50.0, 80.0, 300.0)
@@ -94,6 +95,12 @@ def trials(seed: int, size: float = 1.0) -> list[Trial]:
             add(f"few/{slug}/{speeds}", few, slug, lam=80.0, speeds=speeds, loops=False, states=12)
     add("raw/none", many, raw=True, loops=False)
     return made
+
+
+def asked_for(asked: Asked) -> list[Trial]:
+    """Those that `make` asks for."""
+    every = (trial for seed in asked.seeds for trial in trials(seed, asked.size))
+    return [trial for trial in every if trial.row.startswith(asked.only)]
 
 
 def drawn_pairs(seed: int, count: int) -> list[tuple[str, str]]:

@@ -31,22 +31,19 @@ def _of(outcomes: Sequence[Outcome], row: str) -> list[Outcome]:
     return [one for one in outcomes if one.trial.row == row]
 
 
+def _sum(outcomes: Sequence[Outcome], what: str) -> int:
+    return sum(getattr(one, what) for one in outcomes)
+
+
 def by_effect(outcomes: Sequence[Outcome]) -> list[str]:
     """Each of the seventeen by itself, at λ = 20 and 6 states."""
     rows = []
     for slug in CATALOGUED:
-        mine = _of(outcomes, f"one/{slug}")
-        seen = [one for one in mine if one.detected]
-        if mine:
-            cells = (
-                f"{len(seen)}/{len(mine)}",
-                f"{sum(one.in_set for one in seen)}/{len(seen)}",
-                f"{sum(one.top for one in seen)}/{len(seen)}",
-                f"{sum(one.right for one in mine)}/{len(mine)}",
-                f"{sum(one.wrong for one in mine)}/{len(mine)}",
-                f"{sum(one.unexplained for one in mine)}/{len(mine)}",
-            )
-            rows.append((f"`{slug}`", len(mine), *cells))
+        if mine := _of(outcomes, f"one/{slug}"):
+            seen = [one for one in mine if one.detected]
+            counted = [(mine, "detected"), (seen, "in_set"), (seen, "top")]
+            counted += [(mine, what) for what in ("right", "wrong", "unexplained")]
+            rows.append((f"`{slug}`", len(mine), *(f"{_sum(some, what)}/{len(some)}" for some, what in counted)))
     titles = "campaigns", "detected", "truth in set", "top candidate", "named", "named and wrong", "unexplained"
     return table(("effect, λ = 20", *titles), rows)
 
@@ -56,8 +53,8 @@ def by_loudness(outcomes: Sequence[Outcome]) -> list[str]:
     rows = []
     for slug in CATALOGUED:
         each = [_of(outcomes, f"loud/{lam:.0f}/{slug}") for lam in LOUDNESSES]
-        cells = (f"{sum(o.right for o in mine)}, {sum(o.wrong for o in mine)} of {len(mine)}" for mine in each)
         if any(each):
+            cells = (f"{_sum(mine, 'right')}, {_sum(mine, 'wrong')} of {len(mine)}" for mine in each)
             rows.append((f"`{slug}`", *cells))
     return table(("effect", *(f"λ = {lam:.0f}: named rightly, wrongly" for lam in LOUDNESSES)), rows)
 
@@ -66,15 +63,9 @@ def outside(outcomes: Sequence[Outcome]) -> list[str]:
     """Each effect from outside the catalogue by itself."""
     rows = []
     for slug in OUTSIDE:
-        mine = _of(outcomes, f"outside/{slug}")
-        open_ = [one for one in mine if one.unexplained]
-        counted = (
-            sum(one.detected for one in mine),
-            len(open_),
-            sum(o.right_axis for o in open_),
-            sum(o.named for o in mine),
-        )
-        if mine:
+        if mine := _of(outcomes, f"outside/{slug}"):
+            axis = _sum([one for one in mine if one.unexplained], "right_axis")
+            counted = (_sum(mine, "detected"), _sum(mine, "unexplained"), axis, _sum(mine, "named"))
             rows.append((slug.replace("_", " "), len(mine), *counted))
     titles = "campaigns", "detected", "`unexplained_structure`", "right axis first", "named"
     return table(("outside the catalogue", *titles), rows)

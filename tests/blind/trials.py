@@ -139,8 +139,7 @@ def file_of(trial: Trial, folder: str = "table") -> Path:
 def stored(trial: Trial, folder: str = "table") -> Outcome:
     """The outcome of a trial, judged or read from where an earlier run left it."""
     known = kept(file_of(trial, folder), lambda: pickle.dumps(judge(trial)))
-    outcome: Outcome = pickle.loads(known)  # noqa: S301 -- of this program
-    return outcome
+    return pickle.loads(known)  # noqa: S301 -- of this program
 
 
 def nothing(trial: Trial, verdict: str, error: str, axes: frozenset[str] = frozenset()) -> Outcome:

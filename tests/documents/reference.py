@@ -276,14 +276,13 @@ def _constants(tree: ast.Module) -> Iterator[tuple[str, str]]:
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
             target, value = node.targets[0], node.value
             together = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
-            pairs = zip(target.elts, value.elts, strict=False) if together else [(target, value)]
-            for name, text in pairs:
+            for name, text in zip(target.elts, value.elts, strict=False) if together else [(target, value)]:
                 if isinstance(name, ast.Name) and isinstance(text, ast.Constant) and isinstance(text.value, str):
                     yield name.id, text.value
 
 
 def _of_function(function: ast.AST, constants: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
-    assigned = [node for node in ast.walk(function) if isinstance(node, ast.Assign | ast.Return)]
+    assigned = [node for node in ast.walk(function) if isinstance(node, ast.Assign)]
     for node in ast.walk(function):
         made = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
         if isinstance(node, ast.Call) and made in ("FieldError", "Notice", "InvalidError.of"):
@@ -310,7 +309,7 @@ def _codes(node: ast.expr | None, constants: Mapping[str, str]) -> list[str]:
     return []
 
 
-def _said(node: ast.expr | None, assigned: Sequence[ast.Assign | ast.Return], line: int) -> str:
+def _said(node: ast.expr | None, assigned: Sequence[ast.Assign], line: int) -> str:
     """The words of an expression; of a name those that it was last given above that line."""
     match node:
         case ast.Constant(value=value):
@@ -320,14 +319,10 @@ def _said(node: ast.expr | None, assigned: Sequence[ast.Assign | ast.Return], li
         case ast.BinOp(left=left, right=right):
             return _said(left, assigned, line) + _said(right, assigned, line)
         case ast.Name(id=name):
-            before = [each for each in assigned if each.lineno < line and name in _targets(each)]
+            targets = ((each, target) for each in assigned if each.lineno < line for target in each.targets)
+            before = [each for each, target in targets if isinstance(target, ast.Name) and target.id == name]
             return _said(max(before, key=lambda each: each.lineno).value, [], line) if before else "…"
     return "…"
-
-
-def _targets(statement: ast.Assign | ast.Return) -> list[str]:
-    targets = statement.targets if isinstance(statement, ast.Assign) else []
-    return [target.id for target in targets if isinstance(target, ast.Name)]
 
 
 def metrics() -> str:

@@ -33,20 +33,20 @@ def signs() -> str:
         ("squeezed film: S rises, loop positive", squeeze_film_torque(fine, v, curve, film_time_at(4e5))),
     ):
         off, last = course - torque(v, curve), (fine >= 0) & (v > 0.2)
-        panel = chart.panel(title, "velocity [m/s], 4 bar", "M - S(v) [Nm]", zero=True)
+        chart.panel(title, "velocity [m/s], 4 bar", "M - S(v) [Nm]", zero=True)
         for name, branch in (("accelerating", np.cos(turn) > 0), ("decelerating", np.cos(turn) <= 0)):
             x, y = v[last & branch], off[last & branch]
             order = np.argsort(x, kind="stable")
-            panel.line(x[order], y[order], name)
+            chart.line(x[order], y[order], name)
     rows = loop_signs()
-    panel = chart.panel("area of a loop", "pressure [bar]", "∮M dv [Nm m/s]", zero=True)
+    chart.panel("area of a loop", "pressure [bar]", "∮M dv [Nm m/s]", zero=True)
     for law, name, colour in (
         ("∮M dv, attractor", "attractor", COLOURS[0]),
         ("∮M dv, squeeze film", "squeezed film", COLOURS[1]),
     ):
         for kind, dashed in (("rising", False), ("nominal", True)):
             x, y = np.array([(row["pressure [bar]"], row[law]) for row in rows if row["curve"] == kind]).T
-            panel.line(x, y, f"{name}, {kind} curve", dashed=dashed, colour=colour)
+            chart.line(x, y, f"{name}, {kind} curve", dashed=dashed, colour=colour)
     return chart.drawn()
 
 
@@ -55,13 +55,13 @@ def life() -> str:
     clutch, chart = SimulatedClutch(), Chart(3)
     found = {cycles: _loops(clutch, cycles) for cycles in LIFE}
     over = np.array(LIFE, dtype=np.float64)
-    panel = chart.panel("new, by pressure (fig. 14)", "pressure [bar]", "loop area [Nm m/s]", zero=True)
-    panel.points(np.array([loop.pressure / 1e5 for loop in found[0]]), *_areas(found[0]))
-    panel = chart.panel(f"at {AT_BAR:g} bar, over life (fig. 16)", "duty cycles", "loop area [Nm m/s]")
-    panel.points(over, *_areas([_at(found[cycles], AT_BAR) for cycles in LIFE]))
-    panel = chart.panel("by cycles and pressure (fig. 17)", "duty cycles", "loop area [Nm m/s]")
+    chart.panel("new, by pressure (fig. 14)", "pressure [bar]", "loop area [Nm m/s]", zero=True)
+    chart.points(np.array([loop.pressure / 1e5 for loop in found[0]]), *_areas(found[0]))
+    chart.panel(f"at {AT_BAR:g} bar, over life (fig. 16)", "duty cycles", "loop area [Nm m/s]")
+    chart.points(over, *_areas([_at(found[cycles], AT_BAR) for cycles in LIFE]))
+    chart.panel("by cycles and pressure (fig. 17)", "duty cycles", "loop area [Nm m/s]")
     for bar in (loop.pressure / 1e5 for loop in found[0]):
-        panel.line(over, _areas([_at(found[cycles], bar) for cycles in LIFE])[0], f"{bar:g} bar")
+        chart.line(over, _areas([_at(found[cycles], bar) for cycles in LIFE])[0], f"{bar:g} bar")
     return chart.drawn()
 
 

@@ -9,7 +9,7 @@ COLOURS = ("#1f5fa8", "#c2410c", "#15803d", "#7c3aed", "#b45309", "#0e7490", "#9
 
 
 class Chart:
-    """Panels in a row."""
+    """Panels in a row, pairs of axes each; what is drawn comes into the last one that was begun."""
 
     def __init__(self, panels: int) -> None:
         import matplotlib as mpl  # 0.4 s for whoever draws, not for every collection
@@ -21,31 +21,13 @@ class Chart:
         self.figure, axes = plt.subplots(1, panels, figsize=(3.6 * panels, 3.6), layout="constrained", squeeze=False)
         self._axes = iter(axes[0])
 
-    def panel(self, title: str, x_label: str, y_label: str, *, zero: bool = False) -> "Panel":
-        """The next one; `zero`: with a line at y = 0."""
-        return Panel(next(self._axes), title, x_label, y_label, zero=zero)
-
-    def drawn(self) -> str:
-        from matplotlib import pyplot as plt
-
-        for axis in self.figure.axes:
-            if axis.get_legend_handles_labels()[0]:
-                axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
-        text = io.StringIO()
-        self.figure.savefig(text, format="svg", metadata={"Date": None})
-        plt.close(self.figure)
-        return text.getvalue()
-
-
-class Panel:
-    """One pair of axes."""
-
-    def __init__(self, axis: Any, title: str, x_label: str, y_label: str, *, zero: bool) -> None:
-        self.axis = axis
-        axis.set(title=title, xlabel=x_label, ylabel=y_label)
-        axis.grid(color="#ddd")
+    def panel(self, title: str, x_label: str, y_label: str, *, zero: bool = False) -> None:
+        """Begin the next one; `zero`: with a line at y = 0."""
+        self.axis = next(self._axes)
+        self.axis.set(title=title, xlabel=x_label, ylabel=y_label)
+        self.axis.grid(color="#ddd")
         if zero:
-            axis.axhline(0.0, color="#888", linewidth=0.8)
+            self.axis.axhline(0.0, color="#888", linewidth=0.8)
 
     def line(self, x: FloatArray, y: FloatArray, name: str = "", *, dashed: bool = False, colour: str = "") -> None:
         """y [n] over x [n]."""
@@ -58,3 +40,14 @@ class Panel:
     def _series(self, x: FloatArray, y: FloatArray, deviation: FloatArray | None, **style: Any) -> None:
         style["color"] = style["color"] or COLOURS[len(self.axis.containers) % len(COLOURS)]
         self.axis.errorbar(x, y, deviation, markersize=4, **style)
+
+    def drawn(self) -> str:
+        from matplotlib import pyplot as plt
+
+        for axis in self.figure.axes:
+            if axis.get_legend_handles_labels()[0]:
+                axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
+        text = io.StringIO()
+        self.figure.savefig(text, format="svg", metadata={"Date": None})
+        plt.close(self.figure)
+        return text.getvalue()

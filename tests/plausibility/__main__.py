@@ -12,11 +12,10 @@ import itertools
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict
 from functools import partial
 from typing import Any
 
-from tests.measuring import APPENDIX, Asked, Lines, fill, number, table, wilson
+from tests.measuring import Asked, Lines, number, publish, table, wilson
 from tests.plausibility import slips, trials
 from tests.plausibility.ablation import WITHOUT
 from tests.plausibility.bench import Answer
@@ -106,58 +105,46 @@ def _counted(title: str, outcomes: Sequence[Outcome], *demand: str) -> tuple[obj
     return title, len(outcomes), held, percent(held, len(outcomes)), *demand
 
 
-def _known(
-    store: Lines, label: str, make: Callable[..., Outcome | list[Outcome]], *of: object, **how: bool
-) -> list[Outcome]:
-    """What comes of a trial, from the store or made."""
-
-    def made() -> list[dict[str, Any]]:
-        found = make(*of, **how)
-        return [asdict(one) for one in (found if isinstance(found, list) else [found])]
-
-    outcomes = []
-    for known in store.get(f"{label} {' '.join(map(str, of))}", made):
-        answer = known["answer"]
-        outcomes.append(Outcome(**{**known, "answer": Answer(**{**answer, "codes": tuple(answer["codes"])})}))
-    return outcomes
-
-
 def main() -> int:
     """Print the tables; 1 where the demand is not met."""
     seed, store = Asked.here().seed, Lines(os.environ.get("STORE"))
     sizes = {"CAMPAIGNS": 200, "HONEST": 2000, "LIVES": 20, "ABLATED": 60}
     campaigns, runs, count, ablated = (number(name, size) for name, size in sizes.items())
 
-    def life(label: str, make: Callable[[int, str, int], dict[str, int]], kind: str, n: int) -> dict[str, int]:
-        return store.get(f"{label} {seed} {kind} {n}", partial(make, seed, kind, n))
+    def known(label: str, make: Callable[..., Any], name: str, n: int, **how: bool) -> Any:
+        """What comes of a trial, from the store or made."""
+        return store.get(f"{label} {seed} {name} {n}", partial(make, seed, name, n, **how))
 
-    def sent(
-        label: str, make: Callable[..., Outcome | list[Outcome]], names: Iterable[str], many: int, **how: bool
+    def sent(label: str, make: Callable[..., list[Outcome]], name: str, n: int, **how: bool) -> list[Outcome]:
+        return [Outcome(**(one | {"answer": Answer(**one["answer"])})) for one in known(label, make, name, n, **how)]
+
+    def many(
+        label: str, make: Callable[..., list[Outcome]], names: Iterable[str], each: int, **how: bool
     ) -> list[Outcome]:
         """What comes of so many trials of each name."""
-        jobs = itertools.product(range(many), names)
-        return [one for n, name in jobs for one in _known(store, label, make, seed, name, n, **how)]
+        jobs = itertools.product(range(each), names)
+        return [one for n, name in jobs for one in sent(label, make, name, n, **how)]
 
     def honest_runs(source: str, share: int) -> list[Outcome]:
         """So many honest runs of a source, or all that there are."""
         found: list[Outcome] = []
         for n in itertools.count():
-            own = _known(store, "honest", trials.honest, seed, source, n)
+            own = sent("honest", trials.honest, source, n)
             found += own
             if not own or len(found) >= share:
                 return found[:share]
         return found
 
-    rigs = {rig: sent("slip", trials.slipped, [rig], campaigns // 2) for rig in trials.RIGS}
+    rigs = {rig: many("slip", trials.slipped, [rig], campaigns // 2) for rig in trials.RIGS}
     wrong = [*itertools.chain(*rigs.values())]
-    aside = sent("aside", trials.aside, trials.RIGS, campaigns // 5)
-    lives = {kind: [life("life", trials.honest_life, kind, n) for n in range(count)] for kind in KINDS}
+    aside = many("aside", trials.aside, trials.RIGS, campaigns // 5)
+    lives = {kind: [known("life", trials.honest_life, kind, n) for n in range(count)] for kind in KINDS}
     shares = {"simulated rig": 2 * runs // 5, "blind rig": 2 * runs // 5, "real": runs // 5}
     honest = [one for source, share in shares.items() for one in honest_runs(source, share)]
-    slips_without = sent("slip without", trials.slipped, trials.RIGS, ablated, ablated=True)
-    honest_without = sent("honest without", trials.honest, shares, ablated // 10, ablated=True)
+    slips_without = many("slip without", trials.slipped, trials.RIGS, ablated, ablated=True)
+    honest_without = many("honest without", trials.honest, shares, ablated // 10, ablated=True)
     judged = [(kind, n) for n in range(min(ablated // 10, count)) for kind in KINDS]
-    lives_without = [life("life without", trials.honest_life_without, kind, n) for kind, n in judged]
+    lives_without = [known("life without", trials.honest_life_without, kind, n) for kind, n in judged]
     of_judged = (sum(lives[kind][n][name] for kind, n in judged) for name in ("runs", "end"))
 
     followed = [one for one in wrong if one.out_after is not None]
@@ -188,13 +175,11 @@ def main() -> int:
         f"A stationary test's doubts took {1e3 * times[len(times) // 2]:.1f} ms of a core in the median, "
         f"{1e3 * times[int(0.99 * len(times))]:.1f} ms in 99 % of runs.",
     ]
-    print("\n".join(lines))
+    publish("plausibility.md", "plausibility", lines)
     if "--failures" in sys.argv:
         for one in (*[o for o in wrong if not o.held], *[o for o in honest if o.held]):
             said = (one.kind, one.cycles, one.before, one.answer.codes, one.answer.message)
             print("\n", one.slip or "honest", one.source, *said)
-    if "--write" in sys.argv:
-        fill(APPENDIX / "plausibility.md", {"plausibility": "\n".join(lines)})
     met = held_of(wrong) >= LEAST_HELD * len(wrong) and held_of(honest) <= MOST_FALSE * len(honest)
     met = met and in_the_end <= MOST_IN_THE_END * of_lives and out >= LEAST_AFTER * len(followed)
     return 0 if met else 1

@@ -50,17 +50,17 @@ def of_blind(rng: np.random.Generator) -> Campaign:
 RIGS: dict[str, Draw] = {"simulated rig": simulated.campaign, "blind rig": of_blind}
 
 
-def slipped(seed: int, rig: str, number: int, *, ablated: bool = False) -> Outcome:
+def slipped(seed: int, rig: str, number: int, *, ablated: bool = False) -> list[Outcome]:
     """A campaign of a rig with one slip; the groups of slips take turns."""
     rng = np.random.default_rng([seed, 1, list(RIGS).index(rig), number])
-    return one_slip(rng, RIGS[rig], rig, slips.GROUPS[number % len(slips.GROUPS)], ablated=ablated)
+    return [one_slip(rng, RIGS[rig], rig, slips.GROUPS[number % len(slips.GROUPS)], ablated=ablated)]
 
 
-def aside(seed: int, rig: str, number: int) -> Outcome:
+def aside(seed: int, rig: str, number: int) -> list[Outcome]:
     """A slip beyond the demand, or one that cannot be told."""
     rng = np.random.default_rng([seed, 2, list(RIGS).index(rig), number])
     names = (*slips.OTHERS, *slips.ALIKE)
-    return one_slip(rng, RIGS[rig], rig, names[number % len(names)])
+    return [one_slip(rng, RIGS[rig], rig, names[number % len(names)])]
 
 
 def one_slip(rng: np.random.Generator, draw: Draw, source: str, group: str, *, ablated: bool = False) -> Outcome:

@@ -1,34 +1,44 @@
 """`make real`: post the real measurements to a service and print, as Markdown, what it says of them."""
 
+import itertools
 import statistics
 import sys
 from typing import Any
 
 import httpx2
 
-from tests.measuring import table
+from tests.measuring import show
 from tests.real import diagnosis, lag, lives, loaders, prognosis
 from tests.support import served
+
+#: Nm to mNm; at a mean radius of 1 m a velocity in m/s is a speed in rad/s.
+_PARAMETERS = {
+    "M_s [mNm]": ("static_torque_nm", 1e3),
+    "M̄_c": ("coulomb_ratio", 1.0),
+    "V_S [rad/s]": ("stribeck_velocity_m_s", 1.0),
+    "C_v [mNm]": ("viscous_coefficient", 1e3),
+}
+
+
+def fits_of(http: httpx2.Client, clutch: dict[str, Any], runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The fits of a clutch's runs, which are posted."""
+    http.post("/v1/clutches", json=clutch).raise_for_status()
+    address = f"/v1/clutches/{clutch['clutch_id']}/runs"
+    return [fit for run in runs for fit in http.post(address, json=run).raise_for_status().json()["fits"]]
 
 
 def screw_drives(http: httpx2.Client) -> None:
     """Each drive and direction as a stationary run."""
     rows = []
     for name, run in loaders.screw_drive_runs().items():
-        record = {"clutch_id": name, "geometry": {"mean_radius_mm": 1000}}
-        http.post("/v1/clutches", json=record).raise_for_status()
-        answer = http.post(f"/v1/clutches/{name}/runs", json=run)
-        answer.raise_for_status()
-        fit = answer.json()["fits"][0]
-        parameters = (_formatted(fit, name, scale) for name, scale in _SCALES.items())
-        errors = (f"{fit['rmse_nm'] * 1e3:.3f}", f"{fit['mse_percent']:.1f}")
-        rows.append((name, fit["points"], *parameters, *errors, fit["status"]))
-    titles = "run | points | M_s [mNm] | M̄_c | V_S [rad/s] | C_v [mNm] | RMSE [mNm] | MSE [%] | status"
-    print("### Two screw drives at steady speeds\n", *table(titles.split(" | "), rows), sep="\n")
-
-
-#: Nm to mNm; at a mean radius of 1 m a velocity in m/s is a speed in rad/s.
-_SCALES = {"static_torque_nm": 1e3, "coulomb_ratio": 1.0, "stribeck_velocity_m_s": 1.0, "viscous_coefficient": 1e3}
+        (fit,) = fits_of(http, {"clutch_id": name, "geometry": {"mean_radius_mm": 1000}}, [run])
+        rows.append(
+            {"run": name, "points": fit["points"]}
+            | {title: _formatted(fit, parameter, scale) for title, (parameter, scale) in _PARAMETERS.items()}
+            | {"RMSE [mNm]": f"{fit['rmse_nm'] * 1e3:.3f}", "MSE [%]": f"{fit['mse_percent']:.1f}"}
+            | {"status": fit["status"]}
+        )
+    show("### Two screw drives at steady speeds", rows)
 
 
 def _formatted(fit: dict[str, Any], name: str, scale: float) -> str:
@@ -39,27 +49,23 @@ def _formatted(fit: dict[str, Any], name: str, scale: float) -> str:
 
 def traction(http: httpx2.Client) -> None:
     """200 sweeps of one contact, and what is said of its remaining life."""
-    http.post("/v1/clutches", json=loaders.TRACTION_CLUTCH).raise_for_status()
-    fits = []
-    for run in loaders.traction_runs():
-        answer = http.post("/v1/clutches/traction/runs", json=run)
-        answer.raise_for_status()
-        fits += answer.json()["fits"]
+    fits = fits_of(http, loaders.TRACTION_CLUTCH, loaders.traction_runs())
     names = {"percentage MSE": "mse_percent", "RMSE [Nm]": "rmse_nm", "mean coefficient of traction": "mean_cof"}
     cuts = {title: statistics.quantiles([fit[name] for fit in fits], n=20) for title, name in names.items()}
-    rows = [(title, *(f"{found[k]:.3g}" for k in (0, 9, 18))) for title, found in cuts.items()]
-    print("\n### 200 traction sweeps, down and up\n", *table(("", "5 %", "median", "95 %"), rows), sep="\n")
-    print(f"\n{sum(fit['acceptable'] for fit in fits)} of {len(fits)} fits are acceptable (MSE below 5 %).\n")
+    shares = {"5 %": 0, "median": 9, "95 %": 18}
+    rows = ({"": title} | {at: f"{found[k]:.3g}" for at, k in shares.items()} for title, found in cuts.items())
+    show("### 200 traction sweeps, down and up", rows)
     rows = []
-    for at in (20, 50, 100, 200):
-        for method in ("particle", "ukf", "grid"):
-            params: dict[str, Any] = {"method": method, "at_cycles": at}
-            said = http.get("/v1/clutches/traction/remaining-useful-life", params=params).json()
-            left = (said["remaining_cycles"][q] for q in ("0.05", "0.5", "0.95"))
-            cycles = ("beyond" if value is None else f"{value:.3g}" for value in left)
-            rows.append((str(at), method, said["status"], f"{said['probability_of_reaching']:.2f}", *cycles))
-    titles = "after sweep | method | status | P(reached within 10⁶) | remaining, 5 % | median | 95 %"
-    print(*table(titles.split(" | "), rows), sep="\n")
+    for at, method in itertools.product((20, 50, 100, 200), ("particle", "ukf", "grid")):
+        params: dict[str, Any] = {"method": method, "at_cycles": at}
+        said = http.get("/v1/clutches/traction/remaining-useful-life", params=params).json()
+        row = {"after sweep": at, "method": method, "status": said["status"]}
+        row["P(reached within 10⁶)"] = f"{said['probability_of_reaching']:.2f}"
+        for title, q in (("remaining, 5 %", "0.05"), ("median", "0.5"), ("95 %", "0.95")):
+            left = said["remaining_cycles"][q]
+            row[title] = "beyond" if left is None else f"{left:.3g}"
+        rows.append(row)
+    show(f"{sum(fit['acceptable'] for fit in fits)} of {len(fits)} fits are acceptable (MSE below 5 %).", rows)
 
 
 def main() -> int:
@@ -69,12 +75,9 @@ def main() -> int:
     with served() as (_, http):
         screw_drives(http)
         traction(http)
-    print("\n## Lag: loops and transients\n")
-    lag.main()
-    print("\n## The diagnosis\n")
-    diagnosis.main()
-    print("\n## The prognosis\n")
-    prognosis.main()
+    for title, part in (("Lag: loops and transients", lag), ("The diagnosis", diagnosis), ("The prognosis", prognosis)):
+        print(f"## {title}\n")
+        part.main()
     lives.main()
     return 0
 

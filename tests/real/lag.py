@@ -6,7 +6,7 @@ and how far either describes them.
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,7 +19,7 @@ from models.loops.lag_laws import FILM_EXPONENT, attractor_torque, squeeze_film_
 from models.loops.loop_area import area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
-from tests import measuring
+from tests.measuring import show
 from tests.models.loops.dynamic_records import attractor_area
 from tests.real.loaders import FOLDER, TRACTION_SWEEPS
 
@@ -30,12 +30,6 @@ VELOCITY_STEP = FOLDER / "friction_velocity_steps" / "velstep3_TR2_exp013_sepiol
 FREQUENCY, ATTRACTOR, FILM_TIME = 0.1, 200.0, 0.05
 
 Row = dict[str, Any]
-
-
-def table(rows: Iterable[Row]) -> str:
-    rows = list(rows)
-    cells = [[f"{v:.4g}" if isinstance(v, float) else v for v in row.values()] for row in rows]
-    return "\n".join(measuring.table(list(rows[0]), cells))
 
 
 def film_time_at(pressure: float) -> float:
@@ -81,7 +75,7 @@ def micro_loops() -> list[Row]:
     """
     rows = []
     for name, t, x, f in _tens():
-        place = _position(t, x)
+        place = fit_cycle(t, x)
         work, lag = (area_of(cycle, clean_samples(cycle, t, f)) for cycle in (place, _speed_of(place)))
         whole = (t >= place.start) & (t < place.stop)
         v = np.gradient(x, t)[whole]
@@ -103,7 +97,7 @@ def loop_courses() -> list[tuple[str, FloatArray, FloatArray]]:
     """The mean course of ten cycles: which, speed [200] mm/s and force [200] N over a turn, closed."""
     courses = []
     for name, t, x, f in _tens():
-        place = _position(t, x)
+        place = fit_cycle(t, x)
         turn = np.linspace(0.0, 2 * math.pi, 201)
         part = np.digitize(np.mod(place.phase(t), 2 * math.pi), turn[1:-1])
         force = np.bincount(part, weights=f, minlength=200) / np.maximum(np.bincount(part, minlength=200), 1)
@@ -119,18 +113,11 @@ def _tens() -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
     loaded = np.flatnonzero(normal > 0.9 * np.median(normal))
     rows_loaded = slice(int(loaded[0]), int(loaded[-1]) + 1)
     time, position, force = time[rows_loaded], position[rows_loaded], -friction[rows_loaded] / 1e6
-    whole = _position(time, position)
+    whole = fit_cycle(time, position)
     length = 1 / whole.frequency
     for first in range(0, whole.periods - 9, 10):
         inside = (time >= whole.start + first * length) & (time < whole.start + (first + 10) * length)
         yield f"{first + 1} to {first + 10}", time[inside], position[inside], force[inside]
-
-
-def _position(time: np.ndarray, position: np.ndarray) -> Cycle:
-    cycle = fit_cycle(time, position)
-    if isinstance(cycle, str):
-        raise TypeError(cycle)
-    return cycle
 
 
 def _speed_of(place: Cycle) -> Cycle:
@@ -267,7 +254,7 @@ def main() -> None:
         ("Friction after a step of speed", velocity_step()),
         ("Traction sweeps: up against down", traction_branches()),
     ):
-        print(f"### {title}\n\n{table(rows)}\n")
+        show(f"### {title}", rows)
 
 
 if __name__ == "__main__":

@@ -32,15 +32,14 @@ from models.arrays import FloatArray
 from models.prognosis.criteria import HORIZON
 from models.prognosis.ended_lives import EndedLife, severity_exponent
 from models.prognosis.scoring import measured_end
-from models.prognosis.stated_end import stated_end
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
-from tests.measuring import Asked, Lines
+from tests.measuring import Asked, Lines, show
 from tests.models.tracking.tracked_series import sent
 from tests.real import loaders
-from tests.real.lag import Row, table
+from tests.real.lag import Row
 from tests.real.prognosis import BLOCKS
-from tests.score.table import score
+from tests.score.table import score, score_of_stated
 from tests.statistical.forecasts import DRAWS, GRID, forecast
 from tests.statistical.lives import taught
 
@@ -139,13 +138,9 @@ def with_ended(
             alive = np.array([life.end for life in kin if life.end > now])
             if alive.size == 0:
                 continue
-            stated = stated_end(drawn, fraction=0.5, as_of=now, horizon=HORIZON, ended=kin, tests=seen)
             slid = now + np.array([_left(life, seen) for life in kin])
-            rivals = ((each, np.ones(each.size)) for each in (alive, slid))
-            scores = [
-                score(np.minimum(ends, HORIZON), weight, end)
-                for ends, weight in ((stated.ends, stated.weight), *rivals)
-            ]
+            rivals = (score(np.minimum(ends, HORIZON), np.ones(ends.size), end) for ends in (alive, slid))
+            scores = (score_of_stated(drawn, seen, kin, end), *rivals)
             found[str(count)][f"{stage:g}"] = [[each.held, each.late, each.crps] for each in scores]
     return found
 
@@ -231,14 +226,14 @@ def main() -> None:
     half, asked = os.environ.get("HALF") or "judging", Asked.here("full")
     store = Path(os.environ.get("STORE") or f"real-lives-{half}.jsonl")
     found = list(judged(half, SMALL if asked.size < 1.0 else 1, store))
-    print("### Real lives, each alone: the exact filter, and as it is stated after earlier forecasts\n")
-    print(table(rows_of(found, "alone", alone)))
+    title = "### Real lives, each alone: the exact filter, and as it is stated after earlier forecasts"
+    show(title, rows_of(found, "alone", alone))
     for count in OTHERS:
-        print(f"\n### With {count} ended lives of the kind\n\n{table(rows_of(found, str(count), beside))}")
+        show(f"### With {count} ended lives of the kind", rows_of(found, str(count), beside))
     clogged = list(filters())
     ends, feeds = np.array([end for *_, end in clogged]), np.array([float(kind.split()[1]) for kind, *_ in clogged])
     exponent, deviation = severity_exponent(ends, feeds)
-    print(f"\nThe feed as severity: exponent {-exponent:.3f} ± {deviation:.3f} of {ends.size} lives")
+    print(f"The feed as severity: exponent {-exponent:.3f} ± {deviation:.3f} of {ends.size} lives")
 
 
 if __name__ == "__main__":

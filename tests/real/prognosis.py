@@ -24,10 +24,11 @@ from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
+from tests.measuring import show
 from tests.models.prognosis.sample_scores import crps_of_sample
 from tests.models.tracking.tracked_series import sent
 from tests.real import loaders
-from tests.real.lag import Row, table
+from tests.real.lag import Row
 
 SEED, DRAWS = 2013, 1_000
 GRID = Grid()
@@ -188,10 +189,10 @@ def running_in() -> list[Row]:
 
 
 def main() -> None:
-    print(f"### Lasers: failure at +10 %, each left out\n\n{table(lasers())}\n")
+    show("### Lasers: failure at +10 %, each left out", lasers())
     print("Autocorrelation between inspections {:.2f}, of independent scatter {:.2f}.\n".format(*wandering()))
-    print(f"### Pins: the wear scar of each from the others\n\n{table(pins())}\n")
-    print(f"### Running-in: the last block from the first ones\n\n{table(running_in())}\n")
+    show("### Pins: the wear scar of each from the others", pins())
+    show("### Running-in: the last block from the first ones", running_in())
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 SIZE= scales the number of lives    SEED= other lives (2026)    ARGS=--write puts the table into docs/appendix/prognosis.md
 """
 
-import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -18,7 +17,7 @@ from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.prior import weak
-from tests.measuring import APPENDIX, Asked, fill, table
+from tests.measuring import Asked, publish, table
 from tests.models.prognosis.sample_scores import crps_of_sample
 from tests.rivals.others import CAP, DRAWS, PlainUkf, Progpy, Sample, Surpyval, fitted
 from tests.statistical.lives import STAGES, ends, typical
@@ -59,7 +58,7 @@ class Tally:
         finally:
             self.update[name].append(time.process_time() - begun)
 
-    def table(self) -> str:
+    def table(self) -> list[str]:
         mean, middle = float(np.mean(self.crps["`grid`"])), float(np.median(self.crps["`grid`"]))
         rows = []
         for name in self.whole:
@@ -77,7 +76,7 @@ class Tally:
         titles = (
             "method | CRPS, mean, lives | over `grid`'s | median over `grid`'s | update, ms | distribution, ms | failed"
         )
-        return "\n".join(table(titles.split(" | "), rows))
+        return table(titles.split(" | "), rows)
 
 
 def sampled(tracker: Any, state: Any, rng: np.random.Generator) -> Sample:
@@ -132,11 +131,8 @@ def main() -> None:
         f"{done} lives like the reference's, {INSPECTIONS} inspections in a life, {100 * SCATTER:.0f} % scatter, at 40, 60 "
         f"and 80 % of life, seed {asked.seed}; {releases}"
     )
-    text = f"{head}\n\n{tally.table()}"
-    print(text)
-    if "--write" in sys.argv:
-        command = f"`make rivals SIZE={asked.size:g} SEED={asked.seed}`"
-        fill(APPENDIX / "prognosis.md", {"score rivals": f"{command}: {text}"})
+    command = f"`make rivals SIZE={asked.size:g} SEED={asked.seed}`"
+    publish("prognosis.md", "score rivals", [f"{command}: {head}", "", *tally.table()])
 
 
 if __name__ == "__main__":

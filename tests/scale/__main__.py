@@ -12,7 +12,6 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,29 +21,18 @@ from playwright.sync_api import Browser
 
 from storage.engine.sqlite.database import back_up
 from tests.benchmarks.memory import held, held_alone
+from tests.benchmarks.pages import marked
 from tests.browser.driving import chromium
+from tests.measuring import table
 from tests.scale.copies import bodies, kilobytes, life, multiply, name
 from tests.storage.engine.postgresql.server import postgresql_server
 from tests.support import serving
 
 FEW, ROUNDS, SCREENS = 10, 30, 7
-_SHOWN = "performance.getEntriesByName('fleet-shown')[0]?.startTime ?? null"
 JSON = {"Content-Type": "application/json"}
 
 #: Milliseconds by what was asked.
 Times = defaultdict[str, list[float]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
-    """What a database of so many clutches costs: its bytes, bytes a second of a backup where it is a file, bytes of the
-    service that was asked, alone and with its workers."""
-
-    size: int
-    backup: float | None
-    alone: int
-    memory: int
-    times: Times
 
 
 def timed(times: Times, title: str, ask: Callable[..., httpx2.Response], *arguments: Any) -> None:
@@ -89,40 +77,38 @@ def first_screen(browser: Browser, url: str) -> float:
     context = browser.new_context(viewport={"width": 1360, "height": 900})
     page = context.new_page()
     page.goto(url)
-    while (shown := page.evaluate(_SHOWN)) is None:
-        page.wait_for_timeout(5)
+    shown = marked(page, "fleet-shown")
     assert page.locator("table.fleet tbody tr").count() >= FEW
     context.close()
-    return float(shown)
+    return shown
 
 
-def backed_up(address: str) -> float | None:
-    """Bytes a second of a backup; a server's is not ours."""
+def backup_speed(address: str) -> dict[str, float]:
+    """MB a second of a backup, where it is of a file: a server's is not ours."""
     if not address.startswith("sqlite"):
-        return None
+        return {}
     path = Path(address.removeprefix("sqlite:///"))
     target = path.with_suffix(".copy")
     start = time.perf_counter()
     back_up(address, target)
     taken = time.perf_counter() - start
     target.unlink()
-    return path.stat().st_size / taken
+    return {"backup, MB/s": path.stat().st_size / taken / 1e6}
 
 
 def size_of(address: str) -> int:
     """Bytes of a database."""
     if address.startswith("sqlite"):
         return Path(address.removeprefix("sqlite:///")).stat().st_size
-    engine = sa.create_engine(address)
-    with engine.connect() as connection:
-        size: int = connection.execute(sa.select(sa.func.pg_database_size(sa.func.current_database()))).scalar_one()
-    engine.dispose()
-    return size
+    with sa.create_engine(address, poolclass=sa.NullPool).connect() as connection:
+        return connection.execute(sa.select(sa.func.pg_database_size(sa.func.current_database()))).scalar_one()
 
 
-def side_by_side(addresses: list[str], runs: list[bytes], counts: tuple[int, int], states: int) -> list[Found]:
-    """What a service on each database costs, asked in turn."""
-    backups = [backed_up(address) for address in addresses]
+def side_by_side(
+    addresses: list[str], runs: list[bytes], counts: tuple[int, int], states: int
+) -> list[dict[str, float]]:
+    """What a service on each database costs, asked in turn, by what is asked: medians in ms, and MB."""
+    found = [backup_speed(address) for address in addresses]
     few, many = (serving(address) for address in addresses)
     times: list[Times] = [defaultdict(list) for _ in addresses]
     with few as first, many as second, chromium() as browser:
@@ -137,10 +123,14 @@ def side_by_side(addresses: list[str], runs: list[bytes], counts: tuple[int, int
             for server, taken in zip(servers, times, strict=True):
                 taken["the fleet page's first screen"].append(first_screen(browser, server.url))
         return [
-            Found(
-                size=size_of(address), backup=backup, alone=held_alone(server.pid), memory=held(server.pid), times=taken
-            )
-            for address, backup, server, taken in zip(addresses, backups, servers, times, strict=True)
+            {f"{title}, ms": statistics.median(each) for title, each in taken.items()}
+            | backup
+            | {
+                "memory of the service alone, MB": held_alone(server.pid) / 1e6,
+                "memory of the service and its workers, MB": held(server.pid) / 1e6,
+                "the database, MB": size_of(address) / 1e6,
+            }
+            for address, backup, server, taken in zip(addresses, found, servers, times, strict=True)
         ]
 
 
@@ -164,19 +154,12 @@ def main(clutches: int, states: int, server: str) -> None:
             multiply(address, count)
         sizes = kilobytes(addresses[0])
         few, many = side_by_side(addresses, runs, (FEW, clutches), states)
-    print(f"\n| clutches of {states} stationary tests, {server} | {FEW} | {clutches} | ratio |\n|---|---|---|---|")
-    for title in few.times:
-        beside, here = statistics.median(few.times[title]), statistics.median(many.times[title])
-        print(f"| {title}, ms | {beside:.2f} | {here:.2f} | {here / beside:.2f} |")
-    for title, numbers in (
-        ("backup, MB/s", (few.backup, many.backup)),
-        ("memory of the service alone, MB", (few.alone, many.alone)),
-        ("memory of the service and its workers, MB", (few.memory, many.memory)),
-        ("the database, MB", (few.size, many.size)),
-    ):
-        if None not in numbers:
-            beside, here = (float(number or 0) / 1e6 for number in numbers)
-            print(f"| {title} | {beside:.0f} | {here:.0f} | {here / beside:.2f} |")
+    rows = []
+    for title, beside in few.items():
+        here, digits = many[title], 2 if title.endswith(", ms") else 0
+        rows.append((title, f"{beside:.{digits}f}", f"{here:.{digits}f}", f"{here / beside:.2f}"))
+    head = (f"clutches of {states} stationary tests, {server}", FEW, clutches, "ratio")
+    print("", *table(head, rows), sep="\n")
     filters = sizes.pop("filters") / FEW
     each = ", ".join(f"{title} {size:.1f} kB" for title, size in sizes.items())
     print(f"\nA run takes {each}, a clutch's filters {filters:.0f} kB.")

@@ -6,6 +6,7 @@ import numpy as np
 
 from models.prognosis.fleet import Taught, population, taught
 from models.tracking.measurement import Measurement
+from tests.measuring import table
 
 SEED, DIFFERENT = 4100, 40
 
@@ -25,15 +26,15 @@ def lesson(number: int) -> Taught:
 def main() -> None:
     """Seconds of the processor by clutches; the same lessons are repeated beyond 40, which takes as long."""
     lessons = [lesson(number) for number in range(DIFFERENT)]
-    print(
-        "\n| clutches of a kind | the prior of all, s | without each, or each of 20 groups, s (computed) |\n|---|---|---|"
-    )
+    rows = []
     for count in (10, 100, 1_000):
         fleet = (lessons * (count // DIFFERENT + 1))[:count]
         start = time.process_time()
         population(fleet)
         taken = time.process_time() - start
-        print(f"| {count} | {taken:.2f} | {taken * min(count, 20):.1f} |")
+        rows.append((count, f"{taken:.2f}", f"{taken * min(count, 20):.1f}"))
+    titles = ("clutches of a kind", "the prior of all, s", "without each, or each of 20 groups, s (computed)")
+    print("\n".join(table(titles, rows)))
 
 
 if __name__ == "__main__":

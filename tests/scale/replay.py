@@ -24,6 +24,7 @@ from storage.engine.database import Database
 from storage.engine.opening import open_database
 from storage.tables import clutch, corrected_cof, filter_state, fit, prediction, run
 from storage.transfer import digest
+from tests.measuring import table
 from tests.scale.copies import bodies, life, multiply
 from tests.service.work.clusters import local_cluster
 
@@ -111,10 +112,9 @@ def main(clutches: int, states: int, workers: int) -> None:
         core = time.process_time() - before
         found = {"local": local, f"processes:{workers}": replayed(path, f"processes:{workers}")}
         found[f"Dask, {workers} workers and one that is killed"] = on_cluster(path, clutches, workers)
-    print(f"\n| {clutches} clutches of {states} tests | s | clutches/s | times local |\n|---|---|---|---|")
-    for title, one in found.items():
-        speed = local.seconds / one.seconds
-        print(f"| `{title}` | {one.seconds:.1f} | {clutches / one.seconds:.1f} | {speed:.2f} |")
+    times = {title: one.seconds for title, one in found.items()}
+    rows = ((f"`{t}`", f"{s:.1f}", f"{clutches / s:.1f}", f"{local.seconds / s:.2f}") for t, s in times.items())
+    print("\n".join(table((f"{clutches} clutches of {states} tests", "s", "clutches/s", "times local"), rows)))
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     steps = ", ".join(f"{step} {milliseconds:.1f} ms" for step, milliseconds in each.items())
     print(f"\nA clutch takes of a core: {steps}: {clutches / core:.1f} clutches/s/core in all, `local`.")

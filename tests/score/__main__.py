@@ -6,12 +6,11 @@ ARGS=--write puts the tables into docs/appendix/prognosis.md
 """
 
 import os
-import sys
 import time
 from collections.abc import Callable
 from functools import partial
 
-from tests.measuring import APPENDIX, Asked, each, fill, where
+from tests.measuring import Asked, each, publish, where
 from tests.score import belief, filters, fleets, off_prior, paper
 
 
@@ -41,10 +40,9 @@ def main() -> None:
     }
     names = (os.environ.get("PARTS") or "").split() or list(parts)
     for name, (table, seconds) in zip(names, each(timed, (parts[name] for name in names), where(0)), strict=True):
-        print(f"\n### {name} ({seconds:.0f} s)\n\n{table}", flush=True)
-        if "--write" in sys.argv:
-            command = f"`make score PARTS={name} SIZE={size:g} SEED={seed}`"
-            fill(APPENDIX / "prognosis.md", {f"score {name}": f"{command}: {table}"})
+        print(f"\n### {name} ({seconds:.0f} s)\n")
+        command = f"`make score PARTS={name} SIZE={size:g} SEED={seed}`"
+        publish("prognosis.md", f"score {name}", [f"{command}: {table}"])
 
 
 def timed(part: Callable[[], str]) -> tuple[str, float]:

@@ -2,16 +2,14 @@
 
 import numpy as np
 
-from models.prognosis.first_passage import weighted_quantiles
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
-from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.models.tracking.tracked_series import sent
 from tests.score.off_prior import rig_lives
 from tests.score.table import EVERY, Scores, joined, percents, written
-from tests.statistical.lives import PRIOR, STAGES, at_stages, ends, exact, lives, upto
+from tests.statistical.lives import PRIOR, STAGES, at_stages, exact, lives, upto
 
 RUNS, DRAWS = 25, 1_000
 FILTERS = (Grid(), Particle(), Ukf())
@@ -96,37 +94,28 @@ def beside_exact(count: int, seed: int) -> str:
 def after_end(count: int, seed: int) -> str:
     """Of the simulated rig's lives: intervals that hold the end, begin after it and end before it, and how far off their
     medians."""
-    told: dict[str, list[list[tuple[float, ...]]]] = {}
+    scores = Scores()
     for index, (course, end) in enumerate(rig_lives(count, seed)):
         rng = np.random.default_rng([seed, index])
         shares = np.linspace(0.0, PAST[-1], TESTS)
         cofs = 0.1 * np.array([course(share) for share in shares.tolist()])
         values = cofs * (1.0 + GAIN * rng.standard_normal(TESTS)) + 0.1 * NOISE * rng.standard_normal(TESTS)
         tests = sent(shares * end, values, (0.1 * NOISE) ** 2)
-        for tracker in (Grid(), Particle(), Ukf()):
-            told.setdefault(tracker.name, []).append(_past(tracker, tests, end, rng))
+        for tracker in FILTERS:
+            state, seen = tracker.start(weak(tests[0], falling=True)), 0
+            for stage in PAST:
+                runs = sum(test.progress <= (stage + 1e-6) * end for test in tests)
+                for test in tests[seen:runs]:
+                    state = tracker.update(state, test, rng)
+                seen = runs
+                scores.add(tracker.name, stage, tracker.posterior(state, DRAWS, rng), end)
     rows = []
-    for name, each in told.items():
-        *shares_of, off = np.array(each).mean(axis=0).T
-        bias = joined("{:+.2f}", (100 * off).tolist())
-        rows.append((f"`{name}`", *(f"{percents(which.tolist())} %" for which in shares_of), bias))
+    for name in (tracker.name for tracker in FILTERS):
+        shares_of = (scores.means(name, what, PAST) for what in ("held", "late", "early"))
+        off = joined("{:+.2f}", (100 * (median - 1.0) for median in scores.means(name, "median", PAST)))
+        rows.append((f"`{name}`", *(f"{percents(which)} %" for which in shares_of), off))
     return written(
         f"{count} lives, seed {seed}, {TESTS} tests, scatter {GAIN:.1%} of the value",
         "filter | holds the end at 90/100/120/140 % of life | begins after it | ends before it | median off, % of life",
         rows,
     )
-
-
-def _past(
-    tracker: Grid | Particle | Ukf, tests: list[Measurement], end: float, rng: np.random.Generator
-) -> list[tuple[float, ...]]:
-    state, told, seen = tracker.start(weak(tests[0], falling=True)), [], 0
-    for stage in PAST:
-        runs = sum(test.progress <= (stage + 1e-6) * end for test in tests)
-        for test in tests[seen:runs]:
-            state = tracker.update(state, test, rng)
-        seen = runs
-        posterior = tracker.posterior(state, 1_000, rng)
-        low, middle, high = weighted_quantiles(ends(posterior), posterior.weight, (0.05, 0.5, 0.95)).tolist()
-        told.append((low <= end <= high, low > end, high < end, (middle - end) / end))
-    return told

@@ -8,13 +8,11 @@ import numpy as np
 from models.arrays import FloatArray
 from models.degradation.general_order import Degradation, first_passage
 from models.prognosis import fleet as of_fleets
-from models.prognosis.criteria import HORIZON
-from models.prognosis.stated_end import stated_end
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.models.tracking.tracked_series import sent
-from tests.score.table import EVERY, Scores, joined, percents, score, written
+from tests.score.table import EVERY, Scores, joined, percents, score_of_stated, written
 from tests.statistical.lives import STAGES, Life, taught, upto
 
 GRID = Grid()
@@ -60,10 +58,9 @@ def fleets(count: int, seed: int) -> str:
                 seen = upto(measurements, stage)
                 plain, informed = (GRID.posterior(GRID.from_history(p, seen), 1_000, rng) for p in (ours, theirs))
                 scores.add("weak", stage, plain, life.end)
-                together, now = learned.together(plain, informed, measurements[0]), seen[-1].progress
+                together = learned.together(plain, informed, measurements[0])
                 scores.add("fleet", stage, together, life.end)
-                stated = stated_end(together, fraction=0.5, as_of=now, horizon=HORIZON, ended=ended, tests=seen)
-                scores.add_sample("ended", stage, np.minimum(stated.ends, HORIZON), stated.weight, life.end)
+                scores.kept["ended", stage].append(score_of_stated(together, seen, ended, life.end))
         rows += [
             (
                 name,
@@ -148,13 +145,7 @@ def _fleet(name: str, longer: float, seed: list[int]) -> list[list[list[tuple[fl
         for stage in STAGES:
             seen = upto(tests, stage)
             drawn = GRID.posterior(GRID.from_history(weak(seen[0], falling=True), seen), 500, rng)
-            outcomes = []
-            for count in COUNTS:
-                stated = stated_end(
-                    drawn, fraction=0.5, as_of=seen[-1].progress, horizon=HORIZON, ended=others[:count], tests=seen
-                )
-                scored = score(np.minimum(stated.ends, HORIZON), stated.weight, end)
-                outcomes.append((scored.crps, scored.held))
-            stages.append(outcomes)
+            scored = [score_of_stated(drawn, seen, others[:count], end) for count in COUNTS]
+            stages.append([(one.crps, one.held) for one in scored])
         lives.append(stages)
     return lives

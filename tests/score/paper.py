@@ -24,7 +24,7 @@ from service.lives.quantities.measured import QUANTITIES, SLOPE_SPEEDS, Measured
 from service.lives.run_analysis import levels_of, mean_cofs
 from service.lives.severity_estimate import severity_estimate
 from service.schemas.life import CriterionIn
-from tests.score.table import percents, written
+from tests.score.table import Scores, percents, written
 from tests.service.lives import test_assumptions as of_severity
 
 #: The pressure level that is scored [bar], and its place among the protocol's.
@@ -102,7 +102,7 @@ def slopes(count: int, seed: int) -> str:
 
 def shudder(count: int, seed: int) -> str:
     """How often the 90 % interval of the cycles until friction falls with speed holds the truth, by stage of that life."""
-    told: dict[float, list[tuple[float, ...]]] = {stage: [] for stage in STAGES}
+    scores, of_slope = Scores(), {stage: list[float]() for stage in STAGES}
     criterion = CriterionIn(quantity="slope", pressure_bar=LEVEL, speed_rpm=SHUDDER_RPM)
     for index, (clutch, end) in enumerate(_shuddering(count, seed)):
         rng = np.random.default_rng([seed, index])
@@ -111,20 +111,16 @@ def shudder(count: int, seed: int) -> str:
         for stage in STAGES:
             measured = until(whole, stage * end)
             found = criterion_end(measured, criterion, "grid")
-            capped = np.minimum(found.ends[0], 1e7)
-            low, middle, high = weighted_quantiles(capped, found.ends[1], (0.05, 0.5, 0.95)).tolist()
+            scores.add_sample("", stage, np.minimum(found.ends[0], 1e7), found.ends[1], end)
             truth = _slope(clutch, _PRESSURE, SHUDDER_RPM, measured.life.events[-1].cycles)
-            off = (found.current[0] - truth) / found.current[1]
-            ended = (low <= end <= high, low > end, high < end)
-            told[stage].append((*ended, abs(off) <= Z90, off, middle / end, (high - low) / end))
+            of_slope[stage].append((found.current[0] - truth) / found.current[1])
     rows = []
-    for stage, each in told.items():
-        columns = np.array(each).T
-        held, late, early, now = 100 * columns[:4].mean(axis=1)
-        ratio, width = np.median(columns[5:], axis=1)
-        ends = (f"{held:.1f} %", f"{late:.1f} %", f"{early:.1f} %", f"{ratio:.2f}", f"{width:.2f}")
-        errors = f"{columns[4].mean():+.2f}, {np.sqrt(np.mean(columns[4] ** 2)):.2f}"
-        rows.append((f"{stage:.0%}", *ends, f"{now:.1f} %", errors))
+    for stage, each in of_slope.items():
+        off = np.array(each)
+        shares = (f"{100 * scores.column('', stage, what).mean():.1f} %" for what in ("held", "late", "early"))
+        middles = (f"{np.median(scores.column('', stage, what)):.2f}" for what in ("median", "width"))
+        errors = f"{off.mean():+.2f}, {np.sqrt(np.mean(off**2)):.2f}"
+        rows.append((f"{stage:.0%}", *shares, *middles, f"{100 * np.mean(np.abs(off) <= Z90):.1f} %", errors))
     return written(
         f"{count} lives, seed {seed}: dμ/dv < 0 at {SHUDDER_RPM:g} rpm and {LEVEL:g} bar, a test every 7 % of that life",
         "stage of life | held | begins after the end | ends before it | median over truth | width over life "

@@ -7,8 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from models.prognosis.criteria import HORIZON
+from models.prognosis.ended_lives import EndedLife
 from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.scoring import pit_histogram
+from models.prognosis.stated_end import stated_end
+from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from tests.measuring import table
 from tests.models.prognosis.sample_scores import crps_of_sample, pit_of_sample
@@ -20,27 +24,38 @@ EVERY = (STAGES, *((stage,) for stage in STAGES))
 
 @dataclass(frozen=True)
 class Score:
-    """One prediction: CRPS as a share of the life and of the logarithm of the end, the width of the 90 % interval as a
-    share of the life, whether it held, whether it began after the truth, and the truth's place in it."""
+    """One prediction: CRPS as a share of the life and of the logarithm of the end, median and width of the 90 % interval as
+    shares of the life, whether it held, began after the truth or ended before it, and the truth's place in it."""
 
     crps: float
     log_crps: float
+    median: float
     width: float
     held: bool
     late: bool
+    early: bool
     pit: float
 
 
 def score(sample: np.ndarray, weight: np.ndarray, end: float) -> Score:
-    low, high = weighted_quantiles(sample, weight, (0.05, 0.95)).tolist()
+    low, median, high = weighted_quantiles(sample, weight, (0.05, 0.5, 0.95)).tolist()
     return Score(
         crps=crps_of_sample(sample, weight, end) / end,
         log_crps=crps_of_sample(np.log(np.maximum(sample, 1.0)), weight, math.log(end)),
+        median=median / end,
         width=(high - low) / end,
         held=low <= end <= high,
         late=low > end,
+        early=high < end,
         pit=pit_of_sample(sample, weight, end),
     )
+
+
+def score_of_stated(drawn: Posterior, seen: Sequence[Measurement], ended: Sequence[EndedLife], end: float) -> Score:
+    """The score of what is stated after the tests seen, with ended lives of the kind."""
+    now = seen[-1].progress
+    stated = stated_end(drawn, fraction=0.5, as_of=now, horizon=HORIZON, ended=ended, tests=seen)
+    return score(np.minimum(stated.ends, HORIZON), stated.weight, end)
 
 
 @dataclass
@@ -58,8 +73,8 @@ class Scores:
     def column(self, name: Hashable, stage: float, what: str) -> np.ndarray:
         return np.array([getattr(each, what) for each in self.kept[name, stage]], dtype=float)
 
-    def means(self, name: Hashable, what: str) -> list[float]:
-        return [float(self.column(name, stage, what).mean()) for stage in STAGES]
+    def means(self, name: Hashable, what: str, stages: Sequence[float] = STAGES) -> list[float]:
+        return [float(self.column(name, stage, what).mean()) for stage in stages]
 
     def medians(self, name: Hashable, what: str) -> list[float]:
         return [float(np.median(self.column(name, stage, what))) for stage in STAGES]

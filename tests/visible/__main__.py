@@ -7,9 +7,7 @@ import itertools
 import os
 import sys
 from collections import Counter
-from dataclasses import asdict
 from functools import partial
-from typing import Any
 
 from tests.measuring import Asked, Lines, number, shared, table
 from tests.visible.trial import SLUGS, Shown, shown
@@ -28,7 +26,7 @@ def main() -> None:
     store = Lines(os.environ.get("STORE") or f"visible-{seed}.jsonl")
     results, left_out = list[Shown](), list[str]()
     for k, slug in enumerate(itertools.islice(itertools.cycle(SLUGS), 10 * count)):
-        found = store.get(f"{k} {slug}", partial(_noted, (seed, 7, k), slug))
+        found = store.get(f"{k} {slug}", partial(shown, (seed, 7, k), slug))
         print(slug, found, file=sys.stderr, flush=True)
         if isinstance(found, str):
             left_out.append(slug)
@@ -38,11 +36,6 @@ def main() -> None:
             break
     print(f"`make visible SEED={seed} COUNT={count}`\n")
     print("\n".join(report(results, left_out)))
-
-
-def _noted(seed: tuple[int, ...], slug: str) -> dict[str, Any] | str:
-    found = shown(seed, slug)
-    return found if isinstance(found, str) else asdict(found)
 
 
 if __name__ == "__main__":

@@ -26,13 +26,12 @@ from tests.blind.rig.sensor import measure
 from tests.blind.rig.sent import campaign
 from tests.blind.rig.steady import DWELL
 from tests.blind.rig.world import Effect, read
+from tests.blind.rows import LOOPS, RECORDS
 
 #: How often the amplitude that a report states is hidden.
 TIMES = 2.0
 #: Vibrations have no visible amplitude: raw records are searched for them.
-SLUGS = tuple(slug for slug in CATALOGUED if slug not in {"shaft_ripple", "stick_slip"})
-#: Effects that only loops show.
-LOOPS = {"channel_delay", "inertia_torque", "squeeze_film"}
+SLUGS = tuple(slug for slug in CATALOGUED if slug not in RECORDS)
 _MIDDLE, _AREA = 0.5 * 1970 * RPM * 0.058, 2 * np.pi / 4 * (0.133**2 - 0.099**2)
 _PER_UNIT = {"oil_change": 100.0, "running_in": 100.0, "rest_recovery": 100.0, "channel_delay": 1000.0}
 
@@ -52,9 +51,7 @@ def shown(seed: tuple[int, ...], slug: str) -> Shown | str:
     """Hide an effect at twice its stated amplitude in a campaign of this seed; why not, where that cannot be done."""
     rng = np.random.default_rng([*seed, 5])
     wanted = {"states": int(rng.integers(6, 13)), "loops": slug in LOOPS or bool(rng.random() < 0.5)}
-    own = CATALOGUED[slug][1]
-    needs = {name: getattr(own, name) for name in ("oil", "moments", "energy", "pauses", "early", "event")}
-    blank = hide(seed, (), **{name: value for name, value in needs.items() if value}, **wanted)
+    blank = hide(seed, (), **CATALOGUED[slug][1], **wanted)
     stated = next((each for each in visible_of(_posterior(campaign(blank))) if each.effect == slug), None)
     if stated is None or not np.isfinite(stated.amplitude):
         return "no amplitude is visible in whatever form"

@@ -39,12 +39,10 @@ class Law:
 
     def at(self, bar: FloatArray) -> "Law":
         """The same clutch in the same state under another pressure [bar]."""
-        assert self.elsewhere is not None
         return self.elsewhere(bar, None)
 
     def later(self, cycles: FloatArray) -> "Law":
         """The same clutch under the same pressure after other cycles."""
-        assert self.elsewhere is not None
         return self.elsewhere(None, cycles)
 
     def torque(self, v: FloatArray, *, film: FloatArray | None = None, gamma: FloatArray | float = GAMMA) -> FloatArray:

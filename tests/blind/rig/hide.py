@@ -1,14 +1,13 @@
 """A campaign with something hidden in it, drawn from a seed: plan, clutch, sensor, effects at a loudness, readings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import count
+from dataclasses import dataclass
 
 import numpy as np
 
 from models.arrays import FloatArray
 from tests.blind.rig.clutch import Clutch, draw_clutch
-from tests.blind.rig.loudness import Ear, UnreachableError, listen
+from tests.blind.rig.loudness import UnreachableError, listen
 from tests.blind.rig.makers import ALL
 from tests.blind.rig.plan import Plan, Wish, draw_plan
 from tests.blind.rig.sensor import Sensor, draw_sensor, measure
@@ -34,36 +33,26 @@ class Hidden:
         return frozenset(effect.slug for effect, _ in self.effects)
 
 
-def combined(slugs: Sequence[str], **wanted: object) -> Wish:
-    """One protocol that grants what every effect needs, and what is wanted besides."""
-    wish = Wish()
-    for slug in slugs:
-        own = ALL[slug][1]
-        changed = {name: getattr(own, name) for name in Wish.__dataclass_fields__}
-        standard = {name: getattr(Wish(), name) for name in changed}
-        wish = replace(wish, **{n: x for n, x in changed.items() if x != standard[n]})
-    return replace(wish, **wanted)
-
-
 def hide(seed: Sequence[int], slugs: Sequence[str] = (), lam: float = 0.0, **wanted: object) -> Hidden:
-    """Hide effects by slug, each at loudness `lam` [nats] by itself; `wanted` overrides the wish. Same seed, same data.
+    """Hide effects by slug, each at loudness `lam` [nats] by itself; `wanted` overrides what they need of the protocol. Same
+    seed, same data.
 
     Campaigns in which an effect cannot be as loud as that are drawn anew; raises UnreachableError after `DRAWS`.
     """
-    wish = combined(slugs, **wanted)
-    for attempt in count():
+    needed = {name: value for slug in slugs for name, value in ALL[slug][1].items()}
+    wish = Wish(**(needed | wanted))
+    for attempt in range(DRAWS):
         rng = np.random.default_rng([*seed, attempt])
         plan = draw_plan(rng, wish)
         clutch = draw_clutch(rng, plan.pressures, plan.life.span)
         sensor = draw_sensor(rng, wish.noise)
         made = [ALL[slug][0](rng, plan) for slug in slugs]
         try:
-            ear: Ear | None = listen(plan, clutch, sensor) if slugs else None
-            effects = tuple((one, ear.amplitude_for(one, lam)) for one in made) if ear else ()
-        except UnreachableError:
-            if attempt + 1 == DRAWS:
-                raise
-            continue
-        truth = read(plan, clutch, effects)
-        return Hidden(tuple(seed), plan, clutch, sensor, effects, measure(rng, plan, sensor, truth))
-    raise AssertionError("count() does not end")
+            ear = listen(plan, clutch, sensor) if slugs else None
+            effects = tuple((one, ear.amplitude_for(one, lam)) for one in made)
+        except UnreachableError as error:
+            failure = error
+        else:
+            truth = read(plan, clutch, effects)
+            return Hidden(tuple(seed), plan, clutch, sensor, effects, measure(rng, plan, sensor, truth))
+    raise failure

@@ -83,8 +83,6 @@ class Ear:
             if y is None:
                 return None
             last = self.refit.to(y, last)
-        assert y is not None
-        assert last is not None
         return self.refit.lower(y, last)
 
     def linear(self, effect: Effect, amplitude: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from models.arrays import FloatArray
 from tests.blind.rig.clutch import Law
 from tests.blind.rig.plan import Plan, Site
-from tests.blind.rig.world import Effect
+from tests.blind.rig.world import TESTS, Effect
 
 
 def speed_bump(rng: np.random.Generator, _: Plan) -> Effect:
@@ -26,12 +26,10 @@ def clock_wobble(rng: np.random.Generator, _: Plan) -> Effect:
     """A servo hunts: torque swings with a period of the test's clock that no temperature has."""
     period, phase = rng.uniform(35, 200), rng.uniform(0, 2 * np.pi, 500)
 
-    def reading(a: float, site: Site, torque: FloatArray) -> FloatArray:
-        if site.kind == "loop":
-            return np.zeros_like(torque)
+    def reading(a: float, site: Site, _: FloatArray) -> FloatArray:
         return a * np.sin(2 * np.pi * site.clock / period + phase[site.state][:, None])
 
-    return Effect("clock_wobble", 0.1, 10.0, reading=reading, axes=frozenset({"test_clock_s"}))
+    return Effect("clock_wobble", 0.1, 10.0, reading=reading, at=TESTS, axes=frozenset({"test_clock_s"}))
 
 
 def bent_sensor(rng: np.random.Generator, _: Plan) -> Effect:
@@ -49,14 +47,12 @@ def pressure_way(rng: np.random.Generator, _: Plan) -> Effect:
     sign = rng.choice([-1.0, 1.0])
 
     def friction(a: float, site: Site, law: Law) -> FloatArray:
-        if site.kind == "loop":
-            return np.zeros_like(site.bar)
         top = int(np.argmax(site.bar[0]))
         way = np.where(np.arange(site.bar.shape[1]) <= top, -1.0, 1.0)
         off = sign * a * way * np.sqrt(np.clip((7.1 - site.bar) / 3.0, 0, 1))
         return law.at(site.bar + off).torque(site.v) - law.torque(site.v)
 
-    return Effect("pressure_way", 0.02, 1.5, friction, axes=frozenset({"test_clock_s", "pressure_bar"}))
+    return Effect("pressure_way", 0.02, 1.5, friction, at=TESTS, axes=frozenset({"test_clock_s", "pressure_bar"}))
 
 
 def seasons(rng: np.random.Generator, plan: Plan) -> Effect:
@@ -100,10 +96,8 @@ def braking(rng: np.random.Generator, _: Plan) -> Effect:
     """While slowing down, and only in a band of speed, the rig's brake drags along."""
     at, wide, sign = rng.uniform(500, 1500), rng.uniform(100, 250), rng.choice([-1.0, 1.0])
 
-    def reading(a: float, site: Site, torque: FloatArray) -> FloatArray:
-        if site.kind != "loop":
-            return np.zeros_like(torque)
+    def reading(a: float, site: Site, _: FloatArray) -> FloatArray:
         slowing = np.gradient(site.rpm, axis=1) < 0
         return sign * a * slowing * np.exp(-(((site.rpm - at) / wide) ** 4))
 
-    return Effect("braking", 0.05, 10.0, reading=reading, axes=frozenset({"loop_phase"}))
+    return Effect("braking", 0.05, 10.0, reading=reading, at=("loop",), axes=frozenset({"loop_phase"}))

@@ -91,67 +91,60 @@ def _listed(values: FloatArray, digits: int) -> list[float]:
 
 def campaign(hidden: Hidden) -> Campaign:
     """The same runs in SI units, raw stationary records cut into plateaus as the service cuts them."""
-    sent = runs(hidden)
-    stationary = [_stationary(run) for run in sent if run["kind"] == "stationary_stribeck"]
-    dynamic = [
-        DynamicRun(run_id=run["run_id"], cycles=run["cycles"], record=_record(run), moment=_moment(run))
-        for run in sent
-        if run["kind"] == "dynamic_stribeck"
-    ]
-    duty = [
-        DutyRun(
-            cycles=run["cycles"],
-            engagements=run["duty"]["cycles"],
-            energy=1e3 * run["duty"]["energy_per_cycle_kj"] if "energy_per_cycle_kj" in run["duty"] else None,
-            moment=_moment(run),
-        )
-        for run in sent
-        if run["kind"] == "duty_cycles"
-    ]
-    maintenance = [
-        MaintenanceEvent(cycles=run["cycles"], event=EventKind(run["event"]), moment=_moment(run))
-        for run in sent
-        if run["kind"] == "maintenance"
-    ]
+    stationary, dynamic, duty, maintenance = [], [], [], []
+    for run in runs(hidden):
+        cycles, begun = run["cycles"], run.get("started_at")
+        moment = None if begun is None else datetime.fromisoformat(begun).timestamp()
+        match run["kind"]:
+            case "stationary_stribeck":
+                stationary.append(_stationary(run, moment))
+            case "dynamic_stribeck":
+                record = Record(**in_si(run["channels"]))
+                dynamic.append(DynamicRun(run_id=run["run_id"], cycles=cycles, record=record, moment=moment))
+            case "duty_cycles":
+                told = run["duty"].get("energy_per_cycle_kj")
+                energy = None if told is None else 1e3 * told
+                duty.append(DutyRun(cycles=cycles, engagements=run["duty"]["cycles"], energy=energy, moment=moment))
+            case "maintenance":
+                maintenance.append(MaintenanceEvent(cycles=cycles, event=EventKind(run["event"]), moment=moment))
     return Campaign(
         stationary=tuple(stationary), dynamic=tuple(dynamic), duty=tuple(duty), maintenance=tuple(maintenance)
     )
 
 
-def _moment(run: dict[str, Any]) -> float | None:
-    return datetime.fromisoformat(run["started_at"]).timestamp() if "started_at" in run else None
-
-
-def _columns(run: dict[str, Any]) -> dict[str, FloatArray]:
-    channels = {name: np.array(values) for name, values in run["channels"].items()}
-    columns = {
-        "pressure": channels["pressure_bar"] * 1e5,
-        "speed": channels["speed_rpm"] * RPM,
-        "torque": channels["torque_nm"],
-    }
-    if "oil_temperature_c" in channels:
-        columns["oil_temperature"] = channels["oil_temperature_c"] + KELVIN
-    if "torque_sd_nm" in channels:
-        columns["torque_sd"] = channels["torque_sd_nm"]
-    return columns
-
-
-def _record(run: dict[str, Any]) -> Record:
-    return Record(time=np.array(run["channels"]["time_s"]), **_columns(run))
-
-
-def _stationary(run: dict[str, Any]) -> StationaryRun:
-    if "time_s" not in run["channels"]:
-        plateaus = Plateaus(**_columns(run))
-        return StationaryRun(run_id=run["run_id"], cycles=run["cycles"], plateaus=plateaus, moment=_moment(run))
-    record = _record(run)
+def _stationary(run: dict[str, Any], moment: float | None) -> StationaryRun:
+    columns = in_si(run["channels"])
+    if "time" not in columns:
+        plateaus = Plateaus(**columns)
+        return StationaryRun(run_id=run["run_id"], cycles=run["cycles"], plateaus=plateaus, moment=moment)
+    record = Record(**columns)
     cut = cut_plateaus(record)
     middle = tuple(float(t) for t in 0.5 * (cut.start + cut.stop))
     return StationaryRun(
         run_id=run["run_id"],
         cycles=run["cycles"],
         plateaus=cut.plateaus,
-        moment=_moment(run),
+        moment=moment,
         time=middle,
         record=record,
     )
+
+
+#: A channel's name in SI units, its factor and what is added.
+_SI = {
+    "time_s": ("time", 1.0, 0.0),
+    "pressure_bar": ("pressure", 1e5, 0.0),
+    "speed_rpm": ("speed", RPM, 0.0),
+    "torque_nm": ("torque", 1.0, 0.0),
+    "oil_temperature_c": ("oil_temperature", 1.0, KELVIN),
+    "torque_sd_nm": ("torque_sd", 1.0, 0.0),
+}
+
+
+def in_si(channels: dict[str, list[float]]) -> dict[str, FloatArray]:
+    """A run's channels in SI units."""
+    return {
+        name: np.array(channels[channel], dtype=np.float64) * factor + added
+        for channel, (name, factor, added) in _SI.items()
+        if channel in channels
+    }

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from models.arrays import FloatArray
 from tests.blind.rig.clutch import Law
 from tests.blind.rig.plan import DWELL, Plan, Site
-from tests.blind.rig.world import Effect
+from tests.blind.rig.world import TESTS, Effect
 
 
 def lagged(x: FloatArray, step: float, time: float) -> FloatArray:
@@ -123,15 +123,13 @@ def unsettled_dwell(rng: np.random.Generator, _: Plan) -> Effect:
         return a * (share * lagged(torque, step, fast) + (1 - share) * lagged(torque, step, slow) - torque)
 
     def reading(a: float, site: Site, torque: FloatArray) -> FloatArray:
-        if site.kind == "loop":
-            return np.zeros_like(torque)
         if site.kind == "raw":
             return left(torque, site.step, a)
         fine = np.repeat(torque, 20, axis=1)
         change = left(fine, DWELL / 20, a).reshape(*torque.shape, 20)
         return change[..., 8:].mean(axis=-1)
 
-    return Effect("unsettled_dwell", 0.3, 6.0, reading=reading)
+    return Effect("unsettled_dwell", 0.3, 6.0, reading=reading, at=TESTS)
 
 
 def rest_recovery(rng: np.random.Generator, plan: Plan) -> Effect:

@@ -12,13 +12,16 @@ from tests.blind.rig.plan import Plan, Site
 Friction = Callable[[float, Site, Law], FloatArray]
 Reading = Callable[[float, Site, FloatArray], FloatArray]
 Drag = Callable[[FloatArray], FloatArray]
+#: Kinds of sites that are stationary tests: averaged on the rig, or recorded.
+TESTS = ("stationary", "raw")
 
 
 @dataclass(frozen=True)
 class Effect:
     """Something hidden, its shape already drawn: torque that it adds to friction (which then lags) or to the reading.
 
-    `unit` is an amplitude of ordinary size, `most` the largest that makes sense; `axes` where its structure lives.
+    `unit` is an amplitude of ordinary size, `most` the largest that makes sense; `at` are the kinds of sites where it acts,
+    `axes` where its structure lives.
     """
 
     slug: str
@@ -26,6 +29,7 @@ class Effect:
     most: float
     friction: Friction | None = None
     reading: Reading | None = None
+    at: tuple[str, ...] = (*TESTS, "loop")
     axes: frozenset[str] = frozenset()
     fast: bool = False  # swings from sample to sample, so that no mean over samples shows it
     moves_life: bool = False
@@ -54,7 +58,7 @@ def _rubbed(site: Site, clutch: Clutch, effects: Sequence[tuple[Effect, float]])
     law = clutch.law(site.bar, site.cycles)
     torque = law.torque(site.v)
     for effect, amplitude in effects:
-        if effect.friction is not None:
+        if effect.friction is not None and site.kind in effect.at:
             torque = torque + effect.friction(amplitude, site, law)
     if site.kind == "stationary":
         return torque
@@ -75,7 +79,7 @@ def read(
         if site.bar.any():
             torque = _rubbed(site, clutch, effects)
         for effect, amplitude in effects:
-            if effect.reading is not None:
+            if effect.reading is not None and site.kind in effect.at:
                 torque = torque + effect.reading(amplitude, site, torque)
         readings.append(torque)
     return readings

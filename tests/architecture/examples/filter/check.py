@@ -2,21 +2,16 @@
 
 import tempfile
 
-from fastapi.testclient import TestClient
-
-from service.app import create_app
-from service.settings import Settings
+from tests.service.clients import client_on
 from tests.support import stationary
 
-with tempfile.TemporaryDirectory() as folder:
-    app = create_app(Settings(workers=0, database=f"sqlite:///{folder}/a.db"))
-    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as http:
-        http.post("/v1/clutches", json={"clutch_id": "c1"}).raise_for_status()
-        for number in range(9):
-            body = stationary(1000.0 * number, pressures=(4.0, 5.0, 6.0))
-            http.post("/v1/clutches/c1/runs", json=body).raise_for_status()
-        median = {}
-        for method in ("grid", "importance"):
-            answer = http.get("/v1/clutches/c1/remaining-useful-life", params={"method": method})
-            median[method] = answer.raise_for_status().json()["end_of_life_cycles"]["0.5"]
+with tempfile.TemporaryDirectory() as folder, client_on(f"sqlite:///{folder}/a.db") as http:
+    http.post("/v1/clutches", json={"clutch_id": "c1"}).raise_for_status()
+    for number in range(9):
+        body = stationary(1000.0 * number, pressures=(4.0, 5.0, 6.0))
+        http.post("/v1/clutches/c1/runs", json=body).raise_for_status()
+    median = {}
+    for method in ("grid", "importance"):
+        answer = http.get("/v1/clutches/c1/remaining-useful-life", params={"method": method})
+        median[method] = answer.raise_for_status().json()["end_of_life_cycles"]["0.5"]
 assert abs(median["importance"] / median["grid"] - 1.0) < 0.2, median

@@ -174,7 +174,8 @@ def test_wrong_units_and_dead_channels_are_held(name: str) -> None:
     ],
 )
 def test_a_slip_is_seen_in_a_run_that_has_no_place_in_the_course(rig: str, number: int) -> None:
-    assert trials.slipped(7001, rig, number).held
+    (sent,) = trials.slipped(7001, rig, number)
+    assert sent.held
 
 
 def test_what_is_held_does_not_depend_on_the_order_of_arrival() -> None:
